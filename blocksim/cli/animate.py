@@ -8,7 +8,7 @@ import typer
 from blocksim.cli import options
 from blocksim.cli.output import note, replacement
 from blocksim.cli.progress import counting
-from blocksim.simulation.own_files import is_film, refuse_foreign
+from blocksim.simulation.own_files import refuse_foreign
 from blocksim.study.stored_run import stored_run
 from blocksim.view.animation import Look, Pace, draw_animation, writer_of
 from blocksim.view.paint import paint_named
@@ -44,7 +44,7 @@ def animate_command(
         writer_of(out)
     stored = stored_run(run)
     animation = out or Path(f"{stored.scenario.name}.gif")
-    refuse_foreign(animation, is_film, overwrite=overwrite)
+    refuse_foreign(animation, overwrite=overwrite)
     support = support_of(stored.scenario, stored.events)
     older = replacement(animation)
     look = Look(width, trails, stored.scenario.name, forces, paint_named(colour, stored.frames, stored.scenario))

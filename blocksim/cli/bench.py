@@ -16,7 +16,7 @@ from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import one_by_one
 from blocksim.errors import OutputError
 from blocksim.simulation.atomic import write_text
-from blocksim.simulation.own_files import is_bench, refuse_foreign
+from blocksim.simulation.own_files import refuse_foreign
 from blocksim.verification.verify import number
 
 COLUMNS = ("quantity", "unit", "median", "smallest", "largest")
@@ -58,7 +58,7 @@ def bench_command(
         if out.is_dir() or not out.absolute().parent.is_dir():
             message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}"
             raise OutputError(message)
-        refuse_foreign(out, is_bench, overwrite=overwrite)
+        refuse_foreign(out, overwrite=overwrite)
     machine = this_machine()
     tell_compilation("surface", quiet=silent)
     outcomes: list[Outcome] = []

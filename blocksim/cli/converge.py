@@ -18,7 +18,7 @@ from blocksim.errors import ExitCode
 from blocksim.scenario.spelling import listed
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import RESULTS
-from blocksim.simulation.own_files import is_picture, refuse_foreign
+from blocksim.simulation.own_files import refuse_foreign
 from blocksim.study.converge import (
     FEWEST_LEVELS,
     LEVELS,
@@ -94,7 +94,7 @@ def converge_command(
         if picture:
             refuse_small_page(len(refinements_of(ready, chosen)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture
-                refuse_foreign(path, is_picture, overwrite=overwrite)
+                refuse_foreign(path, overwrite=overwrite)
         tell_compilation(kernels_of(ready), quiet=silent)
         result = converge(
             ready,

@@ -9,8 +9,7 @@ from blocksim.cli import options
 from blocksim.cli.output import note, replacement
 from blocksim.errors import OutputExistsError
 from blocksim.simulation import folder as files
-from blocksim.simulation.own_files import is_table, refuse_foreign
-from blocksim.simulation.stores.csv_tables import CONTACT_COLUMNS
+from blocksim.simulation.own_files import refuse_foreign
 from blocksim.simulation.stores.formats import format_named
 from blocksim.study.stored_run import stored_run
 
@@ -44,9 +43,9 @@ def export_command(
     file = out or Path(f"{stored.scenario.name}.{kind}")
     beside = file.with_name(f"{file.stem}_contacts{file.suffix}")
     _refuse_own_files(file, stored.folder)
-    refuse_foreign(file, form.is_own, overwrite=overwrite)
+    refuse_foreign(file, overwrite=overwrite)
     if form.write_contacts is not None and stored.frames.contacts is not None:
-        refuse_foreign(beside, is_table(*CONTACT_COLUMNS), overwrite=overwrite)
+        refuse_foreign(beside, overwrite=overwrite)
     told = [f"file: {file} ({replacement(file)}{form.write(file, stored.frames, stored.scenario)} {form.counted})"]
     if form.write_contacts is not None and stored.frames.contacts is not None:
         older = replacement(beside)

@@ -9,7 +9,7 @@ import typer
 
 from blocksim.cli import completion, options
 from blocksim.cli.output import note
-from blocksim.simulation.own_files import is_picture, refuse_foreign
+from blocksim.simulation.own_files import refuse_foreign
 from blocksim.study.pictures import draw
 from blocksim.study.run_pictures import RunLook
 
@@ -94,7 +94,7 @@ def plot_command(
     chosen = options.names_of("--panels", panels), options.names_of("--block", blocks)
     asked = RunLook(_moments(times), frames, *chosen, relative, colour, forces, options.names_of("--probe", probes))
     paper = options.paper_of(size, dots)
-    ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
+    ready = partial(refuse_foreign, overwrite=overwrite)
     picture, remark = draw(run, out, asked, experiment, kind, paper, ready=ready)
     if remark:
         note(remark)

@@ -8,7 +8,7 @@ import typer
 from blocksim.cli import options
 from blocksim.cli.output import note
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.own_files import is_report, refuse_foreign
+from blocksim.simulation.own_files import refuse_foreign
 from blocksim.study.reporting import MEMBERS, report_on
 
 MEGABYTE = 1e6
@@ -40,7 +40,7 @@ def report_command(
 
     Example: blocksim report scenarios/three_blocks.toml --out three_blocks.html
     """
-    refuse_foreign(out, is_report, overwrite=overwrite)
+    refuse_foreign(out, overwrite=overwrite)
     size, problems = report_on(places, out, experiment, members, (lambda _: None) if quiet else note)
     if not quiet:
         note(f"report: {out} ({size / MEGABYTE:.1f} MB)")

@@ -24,12 +24,12 @@ from blocksim.simulation.result_files import (
     FRAMES,
     MOTION,
     OURS,
-    RUN_KINDS,
     SCENARIO,
     SOILS,
     SUMMARY,
     is_leftover,
-    is_written,
+    is_of_run,
+    is_resolved,
 )
 
 RESULTS = Path("results")
@@ -125,7 +125,8 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
                 "--overwrite replaces it, --out DIR writes elsewhere"
             )
             raise OutputExistsError(message)
-        for name in sorted(present, key=DONE.__ne__):  # the mark of a finished run goes first
+        # the mark of a finished run goes first, and last what shows that this is the folder of a run
+        for name in sorted(present, key=lambda name: (name != DONE, name == SCENARIO)):
             (folder / name).unlink(missing_ok=True)
     except OSError as error:
         message = f"{folder}: cannot be created: {error.strerror}"
@@ -223,10 +224,10 @@ def remove_run(folder: Path) -> None:
     """Remove a folder with the run in it; a link, or a folder that holds anything else, stays. Raises OSError."""
     if folder.is_symlink() or not folder.is_dir():
         return
-    present = list(folder.iterdir())
-    if all(is_written(path, RUN_KINDS) for path in present):
-        for path in present:
-            path.unlink(missing_ok=True)
+    present = {path.name for path in folder.iterdir()}
+    if not _foreign(folder, present):
+        for name in sorted(present, key=SCENARIO.__eq__):
+            (folder / name).unlink(missing_ok=True)
         folder.rmdir()
 
 
@@ -238,12 +239,22 @@ def _refuse_finished(folder: Path) -> None:
 
 def _refuse_foreign(folder: Path, present: set[str]) -> None:
     """Raise OutputExistsError unless everything here was written by a run."""
-    foreign = sorted(name for name in present if not is_written(folder / name, RUN_KINDS))
-    if foreign:
+    if foreign := _foreign(folder, present):
         raise OutputExistsError(
             f"{folder}: holds files that are not a blocksim run ({foreign[0]}); "
             "move them away, or choose another folder with --out"
         )
+
+
+def _foreign(folder: Path, present: set[str]) -> list[str]:
+    """Return the names of files that no run has written; all, where there is no scenario that a run has resolved."""
+    is_resolved_here = is_resolved(folder / SCENARIO)
+    if SCENARIO in present and not is_resolved_here:
+        return [SCENARIO]
+    foreign = sorted(name for name in present if not is_of_run(folder / name))
+    if foreign or is_resolved_here:
+        return foreign
+    return sorted(name for name in present if not is_leftover(name, OURS))
 
 
 def newest_finished(folder: Path) -> Path | None:

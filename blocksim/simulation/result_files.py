@@ -1,11 +1,8 @@
 """The files of a result folder: their names, which of them blocksim wrote, and copies of the tables of a scenario.
 
-Files are known by name and content together, never by the name alone, as a folder may hold files that a person put
-beside the results, or in their place. Only what is recognised here may be removed or replaced without being named on
-the command line. A run of any version is known by the keys of its run.json, which lists its files with their checksums.
-Where a file is not listed (a run that was killed, a folder of version 0.1) or not as it was, the head of it decides, as
-what comes after may be damaged; wordings of versions differ, so no sentence counts, but the mark that all of them bear.
-An empty file of one of the names, or one of zeros, as a power failure leaves them, holds nothing that could be lost.
+A folder is one of a run if its resolved scenario bears blocksim's mark and it holds nothing but files that a run names;
+`--overwrite` replaces these. The resolved scenario is written first and removed last, so no other file of a run is ever
+alone. A scenario or a table that a person has put in the place of one is never touched.
 
 Copies of the files that a scenario names are kept beside its resolved form, so that the folder can move.
 """
@@ -26,7 +23,6 @@ from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.probes import probe_names
 from blocksim.scenario.resolved import MARK
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
-from blocksim.simulation.table import COLUMNS
 
 SCENARIO = "scenario.toml"  # resolved; written first
 EXPERIMENT = "experiment.csv"  # copy of the table that the scenario names
@@ -36,7 +32,7 @@ FINAL = "final.csv"
 SOILS = "soils.csv"  # where soils ended, in scenarios that have any
 FRAMES = "run.h5"
 PROBE = "probe-"  # and its name: CSV of a probe
-PROBE_LEFTOVER = re.compile(r"\.probe-[A-Za-z0-9._-]+\.csv\.[a-z0-9_]{8}(?:\.csv)?")  # killed while it was written
+PROBE_TABLE = re.compile(r"probe-[A-Za-z0-9._-]+\.csv|\.probe-[A-Za-z0-9._-]+\.csv\.[a-z0-9_]{8}(?:\.csv)?")
 SUMMARY = "run.json"
 DONE = "done.json"  # written last: a folder without it is not finished
 CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
@@ -45,16 +41,8 @@ HEAD_BYTES = 4096
 LONGEST_HEADER = 100_000  # bytes
 MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = MEGABYTE  # of a table of an experiment, which is not read if larger
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-FRAME_MARKS = (b"h5md", b"n_committed")  # names in the root group, which libver latest keeps at the start of the file
 RESOLVED = MARK.encode()
-CHECKPOINT = b'{"format":"blocksim checkpoint '
 Kind = Callable[[bytes], bool]  # whether the first HEAD_BYTES of a file are of a kind
-
-
-def begins(start: bytes) -> Kind:
-    """Return the kind of content that begins with these bytes."""
-    return lambda head: head.startswith(start)
 
 
 def grows_from(start: bytes) -> Kind:
@@ -70,12 +58,6 @@ def grows_from(start: bytes) -> Kind:
 def heads(form: bytes) -> Kind:
     """Return the kind of a CSV file whose first line has this form (a regular expression)."""
     return lambda head: re.fullmatch(form, head.split(b"\n", 1)[0].rstrip(b"\r")) is not None
-
-
-def has_header(columns: Iterable[str]) -> Kind:
-    """Return the kind of a CSV file with exactly these columns."""
-    line = ",".join(columns).encode()
-    return lambda head: head.split(b"\n", 1)[0].rstrip(b"\r") == line
 
 
 class TableRecord(BaseModel, frozen=True):
@@ -125,27 +107,12 @@ def _columns(header: str) -> list[str]:
     return next(csv.reader([header]), [])
 
 
-def is_frames(head: bytes) -> bool:
-    """Return True for the head of run.h5, also of one that was killed or cut off."""
-    return head.startswith(SIGNATURE) and all(mark in head for mark in FRAME_MARKS)
-
-
 def has_keys(*names: str) -> Kind:
     """Return the kind of content that is a JSON object with these keys near its start, however it is laid out."""
     keys = [re.compile(rb'"' + name.encode() + rb'"\s*:') for name in names]
     return lambda head: head.lstrip().startswith(b"{") and all(key.search(head) for key in keys)
 
 
-RUN_KINDS: Mapping[str, Kind] = {
-    SCENARIO: begins(RESOLVED),
-    FINAL: has_header(COLUMNS),
-    SOILS: begins(b"soil,left_mm,"),
-    FRAMES: is_frames,
-    SUMMARY: has_keys("name", "status", "scenario_hash"),
-    DONE: begins(b'{"run": "'),
-    **dict.fromkeys(CHECKPOINTS, begins(CHECKPOINT)),
-}
-"""The files of a run but the copies of tables, whose content is a person's: see `copies`."""
 COPIES = (EXPERIMENT, MOTION, *BODY_MOTIONS)
 
 
@@ -154,21 +121,28 @@ def probe_tables(scenario: Scenario) -> list[str]:
     return [f"{PROBE}{name}.csv" for name in probe_names(scenario)]
 
 
-def _is_probe_table(path: Path) -> bool:
-    return path.name.startswith(PROBE) and path.suffix == ".csv" and _is_of_kind(path, begins(b"step,time_s,"))
+def is_of_run(path: Path) -> bool:
+    """Return True for a file that a run has written, or left half written when it was killed, by its name.
+
+    Only in the folder of a run: see `is_resolved`.
+    """
+    name = path.name
+    if not _is_plain_file(path):
+        return False
+    if name in COPIES:
+        return name in copies(path.parent)
+    return name in OURS or PROBE_TABLE.fullmatch(name) is not None or is_leftover(name, OURS)
 
 
-def is_written(path: Path, kinds: Mapping[str, Kind], plan: str = SCENARIO) -> bool:
-    """Return True if blocksim wrote a file: one of these kinds, a copy that the plan beside it names, or a leftover."""
+def is_written(path: Path, kinds: Mapping[str, Kind], plan: str) -> bool:
+    """Return True if a study wrote a file: one of these kinds, a copy that the plan beside it names, or a leftover."""
     if not _is_plain_file(path):
         return False
     if path.name in COPIES:
         return path.name in copies(path.parent, plan)
     if path.name in kinds:
-        return _is_of_kind(path, kinds[path.name]) or _is_listed(path, plan)
-    if FRAMES in kinds and _is_probe_table(path):
-        return True
-    return is_leftover(path.name, (*kinds, *COPIES)) or PROBE_LEFTOVER.fullmatch(path.name) is not None
+        return _is_of_kind(path, kinds[path.name])
+    return is_leftover(path.name, (*kinds, *COPIES))
 
 
 def _is_of_kind(path: Path, kind: Kind) -> bool:
@@ -181,13 +155,9 @@ def _is_of_kind(path: Path, kind: Kind) -> bool:
 
 def is_leftover(name: str, names: Iterable[str]) -> bool:
     """Return True for what is left of one of these files when its writer was killed: `.final.csv.k2j3h4_x.csv`."""
-    return any(_leftover(of).fullmatch(name) for of in names)
-
-
-def _leftover(name: str) -> re.Pattern[str]:
-    """Return how `atomic.replacing` (with the suffix, or without it as in 0.1) and run.h5 name unfinished files."""
-    suffix = re.escape(Path(name).suffix)
-    return re.compile(rf"\.{re.escape(name)}\.(?:new|[a-z0-9_]{{8}}(?:{suffix})?)")
+    return any(
+        re.fullmatch(rf"\.{re.escape(of)}\.(?:new|\w{{8}}(?:{re.escape(Path(of).suffix)})?)", name) for of in names
+    )
 
 
 def origin_of(plan: str) -> str:
@@ -199,21 +169,18 @@ def copies(folder: Path, plan: str = SCENARIO) -> frozenset[str]:
     """Return the names of the copies of tables that belong to a folder.
 
     Those are what run.json (of a sweep sweep.json, and so on) has listed, as long as nobody has changed them; where it
-    lists none (a folder of 0.1, or of a run that was killed), those that the resolved scenario names.
+    lists none (of a run that was killed), those that the resolved scenario names.
     """
-    listed, named = _listed(folder / origin_of(plan)), _named(folder / plan)
-    present = (name for name in COPIES if _is_plain_file(folder / name))
-    return frozenset(name for name in present if _belongs(folder / name, listed.get(name), is_named=name in named))
-
-
-def _is_listed(path: Path, plan: str) -> bool:
-    """Return True for a file that is as the summary beside it says."""
-    digest = _listed(path.parent / origin_of(plan)).get(path.name)
-    return digest is not None and digest == sha256_of(path)
-
-
-def _belongs(path: Path, digest: object, *, is_named: bool) -> bool:
-    return is_named if digest is None else digest == sha256_of(path)
+    if not is_resolved(folder / plan):
+        return frozenset()
+    listed = _listed(folder / origin_of(plan))
+    lines = read_limited(folder / plan, MOST_BYTES).splitlines()
+    present = {name: listed.get(name) for name in COPIES if _is_plain_file(folder / name)}
+    return frozenset(
+        name
+        for name, digest in present.items()
+        if (f'table = "{name}"'.encode() in lines if digest is None else digest == sha256_of(folder / name))
+    )
 
 
 def _listed(path: Path) -> dict[str, object]:
@@ -224,14 +191,6 @@ def _listed(path: Path) -> dict[str, object]:
         return {}
 
 
-def _named(plan: Path) -> frozenset[str]:
-    """Return the copies that a resolved scenario names; none for a file that a person wrote."""
-    if not is_resolved(plan):
-        return frozenset()
-    lines = read_limited(plan, MOST_BYTES).splitlines(keepends=True)
-    return frozenset(name for name in COPIES if f'table = "{name}"\n'.encode() in lines)
-
-
 def is_resolved(plan: Path) -> bool:
     """Return True for a scenario (or the plan of a sweep) that blocksim wrote, False for that of a person."""
     try:
@@ -239,7 +198,7 @@ def is_resolved(plan: Path) -> bool:
     except BlocksimError:
         return False
     is_marked = any(line.startswith(RESOLVED) for line in lines[:2])  # a sweep has a line of its own before
-    return not lines or is_marked or _is_listed(plan, plan.name)
+    return is_marked or not b"".join(lines).strip(b"\0")  # zeros or nothing are what a power failure leaves
 
 
 def _is_plain_file(path: Path) -> bool:

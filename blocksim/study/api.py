@@ -12,7 +12,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import Source, document_of
 from blocksim.silence import silent
 from blocksim.simulation import Result
-from blocksim.simulation.own_files import is_film, is_picture, is_report, refuse_foreign
+from blocksim.simulation.own_files import refuse_foreign
 from blocksim.study import calibrate as calibration
 from blocksim.study import sensitivity as analysis
 from blocksim.study.calibrate_plan import read_plan
@@ -61,7 +61,7 @@ def plot(  # noqa: PLR0913 - one argument for each option of the command
     others unless `overwrite`, OutputError.
     """
     table = None if experiment is None else Path(experiment)
-    ready = partial(refuse_foreign, is_own=is_picture, overwrite=overwrite)
+    ready = partial(refuse_foreign, overwrite=overwrite)
     paper = Paper(None if size is None else (size[0] / MILLIMETRES_PER_INCH, size[1] / MILLIMETRES_PER_INCH), dpi)
     look = RunLook(_tuple(times), frames, _tuple(panels), _tuple(blocks), relative, colour, forces)
     return draw(_folder(place), None if out is None else Path(out), look, table, kind, paper, ready=ready)[0]
@@ -86,7 +86,7 @@ def animate(
     """
     stored = stored_run(_folder(place))
     path = Path(f"{stored.scenario.name}.gif" if out is None else out)
-    refuse_foreign(path, is_film, overwrite=overwrite)
+    refuse_foreign(path, overwrite=overwrite)
     look = Look(width, trails, stored.scenario.name, forces, paint_named(colour, stored.frames, stored.scenario))
     draw_animation(stored.frames, path, Pace(speed, fps), look, support_of(stored.scenario, stored.events))
     return path
@@ -100,7 +100,7 @@ def report(
     Raises as `plot` does, and InvalidInputError, after writing, for what is damaged in them.
     """
     path = Path(out)
-    refuse_foreign(path, is_report, overwrite=overwrite)
+    refuse_foreign(path, overwrite=overwrite)
     table = None if experiment is None else Path(experiment)
     _, problems = report_on([_folder(place) for place in places], path, table)
     if problems:

@@ -18,8 +18,6 @@ from blocksim.world.systems.blocks import BLOCKS
 from blocksim.world.systems.system import Floats, System, Track
 
 FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
-FIRST_COLUMNS = FRAME_COLUMNS[:8]
-"""Those of the first version, by which exports are recognised."""
 CONTACT_NUMBERS = sorted(UNITS, key=lambda name: "m1N".index(UNITS[name]))  # lengths, directions, forces
 CONTACT_COLUMNS = ("time_s", *BODIES, *(f"{name}{WRITTEN[UNITS[name]][0]}" for name in CONTACT_NUMBERS))
 NOBODY = ""

@@ -8,29 +8,25 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.own_files import IsOwn, is_dxf, is_geojson, is_table_from, is_vtkhdf
-from blocksim.simulation.stores.csv_tables import FIRST_COLUMNS, write_contacts_csv, write_frames_csv
+from blocksim.simulation.stores.csv_tables import write_contacts_csv, write_frames_csv
 from blocksim.simulation.stores.drawn import write_dxf, write_geojson
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 
 
 class Format(NamedTuple):
-    """How a format is written and recognised; both writers return the number of frames, blocks or contacts in it."""
+    """How a format is written; both writers return the number of frames, blocks or contacts in it."""
 
     write: Callable[[Path, Frames, Scenario], int]
-    is_own: IsOwn
     write_contacts: Callable[[Path, Frames, Contacts], int] | None = None  # into a file of their own
     counted: str = "frames"
 
 
 # A format is one entry here.
 FORMATS: dict[str, Format] = {
-    "csv": Format(
-        lambda path, frames, _: write_frames_csv(path, frames), is_table_from(*FIRST_COLUMNS), write_contacts_csv
-    ),
-    "vtkhdf": Format(write_vtkhdf, is_vtkhdf),
-    "geojson": Format(write_geojson, is_geojson, counted="blocks"),
-    "dxf": Format(write_dxf, is_dxf, counted="blocks"),
+    "csv": Format(lambda path, frames, _: write_frames_csv(path, frames), write_contacts_csv),
+    "vtkhdf": Format(write_vtkhdf),
+    "geojson": Format(write_geojson, counted="blocks"),
+    "dxf": Format(write_dxf, counted="blocks"),
 }
 
 

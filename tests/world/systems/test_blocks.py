@@ -1,7 +1,6 @@
 """What blocks show in tables, exports and histories follows from what frames keep of them."""
 
 import csv
-import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +11,7 @@ import pytest
 import blocksim
 from blocksim.simulation import Result
 from blocksim.simulation.frames import data_set, tidy_table
-from blocksim.simulation.own_files import is_table_from
-from blocksim.simulation.stores.csv_tables import FIRST_COLUMNS, write_frames_csv
+from blocksim.simulation.stores.csv_tables import write_frames_csv
 from blocksim.simulation.stores.vtkhdf import write_vtkhdf
 from blocksim.view.history_panels import MOTIONS, Seen
 from blocksim.view.run_data import Support, drawable_frames
@@ -51,13 +49,6 @@ def test_kinetic_energies_of_blocks_add_up_to_that_of_the_ledger(fallen: Result,
 def test_masses_that_frames_do_not_know_leave_the_cells_empty(fallen: Result) -> None:
     unknown = replace(fallen.frames, mass=None, inertia=None)
     assert tidy_table(unknown)["kinetic_energy_J"].isna().all()
-
-
-@pytest.mark.parametrize(("more", "is_own"), [("", True), (",kinetic_energy_J", True), ("s", False)])
-def test_exports_of_earlier_versions_are_recognised(more: str, is_own: bool) -> None:
-    head = ",".join(FIRST_COLUMNS) + more + "\r\n"
-    assert FIRST_COLUMNS[-1] == "spin_deg_s"
-    assert is_table_from(*FIRST_COLUMNS)(io.BytesIO(head.encode())) is is_own
 
 
 def test_corners_turn_counter_clockwise_with_their_block() -> None:
