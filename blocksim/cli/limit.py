@@ -20,7 +20,7 @@ from blocksim.scenario import Document
 from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
 from blocksim.scenario.plausible import implausible_values
 from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.movement import Manner
+from blocksim.simulation.movement import DISPLACEMENT, FIRST_MOVED, FIRST_MOVER, OUTCOME, PEAK, TURN, Manner
 from blocksim.study.criterion import DEFAULT, Verdict
 from blocksim.study.executors import Execution
 from blocksim.study.limit import OnRun, find_limit
@@ -30,11 +30,10 @@ from blocksim.study.limit_plan import OPTION, SCANNED, TOLERANCE, LimitPlan, rea
 from blocksim.study.limit_result import LimitResult
 from blocksim.study.limit_search import Change, Number
 from blocksim.study.limit_stiff import refuse_without_springs
-from blocksim.study.rows import MOVEMENT, PEAK, Row
+from blocksim.study.rows import Row
 
 SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
 PERCENT = 100.0
-OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN, *_ = MOVEMENT
 UNSETTLED = "does not settle"
 AT_ONCE = (
     "start.settle = false: loads that come at once shift limits of arches and walls by 0.2 to 4 %; leave it out, and "
@@ -248,8 +247,8 @@ def _cells(value: Number, verdict: Verdict, row: Row) -> list[str]:
         return [f"{value:.8g}", verdict.value, str(row["reason"]).splitlines()[0], *("",) * 4]
     if OUTCOME not in row:  # it falls before time zero
         return [f"{value:.8g}", verdict.value, UNSETTLED, *("",) * 4]
-    moved = row.get(MOVED)
-    first = "" if row.get(MOVER) is None else f"block {row[MOVER]}"
+    moved = row.get(FIRST_MOVED)
+    first = "" if row.get(FIRST_MOVER) is None else f"block {row[FIRST_MOVER]}"
     return [
         f"{value:.8g}",
         verdict.value,

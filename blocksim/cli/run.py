@@ -14,7 +14,7 @@ from blocksim.cli.verdicts import comparison_table, verdict_lines
 from blocksim.simulation import Result
 from blocksim.simulation.checkpoint_policy import CHECKPOINT_SECONDS, CheckpointPolicy
 from blocksim.simulation.folder import default_folder
-from blocksim.simulation.movement import Movement
+from blocksim.simulation.movement import FIRST, OUTCOME, Movement
 from blocksim.simulation.outcome import REST
 from blocksim.simulation.running import Listener
 from blocksim.simulation.table import rows_of
@@ -140,18 +140,17 @@ def _ending_lines(result: Result) -> list[str]:
 
 def _moved(found: Movement) -> str:
     """Return what moved, how far on the way and first: blocks may end nearer."""
-    far = f"{number(found.largest_displacement_mm)} mm (block {found.displaced_block})"
-    turned = f"{number(found.largest_rotation_deg)}° (block {found.rotated_block})"
-    first = f"\nfirst to move: block {found.first_mover} at {found.first_moved_s:.3f} s" if found.first_mover else ""
-    return f"{found.outcome}: peak displacement {far}, peak rotation {turned}{first}"
+    told = dict(found.lines(number))
+    outcome, first = told.pop(OUTCOME), told.pop(FIRST, "")
+    return f"{outcome}: {', '.join(map(' '.join, told.items()))}" + (f"\n{FIRST}: {first}" if first else "")
 
 
 def _moving(result: Result) -> str:
-    """Return a line for a run that has ended before its blocks were at rest; nothing for others, and for old ones."""
-    end = None if result.summary.movement is None else result.summary.movement.end_speed
-    if end is None or result.summary.reason == REST.reason or end.speed <= result.scenario.time.rest_speed:
+    """Return a line for a run that has ended before its blocks were at rest; nothing for others."""
+    end = result.summary.movement
+    if end is None or result.summary.reason == REST.reason or end.fastest_m_s <= result.scenario.time.rest_speed:
         return ""
-    return f"\nnot at rest: block {end.block} at {end.speed:.2g} m/s"
+    return f"\nnot at rest: block {end.fastest_block} at {end.fastest_m_s:.2g} m/s"
 
 
 def _tell_end(result: Result) -> None:

@@ -13,9 +13,10 @@ from blocksim.cli.output import GAP, answer, duration, note, show, table_lines, 
 from blocksim.cli.progress import counting
 from blocksim.errors import StoppedEarlyError
 from blocksim.scenario import Document
+from blocksim.simulation.movement import DISPLACEMENT, END_SPEED, FIRST_MOVED, FIRST_MOVER, MOVES_ON, OUTCOME, TURN
 from blocksim.study.executors.ensemble import is_still_running
 from blocksim.study.plan import Estimate, estimate
-from blocksim.study.rows import FINISHED, MOVEMENT, Head, Row
+from blocksim.study.rows import FINISHED, Head, Row
 from blocksim.study.sweep_table import SweepResult
 from blocksim.view.sweeps.data import short_names as names_of_keys
 from blocksim.world.free_memory import readable
@@ -26,9 +27,8 @@ EVERY = 2.0  # s
 MOST_ROWS = 40
 MOST_FAILURES = 5
 MOST_MOVERS = 3
-OUTCOME, MOVER, MOVED, DISPLACEMENT, TURN, END_SPEED, MOVES_ON = MOVEMENT
 NOT_SHOWN = {"case", "reason", "seconds", END_SPEED, MOVES_ON}
-SHOWN_LAST = (DISPLACEMENT, TURN, MOVER, MOVED)
+SHOWN_LAST = (DISPLACEMENT, TURN, FIRST_MOVER, FIRST_MOVED)
 POSITION = ".x_mm"
 NOT_SHOWN_ENDS = ("rotation_deg", "y_mm", "left_mm", "right_mm")
 
@@ -163,7 +163,7 @@ def _texts(result: SweepResult, names: list[str], short: dict[str, str]) -> tupl
 
 def _rank(name: str) -> tuple[bool, bool]:
     """Return a key that sorts columns of single blocks behind others, and last what a note below the table tells."""
-    return name in (MOVER, MOVED), name.endswith(POSITION)
+    return name in (FIRST_MOVER, FIRST_MOVED), name.endswith(POSITION)
 
 
 def _tell_movement(result: SweepResult) -> None:
@@ -177,8 +177,8 @@ def _tell_movement(result: SweepResult) -> None:
     moving = int(table[MOVES_ON].isin([True, "True"]).sum()) if MOVES_ON in table else 0
     if moving:
         note(f"{moving} of {len(table)} cases were still moving at the end; increase time.end to see where they end")
-    if MOVER in table and table[MOVER].notna().any():
-        movers = table[MOVER].value_counts()
+    if FIRST_MOVER in table and table[FIRST_MOVER].notna().any():
+        movers = table[FIRST_MOVER].value_counts()
         first = ", ".join(f"block {name} in {count}" for name, count in movers.head(MOST_MOVERS).items())
         more = f", {len(movers) - MOST_MOVERS} others" if len(movers) > MOST_MOVERS else ""
         note(f"first to move: {first}{more} of {len(table)} cases")

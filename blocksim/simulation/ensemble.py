@@ -7,7 +7,6 @@ with the same bits as from a run of its own.
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +29,14 @@ from blocksim.simulation.ledger import (
 )
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.member_end import Closing, Ended, MemberEnd, MemberFailure, in_play_of
-from blocksim.simulation.movement import FirstMoves
+from blocksim.simulation.movement import Watch
 from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.recorder import POSITION, steps_per_frame
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measured_row, scheme_of
 from blocksim.simulation.settling import begun
 from blocksim.simulation.team import ALONE
 from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
+from blocksim.world.systems.blocks import motion_of
 
 BATCH = 256  # members in memory at the same time
 MOST_BODIES = 16_384  # of all members of a batch
@@ -137,7 +137,6 @@ class Ensemble:
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
         own = zip([scenarios[number] for number in stack.numbers], self.placed, self.time_steps, strict=True)
         self.timelines = [Timeline(one, placed, step) if one.events else None for one, placed, step in own]
-        self.settle = [settles(scenarios[number]) for number in stack.numbers]
         ends = [scenarios[number].time.end for number in stack.numbers]
         self.last_steps = np.array([*map(last_step_of, ends, self.time_steps)], dtype=np.int64)
         self.starts = np.zeros((len(ends), len(self.scheme.measured)))
@@ -146,9 +145,9 @@ class Ensemble:
         self.periods = np.array([*map(steps_per_frame, every, self.time_steps)])
         start = self._positions(self.scenes, slice(None))
         self.supports = [MovingSupport(scenarios[number]) for number in stack.numbers]
-        self.moves = FirstMoves(self.placed, start, self.supports)
+        self.watch = Watch(self.placed, self.supports, start)
         steps, places = np.zeros(len(ends), dtype=np.int64), np.zeros_like(start)
-        reach, thresholds = self.moves.shapes.reach, self.moves.thresholds
+        reach, thresholds = self.watch.shapes.reach, self.watch.thresholds
         # compiled code sees no motion relative to a support that moves
         periods = np.where([support.moves for support in self.supports], 0.0, self.periods)
         peaks = np.zeros(len(ends))
@@ -188,13 +187,13 @@ class Ensemble:
         """Advance a member on a moving support to a step, from frame to frame until something has moved there."""
         stops, is_under_way = np.zeros_like(self.codes), True
         while is_under_way:
-            frame = stop if self.moves.found[m] else min(stop, self._next_frame(m))
+            frame = stop if self.watch.first[m] else min(stop, self._next_frame(m))
             stops[m] = frame
             self._advance_members(np.array([m]), stops, rows, self.codes)
             rows = np.zeros_like(rows)  # what is measured at the start of a later call
             is_under_way = self.codes[m] == REACHED and frame < stop
             if self.codes[m] == REACHED and self._is_frame(m, frame):
-                self.moves.see([m], self._positions(self.scenes, [m]), [frame * self.time_steps[m]])
+                self.watch.see([m], self._motion(self.scenes, [m]), [frame * self.time_steps[m]])
 
     def _next_frame(self, m: int) -> int:
         return next_frame(int(self.scenes.world.clock["steps"][m, 0]), self.periods[m])
@@ -209,9 +208,11 @@ class Ensemble:
         return min(next_energy_check(done, self.bodies), int(self.last_steps[m]))
 
     def _next_stop(self, m: int, done: int) -> int:
-        """Return where a member stops next that is advanced alone; frames count only until something has moved."""
+        """Return where a member stops next that is advanced alone: frames count until something has moved."""
         look = self._next_look(m, done)
-        return look if self.moves.found[m] else min(look, next_frame(done, self.periods[m]))
+        if self.watch.first[m] and not self.supports[m].moves:  # which carries a block until it is removed
+            return look
+        return min(look, next_frame(done, self.periods[m]))
 
     def _is_frame(self, m: int, step: int) -> bool:
         return step > 0 and next_frame(step - 1, self.periods[m]) == step
@@ -221,16 +222,20 @@ class Ensemble:
 
         Those whose list of pairs is full continue alone.
         """
-        self.moves.take(self.watched.steps, self.watched.places, self.time_steps)
-        which = [m for m, code in enumerate(self.codes) if self.moves.found[m] is None and code != PAIRS_FULL]
+        self.watch.take(self.watched.steps, self.watched.places, self.time_steps)
+        which = [m for m, code in enumerate(self.codes) if self.watch.first[m] is None and code != PAIRS_FULL]
         steps = self.scenes.world.clock["steps"][which, 0].tolist()
         times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
-        self.moves.see(which, self._positions(self.scenes, which), times)
+        self.watch.see(which, self._motion(self.scenes, which), times)
 
     def _positions(self, scenes: AnyScene, which: list[int] | slice) -> NDArray[np.float64]:
         """Return x, y (m) and angle (rad) of the blocks of some scenes of a stack, (k, 3, b)."""
         bodies = scenes.world.bodies.view(np.ndarray)  # a record array takes five times as long for a field
         return np.stack([bodies[name][which, : len(self.placed[0])] for name in POSITION], axis=1)
+
+    def _motion(self, scenes: AnyScene, which: list[int]) -> NDArray[np.float64]:
+        """Return the states of the blocks of some scenes of a stack, (k, 6, b)."""
+        return motion_of(scenes.world.bodies[which, : len(self.placed[0])])
 
     def _add_up(self, members: Steps) -> list[bool]:
         """Return for each of some members if its energy adds up."""
@@ -246,29 +251,18 @@ class Ensemble:
     def ends(self) -> list[Ended]:
         """Return where the members ended, in order."""
         self._see_ends()
-        closing = Closing(self.scenes, self.placed, self._measured(np.arange(len(self.codes))))
-        peaks = self._peaks()
+        measured = self._measured(np.arange(len(self.codes)))
+        closing = Closing(self.scenes, self.placed, measured, self.watch, self._peaks()[:, None])
         return [
-            self._from_rest(
-                m,
-                self._run_alone(m, self._start(m))
-                if code == PAIRS_FULL
-                else replace(closing.end(m, self._start(m), code, self.moves.found[m]), peak_deg=float(peaks[m])),
-            )
+            self._run_alone(m, self._start(m)) if code == PAIRS_FULL else closing.end(m, self._start(m), code)
             for m, code in enumerate(self.codes.tolist())
         ]
 
     def _peaks(self) -> NDArray[np.float64]:
-        """Return the largest rotation (degrees) of each member, in frames and at the end."""
-        turns = np.abs(self._positions(self.scenes, slice(None))[:, 2] - self.moves.start[:, 2])
-        at_end = np.where(self.moves.shapes.is_free, turns, 0.0).max(axis=1, initial=0.0)
-        peaks: NDArray[np.float64] = np.degrees(np.fmax(self.watched.peaks, at_end))
-        return peaks
-
-    def _from_rest(self, m: int, end: Ended) -> Ended:
-        """Return the end of a member with the places in which it settled, where it did."""
-        is_settled = self.settle[m] and isinstance(end, MemberEnd)
-        return replace(end, start=self.moves.start[m]) if is_settled else end
+        """Return the largest rotation (rad) of each member, in frames and at the end."""
+        turns = np.abs(self._positions(self.scenes, slice(None))[:, 2] - self.watched.start[:, 2])
+        at_end = np.where(self.watch.shapes.is_free, turns, 0.0).max(axis=1, initial=0.0)
+        return np.asarray(np.fmax(self.watched.peaks, at_end))
 
     def _measured(self, members: Steps) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
@@ -286,8 +280,8 @@ class Ensemble:
             scene, code = self._finish(m, scene, start)
         except BlocksimError as error:
             return MemberFailure(error)
-        closing = Closing(stack_of_one(scene), placed, measured_row(scene)[np.newaxis])
-        return closing.end(0, start, code, self.moves.found[m])
+        closing = Closing(stack_of_one(scene), placed, measured_row(scene)[np.newaxis], self.watch.only(m))
+        return closing.end(0, start, code)
 
     def _finish(self, m: int, scene: AnyScene, start: float) -> tuple[AnyScene, int]:
         """Advance one scene from stop to stop, as `_advance` does; return it and its status code."""
@@ -303,6 +297,6 @@ class Ensemble:
             continues = is_under_way and (now != look or adds_up(energy_ledger(scene, start)))
             if not continues or self._is_frame(m, now):
                 time = now * self.time_steps[m]
-                self.moves.see([m], self._positions(stack_of_one(scene), slice(None)), [time])
+                self.watch.see([m], self._motion(stack_of_one(scene), [0]), [time])
             if not continues:
                 return scene, code

@@ -14,7 +14,7 @@ from blocksim.scenario import PlacedBody
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import EnergyLedger, InPlay, ledger_of
 from blocksim.simulation.loop import outcome_of
-from blocksim.simulation.movement import EndSpeed, FirstMove, end_speeds
+from blocksim.simulation.movement import OBSERVABLES, Value, Watch, observed
 from blocksim.simulation.outcome import Outcome, diagnosed
 from blocksim.simulation.recorder import Rows, frames_from_rows
 from blocksim.simulation.schemes import AnyScene, ledger_names, mass_of_systems
@@ -39,10 +39,7 @@ class MemberEnd:
     placed: Placed = field(repr=False)
     time_step: float  # s
     rows: Rows = field(repr=False)  # one: the last
-    first_move: FirstMove | None = None
-    end_speed: EndSpeed | None = None
-    peak_deg: float | None = None  # largest rotation on the way; None where it was not followed
-    start: NDArray[np.float64] | None = field(default=None, repr=False)  # (3, b) x, y, angle (m, rad) where it settled
+    observed: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
 
     @cached_property
     def frames(self) -> Frames:
@@ -83,8 +80,18 @@ def in_play_of(scenes: AnyScene | Coupled, members: Sequence[int]) -> list[InPla
 class Closing:
     """The last states of a stack of scenes."""
 
-    def __init__(self, scenes: AnyScene, placed: list[Placed], measured: NDArray[np.float64]) -> None:
-        """Take what is measured (m, e + 2) in the scenes as they are now, as the scheme's `measured`."""
+    def __init__(
+        self,
+        scenes: AnyScene,
+        placed: list[Placed],
+        measured: NDArray[np.float64],
+        watch: Watch,
+        turned: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Take what is measured (m, e + 2) in the scenes as they are now, as the scheme's `measured`.
+
+        `watch` has seen them on the way; `turned` (m, 1) is their largest rotation (rad), where it was followed.
+        """
         world, blocks = scenes.world, len(placed[0])
         self.names = ledger_names(scenes)
         self.scenes, self.placed = scenes, placed
@@ -95,13 +102,14 @@ class Closing:
         self.in_play = in_play_of(scenes, range(len(placed)))
         self.columns = final_values(self.motion, _shapes(placed), _outlines(placed)).tolist()
         support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
-        self.end_speeds = end_speeds(placed, self.motion, support, [self._seconds(m) for m in range(len(placed))])
+        ends = watch.ends(self.motion, support, [self._seconds(m) for m in range(len(placed))], turned)
+        self.observed = observed(ends, [one.name for one in OBSERVABLES.values() if one.in_rows])
 
     def _seconds(self, m: int) -> float:
         return float(self.steps[m, 0]) * self.time_steps[m]
 
-    def end(self, m: int, start: float, code: int, first_move: FirstMove | None) -> MemberEnd:
-        """Return the end of one member: energy (J) at the start, status code that it came to, what moved first."""
+    def end(self, m: int, start: float, code: int) -> MemberEnd:
+        """Return the end of one member: energy (J) at the start, status code that it came to."""
         ledger = ledger_of(self.names, self.measured[m], start, self.in_play[m])
         names = [body.name for body in self.placed[m]]
         some = slice(m, m + 1)
@@ -116,8 +124,7 @@ class Closing:
             placed=self.placed[m],
             time_step=self.time_steps[m],
             rows=Rows(self.steps[m], (self.motion[some],), self.measured[some], self.names),
-            first_move=first_move,
-            end_speed=self.end_speeds[m],
+            observed=self.observed[m],
         )
 
 

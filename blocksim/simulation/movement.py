@@ -1,4 +1,7 @@
-"""How far blocks have moved, in what way, and which of them first.
+"""Observables: what a run came to, in numbers and words. A new one is one entry of OBSERVABLES.
+
+run.json, rows and columns of sweeps, criteria such as "moved < 5 mm", what is printed, axes and
+reports read that table. All are computed from the ends of m scenes at once; a single run is a stack of one.
 
 A block has moved where its centre, or a corner by its turn, is more than a hundredth of its shortest side away from
 where it started. It has fallen where it is turned by more than 45 degrees, or its centre is lower by more than half its
@@ -17,17 +20,19 @@ first mover is the block that has moved in the first frame in which any has (the
 ensembles keep no frames, but are looked at when those would be recorded, until one block has moved.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.moving_support import AT_REST, MovingSupport
-from blocksim.simulation.table import MILLI, Columns
+from blocksim.simulation.table import MILLI
 
 ROUND_OFF = 1e-9  # between two ways to compute a distance
 MOVED_SHARE = 0.01  # of the shortest side
@@ -35,8 +40,8 @@ FURTHER = 0.1  # of the simulated time
 FALLEN_TURN = np.radians(45.0)
 FALLEN_SHARE = 0.5  # of the shortest side, downwards
 Floats = NDArray[np.float64]
-Way = tuple[float, float]  # m, along x and y
-RESTED: Way = (0.0, 0.0)
+Flags = NDArray[np.bool_]
+Value = str | float | bool | None
 
 
 class Manner(StrEnum):
@@ -56,224 +61,325 @@ class FirstMove(NamedTuple):
     time: float
 
 
-class EndSpeed(NamedTuple):
-    """The fastest block at the end, its speed (m/s), whether any block moves on, and whether any turns on."""
-
-    block: str
-    speed: float
-    moves_on: bool
-    turns_on: bool = False
-
-
-class Movement(BaseModel, frozen=True):
-    """The entries of run.json about movement, in frames and at the end; blocks by name."""
-
-    outcome: Manner
-    largest_displacement_mm: float  # of the centre of a block that can move, from its start, relative to the support
-    displaced_block: str
-    largest_rotation_deg: float
-    rotated_block: str
-    first_mover: str | None = None
-    first_moved_s: float | None = None  # time of the first frame in which it had moved
-    fastest_block: str | None = None  # at the end; None in runs of earlier versions
-    fastest_m_s: float | None = None  # its speed relative to the support, or that of its corners by its spin
-    moves_on: bool | None = None
-    turns_on: bool | None = None
-
-    @property
-    def first_move(self) -> FirstMove | None:
-        """Both entries together."""
-        if self.first_mover is None or self.first_moved_s is None:
-            return None
-        return FirstMove(self.first_mover, self.first_moved_s)
-
-    @property
-    def end_speed(self) -> EndSpeed | None:
-        """The three entries about the end together."""
-        if self.fastest_block is None or self.fastest_m_s is None or self.moves_on is None:
-            return None
-        return EndSpeed(self.fastest_block, self.fastest_m_s, self.moves_on, bool(self.turns_on))
-
-
-class _Shapes(NamedTuple):
-    """Lengths of b blocks (m), and which can move; of m scenes (m, b)."""
+class Shapes(NamedTuple):
+    """Lengths of the blocks (m) of m scenes, and which of them can move: (m, b) each."""
 
     shortest: Floats
     reach: Floats  # half a diagonal
-    is_free: NDArray[np.bool_]
+    is_free: Flags
 
-    def split(self, count: int) -> "_Shapes":
-        """Return those of so many scenes, which are here one after the other."""
-        shape = (count, -1)
-        return _Shapes(self.shortest.reshape(shape), self.reach.reshape(shape), self.is_free.reshape(shape))
+    @classmethod
+    def of(cls, placed: Sequence[Sequence[PlacedBody]]) -> "Shapes":
+        """Return those of scenes with the same number of blocks."""
+        bodies = [body for scene in placed for body in scene]
+        sides = np.array([(body.size_x, body.size_y) for body in bodies], dtype=np.float64).reshape(-1, 2)
+        is_free = np.array([not body.fixed or body.freed for body in bodies], dtype=np.bool_)
+        shortest, reach = sides.min(axis=1), 0.5 * np.hypot(*sides.T)
+        for number, body in enumerate(bodies):
+            if body.outline:
+                shortest[number], reach[number] = body.least_width, body.radius
+        count = len(placed)
+        return cls(shortest.reshape(count, -1), reach.reshape(count, -1), is_free.reshape(count, -1))
 
-    def chosen(self, scenes: list[int]) -> "_Shapes":
+    def chosen(self, scenes: list[int]) -> "Shapes":
         """Return those of some scenes."""
-        return _Shapes(self.shortest[scenes], self.reach[scenes], self.is_free[scenes])
+        return Shapes(self.shortest[scenes], self.reach[scenes], self.is_free[scenes])
+
+    def shares(self, way: Floats, turn: Floats) -> Floats:
+        """Return how far blocks are from their start (m, rad), in units of the threshold: above 1 is moved."""
+        shares = np.fmax(way, turn * self.reach) / (MOVED_SHARE * self.shortest)
+        shares[np.isnan(shares)] = np.inf
+        return np.where(self.is_free, shares, 0.0)
 
 
-def _shapes_of(placed: Sequence[PlacedBody]) -> _Shapes:
-    sides = np.array([(body.size_x, body.size_y) for body in placed], dtype=np.float64).reshape(-1, 2)
-    is_free = np.array([not body.fixed or body.freed for body in placed], dtype=np.bool_)
-    shortest, reach = sides.min(axis=1), 0.5 * np.hypot(*sides.T)
-    for number, body in enumerate(placed):
-        if body.outline:
-            shortest[number], reach[number] = body.least_width, body.radius
-    return _Shapes(shortest, reach, is_free)
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """How m scenes with b blocks each began and ended, and what was seen on the way; SI."""
+
+    placed: Sequence[Sequence[PlacedBody]]
+    shapes: Shapes
+    start: Floats  # (m, 3, b) x, y, angle
+    motion: Floats  # (m, 6, b) x, y, angle and their rates
+    carried: Floats  # (m, 2, b) way of the support, as long as a block was there
+    support: Floats  # (m, 2) velocity of ground and walls
+    seconds: Floats  # (m,) simulated
+    first: Sequence[FirstMove | None]
+    turned: Floats | None = None  # (m, b) or (m, 1) largest rotation on the way; None where it was not followed
+    moved: Floats | None = None  # (m, b) largest displacement on the way; None where it was not followed
+
+    @cached_property
+    def shift(self) -> Floats:
+        """Way of the centres, (m, 2, b), by the final table, which is in mm."""
+        return np.asarray(MILLI * self.motion[:, :2] / MILLI - self.start[:, :2] - self.carried)
+
+    @cached_property
+    def way(self) -> Floats:
+        """Displacement of the centres from start to end, (m, b)."""
+        return np.asarray(np.hypot(self.shift[:, 0], self.shift[:, 1]))
+
+    @cached_property
+    def turn_deg(self) -> Floats:
+        """Rotation from start to end in degrees, (m, b), by the final table, which counts from the angles as drawn."""
+        drawn = np.array([[body.angle for body in scene] for scene in self.placed], dtype=np.float64)
+        return np.asarray(np.abs(np.degrees(self.motion[:, 2] - drawn) - np.degrees(self.start[:, 2] - drawn)))
+
+    @cached_property
+    def turning(self) -> Floats:
+        """Speed of the corners of free blocks by their spin, (m, b)."""
+        return np.where(self.shapes.is_free, np.abs(self.motion[:, 5]) * self.shapes.reach, 0.0)
+
+    @cached_property
+    def speed(self) -> Floats:
+        """Speed of free blocks relative to the support, or that of their corners by their spin, (m, b)."""
+        velocity = np.hypot(self.motion[:, 3] - self.support[:, :1], self.motion[:, 4] - self.support[:, 1:])
+        return np.where(self.shapes.is_free, np.fmax(velocity, self.turning), 0.0)
+
+    def go_on(self, speed: Floats) -> list[bool]:
+        """Return which scenes have a block that would soon have left its place, at speeds (m, b)."""
+        soon = FURTHER * self.seconds[:, None] * speed
+        return [bool(one) for one in np.any(soon > MOVED_SHARE * self.shapes.shortest, axis=1)]
+
+    def largest(self, values: Floats) -> Floats:
+        """Return the largest value (m, b) of a block that can move, (m,)."""
+        return np.asarray((values * self.shapes.is_free).max(axis=1))
+
+    def names(self, values: Floats) -> list[str]:
+        """Return the block with the largest of the values (m, b), of each scene."""
+        which = np.argmax(np.where(np.isnan(values), -1.0, values), axis=1).tolist()
+        return [scene[block].name for scene, block in zip(self.placed, which, strict=True)]
 
 
-def _shares(shapes: _Shapes, way: Floats, turn: Floats) -> Floats:
-    """Return how far blocks, (b,) or (m, b), are from their start, in units of the threshold: above 1 is moved."""
-    shares = np.fmax(way, turn * shapes.reach) / (MOVED_SHARE * shapes.shortest)
-    shares[np.isnan(shares)] = np.inf
-    return np.where(shapes.is_free, shares, 0.0)
+def _outcomes(ends: Ends) -> list[Manner]:
+    turn, shapes = np.radians(ends.turn_deg), ends.shapes
+    is_down = (turn > FALLEN_TURN) | (-ends.shift[:, 1] > FALLEN_SHARE * shapes.shortest)
+    fell = np.any(shapes.is_free & is_down, axis=1)
+    moved = np.any(shapes.shares(ends.way, turn) > 1.0, axis=1)
+    found = []
+    for m, (first, turns_on) in enumerate(zip(ends.first, ends.go_on(ends.turning), strict=True)):
+        if fell[m]:
+            found.append(Manner.FELL)
+        elif moved[m]:
+            found.append(Manner.ROCKING if turns_on else Manner.SLID)
+        else:
+            found.append(Manner.STANDS if first is None else Manner.ROCKED)
+    return found
 
 
-def _manner(shapes: _Shapes, way: Floats, drop: Floats, turn: Floats) -> Manner:
-    fallen = shapes.is_free & ((turn > FALLEN_TURN) | (drop > FALLEN_SHARE * shapes.shortest))
-    if fallen.any():
-        return Manner.FELL
-    return Manner.SLID if (_shares(shapes, way, turn) > 1.0).any() else Manner.STANDS
+def _fastest(ends: Ends) -> Floats:
+    which = np.argmax(np.where(np.isnan(ends.speed), -1.0, ends.speed), axis=1)
+    return np.take_along_axis(ends.speed, which[:, None], axis=1)[:, 0]
 
 
-def end_speeds(
-    placed: Sequence[Sequence[PlacedBody]], motion: Floats, support: Floats, seconds: Sequence[float]
-) -> list[EndSpeed]:
-    """Return which blocks are fastest at the ends of m scenes with b blocks each.
+@dataclass(frozen=True)
+class Observable:
+    """One thing that is known of the end of a run.
 
-    `motion` is (m, 6, b) as MOTION, `support` (m, 2) the velocities of ground and walls (m/s), `seconds` how long each
-    was simulated.
+    `name` is that of its entry in run.json and of its column in sweep.csv; `of` gives a value (or None) for each of m
+    scenes, or None for all where it was not followed. One with a `title` is told by the command line and by reports;
+    `block` is the observable that names the block it is of. `word` stands for it in criteria; `choices` are the values
+    of one that is no number.
     """
-    shapes = _shapes_of([body for bodies in placed for body in bodies]).split(len(placed))
-    velocity = np.hypot(motion[:, 3] - support[:, :1], motion[:, 4] - support[:, 1:])
-    turning = np.where(shapes.is_free, np.abs(motion[:, 5]) * shapes.reach, 0.0)
-    speed = np.where(shapes.is_free, np.fmax(velocity, turning), 0.0)
-    later, threshold = FURTHER * np.asarray(seconds)[:, None], MOVED_SHARE * shapes.shortest
-    moves_on = np.any(later * speed > threshold, axis=1).tolist()
-    turns_on = np.any(later * turning > threshold, axis=1).tolist()
-    fastest = np.nanargmax(np.where(np.isnan(speed), -1.0, speed), axis=1).tolist()
-    return [
-        EndSpeed(bodies[block].name, float(speed[m, block]), moves_on[m], turns_on[m])
-        for m, (bodies, block) in enumerate(zip(placed, fastest, strict=True))
-    ]
+
+    name: str
+    of: Callable[[Ends], "Sequence[Value] | Floats | None"]
+    unit: str = ""
+    title: str = ""
+    block: str = ""
+    word: str = ""
+    choices: tuple[str, ...] = ()
+    in_runs: bool = True  # in run.json
+    in_rows: bool = True  # in rows of sweeps and of other studies
+    in_tables: bool = True  # as a column of sweep.csv
+
+    @property
+    def label(self) -> str:
+        """The name along an axis, with its unit."""
+        return f"{self.title or self.name}{f' ({self.unit})' if self.unit else ''}"
+
+    def text(self, value: float, number: Callable[[float], str]) -> str:
+        """Return a value with its unit, for people."""
+        unit = {"deg": "°", "": ""}.get(self.unit, f" {self.unit}")
+        return f"{number(value)}{unit}"
 
 
-def from_start_to_end(
-    placed: Sequence[PlacedBody],
-    final: Columns,
-    first: FirstMove | None,
-    carried: Way = RESTED,
-    start: Floats | None = None,
-    *,
-    turns_on: bool = False,
-) -> tuple[Manner, float, float]:
-    """Return manner, largest displacement of a centre (mm) and largest rotation (degrees), of a final table.
+OUTCOME, FIRST_MOVER, FIRST_MOVED, MOVES_ON = "outcome", "first_mover", "first_moved_s", "moves_on"
+DISPLACEMENT, TURN, END_SPEED, PEAK = "displacement_mm", "turn_deg", "end_speed_mm_s", "peak_deg"
+LARGEST_TURN = "largest_rotation_deg"
+FIRST = "first to move"
+_ALL = (
+    Observable(OUTCOME, _outcomes, word="outcome", choices=tuple(Manner)),
+    Observable(
+        "largest_displacement_mm",  # of the centre of a block, in any frame
+        lambda ends: None if ends.moved is None else MILLI * ends.largest(ends.moved),
+        "mm",
+        "peak displacement",
+        "displaced_block",
+        in_rows=False,
+    ),
+    Observable(
+        "displaced_block",
+        lambda ends: None if ends.moved is None else ends.names(ends.moved * ends.shapes.is_free),
+        in_rows=False,
+    ),
+    Observable(
+        LARGEST_TURN,  # in any frame
+        lambda ends: None if ends.turned is None else np.degrees(ends.largest(ends.turned)),
+        "deg",
+        "peak rotation",
+        "rotated_block",
+        in_rows=False,
+    ),
+    Observable(
+        "rotated_block",
+        lambda ends: None if ends.turned is None else ends.names(ends.turned * ends.shapes.is_free),
+        in_rows=False,
+    ),
+    Observable(FIRST_MOVER, lambda ends: [None if one is None else one.block for one in ends.first]),
+    Observable(FIRST_MOVED, lambda ends: [None if one is None else one.time for one in ends.first], "s"),
+    Observable(DISPLACEMENT, lambda ends: MILLI * ends.largest(ends.way), "mm", word="moved"),  # from start to end
+    Observable(TURN, lambda ends: ends.largest(ends.turn_deg), "deg", word="turned"),  # from start to end
+    Observable("fastest_block", lambda ends: ends.names(ends.speed), in_rows=False),
+    Observable("fastest_m_s", _fastest, "m/s", in_rows=False),
+    Observable(END_SPEED, lambda ends: MILLI * _fastest(ends), "mm/s"),
+    Observable(MOVES_ON, lambda ends: ends.go_on(ends.speed)),
+    Observable("turns_on", lambda ends: ends.go_on(ends.turning), in_rows=False),
+    Observable(
+        PEAK,  # as largest_rotation_deg
+        lambda ends: None if ends.turned is None else np.degrees(ends.largest(ends.turned)),
+        "deg",
+        in_runs=False,
+        in_tables=False,
+    ),
+)
+OBSERVABLES: dict[str, Observable] = {one.name: one for one in _ALL}
+"""All observables by name, in the order in which they are written."""
 
-    `first` is the first move on the way, if there was any: it distinguishes what rocked back from what stands.
-    `carried` is the way (m) of the support; of blocks that were removed on the way it is not known, and taken as none.
-    `start` is where blocks have settled before time zero, (3, b) as x, y (m), angle (rad); without it they began as
-    placed. `turns_on` says whether some block turns on at the end.
+
+def table_columns() -> list[str]:
+    """Return the names of those that are columns of sweep.csv."""
+    return [one.name for one in OBSERVABLES.values() if one.in_rows and one.in_tables]
+
+
+def observed(ends: Ends, names: Sequence[str]) -> list[dict[str, Value]]:
+    """Return some observables of every scene, by name; none where there are no blocks."""
+    if not ends.motion.shape[2]:
+        return [{} for _ in ends.placed]
+    known = {name: values for name in names if (values := OBSERVABLES[name].of(ends)) is not None}
+    columns = [values.tolist() if isinstance(values, np.ndarray) else values for values in known.values()]
+    return [dict(zip(known, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+class Watch:
+    """Follows m scenes with the same number b of blocks, in frames; a run is one of them.
+
+    It examines nothing but the frames, and is the same wherever a run was resumed.
     """
-    shapes = _shapes_of(placed)
-    is_there = ~np.isnan(np.array(final["vx_mm_s"], dtype=np.float64))
-    drawn = np.array([(body.x, body.y, body.angle) for body in placed], dtype=np.float64).reshape(-1, 3).T
-    x, y, angle = drawn if start is None else start
-    dx = np.array(final["x_mm"]) / MILLI - x - carried[0] * is_there
-    dy = np.array(final["y_mm"]) / MILLI - y - carried[1] * is_there
-    turn = np.abs(np.array(final["rotation_deg"]) - np.degrees(angle - drawn[2]))
-    way = np.hypot(dx, dy)
-    manner = _with_way_there(_manner(shapes, way, -dy, np.radians(turn)), first, turns_on=turns_on)
-    return manner, float(MILLI * (way * shapes.is_free).max()), float((turn * shapes.is_free).max())
-
-
-def _with_way_there(manner: Manner, first: FirstMove | None, *, turns_on: bool) -> Manner:
-    """Return the manner of an end, given what moved before it, and whether some block turns on."""
-    if manner is Manner.SLID and turns_on:
-        return Manner.ROCKING
-    return Manner.ROCKED if manner is Manner.STANDS and first is not None else manner
-
-
-class FirstMoves:
-    """The first moves in m scenes with the same number b of blocks, advanced together."""
 
     def __init__(
-        self, placed: Sequence[Sequence[PlacedBody]], start: Floats, supports: Sequence[MovingSupport] = ()
+        self,
+        placed: Sequence[Sequence[PlacedBody]],
+        supports: Sequence[MovingSupport] = (),
+        start: Floats | None = None,
     ) -> None:
-        """Take the blocks of every scene, where they begin, (m, 3, b): x, y (m), angle (rad), and their supports."""
+        """Take blocks and supports, and where the blocks begin, (m, 3, b) in m and rad: by default as first seen."""
+        count, blocks = len(placed), len(placed[0])
         self.placed, self.start = placed, start
-        self.supports = supports or [AT_REST] * len(placed)
-        self.shapes = _shapes_of([body for bodies in placed for body in bodies]).split(len(placed))
-        self.found: list[FirstMove | None] = [None] * len(placed)
+        self.supports = supports or [AT_REST] * count
+        self.shapes = Shapes.of(placed)
+        self.first: list[FirstMove | None] = [None] * count
+        self.carried = np.zeros((count, 2, blocks))  # m: way of the support, as long as a block was there
+        self.moved, self.turned = np.zeros((count, blocks)), np.zeros((count, blocks))  # largest seen so far: m, rad
+
+    def only(self, m: int) -> "Watch":
+        """Return what is known of one scene."""
+        one = Watch(self.placed[m : m + 1], self.supports[m : m + 1])
+        one.start = None if self.start is None else self.start[m : m + 1]
+        one.first, one.carried = self.first[m : m + 1], self.carried[m : m + 1]
+        return one
 
     @property
     def thresholds(self) -> Floats:
         """Distance (m) of every block, (m, b), beyond which it has moved; infinite for fixed ones."""
         return np.where(self.shapes.is_free, MOVED_SHARE * self.shapes.shortest, np.inf)
 
-    def take(self, steps: NDArray[np.int64], places: Floats, time_steps: Sequence[float]) -> None:
-        """Take what compiled code has found: steps (m,), zero for none, places then (m, 3, b); steps in s."""
-        which = np.flatnonzero(steps).tolist()
-        times = [int(steps[m]) * time_steps[m] for m in which]
-        self.see(which, places[which], times, threshold=1.0 - ROUND_OFF)
-
-    def see(self, scenes: list[int], position: Floats, times: list[float], *, threshold: float = 1.0) -> None:
-        """Examine some scenes, at positions (k, 3, b) and times (s); those that have moved before stay as they are."""
-        carried = np.array([self.supports[m].way(time) for m, time in zip(scenes, times, strict=True)]).reshape(-1, 2)
-        dx, dy, angle = (position - self.start[scenes]).swapaxes(0, 1)
-        dx, dy = dx - carried[:, :1], dy - carried[:, 1:]
-        shares = _shares(self.shapes.chosen(scenes), np.hypot(dx, dy), np.abs(angle))
-        for m, block, share, time in zip(scenes, shares.argmax(axis=1), shares.max(axis=1), times, strict=True):
-            if share > threshold and self.found[m] is None:
-                self.found[m] = FirstMove(self.placed[m][block].name, time)
-
-
-class Watch:
-    """Follows the frames of a run; it examines nothing else, and is the same wherever a run was resumed."""
-
-    def __init__(self, placed: Sequence[PlacedBody], support: MovingSupport = AT_REST) -> None:
-        """Take the blocks and their support; the first frame that is seen says where they begin."""
-        self.placed, self.shapes, self.support = placed, _shapes_of(placed), support
-        self.carried = np.zeros((2, len(placed)))  # m: way of the support, as long as a block was there
-        self.start: Floats | None = None
-        self.way, self.turn = np.zeros(len(placed)), np.zeros(len(placed))  # largest so far: m, rad
-        self.first: FirstMove | None = None
-        self.manner = Manner.STANDS  # in the last frame
-        self.last: tuple[Floats, float] | None = None  # motion and time of it
-
-    def see(self, motion: Floats, time: float) -> None:
-        """Look at a frame: (6, b) as MOTION, at a time (s)."""
-        self.last = motion, time
+    def see(self, scenes: list[int], motion: Floats, times: Sequence[float]) -> None:
+        """Examine some scenes: (k, 6, b) x, y, angle and their rates (SI), at times (s)."""
         if self.start is None:
-            self.start = motion[:3].copy()
-        if self.support.moves:
-            is_there = ~np.isnan(motion[3])
-            self.carried[:, is_there] = np.array(self.support.way(time))[:, None]
-        dx, dy, angle = motion[:3] - self.start
-        dx, dy = dx - self.carried[0], dy - self.carried[1]
-        way, turn = np.hypot(dx, dy), np.abs(angle)
-        self.way, self.turn = np.fmax(self.way, way), np.fmax(self.turn, turn)
-        self.manner = _manner(self.shapes, way, -dy, turn)
-        if self.first is None and self.placed:
-            shares = _shares(self.shapes, way, turn)
-            most = int(np.argmax(shares))
-            self.first = FirstMove(self.placed[most].name, time) if shares[most] > 1.0 else None
+            self.start = motion[:, :3].copy()
+        self._carry(scenes, motion, times)
+        shift = motion[:, :2] - self.start[scenes, :2] - self.carried[scenes]
+        way, turn = np.hypot(shift[:, 0], shift[:, 1]), np.abs(motion[:, 2] - self.start[scenes, 2])
+        self.moved[scenes] = np.fmax(self.moved[scenes], way)
+        self.turned[scenes] = np.fmax(self.turned[scenes], turn)
+        self._note_first(scenes, way, turn, times)
 
-    def found(self, support: tuple[float, float] = (0.0, 0.0)) -> Movement:
-        """Return what was seen of the blocks, one at least, given the velocity (m/s) of ground and walls at the end."""
-        assert self.last is not None  # noqa: S101 - the start is a frame
-        motion, time = self.last
-        (end,) = end_speeds([self.placed], motion[None], np.array([support]), [time])
-        far, turned = (int(np.argmax(most * self.shapes.is_free)) for most in (self.way, self.turn))
-        return Movement(
-            outcome=_with_way_there(self.manner, self.first, turns_on=end.turns_on),
-            largest_displacement_mm=float(MILLI * self.way[far] * self.shapes.is_free[far]),
-            displaced_block=self.placed[far].name,
-            largest_rotation_deg=float(np.degrees(self.turn[turned] * self.shapes.is_free[turned])),
-            rotated_block=self.placed[turned].name,
-            first_mover=None if self.first is None else self.first.block,
-            first_moved_s=None if self.first is None else self.first.time,
-            fastest_block=end.block,
-            fastest_m_s=end.speed,
-            moves_on=end.moves_on,
-            turns_on=end.turns_on,
+    def take(self, steps: NDArray[np.int64], places: Floats, time_steps: Sequence[float]) -> None:
+        """Take what compiled code has found on supports at rest: steps (m,), zero for none, and places (m, 3, b)."""
+        assert self.start is not None  # noqa: S101 - compiled code has it from here
+        scenes = np.flatnonzero(steps).tolist()
+        times = [int(steps[m]) * time_steps[m] for m in scenes]
+        shift = places[scenes] - self.start[scenes]
+        way, turn = np.hypot(shift[:, 0], shift[:, 1]), np.abs(shift[:, 2])
+        self._note_first(scenes, way, turn, times, threshold=1.0 - ROUND_OFF)
+
+    def _carry(self, scenes: list[int], motion: Floats, times: Sequence[float]) -> None:
+        if any(self.supports[m].moves for m in scenes):
+            ways = np.array([self.supports[m].way(time) for m, time in zip(scenes, times, strict=True)])
+            is_there = ~np.isnan(motion[:, 3:4])
+            self.carried[scenes] = np.where(is_there, ways[:, :, None], self.carried[scenes])
+
+    def _note_first(
+        self, scenes: list[int], way: Floats, turn: Floats, times: Sequence[float], threshold: float = 1.0
+    ) -> None:
+        """Note what has moved first, where nothing had before."""
+        shares = self.shapes.chosen(scenes).shares(way, turn) if way.size else np.zeros((len(scenes), 1))
+        for m, block, share, time in zip(scenes, shares.argmax(axis=1), shares.max(axis=1), times, strict=True):
+            if share > threshold and self.first[m] is None:
+                self.first[m] = FirstMove(self.placed[m][block].name, time)
+
+    def ends(self, motion: Floats, support: Floats, seconds: Sequence[float], turned: Floats | None = None) -> Ends:
+        """Return how all scenes ended: as in `Ends`; `turned` is what was seen elsewhere of rotations on the way."""
+        assert self.start is not None  # noqa: S101 - the start is a frame
+        self._carry([*range(len(self.placed))], motion, seconds)
+        return Ends(
+            self.placed, self.shapes, self.start, motion, self.carried, support, np.array(seconds), self.first, turned
         )
+
+
+class Movement(BaseModel, frozen=True, extra="allow"):
+    """The observables in run.json, each an attribute."""
+
+    __pydantic_extra__: dict[str, Value] = Field(init=False)
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    @classmethod
+    def of(cls, watch: Watch, motion: Floats, support: tuple[float, float], time: float) -> "Movement | None":
+        """Return those of a run: its last frame (6, b), the velocity of the support (m/s) and the time (s) then."""
+        ends = replace(watch.ends(motion[None], np.array([support]), [time], watch.turned), moved=watch.moved)
+        (values,) = observed(ends, [one.name for one in OBSERVABLES.values() if one.in_runs])
+        return cls(**values) if values else None
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """All by name."""
+        return self.__pydantic_extra__
+
+    @property
+    def row(self) -> dict[str, Value]:
+        """Those that stand in the row of a case."""
+        values = self.values | {PEAK: self.values[LARGEST_TURN]}
+        return {name: values[name] for name, one in OBSERVABLES.items() if one.in_rows and name in values}
+
+    def lines(self, number: Callable[[float], str]) -> Iterator[tuple[str, str]]:
+        """Yield titles and texts of what people want to know, with units and blocks."""
+        yield OUTCOME, str(self.values[OUTCOME])
+        for one in OBSERVABLES.values():
+            value = self.values.get(one.name)
+            if one.title and value is not None:
+                block = f" (block {self.values[one.block]})" if one.block else ""
+                yield one.title, one.text(float(value), number) + block
+        if self.values[FIRST_MOVER] is not None:
+            yield FIRST, f"block {self.values[FIRST_MOVER]} at {self.values[FIRST_MOVED]:.3f} s"

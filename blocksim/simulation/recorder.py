@@ -88,7 +88,7 @@ class Recorder:
         self.ledger: tuple[str, ...] = ()
         self.with_contacts = contacts
         self.probes = probes
-        self.watch = Watch(self.placed, support)
+        self.watch = Watch([self.placed], [support])
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
@@ -121,7 +121,7 @@ class Recorder:
         contacts = [None] * len(self.steps) if rows.contacts is None else rows.contacts.tables()
         states = [*zip(*rows.values, strict=True)]
         for step, (motion, *_) in zip(self.steps, states, strict=True):
-            self.watch.see(motion, step * self.time_step)
+            self.watch.see([0], motion[None], [step * self.time_step])
         self.held = [Frame(*one) for one in zip(self.steps, states, rows.measured, contacts, strict=True)]
         self.digests = []
         for frame in self.held:
@@ -142,7 +142,7 @@ class Recorder:
         step = int(scene.world.clock[0].steps)
         row = measured_row(scene)
         states = self._states(scene)
-        self.watch.see(states[0], step * self.time_step)
+        self.watch.see([0], states[0][None], [step * self.time_step])
         self.ledger = ledger_names(scene)
         touching = scheme_of(scene).contacts(scene, len(self.placed)) if self.with_contacts else None
         frame = Frame(step, states, row, touching)

@@ -24,6 +24,7 @@ from blocksim.simulation.happened import in_words
 from blocksim.simulation.keeping import keep_result
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
 from blocksim.simulation.loop import Attendance, LoopResult, Watcher, run_loop
+from blocksim.simulation.movement import Movement
 from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.onset import onset_warning
 from blocksim.simulation.probes import probes_of
@@ -261,7 +262,7 @@ def _result(
 def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Summary:
     world = ended.scene.world
     step = float(world.controls[0].step)
-    steps = int(world.clock[0].steps)
+    steps, ground = int(world.clock[0].steps), world.bodies[-1]
     return Summary(
         name=scenario.name,
         status=ended.outcome.status,
@@ -280,15 +281,10 @@ def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds:
         energy_J=ended.ledger,
         threads=ended.threads,
         events=ended.events,
-        movement=recorder.watch.found(_velocity_of_support(ended.scene)) if recorder.placed else None,
+        movement=Movement.of(recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step),
         warnings=tuple(_warnings(scenario, recorder.placed, ended)),
         environment=environment(),
     )
-
-
-def _velocity_of_support(scene: AnyScene) -> tuple[float, float]:
-    ground = scene.world.bodies[-1]
-    return float(ground.vx), float(ground.vy)
 
 
 def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResult) -> Iterator[str]:

@@ -1,8 +1,8 @@
 """What counts as standing, or as failure: conditions on the end of a run, such as "moved < 5 mm, outcome != fell".
 
-Conditions are joined by commas, and all of them must hold. `moved` is the largest displacement of a centre from start
-to end, `turned` the largest rotation; `outcome` is one of stands, rocked back, rocking, slid,
-fell (see `blocksim.simulation.movement`), several of them with "|" between.
+Conditions are joined by commas, and all of them must hold. They name observables by their words (see
+`blocksim.simulation.movement`): `moved` is the largest displacement of a centre from start to end, `turned` the largest
+rotation; `outcome` is one of stands, rocked back, rocking, slid, fell, several of them with "|" between.
 
 A run that meets all conditions but moves on at its end (as `blocksim.simulation.movement` has it) is undecided. A scene
 that does not come to rest before time zero (`start.settle`) falls.
@@ -18,22 +18,24 @@ from enum import StrEnum
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import quantities as q
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.simulation.movement import Manner
+from blocksim.simulation.movement import MOVES_ON, OBSERVABLES, Observable
 from blocksim.simulation.settled import NOT_AT_REST
-from blocksim.study.rows import FINISHED, MOVEMENT
+from blocksim.study.rows import FINISHED
 
 STANDS = "--stands"
 DEFAULT = "outcome = stands | rocked back"
 FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|==?|<|>)\s*(.*?)\s*")
-OUTCOME, _, _, DISPLACEMENT, TURN, _, MOVES_ON = MOVEMENT
 MOVED = "moved"
-NUMBERS: dict[str, tuple[str, q.Kind, float]] = {  # word: column of a row, kind, units of the column in one of SI
-    MOVED: (DISPLACEMENT, q.LENGTH, 1e3),
-    "turned": (TURN, q.ANGLE, math.degrees(1.0)),
+UNITS = {  # of observables: kind, units in one of SI
+    "mm": (q.LENGTH, 1e3),
+    "deg": (q.ANGLE, math.degrees(1.0)),
+    "mm/s": (q.SPEED, 1e3),
+    "m/s": (q.SPEED, 1.0),
+    "s": (q.TIME, 1.0),
+    "": (q.NUMBER, 1.0),
 }
 BELOW: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, "<=": operator.le}
 ABOVE: dict[str, Callable[[float, float], bool]] = {">": operator.gt, ">=": operator.ge}
-WORDS = (*NUMBERS, OUTCOME)
 
 
 class Verdict(StrEnum):
@@ -95,30 +97,28 @@ def _condition(text: str) -> Callable[[Mapping[str, object]], bool]:
     if found is None:
         raise _mistake(text, 'write for example "moved < 5 mm" or "outcome != fell"')
     word, sign, value = found[1], found[2].replace("==", "="), found[3]
-    if word == OUTCOME:
-        return _outcome(text, sign, value)
-    if word not in NUMBERS:
-        raise _mistake(text, f"unknown quantity '{word}', {did_you_mean_or_list(word, WORDS)}")
-    return _number(text, word, sign, value)
+    known = {one.word: one for one in OBSERVABLES.values() if one.word}
+    if word not in known:
+        raise _mistake(text, f"unknown quantity '{word}', {did_you_mean_or_list(word, known)}")
+    return (_choice if known[word].choices else _number)(text, known[word], sign, value)
 
 
-def _outcome(text: str, sign: str, value: str) -> Callable[[Mapping[str, object]], bool]:
-    named = {part.strip() for part in value.split("|")}
-    known = {manner.value for manner in Manner}
+def _choice(text: str, of: Observable, sign: str, value: str) -> Callable[[Mapping[str, object]], bool]:
+    named, known = {part.strip() for part in value.split("|")}, set(of.choices)
     unknown = sorted(named - known)
     if unknown:
-        raise _mistake(text, f"unknown outcome '{unknown[0]}', {did_you_mean_or_list(unknown[0], sorted(known))}")
+        raise _mistake(text, f"unknown {of.word} '{unknown[0]}', {did_you_mean_or_list(unknown[0], sorted(known))}")
     if sign not in ("=", "!="):
-        raise _mistake(text, "an outcome is compared with = or !=")
+        raise _mistake(text, f"an {of.word} is compared with = or !=")
     allowed = named if sign == "=" else known - named
-    return lambda row: row[OUTCOME] in allowed
+    return lambda row: row[of.name] in allowed
 
 
-def _number(text: str, word: str, sign: str, value: str) -> Callable[[Mapping[str, object]], bool]:
-    column, kind, units = NUMBERS[word]
+def _number(text: str, of: Observable, sign: str, value: str) -> Callable[[Mapping[str, object]], bool]:
+    kind, units = UNITS[of.unit]
     compare = {**BELOW, **ABOVE}.get(sign)
     if compare is None:
-        raise _mistake(text, f"{word} is compared with <, <=, > or >=")
+        raise _mistake(text, f"{of.word} is compared with <, <=, > or >=")
     try:
         number, dimension = q.parse_quantity(value, kind)
     except ValueError as error:
@@ -126,7 +126,7 @@ def _number(text: str, word: str, sign: str, value: str) -> Callable[[Mapping[st
     if dimension != kind.dimension:
         raise _mistake(text, f'{kind.name} is needed, such as "{kind.example}"')
     limit = number * units
-    return lambda row: compare(float(str(row[column])), limit)
+    return lambda row: compare(float(str(row[of.name])), limit)
 
 
 def _mistake(text: str, why: str) -> InvalidInputError:

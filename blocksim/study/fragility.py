@@ -18,13 +18,14 @@ from blocksim.scenario import Source, document_of
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
+from blocksim.simulation.movement import MOVES_ON
 from blocksim.study.criterion import falls_before_zero
 from blocksim.study.executors import Execution
 from blocksim.study.fragility_counts import Point
 from blocksim.study.fragility_plan import COLLAPSE, FragilityPlan, read_fragility
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, Timings
-from blocksim.study.rows import FINISHED, MOVEMENT, Row, check_experiment
+from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.study.sweep import TIMINGS, SweepRun, refuse_loss
 from blocksim.study.sweep_folder import FRAGILITY, INTENSITY, prepare, write_answer
 from blocksim.study.sweep_table import SweepTable
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 
 MEMBERS_TABLE, TABLE = "members.csv", "fragility.csv"
 COLUMNS = ("members", "failures", "share", "low", "high", "curve", "curve_low", "curve_high", "moving_on", "no_result")
-MOVES_ON = MOVEMENT[-1]
 OnRow = Callable[[int, int, Row], None]
 
 

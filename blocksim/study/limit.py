@@ -20,6 +20,7 @@ from blocksim.scenario.motion import settles
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
+from blocksim.simulation.movement import PEAK
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study import criterion
@@ -44,7 +45,7 @@ from blocksim.study.limit_stiff import (
 )
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, Entry, Manifest, read_entries, values_hash
-from blocksim.study.rows import PEAK, Row, check_experiment, invalid_row
+from blocksim.study.rows import Row, check_experiment, invalid_row
 from blocksim.study.sweep_folder import LIMIT, prepare
 
 AGAIN = "rerun the command to finish"

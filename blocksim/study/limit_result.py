@@ -5,11 +5,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from blocksim.simulation.movement import PEAK, table_columns
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_plan import LimitPlan
 from blocksim.study.limit_search import Change, Number, changes_in
 from blocksim.study.limit_stiff import Levels
-from blocksim.study.rows import MOVEMENT, PEAK, Row, as_cell
+from blocksim.study.rows import Row, as_cell
 from blocksim.study.sweep_folder import LIMIT, write_answer
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 TABLE = "limit.csv"
 VALUE, VERDICT, SCALE, STEP = "value", "verdict", "stiffness_scale", "half_step_s"
-COLUMNS = (VERDICT, *MOVEMENT, PEAK, "status", "reason", "seconds", SCALE, STEP)
 BOTH = {Verdict.STANDS, Verdict.FALLS}
 BOTH_OR_MOVING = BOTH | {Verdict.UNDECIDED}
 
@@ -130,7 +130,7 @@ class LimitResult:
         """All runs as limit.csv has them."""
         import pandas as pd
 
-        return pd.DataFrame(list(_records(self)), columns=[_head(self.plan), *COLUMNS])
+        return pd.DataFrame(list(_records(self)), columns=[_head(self.plan), *_columns()])
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON."""
@@ -172,7 +172,7 @@ class LimitResult:
 
     def _side(self, value: Number, verdict: Verdict) -> dict[str, object]:
         row, seen = self.rows[value], self.seen(value)
-        told = {name: seen.get(name) for name in (*MOVEMENT, PEAK)} | {
+        told = {name: seen.get(name) for name in (*table_columns(), PEAK)} | {
             name: row.get(name) for name in ("status", "reason")
         }
         return {VALUE: value, VERDICT: verdict.value, **told, "case": self.kept.get(value)}
@@ -186,12 +186,16 @@ class LimitResult:
 
 def write_result(result: LimitResult) -> None:
     """Write limit.csv, and the answer into limit.json."""
-    rows: list[list[object]] = [[_head(result.plan), *COLUMNS], *_records(result)]
+    rows: list[list[object]] = [[_head(result.plan), *_columns()], *_records(result)]
     write_answer(result.folder / TABLE, LIMIT, rows, result.to_dict())
 
 
 def _head(plan: LimitPlan) -> str:
     return f"{VALUE} [{plan.unit}]" if plan.unit else VALUE
+
+
+def _columns() -> list[str]:
+    return [VERDICT, *table_columns(), PEAK, "status", "reason", "seconds", SCALE, STEP]
 
 
 def _records(result: LimitResult) -> Iterator[list[object]]:
@@ -202,7 +206,7 @@ def _records(result: LimitResult) -> Iterator[list[object]]:
     for scale, step, rows in (given, *stiffer, *finer):
         for value in sorted(rows):
             row = rows[value]
-            cells = (as_cell(row.get(name)) for name in COLUMNS[1:-2])
+            cells = (as_cell(row.get(name)) for name in _columns()[1:-2])
             yield [value, result.plan.criterion.verdict(row).value, *cells, scale, step]
 
 

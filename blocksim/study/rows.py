@@ -11,19 +11,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from blocksim.analysis.compare import compare_final, limits
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import PlacedBody, Scenario, Sweep, place_bodies
+from blocksim.scenario import Scenario, Sweep, place_bodies
 from blocksim.scenario import quantities as q
 from blocksim.scenario.units import parse_unit
-from blocksim.simulation.movement import RESTED, EndSpeed, FirstMove, Way, from_start_to_end
-from blocksim.simulation.table import COLUMNS, MILLI, Columns
+from blocksim.simulation.outcome import Outcome
+from blocksim.simulation.summary import Summary
+from blocksim.simulation.table import COLUMNS, Columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,10 +32,6 @@ FINISHED = "finished"
 TABLE = "sweep.csv"
 """Rows of all cases; it makes a folder one of a sweep."""
 X = ".x_mm"
-MOVEMENT = ("outcome", "first_mover", "first_moved_s", "displacement_mm", "turn_deg", "end_speed_mm_s", "moves_on")
-"""As in run.json, but displacement and rotation are the largest of all blocks that can move, from start to end."""
-PEAK = "peak_deg"
-"""The largest rotation of any block on the way; beside what tables of sweeps hold."""
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
 QUARTER = 90.0  # deg
 DIGITS = 12  # of a number in the table: more show the rounding of the unit
@@ -47,34 +41,9 @@ MARK = "'"  # spreadsheets show what follows as text
 NUMBERS = "if"  # kinds of numpy
 
 
-class Course(NamedTuple):
-    """How a case that was run has gone; `seconds` are simulated, so they are the same on every machine.
-
-    `start` is where its blocks have settled before time zero, (3, b) as x, y (m), angle (rad): they move from there.
-    """
-
-    status: str
-    reason: str
-    seconds: float
-    first_move: FirstMove | None
-    end_speed: EndSpeed | None = None
-    carried: Way = RESTED  # m: of the support, from start to end
-    start: NDArray[np.float64] | None = None
-    peak_deg: float | None = None
-
-
-def row_of(course: Course, final: Columns, placed: Sequence[PlacedBody]) -> Row:
-    """Return the row of a case that was run; `placed` are the blocks as they were placed."""
-    row: Row = {"status": course.status, "reason": course.reason, "seconds": course.seconds}
-    mover, moved = course.first_move or (None, None)
-    _, speed, moves_on, turns_on = course.end_speed or (None, None, None, False)
-    manner, displacement, rotation = from_start_to_end(
-        placed, final, course.first_move, course.carried, course.start, turns_on=turns_on
-    )
-    values_of = (manner.value, mover, moved, displacement, rotation, None if speed is None else MILLI * speed, moves_on)
-    row |= dict(zip(MOVEMENT, values_of, strict=True))
-    if course.peak_deg is not None:
-        row[PEAK] = course.peak_deg
+def row_of(end: Outcome | Summary, seconds: float, observed: Mapping[str, object], final: Columns) -> Row:
+    """Return the row of a case that was run; `seconds` are simulated, so they are the same on every machine."""
+    row: Row = {"status": end.status, "reason": end.reason, "seconds": seconds, **observed}
     for block, *values in zip(final["block"], *(final[name] for name in KEPT), strict=True):
         row |= {f"{block}.{name}": value for name, value in zip(KEPT, values, strict=True)}
     return row

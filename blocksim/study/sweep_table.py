@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.scenario.bounded_read import MEGABYTE, read_limited, refuse_large
 from blocksim.simulation.atomic import replacing, sync_file
+from blocksim.simulation.movement import table_columns
 from blocksim.study.plan import Cases
 from blocksim.study.progress import WHOLE, CaseIndex, Shard
-from blocksim.study.rows import FINISHED, KEPT, MOVEMENT, TABLE, Ranges, as_cell, varied_cells
+from blocksim.study.rows import FINISHED, KEPT, TABLE, Ranges, as_cell, varied_cells
 from blocksim.study.sweep_folder import SWEEP, FolderKind, note_table
 
 if TYPE_CHECKING:
@@ -68,10 +69,10 @@ class SweepTable:
     def _columns(self) -> list[str]:
         verdict = [] if self.ranges is None else ["inside"]
         ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
-        return ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *MOVEMENT, *ends]
+        return ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *table_columns(), *ends]
 
     def _rows(self) -> Iterator[list[object]]:
-        ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
+        ends = table_columns() + [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
         with closing(self.done.reader()) as reader:
             for number in self.shard.numbers(len(self.cases)):
                 settings = self.cases.design[number]
@@ -80,7 +81,7 @@ class SweepTable:
                     row = entry.row
                     outcome = [row.get(name) for name in OUTCOME]
                     values = varied_cells(self.cases.heads, settings).values()
-                    cells = [entry.case, *values, *outcome, *self._verdict(row), *map(row.get, (*MOVEMENT, *ends))]
+                    cells = [entry.case, *values, *outcome, *self._verdict(row), *map(row.get, ends)]
                     yield list(map(as_cell, cells))
 
     def _verdict(self, row: dict[str, object]) -> list[object]:

@@ -12,7 +12,7 @@ import h5py
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.study.rows import MOVEMENT
+from blocksim.simulation.movement import table_columns
 from blocksim.study.sweep import sweep
 from tests.cli.conftest import SOFT, Command
 from tests.view.report.folders import SCENARIOS, write_experiment, write_run, write_sweep
@@ -111,7 +111,7 @@ def test_varied_inputs_of_a_real_sweep_are_its_keys_and_no_result(blocksim: Comm
     columns = data_of(REPORT)["columns"]
     by_role = {role: [one["name"] for one in columns if one["role"] == role] for role in ("varied", "outcome")}
     assert by_role["varied"] == list(table.keys) == ["ground.tilt [deg]", KINETIC]
-    assert by_role["outcome"] == ["status", "reason", "seconds", "inside", *MOVEMENT]
+    assert by_role["outcome"] == ["status", "reason", "seconds", "inside", *table_columns()]
     assert "<dt>varied</dt><dd><bdi>ground.tilt [deg], friction.block_block.kinetic</bdi></dd>" in REPORT.read_text()
 
 

@@ -1,17 +1,18 @@
 """How far blocks have moved, in what way, and which first."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from blocksim.scenario import Scenario, load_scenario, place_bodies
+from blocksim.scenario import PlacedBody, Scenario, load_scenario, place_bodies
 from blocksim.simulation import simulate, simulate_into
 from blocksim.simulation.checkpoint_policy import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
-from blocksim.simulation.movement import Manner, Watch, from_start_to_end
-from blocksim.simulation.moving_support import MovingSupport
+from blocksim.simulation.movement import Manner, Movement, Watch
+from blocksim.simulation.moving_support import AT_REST, MovingSupport
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FALLING = {"contact.stiffness_scale": 0.001, "time.end": 0.2, "output.every": 0.005}
@@ -24,6 +25,21 @@ def frame(**changes: float) -> np.ndarray:
     motion[0], motion[1] = [body.x for body in PLACED], [body.y for body in PLACED]
     motion[:3, 1] += (changes.get("dx", 0.0) / 1e3, changes.get("dy", 0.0) / 1e3, np.radians(changes.get("turn", 0.0)))
     return motion
+
+
+def seen(
+    frames: Sequence[tuple[np.ndarray, float]],
+    placed: Sequence[PlacedBody] = PLACED,
+    support: MovingSupport = AT_REST,
+    velocity: float = 0.0,
+) -> Movement:
+    """Return what a run has come to that had these frames, at these times (s)."""
+    watch = Watch([placed], [support])
+    for motion, time in frames:
+        watch.see([0], motion[None], [time])
+    found = Movement.of(watch, frames[-1][0], (velocity, 0.0), frames[-1][1])
+    assert found is not None
+    return found
 
 
 @pytest.mark.parametrize(
@@ -40,17 +56,12 @@ def frame(**changes: float) -> np.ndarray:
     ],
 )
 def test_manner_follows_from_the_end(end: dict[str, float], manner: Manner) -> None:
-    watch = Watch(PLACED)
-    watch.see(frame(), 0.0)
-    watch.see(frame(**end), 0.1)
-    assert watch.found().outcome is manner
+    assert seen([(frame(), 0.0), (frame(**end), 0.1)]).outcome == manner
 
 
 def test_block_that_comes_back_has_rocked_and_its_largest_turn_is_kept() -> None:
-    watch = Watch(PLACED)
-    for time, turn in ((0.0, 0.0), (0.1, 0.1), (0.2, 12.0), (0.3, -5.0), (0.4, 0.0)):
-        watch.see(frame(turn=turn), time)
-    found = watch.found()
+    turns = ((0.0, 0.0), (0.1, 0.1), (0.2, 12.0), (0.3, -5.0), (0.4, 0.0))
+    found = seen([(frame(turn=turn), time) for time, turn in turns])
     assert (found.outcome, found.rotated_block, found.first_mover, found.first_moved_s) == (
         "rocked back",
         "2",
@@ -62,10 +73,8 @@ def test_block_that_comes_back_has_rocked_and_its_largest_turn_is_kept() -> None
 
 def test_fixed_blocks_do_not_move() -> None:
     fixed = tuple(body._replace(fixed=True) for body in PLACED)
-    watch = Watch(fixed)
-    watch.see(frame(), 0.0)
-    watch.see(frame(dx=100.0), 0.1)
-    assert (watch.found().outcome, watch.found().first_mover) == ("stands", None)
+    found = seen([(frame(), 0.0), (frame(dx=100.0), 0.1)], fixed)
+    assert (found.outcome, found.first_mover) == ("stands", None)
 
 
 @pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
@@ -76,10 +85,9 @@ def test_run_and_member_of_an_ensemble_move_alike(scheme: str) -> None:
     assert found is not None
     assert found.first_mover == "3"  # it stands on nothing but its left corner
     assert 0.0 < (found.first_moved_s or 0.0) < 0.05
-    assert member.first_move == found.first_move
-    manner, displacement, _ = from_start_to_end(member.placed, member.columns, member.first_move)
-    assert (found.outcome, manner) == ("fell", "fell")
-    assert found.largest_displacement_mm >= displacement - 1e-9
+    assert member.observed == found.row
+    assert found.outcome == "fell"
+    assert found.largest_displacement_mm >= found.displacement_mm - 1e-9
 
 
 def rocking(spin: float = 2.0, **time: object) -> Scenario:
@@ -99,19 +107,13 @@ def rocking(spin: float = 2.0, **time: object) -> Scenario:
 def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
     scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005), rocking(spin=4.5, end=0.2)]
     members = run_ensemble(scenarios, threads=1)
-    ends = [
-        from_start_to_end(
-            one.placed, one.columns, one.first_move, turns_on=one.end_speed is not None and one.end_speed.turns_on
-        )[0]
-        for one in members
-    ]
+    ends = [one.observed["outcome"] for one in members]
     # the last ones are caught on their way, the first of them long before it would be seen to go on
     assert ends == [Manner.ROCKED, Manner.ROCKED, Manner.SLID, Manner.ROCKING]
     for scenario, member in zip(scenarios, members, strict=True):
         found = simulate(scenario).summary.movement
         assert found is not None
-        assert (found.outcome, found.first_move) == (ends[members.index(member)], member.first_move)
-        assert member.peak_deg == pytest.approx(found.largest_rotation_deg, rel=1e-9)
+        assert found.row == member.observed
         assert found.largest_rotation_deg > 0.5
 
 
@@ -148,9 +150,7 @@ def test_a_block_moves_on_that_would_soon_have_left_its_place(
     motion = frame()
     motion[3] = support
     motion[3, 1], motion[5, 1] = speed, spin
-    watch = Watch(PLACED)
-    watch.see(motion, 0.6)
-    found = watch.found((support, 0.0))
+    found = seen([(motion, 0.6)], velocity=support)
     assert found.fastest_m_s == pytest.approx(fastest, rel=1e-5)
     assert found.moves_on is moves_on
 
@@ -158,10 +158,11 @@ def test_a_block_moves_on_that_would_soon_have_left_its_place(
 def test_members_end_as_fast_as_the_same_runs_alone() -> None:
     changes = ({"time.end": 0.15}, {"time.end": 0.15, "friction.block_ground": 0.2})
     scenarios = [load_scenario(SCENARIOS / "three_blocks_nominal.toml", {**FALLING, **one}) for one in changes]
-    alone = [simulate(one).summary.movement for one in scenarios]
-    members = [member.end_speed for member in run_ensemble(scenarios)]
-    assert members == [movement.end_speed for movement in alone if movement is not None]
-    assert all(end is not None and end.moves_on for end in members)
+    for scenario, member in zip(scenarios, run_ensemble(scenarios), strict=True):
+        alone = simulate(scenario).summary.movement
+        assert alone is not None
+        assert member.observed == alone.row
+        assert member.observed["moves_on"] is True
 
 
 def on_a_table(scheme: str, **motion: object) -> Scenario:
@@ -192,37 +193,32 @@ def test_what_rides_on_a_moving_table_has_not_moved(scheme: str) -> None:
         found = run.summary.movement
         assert found is not None
         assert found.outcome == outcome
-        assert member.first_move == found.first_move
-        carried = MovingSupport(scenario).way(member.seconds)
-        manner, displacement, _ = from_start_to_end(member.placed, member.columns, member.first_move, carried)
-        assert np.hypot(*carried) > 3e-3
-        assert manner == outcome
+        assert member.observed == found.row
+        assert np.hypot(*MovingSupport(scenario).way(member.seconds)) > 3e-3
         assert str(member.columns) == str(run.columns)
-        assert displacement <= found.largest_displacement_mm + 1e-9
+        assert found.displacement_mm <= found.largest_displacement_mm + 1e-9
         assert (found.largest_displacement_mm > 0.25) == (outcome == "slid")
 
 
 def test_removed_block_stays_where_it_was_on_the_table() -> None:
     support = MovingSupport(on_a_table("explicit"))
-    watch = Watch(PLACED, support)
-    rides = frame()
-    watch.see(rides, 0.0)
+    frames = [(frame(), 0.0)]
     for time in (0.14, 0.28):
         rides = frame()
         rides[0] += support.way(min(time, 0.14))[0]
         rides[3] = np.nan if time > 0.14 else 0.0
-        watch.see(rides, time)
+        frames.append((rides, time))
     assert abs(support.way(0.28)[0] - support.way(0.14)[0]) > 1e-3
-    assert watch.found().outcome == "stands"
+    assert seen(frames, support=support).outcome == "stands"
 
 
 def test_driven_blocks_are_not_the_ones_that_moved_farthest() -> None:
-    watch = Watch((PLACED[0], PLACED[1]._replace(fixed=True), PLACED[2]))
+    frames = []
     for dx in (0.0, 100.0):
         motion = frame(dx=dx, turn=dx)
         motion[0, 2] += 1e-6 * dx
-        watch.see(motion, dx)
-    found = watch.found()
+        frames.append((motion, dx))
+    found = seen(frames, (PLACED[0], PLACED[1]._replace(fixed=True), PLACED[2]))
     assert found.displaced_block == "3"
     assert found.largest_displacement_mm == pytest.approx(0.1)
     assert found.largest_rotation_deg == 0.0
@@ -233,4 +229,4 @@ def test_blocks_on_a_shaking_table_are_as_fast_as_they_move_on_it() -> None:
     movement = simulate(shaking).summary.movement
     (member,) = run_ensemble([shaking])
     assert movement is not None
-    assert member.end_speed == movement.end_speed
+    assert member.observed == movement.row

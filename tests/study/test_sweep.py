@@ -18,6 +18,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
+from blocksim.simulation.movement import table_columns
 from blocksim.simulation.result_files import is_resolved
 from blocksim.study.executors.ensemble import run_case
 from blocksim.study.fragility import fragility
@@ -26,7 +27,6 @@ from blocksim.study.limit import limit
 from blocksim.study.limit_curve import limit_curve
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.progress import Manifest, Shard
-from blocksim.study.rows import MOVEMENT
 from blocksim.study.run import run
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_folder import SWEEP, note_table, prepare
@@ -80,7 +80,7 @@ def test_rows_distinguish_what_rocked_back_from_what_stands(tmp_path: Path) -> N
     assert table["first_mover"][1] == "1"
     assert table["first_moved_s"][1] == pytest.approx(0.01, abs=1e-5)  # the first frame
     kept = run_case(Document.from_mapping(ROCKING).with_values({"bodies.0.spin": 6.0}).build(), tmp_path / "case")
-    assert [kept[name] for name in MOVEMENT] == [table[name][1] for name in MOVEMENT]
+    assert [kept[name] for name in table_columns()] == [table[name][1] for name in table_columns()]
 
 
 def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Path) -> None:
@@ -100,7 +100,16 @@ def test_folder_holds_plan_table_and_manifest_and_the_plan_repeats_the_sweep(qui
     files = {"sweep.toml", "sweep.json", "sweep.csv", "manifest.jsonl", "timings.csv", "experiment.csv"}
     assert {path.name for path in tmp_path.iterdir()} == files
     ends = [f"{block}.{name}" for block in "123" for name in ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")]
-    assert list(result.table.columns) == ["case", KINETIC, "status", "reason", "seconds", "inside", *MOVEMENT, *ends]
+    assert list(result.table.columns) == [
+        "case",
+        KINETIC,
+        "status",
+        "reason",
+        "seconds",
+        "inside",
+        *table_columns(),
+        *ends,
+    ]
     pd.testing.assert_frame_equal(read_sweep(tmp_path).table, result.table, check_exact=True)
     timings = pd.read_csv(tmp_path / "timings.csv")
     assert timings["case"].tolist() == result.table["case"].tolist()

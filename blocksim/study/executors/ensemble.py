@@ -14,19 +14,15 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
-from blocksim.scenario import Document, Scenario, place_bodies
+from blocksim.scenario import Document, Scenario
 from blocksim.simulation import MemberEnd, MemberFailure, Result, Summary, run_in_batches
 from blocksim.simulation import folder as files
-from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
-from blocksim.simulation.stores.hdf5_reader import read_frames
 from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.simulation.table import Columns, read_table
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, needs_nothing, take
-from blocksim.study.rows import FINISHED, Course, Row, row_of, row_of_error
+from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
 from blocksim.study.run import run
 
 PATIENCE = 0.7  # s that a batch has to end once the user wants to stop
@@ -93,32 +89,16 @@ def rows_of(scenarios: Sequence[Scenario], threads: int) -> list[Row]:
         return []
     try:
         return [
-            _row_of(one, scenario)
-            for one, scenario in zip(chain(*run_in_batches(scenarios, threads=threads)), scenarios, strict=True)
+            row_of_error(end.error)
+            if isinstance(end, MemberFailure)
+            else row_of(end.outcome, end.seconds, end.observed, end.columns)
+            for end in chain(*run_in_batches(scenarios, threads=threads))
         ]
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         if len(scenarios) == 1:
             return [row_of_error(error)]
     middle = len(scenarios) // 2
     return rows_of(scenarios[:middle], threads) + rows_of(scenarios[middle:], threads)
-
-
-def _row_of(member: MemberEnd | MemberFailure, scenario: Scenario) -> Row:
-    """Return the row of a member."""
-    if isinstance(member, MemberFailure):
-        return row_of_error(member.error)
-    outcome, carried = member.outcome, MovingSupport(scenario).way(member.seconds)
-    course = Course(
-        outcome.status,
-        outcome.reason,
-        member.seconds,
-        member.first_move,
-        member.end_speed,
-        carried,
-        member.start,
-        member.peak_deg,
-    )
-    return row_of(course, member.columns, member.placed)
 
 
 @dataclass(frozen=True)
@@ -166,7 +146,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         row = _known_row(scenario, folder)
         if row is None:
             result = _run_on(scenario, folder)
-            row = row_of(_course(result.summary, folder, scenario), result.columns, place_bodies(scenario))
+            row = _row_of(result.summary, result.columns)
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         return row_of_error(error)
     return row
@@ -186,21 +166,13 @@ def _known_row(scenario: Scenario, folder: Path) -> Row | None:
         summary = read_summary(folder / files.SUMMARY)
         is_same = summary.run == run_hash(scenario)
         if is_same and _has_ended(folder, summary) and not changed_results(folder, summary):
-            final = read_table(folder / files.FINAL)
-            return row_of(_course(summary, folder, scenario), final, place_bodies(scenario))
+            return _row_of(summary, read_table(folder / files.FINAL))
     return None
 
 
-def _course(summary: Summary, folder: Path, scenario: Scenario) -> Course:
+def _row_of(summary: Summary, final: Columns) -> Row:
     moved = summary.movement
-    first, end = (None, None) if moved is None else (moved.first_move, moved.end_speed)
-    seconds, start = summary.simulated_time_s, None
-    if summary.settled is not None:
-        frames = read_frames(folder / files.FRAMES, scenario)
-        start = np.stack([frames.x[0], frames.y[0], frames.angle[0]])
-    peak = None if moved is None else moved.largest_rotation_deg
-    way = MovingSupport(scenario).way(seconds)
-    return Course(summary.status, summary.reason, seconds, first, end, way, start, peak)
+    return row_of(summary, summary.simulated_time_s, {} if moved is None else moved.row, final)
 
 
 def _has_ended(folder: Path, summary: Summary) -> bool:

@@ -13,7 +13,6 @@ from blocksim.scenario.bounded_read import read_limited
 from blocksim.scenario.document import MAX_BYTES
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.movement import Movement
 from blocksim.simulation.probe_series import ProbeSeries
 from blocksim.simulation.stores.hdf5_probes import read_probes
 from blocksim.simulation.stores.hdf5_reader import read_frames
@@ -229,7 +228,7 @@ def _summary(run: PartialRun) -> list[tuple[str, str]]:
     summary = run.summary
     return [
         *blocks,
-        *_movement(summary.movement),
+        *(() if summary.movement is None else summary.movement.lines("{:.2f}".format)),
         ("simulated time", f"{summary.simulated_time_s:.4g} s"),
         ("steps", f"{summary.steps} of {summary.time_step_s:.3g} s"),
         (
@@ -239,20 +238,6 @@ def _summary(run: PartialRun) -> list[tuple[str, str]]:
         ("relative energy error", _share(summary.energy_J.relative_residual)),
         *(("warning", shared_text(warning)) for warning in summary.warnings),
     ]
-
-
-def _movement(found: Movement | None) -> list[tuple[str, str]]:
-    """Return what moved, how far and first; nothing for runs of earlier versions."""
-    if found is None:
-        return []
-    rows = [
-        ("outcome", str(found.outcome)),
-        ("peak displacement", f"{found.largest_displacement_mm:.2f} mm (block {found.displaced_block})"),
-        ("peak rotation", f"{found.largest_rotation_deg:.2f}° (block {found.rotated_block})"),
-    ]
-    if found.first_mover is not None:
-        rows.append(("first to move", f"block {found.first_mover} at {found.first_moved_s:.3f} s"))
-    return rows
 
 
 def _share(value: float) -> str:

@@ -62,7 +62,8 @@ class OutcomeMap {
   fillSelects() {
     const names = (role) => this.data.columns.filter((column) => column.role === role).map((column) => column.name);
     const ends = names("block");
-    const places = [...names("varied"), ...ends];
+    const numbers = names("outcome").filter((name) => this.column(name).values.some((value) => typeof value === "number"));
+    const places = [...names("varied"), ...ends, ...numbers];
     const isJudged = this.column("inside")?.values.some((value) => value !== null);
     const hasOutcome = this.column("outcome")?.values.some((value) => value !== null);
     const colours = [...(isJudged ? ["inside"] : []), ...(hasOutcome ? ["outcome"] : []), "status", ...ends];
