@@ -211,9 +211,9 @@ def _rows(plan: FragilityPlan, done: CaseIndex) -> dict[float, dict[int, Row]]:
     """Return the rows that there are, by intensity and number of the member."""
     rows: dict[float, dict[int, Row]] = {number: {} for number in plan.levels}
     numbers = list(plan.levels)
-    with closing(done.reader()) as reader:
+    with done.reader() as entry_of:
         for case, settings in enumerate(plan.cases.design):
-            entry = reader.entry(case) if done.holds(case, settings) else None
+            entry = entry_of(case) if done.holds(case, settings) else None
             if entry is not None:
                 rows[numbers[case % len(numbers)]][case // len(numbers)] = entry.row
     return rows

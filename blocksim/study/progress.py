@@ -18,10 +18,11 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import Any, BinaryIO, Self
+from typing import Self
 
 import numpy as np
 
@@ -94,33 +95,28 @@ class Entry:
 
     def to_line(self) -> bytes:
         """Return the line of the manifest; numbers that are not finite become null."""
-        row = {name: None if _is_not_finite(value) else value for name, value in self.row.items()}
+        row = {
+            name: None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in self.row.items()
+        }
         data = {"number": self.number, "case": self.case, "values": self.values, "row": row}
         head = json.dumps(data, separators=(",", ":")).encode()[:-1]
         return b'%s%s%08x"}\n' % (head, SUM, zlib.crc32(head))
 
     @classmethod
     def from_line(cls, line: bytes) -> Self | None:
-        """Return the entry of a line, or None where the line is not whole."""
+        """Return the entry of a line, or None where the line is not whole, or not of a sweep."""
         head, _, end = line.rpartition(SUM)
         if end != b'%08x"}\n' % zlib.crc32(head):
             return None
         try:
             data = json.loads(head + b"}")
-            parts = (data["number"], data["case"], data["values"], data["row"])
+            number, case, values, row = data["number"], data["case"], data["values"], data["row"]
         except (ValueError, KeyError, TypeError, RecursionError):  # a right sum below what no sweep writes
             return None
-        return cls(*parts) if _are_parts(*parts) else None
-
-
-def _are_parts(number: Any, case: Any, values: Any, row: Any) -> bool:
-    """Return True if a line holds what a sweep writes, in its types."""
-    is_hash = isinstance(values, str) and re.fullmatch("[0-9a-f]{1,15}", values) is not None
-    return type(number) is int and isinstance(case, str) and is_hash and isinstance(row, dict)
-
-
-def _is_not_finite(value: object) -> bool:
-    return isinstance(value, float) and not math.isfinite(value)
+        is_hash = isinstance(values, str) and re.fullmatch("[0-9a-f]{1,15}", values) is not None
+        is_ours = type(number) is int and isinstance(case, str) and is_hash and isinstance(row, dict)
+        return cls(number, case, values, row) if is_ours else None
 
 
 def values_hash(settings: dict[str, object]) -> str:
@@ -218,10 +214,6 @@ class CaseIndex:
         blocks = blocks_in(entry.row)
         self.blocks[blocks] = min(number, self.blocks.get(blocks, number))
 
-    def forget(self, number: int) -> None:
-        """Have a case run again."""
-        self.state[number] = MISSING
-
     def forget_failed(self, shard: Shard) -> None:
         """Have those cases of a shard run again that did not end well."""
         state = self.state[shard.slice]
@@ -230,7 +222,7 @@ class CaseIndex:
     def holds(self, number: int, settings: dict[str, object]) -> bool:
         """Return True if a case has a row, and that with these values: other code may have numbered the cases again."""
         if self.state[number] != MISSING and self.values[number] != int(values_hash(settings), 16):
-            self.forget(number)
+            self.state[number] = MISSING
         return bool(self.state[number] != MISSING)
 
     def count(self, shard: Shard = WHOLE) -> int:
@@ -242,32 +234,18 @@ class CaseIndex:
         first = sorted(self.blocks, key=self.blocks.__getitem__)
         return tuple(dict.fromkeys(block for blocks in first for block in blocks))
 
-    def reader(self) -> "Reader":
-        """Return what reads entries back."""
-        return Reader(self)
+    @contextmanager
+    def reader(self) -> Iterator[Callable[[int], Entry | None]]:
+        """Give what reads the entry of a case that has a row; it gives None where the file has changed since."""
+        with ExitStack() as files:
+            opened = [files.enter_context(open_regular(path)) for path in self.paths]
 
+            def entry(number: int) -> Entry | None:
+                file = opened[int(self.sources[number])]
+                file.seek(int(self.starts[number]))
+                return Entry.from_line(file.readline())
 
-class Reader:
-    """The manifests, open for reading."""
-
-    def __init__(self, done: CaseIndex) -> None:
-        """Open no file yet."""
-        self.done = done
-        self.files: dict[int, BinaryIO] = {}
-
-    def entry(self, number: int) -> Entry | None:
-        """Return the entry of a case that has a row, or None where the file has changed since."""
-        source = int(self.done.sources[number])
-        if source not in self.files:
-            self.files[source] = open_regular(self.done.paths[source])
-        file = self.files[source]
-        file.seek(int(self.done.starts[number]))
-        return Entry.from_line(file.readline())
-
-    def close(self) -> None:
-        """Close all files."""
-        for file in self.files.values():
-            file.close()
+            yield entry
 
 
 class Timings:
@@ -280,21 +258,17 @@ class Timings:
     def append(self, cases: Iterable[str], seconds: float, host: str) -> None:
         """Add the cases of a batch that took so long (s). Raises OutputError."""
         names = list(cases)
-        share = f"{seconds / max(len(names), 1):.6f}"
         try:
-            is_new = not self.path.exists() or not self.path.stat().st_size
-            text = io.StringIO()
-            writer = csv.writer(text, lineterminator="\n")
-            writer.writerows([TIMING_COLUMNS] if is_new else [])
-            writer.writerows((name, self.executor, share, as_cell(host)) for name in names)
-            with self.path.open("a", encoding="utf-8", newline="") as file:
-                file.write(("" if is_new or self._is_whole() else "\n") + text.getvalue())
+            with self.path.open("a+b") as file:
+                size, text = file.seek(0, os.SEEK_END), io.StringIO()
+                if size:  # a last line that was torn by a kill must not take the next one with it
+                    file.seek(size - 1)
+                    text.write("" if file.read() == NEWLINE else "\n")
+                writer = csv.writer(text, lineterminator="\n")
+                writer.writerows([] if size else [TIMING_COLUMNS])
+                share = f"{seconds / max(len(names), 1):.6f}"
+                writer.writerows((name, self.executor, share, as_cell(host)) for name in names)
+                file.write(text.getvalue().encode())
         except OSError as error:
             message = f"{self.path}: cannot be written: {error.strerror}"
             raise OutputError(message) from error
-
-    def _is_whole(self) -> bool:
-        """Return True if the last line was not torn by a kill."""
-        with self.path.open("rb") as file:
-            file.seek(-1, os.SEEK_END)
-            return file.read() == b"\n"

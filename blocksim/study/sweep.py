@@ -162,7 +162,12 @@ class SweepRun:
     table: SweepTable
     timings: Timings
     on_row: OnRow
-    invalid: list[Ended] = field(default_factory=list)
+    invalid: list[Ended] = field(default_factory=list)  # cases that cannot be run, until they are written
+
+    @property
+    def count(self) -> int:
+        """How many cases there are in this share."""
+        return len(self.done.state[self.shard.slice])
 
     def run(self, executor: Run, setting: Setting, *, fail_fast: bool) -> None:
         """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
@@ -180,11 +185,6 @@ class SweepRun:
             message = f"stopped with {self.done.count(self.shard)} of {self.count} cases done; {AGAIN}"
             raise StoppedEarlyError(message)
 
-    @property
-    def count(self) -> int:
-        """How many cases there are in this share."""
-        return len(self.done.state[self.shard.slice])
-
     def _run(self, executor: Run, setting: Setting, *, fail_fast: bool) -> None:
         # closed here and now: left to the garbage collector, workers would continue
         with closing(executor(self._tasks(), setting)) as batches:
@@ -193,7 +193,7 @@ class SweepRun:
                 self.table.write_now_and_then()
                 if fail_fast and has_failed:
                     return
-        self._keep_invalid()
+        self._keep()
 
     def _tasks(self) -> Iterator[Task]:
         """Make one task after the other; cases that cannot be run get their rows on the way."""
@@ -206,7 +206,7 @@ class SweepRun:
                 continue
             self.invalid.append(Ended(number, case.name, case.settings, invalid_row(case.problem)))
             if len(self.invalid) >= MOST_INVALID:
-                self._keep_invalid()
+                self._keep()
 
     def _keep_batch(self, batch: Batch) -> bool:
         """Keep rows, and return whether one of them is of a case that failed."""
@@ -215,16 +215,12 @@ class SweepRun:
         ]
         has_failed = bool(self.invalid) or any(one.row["status"] != FINISHED for one in ended)
         self._keep(ended)
-        self._keep_invalid()
         self.timings.append((one.name for one in ended), batch.seconds, batch.host)
         return has_failed
 
-    def _keep_invalid(self) -> None:
-        ended, self.invalid = self.invalid, []
-        self._keep(ended)
-
-    def _keep(self, ended: list[Ended]) -> None:
-        """Bring rows to the disk, and then report them."""
+    def _keep(self, ended: Sequence[Ended] = ()) -> None:
+        """Bring rows to the disk, with those of cases that cannot be run, and then report them."""
+        ended, self.invalid = [*ended, *self.invalid], []
         if not ended:
             return
         entries = [Entry(one.number, one.name, values_hash(one.settings), one.row) for one in ended]

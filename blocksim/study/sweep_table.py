@@ -4,7 +4,7 @@ import csv
 import io
 import time
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -58,37 +58,27 @@ class SweepTable:
         self.next_at = began + SOONEST
         with replacing(self.path) as temporary:
             with temporary.open("w", encoding="utf-8", newline="") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(self._columns())
-                writer.writerows(self._rows())
+                csv.writer(file, lineterminator="\n").writerows(self._lines())
             sync_file(temporary)
             note_table(self.path, temporary, self.kind)
         ended = time.monotonic()
         self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
 
-    def _columns(self) -> list[str]:
+    def _lines(self) -> Iterator[list[object]]:
         verdict = [] if self.ranges is None else ["inside"]
-        ends = [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
-        return ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *table_columns(), *ends]
-
-    def _rows(self) -> Iterator[list[object]]:
         ends = table_columns() + [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
-        with closing(self.done.reader()) as reader:
+        yield ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *ends]
+        with self.done.reader() as entry_of:
             for number in self.shard.numbers(len(self.cases)):
                 settings = self.cases.design[number]
-                entry = reader.entry(number) if self.done.holds(number, settings) else None
-                if entry is not None:
-                    row = entry.row
-                    outcome = [row.get(name) for name in OUTCOME]
-                    values = varied_cells(self.cases.heads, settings).values()
-                    cells = [entry.case, *values, *outcome, *self._verdict(row), *map(row.get, ends)]
-                    yield list(map(as_cell, cells))
-
-    def _verdict(self, row: dict[str, object]) -> list[object]:
-        """Judge here and not when the case ended: the measured table may be mended between two calls."""
-        if self.ranges is None:
-            return []
-        return [self.ranges.hold(row) if row.get("status") == FINISHED else None]
+                entry = entry_of(number) if self.done.holds(number, settings) else None
+                if entry is None:
+                    continue
+                row = entry.row
+                if self.ranges is not None:  # judged here and not when the case ended: the measured table may be mended
+                    row = {**row, "inside": self.ranges.hold(row) if row.get("status") == FINISHED else None}
+                values = varied_cells(self.cases.heads, settings).values()
+                yield list(map(as_cell, [entry.case, *values, *map(row.get, (*OUTCOME, *verdict, *ends))]))
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 
 from blocksim.scenario import load_stored
-from blocksim.simulation.movement import MILLI, OBSERVABLES, Observable
+from blocksim.simulation.movement import OBSERVABLES, Observable
 from blocksim.study.executors.ensemble import run_case
 from tests.cli.conftest import SOFT, Command
 
 EDGE = 0.1  # m: of a table on which the block slides
 OVERHANG = Observable(
     "overhang_mm",
-    lambda ends: MILLI * (ends.motion[:, 0] + ends.shapes.reach - EDGE).max(axis=1),
+    lambda ends: 1e3 * (ends.motion[:, 0] + ends.shapes.reach - EDGE).max(axis=1),
     "mm",
     title="greatest overhang",
     word="overhang",
