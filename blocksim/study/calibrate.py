@@ -1,6 +1,6 @@
 """Calibration: values within their priors for which agreement with the repeats is most probable under input scatter."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from blocksim.study.calibrate_search import (
     score_of,
     search,
 )
-from blocksim.study.executors.ensemble import Values, run_members
+from blocksim.study.executors.ensemble import run_members
 from blocksim.study.fitted_file import NOTE, with_fitted
 
 TRIALS = 100
@@ -32,6 +32,7 @@ FRESH_MEMBERS = 512
 WRITTEN = "scenario.toml"
 JOURNAL = ".trials.jsonl"
 NEEDED = ("optuna", "scipy.stats.qmc")  # before anything is written
+TAKEN = "{}: already exists; --overwrite replaces it, --out FILE writes elsewhere"
 OnTrial = Callable[[Trial, Trial, int], None]
 
 
@@ -50,7 +51,7 @@ class Fit:
     @property
     def found(self) -> bool:
         """Return True if a member of the best trial or a fresh one is inside all ranges; if not, it is the nearest."""
-        return _is_found(self.best, self.score)
+        return self.best.score.inside + self.score.inside > 0
 
     @property
     def is_one_of_many(self) -> bool:
@@ -59,7 +60,8 @@ class Fit:
 
     def equally_good(self, prior: Prior) -> tuple[float, float]:
         """Return the least and the greatest of the equally good values of a key, in the unit of its prior."""
-        return _span(prior, self.ties or (self.best,))
+        numbers = [prior.number(trial.values[prior.key]) for trial in self.ties or (self.best,)]
+        return min(numbers), max(numbers)
 
     @property
     def at_bounds(self) -> tuple[Prior, ...]:
@@ -95,19 +97,14 @@ def calibrate(
     fresh = plan.scatter.fresh_members(best.values, fresh_members if plan.scatter.plan else 1, plan.seed)
     members = list(run_members(plan.bare, fresh))
     score = score_of(members, plan.ranges)
-    text = with_fitted(
-        plan.document,
-        best.values,
-        _provenance(plan, best, score, trials, ties),
-        path.parent,
-        _head(plan, best, ties),
-        f"one of {len(ties)} equally good, see [provenance]" if len(ties) > 1 else NOTE,
-    )
+    fit = Fit(plan, best, score, trials, path, hits_of(members, plan.ranges), ties)
+    note = f"one of {len(ties)} equally good, see [provenance]" if fit.is_one_of_many else NOTE
+    text = with_fitted(plan.document, best.values, _provenance(fit), path.parent, _head(fit), note)
     if kept is None:
         write_text(path, text)
     elif kept.read_bytes() != text.encode():
-        raise OutputExistsError(_taken(kept))
-    return Fit(plan, best, score, trials, path, hits_of(members, plan.ranges), ties)
+        raise OutputExistsError(TAKEN.format(kept))
+    return fit
 
 
 def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None:
@@ -116,7 +113,7 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
         raise OutputExistsError(f"{path}: this is a folder; a file name is needed")
     has_trials = journal.exists() and journal.stat().st_size > 0
     if path.exists() and not overwrite and not (resume and has_trials):
-        raise OutputExistsError(_taken(path))
+        raise OutputExistsError(TAKEN.format(path))
     if has_trials and not (resume or overwrite):
         message = f"{journal}: has trials of a calibration; --resume continues them, --overwrite starts again"
         raise OutputExistsError(message)
@@ -129,10 +126,6 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
         raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
 
 
-def _taken(path: Path) -> str:
-    return f"{path}: already exists; --overwrite replaces it, --out FILE writes elsewhere"
-
-
 def _searched(
     plan: Plan, journal: Path, trials: int, on_trial: OnTrial, kept: Path | None
 ) -> tuple[Trial, tuple[Trial, ...]]:
@@ -141,12 +134,12 @@ def _searched(
     tried: list[Trial] = []
 
     def evaluate(values: Mapping[str, object]) -> Score:
-        return _score(plan, plan.scatter.members(values, plan.members, plan.seed))
+        return score_of(run_members(plan.bare, plan.scatter.members(values, plan.members, plan.seed)), plan.ranges)
 
     with opened(journal, plan.fingerprint()) as study, interruptible():
         done = len(finished_trials(study))
         if kept is not None and done < trials:  # they would change the file
-            raise OutputExistsError(_taken(kept))
+            raise OutputExistsError(TAKEN.format(kept))
         try:
             for trial in search(plan.priors, evaluate, study, trials=trials, seed=plan.seed):
                 tried.append(trial)
@@ -161,47 +154,31 @@ def _searched(
     return best, tuple(trial for trial in tried if trial.score.ties_with(best.score))
 
 
-def _span(prior: Prior, trials: Iterable[Trial]) -> tuple[float, float]:
-    numbers = [prior.number(trial.values[prior.key]) for trial in trials]
-    return min(numbers), max(numbers)
-
-
-def _score(plan: Plan, members: Iterable[Values]) -> Score:
-    return score_of(run_members(plan.bare, members), plan.ranges)
-
-
-def _is_found(best: Trial, score: Score) -> bool:
-    return best.score.inside + score.inside > 0
-
-
-def _provenance(plan: Plan, best: Trial, score: Score, trials: int, ties: Sequence[Trial]) -> dict[str, str]:
-    """Say of every fitted value where it comes from."""
-    table = Path(plan.table.source).name
+def _provenance(fit: Fit) -> dict[str, str]:
+    """Say of every fitted value where it comes from, and among which equally good ones it is one of several."""
+    plan, score, table = fit.plan, fit.score, Path(fit.plan.table.source).name
     if plan.scatter.plan is None:
         inside = "inside" if score.inside else "not inside"
-        found = f"seed {plan.seed}, {trials} trials of one run, {inside} all ranges of {table}"
+        found = f"seed {plan.seed}, {fit.trials} trials of one run, {inside} all ranges of {table}"
     else:
         low, high = score.interval
         scatter = ", ".join(f"{key} {words}" for key, words in plan.scatter.described().items())
         found = (
-            f"seed {plan.seed}, {trials} trials of {plan.members} samples, P(inside all ranges) "
+            f"seed {plan.seed}, {fit.trials} trials of {plan.members} samples, P(inside all ranges) "
             f"{score.share_inside:.3f} [{low:.3f}, {high:.3f}] of {score.members} fresh samples, {table}, "
             f"scatter (SI): {scatter}"
         )
-    verb = "calibrated" if _is_found(best, score) else "not calibrated (nothing inside all ranges, nearest values)"
-    among = {prior.key: _among(prior, ties) for prior in plan.priors}
-    return {prior.key: f"{verb}{among[prior.key]}, prior {prior}, {found}" for prior in plan.priors}
+    verb = "calibrated" if fit.found else "not calibrated (nothing inside all ranges, nearest values)"
+    texts = {}
+    for prior in plan.priors:
+        span = prior.range_of(*fit.equally_good(prior))
+        among = f", one of {len(fit.ties)} equally good trials ({span})" if fit.is_one_of_many else ""
+        texts[prior.key] = f"{verb}{among}, prior {prior}, {found}"
+    return texts
 
 
-def _among(prior: Prior, ties: Sequence[Trial]) -> str:
-    """Say among which values a value is one of several that are equally good."""
-    if len(ties) <= 1:
-        return ""
-    return f", one of {len(ties)} equally good trials ({prior.range_of(*_span(prior, ties))})"
-
-
-def _head(plan: Plan, best: Trial, ties: Sequence[Trial]) -> str:
-    name = Path(plan.document.source.where).name
-    which = f"one of {len(ties)} equally good trials: " if len(ties) > 1 else ""
-    values = ", ".join(f"{key} = {value}" for key, value in best.values.items())
+def _head(fit: Fit) -> str:
+    name = Path(fit.plan.document.source.where).name
+    which = f"one of {len(fit.ties)} equally good trials: " if fit.is_one_of_many else ""
+    values = ", ".join(f"{key} = {value}" for key, value in fit.best.values.items())
     return f"{name} calibrated by blocksim: {which}{values}"

@@ -1,9 +1,10 @@
 """What a calibration is asked for, checked before anything runs: priors of what is fitted, and scatter of inputs."""
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil, exp, log, log10, sqrt
+from operator import eq
 from pathlib import Path
 
 from blocksim.analysis.experiment import ExperimentTable, load_table
@@ -204,7 +205,11 @@ def read_plan(
         load_table(experiment)  # so that its mistakes are reported of the option
         document = document.with_values({TABLE: said_by_hand(TABLE, str(experiment.absolute()))})
     fits = varied(document, fit, FIT, MODE)
-    scattered = _scattered(document, scatter)
+    if scatter is not None and scatter.tables:
+        scattered: Sweep | None = varied(document, scatter, SCATTER, MODE)
+    else:
+        own = document.build().sweep
+        scattered = own if own is not None and own.is_sampled else None
     bare = document.without_sweep()
     base = bare.build()
     if base.experiment is None:
@@ -214,61 +219,45 @@ def read_plan(
     _refuse_unfit(fits, scattered, fit, scatter)
     if scattered is None and members > 1:
         raise InvalidInputError(NO_SCATTER)
-    priors = tuple(_prior(key, values, fit) for key, values in fits.vary.items())
-    return Plan(document, bare, base, priors, Scatter(scattered), load_table(base.experiment.table), members, seed)
-
-
-def _prior(key: str, values: object, fit: Variations) -> Prior:
-    assert isinstance(values, Uniform)  # noqa: S101 - all others have been refused
-    table = fit.tables[key]
-    return prior_of(key, values, table["from"] if isinstance(table, Mapping) else None)
-
-
-def _scattered(document: Document, scatter: Variations | None) -> Sweep | None:
-    if scatter is not None and scatter.tables:
-        return varied(document, scatter, SCATTER, MODE)
-    own = document.build().sweep
-    return own if own is not None and own.is_sampled else None
+    priors = []
+    for key, values in fits.vary.items():
+        assert isinstance(values, Uniform)  # noqa: S101 - all others have been refused
+        table = fit.tables[key]
+        priors.append(prior_of(key, values, table["from"] if isinstance(table, Mapping) else None))
+    return Plan(
+        document, bare, base, tuple(priors), Scatter(scattered), load_table(base.experiment.table), members, seed
+    )
 
 
 def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter: Variations | None) -> None:
     """Refuse priors that are no ranges, keys inside one another, and scatter that cannot be moved to a fitted value."""
-    problems = [
-        Problem(f"{FIT} {fit.texts[key]}", "a prior is a range: write KEY=FROM:TO")
-        for key, values in fits.vary.items()
-        if not isinstance(values, Uniform)
-    ]
-    problems += [_inside(key, other, fit) for key, other in _nested(fits.vary, fits.vary)]
-    if scattered is not None:
-        texts = scatter.texts if scatter is not None and scatter.tables else {}
-        problems += _unfit_scatter(fits, scattered, texts)
+    problems = []
+    for key, values in fits.vary.items():
+        where = f"{FIT} {fit.texts[key]}"
+        if not isinstance(values, Uniform):
+            problems.append(Problem(where, "a prior is a range: write KEY=FROM:TO"))
+        problems += [
+            Problem(where, f"this is part of {other}, or contains it, which is fitted too")
+            for other in _related(key, fits.vary)
+        ]
+    fitted = {parse_key(key): values for key, values in fits.vary.items()}
+    texts = scatter.texts if scatter is not None and scatter.tables else {}
+    for key, values in scattered.vary.items() if scattered is not None else ():
+        where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
+        prior = fitted.get(parse_key(key))
+        if prior is not None and isinstance(values, tuple):
+            problems.append(Problem(where, "this key is fitted; its scatter must be a distribution, not a list"))
+        elif isinstance(prior, Uniform) and not isinstance(values, tuple) and prior.angle != values.angle:
+            problems.append(Problem(where, "prior and scatter of this key have different units; use the same unit"))
+        for other in _related(key, fits.vary):
+            text = f"this is part of {other}, or contains it, which is fitted; scatter {other} itself"
+            problems.append(Problem(where, text))
     if problems:
         raise ScenarioError(list(dict.fromkeys(problems)))
 
 
-def _unfit_scatter(fits: Sweep, scattered: Sweep, texts: Mapping[str, str]) -> Iterable[Problem]:
-    parsed = {parse_key(key): key for key in fits.vary}
-    for key, values in scattered.vary.items():
-        where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
-        fitted = fits.vary.get(parsed.get(parse_key(key), ""))
-        if fitted is not None and isinstance(values, tuple):
-            yield Problem(where, "this key is fitted; its scatter must be a distribution, not a list")
-        elif isinstance(fitted, Uniform) and not isinstance(values, tuple) and fitted.angle != values.angle:
-            yield Problem(where, "prior and scatter of this key have different units; use the same unit")
-    for key, other in _nested(scattered.vary, fits.vary):
-        where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
-        yield Problem(where, f"this is part of {other}, or contains it, which is fitted; scatter {other} itself")
-
-
-def _nested(keys: Iterable[str], others: Sequence[str] | Mapping[str, object]) -> list[tuple[str, str]]:
-    """Return pairs of which one is a table that the other is a part of."""
-    pairs = [(key, other, parse_key(key), parse_key(other)) for key in keys for other in others]
-    return [
-        (key, other)
-        for key, other, one, two in pairs
-        if len(one) != len(two) and one[: min(len(one), len(two))] == two[: min(len(one), len(two))]
-    ]
-
-
-def _inside(key: str, other: str, fit: Variations) -> Problem:
-    return Problem(f"{FIT} {fit.texts[key]}", f"this is part of {other}, or contains it, which is fitted too")
+def _related(key: str, others: Iterable[str]) -> list[str]:
+    """Return those keys that are part of one, or contain it."""
+    one = parse_key(key)
+    paths = [(other, parse_key(other)) for other in others]
+    return [name for name, path in paths if len(path) != len(one) and all(map(eq, path, one))]

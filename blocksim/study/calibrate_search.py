@@ -31,7 +31,7 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -47,7 +47,7 @@ from blocksim.study.rows import Range, are_inside, values_at
 if TYPE_CHECKING:
     from optuna import Study
 
-FAILED = 1.0
+FAILED = 1.0  # the miss of a member that failed
 PURPOSE = "calibrate"
 FIRST = 16  # trials before the estimator: a power of two, as a Sobol sequence wants it
 STUDY = "calibrate"
@@ -111,21 +111,14 @@ def hits_of(members: Sequence[Member], ranges: Sequence[Range]) -> tuple[Hit, ..
 
 def score_of(members: Iterable[Member], ranges: Sequence[Range]) -> Score:
     """Judge an ensemble of at least one member."""
-    judged = [_judged(member, ranges) for member in members]
+    rows = [None if member.final is None else values_at(member.final, ranges) for member in members]
+    misses = [None if row is None or not all(map(isfinite, row)) else miss_of(row, ranges) for row in rows]
     return Score(
-        members=len(judged),
-        inside=sum(miss <= 0.0 for miss, _ in judged),
-        failed=sum(failed for _, failed in judged),
-        miss=sum(miss for miss, _ in judged) / len(judged),
+        members=len(misses),
+        inside=sum(miss is not None and miss <= 0.0 for miss in misses),
+        failed=misses.count(None),
+        miss=sum(FAILED if miss is None else miss for miss in misses) / len(misses),
     )
-
-
-def _judged(member: Member, ranges: Sequence[Range]) -> tuple[float, bool]:
-    """Return the miss of a member, and whether it failed."""
-    if member.final is None:
-        return FAILED, True
-    values = values_at(member.final, ranges)
-    return (miss_of(values, ranges), False) if all(map(isfinite, values)) else (FAILED, True)
 
 
 def miss_of(values: Sequence[float], ranges: Sequence[Range]) -> float:
@@ -133,13 +126,12 @@ def miss_of(values: Sequence[float], ranges: Sequence[Range]) -> float:
     off = [one.off_centre(value) for one, value in zip(ranges, values, strict=True)]
     if are_inside(values, ranges):
         return min(max(off) - 1.0, 0.0)
-    outside = [0.0 if one.holds(value) else _beyond(r) for one, value, r in zip(ranges, values, off, strict=True)]
+    # above 0 also where rounding hides by how much
+    outside = [
+        0.0 if one.holds(value) else max(1.0 - 1.0 / r, 1e-15)
+        for one, value, r in zip(ranges, values, off, strict=True)
+    ]
     return sum(outside) / len(outside)
-
-
-def _beyond(off: float) -> float:
-    """Return how far outside, from 0 at the limit to 1; above 0 also where rounding hides by how much."""
-    return max(1.0 - 1.0 / off, 1e-15)
 
 
 Evaluate = Callable[[Mapping[str, object]], Score]
@@ -155,48 +147,33 @@ class Trial:
 
 
 def search(priors: Sequence[Prior], evaluate: Evaluate, study: "Study", *, trials: int, seed: int) -> Iterator[Trial]:
-    """Yield every trial up to `trials`, first those that the study has already."""
+    """Yield every trial up to `trials`, first those that the study has; a new one is in the journal when it comes."""
+    optuna, qmc = loaded("optuna", PURPOSE), loaded("scipy.stats.qmc", PURPOSE)
     done = finished_trials(study)
     yield from done
+    spread = {one.key: optuna.distributions.FloatDistribution(one.low, one.high, log=one.log) for one in priors}
     for number in range(len(done), trials):
-        yield _next_trial(priors, evaluate, study, number, seed)
-
-
-def _next_trial(priors: Sequence[Prior], evaluate: Evaluate, study: "Study", number: int, seed: int) -> Trial:
-    """Make one trial; it is in the journal when this returns."""
-    optuna = loaded("optuna", PURPOSE)
-    with _quiet():
-        study.sampler = optuna.samplers.TPESampler(
-            n_startup_trials=0, multivariate=True, seed=int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
-        )
-    spread = {prior.key: _distribution(optuna, prior) for prior in priors}
-    if number < FIRST:
-        asked, params = None, _first_point(priors, number, seed)
-    else:
-        asked = study.ask(spread)
-        params = asked.params
-    values = {prior.key: prior.value(params[prior.key]) for prior in priors}
-    score = evaluate(values)
-    kept = {VALUES: values, SCORE: [score.members, score.inside, score.failed, score.miss]}
-    if asked is None:
-        state = optuna.trial.create_trial(params=params, distributions=spread, value=score.value, user_attrs=kept)
-        study.add_trial(state)
-    else:
-        for name, value in kept.items():
-            asked.set_user_attr(name, value)
-        study.tell(asked, score.value)
-    return Trial(number + 1, values, score)
-
-
-def _distribution(optuna: Any, prior: Prior) -> Any:
-    return optuna.distributions.FloatDistribution(prior.low, prior.high, log=prior.log)
-
-
-def _first_point(priors: Sequence[Prior], number: int, seed: int) -> dict[str, float]:
-    """Return a point of the Sobol sequence: numbers in the units of the priors."""
-    qmc = loaded("scipy.stats.qmc", PURPOSE)
-    point = qmc.Sobol(len(priors), rng=np.random.default_rng(seed)).random(FIRST)[number]
-    return {prior.key: prior.at(float(share)) for prior, share in zip(priors, point, strict=True)}
+        words = np.random.SeedSequence([seed, number]).generate_state(1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that multivariate sampling may change in later versions
+            study.sampler = optuna.samplers.TPESampler(n_startup_trials=0, multivariate=True, seed=int(words[0]))
+        asked = study.ask(spread) if number >= FIRST else None
+        if asked is None:
+            point = qmc.Sobol(len(priors), rng=np.random.default_rng(seed)).random(FIRST)[number].tolist()
+            params = {prior.key: prior.at(share) for prior, share in zip(priors, point, strict=True)}
+        else:
+            params = asked.params
+        values = {prior.key: prior.value(params[prior.key]) for prior in priors}
+        score = evaluate(values)
+        kept = {VALUES: values, SCORE: [score.members, score.inside, score.failed, score.miss]}
+        if asked is None:
+            state = optuna.trial.create_trial(params=params, distributions=spread, value=score.value, user_attrs=kept)
+            study.add_trial(state)
+        else:
+            for name, value in kept.items():
+                asked.set_user_attr(name, value)
+            study.tell(asked, score.value)
+        yield Trial(number + 1, values, score)
 
 
 def finished_trials(study: "Study") -> list[Trial]:
@@ -221,10 +198,23 @@ def opened(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]":
     loaded("optuna", PURPOSE).logging.set_verbosity(logging.ERROR)
     try:
         with journal.open("ab") as file:
-            _take(file.fileno(), journal)
-            _drop_torn_line(journal)
+            if not takes_lock(file.fileno()):
+                where = "wait for it, or choose another file with --out"
+                raise OutputExistsError(f"{journal}: another calibration is running here; {where}")
+            refuse_other_file(journal)
+            content = journal.read_bytes()
+            file.truncate(content.rfind(b"\n") + 1)  # without a last line that was torn when the power failed
             study = _study_in(journal)
-            _refuse_other_plan(study, plan, journal)
+            known = study.user_attrs.get(PLAN)
+            if known is None:
+                study.set_user_attr(PLAN, dict(plan))
+            differing = [name for name, value in plan.items() if known is not None and known.get(name) != value]
+            if differing:
+                message = (
+                    f"{journal}: holds trials of another calibration ({', '.join(differing)} differ); "
+                    "--overwrite starts again, --out FILE writes elsewhere"
+                )
+                raise OutputExistsError(message)
             yield study
     except OSError as error:
         message = f"{journal}: cannot be written: {error.strerror}"
@@ -255,48 +245,9 @@ class _AlreadyLocked:
         pass
 
 
-def _take(file: int, journal: Path) -> None:
-    """Lock a file until it is closed; raises OutputExistsError where somebody else has it."""
-    if not takes_lock(file):
-        message = f"{journal}: another calibration is running here; wait for it, or choose another file with --out"
-        raise OutputExistsError(message)
-
-
 def refuse_other_file(journal: Path) -> None:
     """Raise InvalidInputError for a file that is no journal; one that is empty, or torn, may be."""
     content = read_head(journal, len(BEGINNING))
     if not BEGINNING.startswith(content):
         message = f"{journal}: not the journal of a calibration; choose another file with --out"
         raise InvalidInputError(message)
-
-
-def _drop_torn_line(journal: Path) -> None:
-    """Cut off a last line that has no end: what was written when the power failed. Leaves other files alone."""
-    refuse_other_file(journal)
-    content = journal.read_bytes()
-    whole = content.rfind(b"\n") + 1
-    if whole < len(content):
-        with journal.open("r+b") as file:
-            file.truncate(whole)
-
-
-def _refuse_other_plan(study: "Study", plan: Mapping[str, object], journal: Path) -> None:
-    known = study.user_attrs.get(PLAN)
-    if known is None:
-        study.set_user_attr(PLAN, dict(plan))
-        return
-    differing = [name for name, value in plan.items() if known.get(name) != value]
-    if differing:
-        message = (
-            f"{journal}: holds trials of another calibration ({', '.join(differing)} differ); "
-            "--overwrite starts again, --out FILE writes elsewhere"
-        )
-        raise OutputExistsError(message)
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Let optuna's remark pass that multivariate sampling may change in later versions."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield

@@ -19,12 +19,13 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Scenario, Sweep, place_bodies
 from blocksim.scenario import quantities as q
 from blocksim.scenario.units import parse_unit
-from blocksim.simulation.outcome import Outcome
-from blocksim.simulation.summary import Summary
 from blocksim.simulation.table import COLUMNS, Columns
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from blocksim.simulation.outcome import Outcome
+    from blocksim.simulation.summary import Summary
 
 Row = dict[str, object]
 FINISHED = "finished"
@@ -41,7 +42,7 @@ MARK = "'"  # spreadsheets show what follows as text
 NUMBERS = "if"  # kinds of numpy
 
 
-def row_of(end: Outcome | Summary, seconds: float, observed: Mapping[str, object], final: Columns) -> Row:
+def row_of(end: "Outcome | Summary", seconds: float, observed: Mapping[str, object], final: Columns) -> Row:
     """Return the row of a case that was run; `seconds` are simulated, so they are the same on every machine."""
     row: Row = {"status": end.status, "reason": end.reason, "seconds": seconds, **observed}
     for block, *values in zip(final["block"], *(final[name] for name in KEPT), strict=True):
@@ -182,11 +183,10 @@ class Range:
 
 def ranges_of(table: ExperimentTable) -> tuple[Range, ...]:
     """Return the limits of every measured quantity, as `compare` has them."""
+    column_of = {name: quantity.final_column for name, quantity in QUANTITIES.items()}
     return tuple(
-        Range(
-            row.block, QUANTITIES[row.quantity].final_column, *limits(row.quantity, row.mean, row.minimum, row.maximum)
-        )
-        for row in table.summaries()
+        Range(one.block, column_of[one.quantity], *limits(one.quantity, one.mean, one.minimum, one.maximum))
+        for one in table.summaries()
     )
 
 
@@ -219,12 +219,8 @@ class Ranges:
         values = ((row.get(name), limits) for name, limits in self.limits.items())
         return all(isinstance(value, float) and limits.holds(value) for value, limits in values)
 
-    def count(self, table: "pd.DataFrame") -> int:
-        """Return how many rows of a table are inside. Raises InvalidInputError for no such block, or no numbers."""
-        return sum(self.inside(table))
-
-    def inside(self, table: "pd.DataFrame") -> list[bool]:
-        """Return whether each row of a table is inside. Raises as `count`."""
+    def inside(self, table: "pd.DataFrame") -> "pd.Series":
+        """Return which rows of a table are inside. Raises InvalidInputError for no such block, or no numbers."""
         missing = [name for name in self.limits if name not in table]
         if missing:
             message = f"{self.source} measures {missing[0]}, but the sweep has no such column"
@@ -232,8 +228,9 @@ class Ranges:
         texts = [name for name in self.limits if table[name].dtype.kind not in NUMBERS and table[name].notna().any()]
         if texts:
             raise InvalidInputError(f"the column {texts[0]} of the sweep does not hold numbers only")
-        inside = [table[name].between(limits.lower, limits.upper) for name, limits in self.limits.items()]
-        return [all(row) for row in zip(*inside, strict=True)]
+        lower, upper = ([getattr(one, end) for one in self.limits.values()] for end in ("lower", "upper"))
+        values = table[list(self.limits)]
+        return ((values >= lower) & (values <= upper)).all(axis=1)
 
 
 def check_experiment(scenario: Scenario) -> None:

@@ -13,7 +13,7 @@ from blocksim.scenario import Document, Sweep
 from blocksim.scenario.models.variation import Normal, Variation
 from blocksim.silence import silent
 from blocksim.simulation.table import Columns
-from blocksim.study.executors.ensemble import Member, run_members
+from blocksim.study.executors.ensemble import run_members
 from blocksim.study.plan import Variations, varied
 from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
 from blocksim.study.sampling import drawn, open_interval
@@ -43,51 +43,34 @@ class Output:
 
 def outputs_of(finals: Sequence[Columns], table: ExperimentTable | None) -> list[Output]:
     """Return every measured quantity (without a table: x of the first blocks), and indicators of the outcome."""
-    positions = _positions(finals) if table is None else _measured(finals, table)
+    blocks = finals[0]["block"]
     outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
-    wanted, name = _class(finals[0]["block"], outcomes, table)
+    if table is None:
+        places = np.array([final["x_mm"] for final in finals])
+        found = [Output(f"x of block {name}", "mm", places[:, k]) for k, name in enumerate(blocks[:MOST_BLOCKS])]
+        means: dict[str, float] = {}
+    else:
+        ranges, summaries = ranges_of(table), table.summaries()
+        values = [values_at(final, ranges) for final in finals]
+        found = [
+            Output(f"{row.quantity} of block {row.block}", QUANTITIES[row.quantity].unit, column)
+            for row, column in zip(summaries, np.array(values).T, strict=True)
+        ]
+        means = {row.block: row.mean for row in summaries if row.quantity == "rotation"}
+    if set(blocks) <= set(means):
+        name, wanted = "measured outcome", quarter_turns([means[block] for block in blocks])
+    else:
+        name, wanted = "most frequent outcome", Counter(outcomes).most_common(1)[0][0]
+    if len(wanted) <= MOST_BLOCKS:
+        shown = "/".join(map(str, wanted))
+    else:
+        shown = f"({sum(angle != 0 for angle in wanted)} of {len(wanted)} blocks turned)"
     hits = np.array([outcome == wanted for outcome in outcomes], dtype=np.float64)
-    found = [*positions, Output(f"{name} {_written(wanted)}", INDICATOR, hits)]
-    return found if table is None else [*found, _inside(finals, table)]
-
-
-def _positions(finals: Sequence[Columns]) -> list[Output]:
-    values = np.array([final["x_mm"] for final in finals])
-    names = finals[0]["block"][:MOST_BLOCKS]
-    return [Output(f"x of block {block}", "mm", values[:, index]) for index, block in enumerate(names)]
-
-
-def _measured(finals: Sequence[Columns], table: ExperimentTable) -> list[Output]:
-    ranges = ranges_of(table)
-    values = np.array([values_at(final, ranges) for final in finals])
-    return [
-        Output(f"{row.quantity} of block {row.block}", QUANTITIES[row.quantity].unit, values[:, index])
-        for index, row in enumerate(table.summaries())
-    ]
-
-
-def _class(
-    blocks: Sequence[str], outcomes: Sequence[tuple[int, ...]], table: ExperimentTable | None
-) -> tuple[tuple[int, ...], str]:
-    """Return the measured class where the rotations of all blocks are measured, else the most frequent one."""
-    measured = {} if table is None else {one.block: one.mean for one in table.summaries() if one.quantity == "rotation"}
-    if set(blocks) <= set(measured):
-        return quarter_turns([measured[block] for block in blocks]), "measured outcome"
-    return Counter(outcomes).most_common(1)[0][0], "most frequent outcome"
-
-
-def _written(outcome: tuple[int, ...]) -> str:
-    """Write a class for people: the turned blocks of many, or all rotations of a few."""
-    if len(outcome) <= MOST_BLOCKS:
-        return "/".join(f"{angle}" for angle in outcome)
-    turned = sum(angle != 0 for angle in outcome)
-    return f"({turned} of {len(outcome)} blocks turned)"
-
-
-def _inside(finals: Sequence[Columns], table: ExperimentTable) -> Output:
-    ranges = ranges_of(table)
-    hits = [are_inside(values_at(final, ranges), ranges) for final in finals]
-    return Output("inside all measured ranges", INDICATOR, np.array(hits, dtype=np.float64))
+    found.append(Output(f"{name} {shown}", INDICATOR, hits))
+    if table is not None:
+        inside = np.array([are_inside(row, ranges) for row in values], dtype=np.float64)
+        found.append(Output("inside all measured ranges", INDICATOR, inside))
+    return found
 
 
 class TooManyFailuresError(BlocksimError):
@@ -176,23 +159,6 @@ def sensitivity(
     for member in run_members(document, settings_at(points, plan.vary)):
         members.append(member)
         on_member(len(members), len(points))
-    return _analysed(members, points, plan, method, table, seed)
-
-
-def settings_at(points: Floats, vary: Mapping[str, Variation]) -> Iterator[dict[str, object]]:
-    """Yield the values of the keys at points of the unit cube, shape (runs, keys)."""
-    columns = [drawn(values, _places(values, points[:, index])) for index, values in enumerate(vary.values())]
-    return (dict(zip(vary, row, strict=True)) for row in zip(*columns, strict=True))
-
-
-def _places(values: Variation, places: Floats) -> Floats:
-    """Return where in the unit interval a design's places lie: not at the infinite ends of a normal distribution."""
-    return TAIL + (1.0 - 2.0 * TAIL) * places if isinstance(values, Normal) else open_interval(places)
-
-
-def _analysed(
-    members: list[Member], points: Floats, plan: Sweep, method: Method, table: ExperimentTable | None, seed: int
-) -> Sensitivity:
     rows = method.rows_of_block(len(plan.vary))
     has_final = np.array([member.final is not None for member in members])
     whole = np.asarray(np.all(has_final.reshape(-1, rows), axis=1))
@@ -204,17 +170,26 @@ def _analysed(
         )
     kept = np.repeat(whole, rows)
     finals = [member.final for member, is_kept in zip(members, kept, strict=True) if is_kept and member.final]
-    found = tuple(indices_of(output, points[kept], method, seed) for output in outputs_of(finals, table))
     return Sensitivity(
         method=method,
         keys=tuple(plan.vary),
-        outputs=found,
+        outputs=tuple(indices_of(output, points[kept], method, seed) for output in outputs_of(finals, table)),
         runs=len(members),
         failed=len(problems),
         first_problem=problems[0] if problems else "",
         blocks=len(whole),
         left_out=int(np.sum(~whole)),
     )
+
+
+def settings_at(points: Floats, vary: Mapping[str, Variation]) -> Iterator[dict[str, object]]:
+    """Yield the values of the keys at points of the unit cube, shape (runs, keys)."""
+    columns = []
+    for values, places in zip(vary.values(), points.T, strict=True):
+        # not at the infinite ends of a normal distribution
+        inner = TAIL + (1.0 - 2.0 * TAIL) * places if isinstance(values, Normal) else open_interval(places)
+        columns.append(drawn(values, inner))
+    return (dict(zip(vary, row, strict=True)) for row in zip(*columns, strict=True))
 
 
 def indices_of(output: Output, points: Floats, method: Method, seed: int) -> Indices:

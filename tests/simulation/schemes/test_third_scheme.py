@@ -66,14 +66,8 @@ def test_its_keys_are_checked_and_written() -> None:
 
 
 def test_sweeps_vary_its_keys_and_resume(tmp_path: Path) -> None:
-<<<<<<< HEAD
-    def swept(*drags: float) -> dict[str, Any]:
-        frame = blocksim.sweep(thrown(), {"time.drag": list(drags)}, out=tmp_path).to_frame()
-        return {str(key): values for key, values in frame.to_dict("list").items()}
-=======
     def swept(*drags: float) -> Any:
         return blocksim.sweep(thrown(), {"time.drag": list(drags)}, out=tmp_path).to_frame().to_dict("list")
->>>>>>> 9cc5dd9 (A folder is one of a run by its resolved scenario and by names)
 
     first = swept(0.0, 0.01)
     assert first["status"] == ["finished", "finished"]
