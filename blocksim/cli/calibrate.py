@@ -10,13 +10,13 @@ import typer
 from blocksim.cli import completion, options
 from blocksim.cli.output import note, number, show, table_lines
 from blocksim.cli.prepare import tell_compilation
-from blocksim.cli.vary import RANGE, SPREAD, read_variations
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.calibrate import FRESH_MEMBERS, MEMBERS, TRIALS, Fit, calibrate
 from blocksim.study.calibrate_plan import FIT, SCATTER, read_plan
 from blocksim.study.calibrate_search import Trial
+from blocksim.study.vary import RANGE, SPREAD, read_variations
 
 COLUMNS = ("key", "prior", "fitted")
 TIED = ("key", "prior", "equally good", "written")

@@ -98,9 +98,11 @@ def loaded(name: str) -> Any:
     """Return the command of a name, ready to be called."""
     module = name.replace("-", "_")
     with loading(), clearing_up(wanted=False):
+        from blocksim.cli.options import expanded
+
         function = getattr(import_module(f"blocksim.cli.{module}"), f"{module}_command")
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-    alone.command(name, short_help=COMMANDS[name], context_settings=HELP)(function)
+    alone.command(name, short_help=COMMANDS[name], context_settings=HELP)(expanded(function))
     command: Any = typer.main.get_command(alone)
     if name in WITH_SCENARIOS:
         command.params.append(_allow_outside())

@@ -10,8 +10,7 @@ from blocksim.analysis.lognormal import Curve, NoCurve
 from blocksim.cli import completion, options
 from blocksim.cli.output import answer, note, number, print_json, table_lines
 from blocksim.cli.prepare import tell_compilation, warn_of_values
-from blocksim.cli.sweep_output import leaving_unfinished_cases, reporting, short_names
-from blocksim.cli.vary import read_variations
+from blocksim.cli.progress import leaving_unfinished_cases, reporting
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
@@ -28,6 +27,7 @@ from blocksim.study.fragility_plan import (
     read_fragility,
 )
 from blocksim.study.progress import WHOLE, Shard
+from blocksim.study.vary import read_variations
 
 DIGITS = 3
 DOUBTFUL = 0.05  # probability of a larger deviance below which counts and curve do not agree
@@ -130,10 +130,10 @@ def fragility_command(
         warn_of_values(base)
     tell_compilation(kernels_of(base), quiet=silent)
     heads = {head.key: head for head in plan.cases.heads}
-    with leaving_unfinished_cases(), reporting(short_names(tuple(heads)), heads, quiet=silent) as on_row:
+    with leaving_unfinished_cases(), reporting(heads.values(), quiet=silent) as on_row:
         found = run_fragility(
             plan,
-            Execution(None if executor is None else executor.value, jobs, scheduler),
+            Execution(executor=None if executor is None else executor.value, jobs=jobs, scheduler=scheduler),
             WHOLE if shard is None else Shard.parse(shard),
             out=out,
             overwrite=overwrite,

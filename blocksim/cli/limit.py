@@ -13,8 +13,7 @@ from blocksim.cli.limit_curve import show_curve
 from blocksim.cli.limit_give import level_lines, margin_lines, step_lines, told_stiffness, warn_of_give
 from blocksim.cli.output import answer, note, number, print_json, table_lines, width_of_screen
 from blocksim.cli.prepare import tell_compilation
-from blocksim.cli.sweep_output import leaving_unfinished_cases
-from blocksim.cli.vary import RANGE, read_variations
+from blocksim.cli.progress import leaving_unfinished_cases
 from blocksim.errors import ExitCode
 from blocksim.scenario import Document
 from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
@@ -31,6 +30,7 @@ from blocksim.study.limit_result import LimitResult
 from blocksim.study.limit_search import Change, Number
 from blocksim.study.limit_stiff import refuse_without_springs
 from blocksim.study.rows import Row
+from blocksim.study.vary import RANGE, read_variations
 
 SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
 PERCENT = 100.0
@@ -145,7 +145,7 @@ def limit_command(
         _warn(curve.one, silent=silent)
         show_curve(
             curve,
-            Execution(None if executor is None else executor.value, jobs, scheduler),
+            Execution(executor=None if executor is None else executor.value, jobs=jobs, scheduler=scheduler),
             out,
             overwrite=overwrite,
             stiffer=stiffer,
@@ -166,7 +166,7 @@ def limit_command(
         with leaving_unfinished_cases():
             found[name] = find_limit(
                 plan,
-                Execution(None if executor is None else executor.value, jobs, scheduler),
+                Execution(executor=None if executor is None else executor.value, jobs=jobs, scheduler=scheduler),
                 out=None if out is None else out / _folder(name) if len(plans) > 1 else out,
                 overwrite=overwrite,
                 keep_runs=not no_runs,

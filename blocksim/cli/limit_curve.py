@@ -8,7 +8,7 @@ import typer
 
 from blocksim.cli.limit_give import warn_of_give
 from blocksim.cli.output import answer, note, print_json, table_lines, width_of_screen
-from blocksim.cli.sweep_output import leaving_unfinished_cases
+from blocksim.cli.progress import leaving_unfinished_cases
 from blocksim.errors import ExitCode
 from blocksim.study.executors import Execution
 from blocksim.study.limit_curve import CurvePlan, CurveResult, find_curve

@@ -2,15 +2,31 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
+from blocksim.cli.options import Settings
 from blocksim.cli.output import note
 from blocksim.cli.process import loading
 from blocksim.errors import ScenarioError
+from blocksim.options import Option
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.plausible import implausible_values
 from blocksim.world.step import SkinTooSmallError, StepError
+
+
+@dataclass(frozen=True)
+class ScenarioInput:
+    """A scenario file on the command line, with what is set in it."""
+
+    scenario: Annotated[Path, Option("Scenario file (TOML).", metavar="SCENARIO", is_argument=True)]
+    settings: Settings = None
+
+    def document(self) -> Document:
+        """Return the document. Raises what reading it raises."""
+        return Document.read(self.scenario).with_settings(self.settings or [])
 
 
 @contextmanager

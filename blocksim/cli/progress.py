@@ -1,18 +1,23 @@
-"""Progress of a run: a live line on a terminal, a plain line now and then elsewhere."""
+"""Progress of a run or a study: a live line on a terminal, a plain line now and then elsewhere."""
 
+import math
+import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, TypeVar
 
 from rich.console import Console
 
 from blocksim.cli.output import note
+from blocksim.errors import StoppedEarlyError
 
 if TYPE_CHECKING:  # stored results are shown without the solver
     from blocksim.simulation import Progress as Where
+    from blocksim.study.rows import Head, Row
 
 T = TypeVar("T")
+FEW = 40  # cases that get a line each
 PLAIN_SECONDS = 2.0
 LIVE_SECONDS = 0.1
 
@@ -130,3 +135,67 @@ def _plain_lines() -> "Callable[[Where], None]":
             )
 
     return show
+
+
+@contextmanager
+def leaving_unfinished_cases() -> Iterator[None]:
+    """End the process at once where a study is stopped early, without waiting for a case that takes minutes."""
+    from blocksim.study.executors.ensemble import is_still_running
+
+    try:
+        yield
+    except StoppedEarlyError as error:
+        if is_still_running():
+            note(str(error))
+            os._exit(error.exit_code)
+        raise
+
+
+@contextmanager
+def reporting(heads: "Iterable[Head]", *, quiet: bool) -> "Iterator[Callable[[int, int, Row], None]]":
+    """Give a function that takes every row of a study of these columns: a bar on a terminal, lines elsewhere."""
+    if quiet:
+        yield lambda *_: None
+    elif Console(stderr=True).is_terminal:
+        with counting("cases", quiet=False) as show:
+            yield lambda done, total, _: show(done, total)
+    else:
+        yield _case_lines(list(heads))
+
+
+def _case_lines(heads: "Sequence[Head]") -> "Callable[[int, int, Row], None]":
+    """Return a function that reports each of a few cases with the values of the varied keys, and the pace of many."""
+    from blocksim.study.rows import FINISHED
+    from blocksim.view.sweeps.data import short_names
+
+    names = short_names([head.key for head in heads])
+    began = shown_at = time.monotonic()
+    new = failed = 0
+
+    def show(done: int, total: int, row: "Row") -> None:
+        nonlocal shown_at, new, failed
+        new += 1
+        failed += row["status"] != FINISHED
+        if total <= FEW:
+            cells = (f"{shown(head.cell(row[head.key]))} {head.unit}".rstrip() for head in heads)
+            values = ", ".join(f"{name} = {cell}" for name, cell in zip(names, cells, strict=True))
+            note(f"{done}/{total} {row['status']}: {values}")
+        elif done == total or time.monotonic() - shown_at > PLAIN_SECONDS:
+            shown_at = time.monotonic()
+            pace = new / max(shown_at - began, 1e-9)
+            left = f", {(total - done) / pace:.0f} s left" if done < total else ""
+            failures = f", {failed} failed" if failed else ""
+            note(f"{done}/{total} cases{failures}, {pace:.3g} a second{left}")
+
+    return show
+
+
+def shown(value: object) -> str:
+    """Return a cell of the table for people."""
+    match value:
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value:.6g}" if math.isfinite(value) else "–"
+        case _:
+            return str(value)

@@ -12,13 +12,13 @@ from blocksim.cli import completion, options
 from blocksim.cli.output import note, number, show, table_lines
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import counting
-from blocksim.cli.vary import SPREAD, read_variations
 from blocksim.errors import OutputExistsError
 from blocksim.scenario import Document
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.sensitivity import INDICATOR, Indices, Sensitivity, sampled_plan, sensitivity
 from blocksim.study.sensitivity_methods import METHODS
+from blocksim.study.vary import SPREAD, read_variations
 
 VARY = "--vary"
 DIGITS = 3

@@ -1,139 +1,177 @@
-"""blocksim sweep: many runs of one scenario."""
+"""blocksim sweep: many runs of one scenario, and what it shows: the estimate of --dry-run, and the table."""
 
-from enum import StrEnum
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated
 
 import typer
 
-from blocksim.cli import completion, options
-from blocksim.cli.output import print_json
+from blocksim.cli.options import Report, Screen, Settings
+from blocksim.cli.output import GAP, duration, table_lines, width_of_screen
 from blocksim.cli.prepare import tell_compilation, warn_of_values
-from blocksim.cli.sweep_output import leaving_unfinished_cases, reporting, short_names, show_estimate, show_sweep
-from blocksim.cli.vary import with_vary
+from blocksim.cli.progress import leaving_unfinished_cases, reporting, shown
 from blocksim.errors import ExitCode
-from blocksim.scenario import Document, Sweep
-from blocksim.study.progress import WHOLE, Shard
-from blocksim.study.rows import heads_of
-from blocksim.study.sweep import kernels_for, sweep
-from blocksim.study.sweep import merge as merge_shards
+from blocksim.options import Option
+from blocksim.scenario import Document
+from blocksim.simulation.movement import DISPLACEMENT, END_SPEED, FIRST_MOVED, FIRST_MOVER, MOVES_ON, OUTCOME, TURN
+from blocksim.study.plan import Estimate, estimate
+from blocksim.study.rows import FINISHED, heads_of
+from blocksim.study.sweep import SweepOptions, kernels_for, merge, run_sweep
 from blocksim.study.sweep_table import SweepResult
+from blocksim.view.sweeps.data import short_names
+from blocksim.world.free_memory import readable
 
-
-class Mode(StrEnum):
-    """How values are combined."""
-
-    GRID = "grid"
-    LIST = "list"
-    TABLE = "table"
-    LHS = "lhs"
-    SOBOL = "sobol"
-    NORMAL = "normal"
+MOST_ROWS = 40
+MOST_FAILURES = 5
+MOST_MOVERS = 3
+NOT_SHOWN = {"case", "reason", "seconds", END_SPEED, MOVES_ON}
+SHOWN_LAST = (DISPLACEMENT, TURN, FIRST_MOVER, FIRST_MOVED)
+POSITION = ".x_mm"
+NOT_SHOWN_ENDS = ("rotation_deg", "y_mm", "left_mm", "right_mm")
 
 
 def sweep_command(
-    scenario: Annotated[Path | None, typer.Argument(metavar="SCENARIO", help="Scenario file (TOML).")] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="KEY=VALUES",
-            help="KEY=a,b,c or KEY=from:to:count; for random draws KEY=from:to or KEY=mean+-sd. With :log at the end, "
-            "from:to is spaced logarithmically. Repeatable.",
-            autocompletion=completion.scenario_keys,
-        ),
+    *,
+    scenario: Annotated[Path | None, Option("Scenario file (TOML).", metavar="SCENARIO", is_argument=True)] = None,
+    settings: Settings = None,
+    options: SweepOptions,
+    merged: Annotated[
+        Path | None,
+        Option("Run nothing; make sweep.csv from the shards in a folder.", flags=("--merge",), metavar="DIR"),
     ] = None,
-    mode: Annotated[
-        Mode | None,
-        typer.Option(help="All combinations, the k-th value of every key, the scenario's table, or random draws."),
-    ] = None,
-    samples: Annotated[int | None, typer.Option(metavar="N", help="Number of cases to draw (default: 128).")] = None,
-    seed: Annotated[int | None, typer.Option(metavar="S", help="Random seed (default: 0).")] = None,
-    settings: options.Settings = None,
-    executor: options.ExecutorName = None,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
-    shard: Annotated[
-        str | None, typer.Option(metavar="I/N", help="Run only cases I, I + N, ... (job arrays); then --merge.")
-    ] = None,
-    merge: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Run nothing; make sweep.csv from the shards in a folder.")
-    ] = None,
-    allow_missing: Annotated[bool, typer.Option("--allow-missing", help="Merge the cases finished so far.")] = False,
-    keep_cases: Annotated[
-        bool, typer.Option("--keep-cases", help="Keep a run folder with all frames for every case.")
-    ] = False,
-    fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first case that fails.")] = False,
-    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run failed cases again.")] = False,
-    out: options.SweepFolder = None,
-    overwrite: options.Overwrite = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print number of cases, cost and size without running anything.")
-    ] = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+    allow_missing: Annotated[bool, Option("Merge the cases finished so far.")] = False,
+    dry_run: Annotated[bool, Option("Print number of cases, cost and size without running anything.")] = False,
+    screen: Screen,
+) -> Report:
     """Run a scenario many times with some keys varied.
 
     Every case gives a row in sweep.csv. The same command again, also after a kill, runs only the missing cases.
 
     Example: blocksim sweep scenarios/slide.toml --vary gravity=1.62,9.81
     """
-    if merge is not None:
-        _tell(_merged(merge, scenario, allow_missing=allow_missing), as_json=as_json, quiet=quiet)
+    if merged is not None:
+        if scenario is not None:
+            message = "--merge takes the plan from the folder; leave the scenario out"
+            raise typer.BadParameter(message, param_hint="--merge")
+        return _table_report(merge(merged, allow_missing=allow_missing))
     if scenario is None:
         raise typer.BadParameter("a scenario file is needed, or --merge DIR", param_hint="SCENARIO")
-    silent = quiet or as_json
-    document = with_vary(
-        Document.read(scenario).with_settings(settings or []),
-        vary or [],
-        None if mode is None else mode.value,
-        samples=samples,
-        seed=seed,
-    )
+    document = options.document(Document.read(scenario).with_settings(settings or []))
     base = document.build()
-    if not silent:
+    if not screen.silent:
         warn_of_values(base)
     if dry_run:
-        show_estimate(document, jobs, keep_cases=keep_cases, as_json=as_json)
-        return
+        found = estimate(document, keep_cases=options.keep_cases)
+        cores = options.jobs or os.cpu_count() or 1
+        remarks = () if screen.as_json else found.remarks
+        return Report(_estimate_lines(found, cores), {**asdict(found), "jobs": cores}, always=remarks)
     for kernels in kernels_for(document):
-        tell_compilation(kernels, quiet=silent)
-    result = _sweep(
-        document,
-        base.sweep,
-        out=out,
-        executor=None if executor is None else executor.value,
-        jobs=jobs,
-        scheduler=scheduler,
-        shard=WHOLE if shard is None else Shard.parse(shard),
-        keep_cases=keep_cases,
-        fail_fast=fail_fast,
-        retry_failed=retry_failed,
-        overwrite=overwrite,
-        silent=silent,
+        tell_compilation(kernels, quiet=screen.silent)
+    heads = () if base.sweep is None else heads_of(base.sweep)
+    with leaving_unfinished_cases(), reporting(heads, quiet=screen.silent) as on_row:
+        result = run_sweep(document, replace(options, on_row=on_row))
+    return _table_report(result)
+
+
+def _estimate_lines(found: Estimate, cores: int) -> list[str]:
+    until_rest = "; less if they stop at rest" if found.stop_at_rest else ""
+    lines = [
+        f"cases      {found.cases}",
+        f"solving    at most about {duration(found.seconds / cores)} on {cores} {'core' if cores == 1 else 'cores'}",
+        f"results    at most about {readable(found.bytes)}",
+        f"memory     about {readable(found.memory)} for a process that runs one case",
+        f"from the steps of {found.looked_at} cases at the measured speed{until_rest}",
+    ]
+    if found.impossible:
+        lines.append(f"{found.impossible} of these {found.looked_at} cannot be simulated; the first: {found.reason}")
+    return lines
+
+
+def _table_report(result: SweepResult) -> Report:
+    """Return the columns that vary as far as they fit on the screen, outcomes, failures and what is left to do."""
+    table = result.table
+    short = dict(zip(result.keys, short_names(result.keys), strict=True))
+    columns = [
+        name for name in table.columns if name not in (*NOT_SHOWN, *SHOWN_LAST) and not name.endswith(NOT_SHOWN_ENDS)
+    ]
+    columns += [name for name in SHOWN_LAST if name in table]
+    names = [name for name in columns if name in short or name == "inside" or _varies(table[name])]
+    heads, rows, fitting = _texts(result, names, short)
+    if fitting < sum(name not in SHOWN_LAST for name in names):  # the first blocks of many may all stay where they are
+        heads, rows, fitting = _texts(result, sorted(names, key=_rank), short)
+    counts = {
+        "row": len(table) - len(rows),
+        "column": len(names) - fitting,
+        "constant column": len(columns) - len(names),
+    }
+    left_out = [f"{count} {what}{'' if count == 1 else 's'}" for what, count in counts.items() if count]
+    notes = [f"not shown: {', '.join(left_out)}"] if left_out else []
+    notes += _movement_lines(result)
+    if result.share_inside is not None:
+        notes.append(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
+    notes += _failure_lines(result, short)
+    if result.left:
+        notes.append(f"{result.left} cases have not been run; rerun the command to finish")
+    return Report(
+        table_lines(heads[:fitting], [row[:fitting] for row in rows], left=0),
+        {"folder": str(result.folder), "rows": table.to_dict(orient="records")},
+        [*notes, f"table: {result.folder / result.name}"],
+        code=ExitCode.SWEEP_HAS_FAILURES if result.failed else ExitCode.SUCCESS,
     )
-    _tell(result, as_json=as_json, quiet=quiet)
 
 
-def _sweep(document: Document, plan: Sweep | None, *, silent: bool, **wanted: Any) -> SweepResult:
-    """Run a sweep and report its rows."""
-    short = short_names(() if plan is None else tuple(plan.vary))
-    heads = {} if plan is None else {head.key: head for head in heads_of(plan)}
-    with leaving_unfinished_cases(), reporting(short, heads, quiet=silent) as on_row:
-        return sweep(document, on_row=on_row, **wanted)
+def _texts(result: SweepResult, names: list[str], short: dict[str, str]) -> tuple[list[str], list[list[str]], int]:
+    """Return heads and rows of a table of some columns, and how many of these fit on the screen, at least one."""
+    heads = [short.get(name, name) for name in names]
+    rows = [[shown(value) for value in row] for row in result.table[names].head(MOST_ROWS).itertuples(index=False)]
+    width, fitting = -len(GAP), 0
+    for column in zip(heads, *rows, strict=True):
+        width += len(GAP) + max(map(len, column))
+        if width > width_of_screen():
+            break
+        fitting += 1
+    return heads, rows, max(fitting, 1)
 
 
-def _merged(folder: Path, scenario: Path | None, *, allow_missing: bool) -> SweepResult:
-    if scenario is not None:
-        raise typer.BadParameter("--merge takes the plan from the folder; leave the scenario out", param_hint="--merge")
-    return merge_shards(folder, allow_missing=allow_missing)
+def _rank(name: str) -> tuple[bool, bool]:
+    """Return a key that sorts columns of single blocks behind others, and last what a note below the table tells."""
+    return name in (FIRST_MOVER, FIRST_MOVED), name.endswith(POSITION)
 
 
-def _tell(result: SweepResult, *, as_json: bool, quiet: bool) -> NoReturn:
-    """Show the table and leave with the exit code."""
-    if as_json:
-        print_json({"folder": str(result.folder), "rows": result.table.to_dict(orient="records")})
-    else:
-        show_sweep(result, quiet=quiet)
-    raise typer.Exit(ExitCode.SWEEP_HAS_FAILURES if result.failed else ExitCode.SUCCESS)
+def _movement_lines(result: SweepResult) -> Iterator[str]:
+    """Yield how often each outcome occurs, and the largest movement of all."""
+    table = result.table
+    if OUTCOME not in table or table[OUTCOME].isna().all():  # all failed
+        return
+    counts = ", ".join(f"{count} {name}" for name, count in table[OUTCOME].value_counts().items())
+    far, turned = table[DISPLACEMENT].max(), table[TURN].max()
+    yield f"{counts}; largest displacement {far:.2f} mm, rotation {turned:.2f}° (start to end)"
+    moving = int(table[MOVES_ON].isin([True, "True"]).sum()) if MOVES_ON in table else 0
+    if moving:
+        yield f"{moving} of {len(table)} cases were still moving at the end; increase time.end to see where they end"
+    if FIRST_MOVER in table and table[FIRST_MOVER].notna().any():
+        movers = table[FIRST_MOVER].value_counts()
+        first = ", ".join(f"block {name} in {count}" for name, count in movers.head(MOST_MOVERS).items())
+        more = f", {len(movers) - MOST_MOVERS} others" if len(movers) > MOST_MOVERS else ""
+        yield f"first to move: {first}{more} of {len(table)} cases"
+
+
+def _failure_lines(result: SweepResult, short: dict[str, str]) -> Iterator[str]:
+    """Yield the first cases that failed, with their reasons."""
+    if not result.failed:
+        return
+    failed = result.table[result.table["status"] != FINISHED]
+    yield f"{result.failed} of {len(result.table)} cases did not finish; the first: {failed.iloc[0]['reason']}"
+    for _, row in failed.head(MOST_FAILURES).iterrows():
+        values = ", ".join(f"{name} = {shown(row[key])}" for key, name in short.items())
+        yield f"  {row['status']}: {values}: {str(row['reason']).splitlines()[0]}"
+    if len(failed) > MOST_FAILURES:
+        yield f"  and {len(failed) - MOST_FAILURES} more; --retry-failed runs them again"
+
+
+def _varies(values: Iterable[object]) -> bool:
+    """Return True if a column varies: "finished" in all rows does not, nor does a block that stays."""
+    texts = [f"{value:.2f}" if isinstance(value, float) else str(value) for value in values]
+    return len(texts) == 1 or len(set(texts)) > 1

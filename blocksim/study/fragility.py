@@ -159,7 +159,7 @@ def fragility(  # noqa: PLR0913 - one argument for each option of the command
     )
     return run_fragility(
         plan,
-        Execution(executor, jobs, scheduler),
+        Execution(executor=executor, jobs=jobs, scheduler=scheduler),
         shard,
         out=out,
         overwrite=overwrite,

@@ -89,7 +89,7 @@ def limit(  # noqa: PLR0913 - one argument for each option of the command
     plan = read_limit(document_of(scenario), vary, stands=stands, tolerance=tolerance, scan=scan)
     return find_limit(
         plan,
-        Execution(executor, jobs, scheduler),
+        Execution(executor=executor, jobs=jobs, scheduler=scheduler),
         out=out,
         overwrite=overwrite,
         keep_runs=keep_runs,

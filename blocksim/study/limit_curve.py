@@ -119,7 +119,13 @@ def limit_curve(  # noqa: PLR0913 - one argument for each option of the command
     Searches are kept in `out` (default: results/NAME/limits-HASH). Raises as `limit`.
     """
     plan = read_curve(document_of(scenario), vary, over, stands=stands, tolerance=tolerance, scan=scan)
-    return find_curve(plan, Execution(executor, jobs, scheduler), out=out, overwrite=overwrite, stiffer=stiffer)
+    return find_curve(
+        plan,
+        Execution(executor=executor, jobs=jobs, scheduler=scheduler),
+        out=out,
+        overwrite=overwrite,
+        stiffer=stiffer,
+    )
 
 
 def read_curve(

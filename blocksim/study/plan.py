@@ -1,6 +1,6 @@
 """What a sweep varies, the scenario of each of its cases, and what they will cost."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 from statistics import fmean
@@ -69,12 +69,11 @@ def with_sweep(
     document: Document,
     vary: Mapping[str, Values] | None,
     mode: str | None = None,
-    labels: Mapping[str, str] | None = None,
     *,
     samples: int | None = None,
     seed: int | None = None,
 ) -> Document:
-    """Return the document with another [sweep] table; mistakes in it are shown at the text that `labels` has for a key.
+    """Return the document with another [sweep] table; mistakes in it are shown at the texts of Variations.
 
     Without `vary`, the document keeps the keys of its own table. Where the mode is "table", the file is read and its
     columns take its place as lists. Raises ScenarioError, InputMissingError or InvalidInputError for a wrong table.
@@ -84,13 +83,14 @@ def with_sweep(
     overrides = list(document.overrides)
     for key, values in (vary or {}).items():
         table[key] = frozen(values) if isinstance(values, Mapping) else tuple(_plain(value) for value in values)
-        text = (labels or {}).get(key, f"{key}={shown(table[key])}")
-        overrides.append(Override(f"--vary {text}" if labels else "vary", text, ("sweep", key)))
+        text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={shown(table[key])}"
+        label = f"--vary {text}" if isinstance(vary, Variations) else "vary"
+        overrides.append(Override(label, text, ("sweep", key)))
     own = {"mode": mode, "samples": samples, "seed": seed}
     for name, value in own.items():
         if value is not None and table:
             table[name] = value
-            label = f"--{name}" if labels is not None else name
+            label = f"--{name}" if isinstance(vary, Variations) else name
             overrides.append(Override(label, f"{name}={value}", ("sweep", name)))
     data = {**document.data, "sweep": table} if table else document.data
     return _with_table_read(replace(document, data=data, overrides=tuple(overrides)))
@@ -199,7 +199,7 @@ def _case(document: Document, values: Settings) -> Case:
 
 
 @dataclass(frozen=True)
-class Variations:
+class Variations(Mapping[str, Values]):
     """What is said of each key, as a [sweep] table has it, and the text in which a person said it."""
 
     tables: Mapping[str, Values]
@@ -207,8 +207,22 @@ class Variations:
 
     @classmethod
     def of(cls, tables: Mapping[str, Values]) -> "Variations":
-        """Take tables such as {"contact.restitution": {"from": 0.2, "to": 0.4}} from Python."""
+        """Take tables such as {"contact.restitution": {"from": 0.2, "to": 0.4}} from Python, or what is typed."""
+        if isinstance(tables, cls):
+            return tables
         return cls(tables, {key: f"{key}={values}" for key, values in tables.items()})
+
+    def __getitem__(self, key: str) -> Values:
+        """Return what is said of a key."""
+        return self.tables[key]
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the keys."""
+        return iter(self.tables)
+
+    def __len__(self) -> int:
+        """Return the number of keys."""
+        return len(self.tables)
 
 
 def varied(document: Document, given: Variations, option: str, mode: str) -> Sweep:
@@ -216,7 +230,7 @@ def varied(document: Document, given: Variations, option: str, mode: str) -> Swe
 
     Raises ScenarioError that shows each mistake in the text given to `option`.
     """
-    labelled = with_sweep(document, given.tables, mode, given.texts)
+    labelled = with_sweep(document, given, mode)
     overrides = [
         replace(one, label=one.label.replace("--vary", option, 1)) if one.path[:1] == ("sweep",) else one
         for one in labelled.overrides

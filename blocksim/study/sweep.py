@@ -10,11 +10,12 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from blocksim.errors import InputMissingError, InvalidInputError, StoppedEarlyError, UnavailableError
+from blocksim.options import Option, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.silence import silent
@@ -23,12 +24,13 @@ from blocksim.simulation.compilation import compile_kernels, kernel_set, kernels
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study.design import levels_of
-from blocksim.study.executors import Batch, Run, Setting, Task, chosen_executor, executor_named
+from blocksim.study.executors import Batch, Execution, Run, Setting, Task, chosen_executor, executor_named
 from blocksim.study.plan import Cases, Values, cases_of, table_digests, with_sweep
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Entry, Manifest, Shard, Timings, values_hash
 from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, check_experiment, invalid_row
 from blocksim.study.sweep_folder import CASES, prepare, read_plan
 from blocksim.study.sweep_table import SweepResult, SweepTable
+from blocksim.study.vary import read_variations
 
 TIMINGS = "timings.csv"
 MEASURED = "experiment.table"
@@ -37,61 +39,97 @@ AGAIN = "rerun the command to finish"
 OnRow = Callable[[int, int, Row], None]
 SHARDED = re.compile(r"manifest-\d+-of-(\d+)\.jsonl")
 MOST_SHARDS = 20
+SharedCases = Annotated[
+    Shard, Option("Run only cases I, I + N, ... (job arrays); then --merge.", metavar="I/N", read=Shard.parse)
+]
 
 
-def sweep(  # noqa: PLR0913 - one argument for each option of the command
-    scenario: Source,
-    vary: Mapping[str, Values] | None = None,
-    *,
-    mode: str | None = None,
-    samples: int | None = None,
-    seed: int | None = None,
-    out: Path | str | None = None,
-    executor: str | None = None,
-    jobs: int | None = None,
-    scheduler: str | None = None,
-    shard: Shard = WHOLE,
-    keep_cases: bool = False,
-    fail_fast: bool = False,
-    retry_failed: bool = False,
-    overwrite: bool = False,
-    on_row: OnRow = silent,
-) -> SweepResult:
-    """Run every case of a sweep that has no row yet, on `jobs` threads or processes (default: one a core).
+@dataclass(frozen=True)
+class SweepOptions(Execution):
+    """What is varied in a sweep, and how its cases are run and kept."""
 
-    `vary` (dotted key: values; from, to, count; from, to; or mean, sd), `mode` (grid, list, table, lhs, sobol, normal)
-    and, for drawn cases, `samples` and `seed` replace what the scenario's [sweep] table says. `executor` is ensemble
-    (default), processes (default with `keep_cases`, which writes a folder of frames for every case) or dask (default
-    with a `scheduler`, such as tcp://host:8786); the rows are the same. With a `shard`, only its cases are run, and
-    `merge` makes one table of all shards.
+    vary: Annotated[
+        Mapping[str, Values] | None,
+        Option(
+            "KEY=a,b,c or KEY=from:to:count; for random draws KEY=from:to or KEY=mean+-sd. With :log at the end, "
+            "from:to is spaced logarithmically. Repeatable.",
+            python="The values of each dotted key: a list, {from, to, count}, {from, to} or {mean, sd}.",
+            metavar="KEY=VALUES",
+            read=read_variations,
+            is_repeatable=True,
+            complete="scenario_keys",
+        ),
+    ] = None
+    _: KW_ONLY
+    mode: Annotated[
+        str | None,
+        Option(
+            "All combinations, the k-th value of every key, the scenario's table, or random draws.",
+            python="grid (all combinations), list (the k-th value of every key), table (the scenario's), or random "
+            "draws by lhs, sobol or normal.",
+            choices=("grid", "list", "table", "lhs", "sobol", "normal"),
+        ),
+    ] = None
+    samples: Annotated[int | None, Option("Number of cases to draw (default: 128).", metavar="N")] = None
+    seed: Annotated[int | None, Option("Random seed (default: 0).", metavar="S")] = None
+    out: Annotated[
+        Path | str | None,
+        Option("Folder for the results (default: results/NAME/sweep-HASH).", metavar="DIR"),
+    ] = None
+    shard: SharedCases = WHOLE
+    keep_cases: Annotated[bool, Option("Keep a run folder with all frames for every case.")] = False
+    fail_fast: Annotated[bool, Option("Stop at the first case that fails.")] = False
+    retry_failed: Annotated[bool, Option("Run failed cases again.")] = False
+    overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
+    on_row: OnRow = silent
 
-    Cases that fail get a row with their status; the others continue, unless `fail_fast`. `retry_failed` runs them
-    again. Raises ScenarioError for a bad scenario, InvalidInputError where nothing is varied, OutputExistsError where
-    the folder is not free, UnavailableError for a scheduler that does not answer, StoppedEarlyError on Ctrl-C.
+    def document(self, scenario: Source) -> Document:
+        """Return a scenario with the [sweep] table that these options make. Raises as `with_sweep`."""
+        return with_sweep(document_of(scenario), self.vary, self.mode, samples=self.samples, seed=self.seed)
+
+
+@takes(SweepOptions)
+def sweep(scenario: Source, options: SweepOptions) -> SweepResult:
+    """Run every case of a sweep that has no row yet.
+
+    `vary`, `mode`, `samples` and `seed` replace what the scenario's [sweep] table says. `executor` is by default
+    processes with `keep_cases` and dask with a `scheduler`; the rows are the same. With a `shard`, only its cases are
+    run, and `merge` makes one table of all shards. `on_row` is called with every row, and how many there are.
+
+    Cases that fail get a row with their status; the others continue, unless `fail_fast`. Raises ScenarioError for a bad
+    scenario, InvalidInputError where nothing is varied, OutputExistsError where the folder is not free,
+    UnavailableError for a scheduler that does not answer, StoppedEarlyError on Ctrl-C.
 
     A script that has processes started needs the guard `if __name__ == "__main__":`, as they import the script.
     """
-    executor = chosen_executor(executor, scheduler, keep_cases=keep_cases)
-    refuse_loss(shard, overwrite=overwrite)
+    return run_sweep(options.document(scenario), options)
+
+
+def run_sweep(document: Document, options: SweepOptions) -> SweepResult:
+    """Run the cases of a document that has its [sweep] table; see `sweep`."""
+    executor = chosen_executor(options.executor, options.scheduler, keep_cases=options.keep_cases)
+    shard = options.shard
+    refuse_loss(shard, overwrite=options.overwrite)
     runner = executor_named(executor)
-    document = with_sweep(document_of(scenario), vary, mode, samples=samples, seed=seed)
     base = document.build()
     plan = _plan_of(base)
     cases = cases_of(document, plan)
     name = sweep_hash(base, plan, table_digests(document, plan.vary))
-    folder = Path(out) if out is not None else files.RESULTS / base.name / f"sweep-{name}"
-    setting = Setting(jobs or os.cpu_count() or 1, scheduler=scheduler, folder=folder / CASES if keep_cases else None)
+    folder = Path(options.out) if options.out is not None else files.RESULTS / base.name / f"sweep-{name}"
+    cases_folder = folder / CASES if options.keep_cases else None
+    setting = Setting(options.jobs or os.cpu_count() or 1, scheduler=options.scheduler, folder=cases_folder)
     runner.check(setting)
-    prepare(folder, base, name, overwrite=overwrite)
+    prepare(folder, base, name, overwrite=options.overwrite)
     for kernels in kernels_for(document):
         compile_kernels(kernels)
     with closing(Manifest(folder / shard.file(MANIFEST))) as kept:
         done = CaseIndex(folder, len(cases))
-        if retry_failed:
+        if options.retry_failed:
             done.forget_failed(shard)
         table = SweepTable(folder / shard.file(TABLE), cases, done, measured_ranges(base), shard)
         timings = Timings(folder / shard.file(TIMINGS), executor)
-        SweepRun(cases, shard, kept, done, table, timings, on_row).run(runner.run, setting, fail_fast=fail_fast)
+        share = SweepRun(cases, shard, kept, done, table, timings, options.on_row)
+        share.run(runner.run, setting, fail_fast=options.fail_fast)
     return SweepResult(folder, shard.file(TABLE), len(done.state[shard.slice]))
 
 

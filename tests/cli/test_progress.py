@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from blocksim.cli import progress, sweep_output
-from blocksim.cli.progress import counting
-from blocksim.cli.sweep_output import reporting
+from blocksim.cli import progress
+from blocksim.cli.progress import counting, reporting
+from blocksim.study.rows import Head
 from tests.cli.conftest import Command
 
 
@@ -16,13 +16,12 @@ from tests.cli.conftest import Command
 def terminal(monkeypatch: pytest.MonkeyPatch) -> StringIO:
     """Have a terminal in place of standard error."""
     screen = StringIO()
-    for module in (progress, sweep_output):
-        monkeypatch.setattr(module, "Console", lambda **_: Console(file=screen, force_terminal=True, width=80))
+    monkeypatch.setattr(progress, "Console", lambda **_: Console(file=screen, force_terminal=True, width=80))
     return screen
 
 
 def test_terminal_has_a_bar_for_the_cases_of_a_sweep(terminal: StringIO, capsys: pytest.CaptureFixture[str]) -> None:
-    with reporting({"gravity": "gravity"}, {}, quiet=False) as on_row:
+    with reporting([Head("gravity")], quiet=False) as on_row:
         on_row(3, 8, {"status": "finished", "gravity": 9.81})
     assert "3 of 8 cases" in terminal.getvalue()
     assert capsys.readouterr().err == ""
@@ -40,7 +39,7 @@ def test_elsewhere_there_are_lines_now_and_then(
 
 
 def test_quiet_shows_nothing(terminal: StringIO, capsys: pytest.CaptureFixture[str]) -> None:
-    with counting("pictures", quiet=True) as show, reporting({}, {}, quiet=True) as on_row:
+    with counting("pictures", quiet=True) as show, reporting([], quiet=True) as on_row:
         show(1, 2)
         on_row(1, 2, {"status": "finished"})
     assert (terminal.getvalue(), capsys.readouterr().err) == ("", "")

@@ -10,7 +10,7 @@ from blocksim.errors import InvalidInputError, ScenarioError
 from blocksim.scenario import Document, scenario_to_toml
 from blocksim.simulation.provenance import run_hash
 from blocksim.study import plan
-from blocksim.study.plan import Values, with_sweep
+from blocksim.study.plan import Values, Variations, with_sweep
 from blocksim.study.sampling import design_of
 from tests.golden import Golden
 from tests.study.plans import SCALE, cases, plan_of
@@ -77,7 +77,7 @@ def test_wrong_keys_values_and_distributions_are_reported_where_they_were_given(
 ) -> None:
     vary, mode = WRONG[name]
     with pytest.raises(ScenarioError) as caught:
-        with_sweep(nominal, vary, mode, {key: f"{key}=typed" for key in vary}).build()
+        with_sweep(nominal, Variations(vary, {key: f"{key}=typed" for key in vary}), mode).build()
     golden(str(caught.value))
 
 
@@ -153,7 +153,7 @@ def test_tables_of_motion_are_read_once_for_all_cases(tmp_path: Path) -> None:
 def test_a_distribution_that_leaves_the_possible_values_is_refused_before_anything_runs(nominal: Document) -> None:
     vary: dict[str, Values] = {"contact.restitution": {"mean": 0.1, "sd": 0.1}, KINETIC: {"mean": 0.2, "sd": 0.01}}
     with pytest.raises(ScenarioError, match=r"--vary contact.restitution=typed: drawn: -0\.\d+ is too small") as caught:
-        cases(nominal, vary, "normal", labels={key: f"{key}=typed" for key in vary}, samples=100)
+        cases(nominal, Variations(vary, {key: f"{key}=typed" for key in vary}), "normal", samples=100)
     assert len(caught.value.problems) == 1
     assert "cut the distribution with from and to" in str(caught.value)
 

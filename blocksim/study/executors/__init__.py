@@ -4,14 +4,15 @@ import os
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from importlib import import_module
 from itertools import takewhile
 from multiprocessing import current_process
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from blocksim.errors import InvalidInputError
+from blocksim.options import Option
 from blocksim.scenario import Scenario
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.study.rows import Row
@@ -117,11 +118,20 @@ def executor_named(name: str) -> Executor:
 
 @dataclass(frozen=True)
 class Execution:
-    """What a caller says of how runs are to be executed; see `blocksim.study.sweep.sweep`."""
+    """Options of every study: how its runs are executed, which does not change its answer."""
 
-    executor: str | None = None
-    jobs: int | None = None
-    scheduler: str | None = None
+    _: KW_ONLY
+    executor: Annotated[
+        str | None,
+        Option(
+            "ensemble: in this process (default); processes: a case that crashes stops no other.",
+            choices=tuple(EXECUTORS),
+        ),
+    ] = None
+    jobs: Annotated[int | None, Option("Threads or processes (default: one per core).", metavar="N", least=1)] = None
+    scheduler: Annotated[
+        str | None, Option("Scheduler of a Dask cluster, such as tcp://host:8786.", metavar="ADDRESS")
+    ] = None
 
     @property
     def name(self) -> str:

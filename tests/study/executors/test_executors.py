@@ -12,7 +12,7 @@ from blocksim.study import executors as batches
 from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, Setting, Task, executor_named, take
 from blocksim.study.plan import Values
 from blocksim.study.progress import Shard
-from blocksim.study.sweep import merge, sweep
+from blocksim.study.sweep import SweepOptions, merge, sweep
 
 KINETIC = "friction.block_block.kinetic"
 # values that finish, fail in the run, fail before it, and do not go together; other shapes and schemes beside them
@@ -50,7 +50,7 @@ def without_experiment(document: Document) -> Document:
 def test_table_is_the_same_from_every_executor(
     quick: Document, whole: bytes, tmp_path: Path, options: dict[str, object]
 ) -> None:
-    sweep(without_experiment(quick), VARY, out=tmp_path, **options)  # type: ignore[arg-type]
+    sweep(without_experiment(quick), SweepOptions(VARY, out=tmp_path, **options))  # type: ignore[arg-type]
     assert (tmp_path / "sweep.csv").read_bytes() == whole
 
 
@@ -123,4 +123,4 @@ def test_a_script_without_a_main_guard_is_told_so_whatever_study_it_begins(monke
     with pytest.raises(
         InvalidInputError, match=r'^worker processes import this script: .* below if __name__ == "__main'
     ):
-        Execution("processes").ready()
+        Execution(executor="processes").ready()

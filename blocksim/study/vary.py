@@ -1,11 +1,10 @@
-"""Reading --vary KEY=VALUES."""
+"""Reading KEY=VALUES, as --vary and other options of studies take it."""
 
 from collections.abc import Sequence
 
 from blocksim.errors import Problem, ScenarioError
-from blocksim.scenario import Document
 from blocksim.scenario.overrides import UnfitOverrideError, parse_value
-from blocksim.study.plan import Values, Variations, with_sweep
+from blocksim.study.plan import Values, Variations
 
 ENDS = ("from", "to", "count")
 LEAST_ENDS = 2
@@ -16,26 +15,11 @@ RANGE = "KEY=from:to (also with :log at the end)"
 SPREAD = "KEY=from:to, KEY=mean+-sd or KEY=a,b,c (from:to also with :log at the end)"
 
 
-def with_vary(
-    document: Document,
-    texts: Sequence[str],
-    mode: str | None,
-    *,
-    samples: int | None = None,
-    seed: int | None = None,
-) -> Document:
-    """Return the document with a [sweep] table from texts such as `key=a,b,c`, `key=from:to:count` or `key=mean+-sd`.
+def read_variations(texts: Sequence[str], option: str = "--vary", forms: str = FORMS) -> Variations:
+    """Return the values of each key in texts such as `key=a,b,c`, `key=from:to:count` or `key=mean+-sd`.
 
-    Raises ScenarioError where a text is none of them; wrong keys and values show when the document is built.
-    """
-    given = read_variations(texts, "--vary")
-    return with_sweep(document, given.tables, mode, given.texts, samples=samples, seed=seed)
-
-
-def read_variations(texts: Sequence[str], option: str, forms: str = FORMS) -> Variations:
-    """Return the values of each key in such texts, given to an option; raises ScenarioError for any other text.
-
-    `forms` are those that the option takes, as the message for a text without a key or values says them.
+    Raises ScenarioError where a text is none of these `forms`, which are those that the option takes; wrong keys and
+    values show when the document is built.
     """
     problems = [Problem(f"{option} {text}", f"write {forms}") for text in texts if not _parts(text)]
     keys = [key for text in texts for key, _ in _parts(text)]
