@@ -19,13 +19,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from blocksim.scenario import load_scenario as load
     from blocksim.scenario import replace_values as replace
-    from blocksim.study.api import animate, calibrate, plot, report, sensitivity
+    from blocksim.study.calibrate import calibrate
     from blocksim.study.compare import compare
     from blocksim.study.converge import converge
     from blocksim.study.fragility import fragility
     from blocksim.study.limit import limit
     from blocksim.study.limit_curve import limit_curve
+    from blocksim.study.pictures import plot
+    from blocksim.study.reporting import report
     from blocksim.study.run import open_run, run
+    from blocksim.study.run_pictures import animate
+    from blocksim.study.sensitivity import sensitivity
     from blocksim.study.sweep import sweep
     from blocksim.study.sweep_table import read_sweep as open_sweep
 
@@ -51,8 +55,8 @@ __all__ = [
 
 # found when first asked for, so that `blocksim --help` need not wait for numba and pandas
 _HOMES = {
-    "animate": ("blocksim.study.api", "animate"),
-    "calibrate": ("blocksim.study.api", "calibrate"),
+    "animate": ("blocksim.study.run_pictures", "animate"),
+    "calibrate": ("blocksim.study.calibrate", "calibrate"),
     "compare": ("blocksim.study.compare", "compare"),
     "converge": ("blocksim.study.converge", "converge"),
     "fragility": ("blocksim.study.fragility", "fragility"),
@@ -61,11 +65,11 @@ _HOMES = {
     "load": ("blocksim.scenario", "load_scenario"),
     "open_run": ("blocksim.study.run", "open_run"),
     "open_sweep": ("blocksim.study.sweep_table", "read_sweep"),
-    "plot": ("blocksim.study.api", "plot"),
+    "plot": ("blocksim.study.pictures", "plot"),
     "replace": ("blocksim.scenario", "replace_values"),
-    "report": ("blocksim.study.api", "report"),
+    "report": ("blocksim.study.reporting", "report"),
     "run": ("blocksim.study.run", "run"),
-    "sensitivity": ("blocksim.study.api", "sensitivity"),
+    "sensitivity": ("blocksim.study.sensitivity", "sensitivity"),
     "sweep": ("blocksim.study.sweep", "sweep"),
 }
 

@@ -76,8 +76,9 @@ def option_fields(options: Any) -> Iterator[OptionField]:
     names = dict.fromkeys(name for kind in options.__mro__ for name in inspect.get_annotations(kind))
     for name in names:
         if name in known:
-            default = known[name].default
-            yield option_field(name, hints[name], inspect.Parameter.empty if default is MISSING else default)
+            default, factory = known[name].default, known[name].default_factory
+            made = inspect.Parameter.empty if factory is MISSING else factory()
+            yield option_field(name, hints[name], made if default is MISSING else default)
 
 
 def option_field(name: str, annotation: Any, default: Any) -> OptionField:

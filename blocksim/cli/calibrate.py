@@ -1,70 +1,24 @@
 """blocksim calibrate: fit inputs to measured repeats, so that agreement is probable under the scatter of the others."""
 
 import time
-from collections.abc import Callable
-from pathlib import Path
-from typing import Annotated
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
 
-import typer
-
-from blocksim.cli import completion, options
-from blocksim.cli.output import note, number, show, table_lines
-from blocksim.cli.prepare import tell_compilation
+from blocksim.cli.options import Report, Screen
+from blocksim.cli.output import note, number, table_lines
+from blocksim.cli.prepare import ScenarioInput, tell_compilation
 from blocksim.errors import ExitCode
-from blocksim.scenario import Document
-from blocksim.simulation.compilation import kernels_of
-from blocksim.study.calibrate import FRESH_MEMBERS, MEMBERS, TRIALS, Fit, calibrate
-from blocksim.study.calibrate_plan import FIT, SCATTER, read_plan
+from blocksim.silence import silent
+from blocksim.study.calibrate import CalibrateOptions, Fit, calibrate
 from blocksim.study.calibrate_search import Trial
-from blocksim.study.vary import RANGE, SPREAD, read_variations
 
 COLUMNS = ("key", "prior", "fitted")
 TIED = ("key", "prior", "equally good", "written")
 TOLD_SECONDS = 2.0
 
 
-def calibrate_command(
-    scenario: options.ScenarioPath,
-    fit: Annotated[
-        list[str] | None,
-        typer.Option(
-            FIT,
-            metavar="KEY=FROM:TO",
-            help="A key to fit, and its prior. Repeatable.",
-            autocompletion=completion.scenario_keys,
-        ),
-    ] = None,
-    scatter: Annotated[
-        list[str] | None,
-        typer.Option(
-            SCATTER,
-            metavar="KEY=MEAN+-SD",
-            help="Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
-            "Default: the distributions of [sweep].",
-            autocompletion=completion.scenario_keys,
-        ),
-    ] = None,
-    trials: Annotated[int, typer.Option(min=1, metavar="N", help="Number of trials.")] = TRIALS,
-    members: Annotated[
-        int, typer.Option("--samples", "--members", min=1, metavar="M", help="Samples of the scatter per trial.")
-    ] = MEMBERS,
-    fresh: Annotated[
-        int, typer.Option(min=1, metavar="M", help="Fresh samples for the final estimate of the probability.")
-    ] = FRESH_MEMBERS,
-    seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed.")] = 0,
-    experiment: options.ExperimentPath = None,
-    settings: options.Settings = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="FILE", help="Scenario file to write (default: results/NAME/calibrate-HASH/scenario.toml)."
-        ),
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Resume with the existing trials.")] = False,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file and the existing trials.")] = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+def calibrate_command(source: ScenarioInput, options: CalibrateOptions, screen: Screen) -> Report:
     """Fit inputs to measured repeats, within their priors.
 
     Maximises the probability that a run is inside all measured ranges (as in compare) while the other inputs scatter as
@@ -77,32 +31,24 @@ def calibrate_command(
 
     Example: blocksim calibrate mine.toml --fit contact.restitution=0.2:0.35
     """
-    silent = quiet or as_json
-    plan = read_plan(
-        Document.read(scenario).with_settings(settings or []),
-        read_variations(fit or [], FIT, RANGE),
-        read_variations(scatter or [], SCATTER, SPREAD),
-        experiment=experiment,
-        members=members,
-        seed=seed,
-    )
-    tell_compilation(kernels_of(plan.base), quiet=silent)
     found = calibrate(
-        plan,
-        trials=trials,
-        fresh_members=fresh,
-        out=out,
-        resume=resume,
-        overwrite=overwrite,
-        on_trial=(lambda *_: None) if silent else _telling(),
+        source.document(),
+        replace(
+            options,
+            on_start=partial(tell_compilation, quiet=screen.silent),
+            on_trial=silent if screen.silent else _trial_lines(),
+        ),
     )
-    show(_lines(found), _data(found), as_json=as_json)
-    if not silent:
-        _tell_end(found)
-    raise typer.Exit(ExitCode.SUCCESS if found.found else ExitCode.OUTSIDE)
+    nothing = [] if found.found else ["", *_nothing_found(found)]
+    return Report(
+        [*_values(found), "", *_probability(found), *nothing],
+        found.to_dict(),
+        _notes(found),
+        code=ExitCode.SUCCESS if found.found else ExitCode.OUTSIDE,
+    )
 
 
-def _telling() -> Callable[[Trial, Trial, int], None]:
+def _trial_lines() -> Callable[[Trial, Trial, int], None]:
     """Return a function that reports every trial that is the best so far, and others now and then."""
     told_at = 0.0
 
@@ -122,11 +68,6 @@ def _agreement(trial: Trial, best: Trial) -> str:
     if best.score.inside:
         return f"{trial.score.share_inside:.0%} inside (best {best.score.share_inside:.0%})"
     return f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
-
-
-def _lines(found: Fit) -> list[str]:
-    nothing = [] if found.found else ["", *_nothing_found(found)]
-    return [*_values(found), "", *_probability(found), *nothing]
 
 
 def _values(found: Fit) -> list[str]:
@@ -173,52 +114,11 @@ def _probability(found: Fit) -> list[str]:
     ]
 
 
-def _tell_end(found: Fit) -> None:
+def _notes(found: Fit) -> Iterator[str]:
     for prior in found.at_bounds:
         value = found.best.values[prior.key]
-        note(f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better")
+        yield f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better"
     failed = found.score.failed
     if failed:
-        note(f"{failed} of {found.score.members} fresh samples failed or cannot be simulated; they count as outside")
-    note(f"written: {found.path}")
-
-
-def _data(found: Fit) -> dict[str, object]:
-    low, high = found.score.interval
-    return {
-        "scenario": str(found.path),
-        "found": found.found,
-        "fitted": [
-            {
-                "key": prior.key,
-                "prior": [prior.low, prior.high],
-                "unit": prior.unit,
-                "value": found.best.values[prior.key],
-                "at_bound": prior in found.at_bounds,
-                "equally_good": list(found.equally_good(prior)),
-            }
-            for prior in found.plan.priors
-        ],
-        "scatter": found.plan.scatter.described(),
-        "experiment": found.plan.table.source,
-        "trials": found.trials,
-        "members": found.plan.members,
-        "seed": found.plan.seed,
-        "best_trial": found.best.number,
-        "tied_trials": len(found.ties),
-        "search_share_inside": found.best.score.share_inside,
-        "share_inside": found.score.share_inside,
-        "interval": [low, high],
-        "fresh_members": found.score.members,
-        "failed": found.score.failed,
-        "quantities": [
-            {
-                "block": hit.range.block,
-                "quantity": hit.range.column,
-                "range": [hit.range.lower, hit.range.upper],
-                "median": hit.median,
-                "share_inside": hit.share_inside,
-            }
-            for hit in found.hits
-        ],
-    }
+        yield f"{failed} of {found.score.members} fresh samples failed or cannot be simulated; they count as outside"
+    yield f"written: {found.path}"

@@ -16,7 +16,7 @@ from blocksim.cli.failures import told
 from blocksim.cli.process import clearing_up, loading
 from blocksim.errors import InputMissingError
 
-COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command in verify_run.py
+COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command, in verify_run.py unless in MODULES
     "run": "Simulate a scenario and print the final positions.",
     "compare": "Compare runs with measured repeats.",
     "check": "Validate a scenario and summarise it.",
@@ -37,6 +37,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
     "schema": "Print the JSON Schema of scenario files, for editors.",
 }
 
+MODULES = {"plot": "pictures", "animate": "pictures", "report": "pictures", "export": "pictures"}
 GROUPS = {  # heads of the list in `blocksim --help`
     "Run": ("new", "run", "schema"),
     "Look": ("plot", "animate", "report", "export"),
@@ -94,13 +95,18 @@ def _refuse_no_folder() -> None:
         raise InputMissingError("the current folder no longer exists; change to another one with cd") from None
 
 
+def function_of(name: str) -> Any:
+    """Return the function of a command."""
+    plain = name.replace("-", "_")
+    return getattr(import_module(f"blocksim.cli.{MODULES.get(name, plain)}"), f"{plain}_command")
+
+
 def loaded(name: str) -> Any:
     """Return the command of a name, ready to be called."""
-    module = name.replace("-", "_")
     with loading(), clearing_up(wanted=False):
         from blocksim.cli.options import expanded
 
-        function = getattr(import_module(f"blocksim.cli.{module}"), f"{module}_command")
+        function = function_of(name)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
     alone.command(name, short_help=COMMANDS[name], context_settings=HELP)(expanded(function))
     command: Any = typer.main.get_command(alone)

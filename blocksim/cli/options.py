@@ -254,22 +254,29 @@ class TextScreen(Screen):
 
 
 def expanded(function: Callable[..., Report | None]) -> Callable[..., None]:
-    """Return a function as typer takes it, in which groups of options are single ones; it shows the report as well."""
+    """Return a command as typer takes it: groups of options are single ones, and its report is shown.
+
+    A command that returns a report and has no parameter for the screen prints text, and has --quiet.
+    """
     parameters: list[inspect.Parameter] = []
     groups: dict[str, Any] = {}
-    for parameter in inspect.signature(function, eval_str=True).parameters.values():
+    own = inspect.signature(function, eval_str=True)
+    for parameter in own.parameters.values():
         field = option_field(parameter.name, parameter.annotation, parameter.default)
         if has_options(field.kind):
             groups[field.name] = field.kind
             parameters += _parameters(field.kind)
         else:
             parameters.append(_parameter(field, field.option) if field.option else parameter)
+    plain = own.return_annotation is Report and not any(issubclass(kind, Screen) for kind in groups.values())
+    parameters += _parameters(TextScreen) if plain else ()
 
     def call(**values: Any) -> None:
+        screen = _made(TextScreen, values) if plain else None
         made = {name: _made(kind, values) for name, kind in groups.items()}
         report = function(**made, **values)
         if report is not None:
-            next(one for one in made.values() if isinstance(one, Screen)).show(report)
+            (screen or next(one for one in made.values() if isinstance(one, Screen))).show(report)
 
     call.__doc__ = function.__doc__
     by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in parameters]
@@ -330,4 +337,7 @@ def _made(group: Any, values: dict[str, Any]) -> Any:
                 given[name] = not value if option.is_negated else value
         elif has_options(kind):
             given[name] = _made(kind, values)
-    return group(**given)
+    try:
+        return group(**given)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None

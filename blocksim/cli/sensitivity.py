@@ -2,67 +2,33 @@
 
 import csv
 import io
-from enum import StrEnum
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from blocksim.cli import completion, options
-from blocksim.cli.output import note, number, show, table_lines
-from blocksim.cli.prepare import tell_compilation
+from blocksim.cli.options import Report, Screen
+from blocksim.cli.output import number, table_lines
+from blocksim.cli.prepare import ScenarioInput, tell_compilation
 from blocksim.cli.progress import counting
 from blocksim.errors import OutputExistsError
-from blocksim.scenario import Document
+from blocksim.options import Option
 from blocksim.simulation.atomic import write_text
-from blocksim.simulation.compilation import kernels_of
-from blocksim.study.sensitivity import INDICATOR, Indices, Sensitivity, sampled_plan, sensitivity
-from blocksim.study.sensitivity_methods import METHODS
-from blocksim.study.vary import SPREAD, read_variations
+from blocksim.study.sensitivity import INDICATOR, Indices, Sensitivity, SensitivityOptions, sensitivity
 
-VARY = "--vary"
 DIGITS = 3
 SIGNS = {"deg": "°", INDICATOR: ""}
-NOTHING = "nothing to vary: give --vary KEY=FROM:TO, or a [sweep] table with distributions"
-
-
-class MethodName(StrEnum):
-    """Methods by their names."""
-
-    MORRIS = "morris"
-    SOBOL = "sobol"
 
 
 def sensitivity_command(
-    scenario: options.ScenarioPath,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            VARY,
-            metavar="KEY=FROM:TO",
-            help="An input and its distribution: KEY=FROM:TO, KEY=MEAN+-SD or KEY=a,b,c. Repeatable. "
-            "Default: the distributions of [sweep].",
-            autocompletion=completion.scenario_keys,
-        ),
-    ] = None,
-    method: Annotated[MethodName, typer.Option(help="Elementary effects, or shares of the variance.")] = (
-        MethodName.MORRIS
-    ),
-    samples: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            help="Morris: trajectories of k + 1 runs for k keys (default: 16); Sobol: base samples of k + 2 runs "
-            "(default: 128).",
-        ),
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed.")] = 0,
-    settings: options.Settings = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="CSV", help="Write all numbers to a table.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table.")] = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+    source: ScenarioInput,
+    options: SensitivityOptions,
+    screen: Screen,
+    *,
+    out: Annotated[Path | None, Option("Write all numbers to a table.", metavar="CSV")] = None,
+    overwrite: Annotated[bool, Option("Replace the table.")] = False,
+) -> Report:
     """Rank the inputs by their effect on final positions.
 
     The results are all measured quantities (without an experiment, x of the blocks) and the class of the outcome:
@@ -71,19 +37,13 @@ def sensitivity_command(
 
     Example: blocksim sensitivity scenarios/slide.toml --vary gravity=9.7:9.9
     """
-    silent = quiet or as_json
     _refuse_present(out, overwrite=overwrite)
-    document = Document.read(scenario).with_settings(settings or [])
-    plan = sampled_plan(document, read_variations(vary or [], VARY, SPREAD), VARY, NOTHING)
-    bare = document.without_sweep()
-    tell_compilation(kernels_of(bare.build()), quiet=silent)
-    with counting("runs", quiet=silent) as on_member:
-        found = sensitivity(bare, plan, METHODS[method.value], samples=samples, seed=seed, on_member=on_member)
+    start = partial(tell_compilation, quiet=screen.silent)
+    with counting("runs", quiet=screen.silent) as on_member:
+        found = sensitivity(source.document(), replace(options, on_start=start, on_member=on_member))
     if out is not None:
         write_text(out, _csv(found))
-    show(_lines(found), _data(found), as_json=as_json)
-    if not silent:
-        _tell_end(found, out)
+    return Report(_lines(found), found.to_dict(), _notes(found, out))
 
 
 def _refuse_present(out: Path | None, *, overwrite: bool) -> None:
@@ -121,18 +81,17 @@ def _table(found: Sensitivity, output: Indices) -> list[str]:
     return table_lines(("key", *(column.split(" ")[0] for column in columns)), rows)
 
 
-def _tell_end(found: Sensitivity, out: Path | None) -> None:
-    for column, meaning in found.method.columns.items():
-        note(f"{column}: {meaning}")
+def _notes(found: Sensitivity, out: Path | None) -> Iterator[str]:
+    yield from (f"{column}: {meaning}" for column, meaning in found.method.columns.items())
     still = [output.name for output in found.outputs if not output.varies]
     if still:
-        note(f"does not vary: {', '.join(still)}")
+        yield f"does not vary: {', '.join(still)}"
     if found.failed:
-        note(
+        yield (
             f"{found.failed} of {found.runs} runs failed; {found.left_out} of {found.blocks} "
             f"{found.method.sample_word} are left out for it. The first: {found.first_problem}"
         )
-    note(f"{found.runs} runs" + (f"; table: {out}" if out is not None else ""))
+    yield f"{found.runs} runs" + (f"; table: {out}" if out is not None else "")
 
 
 def _csv(found: Sensitivity) -> str:
@@ -141,20 +100,3 @@ def _csv(found: Sensitivity) -> str:
     writer.writeheader()
     writer.writerows(found.records())
     return text.getvalue()
-
-
-def _data(found: Sensitivity) -> dict[str, object]:
-    return {
-        "method": found.method.name,
-        "meaning": dict(found.method.columns),
-        "keys": list(found.keys),
-        "runs": found.runs,
-        "failed": found.failed,
-        found.method.sample_word.replace(" ", "_"): found.blocks,
-        "left_out": found.left_out,
-        "outputs": [
-            {"output": one.name, "unit": one.unit, "mean": one.mean, "sd": one.sd, "varies": one.varies}
-            for one in found.outputs
-        ],
-        "indices": list(found.records()),
-    }

@@ -1,16 +1,21 @@
 """Calibration: values within their priors for which agreement with the repeats is most probable under input scatter."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.extras import loaded
+from blocksim.options import Option, takes
+from blocksim.scenario import Source, document_of
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import write_text
+from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.stopping import interruptible
-from blocksim.study.calibrate_plan import Plan, Prior
+from blocksim.study.calibrate_plan import FIT, SCATTER, Plan, Prior, read_plan
 from blocksim.study.calibrate_search import (
     PURPOSE,
     Hit,
@@ -23,12 +28,12 @@ from blocksim.study.calibrate_search import (
     score_of,
     search,
 )
+from blocksim.study.compare import ExperimentTablePath
 from blocksim.study.executors.ensemble import run_members
 from blocksim.study.fitted_file import NOTE, with_fitted
+from blocksim.study.plan import Values, Variations
+from blocksim.study.vary import RANGE, SPREAD, read_variations
 
-TRIALS = 100
-MEMBERS = 64
-FRESH_MEMBERS = 512
 WRITTEN = "scenario.toml"
 JOURNAL = ".trials.jsonl"
 NEEDED = ("optuna", "scipy.stats.qmc")  # before anything is written
@@ -68,36 +73,130 @@ class Fit:
         """Priors at an end of which the fitted value lies: a wider one might give a better fit."""
         return tuple(prior for prior in self.plan.priors if prior.lies_at_bound(self.best.values[prior.key]))
 
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON."""
+        low, high = self.score.interval
+        return {
+            "scenario": str(self.path),
+            "found": self.found,
+            "fitted": [
+                {
+                    "key": prior.key,
+                    "prior": [prior.low, prior.high],
+                    "unit": prior.unit,
+                    "value": self.best.values[prior.key],
+                    "at_bound": prior in self.at_bounds,
+                    "equally_good": list(self.equally_good(prior)),
+                }
+                for prior in self.plan.priors
+            ],
+            "scatter": self.plan.scatter.described(),
+            "experiment": self.plan.table.source,
+            "trials": self.trials,
+            "members": self.plan.members,
+            "seed": self.plan.seed,
+            "best_trial": self.best.number,
+            "tied_trials": len(self.ties),
+            "search_share_inside": self.best.score.share_inside,
+            "share_inside": self.score.share_inside,
+            "interval": [low, high],
+            "fresh_members": self.score.members,
+            "failed": self.score.failed,
+            "quantities": [
+                {
+                    "block": hit.range.block,
+                    "quantity": hit.range.column,
+                    "range": [hit.range.lower, hit.range.upper],
+                    "median": hit.median,
+                    "share_inside": hit.share_inside,
+                }
+                for hit in self.hits
+            ],
+        }
 
-def calibrate(
-    plan: Plan,
-    *,
-    trials: int = TRIALS,
-    fresh_members: int = FRESH_MEMBERS,
-    out: Path | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    on_trial: OnTrial = silent,
-) -> Fit:
-    """Find the best values in `trials` trials, measure how probable agreement is with them, write a scenario file.
 
-    The file is `out` (default: results/NAME/calibrate-HASH/scenario.toml); beside it every trial is kept as it ends, in
-    FILE.trials.jsonl. `resume` continues with trials that are there, `overwrite` replaces them and the file; a finished
-    calibration that is resumed leaves its file as it is. `on_trial` is reported every new trial, the best so far, and
-    how many are to be made. Raises OutputExistsError, OutputError,
-    UnavailableError without the extra `study`, and StoppedEarlyError on Ctrl-C.
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """What is fitted under which scatter, how long it is searched, and where the answer goes."""
+
+    fit: Annotated[
+        Mapping[str, Values],
+        Option(
+            "A key to fit, and its prior. Repeatable.",
+            python='The priors by dotted key, as {"contact.restitution": {"from": 0.2, "to": 0.35}}.',
+            metavar="KEY=FROM:TO",
+            read=partial(read_variations, option=FIT, forms=RANGE),
+            is_repeatable=True,
+            complete="scenario_keys",
+        ),
+    ] = field(default_factory=dict)
+    scatter: Annotated[
+        Mapping[str, Values] | None,
+        Option(
+            "Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
+            "Default: the distributions of [sweep].",
+            python="The distributions of inputs, {mean, sd} or {from, to} (default: those of [sweep]); of a fitted "
+            "key, about its fitted value.",
+            metavar="KEY=MEAN+-SD",
+            read=partial(read_variations, option=SCATTER, forms=SPREAD),
+            is_repeatable=True,
+            complete="scenario_keys",
+        ),
+    ] = None
+    _: KW_ONLY
+    trials: Annotated[int, Option("Number of trials.", metavar="N", least=1)] = 100
+    members: Annotated[
+        int,
+        Option("Samples of the scatter per trial.", flags=("--samples", "--members"), metavar="M", least=1),
+    ] = 64
+    fresh_members: Annotated[
+        int,
+        Option("Fresh samples for the final estimate of the probability.", flags=("--fresh",), metavar="M", least=1),
+    ] = 512
+    seed: Annotated[int, Option("Random seed.", metavar="S", least=0)] = 0
+    experiment: ExperimentTablePath = None
+    out: Annotated[
+        Path | str | None,
+        Option("Scenario file to write (default: results/NAME/calibrate-HASH/scenario.toml).", metavar="FILE"),
+    ] = None
+    resume: Annotated[bool, Option("Resume with the existing trials.")] = False
+    overwrite: Annotated[bool, Option("Replace the file and the existing trials.")] = False
+    on_start: Callable[[str], None] = silent
+    on_trial: OnTrial = silent
+
+
+@takes(CalibrateOptions)
+def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
+    """Fit inputs to measured repeats so that agreement is probable under the scatter of the other inputs.
+
+    Finds the best values, measures how probable agreement is with them, and writes a scenario with these values and
+    their provenance. Beside it every trial is kept as it ends, in FILE.trials.jsonl; a finished calibration that is
+    resumed leaves its file as it is. `on_start` is called with the set of kernels, `on_trial` with every new trial, the
+    best so far, and how many are to be made. Raises ScenarioError, InputMissingError without an experiment table,
+    InvalidInputError, OutputExistsError, OutputError, UnavailableError without the extra `study`, and StoppedEarlyError
+    on Ctrl-C.
     """
-    path = out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN
+    plan = read_plan(
+        document_of(scenario),
+        Variations.of(options.fit),
+        None if options.scatter is None else Variations.of(options.scatter),
+        experiment=None if options.experiment is None else Path(options.experiment),
+        members=options.members,
+        seed=options.seed,
+    )
+    options.on_start(kernels_of(plan.base))
+    resume, overwrite = options.resume, options.overwrite
+    path = Path(options.out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN)
     journal = path.parent / (path.stem + JOURNAL)
     for package in NEEDED:
         loaded(package, PURPOSE)
     prepare(path, journal, resume=resume, overwrite=overwrite)
     kept = path if path.exists() and not overwrite else None
-    best, ties = _searched(plan, journal, trials, on_trial, kept)
-    fresh = plan.scatter.fresh_members(best.values, fresh_members if plan.scatter.plan else 1, plan.seed)
+    best, ties = _searched(plan, journal, options.trials, options.on_trial, kept)
+    fresh = plan.scatter.fresh_members(best.values, options.fresh_members if plan.scatter.plan else 1, plan.seed)
     members = list(run_members(plan.bare, fresh))
     score = score_of(members, plan.ranges)
-    fit = Fit(plan, best, score, trials, path, hits_of(members, plan.ranges), ties)
+    fit = Fit(plan, best, score, options.trials, path, hits_of(members, plan.ranges), ties)
     note = f"one of {len(ties)} equally good, see [provenance]" if fit.is_one_of_many else NOTE
     text = with_fitted(plan.document, best.values, _provenance(fit), path.parent, _head(fit), note)
     if kept is None:

@@ -1,13 +1,14 @@
 """Comparison of whatever was simulated, one run or a sweep, with measured repeats."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Annotated, overload
 
 from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.analysis.judgement import Judgement, Settings, judge
 from blocksim.analysis.members import Members
 from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.options import Option
 from blocksim.scenario import Scenario, load_scenario, load_stored
 from blocksim.simulation import Result
 from blocksim.simulation import folder as files
@@ -20,6 +21,11 @@ from blocksim.study.sweep_table import SweepResult, is_sweep, read_sweep
 
 if TYPE_CHECKING:
     import pandas as pd
+
+ExperimentTablePath = Annotated[
+    Path | str | None,
+    Option("Experiment table (CSV) instead of the scenario's own.", flags=("--experiment",), metavar="TABLE"),
+]
 
 
 @overload

@@ -8,10 +8,12 @@ import numpy as np
 
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.options import takes
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.study.index_pictures import TORNADO, anything_goes, draw_indices
-from blocksim.study.run_pictures import RunLook, draw_motion_of, draw_probes_of, draw_run, refuse
+from blocksim.study.run_pictures import PlotOptions, draw_motion_of, draw_probes_of, draw_run
+from blocksim.study.stored_run import Place, folder_of
 from blocksim.study.study_pictures import draw_study, study_in
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
@@ -111,37 +113,36 @@ def _measured_ranges(scenario: Scenario) -> dict[str, tuple[float, float]]:
     return dict(zip(centres["block"], zip(*ends, strict=True), strict=True))
 
 
-def draw(
-    place: Path,
-    out: Path | None,
-    asked: RunLook,
-    experiment: Path | None,
-    kind: str | None,
-    paper: Paper,
-    *,
-    ready: Callable[[Path], None],
-) -> tuple[Path, str]:
-    """Draw what lies at a place: a run, a sweep, a study, or a table of sensitivities; return as `draw_run`.
+@takes(PlotOptions)
+def plot(place: Place, options: PlotOptions) -> Path:
+    """Draw a run, a sweep, a study or a table of sensitivities.
 
-    Raises as that does, and InputMissingError where nothing is there.
+    `place` is a result that is kept in a folder, a sweep, or what the command takes. Returns the path of the picture
+    (default: NAME.png in the current folder). Raises InvalidInputError for an unknown kind or format, too small a page
+    and a result that was not kept, InputMissingError, OutputExistsError for a file of others unless `overwrite`,
+    OutputError.
     """
+    return draw(folder_of(place), options)[0]
+
+
+def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
+    """Draw what lies at a place, see `plot`; return the picture's path and a remark on an unfinished run."""
     if not place.exists():
         message = f"{place}: no such run folder, sweep folder, table or scenario file"
         raise InputMissingError(message)
+    out = None if options.out is None else Path(options.out)
+    kind, paper, ready = options.kind, options.paper, options.ready
     study = study_in(place)
     if study is not None:
-        refuse(asked.of_runs(), f"{place} is {study.what}")
-        return draw_study(place, study, out, kind, paper, ready, published=experiment), ""
+        options.refuse(None, f"{place} is {study.what}")
+        return draw_study(place, study, out, kind, paper, ready, published=options.table), ""
     if is_sweep(place):
-        refuse(asked.of_runs(), f"{place} is a sweep")
-        return draw_sweep(place, out, experiment, kind, paper, ready=ready), ""
+        options.refuse(None, f"{place} is a sweep")
+        return draw_sweep(place, out, options.table, kind, paper, ready=ready), ""
     if place.suffix.lower() == ".csv":
-        refuse(asked.of_runs(), f"{place} is a table")
+        options.refuse(None, f"{place} is a table")
         return draw_indices(place, out, kind, paper, ready=ready), ""
-    if kind == MOTION:
-        refuse(asked.of_runs(), f"this picture is of kind {kind}")
-        return draw_motion_of(place, out, paper, ready=ready), ""
-    if kind == PROBE:
-        refuse(asked.beside(kind), f"this picture is of kind {kind}")
-        return draw_probes_of(place, out, asked.probes or (), paper, ready=ready)
-    return draw_run(place, out, asked, experiment, kind or STRIP, paper, ready=ready)
+    if kind in {MOTION, PROBE}:
+        options.refuse(kind, f"this picture is of kind {kind}")
+        return (draw_motion_of(place, options), "") if kind == MOTION else draw_probes_of(place, options)
+    return draw_run(place, options, kind or STRIP)

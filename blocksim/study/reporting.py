@@ -12,9 +12,10 @@ from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError,
 from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.bounded_read import MEGABYTE
 from blocksim.simulation import folder as files
+from blocksim.simulation.own_files import refuse_foreign
 from blocksim.study.compare import compare_sweep
 from blocksim.study.rows import FINISHED, TABLE
-from blocksim.study.stored_run import choice, find_run
+from blocksim.study.stored_run import Place, choice, find_run, folder_of
 from blocksim.study.study_pages import study_page
 from blocksim.study.study_pictures import study_in
 from blocksim.study.sweep_folder import PLAN, case_folder
@@ -28,6 +29,22 @@ from blocksim.view.report.sweeps import CaseTable, sweep_subject
 
 MEMBERS = 50  # of a sweep in one page
 MOST_TABLE_BYTES = 200 * MEGABYTE  # of sweep.csv
+
+
+def report(
+    *places: Place, out: Path | str = "report.html", experiment: Path | str | None = None, overwrite: bool = False
+) -> Path:
+    """Write runs and sweeps into one self-contained HTML file with a player, and return its path.
+
+    Raises as `plot` does, and InvalidInputError, after writing, for what is damaged in them.
+    """
+    path = Path(out)
+    refuse_foreign(path, overwrite=overwrite)
+    table = None if experiment is None else Path(experiment)
+    _, problems = report_on([folder_of(place) for place in places], path, table)
+    if problems:
+        raise InvalidInputError("\n".join(problems))
+    return path
 
 
 def report_on(

@@ -2,26 +2,31 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import KW_ONLY, dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
-from blocksim.scenario import Document, Sweep
+from blocksim.options import Option, takes
+from blocksim.scenario import Document, Source, Sweep, document_of
 from blocksim.scenario.models.variation import Normal, Variation
 from blocksim.silence import silent
+from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.table import Columns
 from blocksim.study.executors.ensemble import run_members
-from blocksim.study.plan import Variations, varied
+from blocksim.study.plan import Values, Variations, varied
 from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
 from blocksim.study.sampling import drawn, open_interval
-from blocksim.study.sensitivity_methods import Floats, Method
+from blocksim.study.sensitivity_methods import METHODS, Floats, Method
+from blocksim.study.vary import SPREAD, read_variations
 
 if TYPE_CHECKING:
     import pandas as pd
 
+VARY = "--vary"
 MODE = "sobol"
 MOST_BLOCKS = 10
 INDICATOR = "share"
@@ -121,44 +126,89 @@ class Sensitivity:
 
         return pd.DataFrame(list(self.records()))
 
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON."""
+        return {
+            "method": self.method.name,
+            "meaning": dict(self.method.columns),
+            "keys": list(self.keys),
+            "runs": self.runs,
+            "failed": self.failed,
+            self.method.sample_word.replace(" ", "_"): self.blocks,
+            "left_out": self.left_out,
+            "outputs": [
+                {"output": one.name, "unit": one.unit, "mean": one.mean, "sd": one.sd, "varies": one.varies}
+                for one in self.outputs
+            ],
+            "indices": list(self.records()),
+        }
 
-def sampled_plan(document: Document, given: Variations, option: str, nothing: str) -> Sweep:
-    """Return the distributions that are given to an option, or those of the document where none are.
 
-    Raises ScenarioError for mistakes in them, and InvalidInputError with the message `nothing` where there are none.
-    """
-    plan = varied(document, given, option, MODE) if given.tables else document.build().sweep
-    if plan is None or not plan.is_sampled:
-        raise InvalidInputError(nothing)
-    return plan
+@dataclass(frozen=True)
+class SensitivityOptions:
+    """Which inputs vary, and the design of the runs."""
+
+    vary: Annotated[
+        Mapping[str, Values] | None,
+        Option(
+            "An input and its distribution: KEY=FROM:TO, KEY=MEAN+-SD or KEY=a,b,c. Repeatable. "
+            "Default: the distributions of [sweep].",
+            python='The distribution of each dotted key, as {"gravity": {"from": 9.7, "to": 9.9}}, {mean, sd} or a '
+            "list (default: those of [sweep]).",
+            metavar="KEY=FROM:TO",
+            read=partial(read_variations, option=VARY, forms=SPREAD),
+            is_repeatable=True,
+            complete="scenario_keys",
+        ),
+    ] = None
+    _: KW_ONLY
+    method: Annotated[
+        str,
+        Option(
+            "Elementary effects, or shares of the variance.",
+            python="morris (elementary effects) or sobol (shares of the variance).",
+            choices=tuple(METHODS),
+        ),
+    ] = "morris"
+    samples: Annotated[
+        int | None,
+        Option(
+            "Morris: trajectories of k + 1 runs for k keys (default: 16); Sobol: base samples of k + 2 runs "
+            "(default: 128).",
+            metavar="N",
+        ),
+    ] = None
+    seed: Annotated[int, Option("Random seed.", metavar="S", least=0)] = 0
+    on_start: Callable[[str], None] = silent
+    on_member: OnMember = silent
 
 
-def sensitivity(
-    document: Document,
-    plan: Sweep,
-    method: Method,
-    *,
-    samples: int | None = None,
-    seed: int = 0,
-    on_member: OnMember = silent,
-) -> Sensitivity:
-    """Run a design of `samples` blocks over the distributions of a plan, and return the indices of every output.
+@takes(SensitivityOptions)
+def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
+    """Return Morris or Sobol indices of the run-outs and of the outcome.
 
     Designs need whole blocks (trajectories, base samples): one with a failed run is left out and counted, so the
-    indices are those of inputs that can be simulated. Raises TooManyFailuresError where more than half are left out,
-    UnavailableError without the extra `study`, InvalidInputError for too few samples, and what reading the experiment
-    table raises.
+    indices are those of inputs that can be simulated. `on_start` is called with the set of kernels, `on_member` with
+    how many runs have ended and how many there are. Raises ScenarioError, TooManyFailuresError where more than half of
+    the blocks are left out, UnavailableError without the extra `study`, InvalidInputError where nothing is varied, the
+    method is unknown or samples are too few, and what reading the experiment table raises.
     """
+    if options.method not in METHODS:
+        raise InvalidInputError(f"unknown method {options.method!r}; choose one of {', '.join(METHODS)}")
+    document, method = document_of(scenario), METHODS[options.method]
+    plan = _sampled_plan(document, options.vary)
+    document = document.without_sweep()
     base = document.build()
+    options.on_start(kernels_of(base))
     table = None if base.experiment is None else load_table(base.experiment.table)
-    count = method.samples if samples is None else samples
+    count = method.samples if options.samples is None else options.samples
     if count < LEAST_BLOCKS:
         raise InvalidInputError(f"{count} {method.sample_word} are too few; at least {LEAST_BLOCKS} are needed")
-    points = method.points(len(plan.vary), count, seed)
+    points = method.points(len(plan.vary), count, options.seed)
     members = []
     for member in run_members(document, settings_at(points, plan.vary)):
         members.append(member)
-        on_member(len(members), len(points))
+        options.on_member(len(members), len(points))
     rows = method.rows_of_block(len(plan.vary))
     has_final = np.array([member.final is not None for member in members])
     whole = np.asarray(np.all(has_final.reshape(-1, rows), axis=1))
@@ -173,13 +223,29 @@ def sensitivity(
     return Sensitivity(
         method=method,
         keys=tuple(plan.vary),
-        outputs=tuple(indices_of(output, points[kept], method, seed) for output in outputs_of(finals, table)),
+        outputs=tuple(indices_of(output, points[kept], method, options.seed) for output in outputs_of(finals, table)),
         runs=len(members),
         failed=len(problems),
         first_problem=problems[0] if problems else "",
         blocks=len(whole),
         left_out=int(np.sum(~whole)),
     )
+
+
+def _sampled_plan(document: Document, vary: Mapping[str, Values] | None) -> Sweep:
+    """Return the distributions that are given, or those of the document where none are.
+
+    Raises ScenarioError for mistakes in them, and InvalidInputError where there are none.
+    """
+    is_typed = isinstance(vary, Variations)
+    if vary:
+        plan: Sweep | None = varied(document, Variations.of(vary), VARY if is_typed else "vary", MODE)
+    else:
+        plan = document.build().sweep
+    if plan is None or not plan.is_sampled:
+        given = f"{VARY} KEY=FROM:TO" if is_typed else "vary={key: {'from': a, 'to': b}}"
+        raise InvalidInputError(f"nothing to vary: give {given}, or a [sweep] table with distributions")
+    return plan
 
 
 def settings_at(points: Floats, vary: Mapping[str, Variation]) -> Iterator[dict[str, object]]:

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored
@@ -20,6 +21,29 @@ from blocksim.simulation.summary import read_summary
 from blocksim.study.rows import FINISHED, TABLE
 
 MOST_FOLDERS = 5  # named in a message
+
+
+class Kept(Protocol):
+    """A result of a run, or of a study, that may lie in a folder."""
+
+    @property
+    def folder(self) -> Path | None:
+        """Where it lies, None for one that is in memory only."""
+        ...
+
+
+Place = Path | str | Kept
+
+
+def folder_of(place: Place) -> Path:
+    """Return where a run or a study lies. Raises InvalidInputError for a result that was not kept."""
+    if isinstance(place, Path | str):
+        return Path(place)
+    if place.folder is None:
+        name = getattr(place, "name", "run")
+        message = f"{name}: this result is in memory only; run it with out=FOLDER to store what pictures need"
+        raise InvalidInputError(message)
+    return place.folder
 
 
 def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Path:

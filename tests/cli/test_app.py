@@ -3,14 +3,13 @@
 import inspect
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 from blocksim import __version__
 from blocksim.cli.app import app
-from blocksim.cli.commands import COMMANDS, GROUPS
+from blocksim.cli.commands import COMMANDS, GROUPS, function_of
 from tests.cli.conftest import SOFT, Command
 from tests.golden import Golden
 
@@ -28,8 +27,7 @@ def test_help(blocksim: Command, golden: Golden, name: str) -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_summary_in_the_list_and_the_example_are_those_of_the_command(name: str) -> None:
-    module = name.replace("-", "_")
-    text = inspect.getdoc(getattr(import_module(f"blocksim.cli.{module}"), f"{module}_command"))
+    text = inspect.getdoc(function_of(name))
     assert text is not None
     first, *_, last = text.splitlines()
     assert first == COMMANDS[name]

@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from blocksim.errors import InvalidInputError, OutputExistsError
-from blocksim.study.api import plot, report
 from blocksim.study.limit_curve import CurveResult, limit_curve
+from blocksim.study.pictures import plot
+from blocksim.study.reporting import report
 from blocksim.view.limit_curve import Bracket, LimitCurve, Series, joined
 from tests.study.test_limit import TILT, block_on_a_slope
 

@@ -6,21 +6,18 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Document, Sweep
+from blocksim.scenario import Document
+from blocksim.study.plan import Values
 from blocksim.study.sensitivity import Sensitivity, TooManyFailuresError, sensitivity
-from blocksim.study.sensitivity_methods import METHODS
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SPEED, FRICTION = "bodies.0.velocity.0", "friction.block_ground"
 SOFT = {"contact.stiffness_scale": 0.001}
 
 
-def found(name: str, vary: dict[str, object], method: str, samples: int, **values: object) -> Sensitivity:
+def found(name: str, vary: dict[str, Values], method: str, samples: int, **values: object) -> Sensitivity:
     document = Document.read(SCENARIOS / f"{name}.toml").with_values({**SOFT, **values})
-    data = {key: value for key, value in document.data.items() if key != "sweep"}
-    document = Document(data, document.source, document.folder, document.overrides)
-    plan = Sweep.model_validate({"mode": "sobol", **vary})
-    return sensitivity(document, plan, METHODS[method], samples=samples)
+    return sensitivity(document, vary, method=method, samples=samples)
 
 
 def moments(low: float, high: float, power: int) -> float:
@@ -53,7 +50,7 @@ def test_indices_of_a_slide_are_those_of_its_formula() -> None:
 
 
 def test_measured_quantities_and_outcome_are_looked_at() -> None:
-    vary: dict[str, object] = {
+    vary: dict[str, Values] = {
         "friction.block_block.kinetic": {"from": 0.17, "to": 0.31},
         "structures.0.overlap": {"mean": "10 mm", "sd": "0.3 mm"},
     }
@@ -68,7 +65,7 @@ def test_measured_quantities_and_outcome_are_looked_at() -> None:
 
 
 def test_blocks_of_the_design_with_a_failed_run_are_left_out_and_counted() -> None:
-    vary: dict[str, object] = {
+    vary: dict[str, Values] = {
         "friction.block_ground": {"from": 0.3, "to": 0.4},
         "bodies.0.y": ["12.5 mm", "12.5 mm", "12.5 mm", "12.5 mm", "12.5 mm", "12.5 mm", "12.5 mm", "11 mm"],
     }
@@ -80,7 +77,7 @@ def test_blocks_of_the_design_with_a_failed_run_are_left_out_and_counted() -> No
 
 
 def test_too_many_failures_are_refused() -> None:
-    vary: dict[str, object] = {"bodies.0.y": ["12.5 mm", "11 mm"]}
+    vary: dict[str, Values] = {"bodies.0.y": ["12.5 mm", "11 mm"]}
     with pytest.raises(TooManyFailuresError, match="base samples; no indices can be computed"):
         found("slide", vary, "sobol", 8)
 

@@ -7,9 +7,10 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import replace_values
-from blocksim.study.api import plot, report
 from blocksim.study.fragility import FragilityResult, fragility
 from blocksim.study.limit import limit
+from blocksim.study.pictures import plot
+from blocksim.study.reporting import report
 from blocksim.study.stored_run import stored_run
 from blocksim.study.study_pictures import read_fragility_picture
 from tests.study.test_fragility import FRICTION, SLIDES, SLOPE, TILTS
