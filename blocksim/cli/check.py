@@ -7,14 +7,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated
 
-import typer
-
-from blocksim.cli import options
 from blocksim.cli.check_lists import lines_of
-from blocksim.cli.output import GAP, answer, duration, note, number, print_json, table_lines, width_of_screen
-from blocksim.cli.prepare import read_scenario, warn_of_values
+from blocksim.cli.options import Report, Screen
+from blocksim.cli.output import GAP, duration, number, table_lines, width_of_screen
+from blocksim.cli.prepare import ScenarioInput
+from blocksim.options import Option
 from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
+from blocksim.scenario.plausible import implausible_values
 from blocksim.scenario.units import STANDARD_GRAVITY
 from blocksim.simulation.probe_series import bytes_of_series
 from blocksim.study.rows import check_experiment
@@ -40,14 +40,11 @@ MICRO = 1e6
 
 
 def check_command(
-    scenario: options.ScenarioPath,
-    settings: options.Settings = None,
-    resolved: Annotated[
-        bool, typer.Option("--resolved", help="Print the resolved scenario instead: every value, in SI.")
-    ] = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+    source: ScenarioInput,
+    *,
+    resolved: Annotated[bool, Option("Print the resolved scenario instead: every value, in SI.")] = False,
+    screen: Screen,
+) -> Report:
     """Validate a scenario and summarise it.
 
     Prints time step and cost, then masses, inertias, contact parameters and the keys that set them. Nothing is run;
@@ -55,19 +52,16 @@ def check_command(
 
     Example: blocksim check scenarios/three_blocks.toml
     """
-    with read_scenario(scenario, settings or []) as ready:
+    with source.built() as ready:
         description = describe(ready)
     check_experiment(ready)
-    if as_json:
-        print_json({"scenario": ready.model_dump(mode="json", by_alias=True), **_data(description)})
-    elif resolved:
-        answer(scenario_to_toml(ready))
-    elif not quiet:
-        answer("\n\n".join("\n".join(lines) for lines in _tables(ready, description)))
-        warn_of_values(ready)
-        for text in description.warnings:
-            note(f"warning: {text}")
-        note(f"{ready.name}: valid")
+    data = {"scenario": ready.model_dump(mode="json", by_alias=True), **_data(description)} if screen.as_json else None
+    if resolved:
+        return Report([scenario_to_toml(ready)], data)
+    lines = "\n\n".join("\n".join(lines) for lines in _tables(ready, description))
+    warnings = [*implausible_values(ready), *description.warnings]
+    notes = [*(f"warning: {text}" for text in warnings), f"{ready.name}: valid"]
+    return Report([] if screen.quiet else [lines], data, notes)
 
 
 def _data(description: Description) -> dict[str, object]:

@@ -210,7 +210,7 @@ class Report:
     notes: Iterable[str] = ()
     before: Iterable[str] = ()
     always: Iterable[str] = ()  # notes after the answer that --quiet does not silence
-    code: ExitCode = ExitCode.SUCCESS
+    code: int = ExitCode.SUCCESS
 
 
 @dataclass(frozen=True)
@@ -230,8 +230,8 @@ class Screen:
         if not self.silent:
             note(text)
 
-    def show(self, report: Report) -> NoReturn:
-        """Print a report and leave with its exit code."""
+    def print(self, report: Report) -> None:
+        """Print a report."""
         for text in report.before:
             self.note(text)
         lines = [] if self.as_json else list(report.lines)
@@ -243,6 +243,10 @@ class Screen:
             note(text)
         for text in report.notes:
             self.note(text)
+
+    def show(self, report: Report) -> NoReturn:
+        """Print a report and leave with its exit code."""
+        self.print(report)
         raise typer.Exit(report.code)
 
 

@@ -88,7 +88,6 @@ def report_command(
             is_argument=True,
         ),
     ],
-    screen: TextScreen,
     *,
     out: Annotated[Path, Option("File to write.", metavar="FILE")] = Path("report.html"),
     experiment: ExperimentTablePath = None,
@@ -97,6 +96,7 @@ def report_command(
         Option("Maximum number of runs of a sweep in the page.", flags=("--runs", "--members"), metavar="N", least=0),
     ] = MEMBERS,
     overwrite: Replace = False,
+    screen: TextScreen,
 ) -> Report:
     """Write runs and sweeps into one HTML file.
 

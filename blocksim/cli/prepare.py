@@ -1,7 +1,7 @@
 """What comes before a run: reading the scenario, so that later mistakes also point into the file, and compiling."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -27,6 +27,10 @@ class ScenarioInput:
     def document(self) -> Document:
         """Return the document. Raises what reading it raises."""
         return Document.read(self.scenario).with_settings(self.settings or [])
+
+    def built(self) -> AbstractContextManager[Scenario]:
+        """Give the validated scenario; a step or skin that turns out not to fit is shown where it was written."""
+        return read_scenario(self.scenario, self.settings or [])
 
 
 @contextmanager

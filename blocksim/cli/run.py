@@ -1,18 +1,19 @@
 """blocksim run: simulate one scenario."""
 
 import os
+from collections.abc import Iterator
 from contextlib import nullcontext, suppress
+from dataclasses import replace
 from itertools import islice
 
 import typer
 
-from blocksim.cli import options
-from blocksim.cli.output import note, number, show, table_lines
-from blocksim.cli.prepare import read_scenario, tell_compilation, warn_of_values
+from blocksim.cli.options import Report, Screen
+from blocksim.cli.output import note, number, table_lines
+from blocksim.cli.prepare import ScenarioInput, tell_compilation, warn_of_values
 from blocksim.cli.progress import watching
 from blocksim.cli.verdicts import comparison_table, verdict_lines
 from blocksim.simulation import Result
-from blocksim.simulation.checkpoint_policy import CHECKPOINT_SECONDS, CheckpointPolicy
 from blocksim.simulation.folder import default_folder
 from blocksim.simulation.movement import FIRST, OUTCOME, Movement
 from blocksim.simulation.outcome import REST
@@ -20,27 +21,14 @@ from blocksim.simulation.running import Listener
 from blocksim.simulation.table import rows_of
 from blocksim.study.compare import compare_run
 from blocksim.study.rows import FINISHED
-from blocksim.study.run import run
+from blocksim.study.run import RunOptions, run
 
 MOST_ROWS = 40  # of the final table on the screen; of a longer one the first FIRST_ROWS are shown
 FIRST_ROWS = 10
 INTERRUPTED = "interrupted"
 
 
-def run_command(
-    scenario: options.ScenarioPath,
-    settings: options.Settings = None,
-    out: options.OutFolder = None,
-    overwrite: options.Overwrite = False,
-    resume: options.Resume = False,
-    wall_time: options.WallTime = None,
-    checkpoint_every: options.CheckpointEvery = CHECKPOINT_SECONDS,
-    checkpoint_steps: options.CheckpointSteps = None,
-    checkpoint_time: options.CheckpointTime = None,
-    threads: options.Threads = 1,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+def run_command(source: ScenarioInput, options: RunOptions, screen: Screen) -> None:
     """Simulate a scenario and print the final positions.
 
     If the scenario names an experiment, the table has the measured ranges. A finished run is not repeated but shown.
@@ -49,33 +37,25 @@ def run_command(
 
     Example: blocksim run scenarios/three_blocks.toml --set time.end=0.1
     """
-    if resume and overwrite:
+    if options.resume and options.overwrite:
         raise typer.BadParameter(
             "cannot be combined with --overwrite, which discards existing results", param_hint="--resume"
         )
-    silent = quiet or as_json
-    precautions = CheckpointPolicy(checkpoint_every, checkpoint_steps, checkpoint_time, wall_time)
 
     def start(kernels: str) -> None:
-        warn_of_threads(threads)
-        tell_compilation(kernels, quiet=silent)
+        if options.threads > (count := cores()):  # all wait for one another at every step
+            plural = "s" if count > 1 else ""
+            note(f"warning: {options.threads} threads on {count} core{plural}: oversubscribed, use {count}")
+        tell_compilation(kernels, quiet=screen.silent)
 
-    listener = Listener(on_start=start) if silent else Listener(note, start)
-    with read_scenario(scenario, settings or []) as ready, watching(quiet=silent) as on_progress:
-        if not silent:
+    listener = Listener(on_start=start) if screen.silent else Listener(note, start)
+    with source.built() as ready, watching(quiet=screen.silent) as on_progress:
+        if not screen.silent:
             warn_of_values(ready)
-        result = run(
-            ready,
-            out=out or default_folder(ready),
-            overwrite=overwrite,
-            resume=resume,
-            threads=threads,
-            precautions=precautions,
-            on_progress=on_progress,
-            listener=listener,
-        )
+        out = options.out or default_folder(ready)
+        result = run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
     with nullcontext() if result.status == FINISHED else suppress(OSError):  # SIGHUP reports that the terminal is lost
-        show_result(result, as_json=as_json, quiet=silent)
+        screen.show(_report(result))
     raise typer.Exit(result.summary.exit_code)
 
 
@@ -84,34 +64,29 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def warn_of_threads(threads: int) -> None:
-    """Warn of more threads than cores, as all wait for one another at every step."""
-    count = cores()
-    if threads > count:
-        note(f"warning: {threads} threads on {count} core{'s' if count > 1 else ''}: oversubscribed, use {count}")
-
-
-def show_result(result: Result, *, as_json: bool, quiet: bool) -> None:
-    """Print the final table, with the measured ranges if the scenario names an experiment."""
-    if not quiet:
-        _tell_end(result)
-    summary = result.summary.model_dump()
+def _report(result: Result) -> Report:
+    """Return the final table, with the measured ranges if the scenario names an experiment."""
     endings = {name: rows_of(table) for name, table in result.endings.items()}
-    data = {"folder": str(result.folder), "final": rows_of(result.columns), **endings, "summary": summary}
-    show(_answer_lines(result), data, as_json=as_json)
-    if result.status != FINISHED:
-        note(f"{result.name}: {result.status}: {result.reason}; partial results are in {result.folder}")
-        note(_way_on(result))
-    elif not quiet:
-        note(f"results: {result.folder}")
+    summary = result.summary.model_dump()
+    is_whole = result.status == FINISHED
+    return Report(
+        _answer_lines(result),
+        {"folder": str(result.folder), "final": rows_of(result.columns), **endings, "summary": summary},
+        before=_end_lines(result),
+        notes=[f"results: {result.folder}"] if is_whole else [],
+        always=() if is_whole else _way_on(result),
+        code=result.summary.exit_code,
+    )
 
 
-def _way_on(result: Result) -> str:
-    """Return what can be done with a run that did not finish."""
+def _way_on(result: Result) -> Iterator[str]:
+    """Yield why a run did not finish, and what can be done with it."""
+    yield f"{result.name}: {result.status}: {result.reason}; partial results are in {result.folder}"
     step = result.summary.last_checkpoint
     if result.status == INTERRUPTED:
-        return f"continue with --resume (checkpoint at step {step})"
-    return "no checkpoint saved" if step is None else f"last good checkpoint at step {step}"
+        yield f"continue with --resume (checkpoint at step {step})"
+    else:
+        yield "no checkpoint saved" if step is None else f"last good checkpoint at step {step}"
 
 
 def _answer_lines(result: Result) -> list[str]:
@@ -153,21 +128,20 @@ def _moving(result: Result) -> str:
     return f"\nnot at rest: block {end.fastest_block} at {end.fastest_m_s:.2g} m/s"
 
 
-def _tell_end(result: Result) -> None:
+def _end_lines(result: Result) -> Iterator[str]:
+    """Yield how a run went, and a line that separates this from the answer."""
     summary = result.summary
-    note(f"{result.name}: {result.status} ({result.reason}) at {summary.simulated_time_s:.3f} s of simulated time")
-    note(
+    yield f"{result.name}: {result.status} ({result.reason}) at {summary.simulated_time_s:.3f} s of simulated time"
+    yield (
         f"{summary.steps} steps of {summary.time_step_s:.2e} s in {summary.solver_seconds:.2f} s; "
         f"relative energy error {summary.energy_J.relative_residual:.0e}"
     )
     if summary.settled is not None:
         far = f"{number(summary.settled.largest_displacement_mm)} mm (block {summary.settled.displaced_block})"
         settled = "settled" if summary.settled.at_rest else "released where it did not settle"
-        note(f"{settled} before time zero in {summary.settled.steps} steps; largest displacement {far}")
-    for one in summary.events:
-        note(f"{one.time_s:.3f} s: {one.what}")
+        yield f"{settled} before time zero in {summary.settled.steps} steps; largest displacement {far}"
+    yield from (f"{one.time_s:.3f} s: {one.what}" for one in summary.events)
     if summary.movement is not None:
-        note(f"{_moved(summary.movement)}{_moving(result)}")
-    for text in summary.warnings:
-        note(f"warning: {text}")
-    note("")
+        yield f"{_moved(summary.movement)}{_moving(result)}"
+    yield from (f"warning: {text}" for text in summary.warnings)
+    yield ""

@@ -24,10 +24,10 @@ SIGNS = {"deg": "°", INDICATOR: ""}
 def sensitivity_command(
     source: ScenarioInput,
     options: SensitivityOptions,
-    screen: Screen,
     *,
     out: Annotated[Path | None, Option("Write all numbers to a table.", metavar="CSV")] = None,
     overwrite: Annotated[bool, Option("Replace the table.")] = False,
+    screen: Screen,
 ) -> Report:
     """Rank the inputs by their effect on final positions.
 

@@ -1,16 +1,15 @@
 """blocksim verify: run the verification cases and print their table."""
 
+from collections.abc import Iterator
 from dataclasses import replace
-from enum import StrEnum
 from typing import Annotated
 
-import typer
-
-from blocksim.cli import completion, options
-from blocksim.cli.output import grouped_lines, note, show
+from blocksim.cli.options import Report, Screen
+from blocksim.cli.output import grouped_lines
 from blocksim.cli.prepare import tell_compilation
 from blocksim.cli.progress import one_by_one
 from blocksim.errors import ExitCode
+from blocksim.options import Option
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.simulation.compilation import kernel_set
 from blocksim.verification.case import Row, Setting, Verdict
@@ -27,43 +26,19 @@ from blocksim.verification.verify import (
 COLUMNS = ("quantity", "expected", "measured", "error", "tolerance", "verdict")
 
 
-class Model(StrEnum):
-    """How contacts are found."""
-
-    SURFACE = "surface"
-    PARTICLES = "particles"
-    KERNEL = "kernel"
-
-
-class Law(StrEnum):
-    """How the force grows with the overlap."""
-
-    LINEAR = "linear"
-    HERTZ_MINDLIN = "hertz-mindlin"
-
-
-class Scheme(StrEnum):
-    """How time is stepped."""
-
-    EXPLICIT = SPRINGS
-    NONSMOOTH = IMPULSES
-
-
 def verify_command(
+    *,
     cases: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[CASE]...", help="V1 to V25 (default: all).", autocompletion=completion.cases),
+        Option("V1 to V25 (default: all).", metavar="[CASE]...", complete="cases", is_argument=True),
     ] = None,
-    model: Annotated[Model, typer.Option(help="Contact model.")] = Model.SURFACE,
-    law: Annotated[Law, typer.Option(help="Force law.")] = Law.LINEAR,
-    scheme: Annotated[Scheme, typer.Option(help="Stepping: springs or impulses.")] = Scheme.EXPLICIT,
-    soil: Annotated[bool, typer.Option("--soil", help="The cases of soil, S1 to S11.")] = False,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Run reduced cases; the last lines list what was reduced.")
-    ] = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+    model: Annotated[str, Option("Contact model.", choices=("surface", "particles", "kernel"))] = "surface",
+    law: Annotated[str, Option("Force law.", choices=("linear", "hertz-mindlin"))] = "linear",
+    scheme: Annotated[str, Option("Stepping: springs or impulses.", choices=(SPRINGS, IMPULSES))] = SPRINGS,
+    soil: Annotated[bool, Option("The cases of soil, S1 to S11.")] = False,
+    quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,
+    screen: Screen,
+) -> Report:
     """Run the verification cases and show the table.
 
     Exit code 1: a number is out of tolerance. All cases take about four minutes on one core, half a minute with
@@ -71,28 +46,33 @@ def verify_command(
 
     Example: blocksim verify V3 V7 --law hertz-mindlin
     """
-    silent = quiet or as_json
-    setting = Setting(model.value, law.value, quick, scheme.value)
+    setting = Setting(model, law, quick, scheme)
     refuse_springs(setting)
     if soil and (not setting.has_springs or setting != replace(Setting(), quick=quick)):
         raise SettingError("--soil has one setting: the surface model, linear springs, the explicit scheme")
     wanted = chosen_of_soil(cases or []) if soil else chosen(cases or [], setting.scheme)
-    tell_compilation(kernel_set(setting.scheme, setting.model), quiet=silent)
+    tell_compilation(kernel_set(setting.scheme, setting.model), quiet=screen.silent)
     outcomes: list[Outcome] = []
     try:
-        cases_told = one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=silent)
-        outcomes.extend(run_case(case, setting) for case in cases_told)
-    finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
+        under_way = one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=screen.silent)
+        outcomes.extend(run_case(case, setting) for case in under_way)
+    except BaseException:  # minutes of measuring must not be lost; the list has what was measured
         if outcomes:
-            data = [row for outcome in outcomes for row in outcome.to_dicts()]
-            groups = ((_heading(outcome), [_cells(row) for row in outcome.rows]) for outcome in outcomes)
-            show(grouped_lines(COLUMNS, groups), data, as_json=as_json)
-        if outcomes and not silent:
-            _tell_end(outcomes)
-    if not (silent or cases or soil):
-        _tell_left_out(setting)
-    inside = all(outcome.inside for outcome in outcomes)
-    raise typer.Exit(ExitCode.SUCCESS if inside else ExitCode.OUTSIDE)
+            screen.print(_report(outcomes))
+        raise
+    report = _report(outcomes)
+    missing = () if cases or soil else left_out(setting.scheme)
+    return replace(report, notes=[*report.notes, f"left out: {'; '.join(missing)}"]) if missing else report
+
+
+def _report(outcomes: list[Outcome]) -> Report:
+    groups = ((_heading(outcome), [_cells(row) for row in outcome.rows]) for outcome in outcomes)
+    return Report(
+        grouped_lines(COLUMNS, groups),
+        [row for outcome in outcomes for row in outcome.to_dicts()],
+        list(_notes(outcomes)),
+        code=ExitCode.SUCCESS if all(outcome.inside for outcome in outcomes) else ExitCode.OUTSIDE,
+    )
 
 
 def _heading(outcome: Outcome) -> str:
@@ -110,20 +90,14 @@ def _cells(row: Row) -> tuple[str, ...]:
     )
 
 
-def _tell_end(outcomes: list[Outcome]) -> None:
+def _notes(outcomes: list[Outcome]) -> Iterator[str]:
     missed = [outcome for outcome in outcomes if not outcome.inside]
     for outcome in missed:
         count = sum(row.verdict == Verdict.OUTSIDE for row in outcome.rows)
         why = f": {outcome.remark}" if outcome.remark else ""
-        note(f"{outcome.case.id} {outcome.case.title}: {count} of {len(outcome.rows)} outside{why}")
+        yield f"{outcome.case.id} {outcome.case.title}: {count} of {len(outcome.rows)} outside{why}"
     for outcome in outcomes:
         if outcome.setting.quick and outcome.case.quick:
-            note(f"{outcome.case.id} shortened: {outcome.case.quick}")
+            yield f"{outcome.case.id} shortened: {outcome.case.quick}"
     seconds = sum(outcome.seconds for outcome in outcomes)
-    note(f"{len(outcomes) - len(missed)} of {len(outcomes)} cases inside, {seconds:.0f} s")
-
-
-def _tell_left_out(setting: Setting) -> None:
-    found = left_out(setting.scheme)
-    if found:
-        note(f"left out: {'; '.join(found)}")
+    yield f"{len(outcomes) - len(missed)} of {len(outcomes)} cases inside, {seconds:.0f} s"

@@ -7,8 +7,10 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Annotated, NamedTuple, Protocol
 
+from blocksim.options import Option
+from blocksim.scenario.quantities import TIME, Quantity
 from blocksim.simulation.checkpoint import Origin, Position, write_checkpoint
 from blocksim.simulation.folder import CHECKPOINTS
 from blocksim.simulation.happened import Happened
@@ -17,6 +19,7 @@ from blocksim.simulation.settled import Settled
 
 CHECKPOINT_SECONDS = 60.0
 NEVER = sys.maxsize  # steps
+SECONDS = Quantity(TIME, above=0.0)
 
 
 @dataclass(frozen=True)
@@ -26,10 +29,24 @@ class CheckpointPolicy:
     Checkpoints are written at whatever comes first. A run that is stopped writes one anyway.
     """
 
-    checkpoint_seconds: float = CHECKPOINT_SECONDS  # of wall time between two
-    checkpoint_steps: int | None = None  # between two
-    checkpoint_time: float | None = None  # s of simulated time between two
-    wall_time: float | None = None  # s after which the run stops, as a signal would stop it
+    checkpoint_seconds: Annotated[
+        float,
+        Option(
+            "Wall time between checkpoints (default: 60 s).",
+            flags=("--checkpoint-every",),
+            metavar="TIME",
+            read=SECONDS.read,
+            show_default=False,
+        ),
+    ] = CHECKPOINT_SECONDS  # of wall time between two
+    checkpoint_steps: Annotated[int | None, Option("Steps between checkpoints.", metavar="N", least=1)] = None
+    checkpoint_time: Annotated[
+        float | None, Option("Simulated time between checkpoints.", metavar="TIME", read=SECONDS.read)
+    ] = None  # s
+    wall_time: Annotated[
+        float | None,
+        Option('Stop after this wall time, e.g. "90 min", as Ctrl-C does.', metavar="TIME", read=SECONDS.read),
+    ] = None  # s
 
     def periods(self, step: float) -> tuple[int, ...]:
         """Return the numbers of steps (s) after which checkpoints are due."""

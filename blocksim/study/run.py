@@ -1,9 +1,12 @@
 """One run, kept in a folder or in memory."""
 
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
+from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.silence import silent
 from blocksim.simulation import Result, Watcher, read_result, renew_copies, simulate, simulate_into
@@ -14,18 +17,34 @@ from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.study.rows import check_experiment
 from blocksim.study.stored_run import find_run
 
+Threads = Annotated[
+    int,
+    Option("Threads, for scenes of 200 blocks and more. Results are bit-identical.", metavar="N", least=1),
+]
 
-def run(
-    scenario: Source,
-    *,
-    out: Path | str | None = None,
-    overwrite: bool = False,
-    resume: bool = False,
-    threads: int = 1,
-    precautions: CheckpointPolicy = DEFAULTS,
-    on_progress: Watcher = silent,
-    listener: Listener = SILENT,
-) -> Result:
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Where a run is kept, and how it is executed, none of which changes its bits."""
+
+    out: Annotated[
+        Path | str | None,
+        Option(
+            "Folder for the results (default: results/NAME/HASH).",
+            python="Folder for the results (default: none, in memory only).",
+            metavar="DIR",
+        ),
+    ] = None
+    overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
+    resume: Annotated[bool, Option("Resume a run that was stopped or killed.")] = False
+    precautions: CheckpointPolicy = DEFAULTS
+    threads: Threads = 1
+    on_progress: Watcher = silent
+    listener: Listener = SILENT
+
+
+@takes(RunOptions)
+def run(scenario: Source, options: RunOptions) -> Result:
     """Simulate a scenario and return the result; with `out` it is kept in that folder as well.
 
     A folder that holds the finished run of exactly this scenario and code is read instead, unless `overwrite` is
@@ -37,6 +56,8 @@ def run(
     code and for results that have been changed or cut since, OutputExistsError, OutputError; ValueError for `resume`
     with `overwrite` or without `out`.
     """
+    out, overwrite, resume, threads = options.out, options.overwrite, options.resume, options.threads
+    precautions, on_progress = options.precautions, options.on_progress
     if resume and (overwrite or out is None):
         raise ValueError("resume needs out=FOLDER, and cannot be combined with overwrite")
     if not isinstance(scenario, Scenario):
@@ -50,7 +71,7 @@ def run(
         _clear_after_kill(folder)
         renew_copies(scenario, folder)
         result = read_result(folder)
-        listener.on_remark(f"already computed; rerun with --overwrite: {folder}")
+        options.listener.on_remark(f"already computed; rerun with --overwrite: {folder}")
         return result
     return simulate_into(
         scenario,
@@ -60,7 +81,7 @@ def run(
         threads=threads,
         precautions=precautions,
         on_progress=on_progress,
-        listener=listener,
+        listener=options.listener,
     )
 
 
