@@ -25,6 +25,7 @@ LARGE = 100.0
 
 
 def bench_command(
+    *,
     names: Annotated[
         list[str] | None,
         typer.Argument(

@@ -48,8 +48,14 @@ def _cases() -> list[str]:
     return [case.id for case in (*CASES, *SOIL_CASES)]
 
 
-kinds, colours, cases = of_names(_kinds), of_names(_colours), of_names(_cases)
-"""Completions of kinds of pictures, of ways to colour them, and of verification cases."""
+def _templates() -> Iterable[str]:
+    from blocksim.cli import new
+
+    return new.templates()
+
+
+kinds, colours, cases, templates = map(of_names, (_kinds, _colours, _cases, _templates))
+"""Completions of kinds of pictures, of ways to colour them, of verification cases, and of templates."""
 
 
 def scenario_keys(ctx: Any, incomplete: str) -> list[str]:

@@ -34,6 +34,7 @@ from blocksim.study.convergence import Convergence, Joint, Level, Study, Verdict
 from blocksim.study.pictures import draw_convergence
 from blocksim.study.rows import Row
 from blocksim.view.levels import refuse_small_page
+from blocksim.view.page_size import PageOptions
 from blocksim.view.style import picture_suffix
 
 MOST_BLOCKS = 3
@@ -51,6 +52,7 @@ class Which(StrEnum):
 
 
 def converge_command(
+    *,
     scenario: options.ScenarioPath,
     study: Annotated[
         list[Which] | None, typer.Option(help="What to refine (default: all that matters). Repeatable.")
@@ -69,8 +71,7 @@ def converge_command(
         typer.Option("--out", metavar="FILE", help="Picture: .png, .svg or .pdf (default: results/NAME/converge.png)."),
     ] = None,
     picture: Annotated[bool, typer.Option(help="Draw a picture.")] = True,
-    size: options.Size = None,
-    dots: options.Dots = None,
+    page: PageOptions,
     overwrite: options.Replace = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -86,7 +87,7 @@ def converge_command(
     Example: blocksim converge scenarios/three_blocks_nominal.toml
     """
     silent = quiet or as_json
-    paper = options.paper_of(size, dots)
+    paper = page.paper
     chosen = None if study is None else [one.value for one in study]
     with read_scenario(scenario, settings or []) as ready:
         path = out or RESULTS / ready.name / "converge.png"

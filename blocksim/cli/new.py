@@ -1,4 +1,4 @@
-"""blocksim new: a commented scenario, sweep or experiment table from a template."""
+"""blocksim new and schema: what a scenario is written with, templates and the schema for editors."""
 
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import completion, options
-from blocksim.cli.output import answer, note
+from blocksim.cli.options import Report
+from blocksim.cli.output import print_json
 from blocksim.errors import OutputError, OutputExistsError
+from blocksim.options import Option
+from blocksim.scenario import json_schema
 from blocksim.scenario.spelling import did_you_mean
 from blocksim.simulation.atomic import write_text
 
@@ -28,39 +30,29 @@ def templates() -> dict[str, Traversable]:
 def new_command(
     kind: Annotated[
         str,
-        typer.Argument(
-            metavar="KIND", help=f"One of {', '.join(templates())}.", autocompletion=completion.of_names(templates)
-        ),
+        Option(f"One of {', '.join(templates())}.", metavar="KIND", complete="templates", is_argument=True),
     ],
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="Name of the scenario, and of its file without extension.")
+        str, Option("Name of the scenario, and of its file without extension.", metavar="NAME", is_argument=True)
     ],
-    quiet: options.Quiet = False,
-) -> None:
+) -> Report:
     """Write a commented scenario, sweep or table from a template.
 
     The file is ready to be checked and run; existing files are never overwritten.
 
     Example: blocksim new three-blocks my_blocks
     """
-    template = _template(kind)
+    known = templates()
+    if kind not in known:
+        hint = did_you_mean(kind, known) or f"use one of {', '.join(known)}"
+        raise typer.BadParameter(f"unknown kind {kind!r}, {hint}", param_hint="KIND")
+    template = known[kind]
     ending = Path(template.name).suffix
     path = Path(name.removesuffix(ending) + ending)
     _refuse_bad_name(path.stem)
     _write(path, template.read_text(encoding="utf-8").replace(PLACE, path.stem))
-    answer(str(path))
-    if not quiet:
-        following = "blocksim sweep {path} --dry-run" if kind.startswith(SWEEP) else NEXT[ending]
-        note(f"next: {following.format(path=path)}")
-
-
-def _template(kind: str) -> Traversable:
-    known = templates()
-    if kind in known:
-        return known[kind]
-    hint = did_you_mean(kind, known) or f"use one of {', '.join(known)}"
-    message = f"unknown kind {kind!r}, {hint}"
-    raise typer.BadParameter(message, param_hint="KIND")
+    following = "blocksim sweep {path} --dry-run" if kind.startswith(SWEEP) else NEXT[ending]
+    return Report([str(path)], notes=[f"next: {following.format(path=path)}"])
 
 
 def _refuse_bad_name(name: str) -> None:
@@ -90,3 +82,13 @@ def _write(path: Path, text: str) -> None:
     except OutputError:
         path.unlink(missing_ok=True)  # it was made here, and is empty
         raise
+
+
+def schema_command() -> None:
+    """Print the JSON Schema of scenario files, for editors.
+
+    An editor with a TOML language server completes and checks keys with it.
+
+    Example: blocksim schema > scenario.schema.json
+    """
+    print_json(json_schema())

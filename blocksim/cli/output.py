@@ -9,7 +9,6 @@ import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from itertools import islice
-from pathlib import Path
 from typing import TextIO
 
 NARROW = 80
@@ -35,11 +34,6 @@ def abandon(stream: TextIO) -> None:
     """Keep Python from failing once more when it flushes a stream at its end."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def replacement(path: Path) -> str:
-    """Return a note for a file that replaces an older one; nothing where none exists."""
-    return "replaces an older file, " if path.exists() else ""
 
 
 def answer(text: str) -> None:

@@ -14,6 +14,7 @@ from blocksim.cli.progress import watching
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.scenario import load_stored
 from blocksim.simulation.compilation import kernels_of
+from blocksim.study.run import Threads
 from blocksim.study.study_pictures import study_in
 from blocksim.study.sweep import kernels_for
 from blocksim.study.sweep_folder import FolderKind, read_plan
@@ -48,7 +49,7 @@ def verify_run_command(
             "limit or fragility study.",
         ),
     ],
-    threads: options.Threads = 1,
+    threads: Threads = 1,
     sample: Annotated[
         int, typer.Option(min=1, metavar="N", help="Number of rows of a sweep or study to run again.")
     ] = SAMPLE,
