@@ -1,42 +1,44 @@
-"""blocksim check: validate a scenario and summarise it."""
+"""blocksim check: validate a scenario and summarise it: its cost, what happens in it, its blocks and contacts."""
 
 import math
 import textwrap
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated
 
-from blocksim.cli.check_lists import lines_of
 from blocksim.cli.options import Report, Screen
 from blocksim.cli.output import GAP, duration, number, table_lines, width_of_screen
 from blocksim.cli.prepare import ScenarioInput
 from blocksim.options import Option
-from blocksim.scenario import Contact, PlacedBody, Scenario, scenario_to_toml
+from blocksim.scenario import PlacedBody, Scenario, place_bodies, scenario_to_toml
+from blocksim.scenario.drives import drives_of, greatest_rate
+from blocksim.scenario.events import in_order
+from blocksim.scenario.models.history import Constant, Ramp
+from blocksim.scenario.models.loads import AnyLoad, Force, Gravity, Horizontal, Moment, Pressure
+from blocksim.scenario.models.probe import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
+from blocksim.scenario.motion import settles
 from blocksim.scenario.pairs import DEFAULT, MATERIALS
 from blocksim.scenario.plausible import implausible_values
+from blocksim.scenario.probes import probe_names
 from blocksim.scenario.units import STANDARD_GRAVITY
+from blocksim.simulation.happened import in_words
 from blocksim.simulation.probe_series import bytes_of_series
 from blocksim.study.rows import check_experiment
-from blocksim.world.describe import (
-    Description,
-    MotionDescription,
-    PairDescription,
-    SagDescription,
-    StepLimits,
-    describe,
-)
+from blocksim.world.describe import Description, PairDescription, StepLimits, describe
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import FRAME_VALUES, PROCESS_BYTES
 
 MOST_BODIES = 12
+MOST_LINES = 8  # of events, loads or probes
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
-NO_KEY = (DEFAULT, MATERIALS)
 LEAST_ROOM = 24
+HEAD = 11  # columns: width of the names on the left
 FAR_APART = 10.0  # steps of blocks and of systems beside them that are told with a cure
 HARD_SPACE = "\N{NO-BREAK SPACE}"
 MILLI = 1e3
 MICRO = 1e6
+PREFIXES = ((1e6, "M"), (1e3, "k"))
 
 
 def check_command(
@@ -55,118 +57,51 @@ def check_command(
     with source.built() as ready:
         description = describe(ready)
     check_experiment(ready)
-    data = {"scenario": ready.model_dump(mode="json", by_alias=True), **_data(description)} if screen.as_json else None
+    if screen.as_json:
+        bodies = [{**body._asdict(), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
+        data = {**asdict(replace(description, bodies=())), "bodies": bodies}
+        return Report(data={"scenario": ready.model_dump(mode="json", by_alias=True), **data})
     if resolved:
-        return Report([scenario_to_toml(ready)], data)
-    lines = "\n\n".join("\n".join(lines) for lines in _tables(ready, description))
+        return Report([scenario_to_toml(ready)])
+    tables = [list(_summary(ready, description))]
+    if description.bodies:
+        tables += [_bodies(description.bodies), _pairs(ready, description.pairs), _rules(description.pairs)]
+    lines = "\n\n".join("\n".join(table) for table in tables)
     warnings = [*implausible_values(ready), *description.warnings]
     notes = [*(f"warning: {text}" for text in warnings), f"{ready.name}: valid"]
-    return Report([] if screen.quiet else [lines], data, notes)
+    return Report([] if screen.quiet else [lines], notes=notes)
 
 
-def _data(description: Description) -> dict[str, object]:
-    bodies = [{**body._asdict(), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
-    return {**asdict(replace(description, bodies=())), "bodies": bodies}
-
-
-def _tables(scenario: Scenario, description: Description) -> list[list[str]]:
-    cost = _cost(scenario, description)
-    if not description.bodies:
-        return [cost]
-    return [cost, _bodies(description.bodies), _pairs(scenario, description.pairs), _rules(description.pairs)]
-
-
-def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
-    """List every block; of more than MOST_BODIES list the kinds, their numbers and the range of the centres."""
-    if len(bodies) <= MOST_BODIES:
-        return table_lines(("block", "x mm", "y mm", *SIDES), [_body_cells(body) for body in bodies])
-    counts = Counter(body.block for body in bodies)
-    kinds = {body.block: body for body in bodies}
-    common = counts.most_common(MOST_BODIES)
-    rows = [(name, str(count), *_side_cells(kinds[name])) for name, count in common]
-    more = [f"... and {len(counts) - len(common)} more kinds"] if len(counts) > len(common) else []
-    spans = ("{} {} to {} mm".format(axis, *_span(getattr(body, axis) for body in bodies)) for axis in ("x", "y"))
-    fixed = sum(body.fixed for body in bodies)
-    still = f", {fixed} of them fixed" if fixed else ""
-    return [
-        *table_lines(("kind", "blocks", *SIDES), rows),
-        *more,
-        f"{len(bodies)} blocks{still}",
-        f"centres at {', '.join(spans)}",
-    ]
-
-
-def _span(values: Iterable[float]) -> tuple[str, str]:
-    lengths = tuple(values)
-    return number(MILLI * min(lengths)), number(MILLI * max(lengths))
-
-
-def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
-    cells = [_pair_cells(pair) for pair in pairs]
-    if all(pair.shear_damping_ratio == pair.normal_damping_ratio for pair in pairs):
-        for row in cells:
-            row.pop("ζ shear", None)
-    return [*table_lines(list(cells[0]), [list(row.values()) for row in cells]), *_meanings(scenario, pairs[0])]
-
-
-def _meanings(scenario: Scenario, pair: PairDescription) -> list[str]:
-    if pair.normal_damping_ratio is None:
-        return [
-            "μs static and μk kinetic friction, e restitution; rigid contacts: K in N/m is",
-            "the stiffness of one contact point (a face has two) at rest, for this step",
-        ]
-    points = "a face has two" if scenario.contact.model == "surface" else "the particles of a face share 2 K"
-    return [
-        "μs static and μk kinetic friction, e restitution, ζ damping ratio, k/K in shear,",
-        f"K stiffness in {pair.stiffness_unit} of one contact point ({points})",
-    ]
-
-
-def _rules(pairs: Sequence[PairDescription]) -> list[str]:
-    """List the keys of the scenario that set values, with their pairs; the rest follows defaults and materials."""
-    found: dict[str, dict[str, None]] = {}
-    for pair in pairs:
-        for key in pair.rules.values():
-            if key not in NO_KEY:
-                found.setdefault(key, {})[" - ".join(pair.materials)] = None
-    room = max(LEAST_ROOM, width_of_screen() - len(GAP) - max(map(len, found), default=0))
-    rows = [cells for key in sorted(found, key=_specific_first) for cells in _wrapped(key, found[key], room)]
-    lines = table_lines(("set by", "for"), rows, left=2) if found else []
-    has_springs = pairs[0].normal_damping_ratio is not None
-    return [*lines, f"other values: defaults{'; stiffness from E and ν of the materials' if has_springs else ''}"]
-
-
-def _specific_first(key: str) -> bool:
-    return not key.startswith("pairs.")
-
-
-def _wrapped(key: str, pairs: Iterable[str], room: int) -> Iterator[tuple[str, str]]:
-    """Yield the rows for one key: its pairs, as many in a line as there is room (columns) for."""
-    lines = textwrap.wrap(", ".join(pair.replace(" ", HARD_SPACE) for pair in pairs), room)
-    for i, line in enumerate(lines):
-        yield ("" if i else key), line.replace(HARD_SPACE, " ")
-
-
-def _cost(scenario: Scenario, description: Description) -> list[str]:
-    return [
-        f"time step  {description.step:.3e} s, at most {description.steps} steps",
-        *_limits(description.limits),
-        *_sag(description.rigid),
-        f"solving    at most about {duration(description.seconds)} on one core{_until_rest(scenario)}",
-        f"memory     about {readable(description.memory)}, of which {readable(PROCESS_BYTES)} for the program itself",
-        f"results    at most {description.frames} frames, about {readable(_bytes(scenario, description))}",
-        *_short_interval(scenario, description),
-        *_motion(description.motion),
-        *lines_of(scenario),
-        *_boundary(scenario, description),
-        *(f"{name:<10} {count} particles or elements" for name, count in description.systems.items()),
-        f"neighbours checked up to {MILLI * description.skin:.3g} mm apart",
-    ]
-
-
-def _bytes(scenario: Scenario, description: Description) -> int:
-    """Return the bytes of frames and of probes."""
-    return description.bytes + bytes_of_series(scenario, description.steps, description.step, FRAME_VALUES)
+def _summary(scenario: Scenario, description: Description) -> Iterator[str]:
+    """Yield time step, cost and size, and everything that acts, happens or is recorded."""
+    yield f"time step  {description.step:.3e} s, at most {description.steps} steps"
+    yield from _limits(description.limits)
+    rigid = description.rigid
+    if rigid is not None:
+        solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
+        yield f"           {rigid.why}"
+        yield f"           in {rigid.substeps} substeps, {solved}; manual limit {rigid.longest_step:.1e} s"
+        sag = f"{MICRO * rigid.sag:.3g} µm at rest, block {rigid.block}"
+        yield f"sag        {sag}: numerical, proportional to step squared"
+        if rigid.warning:
+            yield f"warning: {rigid.warning}"
+    until_rest = ", less if it stops at rest" if scenario.time.stop_at_rest else ""
+    yield f"solving    at most about {duration(description.seconds)} on one core{until_rest}"
+    yield f"memory     about {readable(description.memory)}, of which {readable(PROCESS_BYTES)} for the program itself"
+    size = description.bytes + bytes_of_series(scenario, description.steps, description.step, FRAME_VALUES)
+    yield f"results    at most {description.frames} frames, about {readable(size)}"
+    if description.frames_at_every_step:
+        yield f"           output.every = {scenario.output.every:.3g} s is shorter than a step: a frame at every step"
+    motion = description.motion
+    if motion is not None:
+        peaks = f"{number(MILLI * motion.displacement)} mm, {number(MILLI * motion.speed)} mm/s"
+        greatest = f"at most {peaks} and {number(motion.acceleration / STANDARD_GRAVITY)} g"
+        yield f"supports   move {greatest}; {number(MILLI * motion.final_speed)} mm/s at the end"
+    yield from _acting(scenario)
+    if rigid is None:
+        yield f"boundary   {description.particles} particles ({_use_of_particles(scenario)})"
+    yield from (f"{name:<10} {count} particles or elements" for name, count in description.systems.items())
+    yield f"neighbours checked up to {MILLI * description.skin:.3g} mm apart"
 
 
 def _limits(limits: StepLimits | None) -> list[str]:
@@ -185,45 +120,8 @@ def _limits(limits: StepLimits | None) -> list[str]:
     return [f"           {steps}", f"warning: because of the {who} {more}:", f"         {cure}"]
 
 
-def _until_rest(scenario: Scenario) -> str:
-    return ", less if it stops at rest" if scenario.time.stop_at_rest else ""
-
-
-def _short_interval(scenario: Scenario, description: Description) -> list[str]:
-    """Report an output interval that no run can keep."""
-    if not description.frames_at_every_step:
-        return []
-    return [f"           output.every = {scenario.output.every:.3g} s is shorter than a step: a frame at every step"]
-
-
-def _boundary(scenario: Scenario, description: Description) -> list[str]:
-    if description.rigid is not None:
-        return []
-    return [f"boundary   {description.particles} particles ({_use_of_particles(scenario.contact)})"]
-
-
-def _sag(rigid: SagDescription | None) -> list[str]:
-    """Return what the step of the non-smooth scheme implies."""
-    if rigid is None:
-        return []
-    solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
-    return [
-        f"           {rigid.why}",
-        f"           in {rigid.substeps} substeps, {solved}; manual limit {rigid.longest_step:.1e} s",
-        f"sag        {MICRO * rigid.sag:.3g} µm at rest, block {rigid.block}: numerical, proportional to step squared",
-        *([f"warning: {rigid.warning}"] if rigid.warning else []),
-    ]
-
-
-def _motion(motion: MotionDescription | None) -> list[str]:
-    if motion is None:
-        return []
-    peaks = f"{number(MILLI * motion.displacement)} mm, {number(MILLI * motion.speed)} mm/s"
-    greatest = f"at most {peaks} and {number(motion.acceleration / STANDARD_GRAVITY)} g"
-    return [f"supports   move {greatest}; {number(MILLI * motion.final_speed)} mm/s at the end"]
-
-
-def _use_of_particles(contact: Contact) -> str:
+def _use_of_particles(scenario: Scenario) -> str:
+    contact = scenario.contact
     match contact.model:
         case "surface":
             return "the surface model uses those at the corners"
@@ -233,8 +131,108 @@ def _use_of_particles(contact: Contact) -> str:
             return f"at most {number(MILLI * contact.particle_spacing)} mm apart"
 
 
-def _body_cells(body: PlacedBody) -> tuple[str, ...]:
-    return (body.name, number(MILLI * body.x), number(MILLI * body.y), *_side_cells(body))
+def _acting(scenario: Scenario) -> Iterator[str]:
+    """Yield lines about driven bodies, events, loads, the start and probes, the first ones of many."""
+    for drive in drives_of(scenario):
+        spec = scenario.bodies[drive.body - sum(structure.size for structure in scenario.structures)]
+        kind = "" if spec.motion is None else f" ({spec.motion.kind})"
+        speed, spin = greatest_rate(drive.shift), math.degrees(greatest_rate(drive.turn))
+        rates = [f"{number(MILLI * speed)} mm/s"] * (speed > 0.0) + [f"{number(spin)} °/s"] * (spin > 0.0)
+        rests = f", at rest from {drive.rest_time:.3f} s on" if math.isfinite(drive.rest_time) else ""
+        yield f"driven     {place_bodies(scenario)[drive.body].name}{kind}, at most {' and '.join(rates)}{rests}"
+    events = [scenario.events[k] for k in in_order(scenario.events)]
+    yield from _some(
+        "event", [f"{'at rest' if one.at is None else f'{one.at:.3f} s'}: {in_words(one)}" for one in events]
+    )
+    loads = enumerate(scenario.loads)
+    yield from _some("load", [f"{load.name or f'loads.{number}'}: {_load(load)}" for number, load in loads])
+    if settles(scenario):
+        held = f"; held: {', '.join(scenario.start.hold)}" if scenario.start.hold else ""
+        yield from _some("start", [f"settles before time zero{held}"])
+    probes = zip(probe_names(scenario), scenario.probes, strict=True)
+    yield from _some("probe", [f"{name}: {_probe(one)}" for name, one in probes])
+
+
+def _some(head: str, lines: Sequence[str]) -> Iterator[str]:
+    """Yield the first lines of a kind and how many more there are."""
+    first, others = f"{head:<{HEAD}}", f"{'':<{HEAD}}  "
+    for line in lines[:MOST_LINES]:
+        yield from textwrap.wrap(line, width_of_screen(), initial_indent=first, subsequent_indent=others)
+    if len(lines) > MOST_LINES:
+        yield f"{'':<{HEAD}}and {len(lines) - MOST_LINES} more {head}s"
+
+
+def _load(load: AnyLoad) -> str:
+    """Return what a load is, in words."""
+    match load:
+        case Gravity() if load.times:
+            return f"gravity turns by {len(load.times)} samples until {load.times[-1]:g} s"
+        case Gravity():
+            begin = "" if load.first is None else f" from {math.degrees(load.first):g}°"
+            rate = f"{math.degrees(load.rate or 0.0):g} °/s"
+            return f"gravity turns{begin} to a tilt of {math.degrees(load.last or 0.0):g}° at {rate}"
+        case Force():
+            axes = " of its axes" if load.axes == "body" else ""
+            way = f"at {math.degrees(load.direction):g}°{axes}"
+            text = f"force of {_in_unit(load.magnitude, 'N')} on {load.body}, {way}"
+        case Moment():
+            text = f"moment of {_in_unit(load.magnitude, 'N m')} on {load.body}"
+        case Horizontal():
+            text = f"{load.magnitude:g} g on all free blocks, horizontally"
+        case Pressure(magnitude=None):
+            text = f"water to {load.water_level or 0.0:g} m on {load.body}, {load.face} face"
+        case _:
+            text = f"{_in_unit(load.magnitude or 0.0, 'Pa')} on {load.body}, {load.face} face"
+    match load.history:
+        case Constant():
+            return text
+        case Ramp() as ramp:
+            return f"{text}; factor {ramp.first:g} to {ramp.last:g} from {ramp.start:g} to {ramp.end:g} s"
+        case other:
+            return f"{text}; {other.kind} of {len(other.times)} factors until {other.times[-1]:g} s"
+
+
+def _in_unit(value: float, unit: str) -> str:
+    factor, prefix = next(((size, name) for size, name in PREFIXES if abs(value) >= size), (1.0, ""))
+    return f"{value / factor:.4g} {prefix}{unit}"
+
+
+def _probe(probe: AnyProbe) -> str:
+    """Return what a probe records and how often, in words."""
+    match probe:
+        case ForceProbe():
+            text = f"force on {probe.on}" + ("" if probe.by is None else f" by {probe.by}")
+        case PointProbe():
+            text = f"point of {probe.body}"
+        case EnergyProbe():
+            text = "energies"
+        case _:
+            text = f"joint of {' and '.join(probe.bodies)}"
+    if probe.every is None:
+        return f"{text}, at every output time"
+    return f"{text}, at every step" if probe.every == STEP else f"{text}, every {MILLI * float(probe.every):g} ms"
+
+
+def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
+    """List every block; of more than MOST_BODIES list the kinds, their numbers and the range of the centres."""
+    if len(bodies) <= MOST_BODIES:
+        cells = [(one.name, number(MILLI * one.x), number(MILLI * one.y), *_side_cells(one)) for one in bodies]
+        return table_lines(("block", "x mm", "y mm", *SIDES), cells)
+    counts = Counter(body.block for body in bodies)
+    kinds = {body.block: body for body in bodies}
+    common = counts.most_common(MOST_BODIES)
+    rows = [(name, str(count), *_side_cells(kinds[name])) for name, count in common]
+    more = [f"... and {len(counts) - len(common)} more kinds"] if len(counts) > len(common) else []
+    ends = {axis: [MILLI * getattr(body, axis) for body in bodies] for axis in ("x", "y")}
+    spans = (f"{axis} {number(min(places))} to {number(max(places))} mm" for axis, places in ends.items())
+    fixed = sum(body.fixed for body in bodies)
+    still = f", {fixed} of them fixed" if fixed else ""
+    return [
+        *table_lines(("kind", "blocks", *SIDES), rows),
+        *more,
+        f"{len(bodies)} blocks{still}",
+        f"centres at {', '.join(spans)}",
+    ]
 
 
 def _side_cells(body: PlacedBody) -> tuple[str, ...]:
@@ -242,18 +240,56 @@ def _side_cells(body: PlacedBody) -> tuple[str, ...]:
     return (*(number(MILLI * v) for v in lengths), f"{body.mass:.5g}", f"{body.inertia:.5g}")
 
 
-def _pair_cells(pair: PairDescription) -> dict[str, str]:
-    return {
-        "pair": pair.pair,
-        "μs": f"{pair.static_friction:.3g}",
-        "μk": f"{pair.kinetic_friction:.3g}",
-        "e": f"{pair.restitution:.3g}",
-        **_optional("ζ", pair.normal_damping_ratio),
-        **_optional("ζ shear", pair.shear_damping_ratio),
-        "K": f"{pair.normal_stiffness:.2e}",
-        **_optional("k/K", pair.shear_stiffness_ratio),
-    }
+def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
+    """List the contact parameters of each pair of materials, and what the heads mean."""
+    cells = [
+        {
+            "pair": pair.pair,
+            "μs": f"{pair.static_friction:.3g}",
+            "μk": f"{pair.kinetic_friction:.3g}",
+            "e": f"{pair.restitution:.3g}",
+            **_optional("ζ", pair.normal_damping_ratio),
+            **_optional("ζ shear", pair.shear_damping_ratio),
+            "K": f"{pair.normal_stiffness:.2e}",
+            **_optional("k/K", pair.shear_stiffness_ratio),
+        }
+        for pair in pairs
+    ]
+    if all(pair.shear_damping_ratio == pair.normal_damping_ratio for pair in pairs):
+        for row in cells:
+            row.pop("ζ shear", None)
+    table = table_lines(list(cells[0]), [list(row.values()) for row in cells])
+    if pairs[0].normal_damping_ratio is None:
+        return [
+            *table,
+            "μs static and μk kinetic friction, e restitution; rigid contacts: K in N/m is",
+            "the stiffness of one contact point (a face has two) at rest, for this step",
+        ]
+    points = "a face has two" if scenario.contact.model == "surface" else "the particles of a face share 2 K"
+    return [
+        *table,
+        "μs static and μk kinetic friction, e restitution, ζ damping ratio, k/K in shear,",
+        f"K stiffness in {pairs[0].stiffness_unit} of one contact point ({points})",
+    ]
 
 
 def _optional(name: str, value: float | None) -> dict[str, str]:
     return {} if value is None else {name: f"{value:.3f}"}
+
+
+def _rules(pairs: Sequence[PairDescription]) -> list[str]:
+    """List the keys of the scenario that set values, with their pairs; the rest follows defaults and materials."""
+    found: dict[str, dict[str, None]] = {}
+    for pair in pairs:
+        for key in pair.rules.values():
+            if key not in {DEFAULT, MATERIALS}:
+                found.setdefault(key, {})[" - ".join(pair.materials).replace(" ", HARD_SPACE)] = None
+    room = max(LEAST_ROOM, width_of_screen() - len(GAP) - max(map(len, found), default=0))
+    rows = [
+        ("" if i else key, line.replace(HARD_SPACE, " "))
+        for key in sorted(found, key=lambda key: not key.startswith("pairs."))
+        for i, line in enumerate(textwrap.wrap(", ".join(found[key]), room))
+    ]
+    lines = table_lines(("set by", "for"), rows, left=2) if found else []
+    is_rigid = pairs[0].normal_damping_ratio is None
+    return [*lines, f"other values: defaults{'' if is_rigid else '; stiffness from E and ν of the materials'}"]

@@ -13,6 +13,8 @@ from blocksim.cli.output import note
 from blocksim.errors import StoppedEarlyError
 
 if TYPE_CHECKING:  # stored results are shown without the solver
+    from rich.progress import Progress
+
     from blocksim.simulation import Progress as Where
     from blocksim.study.rows import Head, Row
 
@@ -25,77 +27,12 @@ LIVE_SECONDS = 0.1
 @contextmanager
 def watching(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
     """Give a function that shows the progress of a run; on a terminal the line disappears at the end."""
-    if quiet:
-        yield lambda _: None
-        return
     console = Console(stderr=True)
-    if console.is_terminal:
-        with _live_line(console) as show:
-            yield show
-    else:
-        yield _plain_lines()
-
-
-@contextmanager
-def counting(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Give a function that shows how many of all are done; on a terminal the line disappears at the end."""
-    if quiet:
-        yield lambda *_: None
+    if quiet or not console.is_terminal:
+        yield (lambda _: None) if quiet else _plain_lines()
         return
-    console = Console(stderr=True)
-    if console.is_terminal:
-        with _live_count(console, what) as show:
-            yield show
-    else:
-        yield _plain_count(what)
-
-
-def one_by_one(items: Sequence[T], told: Callable[[T], str], *, quiet: bool) -> Iterator[T]:
-    """Yield items that take long and report which one is under way."""
-    for position, item in enumerate(items, start=1):
-        if not quiet:
-            note(f"{position}/{len(items)} {told(item)} ...")
-        yield item
-
-
-@contextmanager
-def _live_count(console: Console, what: str) -> Iterator[Callable[[int, int], None]]:
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.completed} of {task.total} {task.description}"),
-        BarColumn(bar_width=None),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task(what, total=1, visible=False)
-        yield lambda done, total: progress.update(task, completed=done, total=total, visible=True)
-
-
-def _plain_count(what: str) -> Callable[[int, int], None]:
-    shown_at = time.monotonic()
-
-    def show(done: int, total: int) -> None:
-        nonlocal shown_at
-        now = time.monotonic()
-        if now - shown_at > PLAIN_SECONDS:
-            shown_at = now
-            note(f"{done} of {total} {what}")
-
-    return show
-
-
-@contextmanager
-def _live_line(console: Console) -> "Iterator[Callable[[Where], None]]":
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.completed:.3f} of {task.total:g} s"),
-        BarColumn(bar_width=None),
-        TextColumn("{task.fields[speed]} steps/s, relative energy error {task.fields[residual]}"),
-        TimeRemainingColumn(),
-    )
-    progress = Progress(*columns, console=console, transient=True)
+    rates = "{task.fields[speed]} steps/s, relative energy error {task.fields[residual]}"
+    progress = _bar(console, "{task.completed:.3f} of {task.total:g} s", rates)
     task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
     began = shown_at = 0.0
     steps: int | None = None  # when first shown: compiling comes before, and a resumed run has done some
@@ -118,6 +55,48 @@ def _live_line(console: Console) -> "Iterator[Callable[[Where], None]]":
         if steps is not None:
             with suppress(OSError):  # the terminal has gone, and so has its line
                 progress.stop()
+
+
+@contextmanager
+def counting(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    """Give a function that shows how many of all are done; on a terminal the line disappears at the end."""
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield (lambda *_: None) if quiet else _plain_count(what)
+        return
+    with _bar(console, "{task.completed} of {task.total} {task.description}") as progress:
+        task = progress.add_task(what, total=1, visible=False)
+        yield lambda done, total: progress.update(task, completed=done, total=total, visible=True)
+
+
+def _bar(console: Console, first: str, *others: str) -> "Progress":
+    """Return a live line: a text, a bar, other texts and the time that remains."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    texts = map(TextColumn, others)
+    bar = BarColumn(bar_width=None)
+    return Progress(TextColumn(first), bar, *texts, TimeRemainingColumn(), console=console, transient=True)
+
+
+def one_by_one(items: Sequence[T], told: Callable[[T], str], *, quiet: bool) -> Iterator[T]:
+    """Yield items that take long and report which one is under way."""
+    for position, item in enumerate(items, start=1):
+        if not quiet:
+            note(f"{position}/{len(items)} {told(item)} ...")
+        yield item
+
+
+def _plain_count(what: str) -> Callable[[int, int], None]:
+    shown_at = time.monotonic()
+
+    def show(done: int, total: int) -> None:
+        nonlocal shown_at
+        now = time.monotonic()
+        if now - shown_at > PLAIN_SECONDS:
+            shown_at = now
+            note(f"{done} of {total} {what}")
+
+    return show
 
 
 def _plain_lines() -> "Callable[[Where], None]":

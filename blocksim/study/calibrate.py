@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -32,7 +31,7 @@ from blocksim.study.compare import ExperimentTablePath
 from blocksim.study.executors.ensemble import run_members
 from blocksim.study.fitted_file import NOTE, with_fitted
 from blocksim.study.plan import Values, Variations
-from blocksim.study.vary import RANGE, SPREAD, read_variations
+from blocksim.study.vary import RANGE, SPREAD, variations_option
 
 WRITTEN = "scenario.toml"
 JOURNAL = ".trials.jsonl"
@@ -121,26 +120,24 @@ class CalibrateOptions:
 
     fit: Annotated[
         Mapping[str, Values],
-        Option(
+        variations_option(
             "A key to fit, and its prior. Repeatable.",
-            python='The priors by dotted key, as {"contact.restitution": {"from": 0.2, "to": 0.35}}.',
-            metavar="KEY=FROM:TO",
-            read=partial(read_variations, option=FIT, forms=RANGE),
-            is_repeatable=True,
-            complete="scenario_keys",
+            "KEY=FROM:TO",
+            'The priors by dotted key, as {"contact.restitution": {"from": 0.2, "to": 0.35}}.',
+            FIT,
+            RANGE,
         ),
     ] = field(default_factory=dict)
     scatter: Annotated[
         Mapping[str, Values] | None,
-        Option(
+        variations_option(
             "Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
             "Default: the distributions of [sweep].",
-            python="The distributions of inputs, {mean, sd} or {from, to} (default: those of [sweep]); of a fitted "
+            "KEY=MEAN+-SD",
+            "The distributions of inputs, {mean, sd} or {from, to} (default: those of [sweep]); of a fitted "
             "key, about its fitted value.",
-            metavar="KEY=MEAN+-SD",
-            read=partial(read_variations, option=SCATTER, forms=SPREAD),
-            is_repeatable=True,
-            complete="scenario_keys",
+            SCATTER,
+            SPREAD,
         ),
     ] = None
     _: KW_ONLY

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -21,7 +20,7 @@ from blocksim.study.plan import Values, Variations, varied
 from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
 from blocksim.study.sampling import drawn, open_interval
 from blocksim.study.sensitivity_methods import METHODS, Floats, Method
-from blocksim.study.vary import SPREAD, read_variations
+from blocksim.study.vary import SPREAD, variations_option
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -150,15 +149,13 @@ class SensitivityOptions:
 
     vary: Annotated[
         Mapping[str, Values] | None,
-        Option(
+        variations_option(
             "An input and its distribution: KEY=FROM:TO, KEY=MEAN+-SD or KEY=a,b,c. Repeatable. "
             "Default: the distributions of [sweep].",
-            python='The distribution of each dotted key, as {"gravity": {"from": 9.7, "to": 9.9}}, {mean, sd} or a '
+            "KEY=FROM:TO",
+            'The distribution of each dotted key, as {"gravity": {"from": 9.7, "to": 9.9}}, {mean, sd} or a '
             "list (default: those of [sweep]).",
-            metavar="KEY=FROM:TO",
-            read=partial(read_variations, option=VARY, forms=SPREAD),
-            is_repeatable=True,
-            complete="scenario_keys",
+            forms=SPREAD,
         ),
     ] = None
     _: KW_ONLY

@@ -30,7 +30,7 @@ from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Entry, Manifest,
 from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, check_experiment, invalid_row
 from blocksim.study.sweep_folder import CASES, prepare, read_plan
 from blocksim.study.sweep_table import SweepResult, SweepTable
-from blocksim.study.vary import read_variations
+from blocksim.study.vary import variations_option
 
 TIMINGS = "timings.csv"
 MEASURED = "experiment.table"
@@ -50,14 +50,11 @@ class SweepOptions(Execution):
 
     vary: Annotated[
         Mapping[str, Values] | None,
-        Option(
+        variations_option(
             "KEY=a,b,c or KEY=from:to:count; for random draws KEY=from:to or KEY=mean+-sd. With :log at the end, "
             "from:to is spaced logarithmically. Repeatable.",
-            python="The values of each dotted key: a list, {from, to, count}, {from, to} or {mean, sd}.",
-            metavar="KEY=VALUES",
-            read=read_variations,
-            is_repeatable=True,
-            complete="scenario_keys",
+            "KEY=VALUES",
+            "The values of each dotted key: a list, {from, to, count}, {from, to} or {mean, sd}.",
         ),
     ] = None
     _: KW_ONLY

@@ -1,8 +1,10 @@
 """Reading KEY=VALUES, as --vary and other options of studies take it."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from blocksim.errors import Problem, ScenarioError
+from blocksim.options import Option
 from blocksim.scenario.overrides import UnfitOverrideError, parse_value
 from blocksim.study.plan import Values, Variations
 
@@ -13,6 +15,12 @@ PLUS_MINUS = ("+-", "±")
 FORMS = "KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd (from:to also with :log at the end)"
 RANGE = "KEY=from:to (also with :log at the end)"
 SPREAD = "KEY=from:to, KEY=mean+-sd or KEY=a,b,c (from:to also with :log at the end)"
+
+
+def variations_option(text: str, metavar: str, python: str, flag: str = "--vary", forms: str = FORMS) -> Option:
+    """Return an option that gives values to keys, KEY=VALUES, and may be repeated."""
+    read = partial(read_variations, option=flag, forms=forms)
+    return Option(text, (flag,), metavar, python, read, is_repeatable=True, complete="scenario_keys")
 
 
 def read_variations(texts: Sequence[str], option: str = "--vary", forms: str = FORMS) -> Variations:
