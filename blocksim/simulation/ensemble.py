@@ -45,15 +45,16 @@ CHUNK = 4  # members at most that a thread takes at a time: few enough that all 
 Steps = NDArray[np.int64]
 
 
-def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None) -> list[MemberEnd]:
+def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None, peaks: bool = False) -> list[MemberEnd]:
     """Run scenarios to their ends and return those in the same order.
 
     They may differ in anything; those whose scenes have the same shape (scheme, numbers of bodies and material pairs)
-    are advanced together, on `threads` threads (default: one a core). The result does not depend on that number. Raises
-    what building a world raises, and ValueError for less than one thread.
+    are advanced together, on `threads` threads (default: one a core). The result does not depend on that number. With
+    `peaks` the largest rotation of each is followed from frame to frame, which takes longer. Raises what building a
+    world raises, and ValueError for less than one thread.
     """
     ends: list[MemberEnd] = []
-    for batch in run_in_batches(scenarios, threads=threads):
+    for batch in run_in_batches(scenarios, threads=threads, peaks=peaks):
         for end in batch:
             if isinstance(end, MemberFailure):
                 raise end.error
@@ -62,7 +63,7 @@ def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None) -
 
 
 def run_in_batches(
-    scenarios: Iterable[Scenario], *, threads: int | None = None, most: int = BATCH
+    scenarios: Iterable[Scenario], *, threads: int | None = None, most: int = BATCH, peaks: bool = False
 ) -> Iterator[list[Ended]]:
     """Run scenarios as `run_ensemble` does, at most `most` at a time; yield where those of a batch ended, in order.
 
@@ -75,15 +76,15 @@ def run_in_batches(
         if number < 1:
             message = f"{what} must be at least 1, not {number}"
             raise ValueError(message)
-    return _run_all(scenarios, count, most)
+    return _run_all(scenarios, count, most, peaks=peaks)
 
 
-def _run_all(scenarios: Iterable[Scenario], threads: int, most: int) -> Iterator[list[Ended]]:
+def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: bool) -> Iterator[list[Ended]]:
     with ThreadPoolExecutor(threads) as pool:
         for batch in _batches(scenarios, most):
             for kernels in dict.fromkeys(map(kernels_of, batch)):
                 compile_kernels(kernels)
-            yield _run_batch(batch, pool, threads)
+            yield _run_batch(batch, pool, threads, peaks=peaks)
 
 
 def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario]]:
@@ -100,7 +101,7 @@ def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario
         yield batch
 
 
-def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads: int) -> list[Ended]:
+def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads: int, *, peaks: bool) -> list[Ended]:
     ends: dict[int, Ended] = {}
     for one in build_stacks(scenarios):
         if isinstance(one, Refusal):
@@ -111,7 +112,7 @@ def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads:
         except BlocksimError as error:
             ends[one.numbers[0]] = MemberFailure(error)
             continue
-        ensemble = Ensemble(scenarios, stack)
+        ensemble = Ensemble(scenarios, stack, peaks=peaks)
         ensemble.advance(pool, threads)
         ends.update(zip(one.numbers, ensemble.ends(), strict=True))
     return [ends[i] for i in range(len(scenarios))]
@@ -128,9 +129,13 @@ def _settled(scenario: Scenario, stack: Stack) -> Stack:
 class Ensemble:
     """Scenes of one scheme and shape, stacked, to be advanced together once."""
 
-    def __init__(self, scenarios: Sequence[Scenario], stack: Stack) -> None:
-        """Take a stack of scenes that have not moved yet, and the scenarios that its numbers count."""
+    def __init__(self, scenarios: Sequence[Scenario], stack: Stack, *, peaks: bool = False) -> None:
+        """Take a stack of scenes that have not moved yet, and the scenarios that its numbers count.
+
+        `peaks` says whether the largest rotations on the way are followed.
+        """
         self.placed = stack.placed
+        self.has_peaks = peaks
         self.scenes: AnyScene = stack.scenes
         self.scheme, self.names = scheme_of(self.scenes), ledger_names(self.scenes)
         self.bodies = int(self.scenes.world.bodies.shape[1]) - 1
@@ -150,8 +155,8 @@ class Ensemble:
         reach, thresholds = self.watch.shapes.reach, self.watch.thresholds
         # compiled code sees no motion relative to a support that moves
         periods = np.where([support.moves for support in self.supports], 0.0, self.periods)
-        peaks = np.zeros(len(ends))
-        self.watched = Watched(self.periods, periods, steps, places, start, reach, thresholds, peaks)
+        frames = self.periods if peaks else np.zeros(len(ends))
+        self.watched = Watched(frames, periods, steps, places, start, reach, thresholds, np.zeros(len(ends)))
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
@@ -252,17 +257,19 @@ class Ensemble:
         """Return where the members ended, in order."""
         self._see_ends()
         measured = self._measured(np.arange(len(self.codes)))
-        closing = Closing(self.scenes, self.placed, measured, self.watch, self._peaks()[:, None])
+        closing = Closing(self.scenes, self.placed, measured, self.watch, self._peaks())
         return [
             self._run_alone(m, self._start(m)) if code == PAIRS_FULL else closing.end(m, self._start(m), code)
             for m, code in enumerate(self.codes.tolist())
         ]
 
-    def _peaks(self) -> NDArray[np.float64]:
-        """Return the largest rotation (rad) of each member, in frames and at the end."""
+    def _peaks(self) -> NDArray[np.float64] | None:
+        """Return the largest rotation (rad) of each member, (m, 1), in frames and at the end, where it was followed."""
+        if not self.has_peaks:
+            return None
         turns = np.abs(self._positions(self.scenes, slice(None))[:, 2] - self.watched.start[:, 2])
         at_end = np.where(self.watch.shapes.is_free, turns, 0.0).max(axis=1, initial=0.0)
-        return np.asarray(np.fmax(self.watched.peaks, at_end))
+        return np.asarray(np.fmax(self.watched.peaks, at_end))[:, None]
 
     def _measured(self, members: Steps) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""

@@ -122,7 +122,7 @@ def find_limit(
         runs = _Runs(manifest, run, on_run)
         try:
             with stop_requests() as is_stopped:
-                runs.setting = replace(setting, is_stopped=is_stopped)
+                runs.setting = replace(setting, is_stopped=is_stopped, peaks=True)
                 rows = runs.searched(
                     plan, lambda known: next_values(plan.span, known, plan.tolerance, runs.peaks(plan, known))
                 )

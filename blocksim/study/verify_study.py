@@ -21,6 +21,7 @@ from typing import Any
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document
 from blocksim.scenario.bounded_read import read_limited
+from blocksim.simulation.movement import PEAK
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.fragility import MEMBERS_TABLE, run_fragility
@@ -130,10 +131,10 @@ def _verified(folder: Path, kind: FolderKind, repeated: "Repeated", sample: int,
     entries = [*apart(kind.origin, "", _bare(_read_answer(folder, kind)), _bare(repeated.answer))]
     tasks = repeated.tasks
     chosen = sorted(random.Random(seed).sample(range(len(tasks)), min(sample, len(tasks))))  # noqa: S311 - no secret
-    rows = rows_of([tasks[number].scenario for number in chosen], os.cpu_count() or 1)
-    for number, row in zip(chosen, rows, strict=True):
-        entry = repeated.look(tasks[number])
-        assert entry is not None  # noqa: S101 - it was there before
+    known = [entry for number in chosen if (entry := repeated.look(tasks[number])) is not None]  # all were there
+    peaks = any(PEAK in entry.row for entry in known)
+    rows = rows_of([tasks[number].scenario for number in chosen], os.cpu_count() or 1, peaks=peaks)
+    for number, entry, row in zip(chosen, known, rows, strict=True):
         name = tasks[number].name if is_same_code else entry.case
         cells += _row_apart(number + 1, entry, {CASE: name, **row})
     return SweepVerdict(

@@ -95,8 +95,10 @@ def has_row(placed: Sequence[PlacedBody]) -> bool:
         and min(one.top, other.top) > max(one.bottom, other.bottom) + near
         for one, other in combinations(boxes, 2)
     )
+    if not any(touching):
+        return False
     loads = loads_at_rest(placed, 1.0)
-    return any(touching) and not any(load.lower is not None and not placed[load.lower].fixed for load in loads)
+    return not any(load.lower is not None and not placed[load.lower].fixed for load in loads)
 
 
 def has_impacts_in_rounds(

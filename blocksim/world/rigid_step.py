@@ -71,10 +71,19 @@ class CoarseStepError(StepError):
 
 
 class Reason(NamedTuple):
-    """A step (s) that must not be exceeded, and the reason in a few words."""
+    """A step (s) that must not be exceeded, and the reason in a few words, with places for numbers.
+
+    The text is made when somebody asks for it: members of ensembles want the step only.
+    """
 
     step: float
-    why: str
+    text: str
+    numbers: tuple[float, ...] = ()
+
+    @property
+    def why(self) -> str:
+        """The reason, with its numbers."""
+        return self.text.format(*self.numbers)
 
 
 def choose_rigid_step(outline: Outline, bounds: Bounds) -> float:
@@ -103,14 +112,14 @@ def reason_of_step(outline: Outline, bounds: Bounds) -> Reason:
     for share, speed in speeds:
         if speed > 0.0:
             way = SHARE * share * bounds.smallest
-            why = f"no point moves farther than {MILLI * way:.3g} mm in it, at most at {speed:.3g} m/s"
-            reasons.append(Reason(way / speed, why))
+            why = "no point moves farther than {:.3g} mm in it, at most at {:.3g} m/s"
+            reasons.append(Reason(way / speed, why, (MILLI * way, speed)))
     reasons += _reasons_of_motion(scenario, bounds, few)
     if bounds.free and scenario.gravity > 0.0:
         share = NATURAL * bounds.free / FEW
-        why = f"{share:.2g} √(L/g) for so few blocks, L = {MILLI * bounds.smallest:.4g} mm the smallest side"
+        why = "{:.2g} √(L/g) for so few blocks, L = {:.4g} mm the smallest side"
         parts = max(1, round(USUAL_STEP / (share * math.sqrt(bounds.smallest / scenario.gravity))))
-        reasons.append(Reason(USUAL_STEP / parts, why))
+        reasons.append(Reason(USUAL_STEP / parts, why, (share, MILLI * bounds.smallest)))
         reasons += _reasons_of_sag(outline, bounds)
         reasons += _reasons_of_thrust(outline, bounds)
     return min(reasons, key=lambda reason: reason.step)
@@ -122,13 +131,11 @@ def _reasons_of_motion(scenario: Scenario, bounds: Bounds, few: float) -> Iterat
         way = SHARE * few * bounds.smallest
         speed = given_speed(scenario, bounds) + support_speed(scenario)
         if speed > 0.0:
-            why = (
-                f"supports move no farther than {MILLI * way:.3g} mm in it, at most at {speed:.3g} m/s with the blocks"
-            )
-            yield Reason(way / speed, why)
+            why = "supports move no farther than {:.3g} mm in it, at most at {:.3g} m/s with the blocks"
+            yield Reason(way / speed, why, (MILLI * way, speed))
     period = shortest_period(scenario)
     if period > 0.0:
-        yield Reason(PERIOD_SHARE * period, f"a twentieth of {period:.3g} s, the shortest period of a motion")
+        yield Reason(PERIOD_SHARE * period, "a twentieth of {:.3g} s, the shortest period of a motion", (period,))
 
 
 def _reasons_of_sag(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
@@ -151,8 +158,8 @@ def _reasons_of_sag(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
     sag = scene_sag(USUAL_STEP / substeps, outline.placed, scenario.gravity)
     for found, most in ((sag.crushed, crushed), (sag.overlap, allowed)):
         if found > most:
-            why = f"no contact gives way by more than {MILLI * most:.3g} mm where light blocks carry heavy ones"
-            yield Reason(USUAL_STEP / math.ceil(math.sqrt(found / most)), why)
+            why = "no contact gives way by more than {:.3g} mm where light blocks carry heavy ones"
+            yield Reason(USUAL_STEP / math.ceil(math.sqrt(found / most)), why, (MILLI * most,))
 
 
 def _reasons_of_thrust(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
@@ -162,10 +169,10 @@ def _reasons_of_thrust(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
         parts = math.ceil(math.sqrt(thrust_shift(outline) / square / SHIFT))
         if parts > 1:
             why = (
-                f"at rest joints move across their thrust by no more than {PERCENT * SHIFT:.2g} % of their widths, "
-                f"in columns and walls {PERCENT * SHIFT / COURSED:.2g} %"
+                "at rest joints move across their thrust by no more than {:.2g} % of their widths, "
+                "in columns and walls {:.2g} %"
             )
-            yield Reason(USUAL_STEP / parts, why)
+            yield Reason(USUAL_STEP / parts, why, (PERCENT * SHIFT, PERCENT * SHIFT / COURSED))
 
 
 def _substeps(scenario: Scenario) -> int:

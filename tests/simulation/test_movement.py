@@ -106,7 +106,7 @@ def rocking(spin: float = 2.0, **time: object) -> Scenario:
 
 def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
     scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005), rocking(spin=4.5, end=0.2)]
-    members = run_ensemble(scenarios, threads=1)
+    members = run_ensemble(scenarios, threads=1, peaks=True)
     ends = [one.observed["outcome"] for one in members]
     # the last ones are caught on their way, the first of them long before it would be seen to go on
     assert ends == [Manner.ROCKED, Manner.ROCKED, Manner.SLID, Manner.ROCKING]

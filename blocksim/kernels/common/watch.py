@@ -15,7 +15,7 @@ from blocksim.kernels.common.jit import rare_kernel
 class Watched(NamedTuple):
     """What is watched of m members with b blocks each."""
 
-    frames: Floats  # (m,) steps between two frames, zero where there are none
+    frames: Floats  # (m,) steps between two frames, zero where peaks are not followed
     periods: Floats  # (m,) the same, zero where it is not watched what moves first
     steps: Integers  # (m,) output: the first frame in which a block had moved, zero before
     places: Floats  # (m, 3, b) output: x, y (m), angle (rad) then
@@ -30,8 +30,14 @@ step_of_next = rare_kernel(next_frame)
 
 @rare_kernel
 def frame_to_watch(watched: Watched, m: int, done: int) -> int:
-    """Return the next step with a frame of a member, zero where there is none."""
-    return step_of_next(done, watched.frames[m]) if watched.frames[m] > 0.0 else 0
+    """Return the next step with a frame of a member that is of interest, zero where there is none.
+
+    Every stop costs: without peaks there is none after the first move.
+    """
+    if watched.frames[m] > 0.0:
+        return step_of_next(done, watched.frames[m])
+    is_watched = watched.periods[m] > 0.0 and watched.steps[m] == 0
+    return step_of_next(done, watched.periods[m]) if is_watched else 0
 
 
 @rare_kernel

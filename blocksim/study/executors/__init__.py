@@ -57,6 +57,7 @@ class Setting:
     is_stopped: Callable[[], bool] = lambda: False
     scheduler: str | None = None  # address of a Dask cluster
     folder: Path | None = None  # where folders of runs are kept
+    peaks: bool = False  # whether rows need the largest rotation on the way
 
     def folder_of(self, task: Task) -> Path | None:
         """Return where a run is kept, None where it is not."""

@@ -110,7 +110,8 @@ class Submission:
             if not tasks:
                 return
             payload = [(task.scenario, None) for task in tasks]
-            self._await(self.client.submit(run_batch, payload, code_hash(), pure=False), tasks)
+            future = self.client.submit(run_batch, payload, code_hash(), peaks=self.setting.peaks, pure=False)
+            self._await(future, tasks)
 
     def _threads(self) -> int:
         """Return how many batches the workers run at a time, all together."""

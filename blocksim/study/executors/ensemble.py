@@ -41,7 +41,7 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
     batch = take(tasks, size.count, setting.is_stopped)
     while batch and not setting.is_stopped():
         began = time.monotonic()
-        running = Running(batch, setting.jobs)
+        running = Running(batch, setting)
         following = take(tasks, size.count, setting.is_stopped)
         if not running.wait(setting):
             return
@@ -53,9 +53,9 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
 class Running:
     """A batch that is under way."""
 
-    def __init__(self, tasks: tuple[Task, ...], threads: int) -> None:
+    def __init__(self, tasks: tuple[Task, ...], setting: Setting) -> None:
         """Begin."""
-        self.tasks, self.threads = tasks, threads
+        self.tasks, self.setting = tasks, setting
         self.rows: list[Row] = []
         self.seconds = 0.0
         self._thread = threading.Thread(target=self._run, name=THREAD, daemon=True)
@@ -63,7 +63,7 @@ class Running:
 
     def _run(self) -> None:
         began = time.perf_counter()
-        self.rows = rows_of([task.scenario for task in self.tasks], self.threads)
+        self.rows = rows_of([task.scenario for task in self.tasks], self.setting.jobs, peaks=self.setting.peaks)
         self.seconds = time.perf_counter() - began
 
     def wait(self, setting: Setting) -> bool:
@@ -83,7 +83,7 @@ def is_still_running() -> bool:
     return any(thread.name == THREAD for thread in threading.enumerate())
 
 
-def rows_of(scenarios: Sequence[Scenario], threads: int) -> list[Row]:
+def rows_of(scenarios: Sequence[Scenario], threads: int, *, peaks: bool = False) -> list[Row]:
     """Return the row of every scenario; one that ends in an error of ours fails alone, found by halving."""
     if not scenarios:
         return []
@@ -92,13 +92,13 @@ def rows_of(scenarios: Sequence[Scenario], threads: int) -> list[Row]:
             row_of_error(end.error)
             if isinstance(end, MemberFailure)
             else row_of(end.outcome, end.seconds, end.observed, end.columns)
-            for end in chain(*run_in_batches(scenarios, threads=threads))
+            for end in chain(*run_in_batches(scenarios, threads=threads, peaks=peaks))
         ]
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         if len(scenarios) == 1:
             return [row_of_error(error)]
     middle = len(scenarios) // 2
-    return rows_of(scenarios[:middle], threads) + rows_of(scenarios[middle:], threads)
+    return rows_of(scenarios[:middle], threads, peaks=peaks) + rows_of(scenarios[middle:], threads, peaks=peaks)
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ class Outcome(NamedTuple):
     host: str
 
 
-def run_batch(payload: Payload, code: str) -> Outcome:
+def run_batch(payload: Payload, code: str, *, peaks: bool = False) -> Outcome:
     """Run scenarios on one thread, by the same code as whoever asks. Raises InvalidInputError where it is another."""
     if code != code_hash():
         message = (
@@ -199,7 +199,7 @@ def run_batch(payload: Payload, code: str) -> Outcome:
     if any(folder is not None for _, folder in payload):
         rows = [_kept(scenario, folder) for scenario, folder in payload if folder is not None]
     else:
-        rows = rows_of([scenario for scenario, _ in payload], 1)
+        rows = rows_of([scenario for scenario, _ in payload], 1, peaks=peaks)
     return Outcome(tuple(rows), time.perf_counter() - began, platform.node())
 
 

@@ -158,7 +158,7 @@ def _run_on(tasks: Iterator[Task], setting: Setting, pool_of: PoolOf) -> Generat
 def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, None]:
     """Run tasks one after the other in this process, as a worker does. Raises KeyboardInterrupt on Ctrl-C."""
     for task in tasks:
-        yield Batch((task,), *run_batch([(task.scenario, setting.folder_of(task))], code_hash()))
+        yield Batch((task,), *run_batch([(task.scenario, setting.folder_of(task))], code_hash(), peaks=setting.peaks))
 
 
 class Work:
@@ -198,7 +198,7 @@ class Work:
     def _submit(self, pool: ProcessPoolExecutor, job: Job) -> None:
         payload = [(task.scenario, self.setting.folder_of(task)) for task in job.tasks]
         try:
-            self.pending[pool.submit(run_batch, payload, code_hash())] = job
+            self.pending[pool.submit(run_batch, payload, code_hash(), peaks=self.setting.peaks)] = job
         except BrokenProcessPool:  # it died before it got the job
             self.suspects.append(job)
             raise

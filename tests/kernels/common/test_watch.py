@@ -20,14 +20,13 @@ def test_frames_are_those_that_a_recorder_keeps(done: int, period: float) -> Non
     assert step_of_next(done, period) == next_frame(done, period)
 
 
-def watched(threshold: float = THRESHOLD) -> Watched:
+def watched(threshold: float = THRESHOLD, *, peaks: bool = True) -> Watched:
     """Watch the second of two members, of two blocks each, the second of them fixed."""
     thresholds = np.array([[math.inf, math.inf], [threshold, math.inf]])
     places = np.zeros((2, 3, 2))
     periods, steps = np.array([0.0, 3.0]), np.zeros(2, dtype=np.int64)
-    return Watched(
-        periods, periods, steps, places, np.zeros((2, 3, 2)), np.full((2, 2), REACH), thresholds, np.zeros(2)
-    )
+    frames = periods if peaks else np.zeros(2)
+    return Watched(frames, periods, steps, places, np.zeros((2, 3, 2)), np.full((2, 2), REACH), thresholds, np.zeros(2))
 
 
 def bodies(**state: float) -> Records:
@@ -71,3 +70,11 @@ def test_the_largest_rotation_is_followed_to_the_end_and_the_first_frame_of_a_mo
     assert seen.steps.tolist() == [0, 6]
     assert seen.peaks.tolist() == [0.0, 0.2]
     assert frame_to_watch(seen, 1, 7) == 9
+
+
+def test_without_peaks_nothing_stops_after_the_first_move() -> None:
+    seen = watched(peaks=False)
+    assert [frame_to_watch(seen, m, 4) for m in (0, 1)] == [0, 6]
+    watch(bodies(angle=-0.2), seen, 1, 6)
+    assert seen.steps.tolist() == [0, 6]
+    assert frame_to_watch(seen, 1, 7) == 0
