@@ -68,7 +68,7 @@ def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[Numb
     clock: list[float] = []
 
     def sample() -> float:
-        ensemble = Ensemble(members, only(build_stacks(members)))
+        ensemble = Ensemble(members, only(build_stacks(members)), peaks=False)
         with ThreadPoolExecutor(threads) as pool:
             cpu, began = time.process_time(), time.perf_counter()
             ensemble.advance(pool, threads)

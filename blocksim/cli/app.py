@@ -2,6 +2,7 @@
 
 import io
 import sys
+import time
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ def __getattr__(name: str) -> Any:
 
 def main() -> None:
     """Run the command line; every error becomes a message and an exit code."""
+    began = time.monotonic()
     take_interrupts()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -29,7 +31,7 @@ def main() -> None:
     from blocksim.errors import ExitCode
 
     try:
-        app()
+        app(obj=began)
     except KeyboardInterrupt:
         sys.exit(ExitCode.STOPPED_EARLY)
     except Exception as error:  # noqa: BLE001 - the last line of defence

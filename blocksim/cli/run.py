@@ -1,11 +1,13 @@
 """blocksim run: simulate one scenario."""
 
 import os
+import time
 from collections.abc import Iterator
 from contextlib import nullcontext, suppress
 from dataclasses import replace
 from itertools import islice
 
+import click
 import typer
 
 from blocksim.cli.options import Report, Screen
@@ -53,6 +55,10 @@ def run_command(source: ScenarioInput, options: RunOptions, screen: Screen) -> N
         if not screen.silent:
             warn_of_values(ready)
         out = options.out or default_folder(ready)
+        context = click.get_current_context(silent=True)
+        if context is not None and context.obj is not None:  # imports and compiling are waited for too
+            over = time.monotonic() - context.obj
+            options = replace(options, precautions=replace(options.precautions, time_over=over))
         result = run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
     with nullcontext() if result.status == FINISHED else suppress(OSError):  # SIGHUP reports that the terminal is lost
         screen.show(_report(result))

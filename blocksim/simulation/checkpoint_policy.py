@@ -47,6 +47,7 @@ class CheckpointPolicy:
         float | None,
         Option('Stop after this wall time, e.g. "90 min", as Ctrl-C does.', metavar="TIME", read=SECONDS.read),
     ] = None  # s
+    time_over: float = 0.0  # s of them that are over before the run begins
 
     def periods(self, step: float) -> tuple[int, ...]:
         """Return the numbers of steps (s) after which checkpoints are due."""

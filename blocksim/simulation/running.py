@@ -102,14 +102,13 @@ def simulate_into(
     fails. A signal (SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1) or the limit of wall time ends it with the status
     `interrupted`, and what was computed until then is kept.
     """
-    began = time.perf_counter()
+    limit, began = WallTime(precautions.wall_time, precautions.time_over), time.perf_counter()
     built = build(scenario)
     refuse_full_disk(folder, scenario, built.scene)
     tables = read_tables(scenario)
     with folder_lock(folder):
         resumption = _resumption(folder, scenario, listener) if resume else NEW
         began += _compiled(scenario, listener)
-        limit = WallTime(precautions.wall_time)
         with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
             settled = None if resumption.checkpoint is None else resumption.checkpoint.position.settled
             if resumption.checkpoint is None:

@@ -46,12 +46,12 @@ def stop_requests() -> Iterator[StopRequests]:
 
 
 class WallTime:
-    """A limit of wall time (s), None for no limit, that begins to run now."""
+    """A limit of wall time (s), None for no limit, of which so much is over now."""
 
-    def __init__(self, limit: float | None) -> None:
+    def __init__(self, limit: float | None, over: float = 0.0) -> None:
         """Begin."""
         self.limit = limit
-        self.began = time.monotonic()
+        self.began = time.monotonic() - over
 
     def reason(self) -> str:
         """Return why to stop, in words, and nothing before the limit."""

@@ -180,6 +180,15 @@ def test_wall_time_stops_and_resume_tells_where_it_continues(blocksim: Command, 
     assert shown.err.startswith("already computed; rerun with --overwrite")
 
 
+def test_the_limit_of_wall_time_counts_from_the_start_of_the_process(process: Process, tmp_path: Path) -> None:
+    slow = "import time, blocksim.cli.commands as late; late.app = lambda obj, app=late.app: app(obj=obj - 1000.0)"
+    running = process(*LONG, "--wall-time", "1000 s", "--out", "out", before=slow)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 75, err
+    assert "wall-time limit of 1000 s reached" in err
+    assert told(tmp_path / "out")["steps"] == 0
+
+
 def test_run_of_other_code_or_values_that_waits_is_reported(blocksim: Command) -> None:
     stopped = blocksim(*LONG, "--wall-time", "0.1 s")
     assert stopped.code == 75

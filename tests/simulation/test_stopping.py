@@ -35,6 +35,7 @@ def test_limit_of_wall_time_is_a_reason_to_stop_once_it_is_over() -> None:
     limit = WallTime(0.01)
     time.sleep(0.02)
     assert limit.reason() == "wall-time limit of 0.01 s reached"
+    assert WallTime(60.0, 61.0).reason() == "wall-time limit of 60 s reached"
 
 
 def test_handler_of_somebody_else_stays() -> None:
