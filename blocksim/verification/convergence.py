@@ -10,8 +10,8 @@ import numpy as np
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, at_least
 from blocksim.verification.collapse import LONGEST, collapse
-from blocksim.verification.resting import CONTACT_RADIUS
-from blocksim.verification.scene import HEIGHT, PaperBlock
+from blocksim.verification.resting import CONTACT_RADIUS, resting_overlap
+from blocksim.verification.scene import HEIGHT
 from blocksim.verification.throws import Throw, Thrower
 
 if TYPE_CHECKING:
@@ -48,19 +48,10 @@ def rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def resting_state(setting: Setting) -> tuple[float, float]:
-    """Return overlap (m) and frequency (1/s) of a block that rests on its face."""
-    block = PaperBlock()
-    if setting.hertzian:
-        overlap = forms.hertz_static_overlap(block.mass, block.modulus, CONTACT_RADIUS)
-        return overlap, sqrt(1.5 * forms.GRAVITY / overlap)  # the slope of d^1.5 is 1.5 times force over overlap
-    overlap = forms.static_overlap(block.mass, 2.0 * block.point_stiffness)
-    return overlap, sqrt(forms.GRAVITY / overlap)
-
-
 def oscillation(setting: Setting, refinement: int) -> NDArray[np.float64]:
     """Return heights (m) at fixed times of an undamped block that starts half of its overlap too high: no lift-off."""
-    overlap, frequency = resting_state(setting)
+    overlap = resting_overlap(setting)
+    frequency = sqrt((1.5 if setting.hertzian else 1.0) * forms.GRAVITY / overlap)  # slope of d^1.5: 1.5 force/overlap
     step = COARSEST / frequency / refinement
 
     def press(world: World) -> None:

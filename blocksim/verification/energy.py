@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blocksim.kernels.common.arrays import AT_REST, REACHED
-from blocksim.scenario import Document, Scenario, load_scenario, place_bodies
+from blocksim.scenario import Document, load_scenario, place_bodies
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.case import Row, Setting, absolute, at_least
 from blocksim.verification.scene import Simulation
@@ -79,27 +79,9 @@ def ledgers(setting: Setting) -> Iterator[Row]:
         if setting.has_springs and not load_scenario(path).time.has_springs:
             continue
         tolerance = LEDGER_TOLERANCE if setting.has_springs else HEAVY.get(path.stem, RIGID_LEDGER_TOLERANCE)
-        yield absolute(_name(setting, path), "", 0.0, worst_residual(setting, path), tolerance)
-
-
-def _name(setting: Setting, path: Path) -> str:
-    """Return the name of a scenario, and the part of it that is run."""
-    if not setting.has_springs or not _is_crowd(load_scenario(path)):
-        return path.stem
-    return f"{path.stem}, first moments"
-
-
-def _gives_way(setting: Setting, scenario: Scenario, *, is_crowd: bool) -> bool:
-    """Return True where a scenario's own stiffness, meant for the linear law, is too soft for Hertz–Mindlin's."""
-    return setting.law != Setting().law and (is_crowd or scenario.contact.model != Setting().model)
-
-
-def _is_crowd(scenario: Scenario) -> bool:
-    return len(place_bodies(scenario)) > CROWD
-
-
-def _crowd_end(setting: Setting) -> float:
-    return CROWD_END if setting.model == "surface" else CROWD_END_PARTICLES
+        is_whole = not setting.has_springs or len(place_bodies(load_scenario(path))) <= CROWD
+        name = path.stem if is_whole else f"{path.stem}, first moments"
+        yield absolute(name, "", 0.0, worst_residual(setting, path), tolerance)
 
 
 def asked_of(setting: Setting) -> dict[str, object]:
@@ -129,15 +111,16 @@ def worst_residual(setting: Setting, path: Path) -> float:
     overrides = asked_of(setting)
     document = Document.read(path)
     own = document.build()
-    is_crowd = _is_crowd(own)
+    is_crowd = len(place_bodies(own)) > CROWD
     if setting.quick and not is_crowd:
         is_driven = any(body.motion is not None for body in own.bodies)
         overrides["contact.stiffness_scale"] = LESS_SOFT if is_driven else SOFT
-    if _gives_way(setting, own, is_crowd=is_crowd):
+    if setting.law != Setting().law and (is_crowd or own.contact.model != Setting().model):
+        # the scenario's own stiffness, meant for the linear law, is too soft for that of Hertz and Mindlin
         usual = overrides.get("contact.stiffness_scale", own.contact.stiffness_scale)
         overrides["contact.stiffness_scale"] = STIFFER * float(str(usual))
     if is_crowd and setting.has_springs:
-        overrides["time.end"] = _crowd_end(setting)
+        overrides["time.end"] = CROWD_END if setting.model == "surface" else CROWD_END_PARTICLES
     scenario = (document if setting.has_springs else without_springs(document)).with_values(overrides).build()
     run = Simulation(build_scene(scenario))
     outputs = round(scenario.time.end / scenario.output.every)

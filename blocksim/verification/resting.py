@@ -27,14 +27,18 @@ TOWER = 10
 
 def static_overlap(setting: Setting) -> Iterator[Row]:
     """Let a block settle on the ground under its weight."""
-    block = PaperBlock()
     contact = {"contact_radius": CONTACT_RADIUS} if setting.hertzian else {}
     rest = setting.start([{"y": HEIGHT / 2}], contact=contact).to_time(0.05)
-    if setting.hertzian:
-        expected = forms.hertz_static_overlap(block.mass, block.modulus, CONTACT_RADIUS)
-    else:
-        expected = forms.static_overlap(block.mass, 2.0 * block.point_stiffness)
+    expected = resting_overlap(setting)
     yield relative("overlap", "nm", 1e9 * expected, 1e9 * float(HEIGHT / 2 - rest.bodies[0].y), 1e-3)
+
+
+def resting_overlap(setting: Setting) -> float:
+    """Return the overlap (m) of the paper's block that rests on its face."""
+    block = PaperBlock()
+    if setting.hertzian:
+        return forms.hertz_static_overlap(block.mass, block.modulus, CONTACT_RADIUS)
+    return forms.static_overlap(block.mass, 2.0 * block.point_stiffness)
 
 
 def overhanging_stacks(setting: Setting) -> Iterator[Row]:

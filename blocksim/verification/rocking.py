@@ -58,16 +58,10 @@ def housner(setting: Setting) -> Iterator[Row]:
     follows from the energy about the corner, w^2 + (3/2) g (cos(alpha) - cos(alpha - |angle|)) / R.
     """
     scene = released(setting, 0.0)
-    before = upright_spin_before()
     time, _ = until_upright(scene)
     block = scene.to_time(time + SETTLED).bodies[0]
     half, alpha = hypot(SLENDER, TALL) / 2, forms.toppling_slope(SLENDER, TALL)
     lifted = 1.5 * 9.81 / half * (cos(alpha - abs(block.angle)) - cos(alpha))
+    before = (1.5 * 9.81 / half * (cos(alpha - alpha / 2) - cos(alpha))) ** 0.5  # let go at half of alpha
     after = (block.spin**2 + lifted) ** 0.5
     yield relative("spin ratio", "", forms.housner_ratio(SLENDER, TALL), after / before, 0.05)
-
-
-def upright_spin_before() -> float:
-    """Return the spin (rad/s) on reaching the upright position, from the energy about the corner."""
-    half, alpha = hypot(SLENDER, TALL) / 2, forms.toppling_slope(SLENDER, TALL)
-    return float((1.5 * 9.81 / half * (cos(alpha - alpha / 2) - cos(alpha))) ** 0.5)

@@ -49,16 +49,14 @@ def applied_loads(scenario: Scenario, placed: Sequence[PlacedBody]) -> Applied:
     rows = [_in_units(load, one) for load, some in zip(scenario.loads, histories, strict=True) for one in some]
     for number, name in enumerate(Stretch._fields):
         pieces[name] = [row[number] for row in rows]
-    return Applied(loads, pieces, sum(_pushes(scenario, placed)), max(map(_end, histories), default=0.0))
+    return Applied(
+        loads, pieces, sum(_pushes(scenario, placed)), max((one[-1].start for one in histories), default=0.0)
+    )
 
 
 def stretches_of(scenario: Scenario, load: AnyLoad) -> tuple[Stretch, ...]:
     """Return the factor of a load, or the tilt (rad) of gravity that turns, over time."""
     return load.stretches_from(scenario.ground.tilt) if isinstance(load, Gravity) else load.stretches()
-
-
-def _end(stretches: Sequence[Stretch]) -> float:
-    return stretches[-1].start
 
 
 def _in_units(load: AnyLoad, one: Stretch) -> Stretch:

@@ -138,7 +138,15 @@ def _fill_blocks(records: NDArray[np.record], outlines: Outlines) -> None:
         records[name][is_free] = column(map(attrgetter(name), placed))[is_free]
         is_heavy = records["mass"] > 0.0
         records[f"inverse_{name}"][is_heavy] = 1.0 / records[name][is_heavy]
-    records["contact_class"] = column(code for outline in outlines for code in _codes(outline))
+    classes = [
+        {(one.material, one.depth): code for code, one in enumerate(outline.classes) if not one.is_ground}
+        for outline in outlines
+    ]
+    records["contact_class"] = column(
+        codes[body.material, body.depth]
+        for outline, codes in zip(outlines, classes, strict=True)
+        for body in outline.placed
+    )
 
 
 def _fill_polygons(records: NDArray[np.record], placed: Sequence[PlacedBody], shapes: Shapes) -> None:
@@ -150,12 +158,6 @@ def _fill_polygons(records: NDArray[np.record], placed: Sequence[PlacedBody], sh
             record["half_x"], record["half_y"] = (max(map(abs, axis)) for axis in zip(*body.outline, strict=True))
             record["radius"] = body.radius
             record["faces"] = OUTLINE
-
-
-def _codes(outline: Outline) -> Iterator[int]:
-    """Return the class of every block."""
-    codes = {(one.material, one.depth): code for code, one in enumerate(outline.classes) if not one.is_ground}
-    return (codes[body.material, body.depth] for body in outline.placed)
 
 
 def _slab_thickness(scenario: Scenario, placed: Sequence[PlacedBody]) -> float:

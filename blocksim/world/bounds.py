@@ -5,7 +5,7 @@ Time steps and skins are chosen by these bounds, known before anything moves.
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,7 +48,10 @@ def bounds_of(bodies: NDArray[np.record], blocks: int, shapes: Sequence[Shapes |
     """Return the bounds of scenes, given their bodies (m, n + 1), of which so many are blocks, and shapes of blocks."""
     all_blocks = bodies[:, :blocks]
     columns = {name: np.ascontiguousarray(all_blocks[name]) for name in ("radius", "half_x", "half_y", "mass")}
-    smallest = _smallest_sides(all_blocks, columns)
+    sides = 2.0 * np.minimum(columns["half_x"], columns["half_y"])
+    if any(shape is not None for shape in shapes):
+        sides = np.where(all_blocks["faces"] == OUTLINE, all_blocks["least_width"], sides)
+    smallest = sides.min(axis=1, initial=math.inf)
     top = np.max(all_blocks["y"] + columns["radius"], axis=1, initial=-math.inf)
     speed = np.max(
         np.hypot(all_blocks["vx"], all_blocks["vy"]) + columns["radius"] * np.abs(all_blocks["spin"]),
@@ -95,19 +98,6 @@ def _faces_of(corners: Records) -> Iterator[tuple[float, float]]:
     places = np.stack([corners["x"], corners["y"]])
     ends = np.abs(np.stack([(tangents * places).sum(axis=0), (tangents * np.roll(places, -1, axis=1)).sum(axis=0)]))
     yield from zip(ends.max(axis=0).tolist(), corners["distance"].tolist(), strict=True)
-
-
-def _smallest_sides(blocks: NDArray[np.record], columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the smallest sides (m) of scenes, of polygons their least width."""
-    is_polygon = blocks["faces"] == OUTLINE
-    if not is_polygon.any():
-        smallest: NDArray[np.float64] = 2.0 * np.minimum(
-            columns["half_x"].min(axis=1, initial=math.inf), columns["half_y"].min(axis=1, initial=math.inf)
-        )
-        return smallest
-    sides = np.where(is_polygon, blocks["least_width"], 2.0 * np.minimum(columns["half_x"], columns["half_y"]))
-    least: NDArray[np.float64] = sides.min(axis=1)
-    return least
 
 
 def fastest_fall(scenario: Scenario, bounds: Bounds) -> float:

@@ -69,8 +69,10 @@ def _size(parts: Parts) -> Size:
 
 def _assemble(parts: Parts, strides: Sequence[Stride]) -> World:
     members, bodies = parts.bodies.shape
-    model = _model(parts.outlines[0])
-    before = zeros((members, contacts_of_a_pair(parts.slots, model)), contact_type(model))
+    if _model(parts.outlines[0]) == "surface":
+        before = zeros((members, CONTACTS), CONTACT)
+    else:
+        before = zeros((members, parts.slots), PARTICLE_CONTACT)
     controls = empty_controls(parts, strides)
     reach = np.maximum(controls["skin"], TRAVELLED * controls["skin"] + controls["approach"])
     controls["cell_width"] = 2.0 * controls["cell_radius"] + reach
@@ -91,11 +93,12 @@ def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
     bodies = parts.bodies
     bodies["half_x"][:, -1] = math.inf  # the half-plane has one face without ends
     loads, load_pieces = stacked([outline.applied for outline in parts.outlines])
+    tables = [one.shapes.table for one in parts.outlines if one.shapes is not None]  # none where all are rectangles
     world = World(
         bodies=bodies,
         **arrays,
         particles=parts.particles,
-        corners=_corners(parts),
+        corners=joined(tables) if tables else None,
         **_grid(parts),
         interactions=interaction_tables([outline.interactions for outline in parts.outlines]),
         ledger=zeros((members, count // GROUP + 1), LEDGER),
@@ -113,7 +116,10 @@ def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
     )
     world.clock["motion_piece"][:, 0] = parts.outlines[0].drives.paths.size
     world.controls["driven"][:, 0] = parts.outlines[0].drives.driven.size
-    world.ledger["largest_kinetic"][:, 0] = _kinetic_energies(bodies)
+    speed_squared = bodies["vx"] ** 2 + bodies["vy"] ** 2
+    energies = bodies["mass"] * speed_squared + bodies["inertia"] * bodies["spin"] ** 2
+    # one by one, as the order of a sum affects its last digit
+    world.ledger["largest_kinetic"][:, 0] = [0.5 * float(np.sum(one)) for one in energies]
     return world
 
 
@@ -125,33 +131,10 @@ def without_lists(parts: Parts, controls: Records) -> World:
     return assembled(parts, controls, points=_points(members, 1), before=before, **lists)
 
 
-def _corners(parts: Parts) -> Records | None:
-    """Return the corners (m, q) of the shapes of scenes; None where all blocks are rectangles."""
-    shapes = [outline.shapes for outline in parts.outlines]
-    tables = [one.table for one in shapes if one is not None]
-    return joined(tables) if tables else None
-
-
-def _kinetic_energies(bodies: Records) -> list[float]:
-    speed_squared = bodies["vx"] ** 2 + bodies["vy"] ** 2
-    energies = bodies["mass"] * speed_squared + bodies["inertia"] * bodies["spin"] ** 2
-    return [0.5 * float(np.sum(one)) for one in energies]  # one by one, as the order of a sum affects its last digit
-
-
 def numbers(shape: tuple[int, ...], kind: type[np.generic]) -> Any:
     """Return zeros that start on a cache line."""
     plain: Any = np.dtype(kind)
     return zeros(shape, plain).view(np.ndarray)
-
-
-def contact_type(model: str) -> np.dtype[np.void]:
-    """Return the type of the contact records of a model."""
-    return CONTACT if model == "surface" else PARTICLE_CONTACT
-
-
-def contacts_of_a_pair(slots: int, model: str) -> int:
-    """Return how many contacts a pair can have at the same time."""
-    return CONTACTS if model == "surface" else slots
 
 
 def first_capacity(bodies: int) -> int:

@@ -33,7 +33,6 @@ from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, s
 from blocksim.world.scenes import stack_of_one
 from blocksim.world.step import safety_of, step_of_contacts
 from blocksim.world.systems import largest_step, others_of, warnings_of
-from blocksim.world.systems.system import Present
 
 # measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
@@ -135,6 +134,7 @@ def describe(scenario: Scenario) -> Description:
     contacts = recorded_contacts(len(placed), touching) if scenario.output.contacts else 0
     others = others_of(scenario)
     more = sum(one.count * one.system.cost.memory for one in others)
+    of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
     return Description(
         bodies=placed,
         pairs=tuple(_pairs(scenario, world, placed)),
@@ -142,7 +142,7 @@ def describe(scenario: Scenario) -> Description:
         step=step,
         steps=steps,
         frames=frames,
-        seconds=steps * (_seconds_per_step(scenario, len(placed), particles) + _seconds_of(scenario, others)),
+        seconds=steps * (_seconds_per_step(scenario, len(placed), particles) + of_systems),
         bytes=run_bytes(len(placed), frames, contacts, others),
         memory=PROCESS_BYTES + size.bytes + more,  # without frames: into a folder, they are written as they come
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
@@ -177,11 +177,6 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
     rectangles = blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
     return OUTLINES_COST * rectangles if has_outlines(scenario) else rectangles
-
-
-def _seconds_of(scenario: Scenario, others: Sequence[Present]) -> float:
-    """Return what a step of further systems costs (s)."""
-    return sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
 
 
 def _limits(outline: Outline, bounds: Bounds) -> StepLimits | None:

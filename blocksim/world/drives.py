@@ -54,12 +54,13 @@ def driven_speed(scenario: Scenario) -> float:
     """Return the greatest speed (m/s) of any point of a driven body, zero where there are none."""
     drives = drives_of(scenario)
     placed = place_bodies(scenario) if drives else ()
-    return max((_speed(drive, placed[drive.body]) for drive in drives), default=0.0)
+    reaches = [(drive, _reach(drive, placed[drive.body])) for drive in drives]
+    return max((greatest_rate(one.shift) + reach * greatest_rate(one.turn) for one, reach in reaches), default=0.0)
 
 
-def _speed(drive: Drive, body: PlacedBody) -> float:
-    reach = math.dist((body.x, body.y), drive.about) + body.radius
-    return greatest_rate(drive.shift) + reach * greatest_rate(drive.turn)
+def _reach(drive: Drive, body: PlacedBody) -> float:
+    """Return how far (m) a point of a driven body is from what it turns about, at most."""
+    return math.dist((body.x, body.y), drive.about) + body.radius
 
 
 def highest_rise(scenario: Scenario) -> float:
@@ -75,6 +76,5 @@ def _rise(drive: Drive, scenario: Scenario) -> float:
     c0, c1, c2, c3 = pieces.coefficients.T
     ends.append(c0 + length * (c1 + length * (c2 + length * c3)))
     up = max(0.0, float(np.max(drive.along[1] * np.concatenate(ends))))
-    body = place_bodies(scenario)[drive.body]
-    reach = math.dist((body.x, body.y), drive.about) + body.radius
+    reach = _reach(drive, place_bodies(scenario)[drive.body])
     return up + (2.0 * reach if drive.turn.coefficients[:, 1:].any() else 0.0)

@@ -14,12 +14,11 @@ A block that meets something in a substep h stays there until it ends, and has n
 is behind by what the impact adds to velocity and spin times h/2 on average, and gravity changes its speed by g h
 meanwhile. Every impact passes that on to the next. Against speeds of free falls over sides L, sqrt(g L), that is h /
 sqrt(L/g). A few blocks can afford to have it small: a step is at most a share of sqrt(L/g) that grows with their
-number, so that costs are about the same, and that of a crowd is the usual one. A single block of 25 mm takes 1/13 ms,
-three of 32 mm take 1/4 ms; the usual step is divided by whole numbers, so that outputs fall on the ends of steps. So
-with the way in a step at the speed of an impact. Supports that move count as bodies that are driven do: they come no
-farther towards a block in a step than blocks may move, and a step is a twentieth of their shortest period at most.
-Where few blocks rebound strongly that is not enough, as hops multiply errors a hundredfold: their steps are cut at
-impacts, see blocksim.kernels.nonsmooth.parts.
+number, so that costs are about the same, and that of a crowd is the usual one. The usual step is divided by whole
+numbers, so that outputs fall on the ends of steps. So with the way in a step at the speed of an impact. Supports
+that move count as bodies that are driven do: they come no farther towards a block in a step than blocks may move, and a
+step is a twentieth of their shortest period at most. Where few blocks rebound strongly that is not enough, as hops
+multiply errors a hundredfold: their steps are cut at impacts, see blocksim.kernels.nonsmooth.parts.
 """
 
 import math

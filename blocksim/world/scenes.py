@@ -48,7 +48,8 @@ class Parts(NamedTuple):
     @property
     def is_large(self) -> NDArray[np.bool_]:
         """Which bodies (m, n) stay out of the grid; equally many in each scene."""
-        return _is_large(self.bodies, self.cell_radius)
+        is_large: NDArray[np.bool_] = self.bodies["radius"][:, :-1] > self.cell_radius[:, np.newaxis]
+        return is_large
 
     def chosen(self, numbers: Sequence[int]) -> "Parts":
         """Return the parts of some of the scenes."""
@@ -163,7 +164,6 @@ def _divided(outlines: Outlines, bodies: Records, model: str) -> Iterator[tuple[
     What decides the shape by now: how many bodies are large, how many move with the support, how many particles there
     are, and how many slots a pair has: of corners those of its two bodies, at most.
     """
-    radius = cell_radius(bodies)
     particles: list[Records | None] = [None] * len(outlines)
     if model == SURFACE:
         sizes = [None if one.shapes is None else one.shapes.sizes for one in outlines]
@@ -172,14 +172,14 @@ def _divided(outlines: Outlines, bodies: Records, model: str) -> Iterator[tuple[
         spacings = [outline.scenario.contact.particle_spacing for outline in outlines]
         particles = [place_particles(one, model, spacing) for one, spacing in zip(bodies, spacings, strict=True)]
         slots = [slots_of_a_pair(one, model) for one in bodies]
+    parts = Parts(outlines, bodies, cell_radius(bodies), None, SLOTS)
     counts = zip(
-        np.count_nonzero(_is_large(bodies, radius), axis=1),
+        np.count_nonzero(parts.is_large, axis=1),
         np.count_nonzero(bodies["is_moved"], axis=1),
         slots,
         (None if one is None else one.size for one in particles),
         strict=True,
     )
-    parts = Parts(outlines, bodies, radius, None, SLOTS)
     for same in alike(list(counts)):
         one = parts.chosen(same)._replace(slots=slots[same[0]])
         some_particles = [found for k in same if (found := particles[k]) is not None]
@@ -199,11 +199,6 @@ def cell_radius(bodies: Records) -> Floats:
     smaller = np.take_along_axis(radii, np.asarray(count)[..., np.newaxis] - 1, axis=-1)[..., 0]
     radius: Floats = np.maximum(radii[..., -1 - few], smaller)
     return radius
-
-
-def _is_large(bodies: Records, radius: Floats) -> NDArray[np.bool_]:
-    is_large: NDArray[np.bool_] = bodies["radius"][:, :-1] > radius[:, np.newaxis]
-    return is_large
 
 
 def alike(keys: Sequence[Hashable]) -> list[list[int]]:

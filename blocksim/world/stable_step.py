@@ -29,9 +29,8 @@ So well beyond critical damping the step shrinks with 1/z:
     dt = safety * (2 / w) / max(1, z/2)
 
 With safety = 0.05 impacts are resolved with w dt <= 0.1, some thirty steps, and z w dt <= 0.2. The frequency of p pairs
-on one body in the mode that they share, translation, is about half of the bound w, so that forty blocks on one thin
-plank are stable too (measured). For a dashpot that lags a step with its own force as well, the factor would be
-sqrt(1 + z^2) - z: a quarter at z = 5.
+on one body in the mode that they share, translation, is about half of the bound w. For a dashpot that lags a step with
+its own force as well, the factor would be sqrt(1 + z^2) - z: a quarter at z = 5.
 
 Hertz. The slope of the force grows with the overlap; the deepest one expected decides. An impact at speed v of a mass m
 goes to d = (5 m v^2/(4 K))^(2/5) (from m v^2/2 = 2/5 K d^(5/2)), a weight W to (W/K)^(2/3). As the step goes with

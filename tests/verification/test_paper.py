@@ -61,8 +61,8 @@ def test_a_bounce_follows_equation_10_and_another_restitution_does_not() -> None
     at_half = 0.5 * (law.marks[0] + law.marks[1])
     assert np.interp(at_half, law.time, law.expected) == pytest.approx(25.0, abs=0.01)  # h0 e^2
     for one in laws.bounces(run):
-        assert one.apex == pytest.approx(one.told_apex, rel=0.01, abs=0.002)
-        assert one.flight == pytest.approx(one.told_flight, rel=0.002)
+        assert one.apex == pytest.approx(one.eq12_apex, rel=0.01, abs=0.002)
+        assert one.flight == pytest.approx(one.eq12_flight, rel=0.002)
     assert len(laws.bounces(run)) == 6
     wrong = {"contact.restitution": 0.45}
     other = laws.bounce_law(simulate(load_scenario(SCENARIOS / "bounce.toml", wrong)))

@@ -14,9 +14,9 @@ the true area in 91 to 98 % of 400 trials, and in 84 % where both distributions 
 
 from math import nan, sqrt
 from statistics import NormalDist
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.analysis.intervals import CONFIDENCE, quantile
 from blocksim.analysis.metrics.metric import (
@@ -24,6 +24,7 @@ from blocksim.analysis.metrics.metric import (
     Column,
     Evidence,
     Findings,
+    Floats,
     Form,
     Interval,
     Metric,
@@ -31,12 +32,7 @@ from blocksim.analysis.metrics.metric import (
     Row,
 )
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Counts = NDArray[np.int64]
-
+Counts = NDArray[np.int64]
 RESAMPLES = 2000
 SEED = 0
 FEWEST = 4  # values of a sample that is worth resampling
@@ -45,30 +41,30 @@ FEWEST = 4  # values of a sample that is worth resampling
 class Steps:
     """Two samples on their common grid of values, for the area between their distributions as counts change."""
 
-    def __init__(self, one: "Floats", other: "Floats") -> None:
+    def __init__(self, one: Floats, other: Floats) -> None:
         """Take samples of any length, at least one value each."""
         grid, places = np.unique(np.concatenate([one, other]), return_inverse=True)
         self.widths = np.diff(grid)
         self.one, self.other = places[: one.size], places[one.size :]
 
-    def area(self, one: "Counts", other: "Counts") -> float:
+    def area(self, one: Counts, other: Counts) -> float:
         """Return the area between two samples, given as the places of their values on the grid."""
         gap = self._distribution(one) - self._distribution(other)
         return float(np.sum(np.abs(gap) * self.widths))  # not by BLAS, whose threads hinder one another here
 
-    def _distribution(self, places: "Counts") -> "Floats":
+    def _distribution(self, places: Counts) -> Floats:
         """Return the share of values up to each place of the grid but the last."""
         counts = np.bincount(places, minlength=self.widths.size + 1)
         return np.cumsum(counts)[:-1] / places.size
 
 
-def area_between(one: "Floats", other: "Floats") -> float:
+def area_between(one: Floats, other: Floats) -> float:
     """Return the area between the distributions of two samples, in their unit."""
     steps = Steps(one, other)
     return steps.area(steps.one, steps.other)
 
 
-def area_interval(members: "Floats", repeats: "Floats", resamples: int = RESAMPLES, seed: int = SEED) -> Interval:
+def area_interval(members: Floats, repeats: Floats, resamples: int = RESAMPLES, seed: int = SEED) -> Interval:
     """Return the 95 % interval of the area, see above; NaN where a sample is too small for one."""
     smaller = min(members.size, repeats.size)
     if smaller < FEWEST:
@@ -82,7 +78,7 @@ def area_interval(members: "Floats", repeats: "Floats", resamples: int = RESAMPL
     return max(area - half, 0.0), area + half
 
 
-def _resampled(places: "Counts", random: np.random.Generator) -> "Counts":
+def _resampled(places: Counts, random: np.random.Generator) -> Counts:
     return places[random.integers(0, places.size, places.size)]
 
 

@@ -13,7 +13,7 @@ repeats against the ensemble's mean. For p = 1 it is Welch's test. It does not i
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from blocksim.analysis.metrics.metric import (
     Column,
     Evidence,
     Findings,
+    Floats,
     Form,
     Metric,
     Pair,
@@ -29,11 +30,6 @@ from blocksim.analysis.metrics.metric import (
     complete_repeats,
 )
 from blocksim.extras import loaded
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
 
 SMALLEST_EIGENVALUE = 1e-9  # of the correlation matrix: below it, one position follows from the others
 
@@ -49,7 +45,7 @@ class Hotelling(NamedTuple):
     p_value: float
 
 
-def hotelling(repeats: "Floats", members: "Floats") -> Hotelling | None:
+def hotelling(repeats: Floats, members: Floats) -> Hotelling | None:
     """Compare the means of repeats (n, p) and members (N, p), n > p; None where degrees of freedom do not suffice."""
     n, p = repeats.shape
     difference = repeats.mean(axis=0) - members.mean(axis=0)
@@ -69,7 +65,7 @@ def hotelling(repeats: "Floats", members: "Floats") -> Hotelling | None:
     return Hotelling(squared, squared / scale, float(p), rest, critical, float(special.fdtrc(p, rest, squared / scale)))
 
 
-def _covariance_of_mean(sample: "Floats") -> "Floats":
+def _covariance_of_mean(sample: Floats) -> Floats:
     """Return the sample covariance of p columns by the number of rows; zero for a single row."""
     n, p = sample.shape
     if n == 1:
@@ -78,7 +74,7 @@ def _covariance_of_mean(sample: "Floats") -> "Floats":
     return covariance
 
 
-def _spread(both: "Floats", part: "Floats") -> float:
+def _spread(both: Floats, part: Floats) -> float:
     """Return tr(M^2) + tr(M)^2 for M = part both^-1, which has the traces of both^-1 part."""
     share = np.linalg.solve(both, part)
     return float(np.trace(share @ share) + np.trace(share) ** 2)
@@ -102,7 +98,7 @@ def _find(evidence: Evidence) -> Findings:
     return Findings((_row(chosen, repeats, members, found),), tuple(messages))
 
 
-def _complaint(repeats: "Floats", members: "Floats") -> str:
+def _complaint(repeats: Floats, members: Floats) -> str:
     """Return why no test is possible, or nothing."""
     n, p = repeats.shape
     if n <= p:
@@ -117,7 +113,7 @@ def _complaint(repeats: "Floats", members: "Floats") -> str:
     return ""
 
 
-def _row(pairs: Sequence[Pair], repeats: "Floats", members: "Floats", found: Hotelling) -> Row:
+def _row(pairs: Sequence[Pair], repeats: Floats, members: Floats, found: Hotelling) -> Row:
     return {
         "positions": ", ".join(f"{pair.measured.block} {pair.measured.quantity}" for pair in pairs),
         "repeats": len(repeats),

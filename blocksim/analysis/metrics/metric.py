@@ -4,18 +4,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.analysis.compare import limits
 from blocksim.analysis.experiment import MOST_NAMES, ExperimentTable, Statistics
 from blocksim.analysis.members import Members
 from blocksim.scenario.spelling import listed
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+Floats = NDArray[np.float64]
 Interval = tuple[float, float]
 Value = str | int | float | bool | Interval | None
 Row = dict[str, Value]  # by the names of the metric's columns; None where a number is missing
@@ -47,7 +45,7 @@ class Pair:
 
     measured: Statistics
     repeats: dict[int, float]  # by replicate, ascending
-    values: "NDArray[np.float64]" = field(repr=False)
+    values: Floats = field(repr=False)
 
     @property
     def is_length(self) -> bool:
@@ -60,7 +58,7 @@ class Pair:
         return self.measured.minimum < self.measured.maximum
 
     @property
-    def known(self) -> "NDArray[np.float64]":
+    def known(self) -> Floats:
         """The values of the members that have one."""
         return self.values[np.isfinite(self.values)]
 
@@ -70,11 +68,11 @@ class Pair:
         return limits(self.measured.quantity, self.measured.mean, self.measured.minimum, self.measured.maximum)
 
     @property
-    def inside(self) -> "NDArray[np.bool_]":
+    def inside(self) -> NDArray[np.bool_]:
         """Whether each member is inside the limits, ends included; a member without a value is not."""
         return self.between(self.limits)
 
-    def between(self, ends: Interval) -> "NDArray[np.bool_]":
+    def between(self, ends: Interval) -> NDArray[np.bool_]:
         """Return for each member whether it lies between two ends, ends included."""
         return (self.values >= ends[0]) & (self.values <= ends[1])
 
@@ -112,7 +110,7 @@ class Evidence:
         return [pair for pair in self.pairs if pair.is_length]
 
     @property
-    def inside(self) -> "NDArray[np.bool_]":
+    def inside(self) -> NDArray[np.bool_]:
         """Whether each member is within all measured ranges."""
         inside: NDArray[np.bool_] = np.all([pair.inside for pair in self.pairs], axis=0)
         return inside
@@ -143,7 +141,7 @@ BLOCK = (
 )
 
 
-def complete_repeats(pairs: Sequence[Pair]) -> "tuple[NDArray[np.float64], str]":
+def complete_repeats(pairs: Sequence[Pair]) -> tuple[Floats, str]:
     """Return the replicates in which all p pairs were measured, shape (n, p), and a list of the others."""
     every = sorted({replicate for pair in pairs for replicate in pair.repeats})
     complete = [replicate for replicate in every if all(replicate in pair.repeats for pair in pairs)]

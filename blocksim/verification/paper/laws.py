@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import Scenario
 from blocksim.simulation.result import Result
 from blocksim.verification import closed_forms as forms
 from blocksim.view.law import Law
@@ -21,9 +20,9 @@ class Bounce(NamedTuple):
 
     number: int
     apex: float
-    told_apex: float
+    eq12_apex: float
     flight: float
-    told_flight: float
+    eq12_flight: float
 
 
 def bounce_law(result: Result) -> Law:
@@ -34,7 +33,7 @@ def bounce_law(result: Result) -> Law:
     """
     frames, scenario = result.frames, result.scenario
     clearance = frames.y[:, 0] - 0.5 * frames.size_y[0]
-    start, restitution = float(clearance[0]), _restitution(scenario)
+    start, restitution = float(clearance[0]), scenario.contact.restitution.block_ground
     impacts = impact_times(start, restitution, scenario.gravity)
     expected = np.array([_height(float(time), start, restitution, scenario.gravity, impacts) for time in frames.time])
     marks = [time for time in impacts if time < float(frames.time[-1])]
@@ -57,7 +56,7 @@ def bounces(result: Result) -> list[Bounce]:
     """
     frames, gravity = result.frames, result.scenario.gravity
     clearance, speed = frames.y[:, 0] - 0.5 * frames.size_y[0], frames.vy[:, 0]
-    restitution, start = _restitution(result.scenario), float(clearance[0])
+    restitution, start = result.scenario.contact.restitution.block_ground, float(clearance[0])
     turns = np.flatnonzero((speed[:-1] < 0.0) & (speed[1:] > 0.0)) + 1
     tops, landings = [], []
     for first, last in pairwise([0, *turns]):
@@ -101,8 +100,3 @@ def _height(time: float, start: float, restitution: float, gravity: float, impac
     since = time - impacts[number - 1]
     still = forms.remaining_rise(since, start, restitution, number, gravity)
     return forms.apex_height(start, restitution, number) - still
-
-
-def _restitution(scenario: Scenario) -> float:
-    restitution = scenario.contact.restitution
-    return float(restitution.block_ground)

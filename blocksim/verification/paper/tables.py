@@ -3,7 +3,7 @@
 Measurements are in scenarios/experiments; the results of the paper's own simulation are here.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from blocksim.analysis.compare import ComparisonRow, Verdict, compare_final
@@ -75,7 +75,7 @@ def rotations_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
 def bounces_table(bounces: Sequence[Bounce]) -> str:
     """Return apexes and flight times with those of Eq. 12."""
     rows = [
-        (str(one.number), *(f"{value:.3f}" for value in (one.told_apex, one.apex, one.told_flight, one.flight)))
+        (str(one.number), *(f"{value:.3f}" for value in (one.eq12_apex, one.apex, one.eq12_flight, one.flight)))
         for one in bounces
     ]
     heads = ("impact p", "h_p by Eq. 12, mm", "simulated, mm", "t_p by Eq. 12, ms", "simulated, ms")
@@ -119,7 +119,7 @@ def _used(scenario: Scenario) -> dict[str, float]:
     """Return a scenario's sizes, material and static frictions (SI) by the names of the table of properties."""
     block, material = next(iter(scenario.blocks.values())), next(iter(scenario.materials.values()))
     overlaps = [overlap for one in scenario.structures if (overlap := getattr(one, "overlap", None)) is not None]
-    return dict(_named(block, ("width", "height", "length"))) | {
+    return {name: float(getattr(block, name)) for name in ("width", "height", "length")} | {
         "overlap": overlaps[0] if overlaps else float("nan"),
         "unit_weight": material.density * scenario.gravity,
         "young_modulus": material.young_modulus,
@@ -127,8 +127,3 @@ def _used(scenario: Scenario) -> dict[str, float]:
         "friction_block_block": scenario.friction.block_block.static,
         "friction_block_ground": scenario.friction.block_ground.static,
     }
-
-
-def _named(thing: object, names: Sequence[str]) -> Iterator[tuple[str, float]]:
-    for name in names:
-        yield name, float(getattr(thing, name))

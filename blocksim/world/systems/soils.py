@@ -15,6 +15,7 @@ from blocksim.world.systems.soil_kinds import (
     wave_speed,
 )
 from blocksim.world.systems.soil_shown import (
+    MILLI,
     SHADES,
     displacement,
     ending,
@@ -37,7 +38,6 @@ from blocksim.world.systems.system import (
 )
 
 COURANT = 0.4  # step in smoothing lengths that a wave passes
-MILLI = 1e3
 # J, as kernels/soil/energy.py measures them; the last six are losses
 ENERGIES = (
     "kinetic",
