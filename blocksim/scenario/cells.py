@@ -16,7 +16,17 @@ NEAREST = 48
 def voronoi(points: Sequence[Corner], region: Sequence[Corner]) -> list[list[Corner]]:
     """Return the cell (m) of each point, counter-clockwise; so are the corners of the convex region."""
     places = np.array(points)
-    return [_cell(number, places, region) for number in range(len(points))]
+    cells = []
+    for number in range(len(points)):
+        x, y = (float(one) for one in places[number])
+        cell = [(u - x, v - y) for u, v in region]
+        for dx, dy in _around(number, places):
+            reach = max(u * u + v * v for u, v in cell)
+            if dx * dx + dy * dy >= 4.0 * reach:
+                break
+            cell = _cut(cell, dx, dy)
+        cells.append([(x + u, y + v) for u, v in cell])
+    return cells
 
 
 def relaxed(points: Sequence[Corner], region: Sequence[Corner], times: int) -> list[Corner]:
@@ -24,17 +34,6 @@ def relaxed(points: Sequence[Corner], region: Sequence[Corner], times: int) -> l
     for _ in range(times):
         points = [centroid(cell) for cell in voronoi(points, region)]
     return [*points]
-
-
-def _cell(number: int, places: Floats, region: Sequence[Corner]) -> list[Corner]:
-    x, y = (float(one) for one in places[number])
-    cell = [(u - x, v - y) for u, v in region]
-    for dx, dy in _around(number, places):
-        reach = max(u * u + v * v for u, v in cell)
-        if dx * dx + dy * dy >= 4.0 * reach:
-            break
-        cell = _cut(cell, dx, dy)
-    return [(x + u, y + v) for u, v in cell]
 
 
 def _around(number: int, places: Floats) -> Iterator[Corner]:
@@ -76,22 +75,16 @@ def cleaned(cell: Sequence[Corner], least: float) -> list[Corner]:
     extent = max((math.dist(a, b) for a in corners for b in corners), default=0.0)
     shortest = max(least, 2.0 * SHORTEST * extent)
     while len(corners) > 3:
-        needless = [number for number in range(len(corners)) if _is_needless(corners, number, shortest)]
+        needless, losses = [], []
+        for number, here in enumerate(corners):
+            before, after = corners[number - 1], corners[(number + 1) % len(corners)]
+            one, other = (here[0] - before[0], here[1] - before[1]), (after[0] - here[0], after[1] - here[1])
+            turn = math.atan2(one[0] * other[1] - one[1] * other[0], one[0] * other[0] + one[1] * other[1])
+            is_short = min(math.dist(before, here), math.dist(here, after)) < shortest
+            needless += [number] if is_short or turn < 2.0 * STRAIGHT else []
+            wide, far = (after[0] - before[0], after[1] - before[1])
+            losses.append(one[0] * far - one[1] * wide)
         if not needless and len(corners) <= MOST:
             break
-        corners.pop(min(needless or range(len(corners)), key=lambda number: _loss(corners, number)))
+        corners.pop(min(needless or range(len(corners)), key=losses.__getitem__))
     return corners
-
-
-def _is_needless(corners: Sequence[Corner], number: int, shortest: float) -> bool:
-    before, here, after = corners[number - 1], corners[number], corners[(number + 1) % len(corners)]
-    if min(math.dist(before, here), math.dist(here, after)) < shortest:
-        return True
-    one, other = (here[0] - before[0], here[1] - before[1]), (after[0] - here[0], after[1] - here[1])
-    turn = math.atan2(one[0] * other[1] - one[1] * other[0], one[0] * other[0] + one[1] * other[1])
-    return turn < 2.0 * STRAIGHT
-
-
-def _loss(corners: Sequence[Corner], number: int) -> float:
-    (x0, y0), (x1, y1), (x2, y2) = corners[number - 1], corners[number], corners[(number + 1) % len(corners)]
-    return (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0)

@@ -46,21 +46,19 @@ def read_drawing(path: Path) -> list[Drawn]:
 
     Raises DrawingError, and UnavailableError for DXF without its package.
     """
-    found = _dxf(path) if path.suffix.lower() == f".{DXF}" else _geojson(path)
+    is_dxf = path.suffix.lower() == f".{DXF}"
+    found = _dxf(path) if is_dxf else _geojson(path)
     if not found:
-        raise DrawingError("no polygon in it" if path.suffix.lower() != f".{DXF}" else "no closed polyline in it")
+        raise DrawingError("no closed polyline in it" if is_dxf else "no polygon in it")
     if len(found) > MOST_OUTLINES or sum(len(one.outline) for one in found) > MOST_CORNERS:
-        message = f"{len(found)} outlines are too many; at most {MOST_OUTLINES} with {MOST_CORNERS} corners are allowed"
-        raise DrawingError(message)
-    return [one._replace(outline=_checked(one)) for one in found]
-
-
-def _checked(drawn: Drawn) -> list[Corner]:
-    corners = simplified(drawn.outline)
-    for number, message in outlines.faults(corners):
-        place = "" if number is None else f", corner ({corners[number][0]:g}, {corners[number][1]:g})"
-        raise DrawingError(f"{drawn.name}{place}: {message}")
-    return corners
+        most = f"at most {MOST_OUTLINES} with {MOST_CORNERS} corners are allowed"
+        raise DrawingError(f"{len(found)} outlines are too many; {most}")
+    outlines_found = [one._replace(outline=simplified(one.outline)) for one in found]
+    for one in outlines_found:
+        for number, message in outlines.faults(one.outline):
+            place = "" if number is None else ", corner ({:g}, {:g})".format(*one.outline[number])
+            raise DrawingError(f"{one.name}{place}: {message}")
+    return outlines_found
 
 
 def simplified(points: Sequence[Corner]) -> list[Corner]:

@@ -37,20 +37,18 @@ class Drive(NamedTuple):
 
 def drives_of(scenario: Scenario) -> tuple[Drive, ...]:
     """Return the motions of all driven bodies, in the order of the bodies."""
-    first = sum(structure.size for structure in scenario.structures)
-    driven = [number for number, body in enumerate(scenario.bodies) if body.motion is not None]
-    return tuple(_drive(scenario, number, first + number) for number in driven)
-
-
-def _drive(scenario: Scenario, number: int, body: int) -> Drive:
-    motion = scenario.bodies[number].motion
-    end = BEYOND * scenario.time.end
-    centre = scenario.bodies[number].x, scenario.bodies[number].y
-    if isinstance(motion, Rotation):
-        return Drive(body, (1.0, 0.0), STILL, motion.about or centre, _course(motion, motion.angle, end))
-    alone = scenario.model_copy(update={"motion": motion})  # as if it were that of the supports
-    shift = _course(motion, motion.distance, end) if isinstance(motion, Ramp) else motion_pieces(alone)
-    return Drive(body, motion_direction(alone), shift, centre, STILL)
+    first, end = sum(structure.size for structure in scenario.structures), BEYOND * scenario.time.end
+    drives = []
+    for number, body in enumerate(scenario.bodies, start=first):
+        motion, centre = body.motion, (body.x, body.y)
+        if isinstance(motion, Rotation):
+            turn = _course(motion, motion.angle, end)
+            drives.append(Drive(number, (1.0, 0.0), STILL, motion.about or centre, turn))
+        elif motion is not None:
+            alone = scenario.model_copy(update={"motion": motion})  # as if it were that of the supports
+            shift = _course(motion, motion.distance, end) if isinstance(motion, Ramp) else motion_pieces(alone)
+            drives.append(Drive(number, motion_direction(alone), shift, centre, STILL))
+    return tuple(drives)
 
 
 def _course(motion: Ramp | Rotation, way: float, end: float) -> MotionPieces:
@@ -64,13 +62,9 @@ def _course(motion: Ramp | Rotation, way: float, end: float) -> MotionPieces:
         values = way * share**3 * (10.0 - 15.0 * share + 6.0 * share * share)
         rates = way / motion.resolved_duration * 30.0 * (share * (1.0 - share)) ** 2
         pieces = through(times, values, rates)
-    return _ending_at(from_zero_to(end, pieces), way)
-
-
-def _ending_at(pieces: MotionPieces, way: float) -> MotionPieces:
-    """Return pieces whose last one, where it is constant, is exactly at the end of the way."""
+    pieces = from_zero_to(end, pieces)
     last = pieces.coefficients[-1]
-    if not last[1:].any():
+    if not last[1:].any():  # constant: exactly at the end of the way
         last[0] = way
     return pieces
 

@@ -88,7 +88,7 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place = prefix.partition(",")[0]
     note = prefix.partition(", ")[2]
     told = next(
-        (base.model_fields for base in (Structure, Load, Time, Probe) if issubclass(model, base) and model is not base),
+        (base.model_fields for base in SHARED if issubclass(model, base) and model is not base),
         {},
     )
     for name, info in model.model_fields.items():

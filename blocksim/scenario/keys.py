@@ -4,7 +4,7 @@ import functools
 import re
 import tomllib
 import types
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
@@ -108,7 +108,12 @@ def table_at(path: Sequence[str | int], data: object) -> type[Table] | None:
     """Return the model of the table at a path; `data` has the kinds of structures and motion."""
     annotation: object = Scenario
     for depth, part in enumerate(path):
-        annotation = _inside(annotation, part, follow(data, path[:depth]))
+        table = _table(annotation, follow(data, path[:depth]))
+        entries = [(get_origin(option), get_args(option)) for option in options(annotation)]
+        inner = [arguments[1] for origin, arguments in entries if origin is dict]
+        inner += [arguments[0] for origin, arguments in entries if origin is tuple and isinstance(part, int)]
+        field = None if table is None else _fields(table).get(part)
+        annotation = inner[0] if inner else None if field is None else field.annotation
     return _table(annotation, follow(data, path))
 
 
@@ -163,32 +168,17 @@ def _own_fields(table: type[Table]) -> dict[str | int, FieldInfo]:
     return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != HELD}
 
 
-def _inside(annotation: object, part: str | int, node: object) -> object:
-    """Return the annotation of the element `part` of something annotated so."""
-    for option in options(annotation):
-        arguments = get_args(option)
-        if get_origin(option) is dict:
-            return arguments[1]
-        if get_origin(option) is tuple and isinstance(part, int):
-            return arguments[0]
-    table = _table(annotation, node)
-    field = None if table is None else _fields(table).get(part)
-    return None if field is None else field.annotation
-
-
 def _table(annotation: object, node: object) -> type[Table] | None:
     tables = [option for option in options(annotation) if isinstance(option, type) and issubclass(option, Table)]
     if len(tables) > 1:
         tables = [*SCHEMES.values()] if issubclass(tables[0], Time) else tables
-        return next((table for table in tables if _word(table, node) in kinds_of(table)), None)
+        for table in tables:
+            tag = _tag(table)  # the key whose word distinguishes the alternatives, here or by default
+            word = node.get(tag, MISSING) if isinstance(node, Mapping) else MISSING
+            if (table.model_fields[tag].default if word is MISSING else word) in kinds_of(table):
+                return table
+        return None
     return tables[0] if tables else None
-
-
-def _word(table: type[Table], node: object) -> object:
-    """Return the word that distinguishes a table from its alternatives, or the default."""
-    tag = _tag(table)
-    word = node.get(tag, MISSING) if isinstance(node, Mapping) else MISSING
-    return table.model_fields[tag].default if word is MISSING else word
 
 
 def _tag(table: type[Table]) -> str:
@@ -208,15 +198,12 @@ def si_unit(info: FieldInfo) -> str:
 
 def marks_of(info: FieldInfo) -> Iterator[Any]:
     """Yield what describes the values of a field: annotations of its type, and of the alternatives in it."""
-    yield from _marks(info.annotation, info.metadata)
-
-
-def _marks(annotation: Any, metadata: Iterable[Any]) -> Iterator[Any]:
-    """Yield the annotations of a type expression, those inside alternatives too."""
-    yield from metadata
-    for part in get_args(annotation):
+    yield from info.metadata
+    inner = [*get_args(info.annotation)]
+    while inner:
+        part = inner.pop(0)
         yield part
-        yield from _marks(part, [])
+        inner[:0] = get_args(part)
 
 
 def options(annotation: Any) -> Iterator[Any]:

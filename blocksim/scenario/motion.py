@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 
 from blocksim.scenario.accelerations import pulse_samples, record_samples
 from blocksim.scenario.models.motion import FromTable, Harmonic
-from blocksim.scenario.models.motions import AnyMotion
 from blocksim.scenario.models.pulse import Pulse
-from blocksim.scenario.models.record import Record
 from blocksim.scenario.models.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -55,7 +53,21 @@ def motion_pieces(scenario: Scenario) -> MotionPieces:
     motion, end = scenario.motion, BEYOND * scenario.time.end
     if motion is None:
         return MotionPieces(np.zeros(1), np.zeros((0, 4)), 0.0)
-    return from_zero_to(end, _pieces(motion, end))
+    match motion:
+        case Harmonic():
+            pieces = _harmonic(motion, end)
+        case FromTable():
+            times, values = motion.start + np.array(motion.table.times), motion.scale * np.array(motion.table.values)
+            if motion.table.quantity == "acceleration":
+                pieces = _integrated(times, values)
+            else:
+                displacement = values - values[0]
+                pieces = through(times, displacement, spline_slopes(times, displacement))
+        case Pulse():
+            pieces = through(*pulse_samples(motion))
+        case _:
+            pieces = _integrated(*record_samples(motion))
+    return from_zero_to(end, pieces)
 
 
 def displacement_and_velocity(pieces: MotionPieces, times: Floats) -> tuple[Floats, Floats]:
@@ -67,18 +79,6 @@ def displacement_and_velocity(pieces: MotionPieces, times: Floats) -> tuple[Floa
     s = times - pieces.times[piece]
     c0, c1, c2, c3 = pieces.coefficients[piece].T
     return c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * s * c3)
-
-
-def _pieces(motion: AnyMotion, end: float) -> MotionPieces:
-    match motion:
-        case Harmonic():
-            return _harmonic(motion, end)
-        case FromTable():
-            return _from_table(motion)
-        case Pulse():
-            return through(*pulse_samples(motion))
-        case Record():
-            return _integrated(*record_samples(motion))
 
 
 def _harmonic(motion: Harmonic, end: float) -> MotionPieces:
@@ -101,15 +101,6 @@ def _ramp(share: Floats) -> tuple[Floats, Floats]:
     """Return 10 s³ - 15 s⁴ + 6 s⁵ and its slope, 0 before s = 0 and 1 after s = 1."""
     s = np.clip(share, 0.0, 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * (s * (1.0 - s)) ** 2
-
-
-def _from_table(motion: FromTable) -> MotionPieces:
-    times = motion.start + np.array(motion.table.times)
-    values = motion.scale * np.array(motion.table.values)
-    if motion.table.quantity == "acceleration":
-        return _integrated(times, values)
-    displacement = values - values[0]
-    return through(times, displacement, spline_slopes(times, displacement))
 
 
 def _integrated(times: Floats, acceleration: Floats) -> MotionPieces:

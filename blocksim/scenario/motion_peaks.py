@@ -1,7 +1,6 @@
 """Largest acceleration, velocity and displacement of the supports (PGA, PGV, PGD), exact for their cubic pieces."""
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -53,7 +52,8 @@ def motion_peaks(pieces: MotionPieces, end: float) -> MotionPeaks:
 
 def shortest_cycle(scenario: Scenario) -> float:
     """Return the shortest cycle (s) of harmonic motions and pulses, of supports or bodies; infinite without any."""
-    return min((motion.cycle for motion in _cyclic(scenario)), default=math.inf)
+    motions = (scenario.motion, *(body.motion for body in scenario.bodies))
+    return min((motion.cycle for motion in motions if isinstance(motion, Harmonic | Pulse)), default=math.inf)
 
 
 def shortest_period(scenario: Scenario) -> float:
@@ -69,12 +69,6 @@ def shortest_period(scenario: Scenario) -> float:
     if not peaks.acceleration.value > 0.0:
         return shortest
     return min(shortest, 2.0 * math.pi * peaks.velocity.value / peaks.acceleration.value)
-
-
-def _cyclic(scenario: Scenario) -> Iterator[Harmonic | Pulse]:
-    for motion in (scenario.motion, *(body.motion for body in scenario.bodies)):
-        if isinstance(motion, Harmonic | Pulse):
-            yield motion
 
 
 def _largest(values: Floats, times: Floats) -> Peak:

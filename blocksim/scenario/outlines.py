@@ -89,7 +89,11 @@ def middle_of(corners: Sequence[Corner]) -> Corner:
 @lru_cache(maxsize=256)
 def least_width(corners: Corners) -> float:
     """Return the least distance (m) of two parallel lines with all corners between them; one is along an edge."""
-    return min(_reach(corners, a, b) for a, b in _edges(corners))
+    reaches = []
+    for a, b in _edges(corners):
+        along, length = _minus(b, a), math.dist(a, b)
+        reaches.append(max(abs(_cross(along, _minus(corner, a))) for corner in corners) / length if length else 0.0)
+    return min(reaches)
 
 
 def holds(corners: Sequence[Corner], point: Corner, margin: float) -> bool:
@@ -137,15 +141,6 @@ def faults(points: Sequence[Corner]) -> Iterator[tuple[int | None, str]]:
         yield None, f"all corners are within {1e6 * LEAST:g} µm"
         return
     local = [((x - points[0][0]) / extent, (y - points[0][1]) / extent) for x, y in points]
-    yield from _repeated(local, extent)
-    turns = _turns(local)
-    if min(turns) <= 0.0 or sum(turns) > 1.5 * 2.0 * math.pi:  # slow, and cannot happen to others
-        yield from _crossed(local)
-    thin = list(_thin(local, extent))
-    yield from thin or _bent(turns)
-
-
-def _repeated(local: Sequence[Corner], extent: float) -> Iterator[tuple[int, str]]:
     for number, corner in enumerate(local):
         edge = math.dist(corner, local[number - 1])
         if edge == 0.0 and number == 0:
@@ -154,45 +149,24 @@ def _repeated(local: Sequence[Corner], extent: float) -> Iterator[tuple[int, str
             yield number, "the same corner as the one before"
         elif edge < SHORTEST:
             yield number, f"this corner is only {1e3 * edge * extent:.3g} mm from the one before; leave one of them out"
-
-
-def _crossed(local: Sequence[Corner]) -> Iterator[tuple[int, str]]:
-    for one, other in self_crossings(corners_of(local)):
-        first, second = sorted(_as_given(local, edge) for edge in (one, other))
-        meets = f"the edge from corner {second + 1} meets that from corner {first + 1}"
-        yield second, f"{meets}: the outline crosses itself"
-
-
-def _as_given(local: Sequence[Corner], edge: int) -> int:
-    """Return the number of an edge of the counter-clockwise outline in the order of the file."""
-    return edge if area_of(local) >= 0.0 else (len(local) - 2 - edge) % len(local)
-
-
-def _turns(local: Sequence[Corner]) -> list[float]:
-    """Return the angles (rad) by which the outline turns at its corners, positive where it is convex."""
     sense = math.copysign(1.0, area_of(local))
     ways = [_minus(b, a) for a, b in _edges(local)]
-    return [sense * math.atan2(_cross(a, b), _dot(a, b)) for a, b in zip((ways[-1], *ways), ways, strict=False)]
-
-
-def _bent(turns: Sequence[float]) -> Iterator[tuple[int, str]]:
+    turns = [sense * math.atan2(_cross(a, b), _dot(a, b)) for a, b in zip((ways[-1], *ways), ways, strict=False)]
+    if min(turns) <= 0.0 or sum(turns) > 1.5 * 2.0 * math.pi:  # slow, and cannot happen to others
+        for edges in self_crossings(corners_of(local)):  # of the counter-clockwise outline, here in the file's order
+            first, second = sorted(one if sense > 0.0 else (len(local) - 2 - one) % len(local) for one in edges)
+            meets = f"the edge from corner {second + 1} meets that from corner {first + 1}"
+            yield second, f"{meets}: the outline crosses itself"
+    thickness = least_width(tuple(local))
+    if thickness < SHORTEST:
+        size = f"{1e3 * thickness * extent:.3g} mm thick and {1e3 * extent:.3g} mm long"
+        yield None, f"a sliver: {size}; at least {SHORTEST:g} of the length is needed"
+        return
     for number, turn in enumerate(turns):
         if turn <= -STRAIGHT:
             yield number, "the outline is not convex at this corner; divide the block into convex ones"
         elif turn < STRAIGHT:
             yield number, f"the outline is nearly straight here ({180.0 - math.degrees(turn):.6g} deg); leave it out"
-
-
-def _thin(local: Sequence[Corner], extent: float) -> Iterator[tuple[None, str]]:
-    thickness = least_width(tuple(local))
-    if thickness < SHORTEST:
-        size = f"{1e3 * thickness * extent:.3g} mm thick and {1e3 * extent:.3g} mm long"
-        yield None, f"a sliver: {size}; at least {SHORTEST:g} of the length is needed"
-
-
-def _reach(local: Sequence[Corner], a: Corner, b: Corner) -> float:
-    along, length = _minus(b, a), math.dist(a, b)
-    return max(abs(_cross(along, _minus(corner, a))) for corner in local) / length if length else 0.0
 
 
 def _edges(corners: Sequence[Corner]) -> Iterator[tuple[Corner, Corner]]:

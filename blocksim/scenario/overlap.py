@@ -1,7 +1,7 @@
 """Overlap of placed blocks with one another, the ground and walls, exactly (separating axes)."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from typing import NamedTuple, Self
 
@@ -40,7 +40,8 @@ class Rectangles(NamedTuple):
     @classmethod
     def of(cls, bodies: Sequence[PlacedBody]) -> Self:
         """Take the boxes along the own axes of placed bodies; of rectangles that is the body."""
-        x, y, size_x, size_y = (_column(bodies, attrgetter(name)) for name in ("x", "y", "size_x", "size_y"))
+        names = ("x", "y", "size_x", "size_y")
+        x, y, size_x, size_y = (np.fromiter(map(attrgetter(one), bodies), np.float64, len(bodies)) for one in names)
         # math, as numpy's functions may differ in the last digit
         cosine, sine = (np.fromiter((of(body.angle) for body in bodies), np.float64) for of in (math.cos, math.sin))
         for index in (number for number, body in enumerate(bodies) if body.outline):
@@ -138,26 +139,19 @@ def _portions(indices: Integers) -> Iterator[Integers]:
     return (indices[begin : begin + POLYGONS_AT_ONCE] for begin in range(0, indices.size, POLYGONS_AT_ONCE))
 
 
-def _column(bodies: Sequence[PlacedBody], value: Callable[[PlacedBody], float]) -> Floats:
-    return np.fromiter(map(value, bodies), np.float64, len(bodies))
-
-
 def penetration(ones: Outlines, others: Outlines) -> Floats:
     """Return the penetration depths (m) of pairs of outlines; zero or negative where they are apart."""
-    depth = _of_boxes(ones.boxes, others.boxes)
+    one, other = ones.boxes, others.boxes
+    x, y = other.x - one.x, other.y - one.y
+    axes = [axis for r in (one, other) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
+    depth: Floats = np.min(
+        [one.half_extent(*axis) + other.half_extent(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes], axis=0
+    )
     polygon = (ones.kinds != RECTANGLE) | (others.kinds != RECTANGLE)
     for some in _portions(np.flatnonzero(polygon & (depth > 0.0))):
-        one, other = ones.some(some).corners(), others.some(some).corners()
-        depth[some] = np.minimum(_least_reach(one, other), _least_reach(other, one))
+        corners, behind = ones.some(some).corners(), others.some(some).corners()
+        depth[some] = np.minimum(_least_reach(corners, behind), _least_reach(behind, corners))
     return depth
-
-
-def _of_boxes(ones: Rectangles, others: Rectangles) -> Floats:
-    x, y = others.x - ones.x, others.y - ones.y
-    axes = [axis for r in (ones, others) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
-    depths = [ones.half_extent(*axis) + others.half_extent(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes]
-    least: Floats = np.min(depths, axis=0)
-    return least
 
 
 def _least_reach(ones: Floats, others: Floats) -> Floats:

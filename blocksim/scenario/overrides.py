@@ -96,20 +96,14 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
         parts = parse_key(key) if isinstance(key, str) else tuple(key)
     except ValueError:
         raise UnfitOverrideError(f"{shown(key)} is not a dotted key") from None
+    if parts[0] == "pairs" and len(parts) >= 3 and follow(data, parts[:3]) is MISSING:
+        turned = (parts[0], parts[2], parts[1])  # pairs.B.A is the pair that the data may have as pairs.A.B
+        parts = parts if follow(data, turned) is MISSING else (*turned, *parts[3:])
     path: list[str | int] = []
-    where = _in_given_order(data, parts)
-    start = _with_list_to_change(_with_own_friction(data, where), where)
-    result = _put(start, where, frozen(value), path)
+    start = _with_list_to_change(_with_own_friction(data, parts), parts)
+    result = _put(start, parts, frozen(value), path)
     assert isinstance(result, Mapping)  # noqa: S101 - data is a mapping, so is its copy
     return result, tuple(path)
-
-
-def _in_given_order(data: Data, parts: Sequence[str | int]) -> Sequence[str | int]:
-    """Reverse pairs.B.A if the data have pairs.A.B: it is the same pair."""
-    if parts[0] != "pairs" or len(parts) < 3 or follow(data, parts[:3]) is not MISSING:
-        return parts
-    turned = (parts[0], parts[2], parts[1])
-    return parts if follow(data, turned) is MISSING else (*turned, *parts[3:])
 
 
 def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
@@ -149,25 +143,15 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
     if child is MISSING and tuple(done) in _NAMED and len(parts) > 1:
         hint = did_you_mean_or_list(part, node)
         raise UnfitOverrideError(f"{done[0]} has no {shown(part)}, {hint}")
-    if child is MISSING and not done and len(parts) > 1 and _is_list(part):
-        raise UnfitOverrideError(f"this scenario has no [[{part}]], so no {shown(str(parts[1]))} among them")
+    if child is MISSING and not done and len(parts) > 1:
+        field = field_at((part,), {})
+        if field is not None and isinstance(field.default, tuple):
+            raise UnfitOverrideError(f"this scenario has no [[{part}]], so no {shown(str(parts[1]))} among them")
     done.append(part)
-    return {
-        **_without_synonym(node, part),
-        part: _put(_opened(tuple(done), child) if len(parts) > 1 else child, parts[1:], value, done),
-    }
-
-
-def _is_list(key: str) -> bool:
-    """Return True for the key of a list of tables, as [[loads]]."""
-    field = field_at((key,), {})
-    return field is not None and isinstance(field.default, tuple)
-
-
-def _without_synonym(node: Data, part: str) -> Data:
-    """Leave out the other way to write what is going to be set."""
-    synonym = SYNONYMS.get(part)
-    return {key: entry for key, entry in node.items() if key != synonym} if synonym in node else node
+    child = _opened(tuple(done), child) if len(parts) > 1 else child
+    synonym = SYNONYMS.get(part)  # another way to write what is going to be set
+    others = {key: entry for key, entry in node.items() if key != synonym}
+    return {**others, part: _put(child, parts[1:], value, done)}
 
 
 def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]) -> int:

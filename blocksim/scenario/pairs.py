@@ -9,13 +9,12 @@ Each quantity is set by the first of these keys that is given:
 and contact.normal_stiffness, contact.shear_stiffness_ratio and contact.shear_damping_ratio where no pair has its own.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from blocksim.scenario.keys import format_key
-from blocksim.scenario.models.base import Table
-from blocksim.scenario.models.contact import Contact, Pair, PairFriction
+from blocksim.scenario.models.contact import Pair, PairFriction
 from blocksim.scenario.models.scenario import Scenario
 
 GROUND = "ground"
@@ -46,7 +45,17 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
     With `ground`, `one` is a block's material and `other` is "ground" or the material that a wall names; a wall
     without a material is as the ground.
     """
-    overrides = list(_overrides(scenario, _partners(scenario, one, other, ground=ground)))
+    partners = [(one, other)]  # whose tables apply, in order of precedence
+    if ground and other != GROUND:
+        partners.append((one, GROUND))
+    elif ground and scenario.ground.material is not None:
+        partners.append((one, scenario.ground.material))
+    overrides: list[tuple[str, Pair]] = []
+    for names in partners:
+        for left, right in dict.fromkeys([names, names[::-1]]):
+            pair = scenario.pairs.get(left, {}).get(right)
+            if pair is not None:
+                overrides.append((format_key(("pairs", left, right)), pair))
     values: dict[str, Any] = {}
     rules: dict[str, str] = {}
     for quantity, general in _general(scenario, "block_ground" if ground else "block_block").items():
@@ -55,42 +64,17 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
     return ResolvedPair(**values, rules=rules)
 
 
-def _partners(scenario: Scenario, one: str, other: str, *, ground: bool) -> list[tuple[str, str]]:
-    """Return the pairs of names whose tables apply, in order of precedence."""
-    if not ground:
-        return [(one, other)]
-    if other != GROUND:
-        return [(one, other), (one, GROUND)]
-    named = scenario.ground.material
-    return [(one, GROUND)] if named is None else [(one, GROUND), (one, named)]
-
-
-def _overrides(scenario: Scenario, partners: Sequence[tuple[str, str]]) -> Iterator[tuple[str, Pair]]:
-    """Yield the tables of these pairs with their keys as in the file, in either order."""
-    for one, other in partners:
-        for left, right in dict.fromkeys([(one, other), (other, one)]):
-            pair = scenario.pairs.get(left, {}).get(right)
-            if pair is not None:
-                yield format_key(("pairs", left, right)), pair
-
-
 def _general(scenario: Scenario, side: str) -> dict[str, tuple[object, str]]:
     """Return the values for all pairs of this side without a table of their own, and the keys that set them."""
-    contact, friction = scenario.contact, scenario.friction
-    restitution = contact.restitution
-    return {
-        "friction": (getattr(friction, side), _if_given(friction, side, "friction")),
-        "restitution": (getattr(restitution, side), _if_given(restitution, side, "contact.restitution")),
-        "normal_stiffness": _if_any(contact, "normal_stiffness", MATERIALS),
-        "shear_stiffness_ratio": _if_any(contact, "shear_stiffness_ratio", MATERIALS),
-        "shear_damping_ratio": _if_any(contact, "shear_damping_ratio", DEFAULT),
-    }
-
-
-def _if_given(table: Table, key: str, place: str) -> str:
-    return f"{place}.{key}" if key in table.model_fields_set else DEFAULT
-
-
-def _if_any(contact: Contact, key: str, otherwise: str) -> tuple[object, str]:
-    value = getattr(contact, key)
-    return value, otherwise if value is None else f"contact.{key}"
+    contact = scenario.contact
+    general: dict[str, tuple[object, str]] = {}
+    for name, table, place in (
+        ("friction", scenario.friction, "friction"),
+        ("restitution", contact.restitution, "contact.restitution"),
+    ):
+        general[name] = getattr(table, side), f"{place}.{side}" if side in table.model_fields_set else DEFAULT
+    for name in ("normal_stiffness", "shear_stiffness_ratio", "shear_damping_ratio"):
+        otherwise = DEFAULT if name == "shear_damping_ratio" else MATERIALS
+        value = getattr(contact, name)
+        general[name] = value, otherwise if value is None else f"contact.{name}"
+    return general

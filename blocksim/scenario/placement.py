@@ -2,11 +2,10 @@
 
 import math
 import weakref
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
 from blocksim.scenario.keys import KeyPath
-from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.outlines import Corners, box_of, is_upright, least_width, middle_of, section_of
 from blocksim.scenario.structures import Pose, Shaped, Structure
@@ -133,10 +132,6 @@ def _placement(scenario: Scenario) -> _Placement:
     return known
 
 
-def _forget(dead: weakref.ref[Scenario]) -> None:
-    _latest[:] = [one for one in _latest if one.scenario is not dead]
-
-
 def _placed(scenario: Scenario) -> _Placement:
     freed = {name for event in scenario.events for name in event.free}
     bodies: list[PlacedBody] = []
@@ -155,14 +150,22 @@ def _placed(scenario: Scenario) -> _Placement:
     return _Placement(weakref.ref(scenario, _forget), tuple(bodies), tuple(origins))
 
 
+def _forget(dead: weakref.ref[Scenario]) -> None:
+    _latest[:] = [one for one in _latest if one.scenario is not dead]
+
+
 def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedBody]:
     """Return the bodies of a structure, called by their numbers from a first one on."""
     poses = structure.start(scenario.blocks[structure.block])
     if isinstance(structure, Shaped):
-        numbered = enumerate(zip(structure.cells, structure.shapes, poses, strict=True), start=first)
-        return [_shaped(scenario, structure.block, str(index), *one) for index, one in numbered]
+        return [
+            _shaped(scenario, structure.block, str(number), *one)
+            for number, one in enumerate(zip(structure.cells, structure.shapes, poses, strict=True), start=first)
+        ]
+    x, y = middle_of(scenario.blocks[structure.block].polygon or ((0.0, 0.0),))
+    if x or y:  # structures place the middle of the bounding box, bodies are placed by their centroid
+        poses = [_moved(pose, -x, -y) for pose in poses]
     place = _placer(scenario, structure.block)
-    poses = _about_centroid(poses, scenario.blocks[structure.block])
     return [place(str(index), pose, fixed=False) for index, pose in enumerate(poses, start=first)]
 
 
@@ -176,18 +179,11 @@ def _shaped(scenario: Scenario, usual: str, number: str, cell: Cell, outline: Co
     return PlacedBody(name, key, block.material, *sizes, density, *pose, cell.fixed, outline=outline)
 
 
-def _about_centroid(poses: Sequence[Pose], block: Block) -> Sequence[Pose]:
-    """Return poses of the centroid for those of the middle of the bounding box, by which structures place blocks."""
-    x, y = middle_of(block.polygon or ((0.0, 0.0),))
-    return [_moved(pose, -x, -y) for pose in poses] if x or y else poses
-
-
 def _moved(pose: Pose, x: float, y: float) -> Pose:
     """Return the pose of a point x, y along the axes of a body."""
     c, s = math.cos(pose.angle), math.sin(pose.angle)
     dx, dy = c * x - s * y, s * x + c * y
-    moved = {"x": pose.x + dx, "y": pose.y + dy, "vx": pose.vx - pose.spin * dy, "vy": pose.vy + pose.spin * dx}
-    return pose._replace(**moved)
+    return pose._replace(x=pose.x + dx, y=pose.y + dy, vx=pose.vx - pose.spin * dy, vy=pose.vy + pose.spin * dx)
 
 
 class _Place(Protocol):

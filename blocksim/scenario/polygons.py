@@ -78,15 +78,10 @@ def overlap(one: Floats, other: Floats) -> bool:
     for a, b in ((one, other), (other, one)):
         if any(cuts(begin, end, b) for begin, end in zip(*edges_of(a), strict=True)):
             return True
-    return bool(deep_inside(_inner_point(one), other).any())
-
-
-def _inner_point(corners: Floats) -> Floats:
-    """Return a point (1, 2) inside a polygon: halfway through it at a height between two of its corners."""
-    heights = np.unique(corners[:, 1])
+    heights = np.unique(one[:, 1])  # neither cuts the other: a point in one of them tells whether one is in the other
     y = 0.5 * (heights[0] + heights[1])
-    low, high = crossings_below(corners, np.array([y]), axis=1)[0][:2]
-    return np.array([[0.5 * (low + high), y]])
+    low, high = crossings_below(one, np.array([y]), axis=1)[0][:2]
+    return bool(deep_inside(np.array([[0.5 * (low + high), y]]), other).any())
 
 
 def crossings_below(corners: Floats, places: Floats, axis: int) -> list[Floats]:
@@ -117,21 +112,20 @@ def height_above(corners: Floats, points: Floats) -> Floats:
 
 def self_crossings(corners: Floats) -> Iterator[tuple[int, int]]:
     """Yield pairs of edges of a polygon that cross or touch although they are no neighbours."""
-    begins, ends = edges_of(corners)
-    count = len(corners)
-    for i in range(count):
-        for j in range(i + 2, count):
-            if (j + 1) % count != i and _meet(begins[i], ends[i], begins[j], ends[j]):
-                yield i, j
 
-
-def _meet(a0: Floats, a1: Floats, b0: Floats, b1: Floats) -> bool:
     def side(p: Floats, q: Floats, r: Floats) -> float:
         return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
 
-    crosses = side(a0, a1, b0) * side(a0, a1, b1) <= 0.0 and side(b0, b1, a0) * side(b0, b1, a1) <= 0.0
-    boxes = np.maximum(np.minimum(a0, a1), np.minimum(b0, b1)) <= np.minimum(np.maximum(a0, a1), np.maximum(b0, b1))
-    return crosses and bool(boxes.all())
+    edges = list(zip(*edges_of(corners), strict=True))
+    for i, (a0, a1) in enumerate(edges):
+        for j, (b0, b1) in enumerate(edges[i + 2 :], start=i + 2):
+            low, high = (
+                np.maximum(np.minimum(a0, a1), np.minimum(b0, b1)),
+                np.minimum(np.maximum(a0, a1), np.maximum(b0, b1)),
+            )
+            crosses = side(a0, a1, b0) * side(a0, a1, b1) <= 0.0 and side(b0, b1, a0) * side(b0, b1, a1) <= 0.0
+            if (j + 1) % len(edges) != i and crosses and bool((low <= high).all()):
+                yield i, j
 
 
 def count_across(corners: Floats, spacing: float) -> tuple[int, int]:

@@ -8,16 +8,22 @@ Two columns, separated by blanks, commas or semicolons: times in s at a constant
 with `#` or `%` are notes. A first line with names may say the unit: g, m/s2, cm/s2 (gal).
 """
 
-import math
 import re
 import statistics
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from blocksim.scenario.models.motion import LEAST_ROWS, MAX_ROWS, MotionTable, MotionTableError, content_of
+from blocksim.scenario.models.motion import (
+    LEAST_ROWS,
+    MAX_ROWS,
+    MotionTable,
+    MotionTableError,
+    content_of,
+    finite_number,
+)
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.units import STANDARD_GRAVITY
 
@@ -98,29 +104,22 @@ def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], l
     """Return unit, times and values of a file with two columns."""
     kept = [line for line in lines if line.text.strip() and line.text.lstrip()[0] not in "#%"]
     unit, is_named = _named_unit(kept[0]) if kept else (None, False)
-    rows = list(_rows(kept[is_named:]))
+    rows = []
+    for number, text in kept[is_named:]:
+        cells = _cells(text)
+        if len(cells) != COLUMNS:  # as in 0,01;0,12 or 0,01,0,12, whose numbers have a comma where a point belongs
+            by_others = [cell for cell in re.split(r"[;\s]+", text.strip(" ;\t")) if cell]
+            is_pair = len(by_others) == COLUMNS and 0 < text.count(",") <= COLUMNS
+            has_commas = is_pair or (len(by_others) == 1 and text.count(",") == 1 + COLUMNS)
+            hint = "; decimals are written with a point" if has_commas else ""
+            why = f"a time and an acceleration are needed{hint}"
+            raise MotionTableError(f"line {number}: {shown(text.strip())}: {why}")
+        rows.append((number, _number(number, cells[0]), _number(number, cells[1])))
     _check_count(len(rows))
     times = [time for _, time, _ in rows]
     step = (times[-1] - times[0]) / (len(times) - 1)
     _check_steps([number for number, *_ in rows], times, step)
     return unit, (times[0] + place * step for place in range(len(times))), [value for *_, value in rows]
-
-
-def _rows(lines: Iterable[Line]) -> Iterator[tuple[int, float, float]]:
-    """Yield line, time and acceleration of every sample."""
-    for number, text in lines:
-        cells = _cells(text)
-        if len(cells) != COLUMNS:
-            hint = "; decimals are written with a point" if _has_decimal_commas(text) else ""
-            raise MotionTableError(f"line {number}: {shown(text.strip())}: a time and an acceleration are needed{hint}")
-        yield number, _number(number, cells[0]), _number(number, cells[1])
-
-
-def _has_decimal_commas(text: str) -> bool:
-    """Return True for a line such as 0,01;0,12 or 0,01,0,12: its numbers have a comma where a point belongs."""
-    by_others = [cell for cell in re.split(r"[;\s]+", text.strip(" ;\t")) if cell]
-    commas = text.count(",")
-    return (len(by_others) == COLUMNS and 0 < commas <= COLUMNS) or (len(by_others) == 1 and commas == 1 + COLUMNS)
 
 
 def _cells(text: str) -> list[str]:
@@ -158,32 +157,24 @@ def _check_steps(lines: Sequence[int], times: Sequence[float], mean: float) -> N
     """Raise MotionTableError at the first time that does not increase, after a gap, or off a constant step (s)."""
     steps = [after - before for before, after in pairwise(times)]
     usual = statistics.median(steps)
-    place, why = 0, "times must increase from 0 or later" if times[0] < 0.0 else ""
-    if not why and min(steps) <= 0.0:  # before gaps: where times are repeated, the usual step means nothing
+    gap = next((number for number, step in enumerate(steps, start=1) if step > GAP * usual), 0)
+    uneven = (number for number, time in enumerate(times) if abs(time - times[0] - number * mean) > UNEVEN * mean)
+    place, why = 0, ""
+    if times[0] < 0.0:
+        why = "times must increase from 0 or later"
+    elif min(steps) <= 0.0:  # before gaps: where times are repeated, the usual step means nothing
         place = next(number for number, step in enumerate(steps, start=1) if step <= 0.0)
-        again = f"the time of line {lines[place - 1]} is repeated"
-        why = (
-            again
-            if steps[place - 1] == 0.0
-            else f"times must increase, line {lines[place - 1]} has {times[place - 1]:g} s"
-        )
-    elif not why and max(steps) > GAP * usual:
-        place = next(number for number, step in enumerate(steps, start=1) if step > GAP * usual)
-        why = f"a gap of {steps[place - 1]:g} s, the step is {usual:g} s"
+        before = f"line {lines[place - 1]}"
+        again = f"the time of {before} is repeated"
+        why = f"times must increase, {before} has {times[place - 1]:g} s" if steps[place - 1] < 0.0 else again
+    elif max(steps) > GAP * usual:
+        place, why = gap, f"a gap of {steps[gap - 1]:g} s, the step is {usual:g} s"
+    elif (place := next(uneven, 0)) > 0:
+        why = f'not at a constant step of {usual:g} s; a motion of kind "table" takes any steps'
     if why:
         raise MotionTableError(f"line {lines[place]}: time {times[place]:g} s: {why}")
-    for place, time in enumerate(times):
-        if abs(time - times[0] - place * mean) > UNEVEN * mean:
-            why = f'not at a constant step of {usual:g} s; a motion of kind "table" takes any steps'
-            raise MotionTableError(f"line {lines[place]}: time {time:g} s: {why}")
 
 
 def _number(line: int, text: str) -> float:
     """Return a number of the file, also with the D of Fortran in its exponent."""
-    try:
-        number = float(re.sub(r"(?<=[0-9.])[dD](?=[+-]?\d)", "E", text))
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise MotionTableError(f"line {line}: {shown(text)} is not a finite number")
-    return number
+    return finite_number(line, text, re.sub(r"(?<=[0-9.])[dD](?=[+-]?\d)", "E", text))

@@ -9,7 +9,6 @@ from typing import Any
 
 import tomli_w
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 
 from blocksim.scenario.keys import si_unit
 from blocksim.scenario.models.contact import Friction, PairFriction
@@ -45,7 +44,14 @@ def scenario_to_toml(
     """
     data = _plain(scenario)
     if scenario.sweep is not None or is_varied:
-        _leave_to_static(scenario, data)
+        # a sweep may vary static frictions, which the kinetic ones follow that were not set
+        pairs = [(one, other, pair) for one, others in scenario.pairs.items() for other, pair in others.items()]
+        frictions: list[tuple[PairFriction | None, tuple[str, ...]]]
+        frictions = [(getattr(scenario.friction, side), ("friction", side)) for side in Friction.model_fields]
+        frictions += [(pair.friction, ("pairs", one, other, "friction")) for one, other, pair in pairs]
+        for friction, path in frictions:
+            if friction is not None and "kinetic" not in friction.model_fields_set:
+                functools.reduce(dict.__getitem__, path, data).pop("kinetic", None)
     if scenario.sweep is not None and SCHEME in scenario.sweep.vary:
         data["time"] = {key: value for key, value in data["time"].items() if key in Time.model_fields}
     if experiment_table is not None and "experiment" in data:
@@ -57,19 +63,6 @@ def scenario_to_toml(
         if name is not None:
             data["bodies"][number]["motion"]["table"] = name
     return HEADER + tomli_w.dumps(data)
-
-
-def _leave_to_static(scenario: Scenario, data: dict[str, Any]) -> None:
-    """Leave out kinetic frictions that were not set: a sweep may vary the static one, which they follow."""
-    sides = ((getattr(scenario.friction, side), ("friction", side)) for side in Friction.model_fields)
-    pairs = (
-        (pair.friction, ("pairs", one, other, "friction"))
-        for one, others in scenario.pairs.items()
-        for other, pair in others.items()
-    )
-    for friction, path in (*sides, *pairs):
-        if friction is not None and "kinetic" not in friction.model_fields_set:
-            functools.reduce(dict.__getitem__, path, data).pop("kinetic", None)
 
 
 def deciding_values(scenario: Scenario) -> dict[str, Any]:
@@ -109,22 +102,22 @@ def _plain(table: BaseModel) -> dict[str, Any]:
     """Turn a table into its TOML form; keys without a value are left out."""
     if isinstance(table, Sweep):
         return {key: _value(entry) for key, entry in table.as_table().items()}
-    fields = type(table).model_fields
-    entries = {info.alias or name: _field(info, getattr(table, name)) for name, info in fields.items()}
-    systems = entries.pop(HELD, None)
-    entries |= systems if isinstance(systems, dict) else {}
+    entries: dict[str, Any] = {}
+    for name, info in type(table).model_fields.items():
+        value = getattr(table, name)
+        if si_unit(info) != ANGLE.unit or value is None:
+            value = _value(value)
+        elif isinstance(value, tuple):
+            value = [f"{one!r} rad" for one in value]  # an angle must carry a unit: a bare one would be refused
+        else:
+            value = f"{value!r} rad"
+        entries[info.alias or name] = value
+    entries |= entries.pop(HELD, None) or {}
     if isinstance(table, PairFriction) and table.kinetic_ratio is not None:
         entries["kinetic"] = None
     if isinstance(table, Block):
         entries = {key: entry for key, entry in entries.items() if table.has_key(key)}
     return {key: entry for key, entry in entries.items() if entry is not None}
-
-
-def _field(info: FieldInfo, value: object) -> object:
-    """Write one field; an angle must carry a unit, because a bare one would be refused."""
-    if si_unit(info) != ANGLE.unit or value is None:
-        return _value(value)
-    return [f"{one!r} rad" for one in value] if isinstance(value, tuple) else f"{value!r} rad"
 
 
 def _value(value: object) -> object:

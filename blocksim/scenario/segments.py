@@ -8,12 +8,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.models.geometry import Wall
 from blocksim.scenario.models.scenario import Scenario
 
 ENDLESS = 1e5
@@ -129,68 +127,40 @@ def _is_sharp(before: Point, joint: Point, after: Point) -> bool:
     return back and _turn(before, joint, after) < 0.0
 
 
-class _End(NamedTuple):
-    extends: bool
-    touches: bool
-    is_sharp: bool
-
-
 def wall_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     """Return one piece for every wall."""
-    if not scenario.walls:
-        return ()
-    starts, ends = (np.array([getattr(wall, end) for wall in scenario.walls]) for end in ("start", "end"))
-    heights = [surface_heights(scenario, points[:, 0]) for points in (starts, ends)]
-    ground = [points[:, 1] <= height + TOLERANCE for points, height in zip((starts, ends), heights, strict=True)]
-    return tuple(
-        _wall(scenario.walls, number, starts, ends, (bool(ground[0][number]), bool(ground[1][number])))
-        for number in range(len(scenario.walls))
-    )
-
-
-def _wall(
-    walls: Sequence[Wall], number: int, starts: Floats, ends: Floats, on_ground: tuple[bool, bool]
-) -> PlacedSegment:
-    """Place one wall; `starts` and `ends` (n, 2) are those of all."""
-    wall = walls[number]
-    before, after = _neighbour(ends, wall.start, number), _neighbour(starts, wall.end, number)
-    others = np.arange(len(walls)) != number
-    if before is None:
-        start = _free_end(is_covered=on_ground[0] or _touches(wall.start, starts[others], ends[others]))
-    else:
-        start = _joint(walls[before], wall, is_first=False)
-    if after is None:
-        end = _free_end(is_covered=on_ground[1] or _touches(wall.end, starts[others], ends[others]))
-    else:
-        end = _joint(wall, walls[after], is_first=True)
-    return PlacedSegment(
-        *wall.start,
-        *wall.end,
-        material=wall.material,
-        extends_start=start.extends,
-        extends_end=end.extends,
-        touches_start=start.touches,
-        touches_end=end.touches,
-        sharp_start=start.is_sharp,
-        sharp_end=end.is_sharp,
-    )
+    walls = scenario.walls
+    starts, ends = (np.array([getattr(wall, end) for wall in walls]).reshape(-1, 2) for end in ("start", "end"))
+    pieces = []
+    for number, wall in enumerate(walls):
+        others = np.arange(len(walls)) != number
+        before, after = _neighbour(ends, wall.start, number), _neighbour(starts, wall.end, number)
+        into = None if before is None else _turn(walls[before].start, walls[before].end, wall.end)
+        onwards = None if after is None else _turn(wall.start, wall.end, walls[after].end)
+        # ends without a neighbour: covered by the ground or the middle of another wall, or not
+        is_start_free, is_end_free = (
+            end[1] > surface_height(scenario, end[0]) + TOLERANCE and not _touches(end, starts[others], ends[others])
+            for end in (wall.start, wall.end)
+        )
+        piece = PlacedSegment(
+            *wall.start,
+            *wall.end,
+            material=wall.material,
+            extends_start=not is_start_free if into is None else into > STRAIGHT,
+            extends_end=not is_end_free if onwards is None else onwards > STRAIGHT,
+            touches_start=into is None and is_start_free,
+            touches_end=is_end_free if onwards is None else onwards < -STRAIGHT,
+            sharp_start=into is None and is_start_free,
+            sharp_end=is_end_free if after is None else _is_sharp(wall.start, wall.end, walls[after].end),
+        )
+        pieces.append(piece)
+    return tuple(pieces)
 
 
 def _neighbour(points: Floats, end: Point, number: int) -> int | None:
     """Return the first other wall with an end at the same point; ends are (n, 2)."""
     near = np.flatnonzero(np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) <= TOLERANCE)
     return next((int(other) for other in near if other != number), None)
-
-
-def _joint(before: Wall, after: Wall, *, is_first: bool) -> _End:
-    turn = _turn(before.start, before.end, after.end)
-    is_sharp = is_first and _is_sharp(before.start, before.end, after.end)
-    return _End(extends=turn > STRAIGHT, touches=is_first and turn < -STRAIGHT, is_sharp=is_sharp)
-
-
-def _free_end(*, is_covered: bool) -> _End:
-    """Judge an end without a neighbour, covered by the ground or the middle of another wall or not."""
-    return _End(extends=is_covered, touches=not is_covered, is_sharp=not is_covered)
 
 
 def _touches(point: Point, starts: Floats, ends: Floats) -> bool:

@@ -123,17 +123,12 @@ def override_problem(override: Override, path: KeyPath, message: str, at: str) -
     start, stop = (0, end) if in_key else (value, len(text))
     line, shift = clipped(text, start)
     length = max(1, min(stop - start, len(line) - shift))
-    return Problem(override.label, message, _key_shown(override, path), None, line, shift, length)
-
-
-def _key_shown(override: Override, path: KeyPath) -> str:
-    """Return the key of a mistake, unless the override names it; of a key that a study varies, what lies below it."""
+    depth, key = len(override.path), format_key(path)
     if path == override.path:
-        return ""
-    depth = len(override.path)
-    if path[0] != "sweep" or path[:depth] != override.path:
-        return format_key(path)
-    return "" if isinstance(path[depth], int) else format_key(path[depth:])
+        key = ""  # it stands in the text
+    elif path[0] == "sweep" and path[:depth] == override.path:  # what lies below a key that a study varies
+        key = "" if isinstance(path[depth], int) else format_key(path[depth:])
+    return Problem(override.label, message, key, None, line, shift, length)
 
 
 def clipped(line: str, start: int) -> tuple[str, int]:
@@ -148,8 +143,17 @@ def clipped(line: str, start: int) -> tuple[str, int]:
 
 
 def locate(text: str) -> dict[KeyPath, Place]:
-    """Map every path of a valid TOML text (lines end with a line feed) to its place."""
-    return _Scanner(text).run()
+    """Map every path of a valid TOML text (lines end with a line feed) to its place; the first one of a table."""
+    scanner = _Scanner(text)
+    table: KeyPath = ()
+    at = scanner.skip(0)
+    while at < len(text):
+        if text[at] == "[":
+            table, at = scanner.header(at)
+        else:
+            at = scanner.pair(table, at)
+        at = scanner.skip(at)
+    return scanner.places
 
 
 class _Scanner:
@@ -161,17 +165,6 @@ class _Scanner:
         self.after = 0
         self.places: dict[KeyPath, Place] = {}
         self.list_sizes: dict[KeyPath, int] = {}
-
-    def run(self) -> dict[KeyPath, Place]:
-        table: KeyPath = ()
-        at = self.skip(0)
-        while at < len(self.text):
-            if self.text[at] == "[":
-                table, at = self.header(at)
-            else:
-                at = self.pair(table, at)
-            at = self.skip(at)
-        return self.places
 
     def skip(self, at: int) -> int:
         """Pass white space, line ends and comments."""
@@ -218,29 +211,21 @@ class _Scanner:
         """Pass one value and record what is inside it; return its end."""
         opening = self.text[at : at + 1]
         if opening == "[":
-            return self.array(path, at)
+            for index, start in enumerate(self.elements(at, "]")):
+                element = (*path, index)
+                self.after = self.value(element, start)
+                span = self.span(start, self.after)
+                self.places[element] = Place(span, span)
+            return self.after
         if opening == "{":
-            return self.inline_table(path, at)
+            for start in self.elements(at, "}"):
+                self.after = self.pair(path, start)
+            return self.after
         found = next((m for p in _STRINGS if (m := p.match(self.text, at))), None)
         if found is not None:
             return found.end()
         scalar = _SCALAR.match(self.text, at)
         return at if scalar is None else at + len(scalar[0].rstrip())
-
-    def array(self, path: KeyPath, at: int) -> int:
-        """Pass a list and record every element."""
-        for index, start in enumerate(self.elements(at, "]")):
-            element = (*path, index)
-            self.after = self.value(element, start)
-            span = self.span(start, self.after)
-            self.places[element] = Place(span, span)
-        return self.after
-
-    def inline_table(self, path: KeyPath, at: int) -> int:
-        """Pass { key = value, … } and record every key."""
-        for start in self.elements(at, "}"):
-            self.after = self.pair(path, start)
-        return self.after
 
     def elements(self, at: int, closing: str) -> Iterator[int]:
         """Yield the start of each element; the caller sets `after` to its end, and finally to that of the list."""

@@ -9,7 +9,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from blocksim.scenario.path_policy import OutOfReachError, table_in
-from blocksim.scenario.quantities import invalid, shown
+from blocksim.scenario.quantities import TIME, Quantity, invalid, shown
 from blocksim.scenario.spelling import nearest
 
 
@@ -24,8 +24,23 @@ class Table(BaseModel):
     )
 
 
-@dataclass(frozen=True, slots=True)
-class OneOf:
+POSITIVE_TIME = Quantity(TIME, above=0.0)
+
+
+class Checked:
+    """What annotations of a field have in common: they read the value of the file before pydantic does."""
+
+    def read(self, value: object) -> object:
+        """Return the value; raises a pydantic error."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the value first, then let pydantic see it."""
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+
+@dataclass(frozen=True)
+class OneOf(Checked):
     """Annotation of a literal field: the words that are available, and those that are planned."""
 
     available: tuple[str | int, ...]
@@ -47,13 +62,29 @@ class OneOf:
         hint = f"did you mean {shown(similar)}?" if similar else f"use {self.wanted}"
         raise invalid(f"{shown(value)} is unknown, {hint}")
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check the word first, then let pydantic see its literal."""
-        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+@dataclass(frozen=True)
+class TimeOr(Checked):
+    """Annotation of a time above 0 (s) or one word; `what` it is stands in messages."""
+
+    word: str
+    what: str
+
+    def read(self, value: object) -> object:
+        """Pass the word, or read the time; raises a pydantic error."""
+        if isinstance(value, str) and not any(letter.isdigit() for letter in value):
+            if value == self.word:
+                return value
+            raise invalid(f'{shown(value)} is not {self.what}; use "{self.word}" or {POSITIVE_TIME.wanted}')
+        return POSITIVE_TIME.read(value)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Describe both to editors."""
+        return {"anyOf": [{"const": self.word}, *POSITIVE_TIME.json_schema()["anyOf"]]}
 
 
-@dataclass(frozen=True, slots=True)
-class Whole:
+@dataclass(frozen=True)
+class Whole(Checked):
     """Annotation of a whole number in a range."""
 
     least: int
@@ -64,10 +95,6 @@ class Whole:
         if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
             raise invalid(f"{shown(value)} is not a whole number from {self.least} to {self.most}")
         return value
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check the range first, then let pydantic see the number."""
-        return core_schema.no_info_before_validator_function(self.read, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the range to editors."""

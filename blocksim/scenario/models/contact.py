@@ -57,13 +57,9 @@ class PairFriction(Table):
         raise q.invalid(message)
 
     @model_validator(mode="after")
-    def _kinetic_said_once(self) -> Self:
+    def _kinetic_once_and_not_above_static(self) -> Self:
         if self.kinetic_ratio is not None and "kinetic" in self.model_fields_set:
             raise q.invalid("kinetic and kinetic_ratio mean the same; keep one of the two", "kinetic_ratio", at="key")
-        return self
-
-    @model_validator(mode="after")
-    def _kinetic_not_above_static(self) -> Self:
         if self.kinetic > self.static:
             raise q.invalid(f"kinetic friction {self.kinetic:g} is above static friction {self.static:g}", "kinetic")
         return self
@@ -181,13 +177,9 @@ class Contact(Table):
         return SUPPORT[self.kernel] * self.resolved_smoothing_length
 
     @model_validator(mode="after")
-    def _stiffness_of_the_law(self) -> Self:
+    def _stiffness_and_neighbours(self) -> Self:
         if self.law == "hertz-mindlin" and self.normal_stiffness is not None:
             raise q.invalid(NO_FIXED_STIFFNESS, "normal_stiffness")
-        return self
-
-    @model_validator(mode="after")
-    def _neighbours_within_reach(self) -> Self:
         least = LEAST_SPACINGS * self.particle_spacing
         if self.model == "kernel" and self.smoothing_length is not None and self.smoothing_length < least:
             message = (

@@ -41,12 +41,8 @@ class Event(Table):
     velocity: NewVelocity | None = Field(default=None, description="velocity that a body gets")
 
     @model_validator(mode="after")
-    def _has_one_moment(self) -> Self:
+    def _has_one_moment_and_an_effect(self) -> Self:
         require_one('give a time, such as at = "0.2 s", or when = "rest"', at=self.at, when=self.when)
-        return self
-
-    @model_validator(mode="after")
-    def _does_something(self) -> Self:
         if not any(getattr(self, action) for action in ACTIONS):
             raise q.invalid("nothing happens; give remove, fix, free, unload or velocity")
         return self

@@ -1,7 +1,7 @@
 """Materials, blocks, single bodies, and the boundary: the ground and walls."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain, pairwise
 from typing import Annotated, Any, Literal, Self, get_args
@@ -56,13 +56,9 @@ class Material(Table):
     )
 
     @model_validator(mode="after")
-    def _one_density(self) -> Self:
+    def _one_density_and_soil_with_an_angle(self) -> Self:
         missing = 'the density is missing: give density (such as "2700 kg/m^3") or unit_weight'
         require_one(missing, density=self.given_density, unit_weight=self.unit_weight)
-        return self
-
-    @model_validator(mode="after")
-    def _soil_has_a_friction_angle(self) -> Self:
         for key in () if self.is_soil else ("cohesion", "dilation", "yield_surface"):
             if getattr(self, key) is not None:
                 raise q.invalid(
@@ -151,17 +147,9 @@ class Block(Table):
                 elsewhere = "belongs to a block with an outline or sides"
                 why = elsewhere if shape == "width" else f"has no meaning beside {shape}"
                 raise q.invalid(f"{key} {why}; keep one of them", key, at="key")
-        return self
-
-    @model_validator(mode="after")
-    def _two_sides(self) -> Self:
         if self.along == self.upright:
             others = " or ".join(q.shown(side) for side in SIDES if side != self.upright)
             raise q.invalid(f"{q.shown(self.upright)} already stands upright; {others} can lie along x", "along")
-        return self
-
-    @model_validator(mode="after")
-    def _convex(self) -> Self:
         for number, message in outlines.faults(self.outline) if self.outline is not None else ():
             raise q.invalid(message, "outline", *(() if number is None else (number,)))
         for _, message in outlines.faults(self.polygon) if self.sides is not None and self.radius is not None else ():
@@ -235,31 +223,14 @@ class BodySpec(Table):
     name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
 
     @model_validator(mode="after")
-    def _fixed_stands_still(self) -> Self:
+    def _fixed_or_driven_or_free(self) -> Self:
         if self.fixed and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
             raise q.invalid("a fixed body cannot have a velocity or a spin", "fixed")
-        return self
-
-    @model_validator(mode="after")
-    def _driven_by_its_motion(self) -> Self:
         if self.motion is not None and self.fixed:
             raise q.invalid("a body with a motion is driven, not fixed; remove one of the two", "fixed")
         if self.motion is not None and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
             raise q.invalid("velocity and spin of a driven body follow from its motion", "motion")
         return self
-
-
-def _slips(points: Sequence[tuple[float, float]]) -> Iterator[tuple[int, str]]:
-    """Yield the number of every invalid point of a profile, and why."""
-    for number, ((x_before, y_before), (x, y)) in enumerate(pairwise(points), start=1):
-        if (x, y) == (x_before, y_before):
-            yield number, "the same point as the one before"
-        elif x < x_before:
-            yield number, f"x goes back from {x_before:.6g} m to {x:.6g} m; a profile runs towards +x"
-        if number > 1 and points[number - 2][0] == x_before == x:
-            turns = (y_before - points[number - 2][1]) * (y - y_before) < 0.0
-            if turns:
-                yield number, "the profile goes back over its own vertical segment"
 
 
 class Ground(Table):
@@ -279,8 +250,17 @@ class Ground(Table):
             return self
         if len(self.profile) < 2:
             raise q.invalid("a profile needs at least two points [x, y]", "profile")
-        for number, message in _slips(self.profile):
-            raise q.invalid(message, "profile", number)
+        for number, ((x_before, y_before), (x, y)) in enumerate(pairwise(self.profile), start=1):
+            x_first, y_first = self.profile[max(number - 2, 0)]
+            message = ""
+            if (x, y) == (x_before, y_before):
+                message = "the same point as the one before"
+            elif x < x_before:
+                message = f"x goes back from {x_before:.6g} m to {x:.6g} m; a profile runs towards +x"
+            elif number > 1 and x_first == x_before == x and (y_before - y_first) * (y - y_before) < 0.0:
+                message = "the profile goes back over its own vertical segment"
+            if message:
+                raise q.invalid(message, "profile", number)
         return self
 
 

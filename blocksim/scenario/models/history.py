@@ -11,7 +11,7 @@ Lines that begin with `#` are notes. Times increase and are not negative. The nu
 and that of the last line after it. The resolved scenario holds the samples, so that it needs no copy of the table.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -20,7 +20,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import quantities as q
-from blocksim.scenario.csv_table import Cell, read_open_table
+from blocksim.scenario.csv_table import read_open_table
 from blocksim.scenario.models.base import Table, by_kind, table_path
 
 MAX_BYTES = 1_000_000
@@ -152,41 +152,37 @@ def with_samples(value: object, info: ValidationInfo, column: str, key: str) -> 
 
 def _rows(path: Path, column: str) -> list[tuple[float, float]]:
     """Read time (s) and value of every line; raises pydantic's error with the line of the first mistake."""
+
+    def mistake(line: int, message: str) -> Exception:
+        return q.invalid(f"{path.name}: line {line}: {message}", "table")
+
     try:
         heads, table = read_open_table(path, MAX_BYTES)
     except BlocksimError as error:
         raise q.invalid(str(error).splitlines()[0], "table") from None
     names = [head.text for head in heads]
     if sorted(names) != sorted((TIME, column)):
-        raise _mistake(path, table.header.number, f"the columns are {','.join(names)}; {TIME},{column} are needed")
+        raise mistake(table.header.number, f"the columns are {','.join(names)}; {TIME},{column} are needed")
     if table.problems:
         first = min(table.problems, key=lambda problem: problem.line_number or 0)
-        raise _mistake(path, first.line_number or 1, first.message)
+        raise mistake(first.line_number or 1, first.message)
     if not 2 <= len(table.rows) <= MAX_ROWS:
         message = f"{len(table.rows)} lines with samples; 2 to {MAX_ROWS} are allowed"
         raise q.invalid(f"{path.name}: {message}", "table")
-    return list(_numbers(path, table.rows, column))
-
-
-def _numbers(path: Path, rows: Sequence[Mapping[str, Cell]], column: str) -> Iterator[tuple[float, float]]:
-    before = -1.0
-    for row in rows:
-        time, value = (_number(path, row[name]) for name in (TIME, column))
+    rows: list[tuple[float, float]] = []
+    for row in table.rows:
+        line, numbers = row[TIME].line.number, []
+        for cell in (row[TIME], row[column]):
+            if not cell.text:
+                raise mistake(line, f"the {cell.column} is missing")
+            try:
+                numbers.append(cell.number())
+            except ValueError as error:
+                raise mistake(line, str(error)) from None
+        time, value = numbers
+        before = rows[-1][0] if rows else -1.0
         if time < 0.0 or time <= before:
             why = "times must not be negative" if time < 0.0 else f"times must increase, the one before is {before:g} s"
-            raise _mistake(path, row[TIME].line.number, f"time {time:g} s: {why}")
-        before = time
-        yield time, value
-
-
-def _number(path: Path, cell: Cell) -> float:
-    if not cell.text:
-        raise _mistake(path, cell.line.number, f"the {cell.column} is missing")
-    try:
-        return cell.number()
-    except ValueError as error:
-        raise _mistake(path, cell.line.number, str(error)) from None
-
-
-def _mistake(path: Path, line: int, message: str) -> Exception:
-    return q.invalid(f"{path.name}: line {line}: {message}", "table")
+            raise mistake(line, f"time {time:g} s: {why}")
+        rows.append((time, value))
+    return rows

@@ -12,7 +12,7 @@ Lines that begin with `#` are notes. Times increase and are not negative; the mo
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal, Self, TypeVar
@@ -124,46 +124,38 @@ def read_motion_table(path: Path) -> MotionTable:
         lines = bare_rows(content)
     except UnicodeDecodeError:
         raise MotionTableError("not a text file in UTF-8") from None
-    column = _columns(lines)
-    quantity, unit = COLUMNS[column[1 - column.index(TIME)]]
-    rows = list(_samples(lines[1:], column.index(TIME)))
-    if len(rows) < LEAST_ROWS or len(rows) > MAX_ROWS:
-        raise MotionTableError(f"{len(rows)} lines with samples; {LEAST_ROWS} to {MAX_ROWS} are allowed")
-    times, values = zip(*rows, strict=True)
-    return MotionTable(path, quantity, times, tuple(unit * value for value in values), content)
-
-
-def _columns(lines: Sequence[tuple[int, list[str]]]) -> list[str]:
-    number, names = lines[0] if lines else (1, [])
+    line, names = lines[0] if lines else (1, [])
     others = [name for name in names if name != TIME]
     if len(names) != 2 or len(others) != 1 or others[0] not in COLUMNS:
-        found = ",".join(names)
+        found = q.shown(",".join(names))
+        message = f"the columns are {found}; {TIME} and one of {', '.join(COLUMNS)} are needed"
         if ";" in found:
-            raise MotionTableError(f"line {number}: {q.shown(found)}: columns are separated by semicolons; {DIALECT}")
-        message = f"line {number}: the columns are {q.shown(found)}; {TIME} and one of {', '.join(COLUMNS)} are needed"
-        raise MotionTableError(message)
-    return names
-
-
-def _samples(lines: Sequence[tuple[int, list[str]]], first: int) -> Iterator[tuple[float, float]]:
-    """Yield time and value of every line; `first` is the column of the time."""
-    before = -math.inf
-    for number, cells in lines:
+            message = f"{found}: columns are separated by semicolons; {DIALECT}"
+        raise MotionTableError(f"line {line}: {message}")
+    quantity, unit = COLUMNS[others[0]]
+    times: list[float] = []
+    values: list[float] = []
+    for line, cells in lines[1:]:
         if len(cells) != 2:
             hint = f"; {DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""
-            raise MotionTableError(f"line {number}: {q.shown(','.join(cells))}: a time and a value are needed{hint}")
-        time, value = (_number(number, cells[place]) for place in (first, 1 - first))
+            raise MotionTableError(f"line {line}: {q.shown(','.join(cells))}: a time and a value are needed{hint}")
+        numbers = dict(zip(names, (finite_number(line, cell, cell) for cell in cells), strict=True))
+        time, before = numbers[TIME], times[-1] if times else -math.inf
         if time < 0.0 or time <= before:
             why = "times must not be negative" if time < 0.0 else f"times must increase, the one before is {before:g} s"
             why = "the time of the line before is repeated" if time == before else why
-            raise MotionTableError(f"line {number}: time {time:g} s: {why}")
-        before = time
-        yield time, value
+            raise MotionTableError(f"line {line}: time {time:g} s: {why}")
+        times.append(time)
+        values.append(unit * numbers[others[0]])
+    if not LEAST_ROWS <= len(times) <= MAX_ROWS:
+        raise MotionTableError(f"{len(times)} lines with samples; {LEAST_ROWS} to {MAX_ROWS} are allowed")
+    return MotionTable(path, quantity, tuple(times), tuple(values), content)
 
 
-def _number(line: int, text: str) -> float:
+def finite_number(line: int, text: str, digits: str) -> float:
+    """Return the number that is written with these digits, `text` in the line; raises MotionTableError."""
     try:
-        number = float(text)
+        number = float(digits)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):

@@ -1,31 +1,18 @@
 """Probes: time histories of forces, material points, joints and energies, recorded while a run continues."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Identifier, Table, by_kind
+from blocksim.scenario.models.base import Identifier, Table, TimeOr, by_kind
 
-_TIME = q.Quantity(q.TIME, above=0.0)
 STEP = "step"
-TWO = 2
-
-
-def _every(value: object) -> object:
-    if value == STEP:
-        return value
-    if isinstance(value, str) and not any(c.isdigit() for c in value):
-        raise q.invalid(f'{q.shown(value)} is not a time between samples; use "step" or {_TIME.wanted}')
-    return _TIME.read(value)
-
-
-_EVERY_SCHEMA: dict[str, Any] = {"anyOf": [{"const": STEP}, *_TIME.json_schema()["anyOf"]]}
-Every = Annotated[float | Literal["step"], q.TIME, BeforeValidator(_every), WithJsonSchema(_EVERY_SCHEMA)]
+Every = Annotated[float | Literal["step"], q.TIME, TimeOr(STEP, "a time between samples")]
 
 
 def _two(value: object) -> object:
-    if isinstance(value, list | tuple) and len(value) != TWO:
+    if isinstance(value, list | tuple) and len(value) != 2:
         raise q.invalid(f'{len(value)} bodies do not make a joint; two are needed, such as ["1", "2"]')
     return value
 

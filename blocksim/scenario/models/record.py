@@ -52,16 +52,12 @@ class Record(Table):
         return UNITS[self.unit] if self.table.unit is None and self.unit is not None else 1.0
 
     @model_validator(mode="after")
-    def _has_one_unit(self) -> Self:
+    def _has_one_unit_and_scale(self) -> Self:
         name, said = self.table.path.name, self.table.unit
         if said is None and self.unit is None:
             raise q.invalid(f'{name} does not say its unit; write unit = "g", "m/s^2" or "cm/s^2"', "table")
         if said is not None and self.unit not in (None, said):
             raise q.invalid(f"{q.shown(self.unit)}: {name} says {said}", "unit")
-        return self
-
-    @model_validator(mode="after")
-    def _has_one_scale(self) -> Self:
         if self.pga is not None and self.scale != 1.0:
             raise q.invalid("scale and pga are both given; one of them decides the accelerations", "pga")
         if self.pga is not None and not any(self.table.values):

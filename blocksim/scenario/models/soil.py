@@ -60,7 +60,7 @@ class SoilTable(SystemTable):
     )
 
     @model_validator(mode="after")
-    def _one_shape(self) -> Self:
+    def _one_shape_with_an_inside(self) -> Self:
         wanted = SHAPES[self.kind]
         for key in ("outline", "x", "y", "angle"):
             is_given = getattr(self, key) is not None
@@ -74,10 +74,6 @@ class SoilTable(SystemTable):
                 raise q.invalid("the end must be beyond the begin", key)
         if self.angle is not None and self.x is not None and max(self._heads) >= self.x[1] - self.x[0]:
             raise q.invalid("the face reaches the other end below the crest", "angle")
-        return self
-
-    @model_validator(mode="after")
-    def _is_a_polygon(self) -> Self:
         if self.outline is None:
             return self
         if len(self.outline) < 3:
@@ -118,23 +114,22 @@ class SoilTable(SystemTable):
             yield "material", f"{q.shown(self.material)} is no soil; give this material a friction_angle"
         if has_outlines(scenario):  # refused: they say nothing about spacing and place
             return
-        unfit = list(self._unfit_spacing(scenario))
-        yield from unfit or meetings(self, "outline" if self.kind == "outline" else "kind", scenario)
-
-    def _unfit_spacing(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
-        """Find a spacing that is too large, too small, or not that of the first soil."""
         sides = [side for block in scenario.blocks.values() if (side := min(block.size_x, block.size_y)) > 0.0]
         across = polygons.count_across(self.corners, self.spacing)
         first = scenario.systems["soils"][0]
+        unfit = []
         if isinstance(first, SoilTable) and self.spacing != first.spacing:
-            yield "spacing", f"all soils have the same spacing, here {MILLI * first.spacing:.6g} mm"
+            unfit.append(f"all soils have the same spacing, here {MILLI * first.spacing:.6g} mm")
         if sides and SPACINGS_A_SIDE * self.spacing > min(sides) * (1.0 + 1e-9):
             most = MILLI * min(sides) / SPACINGS_A_SIDE
-            yield "spacing", f"above an eighth of the smallest side of the blocks: at most {most:.4g} mm"
+            unfit.append(f"above an eighth of the smallest side of the blocks: at most {most:.4g} mm")
         if min(across) < LEAST_ACROSS:
-            yield "spacing", f"only {min(across)} particles across; at least {LEAST_ACROSS} are needed"
+            unfit.append(f"only {min(across)} particles across; at least {LEAST_ACROSS} are needed")
         if across[0] * across[1] > MOST_PARTICLES:
-            yield "spacing", f"{across[0] * across[1]} particles are too many; at most {MOST_PARTICLES} are allowed"
+            unfit.append(f"{across[0] * across[1]} particles are too many; at most {MOST_PARTICLES} are allowed")
+        yield from (("spacing", message) for message in unfit)
+        if not unfit:
+            yield from meetings(self, "outline" if self.kind == "outline" else "kind", scenario)
 
 
 SYSTEMS["soils"] = SoilTable

@@ -1,22 +1,20 @@
 """Time stepping and recording."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import (
-    BeforeValidator,
     Discriminator,
     Field,
     SerializeAsAny,
     Tag,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
-    WithJsonSchema,
     WrapValidator,
 )
 
 from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import OneOf, Table, Whole
+from blocksim.scenario.models.base import OneOf, Table, TimeOr, Whole
 from blocksim.scenario.spelling import nearest
 
 Scheme = Literal["explicit", "nonsmooth"]
@@ -29,20 +27,10 @@ MOST_SUBSTEPS = 1000
 MOST_SWEEPS = 1_000_000
 LEAST_TOLERANCE = 1e-12
 """Of velocities in m/s; sums of impulses are not more exact."""
-_STEP = q.Quantity(q.TIME, above=0.0)
 _TOLERANCE = q.Quantity(q.SPEED, at_least=LEAST_TOLERANCE)
 
 
-def _step(value: object) -> object:
-    if isinstance(value, str) and not any(c.isdigit() for c in value):
-        if value == "auto":
-            return value
-        raise q.invalid(f'{q.shown(value)} is not a time step; use "auto" or {_STEP.wanted}')
-    return _STEP.read(value)
-
-
-_STEP_SCHEMA: dict[str, Any] = {"anyOf": [{"const": "auto"}, *_STEP.json_schema()["anyOf"]]}
-Step = Annotated[float | Literal["auto"], q.TIME, BeforeValidator(_step), WithJsonSchema(_STEP_SCHEMA)]
+Step = Annotated[float | Literal["auto"], q.TIME, TimeOr("auto", "a time step")]
 
 
 class Time(Table):

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
-    AfterValidator,
     BeforeValidator,
     Field,
     GetJsonSchemaHandler,
     PlainValidator,
     ValidationInfo,
     WithJsonSchema,
+    field_validator,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
@@ -84,11 +84,6 @@ def _of_the_mode(value: object, info: ValidationInfo) -> object:
 Values = Annotated[Variation, PlainValidator(_variation), WithJsonSchema(VALUES_SCHEMA)]
 
 
-def _lists_first(vary: dict[str, Any]) -> dict[str, Any]:
-    """Put lists before distributions, as in a resolved file: Sobol's dimensions follow the order of keys."""
-    return dict(sorted(vary.items(), key=lambda entry: not isinstance(entry[1], tuple)))
-
-
 class Sweep(Table):
     """Scenario keys to vary; in the file every dotted key is a key in quotes next to `mode`."""
 
@@ -107,7 +102,7 @@ class Sweep(Table):
         default=None,
         description="CSV table of cases, relative to the scenario file: one column per key, units as in `overlap [mm]`",
     )
-    vary: Annotated[dict[str, Values], AfterValidator(_lists_first)] = Field(
+    vary: dict[str, Values] = Field(
         description="dotted key of the scenario, and a list, { from, to, count }, { from, to }, { mean, sd } or "
         '{ mean, sd, from, to }; scale = "log" with from and to'
     )
@@ -123,17 +118,19 @@ class Sweep(Table):
             raise q.invalid('nothing to vary; add a line such as "contact.stiffness_scale" = [0.1, 1.0]')
         return {**own, "vary": keys}
 
+    @field_validator("vary")
+    @classmethod
+    def _lists_first(cls, vary: dict[str, Variation]) -> dict[str, Variation]:
+        """Put lists before distributions, as in a resolved file: Sobol's dimensions follow the order of keys."""
+        return dict(sorted(vary.items(), key=lambda entry: not isinstance(entry[1], tuple)))
+
     @model_validator(mode="after")
-    def _equally_long(self) -> Self:
+    def _suits_its_mode(self) -> Self:
         counts = {key: len(values) for key, values in self.vary.items() if isinstance(values, tuple)}
         if self.mode == "list" and len(set(counts.values())) > 1:
             told = ", ".join(f"{count} for {key}" for key, count in counts.items())
             message = f'mode "list" takes one value of every key at a time, but the numbers of values differ: {told}'
             raise q.invalid(message, "mode")
-        return self
-
-    @model_validator(mode="after")
-    def _names_its_table(self) -> Self:
         if self.mode == "table" and self.table is None:
             raise q.invalid('mode "table" needs the path of a table, as in table = "samples.csv"', "mode")
         return self
@@ -146,7 +143,8 @@ class Sweep(Table):
     def as_table(self) -> dict[str, Any]:
         """Return the table of the file that says this, with all values in SI."""
         own = {name: getattr(self, name) for name, modes in KEYS_OF.items() if self.mode in modes}
-        return {"mode": self.mode, **own, **{key: _as_table(values) for key, values in self.vary.items()}}
+        vary = {key: [*one] if isinstance(one, tuple) else one.as_table() for key, one in self.vary.items()}
+        return {"mode": self.mode, **own, **vary}
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -168,7 +166,3 @@ OWN_KEYS = tuple(name for name in Sweep.model_fields if name != "vary")
 def slip_of(key: object) -> str | None:
     """Return the key of [sweep] itself that a word was probably meant to be."""
     return nearest(str(key), OWN_KEYS, most=2)
-
-
-def _as_table(values: Variation) -> object:
-    return list(values) if isinstance(values, tuple) else values.as_table()

@@ -18,6 +18,7 @@ SIGNIFICANT = 12
 FARTHEST = 8.0
 """Largest distance from the mean, in standard deviations, at which a truncated normal distribution may begin."""
 
+NO_DIMENSION = q.NUMBER.dimension
 Scale = Literal["linear", "log"]
 
 
@@ -91,11 +92,14 @@ def rounded(number: float) -> float:
 
 def read_spread(value: object) -> tuple[Any, ...]:
     """Return the values of a list or of { from, to, count }; raises a pydantic error for anything else."""
-    if isinstance(value, Mapping):
-        _refuse_distribution(value)
-        _refuse_slips(value, ("from", "to", "count", "scale"), needed=("from", "to", "count"))
-        return _spread(value)
-    return _levels(value, "{ from, to, count }")
+    if not isinstance(value, Mapping):
+        return _levels(value, "{ from, to, count }")
+    is_whole = {"from", "to"} <= set(value) and "count" not in value and set(value) <= {"from", "to", "scale"}
+    if is_whole or "mean" in value or "sd" in value:
+        message = "a distribution needs one of the modes lhs, sobol and normal; "
+        raise q.invalid(message + "otherwise write a list or { from, to, count }")
+    _refuse_slips(value, ("from", "to", "count", "scale"), needed=("from", "to", "count"))
+    return _spread(value)
 
 
 def read_sampled(value: object) -> Variation:
@@ -106,7 +110,11 @@ def read_sampled(value: object) -> Variation:
         raise q.invalid('count belongs to the modes "grid" and "list"; here `samples` sets the number', "count")
     if "mean" in value or "sd" in value:
         return _normal(value)
-    return _uniform(value)
+    _refuse_slips(value, ("from", "to", "scale", "mean", "sd"), needed=("from", "to"))
+    (low, high), angle = _numbers(value, "from", "to")
+    scale = _scale(value, low, high)
+    _refuse_empty(value, low, high)
+    return Uniform(low, high, scale, angle, _unit(value, "from", "to"))
 
 
 def read_any(value: object) -> Variation:
@@ -122,13 +130,6 @@ def _levels(value: object, tables: str) -> tuple[Any, ...]:
     if not value:
         raise q.invalid("the list of values is empty")
     return tuple(value)
-
-
-def _refuse_distribution(value: Mapping[str, Any]) -> None:
-    is_whole = {"from", "to"} <= set(value) and "count" not in value and set(value) <= {"from", "to", "scale"}
-    if is_whole or "mean" in value or "sd" in value:
-        message = "a distribution needs one of the modes lhs, sobol and normal; "
-        raise q.invalid(message + "otherwise write a list or { from, to, count }")
 
 
 def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tuple[str, ...]) -> None:
@@ -158,17 +159,15 @@ def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
         raise q.invalid(f"count {q.shown(count)} is not a whole number from 2 to {MAX_VALUES}")
     (first, last), angle = _numbers(value, "from", "to")
     scale = _scale(value, first, last)
-    steps = (i / (count - 1) for i in range(1, count - 1))
     if scale == "log":
-        inner = [rounded(first * (last / first) ** step) for step in steps]
+        inner = [rounded(first * (last / first) ** (i / (count - 1))) for i in range(1, count - 1)]
     else:
         inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
     if type(value["from"]) is type(value["to"]) is int:
         return tuple(int(number) if number.is_integer() else number for number in (first, *inner, last))
-    typed = (value[name] if isinstance(value[name], str) else None for name in ("from", "to"))  # these keep their unit
-    ends = [
-        written(number, angle=angle) if text is None else text
-        for text, number in zip(typed, (first, last), strict=True)
+    ends = [  # as typed, with their unit
+        value[name] if isinstance(value[name], str) else written(number, angle=angle)
+        for name, number in (("from", first), ("to", last))
     ]
     return (ends[0], *(written(number, angle=angle) for number in inner), ends[1])
 
@@ -180,14 +179,6 @@ def is_descending(value: Mapping[str, Any]) -> bool:
     except PydanticCustomError:
         return False
     return first > last
-
-
-def _uniform(value: Mapping[str, Any]) -> Uniform:
-    _refuse_slips(value, ("from", "to", "scale", "mean", "sd"), needed=("from", "to"))
-    (low, high), angle = _numbers(value, "from", "to")
-    scale = _scale(value, low, high)
-    _refuse_empty(value, low, high)
-    return Uniform(low, high, scale, angle, _unit(value, "from", "to"))
 
 
 def _normal(value: Mapping[str, Any]) -> Normal:
@@ -222,7 +213,7 @@ def _scale(value: Mapping[str, Any], low: float, high: float) -> Scale:
 def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
     """Return the SI numbers of keys of one kind, and whether they are angles."""
     ends = [_end(value[name]) for name in names]
-    kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != q.NUMBER.dimension}
+    kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != NO_DIMENSION}
     if len(kinds) > 1:
         *others, last = (f"{name} {q.shown(value[name])}" for name in names)
         raise q.invalid(f"{', '.join(others)} and {last} are not of one kind")
@@ -231,7 +222,7 @@ def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
 
 def _end(value: object) -> tuple[float, Dimension]:
     if not isinstance(value, str):
-        return q.Quantity(q.NUMBER).read(value), q.NUMBER.dimension
+        return q.Quantity(q.NUMBER).read(value), NO_DIMENSION
     try:
         return q.parse_quantity(value, q.LENGTH)
     except ValueError as error:

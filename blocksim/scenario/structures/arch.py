@@ -14,6 +14,7 @@ from blocksim.scenario.structures.base import UnfitError
 from blocksim.scenario.structures.shaped import Cell, Shaped
 
 MOST_VOUSSOIRS = 1000
+MOST_TURN = 0.9 * math.pi
 ABUTMENT = 2.0
 """Width of an abutment in thicknesses of the arch; it is half as deep behind its joint."""
 
@@ -71,9 +72,6 @@ class Arch(Shaped):
         dx, dy = -back * math.sin(angle), back * math.cos(angle)
         (x0, y0), (x1, y1) = _at(inner, angle), _at(outer, angle)
         return Cell([(x0, y0), (x1, y1), (x1 + dx, y1 + dy), (x0 + dx, y0 + dy)], fixed=True)
-
-
-MOST_TURN = 0.9 * math.pi
 
 
 def _at(radius: float, angle: float) -> Corner:

@@ -89,10 +89,15 @@ class Courses(Structure):
 
     rows: Count = Field(description="number of courses, one above the other")
 
+    def height(self, block: Block) -> float:
+        """All courses, whether or not the highest has a block left."""
+        return self.rows * block.size_y
+
     @model_validator(mode="after")
     def _not_too_many(self) -> Self:
         if self.size > MAX_BLOCKS:
-            raise q.invalid(f"{self.size} blocks are too many; a structure has at most {MAX_BLOCKS}", "rows")
+            message = f"{self.size} blocks are too many; a structure has at most {MAX_BLOCKS}"
+            raise q.invalid(message, "rows")
         return self
 
 

@@ -39,16 +39,7 @@ class Grid(Courses):
 
     def place(self, block: Block) -> Sequence[Pose]:
         """Return the poses row by row, each from left to right."""
-        self._keep_apart(block)
-        shift_x, shift_y, turn = 2.0 * draws(self.seed, 3, self.rows, self.columns) - 1.0
-        row, column = np.indices((self.rows, self.columns))
-        x = self.left + 0.5 * block.size_x + column * (block.size_x + self.gap_x) + self.offset * shift_x
-        y = self.bottom + 0.5 * block.size_y + row * (block.size_y + self.gap_y) + self.offset * shift_y
-        return poses_at(x, y, self.turn * turn)
-
-    def _keep_apart(self, block: Block) -> None:
-        """Refuse gaps in which two neighbours, shifted and turned towards each other, could overlap."""
-        needs = {
+        needs = {  # gaps in which two neighbours, shifted and turned towards each other, cannot overlap
             "gap_x": (self.columns, self.gap_x, _growth(block.size_x, block.size_y, self.turn)),
             "gap_y": (self.rows, self.gap_y, _growth(block.size_y, block.size_x, self.turn)),
         }
@@ -59,6 +50,11 @@ class Grid(Courses):
                     f"{gap * 1e3:g} mm is too small for such random shifts and angles; at least {least * 1e3:g} mm"
                 )
                 raise UnfitError(key, f"{message} is needed")
+        shift_x, shift_y, turn = 2.0 * draws(self.seed, 3, self.rows, self.columns) - 1.0
+        row, column = np.indices((self.rows, self.columns))
+        x = self.left + 0.5 * block.size_x + column * (block.size_x + self.gap_x) + self.offset * shift_x
+        y = self.bottom + 0.5 * block.size_y + row * (block.size_y + self.gap_y) + self.offset * shift_y
+        return poses_at(x, y, self.turn * turn)
 
 
 def _growth(side: float, other: float, turn: float) -> float:

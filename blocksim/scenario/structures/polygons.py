@@ -1,13 +1,13 @@
 """Blocks by their corners where they are: written out, or taken from a drawing."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
 from blocksim.scenario import outlines
 from blocksim.scenario import quantities as q
-from blocksim.scenario.drawings import MOST_OUTLINES, DrawingError, Drawn, read_drawing
+from blocksim.scenario.drawings import MOST_OUTLINES, DrawingError, read_drawing
 from blocksim.scenario.models.base import Identifier, Table, table_path
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.structures.shaped import Cell, Shaped
@@ -59,7 +59,7 @@ class Polygons(Shaped):
             return data
         if "cells" in data:
             raise q.invalid("table and cells are both given; keep one of them", "table")
-        unit = _unit(data.get("unit", 1.0))
+        unit = q.Quantity(q.LENGTH, above=0.0).read(data.get("unit", 1.0))
         path = table_path(data["table"], (info.context or {}).get("folder"), "wall.geojson")
         try:
             drawn = read_drawing(path)
@@ -68,18 +68,19 @@ class Polygons(Shaped):
         for one in drawn:
             if "material" in one.properties and "block" not in one.properties:
                 raise q.invalid(f"{path.name}: {one.name}: material is not read; name a block, which has one", "table")
-        others = {key: value for key, value in data.items() if key not in ("table", "unit")}
-        return {**others, "cells": tuple(_table(one, unit) for one in drawn)}
+        cells = []
+        for one in drawn:
+            known = {
+                key: one.properties[key] for key in ("block", "fixed", "name") if one.properties.get(key) is not None
+            }
+            cells.append({"outline": tuple((x * unit, y * unit) for x, y in one.outline), **known})
+        return {**{key: value for key, value in data.items() if key not in ("table", "unit")}, "cells": tuple(cells)}
 
     @model_validator(mode="after")
-    def _some(self) -> Self:
+    def _some_and_not_shrunk_away(self) -> Self:
         if not 0 < len(self.cells_given) <= MOST_OUTLINES:
             message = f"{len(self.cells_given)} blocks; 1 to {MOST_OUTLINES} are allowed, in cells or in the file table"
             raise q.invalid(message)
-        return self
-
-    @model_validator(mode="after")
-    def _not_shrunk_away(self) -> Self:
         if not self.shrink:
             return self
         width = min(outlines.least_width(tuple(one.outline)) for one in self.cells_given)
@@ -103,14 +104,3 @@ class Polygons(Shaped):
     def shift(self) -> tuple[float, float]:
         """How far all blocks move (m)."""
         return (0.0, 0.0) if self.in_place else super().shift
-
-
-def _unit(value: object) -> float:
-    return q.Quantity(q.LENGTH, above=0.0).read(value)
-
-
-def _table(drawn: Drawn, unit: float) -> dict[str, Any]:
-    """Return an outline of a drawing in the form of a scenario."""
-    known = {key: value for key, value in drawn.properties.items() if key in ("block", "fixed", "name")}
-    outline = tuple((x * unit, y * unit) for x, y in drawn.outline)
-    return {"outline": outline, **{key: value for key, value in known.items() if value is not None}}

@@ -22,10 +22,6 @@ class Pyramid(Courses):
         """Number of blocks."""
         return self.rows * (self.rows + 1) // 2
 
-    def height(self, block: Block) -> float:
-        """All courses."""
-        return self.rows * block.size_y
-
     def place(self, block: Block) -> Sequence[Pose]:
         """Return the poses course by course, each from left to right."""
         row = np.repeat(np.arange(self.rows), np.arange(self.rows, 0, -1))

@@ -17,6 +17,8 @@ from blocksim.scenario.structures.shaped import Cell, Shaped
 
 MOST_CELLS = 5000
 MOST_ROUNDS = 20
+TRIALS = 8
+"""Random points in the box for each cell; a thin region has fewer cells."""
 LEAST_EDGE, LEAST_WIDTH = 0.02, 0.1
 """Shortest edge of a cell and its least width by default, in sides of a square of the mean area."""
 
@@ -90,16 +92,11 @@ class Voronoi(Shaped):
 
     def _points(self) -> list[Corner]:
         """Return random points in the region, the same for a seed."""
-        low, high = outlines.box_of(self.whole)
+        (left, bottom), (right, top) = outlines.box_of(self.whole)
         random = draws(self.seed, TRIALS * self.count, 2).tolist()
-        width, tall = high[0] - low[0], high[1] - low[1]
-        places = ((low[0] + u * width, low[1] + v * tall) for u, v in random)
+        places = ((left + u * (right - left), bottom + v * (top - bottom)) for u, v in random)
         found = [place for place in places if outlines.holds(self.whole, place, 0.0)]
         return found[: self.count] or [outlines.centroid(self.whole)]
-
-
-TRIALS = 8
-"""Random points in the box for each cell; a thin region has fewer cells."""
 
 
 def _width(cell: Sequence[Corner]) -> float:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
 from blocksim.scenario import quantities as q
@@ -50,7 +49,7 @@ class BlockWall(Courses):
     seed: Seed = Field(default=0, description="random seed of shifts and blocks left out")
 
     @model_validator(mode="after")
-    def _holes_are_inside(self) -> Self:
+    def _holes_are_inside_and_neighbours_apart(self) -> Self:
         seen = set()
         for number, (row, column) in enumerate(self.holes):
             if row > self.rows or column > self.columns:
@@ -59,17 +58,9 @@ class BlockWall(Courses):
             if (row, column) in seen:
                 raise q.invalid(f"[{row}, {column}] is left out twice", "holes", number)
             seen.add((row, column))
-        return self
-
-    @model_validator(mode="after")
-    def _something_is_left(self) -> Self:
         if self.size == 0:
             message = "this wall has no block left"
             raise q.invalid(message, "holes" if len(self.holes) == self.rows * self.columns else "missing")
-        return self
-
-    @model_validator(mode="after")
-    def _neighbours_stay_apart(self) -> Self:
         if self.offset > 0.5 * self.gap:
             message = (
                 f"two neighbours shifted by {self.offset * 1e3:g} mm could overlap; "
@@ -87,10 +78,6 @@ class BlockWall(Courses):
     def _random_holes(self, others: int) -> int:
         return round(self.missing * others)
 
-    def height(self, block: Block) -> float:
-        """All courses, whether or not the highest has a block left."""
-        return self.rows * block.size_y
-
     def place(self, block: Block) -> Sequence[Pose]:
         """Return the poses course by course, each from left to right."""
         random = draws(self.seed, 2, self.rows, self.columns)
@@ -99,15 +86,10 @@ class BlockWall(Courses):
         shift = np.where(row % 2 == 1, 0.5 * pitch, 0.0) if self.bond == "running" else np.zeros(row.shape)
         x = self.left + 0.5 * block.size_x + column * pitch + shift + self.offset * (2.0 * random[0] - 1.0)
         y = self.bottom + (row.astype(np.float64) + 0.5) * block.size_y
-        kept = self._kept(random[1])
-        return poses_at(x[kept], y[kept])
-
-    def _kept(self, rank: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Leave out the holes, then the blocks of lowest rank; `rank` in [0, 1) for every place."""
-        kept = np.ones(rank.shape, dtype=np.bool_)
-        for row, column in self.holes:
-            kept[row - 1, column - 1] = False
+        kept = np.ones(row.shape, dtype=np.bool_)
+        for hole_row, hole_column in self.holes:
+            kept[hole_row - 1, hole_column - 1] = False
         others = np.flatnonzero(kept)
-        lowest = np.argsort(rank.ravel()[others], kind="stable")[: self._random_holes(others.size)]
+        lowest = np.argsort(random[1].ravel()[others], kind="stable")[: self._random_holes(others.size)]
         kept.ravel()[others[lowest]] = False
-        return kept
+        return poses_at(x[kept], y[kept])
