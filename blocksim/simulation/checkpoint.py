@@ -43,7 +43,7 @@ class Position(BaseModel, frozen=True):
     frames_sha256: str  # of their bits
     start_energy: float  # J, that of the ledger
     solver_seconds: float  # of wall time, in all parts so far
-    total_seconds: float
+    total_seconds: float = 0.0
     threads: int  # that it ran on; it can continue with any number
     settled: Settled | None = None  # how it came to rest before time zero, where it did
     resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run were resumed

@@ -5,15 +5,15 @@ Checkpoints are written into two files by turns, so that a whole one is always t
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, NamedTuple, Protocol
+from typing import Annotated
 
 from blocksim.options import Option
 from blocksim.scenario.quantities import TIME, Quantity
 from blocksim.simulation.checkpoint import Origin, Position, write_checkpoint
 from blocksim.simulation.folder import CHECKPOINTS
-from blocksim.simulation.happened import Happened
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.settled import Settled
 
@@ -58,18 +58,6 @@ class CheckpointPolicy:
 DEFAULTS = CheckpointPolicy()
 
 
-class Standing(NamedTuple):
-    """What the time loop knows of a run, beside its arrays."""
-
-    step: int  # steps done
-    frames: int  # recorded up to then, at output times
-    frames_sha256: str  # of their bits
-    start_energy: float  # J
-    solver_seconds: float  # in all parts of the run
-    threads: int
-    events: tuple[Happened, ...] = ()
-
-
 @dataclass(frozen=True)
 class Past:
     """What the parts of a run before this one have left."""
@@ -90,51 +78,13 @@ class Past:
 NO_PAST = Past()
 
 
-class Keeper(Protocol):
-    """Whoever keeps checkpoints of a run."""
-
-    def next_step(self, done: int) -> int:
-        """Return the step after `done` at which the loop has to stop for one."""
-
-    def is_due(self, done: int) -> bool:
-        """Return True if one is to be kept now."""
-
-    def keep(self, scene: AnyScene, standing: Standing) -> None:
-        """Keep one."""
-
-
-class NothingKept:
-    """Keeps no checkpoints: of runs that have no folder."""
-
-    def next_step(self, _: int) -> int:
-        """Never."""
-        return NEVER
-
-    def is_due(self, _: int) -> bool:
-        """Never."""
-        return False
-
-    def keep(self, _scene: AnyScene, _standing: Standing) -> None:
-        """Do nothing."""
-
-
-KEEPS_NOTHING = NothingKept()
-
-
-class Synced(Protocol):
-    """The file of the frames, which has to be on the disk before a checkpoint counts them."""
-
-    def sync(self) -> None:
-        """Bring all frames so far to the disk."""
-
-
 @dataclass
 class CheckpointWriter:
     """Writes the checkpoints of one run into its folder."""
 
     folder: Path
     origin: Origin
-    frames: Synced
+    sync: Callable[[], None]  # brings all frames so far to the disk
     periods: tuple[int, ...] = ()  # in steps
     seconds: float = CHECKPOINT_SECONDS  # of wall time between two
     past: Past = NO_PAST
@@ -145,32 +95,27 @@ class CheckpointWriter:
         self.last_step = self.past.step
         self.began = self.written_at = time.monotonic()
 
-    @property
-    def total_seconds(self) -> float:
-        """Wall time of all parts of the run so far."""
-        return self.past.seconds + time.monotonic() - self.began
-
     def next_step(self, done: int) -> int:
-        """As Keeper."""
+        """Return the step after `done` at which the loop has to stop for a checkpoint."""
         return min(((done // period + 1) * period for period in self.periods), default=NEVER)
 
     def is_due(self, done: int) -> bool:
-        """As Keeper."""
+        """Return True if one is to be written now."""
         return any(done % period == 0 for period in self.periods) or (
             time.monotonic() - self.written_at >= self.seconds
         )
 
-    def keep(self, scene: AnyScene, standing: Standing) -> None:
-        """Write one, once the frames before it are on the disk. Raises OutputError."""
-        if standing.step == self.last_step:
+    def write(self, scene: AnyScene, position: Position) -> None:
+        """Write one, once the frames before it are on the disk. Raises OutputError.
+
+        `position` is what the time loop knows; what earlier parts have left is added.
+        """
+        if position.step == self.last_step:
             return
-        self.frames.sync()
-        position = Position(
-            **standing._asdict(),
-            total_seconds=self.total_seconds,
-            settled=self.past.settled,
-            resumed_from=self.past.resumed_from,
-        )
+        self.sync()
+        whole = {"settled": self.past.settled, "resumed_from": self.past.resumed_from}
+        total = self.past.seconds + time.monotonic() - self.began
+        position = position.model_copy(update={**whole, "total_seconds": total})
         write_checkpoint(self.paths[0], scene, position, self.origin)
         self.paths.reverse()
-        self.last_step, self.written_at = standing.step, time.monotonic()
+        self.last_step, self.written_at = position.step, time.monotonic()

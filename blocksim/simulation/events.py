@@ -39,7 +39,8 @@ class Timeline:
         self.loads = [load.name for load in scenario.loads]
         self.happened: tuple[Happened, ...] = ()
         order = in_order(self.events)
-        self.timed = [(_step_of(self.events[n].at, step), n) for n in order if self.events[n].at is not None]
+        timed = ((self.events[number].at, number) for number in order)
+        self.timed = [(max(1, round(at / step)), number) for at, number in timed if at is not None]
         self.at_rest = [number for number in order if self.events[number].at is None]
 
     @property
@@ -98,7 +99,10 @@ class Timeline:
         for name in event.unload:
             end_load(world, self.loads.index(name))
         if event.velocity is not None:
-            _set_velocity(world.bodies[self.names[event.velocity.body]], event)
+            body = world.bodies[self.names[event.velocity.body]]
+            for rate in RATES if body.inverse_mass > 0.0 else ():
+                if (value := getattr(event.velocity, rate)) is not None:
+                    body[rate] = value
         return world if isinstance(scene, World) else scene._replace(world=world)
 
     def _number(self, world: World, name: str) -> int:
@@ -106,10 +110,6 @@ class Timeline:
         if name in self.names:
             return self.names[name]
         return int(world.bodies.size) - 1 - len(self.walls) + self.walls.index(name)
-
-
-def _step_of(time: float | None, step: float) -> int:
-    return max(1, round((time or 0.0) / step))
 
 
 def removed(world: World, number: int) -> World:
@@ -189,11 +189,3 @@ def _displacement(world: World) -> float:
     piece = world.motion[first + max(0, begun - 1)]
     t = time - piece.start
     return float(piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3)))
-
-
-def _set_velocity(body: Record, event: Event) -> None:
-    new = event.velocity
-    for name in RATES if new is not None and body.inverse_mass > 0.0 else ():
-        value = getattr(new, name)
-        if value is not None:
-            body[name] = value

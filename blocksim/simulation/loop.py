@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from blocksim.kernels.common.arrays import REACHED
 from blocksim.simulation import outcome as ends
 from blocksim.simulation.checkpoint import Position
-from blocksim.simulation.checkpoint_policy import KEEPS_NOTHING, Keeper, Standing
+from blocksim.simulation.checkpoint_policy import NEVER, CheckpointWriter
 from blocksim.simulation.events import Timeline
 from blocksim.simulation.happened import Happened
 from blocksim.simulation.ledger import EnergyLedger, adds_up, energy_ledger, next_energy_check, start_energy
@@ -36,16 +36,16 @@ Watcher = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
-class Attendance:
-    """What is called between two compiled calls."""
+class RunControl:
+    """What happens between two compiled calls; nothing by default."""
 
     on_progress: Watcher = lambda _: None
     stop: Callable[[], str] = lambda: ""  # why to stop now; nothing as long as the run may continue
-    keeper: Keeper = KEEPS_NOTHING
+    checkpoints: CheckpointWriter | None = None
     timeline: Timeline | None = None  # where there are events
 
 
-NOBODY = Attendance()
+UNCONTROLLED = RunControl()
 
 
 @dataclass(frozen=True)
@@ -84,19 +84,19 @@ def run_loop(
     end: float,
     *,
     team: Team = ALONE,
-    attendance: Attendance = NOBODY,
+    control: RunControl = UNCONTROLLED,
     since: Position | None = None,
 ) -> LoopResult:
     """Advance a scene to `end` (s) or until it rests, fails or is stopped; the recorder samples on the way.
 
     `since` is where the scene of a checkpoint stood. Raises what keeping frames and checkpoints raises.
     """
-    going = _Going(scene, recorder, end, team, attendance)
-    going.begin(since)
-    why = going.go_on()
+    run = _Run(scene, recorder, end, team, control)
+    run.begin(since)
+    why = run.advance()
     if why:
-        going.keep_checkpoint()
-    return going.result(why)
+        run.write_checkpoint()
+    return run.result(why)
 
 
 class Pace:
@@ -116,19 +116,18 @@ class Pace:
             self.steps = max(1, int(min(fitting, MOST_GROWTH * max(steps, self.steps))))
 
 
-class _Going:
+class _Run:
     """A run under way."""
 
-    def __init__(self, scene: AnyScene, recorder: Recorder, end: float, team: Team, attendance: Attendance) -> None:
-        self.scene, self.recorder, self.end, self.team = scene, recorder, end, team
-        self.on_progress, self.stop, self.keeper = attendance.on_progress, attendance.stop, attendance.keeper
+    def __init__(self, scene: AnyScene, recorder: Recorder, end: float, team: Team, control: RunControl) -> None:
+        self.scene, self.recorder, self.end, self.team, self.control = scene, recorder, end, team, control
         self.step = float(scene.world.controls[0].step)
         self.last = last_step_of(end, self.step)
         self.bodies = scene.world.bodies.size - 1
         self.pace = Pace(self.bodies)
         self.status, self.is_lost = REACHED, False
         self.seconds = self.start = 0.0  # in compiled code; J
-        self.timeline = attendance.timeline
+        self.timeline = control.timeline
 
     @property
     def done(self) -> int:
@@ -147,21 +146,22 @@ class _Going:
         self.recorder.sample(self.scene)
         self.recorder.probes.sample(self.scene)
 
-    def go_on(self) -> str:
+    def advance(self) -> str:
         """Run to the end, or until somebody wants to stop; return why, and nothing at the end."""
         while self.status == REACHED and self.done < self.last and not self.is_lost:
-            why = self.stop()
-            if why:
+            if why := self.control.stop():
                 return why
-            self._go_to(min(self.recorder.next_step(self.done), self.last))
+            self._advance_towards(min(self.recorder.next_step(self.done), self.last))
         return ""
 
-    def _go_to(self, wanted: int) -> None:
+    def _advance_towards(self, wanted: int) -> None:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
         done, before = self.done, time.perf_counter()
         look = next_energy_check(done, self.bodies)
         event = wanted if self.timeline is None else self.timeline.next_step(done)
-        self._go_by_probes(min(wanted, look, event, done + self.pace.steps, self.keeper.next_step(done)))
+        checkpoints = self.control.checkpoints
+        due = NEVER if checkpoints is None else checkpoints.next_step(done)
+        self._advance_by_probes(min(wanted, look, event, done + self.pace.steps, due))
         self.pace.learn(self.done - done, time.perf_counter() - before)
         if self.timeline is not None:
             self.scene, self.status = self.timeline.act(self.scene, self.team, self.status)
@@ -171,11 +171,12 @@ class _Going:
             self.recorder.sample(self.scene)
         ledger = energy_ledger(self.scene, self.start)
         self.is_lost = self.done == look and not adds_up(ledger)
-        if self.status == REACHED and adds_up(ledger) and self.done < self.last and self.keeper.is_due(self.done):
-            self.keep_checkpoint()
-        self.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))
+        is_sound = self.status == REACHED and adds_up(ledger) and self.done < self.last
+        if is_sound and checkpoints is not None and checkpoints.is_due(self.done):
+            self.write_checkpoint()
+        self.control.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))
 
-    def _go_by_probes(self, last_step: int) -> None:
+    def _advance_by_probes(self, last_step: int) -> None:
         """Advance to a step in one call, or in several where probes are to be sampled on the way.
 
         It ends early where that takes long, as sampling may take longer than the steps.
@@ -196,12 +197,20 @@ class _Going:
         self.scene, self.status = self.team.advance(self.scene, last_step)
         self.seconds += time.perf_counter()
 
-    def keep_checkpoint(self) -> None:
-        """Have the present state kept, before the frame of a moment that is no output time is recorded."""
-        done, recorder = self.done, self.recorder
-        frames = recorder.count_until(done), recorder.digest_until(done)
-        events = () if self.timeline is None else self.timeline.happened
-        self.keeper.keep(self.scene, Standing(done, *frames, self.start, self.seconds, self.team.threads, events))
+    def write_checkpoint(self) -> None:
+        """Keep the present state, before the frame of a moment that is no output time is recorded."""
+        if self.control.checkpoints is None:
+            return
+        position = Position(
+            step=self.done,
+            frames=self.recorder.count_until(self.done),
+            frames_sha256=self.recorder.digest_until(self.done),
+            start_energy=self.start,
+            solver_seconds=self.seconds,
+            threads=self.team.threads,
+            events=() if self.timeline is None else self.timeline.happened,
+        )
+        self.control.checkpoints.write(self.scene, position)
 
     def result(self, why: str) -> LoopResult:
         """Record where the run ended, and return its outcome."""

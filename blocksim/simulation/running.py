@@ -23,7 +23,7 @@ from blocksim.simulation.folder import folder_lock
 from blocksim.simulation.happened import in_words
 from blocksim.simulation.keeping import keep_result
 from blocksim.simulation.ledger import RESIDUAL_PROMISE
-from blocksim.simulation.loop import Attendance, LoopResult, Watcher, run_loop
+from blocksim.simulation.loop import LoopResult, RunControl, Watcher, run_loop
 from blocksim.simulation.movement import Movement
 from blocksim.simulation.moving_support import MovingSupport
 from blocksim.simulation.onset import onset_warning
@@ -76,10 +76,10 @@ def simulate(
     built = build(scenario)
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
-    with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
-        scene, settled = begun(built.scene, scenario, built.placed, team, attendance.stop)
-        watched = replace(attendance, timeline=_timeline(scenario, recorder))
-        ended = run_loop(scene, recorder, scenario.time.end, team=team, attendance=watched)
+    with _attended(built.scene, scenario, threads, limit, on_progress) as (team, control):
+        scene, settled = begun(built.scene, scenario, built.placed, team, control.stop)
+        watched = replace(control, timeline=_timeline(scenario, recorder))
+        ended = run_loop(scene, recorder, scenario.time.end, team=team, control=watched)
     return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
 
 
@@ -107,18 +107,20 @@ def simulate_into(
     refuse_full_disk(folder, scenario, built.scene)
     tables = read_tables(scenario)
     with folder_lock(folder):
-        resumption = _resumption(folder, scenario, listener) if resume else NEW
+        resumption = find_resumption(folder, scenario) if resume else NEW
+        for remark in remarks_on(resumption, folder) if resume else ():
+            listener.on_remark(remark)
         began += _compiled(scenario, listener)
-        with _attended(built.scene, scenario, threads, limit, on_progress) as (team, attendance):
+        with _attended(built.scene, scenario, threads, limit, on_progress) as (team, control):
             settled = None if resumption.checkpoint is None else resumption.checkpoint.position.settled
             if resumption.checkpoint is None:
-                scene, settled = begun(built.scene, scenario, built.placed, team, attendance.stop)
+                scene, settled = begun(built.scene, scenario, built.placed, team, control.stop)
                 built = built._replace(scene=scene)
-            part = Part(scenario, folder, built, resumption, settled)
-            toml = part.prepare(tables, overwrite=overwrite or resume)
-            ended = part.run(toml, precautions, team, attendance)
-            result = _result(scenario, part.recorder, ended, time.perf_counter() - began, settled)
-            return keep_result(result, part.account(result.summary), folder)
+            segment = RunSegment(scenario, folder, built, resumption, settled)
+            toml = segment.prepare(tables, overwrite=overwrite or resume)
+            ended = segment.run(toml, precautions, team, control)
+            result = _result(scenario, segment.recorder, ended, time.perf_counter() - began, settled)
+            return keep_result(result, segment.account(result.summary), folder)
 
 
 def _compiled(scenario: Scenario, listener: Listener = SILENT) -> float:
@@ -131,22 +133,14 @@ def _compiled(scenario: Scenario, listener: Listener = SILENT) -> float:
     return time.perf_counter() - began
 
 
-def _resumption(folder: Path, scenario: Scenario, listener: Listener) -> Resumption:
-    """Return where a run can continue, and report it. Raises what `find_resumption` raises."""
-    resumption = find_resumption(folder, scenario)
-    for remark in remarks_on(resumption, folder):
-        listener.on_remark(remark)
-    return resumption
-
-
 @contextmanager
 def _attended(
     scene: AnyScene, scenario: Scenario, threads: int, limit: WallTime, on_progress: Watcher
-) -> Iterator[tuple[Team, Attendance]]:
+) -> Iterator[tuple[Team, RunControl]]:
     """Give the threads of a run, and what stops it: a signal, or the limit of wall time."""
     elements = sum(one.count for one in others_of(scenario))
     with stop_requests() as requests, team_for(scene, threads, elements) as team:
-        yield team, Attendance(on_progress, lambda: requests.reason() or limit.reason())
+        yield team, RunControl(on_progress, lambda: requests.reason() or limit.reason())
 
 
 def _timeline(scenario: Scenario, recorder: Recorder) -> Timeline | None:
@@ -163,8 +157,8 @@ def _recorder(scenario: Scenario, built: Built) -> Recorder:
     )
 
 
-class Part:
-    """What goes into the folder of a run while it runs: frames and checkpoints."""
+class RunSegment:
+    """A run, or a part of one that was resumed, in its folder: its frames and checkpoints."""
 
     def __init__(
         self, scenario: Scenario, folder: Path, built: Built, resumption: Resumption, settled: Settled | None = None
@@ -191,7 +185,7 @@ class Part:
             files.prepare_folder(self.folder, overwrite=overwrite)
         return keep_scenario(self.scenario, tables, self.folder)
 
-    def run(self, toml: str, precautions: CheckpointPolicy, team: Team, attendance: Attendance) -> LoopResult:
+    def run(self, toml: str, precautions: CheckpointPolicy, team: Team, control: RunControl) -> LoopResult:
         """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""
         with FrameFile(
             self.folder / files.FRAMES,
@@ -208,42 +202,34 @@ class Part:
             files.clear_remains(
                 self.folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(self.scenario))
             )  # of the part before
-            self.writer = self._writer(sink, precautions)
-            watched = replace(attendance, keeper=self.writer, timeline=_timeline(self.scenario, self.recorder))
-            since = self.resumption.checkpoint and self.resumption.checkpoint.position
-            return run_loop(
-                self.scene, self.recorder, self.scenario.time.end, team=team, attendance=watched, since=since
+            self.writer = CheckpointWriter(
+                self.folder,
+                origin_of(self.scenario),
+                sink.sync,
+                precautions.periods(self.step),
+                precautions.checkpoint_seconds,
+                self.past,
             )
+            control = replace(control, checkpoints=self.writer, timeline=_timeline(self.scenario, self.recorder))
+            since = self.resumption.checkpoint and self.resumption.checkpoint.position
+            return run_loop(self.scene, self.recorder, self.scenario.time.end, team=team, control=control, since=since)
 
     def account(self, summary: Summary) -> Summary:
         """Return the summary of this part as that of the whole run."""
         last = None if summary.status == "finished" else self.writer.last_step
+        altered, warnings = self.recorder.altered, self.resumption.remarks
+        if altered:
+            more = f" and {len(altered) - 1} more" if len(altered) > 1 else ""
+            where = f"{self.folder / files.FRAMES}: the frame of step {altered[0]}{more}"
+            text = f"{where} differs from the recomputed one: it was changed after recording"
+            warnings = (*warnings, text)
         return summary.model_copy(
             update={
                 "total_seconds": self.past.seconds + summary.total_seconds,
                 "resumed_from": self.past.resumed_from,
                 "last_checkpoint": last,
-                "warnings": (*self.resumption.remarks, *self._altered(), *summary.warnings),
+                "warnings": (*warnings, *summary.warnings),
             }
-        )
-
-    def _altered(self) -> tuple[str, ...]:
-        """Return a warning of frames after the checkpoint that have come out otherwise now."""
-        steps = self.recorder.altered
-        if not steps:
-            return ()
-        more = f" and {len(steps) - 1} more" if len(steps) > 1 else ""
-        where = f"{self.folder / files.FRAMES}: the frame of step {steps[0]}{more}"
-        return (f"{where} differs from the recomputed one: it was changed after recording",)
-
-    def _writer(self, sink: FrameFile, precautions: CheckpointPolicy) -> CheckpointWriter:
-        return CheckpointWriter(
-            self.folder,
-            origin_of(self.scenario),
-            sink,
-            precautions.periods(self.step),
-            precautions.checkpoint_seconds,
-            self.past,
         )
 
 

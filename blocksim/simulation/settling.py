@@ -102,7 +102,7 @@ def settle(
     with going.without_time():
         try:
             going.load_up()
-            going.come_to_rest()
+            going.rest(going.pace.most)
             going.follow_support()
         except SettleError:
             if not going.is_released:
@@ -188,11 +188,7 @@ class _Settling:
                     break
         self.path = _Path(self._places())  # what moved faster and faster under growing loads is no mechanism yet
 
-    def come_to_rest(self) -> None:
-        """Go on until nothing moves any more. Raises SettleError."""
-        self._rest(self.pace.most)
-
-    def _rest(self, last: int) -> None:
+    def rest(self, last: int) -> None:
         """Go on until nothing moves any more, at most a little beyond a step. Raises SettleError."""
         while self._unrest() > BALANCE or self.energy > 0.0:
             if self.steps > last:
@@ -224,7 +220,7 @@ class _Settling:
         self._load(1.0, share)
         try:
             self._go()
-            self._rest(self.steps + steps)
+            self.rest(self.steps + steps)
         except SettleError:
             return False
         return True

@@ -17,8 +17,8 @@ def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped) -> None:
     world = build_world(scenario)
     recorder = Recorder(place_bodies(scenario), 100.0, float(world.controls[0].step))
     seen: list[loop.Progress] = []
-    attendance = loop.Attendance(seen.append, lambda: "enough" if len(seen) == 3 else "")
-    ended = loop.run_loop(world, recorder, 20.0, attendance=attendance)
+    control = loop.RunControl(seen.append, lambda: "enough" if len(seen) == 3 else "")
+    ended = loop.run_loop(world, recorder, 20.0, control=control)
     assert (ended.outcome.status, ended.outcome.reason, ended.outcome.exit_code) == ("interrupted", "enough", 75)
     assert len(seen) == 3
     assert recorder.steps == [0, seen[-1].steps]
@@ -29,7 +29,7 @@ def test_stop_before_the_first_step_leaves_one_frame(soft: Shipped) -> None:
     scenario = soft()
     world = build_world(scenario)
     recorder = Recorder(place_bodies(scenario), 1e-3, float(world.controls[0].step))
-    ended = loop.run_loop(world, recorder, 1.0, attendance=loop.Attendance(stop=lambda: "at once"))
+    ended = loop.run_loop(world, recorder, 1.0, control=loop.RunControl(stop=lambda: "at once"))
     assert ended.outcome.status == "interrupted"
     assert recorder.steps == [0]
 

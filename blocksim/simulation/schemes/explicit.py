@@ -64,66 +64,26 @@ def _add_bearing(rows: Rows, world: World, pairs: Any) -> None:
 
 
 def _places(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
-    """Return place (m) and normal of contacts."""
+    """Return place (m) and normal of contacts: those of particles keep them, corners are found again as kernels do."""
     if "nx" in (contacts.dtype.names or ()):
-        return _kept_places(contacts)
-    if world.corners is None:
-        return _places_of_corners(world, contacts, a, b)
-    return _places_on_outlines(world, contacts, a, b)
-
-
-def _kept_places(contacts: Any) -> list[Any]:
-    """Return place (m) and normal of contacts of particles, which keep them."""
-    return [contacts[name] for name in ("x", "y", "nx", "ny")]
-
-
-def _places_of_corners(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
-    """Return place (m) and normal of contacts of corners, as the kernels find them again."""
-    slot, face = contacts["slot"], contacts["face"]
-    is_of_a = slot < HALF
-    owner = world.bodies[np.where(is_of_a, a, b)]
-    touched = world.bodies[np.where(is_of_a, b, a)]
-    px = np.choose(slot % HALF, SIDES_X) * owner["half_x"]
-    py = np.choose(slot % HALF, SIDES_Y) * owner["half_y"]
-    cosine, sine = owner["cos"], owner["sin"]
-    outward = np.where(is_of_a, 1.0, -1.0)  # from b to a, whichever of the two is touched
-    nx, ny = _face_normal(face, touched["cos"], touched["sin"])
-    return [
-        owner["x"] + cosine * px - sine * py,
-        owner["y"] + sine * px + cosine * py,
-        outward * nx,
-        outward * ny,
-    ]
-
-
-def _places_on_outlines(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
-    """Return place (m) and normal of contacts of corners in a scene with polygons; see models/outlines.py."""
-    is_of_a = contacts["slot"] < MOST_CORNERS
-    owner = world.bodies[np.where(is_of_a, a, b)]
-    touched = world.bodies[np.where(is_of_a, b, a)]
-    outward = np.where(is_of_a, 1.0, -1.0)  # from b to a, whichever of the two is touched
-    x, y = _corners(world, owner, contacts["slot"] % MOST_CORNERS)
-    nx, ny = _normals(world, touched, contacts["face"])
+        return [contacts[name] for name in ("x", "y", "nx", "ny")]
+    half = HALF if world.corners is None else MOST_CORNERS  # slots of the corners of a, then those of b
+    is_of_a = contacts["slot"] < half
+    owner, touched = world.bodies[np.where(is_of_a, a, b)], world.bodies[np.where(is_of_a, b, a)]
+    number, face = contacts["slot"] % half, contacts["face"]
     cosine, sine = touched["cos"], touched["sin"]
-    return [x, y, outward * (cosine * nx - sine * ny), outward * (sine * nx + cosine * ny)]
-
-
-def _corners(world: World, owner: Any, number: Any) -> tuple[Any, Any]:
-    """Return where (m) corners of bodies are."""
-    rows = world.corners[owner["first_corner"] + number]
+    if world.corners is None:
+        px, py = np.choose(number, SIDES_X) * owner["half_x"], np.choose(number, SIDES_Y) * owner["half_y"]
+        # faces 0: +x, 1: +y, 2: -x, 3: -y
+        nx, ny = np.choose(face, [cosine, -sine, -cosine, sine]), np.choose(face, [sine, cosine, -sine, -cosine])
+    else:
+        corner, edge = world.corners[owner["first_corner"] + number], world.corners[touched["first_corner"] + face]
+        px, py = corner["x"], corner["y"]
+        nx, ny = cosine * edge["nx"] - sine * edge["ny"], sine * edge["nx"] + cosine * edge["ny"]
+    outward = np.where(is_of_a, 1.0, -1.0)  # from b to a, whichever of the two is touched
     cosine, sine = owner["cos"], owner["sin"]
-    return owner["x"] + cosine * rows["x"] - sine * rows["y"], owner["y"] + sine * rows["x"] + cosine * rows["y"]
-
-
-def _normals(world: World, touched: Any, face: Any) -> tuple[Any, Any]:
-    """Return the outward normals of faces in the frames of their bodies."""
-    rows = world.corners[touched["first_corner"] + face]
-    return rows["nx"], rows["ny"]
-
-
-def _face_normal(face: Any, cosine: Any, sine: Any) -> tuple[Any, Any]:
-    """Return the outward normals of faces 0: +x, 1: +y, 2: -x, 3: -y of bodies turned by these."""
-    return np.choose(face, [cosine, -sine, -cosine, sine]), np.choose(face, [sine, cosine, -sine, -cosine])
+    x, y = owner["x"] + cosine * px - sine * py, owner["y"] + sine * px + cosine * py
+    return [x, y, outward * nx, outward * ny]
 
 
 def with_own_work_space(world: World) -> World:

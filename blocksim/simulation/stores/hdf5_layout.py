@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from blocksim.simulation.contacts import BODIES, CONTACT_ROW, UNITS, empty_rows
 from blocksim.simulation.probe_series import CHUNK_ROWS, ProbeSeries
 from blocksim.simulation.recorder import Frame
-from blocksim.world.memory import chunk_rows
 from blocksim.world.systems.blocks import BLOCKS as _BLOCKS
 from blocksim.world.systems.system import Present, System
 
@@ -83,10 +82,12 @@ def measured_units(ledger: Iterable[str]) -> dict[str, str]:
 
 
 def sets_of_frames(
-    systems: Sequence[Present], ledger: Iterable[str], time_step: float = 0.0, *, contacts: bool
+    systems: Sequence[Present], ledger: Iterable[str], time_step: float, chunk: int, *, contacts: bool
 ) -> Iterator[DataSet]:
-    """Yield the data sets of frames (each `of` takes a list of these), of contacts too where these are recorded."""
-    chunk = chunk_rows(max(one.count for one in systems))
+    """Yield the data sets of frames with steps of `time_step` (s), in chunks of so many rows.
+
+    Each `of` takes a list of frames. Contacts are among them where these are recorded.
+    """
     yield DataSet(STEP, "1", _steps, np.int64, chunk=chunk)
     yield DataSet(TIME, "s", lambda frames: _steps(frames) * time_step, chunk=chunk)
     for number, present in enumerate(systems):

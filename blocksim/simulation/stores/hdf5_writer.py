@@ -24,6 +24,7 @@ from blocksim.simulation.probes import NO_PROBES, Probes
 from blocksim.simulation.recorder import Frame
 from blocksim.simulation.stores import hdf5_layout as layout
 from blocksim.simulation.stores.hdf5_open import SIGNATURE, SUPERBLOCK, VERSION
+from blocksim.world.memory import chunk_rows
 from blocksim.world.systems.blocks import blocks_placed
 from blocksim.world.systems.system import Present
 
@@ -66,7 +67,8 @@ class FrameFile:
         """
         self.path = path
         self.systems = (blocks_placed(placed), *others)
-        self.sets = [*layout.sets_of_frames(self.systems, ledger, time_step, contacts=contacts)]
+        chunk = chunk_rows(max(one.count for one in self.systems))
+        self.sets = [*layout.sets_of_frames(self.systems, ledger, time_step, chunk, contacts=contacts)]
         self.probes = probes
         self.probe_sets = {name: [*layout.sets_of_probe(one)] for name, one in probes.series().items()}
         self.count = 0
