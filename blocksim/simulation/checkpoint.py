@@ -107,30 +107,34 @@ def write_checkpoint(path: Path, scene: AnyScene, position: Position, origin: Or
         hashed = _Hashed(file)
         hashed.write(head.model_dump_json().encode() + b"\n")
         for array in arrays:
-            npy.write_array(hashed, _bytes_of(array), allow_pickle=False)
+            content = np.frombuffer(np.ascontiguousarray(array).tobytes(), dtype=np.uint8)
+            npy.write_array(hashed, content, allow_pickle=False)
         file.write(hashed.digest())
 
 
 def read_checkpoint(path: Path) -> Stored:
     """Read a checkpoint. Raises InvalidInputError for one that is damaged, or none of ours."""
     try:
-        content = _content(path)
-        body, digest = content[:-DIGEST_BYTES], content[-DIGEST_BYTES:]
-        if hashlib.sha256(body).digest() != digest:
-            raise ValueError("its checksum does not match its content")  # noqa: TRY301 - reported as all other damage
-        head, arrays = _parts(body)
+        return _read(path)
     except (OSError, ValueError, MemoryError, ValidationError) as error:  # memory: of an array of a forged size
         reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
         raise InvalidInputError(f"{path}: not a complete checkpoint: {reason}") from error
-    return Stored(path, head, arrays)
 
 
-def _content(path: Path) -> bytes:
-    """Return all bytes of a file. Raises OSError, and ValueError where their copies would not fit into memory."""
+def _read(path: Path) -> Stored:
     size, available = path.stat().st_size, available_bytes()
     if available is not None and COPIES * size > available:
         raise ValueError(f"it has {readable(size)}, but only {readable(available)} of memory are free")
-    return path.read_bytes()
+    content = path.read_bytes()
+    body, digest = content[:-DIGEST_BYTES], content[-DIGEST_BYTES:]
+    if hashlib.sha256(body).digest() != digest:
+        raise ValueError("its checksum does not match its content")
+    file = io.BytesIO(body)
+    head = Head.model_validate_json(file.readline())
+    arrays = tuple(np.asarray(npy.read_array(file, allow_pickle=False)) for _ in head.arrays)
+    if any(array.dtype != np.uint8 or array.ndim != 1 for array in arrays):
+        raise ValueError("an array is not an array of bytes")
+    return Stored(path, head, arrays)
 
 
 def restored(stored: Stored, built: AnyScene) -> AnyScene:
@@ -163,20 +167,6 @@ def _array_like(built: NDArray[Any], kind: ArrayType, content: NDArray[np.uint8]
     if count:
         array[...] = content.view(built.dtype).reshape(kind.shape)
     return array
-
-
-def _bytes_of(array: NDArray[Any]) -> NDArray[np.uint8]:
-    return np.frombuffer(np.ascontiguousarray(array).tobytes(), dtype=np.uint8)
-
-
-def _parts(body: bytes) -> tuple[Head, tuple[NDArray[np.uint8], ...]]:
-    """Return head and arrays. Raises ValueError."""
-    file = io.BytesIO(body)
-    head = Head.model_validate_json(file.readline())
-    arrays = tuple(np.asarray(npy.read_array(file, allow_pickle=False)) for _ in head.arrays)
-    if any(array.dtype != np.uint8 or array.ndim != 1 for array in arrays):
-        raise ValueError("an array is not an array of bytes")
-    return head, arrays
 
 
 class _Hashed:

@@ -8,6 +8,7 @@ from blocksim.errors import OutputError
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.compiler import compiling
 from blocksim.scenario import PlacedBody, Scenario, scenario_from_mapping
+from blocksim.scenario.placement import has_outlines
 from blocksim.simulation.schemes import SCHEMES, build_scene, measured_row, scheme_named
 from blocksim.simulation.team import ALONE
 
@@ -24,7 +25,10 @@ SMALLEST_SCENE = {
 def kernels_of(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> str:
     """Return which set of kernels a scenario needs; `placed` are its bodies, where they are known."""
     scheme = scheme_named(scenario)
-    return scheme.kernel_variant(scheme.kernels(scenario.contact.model), scenario, placed)
+    kernels = scheme.kernels(scenario.contact.model)
+    if has_outlines(scenario):
+        kernels = scheme.of_outlines.get(kernels, kernels)
+    return scheme.kernel_variant(kernels, scenario, placed)
 
 
 def kernel_set(scheme: str, model: str) -> str:

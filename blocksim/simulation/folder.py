@@ -33,7 +33,7 @@ from blocksim.simulation.result_files import (
 )
 
 RESULTS = Path("results")
-MOST_BYTES = MEGABYTE  # of done.json
+DONE_BYTES = MEGABYTE  # of done.json
 PATIENCE = 30.0  # s that files of a study may take to change together; jobs of an array begin at the same time
 POLL = 0.01  # s
 
@@ -79,7 +79,7 @@ def is_finished(folder: Path) -> bool:
 def holds_run(folder: Path, scenario: Scenario) -> bool:
     """Return True if the folder holds a finished run of exactly this scenario and code."""
     with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
-        done = json.loads(read_limited(folder / DONE, MOST_BYTES))
+        done = json.loads(read_limited(folder / DONE, DONE_BYTES))
         return bool(done["run"] == run_hash(scenario))
     return False
 

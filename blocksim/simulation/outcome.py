@@ -17,7 +17,6 @@ from blocksim.scenario import PlacedBody
 from blocksim.simulation.ledger import RESIDUAL_LIMIT
 from blocksim.simulation.recorder import MOTION
 from blocksim.simulation.schemes import AnyScene, scheme_of
-from blocksim.simulation.schemes.scheme import Overlaps
 
 GROUND = "the ground"
 WALL = "a wall"
@@ -67,7 +66,8 @@ def diagnosed(outcome: Outcome, code: int, scene: AnyScene, placed: Sequence[Pla
     names = [body.name for body in placed]
     with np.errstate(all="ignore"):  # not finite numbers are what is searched for
         who = _FINDERS.get(code, _fastest)(scene, names)
-        reason = scheme_of(scene).lost_contact(scene, _overlaps(scene)) if code == OVERLAP_LIMIT else ""
+        scheme = scheme_of(scene)
+        reason = scheme.lost_contact(scene, scheme.overlaps(scene)) if code == OVERLAP_LIMIT else ""
     return replace(outcome, reason=f"{reason or outcome.reason} ({who}, step {int(scene.world.clock[0].steps)})")
 
 
@@ -97,18 +97,12 @@ def _fastest(scene: AnyScene, names: Sequence[str]) -> str:
 
 
 def _deepest(scene: AnyScene, names: Sequence[str]) -> str:
-    world, found = scene.world, _overlaps(scene)
+    world, found = scene.world, scheme_of(scene).overlaps(scene)
     worst = int(np.nanargmax(found.depth / found.limit))
     pair = " and ".join(_name(world, names, int(i[worst])) for i in (found.a, found.b))
     is_capped = found.limit[worst] < world.controls[0].max_overlap
     most = f", more than half of a side of {MILLI * 2.0 * found.limit[worst]:.3g} mm" if is_capped else ""
     return f"{pair} by {MILLI * found.depth[worst]:.3g} mm{most}"
-
-
-def _overlaps(scene: AnyScene) -> Overlaps:
-    overlaps = scheme_of(scene).overlaps
-    assert overlaps is not None  # noqa: S101 - of a scheme that ends runs for that reason
-    return overlaps(scene)
 
 
 def _name(world: World, names: Sequence[str], body: int) -> str:

@@ -106,7 +106,13 @@ def take_over_probes(stored: Stored, scenario: Scenario, recorder: Recorder) -> 
 def _newest_good(paths: list[Path], scenario: Scenario) -> Resumption:
     """Return the checkpoint of the most steps among those that are whole."""
     remarks: list[str] = []
-    whole = sorted(_whole(paths, remarks), key=lambda stored: stored.position.step)
+    whole: list[Stored] = []
+    for path in paths:
+        try:
+            whole.append(read_checkpoint(path))
+        except InvalidInputError as error:
+            remarks.append(str(error))
+    whole.sort(key=lambda stored: stored.position.step)
     if not whole:
         raise InvalidInputError("\n".join([*remarks, f"{paths[0].parent}: no checkpoint is complete; {REMEDY}"]))
     newest, origin = whole[-1], origin_of(scenario)
@@ -117,14 +123,6 @@ def _newest_good(paths: list[Path], scenario: Scenario) -> Resumption:
         was = newest.head.origin.machine
         remarks.append(f"this part runs on another machine than before ({was}): the last digits may differ")
     return Resumption(newest, tuple(remarks))
-
-
-def _whole(paths: list[Path], remarks: list[str]) -> Iterator[Stored]:
-    for path in paths:
-        try:
-            yield read_checkpoint(path)
-        except InvalidInputError as error:
-            remarks.append(str(error))
 
 
 def _refuse_other_start(folder: Path, scenario: Scenario) -> None:

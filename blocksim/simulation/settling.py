@@ -98,21 +98,21 @@ def settle(
 
     Raises SettleError, and StoppedEarlyError where `stop` says why.
     """
-    going = _Settling(scene, scenario, placed, team, stop)
-    with going.without_time():
+    run = _Settlement(scene, scenario, placed, team, stop)
+    with run.without_time():
         try:
-            going.load_up()
-            going.rest(going.pace.most)
-            going.follow_support()
+            run.load_up()
+            run.rest(run.pace.most)
+            run.follow_support()
         except SettleError:
-            if not going.is_released:
+            if not run.is_released:
                 raise
-            going.lean_back()
-    going.begin()
-    return going.scene, going.settled()
+            run.lean_back()
+    run.begin()
+    return run.scene, run.settled()
 
 
-class _Settling:
+class _Settlement:
     """A scene on its way to rest."""
 
     def __init__(
@@ -139,7 +139,7 @@ class _Settling:
         self.is_released = scenario.start.release == "always"
         self.lean: tuple[AnyScene, list[NDArray[Any]]] | None = None
         self.leaving: dict[str, Floats] = {}
-        self.path = _Path(self.start)
+        self.since, self.speeds = self.start, list[float]()  # velocities were taken away; roots of kinetic energies
 
     @property
     def bodies(self) -> Any:
@@ -186,7 +186,7 @@ class _Settling:
                 self._go()
                 if self._unrest() <= ROUGH_BALANCE / PARTS:
                     break
-        self.path = _Path(self._places())  # what moved faster and faster under growing loads is no mechanism yet
+        self.since, self.speeds = self._places(), []  # what moved faster under growing loads is no mechanism yet
 
     def rest(self, last: int) -> None:
         """Go on until nothing moves any more, at most a little beyond a step. Raises SettleError."""
@@ -289,14 +289,14 @@ class _Settling:
             self._stop()
         else:
             self.energy = energy
-            self.path.speeds.append(float(np.sqrt(energy)))
+            self.speeds.append(float(np.sqrt(energy)))
 
     def _stop(self) -> None:
         for name in VELOCITIES:
             self.bodies[name] = 0.0
         self.scheme.halt(self.scene, self.count)
         self.energy = 0.0
-        self.path = _Path(self._places())
+        self.since, self.speeds = self._places(), []
 
     def _is_mechanism(self) -> bool:
         """Return True where contacts do not hold any more what moves, and nothing else will.
@@ -304,24 +304,21 @@ class _Settling:
         Whatever vibrates about a place of rest slows down before it, and has come no farther than contacts give way,
         each at most by the deepest overlap: block after block they turn, by that over a side, and move what is above.
         """
-        speeds = self.path.speeds
+        speeds = self.speeds
         if not speeds or len(speeds) % LOOKS:
             return False
         window = len(speeds) // WINDOWS
         last, before = speeds[-1] - speeds[-1 - window], speeds[-1 - window] - speeds[-1 - 2 * window]
         if not last >= STEADY * before > 0.0:
             return False
-        change = self._places() - self.path.start
+        change = self._places() - self.since
         way = float((corner_ways(change, self.bodies["radius"]) * self.is_free).max())
-        give = CHAIN * self.count * self._slenderness() * self.scheme.give(self.scene)
+        x, y = self.bodies["x"][self.is_free], self.bodies["y"][self.is_free]
+        slenderness = max(1.0, float(max(np.ptp(x), np.ptp(y))) / self.smallest)  # of all free blocks
+        give = CHAIN * self.count * slenderness * self.scheme.give(self.scene)
         if way <= max(give, self.pace.least_share * self.smallest):
             return False
         return not any(self._meets(change * (share * self.smallest / way), share) for share in AHEAD)
-
-    def _slenderness(self) -> float:
-        """Return the extent of all free blocks over the smallest side of one."""
-        x, y = self.bodies["x"][self.is_free], self.bodies["y"][self.is_free]
-        return max(1.0, float(max(np.ptp(x), np.ptp(y))) / self.smallest)
 
     def _meets(self, change: Floats, share: float) -> bool:
         """Return True if blocks come to bear on one another on a way from where they are, that of some share."""
@@ -369,14 +366,6 @@ class _Settling:
             f"{MILLI * float(speeds[fastest]):.3g} mm/s, block {self.placed[far].name} has come "
             f"{MILLI * float(ways[far]):.3g} mm, after {self.steps} steps"
         )
-
-
-class _Path:
-    """What has moved since velocities were taken away: from where, and roots of the kinetic energy after each call."""
-
-    def __init__(self, start: Floats) -> None:
-        self.start = start
-        self.speeds: list[float] = []
 
 
 def _near(boxes: Rectangles, is_free: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -1,6 +1,6 @@
 """Springs and dashpots, small explicit steps; contacts as a table of the forces of springs and dashpots now."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -17,9 +17,7 @@ from blocksim.kernels.explicit.models import KERNEL
 from blocksim.kernels.explicit.models import SURFACE as SURFACE_MODEL
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.kernels.explicit.step import advance, advance_coupled_alone, advance_coupled_in_team, advance_in_team
-from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.overlap import penetration
-from blocksim.scenario.placement import has_outlines
 from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
 from blocksim.simulation.schemes.scheme import BODIES_A_THREAD, Overlaps, Scheme, outlines_of, smallest_sides
 from blocksim.world.build import EXPLICIT as CONSTRUCTION
@@ -149,10 +147,6 @@ SURFACE, PARTICLES, SURFACE_OF_OUTLINES = "surface", "with-particles", "outlines
 POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
 
 
-def _variant(kernels: str, scenario: Scenario, _: Sequence[PlacedBody] | None) -> str:
-    return SURFACE_OF_OUTLINES if kernels == SURFACE and has_outlines(scenario) else kernels
-
-
 def _inside(change: Callable[..., Any]) -> Callable[..., Coupled]:
     """Return what changes the world of a scene with further systems."""
     return lambda scene, *values: scene._replace(world=change(scene.world, *values))
@@ -172,7 +166,7 @@ WORLDS = Scheme(
     for_another_thread=with_own_work_space,
     after_event=evaluate_anew,
     kernels=lambda model: SURFACE if model == "surface" else PARTICLES,
-    kernel_variant=_variant,
+    of_outlines={SURFACE: SURFACE_OF_OUTLINES},
     kernel_sets={
         SURFACE: {},
         PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models of particles

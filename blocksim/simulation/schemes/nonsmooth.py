@@ -16,7 +16,6 @@ from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER, measure_nonsmoot
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.step import advance_nonsmooth, advance_nonsmooth_in_team
 from blocksim.scenario import PlacedBody, Scenario
-from blocksim.scenario.placement import has_outlines
 from blocksim.simulation.contacts import SUPPORT, Rows, empty_rows
 from blocksim.simulation.schemes.scheme import (
     BODIES_A_THREAD,
@@ -123,8 +122,7 @@ def overlaps_of_constraints(scene: Nonsmooth) -> Overlaps:
 
 
 def _variant(kernels: str, scenario: Scenario, placed: Sequence[PlacedBody] | None) -> str:
-    of_shapes = OF_OUTLINES if has_outlines(scenario) else kernels
-    return IN_ROUNDS[of_shapes] if may_rebound_in_rounds(scenario, placed) else of_shapes
+    return IN_ROUNDS[kernels] if may_rebound_in_rounds(scenario, placed) else kernels
 
 
 RATES = ("vx", "vy", "spin")
@@ -151,6 +149,7 @@ NONSMOOTH = Scheme(
     threads_of=threads_of,
     after_event=renew,
     kernels=lambda _: RIGID,
+    of_outlines={RIGID: OF_OUTLINES},
     kernel_variant=_variant,
     kernel_sets={
         RIGID: PLAIN,

@@ -39,6 +39,9 @@ class Overlaps(NamedTuple):
     limit: Floats  # m, or 1 where any depth is judged alike
 
 
+NO_OVERLAPS = Overlaps(*(np.zeros(0) for _ in Overlaps._fields))
+
+
 class SettlingSteps(NamedTuple):
     """How settling before time zero goes on with a scheme."""
 
@@ -128,6 +131,7 @@ class Scheme:
 
     # compiling: sets of machine code by name, see compilation.py
     kernels: Callable[[str], str]  # that it needs with a contact model
+    of_outlines: Mapping[str, str] = field(default_factory=dict)  # the set instead of another, with any polygon
     kernel_variant: Callable[[str, Scenario, Sequence[PlacedBody] | None], str] = _same  # of a set, for a scenario
     kernel_sets: Mapping[str, Mapping[str, object]] = field(default_factory=dict)  # changes of the smallest scene
 
@@ -144,10 +148,9 @@ class Scheme:
     ledger: tuple[str, ...]  # energies (J) that are measured
     measure: Callable[[Any, Any], None]  # writes energies, number of contacts and largest overlap into a row
     contacts: Callable[[Any, int], Rows] = lambda *_: empty_rows(0)  # of a scene with so many blocks
-    overlaps: Callable[[Any], Overlaps] | None = None  # of a scene that an overlap has ended
-    lost_contact: Callable[[Any, Overlaps], str] = lambda *_: (
-        ""
-    )  # why such a run ended, where not by contact.max_overlap
+    overlaps: Callable[[Any], Overlaps] = lambda _: NO_OVERLAPS  # of a scene that an overlap has ended
+    lost_contact: Callable[[Any, Overlaps], str] = lambda *_: ""
+    # why it has ended, where not by contact.max_overlap
     warning: Callable[[Any, float, float], str] = lambda *_: ""
     # of contacts in a scene that has finished, given the largest overlap and the smallest side of a block (m)
 

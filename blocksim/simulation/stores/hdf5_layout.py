@@ -103,7 +103,7 @@ def sets_of_frames(
 def sets_of_contacts() -> Iterator[DataSet]:
     """Yield the data sets with a row a contact."""
     for name, unit in {**dict.fromkeys(BODIES, "1"), **UNITS}.items():
-        yield DataSet(f"{CONTACTS}/{name}", unit, partial(_contacts, name), CONTACT_ROW[name])
+        yield DataSet(f"{CONTACTS}/{name}", unit, partial(_contact_column, name), CONTACT_ROW[name])
 
 
 def sets_of_probe(probe: ProbeSeries) -> Iterator[DataSet]:
@@ -140,7 +140,7 @@ def _ends(frames: Sequence[Frame]) -> Values:
     return np.cumsum([0 if frame.contacts is None else len(frame.contacts) for frame in frames])
 
 
-def _contacts(name: str, frames: Sequence[Frame]) -> Values:
+def _contact_column(name: str, frames: Sequence[Frame]) -> Values:
     return np.concatenate([(empty_rows(0) if one.contacts is None else one.contacts)[name] for one in frames])
 
 

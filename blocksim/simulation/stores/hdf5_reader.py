@@ -59,7 +59,7 @@ def _read(path: Path, file: Any, systems: Sequence[Present]) -> tuple[float, Row
     """Return step (s) and rows of all committed frames, after looking at what would be read."""
     count = int(safety.data_set(file, layout.COMMITTED, 0)[()])
     ledger = tuple(name for name in safety.group(file, layout.OBSERVABLES) if name not in layout.COUNTED_UNITS)
-    table = layout.sets_of_frames(systems, ledger, math.nan, layout.CHUNK_ROWS, contacts=False)
+    table = layout.sets_of_frames(systems, ledger, math.nan, 1, contacts=False)
     sets = {one.name: safety.data_set(file, one.name, 1 + len(one.row)) for one in table if one.name != layout.TIME}
     for present in systems:
         found = {sets[place].shape[1] for place in layout.places_of(present.system)}
