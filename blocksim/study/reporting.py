@@ -18,9 +18,11 @@ from blocksim.study.rows import FINISHED, TABLE
 from blocksim.study.stored_run import Place, choice, find_run, folder_of
 from blocksim.study.study_pages import study_page
 from blocksim.study.study_pictures import study_in
+from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.study.sweep_table import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, lines_in
 from blocksim.view.report.page import write_report
+from blocksim.view.report.pictures import pictures_of
 from blocksim.view.report.player import MOST_BYTES
 from blocksim.view.report.runs import PartialRun, Subject, read_stored, run_subject
 from blocksim.view.report.shared import shared_path, shared_text
@@ -128,10 +130,20 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
     table = _case_table(place)
     scenario, problems = _plan(place)
     judged, remarks = _judged(place, scenario, experiment)
+    pictures, undrawn = _pictures(place, experiment, len(table.rows))
     cases = _kept(table)
     found = [(case, read_stored(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
-    sweep = sweep_subject(key, table, scenario, keys, [*problems, *remarks], list(cases)[most:], judged=judged)
+    sweep = sweep_subject(
+        key,
+        table,
+        scenario,
+        keys,
+        [*problems, *remarks, *undrawn],
+        list(cases)[most:],
+        judged=judged,
+        pictures=pictures,
+    )
     shown = [
         run_subject(keys[case], run, *_compared(run, experiment), most_bytes=MOST_BYTES // len(found), parent=key)
         for case, run in found
@@ -161,6 +173,17 @@ def _judged(
         if experiment is not None and not isinstance(error, UnavailableError):
             raise
         return None, (str(error),)
+
+
+def _pictures(place: Path, experiment: Path | None, cases: int) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
+    """Return the pictures of a sweep for the page, or why there is none."""
+    try:
+        sweep = read_sweep_data(place, experiment)
+    except BlocksimError as error:
+        return [], (f"no picture of the sweep: {error}",)
+    if len(sweep.finished) != cases:
+        return [], ("no picture of the sweep: its table is damaged",)
+    return pictures_of(sweep), ()
 
 
 def _plan(place: Path) -> tuple[Scenario | None, tuple[str, ...]]:

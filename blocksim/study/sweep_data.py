@@ -53,6 +53,7 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
         finished=finished,
         inside=None if path is None else _inside(table, Ranges.read(path)) & finished,
         measured=Measured() if path is None else measured_of(load_table(path), blocks),
+        manners=tuple(table["outcome"].fillna("").astype(str)) if "outcome" in table.columns else (),
     )
 
 

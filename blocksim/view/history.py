@@ -1,6 +1,7 @@
 """Histories of a run: motions of the blocks, energies, contacts, forces and the ground's motion over time."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
@@ -109,23 +110,39 @@ def draw_history(
     title: str | None = None,
     measured: MeasuredTable | None = None,
     support: Support | None = None,
+    **asked: Any,
+) -> None:
+    """Draw a history as `drawn_history` has it and write PNG, SVG or PDF; the same input gives the same bytes.
+
+    Raises as that does, InvalidInputError for an unknown picture format, and OutputError when the file cannot be
+    written.
+    """
+    path = Path(path)
+    style.picture_suffix(path)
+    with drawn_history(frames, title, measured, support, **asked) as (figure, _):
+        style.save_figure(figure, path)
+
+
+@contextmanager
+def drawn_history(
+    frames: HistoryLike,
+    title: str | None = None,
+    measured: MeasuredTable | None = None,
+    support: Support | None = None,
     *,
     forces: bool = False,
     choice: Choice | None = None,
     paint: Paint | None = None,
     paper: Paper = OWN,
-) -> None:
-    """Draw x, y, rotation, energies and contacts over time, or the panels of `choice`.
+) -> "Iterator[tuple[Figure, dict[str, Axes]]]":
+    """Give x, y, rotation, energies and contacts over time, or the panels of `choice`, by the name of each.
 
     Measured means and ranges are drawn at the end. If contacts were stored, a panel shows the force of ground and walls
     on all blocks; `forces` requires it. A moving ground has a panel of its displacement. Of more than
-    six blocks the six that move farthest are coloured, the others grey, unless `choice` names blocks. The same input
-    gives the same bytes. Raises InvalidInputError for an unknown picture format, unknown panels or blocks,
-    forces that were not stored, a page that is too small or nothing to draw, and OutputError when the file cannot be
-    written.
+    six blocks the six that move farthest are coloured, the others grey, unless `choice` names blocks. Raises
+    InvalidInputError for unknown panels or blocks, forces that were not stored, a page that is too small or nothing to
+    draw.
     """
-    path = Path(path)
-    style.picture_suffix(path)
     choice, support = choice or Choice(), support or Support()
     drawing = _drawing(frames, support, choice, paint or by_block(frames))
     names = _panel_names(drawing, choice, forces=forces)
@@ -140,7 +157,7 @@ def draw_history(
             _draw_panel(axes, drawing, name, measured)
         _finish(panels, drawing)
         _draw_texts(figure, title, "\n".join(notes))
-        style.save_figure(figure, path)
+        yield figure, panels
 
 
 def line_looks(fills: Sequence[str], shown: Sequence[int]) -> dict[int, dict[str, Any]]:

@@ -1,16 +1,26 @@
 """The kinds of pictures of runs and of sweeps, by name; a kind is one file and one line here."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
+from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
+from blocksim.view.layout import OWN, Paper
 from blocksim.view.profile import draw_profile
 from blocksim.view.strip import draw_strip
 from blocksim.view.sweeps import histogram, lines, matrix, outcome_map
 from blocksim.view.sweeps.data import SweepData
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.figure import Figure
 
 STRIP, FINAL, HISTORY, PROFILE = "strip", "final", "history", "profile"
 MOTION = "motion"  # of the supports; needs no run
@@ -27,21 +37,33 @@ MOST_SLIPS = 2
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of picture of a sweep: which sweeps it cannot show or suits best, and its drawing.
-
-    `draw` raises InvalidInputError for an unknown picture format and OutputError when the file cannot be written.
-    """
+    """A kind of picture of a sweep: which sweeps it cannot show or suits best, and its drawing."""
 
     refusal: Callable[[SweepData], str]  # why it cannot show a sweep; empty where it can
     suits: Callable[[SweepData], bool]
-    draw: Callable[..., None]  # (sweep, path, paper = OWN)
+    drawn: "Callable[[SweepData, Paper], AbstractContextManager[Figure]]"
+
+    def draw(self, sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
+        """Draw a sweep and write PNG, SVG or PDF; the same input gives the same bytes.
+
+        Raises InvalidInputError for an unknown picture format or too small a page, OutputError.
+        """
+        style.picture_suffix(path)
+        with self.drawn(sweep, paper) as figure:
+            style.save_figure(figure, path)
+
+
+@contextmanager
+def _map(sweep: SweepData, paper: Paper) -> "Iterator[Figure]":
+    with outcome_map.drawn(sweep, paper) as (figure, _):
+        yield figure
 
 
 SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
-    "lines": Kind(lines.refusal, lines.suits, lines.draw),
-    "map": Kind(outcome_map.refusal, outcome_map.suits, outcome_map.draw),
-    "matrix": Kind(matrix.refusal, matrix.suits, matrix.draw),
-    "histogram": Kind(histogram.refusal, histogram.suits, histogram.draw),
+    "lines": Kind(lines.refusal, lines.suits, lines.drawn),
+    "map": Kind(outcome_map.refusal, outcome_map.suits, _map),
+    "matrix": Kind(matrix.refusal, matrix.suits, matrix.drawn),
+    "histogram": Kind(histogram.refusal, histogram.suits, histogram.drawn),
 }
 
 

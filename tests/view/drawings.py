@@ -13,6 +13,7 @@ from blocksim.analysis import load_table
 from blocksim.scenario.models.history import Stretch
 from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure
 from blocksim.scenario.motion import MotionPieces
+from blocksim.view import style
 from blocksim.view.acting import Acting
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
@@ -22,7 +23,7 @@ from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import by_speed, by_turn
 from blocksim.view.run_data import Support
 from blocksim.view.strip import draw_strip
-from blocksim.view.sweeps.lines import Series, draw_series
+from blocksim.view.sweeps.lines import Series, drawn_series
 from blocksim.view.tornado import Bars, draw_tornado
 from tests.bench.peers.work_precision import Curve, draw_work_precision
 from tests.bench.peers.work_precision import Panel as Work
@@ -113,6 +114,14 @@ def of_sweep(kind: str, sweep: SweepData) -> Drawing:
     return partial(SWEEP_KINDS[kind].draw, sweep)
 
 
+def of_series(*values: Any, **more: Any) -> Drawing:
+    def draw(path: Path, paper: Paper) -> None:
+        with drawn_series(*values, paper=paper, **more) as figure:
+            style.save_figure(figure, path)
+
+    return draw
+
+
 def failed() -> Frames:
     """Return a run whose last frame is no number."""
     frames = toppling(2, steps=7)
@@ -194,17 +203,17 @@ DRAWINGS: dict[str, Drawing] = {
         [replace(panel(8), blocks=ODD)] * 3, path, title=ODD[0], measured=dict.fromkeys(ODD, 7.0), paper=paper
     ),
     "tornado": lambda path, paper: draw_tornado(bars(), LEGEND, path, "Which inputs matter", paper),
-    "series": lambda path, paper: draw_series(
-        [series(3, "e = 0.3"), series(3, "e = 0.5")], ("1", "2", "brick"), ("overlap", "m"), path, title="jitter",
-        measured={"2": (60.0, 75.0)}, paper=paper,
+    "series": of_series(
+        [series(3, "e = 0.3"), series(3, "e = 0.5")], ("1", "2", "brick"), ("overlap", "m"), title="jitter",
+        measured={"2": (60.0, 75.0)},
     ),
-    "narrow series": lambda path, paper: draw_series(
+    "narrow series": of_series(
         [series(3, f"friction.block_block.kinetic = 0.{number}") for number in range(4)], ("1", "2", "3"),
-        ("gravity", ""), path, paper=paper,
+        ("gravity", ""),
     ),
-    "series with odd names": lambda path, paper: draw_series(
-        [series(8, name) for name in ODD[:4]], ODD, (f"blocks.{ODD[0]}.width", "m"), path, title=ODD[1],
-        measured={ODD[2]: (1.0, 2.0)}, paper=paper,
+    "series with odd names": of_series(
+        [series(8, name) for name in ODD[:4]], ODD, (f"blocks.{ODD[0]}.width", "m"), title=ODD[1],
+        measured={ODD[2]: (1.0, 2.0)},
     ),
     "lines": of_sweep("lines", made_up(grid())),
     "map": of_sweep("map", made_up(grid(3), failed=5)),

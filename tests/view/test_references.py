@@ -16,9 +16,9 @@ from PIL import Image
 from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
+from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.run_data import Support
 from blocksim.view.strip import draw_strip
-from blocksim.view.sweeps.outcome_map import draw
 from blocksim.view.tornado import Bars, draw_tornado
 from tests.view.made_up import pressed, toppling
 from tests.view.sweeps.made_up import grid, made_up
@@ -52,7 +52,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "strip": lambda path: draw_strip(FRAMES, path, [0.0, 0.4, 0.6], "made up", measured=Repeats(), forces=True),
     "final": lambda path: draw_final(FRAMES, path, title="made up", measured=Repeats()),
     "history": lambda path: draw_history(FRAMES, path, title="made up", support=Support(weight=12.0)),
-    "map": lambda path: draw(made_up(grid(3), failed=5), path),
+    "map": lambda path: SWEEP_KINDS["map"].draw(made_up(grid(3), failed=5), path),
     "tornado": tornado,
 }
 

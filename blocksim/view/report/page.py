@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-SCRIPTS = ("decode", "frames", "view", "drawing", "loads", "player", "history", "table", "map", "main")  # in this order
+SCRIPTS = ("decode", "frames", "view", "drawing", "loads", "player", "pictures", "table", "main")  # in this order
 PARTS = resources.files("blocksim.view.report") / "parts"
 
 MOST_KEYS = 2  # in a label

@@ -66,9 +66,6 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
         "outlines": _outlines(frames),
         "start_angle": listed(np.degrees(frames.start_angle)),
         "channels": {name: part for name, (part, _) in packed.items()},
-        "energy": {name: pack(values[kept], exact=True)[0] for name, values in frames.energy.items()},
-        "contact_count": pack(frames.contact_count[kept], exact=True)[0],
-        "largest_overlap": pack(MILLIMETRES * frames.largest_overlap[kept], exact=True)[0],
         "systems": pack_systems(frames, kept),
     }
     return Packed(data, len(kept), len(frames), {name: error for name, (_, error) in packed.items()})

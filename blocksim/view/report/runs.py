@@ -20,8 +20,10 @@ from blocksim.simulation.summary import Summary, read_summary
 from blocksim.simulation.table import Columns, read_table, rows_of
 from blocksim.view.probes import panels_of, probe_picture
 from blocksim.view.report.loads import pack_loads
+from blocksim.view.report.pictures import Repeats, history_of
 from blocksim.view.report.player import MOST_BYTES, frame_indices, pack_forces, pack_frames, scene_data
 from blocksim.view.report.shared import shared_path, shared_text
+from blocksim.view.run_data import support_of
 
 Part = TypeVar("Part")
 
@@ -152,8 +154,13 @@ def run_subject(
     `parent` is the key of the sweep that it is a member of.
     """
     data, notes, problems = _moving(run, most_bytes)
-    if data is not None:
+    history = None
+    if data is not None and run.frames is not None and run.scenario is not None:
         data["measured"] = _measured(data["names"], comparison)
+        repeats = None if comparison is None else Repeats(comparison["rows"])
+        if data["names"]:
+            support = support_of(run.scenario, () if run.summary is None else run.summary.events)
+            history, data["histories"] = history_of(run.frames, support, repeats)
     page = {
         "parent": parent,
         "place": shared_path(str(run.folder)),
@@ -171,6 +178,8 @@ def run_subject(
         "provenance": _provenance(run),
         "probes": [] if parent is not None else [_probe(one) for one in run.probes.values() if len(one)],
         "has_player": data is not None,
+        "history": history,
+        "names": data["names"] if data else [],
         "has_particles": bool(data and data["scene"]["particles"]),
         "has_forces": bool(data and data["forces"]),
         "has_loads": bool(data and data["loads"]),
@@ -194,10 +203,8 @@ def _moving(run: PartialRun, most_bytes: int) -> tuple[dict[str, Any] | None, li
     forces, loads = pack_forces(run.frames, kept, scene["tilt"]), pack_loads(run.frames, run.scenario, kept, happened)
     if loads is not None:
         scene["extent"] = [loads.extent.left, loads.extent.right, loads.extent.bottom, loads.extent.top]
-    found = packed.data["energy"]
-    energy = {label: found[name] for name, label in LEDGER.items() if name in found}
     notes = [*packed.notes, NO_FORCES if forces is None else forces["told"], *(loads.notes if loads else ())]
-    moving = {"energy": energy, "scene": scene, "forces": forces, "loads": loads.data if loads else None}
+    moving = {"scene": scene, "forces": forces, "loads": loads.data if loads else None}
     return {**packed.data, **moving}, notes, []
 
 

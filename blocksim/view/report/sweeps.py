@@ -60,10 +60,12 @@ def sweep_subject(
     left_out: Sequence[str] = (),
     *,
     judged: Mapping[str, Any] | None = None,
+    pictures: Sequence[Mapping[str, Any]] = (),
 ) -> Subject:
     """Return a sweep for a report; `members` are the keys of the subjects of its cases.
 
-    `left_out` are cases with frames that are not in the page. `judged` is what `Judgement.to_dict` gives.
+    `left_out` are cases with frames that are not in the page. `judged` is what `Judgement.to_dict` gives,
+    `pictures` what `pictures_of` does.
     """
     name = table.folder.name if scenario is None else scenario.name
     shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
@@ -75,6 +77,7 @@ def sweep_subject(
         "hidden_blocks": len(table.blocks) - len(shown),
         "has_members": bool(members),
         "judged": judged,
+        "pictures": [(one["label"], one["source"]) for one in pictures],
     }
     data = {
         "kind": "sweep",
@@ -84,6 +87,7 @@ def sweep_subject(
         "left_out": list(left_out),
         "measured": {} if judged is None else _limits(judged),
         "members": dict(members),
+        "pictures": [one["data"] for one in pictures],
     }
     return Subject(key, "sweep", name, page, data)
 

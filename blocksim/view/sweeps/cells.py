@@ -19,6 +19,7 @@ RARE = 1.0  # percent at either end that share the colour of the last step
 LEAST_SPAN_MM = 1.0
 RUN_OUT_COLOURS = "viridis"  # distinguishable with every colour blindness, and in grey: brighter all the way
 # The same holds of these: no two are nearer than 0.12 in brightness.
+MANNERS = {"stands": "#009E73", "rocked back": "#56B4E9", "rocking": "#CC79A7", "slid": "#E69F00", "fell": "#D55E00"}
 CLASS_COLOURS = ("#56B4E9", "#16325B", "#F4E27A", "#A05A8C", "#1B6B4A")
 OTHER_COLOUR, FAILED_COLOUR = "#D9D9D9", "#FFFFFF"
 DOTS: dict[str, Any] = {"s": 9.0, "linewidth": 0.5, "zorder": 2}
@@ -35,6 +36,7 @@ class Classes:
     numbers: Floats  # (n,)
     labels: tuple[str, ...]
     colours: tuple[str, ...]
+    title: str = "final rotations of all blocks"
 
 
 def run_out_scale(x_mm: Floats) -> "tuple[Colormap, BoundaryNorm]":
@@ -62,6 +64,17 @@ def classes_of(sweep: SweepData) -> Classes:
     shares = [float((numbers == number).mean()) for number in range(len(names))]
     labels = tuple(f"{name}: {percent(share)}" for name, share in zip(names, shares, strict=True))
     return Classes(numbers, labels, (*CLASS_COLOURS[: len(order)], OTHER_COLOUR, FAILED_COLOUR))
+
+
+def manners_of(sweep: SweepData) -> Classes:
+    """Return how all cases ended as numbers, in the order of `MANNERS`."""
+    names = [name for name in MANNERS if name in sweep.manners]
+    ends = zip(sweep.manners, sweep.finished, strict=True)
+    numbers = np.array([names.index(one) if ok and one in names else len(names) for one, ok in ends], dtype=np.float64)
+    labels = tuple(
+        f"{name}: {percent(float((numbers == number).mean()))}" for number, name in enumerate([*names, "failed"])
+    )
+    return Classes(numbers, labels, (*(MANNERS[name] for name in names), FAILED_COLOUR), "outcome")
 
 
 def _in_order(outcomes: Sequence[tuple[int, ...] | None], measured: tuple[int, ...] | None) -> list[tuple[int, ...]]:

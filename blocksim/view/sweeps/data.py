@@ -84,6 +84,7 @@ class SweepData:
     finished: Flags  # (n,)
     inside: Flags | None = None  # (n,) in all measured ranges; None without an experiment
     measured: Measured = field(default_factory=Measured)
+    manners: tuple[str, ...] = ()  # (n,) how each case ended, such as `fell`; none where nobody judged it
 
     @property
     def is_sampled(self) -> bool:

@@ -1,6 +1,6 @@
 """Histogram: final x of the members of a sweep, with the repeats of the experiment and their intervals."""
 
-from pathlib import Path
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,10 @@ from blocksim.view.layout import OWN, Paper
 from blocksim.view.sweeps.data import Flags, Floats, SweepData, percent
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LEFT, RIGHT, FOOT = 0.55, 0.2, 0.42  # inches
 PANEL_HEIGHT, GAP, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
@@ -35,8 +38,9 @@ def suits(_sweep: SweepData) -> bool:
     return True
 
 
-def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
-    """Draw a panel for each block that moves."""
+@contextmanager
+def drawn(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
+    """Give a panel for each block that moves."""
     blocks = sweep.moving[-MOST_BLOCKS:]
     legend = _entries(sweep)
     foot = FOOT + LINE * -(-len(legend) // 2) + 2.0 * layout.EDGE
@@ -62,7 +66,7 @@ def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
             labelspacing=0.25,
             columnspacing=1.0,
         )
-        style.save_figure(figure, path)
+        yield figure
 
 
 def limits_of(x_mm: Floats, others: Floats) -> tuple[float, float]:

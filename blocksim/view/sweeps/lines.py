@@ -1,8 +1,8 @@
 """Lines: final x of the blocks over one input, a row for each block, a column for each value of a second input."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
@@ -68,13 +68,13 @@ def suits(sweep: SweepData) -> bool:
     return other is None or other.count <= MOST_COLUMNS
 
 
-def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
-    """Draw the lines."""
+def drawn(sweep: SweepData, paper: Paper = OWN) -> "AbstractContextManager[Figure]":
+    """Give the drawn lines."""
     axis, _ = _axis_and_other(sweep)
     ranges = {block: ends for block in sweep.blocks if (ends := sweep.measured.range_of(block)) is not None}
     key = axis.key, axis.unit
     series = list(series_of(sweep))
-    draw_series(series, sweep.blocks, key, path, sweep.title, ranges, typed=axis.typed, paper=paper)
+    return drawn_series(series, sweep.blocks, key, sweep.title, ranges, typed=axis.typed, paper=paper)
 
 
 def series_of(sweep: SweepData) -> Iterator[Series]:
@@ -98,30 +98,27 @@ def _axis_and_other(sweep: SweepData) -> tuple[Input, Input | None]:
     return axis, others[0] if others and sweep.is_grid else None
 
 
-def draw_series(
+@contextmanager
+def drawn_series(
     series: Sequence[Series],
     blocks: Sequence[str],
     key: tuple[str, str],
-    path: Path | str,
     title: str | None = None,
     measured: Mapping[str, tuple[float, float]] | None = None,
     *,
     typed: Typed | None = None,
     paper: Paper = OWN,
-) -> None:
-    """Draw final x over a key, given with its SI unit, and write PNG, SVG or PDF; the same input gives the same bytes.
+) -> "Iterator[Figure]":
+    """Give final x drawn over a key, that is given with its SI unit.
 
     The axis has the `typed` unit, or where there is none that in which the values are best read.
-    `measured` gives smallest and largest measured x (mm) of some blocks. Raises InvalidInputError for an unknown
-    picture format and OutputError when the file cannot be written.
+    `measured` gives smallest and largest measured x (mm) of some blocks. Raises InvalidInputError for too small a page.
     """
-    path = Path(path)
-    style.picture_suffix(path)
-    drawn = list(series)[:MOST_COLUMNS]
-    rows = [(block, blocks[block]) for block in moving_blocks(drawn)]
-    axis = value_axis(np.concatenate([one.values for one in drawn]), *key, typed=typed)
-    page = _page(drawn, rows, axis, paper)
-    count = len(drawn)
+    shown = list(series)[:MOST_COLUMNS]
+    rows = [(block, blocks[block]) for block in moving_blocks(shown)]
+    axis = value_axis(np.concatenate([one.values for one in shown]), *key, typed=typed)
+    page = _page(shown, rows, axis, paper)
+    count = len(shown)
     texts = _legend(len(rows), len(blocks), len(series) - count, is_measured=bool(measured))
     notes = wrap(texts, max(1, int(LETTERS_AN_INCH * page.width)))
     page = replace(page, foot=page.foot + (len(notes) - 1) * LINE)
@@ -129,13 +126,13 @@ def draw_series(
     page = replace(page, row=paper.panel(ROW_HEIGHT, len(rows), others, LOWEST))
     page = replace(page, height=paper.height(others + len(rows) * page.row))
     with style.styled_figure(page.width, page.height, paper.dots) as figure:
-        _draw_panels(figure, page, drawn, rows, measured or {})
+        _draw_panels(figure, page, shown, rows, measured or {})
         for column, lines in enumerate(page.headings):
             place = (LEFT + column * (page.panel + COLUMN_GAP)) / page.width, 1.0 - TITLE / page.height
             figure.text(*place, "\n".join(lines), va="top", weight="bold")
         write_heading(figure, title, 0.1)
         figure.text(0.1 / page.width, 0.06 / page.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
-        style.save_figure(figure, path)
+        yield figure
 
 
 @dataclass(frozen=True)

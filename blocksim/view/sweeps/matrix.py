@@ -1,8 +1,8 @@
 """Scatter matrix: every two of the inputs and the final x of the blocks, cases that agree and the repeats marked."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from blocksim.view.sweeps.data import Floats, Input, SweepData, ValueAxis, perce
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
 LEFT, FOOT = 0.46, 0.34  # inches; more where names of levels stand there
 GAP = 0.05  # inches, between panels
@@ -70,8 +71,9 @@ def variables_of(sweep: SweepData) -> list[Variable]:
     ]
 
 
-def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
-    """Draw the lower half of the matrix, with histograms on its diagonal."""
+@contextmanager
+def drawn(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
+    """Give the lower half of the matrix, with histograms on its diagonal."""
     variables = variables_of(sweep)
     count, legend = len(variables), _entries(sweep)
     sides = _sides_of(variables)
@@ -93,7 +95,7 @@ def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
             place = (sides.left + row * (size + GAP) + size + 0.04, bottom + 0.5 * size)
             layout.write_text(figure, *place, variables[row].name, va="center", fontsize=NAME_FONT)
         figure.legend(handles=legend, **_legend_place(across, height))
-        style.save_figure(figure, path)
+        yield figure
 
 
 @dataclass(frozen=True)

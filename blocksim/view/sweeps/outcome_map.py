@@ -1,17 +1,19 @@
 """Outcome map: run-outs and class of the outcome over two inputs; one column per value of a third."""
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from blocksim.view import layout, style
 from blocksim.view.layout import OWN, Paper
-from blocksim.view.sweeps.cells import Classes, Plane, classes_of, draw_panel, mark_failed, run_out_scale
+from blocksim.view.sweeps.cells import Classes, Plane, classes_of, draw_panel, manners_of, mark_failed, run_out_scale
 from blocksim.view.sweeps.data import MOST_COLUMNS, Flags, Floats, Input, SweepData, ValueAxis, value_axis
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -28,8 +30,8 @@ FEWEST = 3  # values of an input that is an axis
 
 
 @dataclass(frozen=True, eq=False)
-class _Map:
-    """Contents and layout."""
+class OutcomeMap:
+    """Contents and layout; `panels` are the axes that are drawn, row by row."""
 
     sweep: SweepData
     x: Input
@@ -39,6 +41,7 @@ class _Map:
     axes: tuple[ValueAxis, ValueAxis]
     paper: Paper = OWN
     row_height: float = ROW_HEIGHT
+    panels: "list[list[Axes]]" = field(default_factory=list)
 
     def plane(self, cases: Flags) -> Plane:
         """Return the inputs of some cases."""
@@ -104,10 +107,17 @@ def refusal(sweep: SweepData) -> str:
     return "a map needs two numeric inputs" if len(_axes_of(sweep)) < AXES else ""
 
 
-def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
-    """Draw the map. Samples over more than two inputs are seen along all others."""
-    found = _map_of(sweep, paper)
-    classes = classes_of(sweep)
+@contextmanager
+def drawn(
+    sweep: SweepData, paper: Paper = OWN, axes: tuple[Input, Input] | None = None, *, by_manner: bool = False
+) -> "Iterator[tuple[Figure, OutcomeMap]]":
+    """Give the drawn map. Samples over more than two inputs are seen along all others.
+
+    `axes` are the inputs along x and y, by default the two with the most values. `by_manner` shows in the last row how
+    cases ended in place of their final rotations. Raises InvalidInputError for a page that is too small.
+    """
+    found = map_of(sweep, paper, axes)
+    classes = manners_of(sweep) if by_manner else classes_of(sweep)
     notes = layout.wrapped(_notes(found), found.width - 2.0 * layout.EDGE)
     below = len(notes) - (-len(_shown_classes(classes)) // found.legend_columns)
     foot = FOOT + layout.LINE * (below + len(found.x_label) - 1) + 2.0 * layout.EDGE
@@ -124,7 +134,7 @@ def draw(sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
         for number, line in enumerate(reversed(notes)):
             place = (layout.EDGE, layout.EDGE + layout.LINE * number)
             layout.write_text(figure, *place, line, color=style.FAINT_INK, va="bottom")
-        style.save_figure(figure, path)
+        yield figure, found
 
 
 def _axes_of(sweep: SweepData) -> tuple[Input, ...]:
@@ -132,8 +142,9 @@ def _axes_of(sweep: SweepData) -> tuple[Input, ...]:
     return tuple(sorted((one for one in sweep.inputs if one.is_number), key=lambda one: -one.count)[:AXES])
 
 
-def _map_of(sweep: SweepData, paper: Paper) -> _Map:
-    x, y = axes = _axes_of(sweep)
+def map_of(sweep: SweepData, paper: Paper, axes: tuple[Input, ...] | None = None) -> OutcomeMap:
+    """Return the contents of a map over two inputs, by default those with the most values."""
+    x, y = axes = axes or _axes_of(sweep)
     others = [one for one in sweep.inputs if one not in axes and one.count <= MOST_COLUMNS]
     everything = np.ones(len(sweep.finished), dtype=bool)
     columns: list[tuple[str, Flags]] = [("", everything)]
@@ -142,10 +153,10 @@ def _map_of(sweep: SweepData, paper: Paper) -> _Map:
         values = np.unique(others[0].values)
         columns = [(f"{name} = {others[0].label(value)}", others[0].values == value) for value in values]
     shown = tuple(value_axis(one.values, one.key, one.unit, is_even=one.is_even, typed=one.typed) for one in axes)
-    return _Map(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]), paper)
+    return OutcomeMap(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]), paper)
 
 
-def _panels(figure: "Figure", found: _Map, bottom: float) -> "list[Axes]":
+def _panels(figure: "Figure", found: OutcomeMap, bottom: float) -> "list[Axes]":
     """Return a row of empty panels."""
     step = found.panel_width + COLUMN_GAP
     return [
@@ -155,9 +166,10 @@ def _panels(figure: "Figure", found: _Map, bottom: float) -> "list[Axes]":
 
 
 def _draw_row(
-    figure: "Figure", found: _Map, bottom: float, numbers: Floats, look: dict[str, Any], agrees: Flags | None
+    figure: "Figure", found: OutcomeMap, bottom: float, numbers: Floats, look: dict[str, Any], agrees: Flags | None
 ) -> None:
-    for axes, (_, cases) in zip(_panels(figure, found, bottom), found.columns, strict=True):
+    found.panels.append(_panels(figure, found, bottom))
+    for axes, (_, cases) in zip(found.panels[-1], found.columns, strict=True):
         plane = found.plane(cases)
         draw_panel(axes, plane, numbers[cases], look, None if agrees is None else agrees[cases])
         mark_failed(axes, plane, ~found.sweep.finished[cases])
@@ -166,7 +178,7 @@ def _draw_row(
         axes.tick_params(axis="y", labelleft=cases is found.columns[0][1])
 
 
-def _draw_block(figure: "Figure", found: _Map, block: int, bottom: float) -> None:
+def _draw_block(figure: "Figure", found: OutcomeMap, block: int, bottom: float) -> None:
     """Draw the run-out of a block, with the measured range outlined and marked at the colour bar."""
     x = found.sweep.x_mm[:, block]
     colours, norm = run_out_scale(x)
@@ -193,7 +205,7 @@ def _draw_bar(axes: "Axes", colours: Any, norm: Any, band: tuple[float, float] |
         axes.fill_between([0.55, 1.0], low, high, color=style.MEASURED_COLOUR, linewidth=0.0)
 
 
-def _draw_classes(figure: "Figure", found: _Map, classes: Classes, bottom: float) -> None:
+def _draw_classes(figure: "Figure", found: OutcomeMap, classes: Classes, bottom: float) -> None:
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     look = {
@@ -201,10 +213,10 @@ def _draw_classes(figure: "Figure", found: _Map, classes: Classes, bottom: float
         "norm": BoundaryNorm(np.arange(len(classes.colours) + 1) - 0.5, len(classes.colours)),
     }
     _draw_row(figure, found, bottom, classes.numbers, look, found.sweep.inside)
-    layout.write_text(figure, LEFT, bottom + found.row_height + 0.05, "final rotations of all blocks")
+    layout.write_text(figure, LEFT, bottom + found.row_height + 0.05, classes.title)
 
 
-def _name_axes(figure: "Figure", found: _Map, foot: float) -> None:
+def _name_axes(figure: "Figure", found: OutcomeMap, foot: float) -> None:
     """Write the keys once below and at the left of all panels, numbers only at the outer ones, headings at the top."""
     for axes in figure.axes:
         if axes.get_label() != "<colorbar>":
@@ -229,7 +241,7 @@ def _shown_classes(classes: Classes) -> list[tuple[str, str]]:
     return [pair for number, pair in enumerate(pairs) if (classes.numbers == number).any()]
 
 
-def _draw_legend(figure: "Figure", found: _Map, classes: Classes, top: float) -> None:
+def _draw_legend(figure: "Figure", found: OutcomeMap, classes: Classes, top: float) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -254,7 +266,7 @@ def _draw_legend(figure: "Figure", found: _Map, classes: Classes, top: float) ->
     )
 
 
-def _notes(found: _Map) -> list[str]:
+def _notes(found: OutcomeMap) -> list[str]:
     texts = []
     if found.sweep.measured.x_mm:
         texts.append("Outlined: inside the measured range; at the bottom: inside all of them.")

@@ -86,9 +86,15 @@ def summary_of(name: str, count: int) -> Summary:
     )
 
 
-def write_sweep(folder: Path, cases: int = 6, kept: int = 2) -> None:
-    """Write a sweep over two keys; the first `kept` members have folders with frames."""
+def write_sweep(folder: Path, cases: int = 6, kept: int = 2, *, planned: bool = False) -> None:
+    """Write a sweep over two keys, with its plan if asked; the first `kept` members have folders with frames."""
     folder.mkdir(parents=True)
+    if planned:
+        vary = {"friction.block_block.kinetic": [0.1, 0.2, 0.3], "contact.restitution": [0.1, 0.3]}
+        overrides = {"sweep": {"vary": vary}, "experiment": None}
+        scenario = load_scenario(SCENARIOS / "three_blocks.toml", overrides)
+        keep_scenario(scenario, read_tables(scenario), folder)
+        (folder / files.SCENARIO).rename(folder / "sweep.toml")
     lines = ["case,friction.block_block.kinetic,contact.restitution,status,reason,seconds,inside,1.x_mm,1.rotation_deg"]
     for number in range(cases):
         case, x = f"{number:012x}", 70.0 - number

@@ -1,5 +1,7 @@
 """Maps: cells where they belong, what agrees outlined, classes and colours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,18 +11,19 @@ from blocksim.view.sweeps.cells import (
     OTHER_COLOUR,
     classes_of,
     edges_of,
+    manners_of,
     on_grid,
     outline_of,
     run_out_scale,
 )
 from blocksim.view.sweeps.data import Input, SweepData, percent
-from blocksim.view.sweeps.outcome_map import _map_of
+from blocksim.view.sweeps.outcome_map import map_of
 from tests.view.sweeps.made_up import grid, made_up
 
 
 def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
     sweep = made_up(grid())
-    found = _map_of(sweep, OWN)
+    found = map_of(sweep, OWN)
     x, y, table = on_grid(found.plane(np.ones(35, dtype=bool)), sweep.x_mm[:, 1])
     assert x.tolist() == pytest.approx(np.linspace(0.2, 0.4, 7).tolist())
     assert y.tolist() == pytest.approx(np.geomspace(1e-3, 1e-1, 5).tolist())
@@ -31,7 +34,7 @@ def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
 def test_cells_that_were_not_run_stay_empty() -> None:
     friction, scale = grid()
     cut = tuple(Input(one.key, one.unit, one.values[:-1]) for one in (friction, scale))
-    found = _map_of(made_up(cut), OWN)
+    found = map_of(made_up(cut), OWN)
     _, _, table = on_grid(found.plane(np.ones(34, dtype=bool)), np.ones(34))
     assert np.argwhere(np.isnan(table)).tolist() == [[4, 6]]
 
@@ -81,3 +84,12 @@ def test_colours_change_at_round_run_outs_and_span_nearly_all() -> None:
     _, norm = run_out_scale(np.full(5, 70.0))
     assert norm.boundaries[0] <= 69.5
     assert norm.boundaries[-1] >= 70.5
+
+
+def test_cases_are_classed_by_how_they_ended_where_that_is_known() -> None:
+    made = replace(
+        made_up((Input("gravity", "", np.arange(4.0)),), failed=1), manners=("fell", "fell", "stands", "fell")
+    )
+    found = manners_of(made)
+    assert found.labels == ("stands: 25 %", "fell: 50 %", "failed: 25 %")
+    assert found.numbers.tolist() == [2.0, 1.0, 0.0, 1.0]

@@ -36,14 +36,3 @@ const roundBelow = (length) => {
   const power = 10 ** Math.floor(Math.log10(length));
   return [5, 2, 1].find((part) => part * power <= length) * power;
 };
-
-// Round numbers between low and high for an axis.
-const ticks = (low, high, most) => {
-  const span = high - low || 1;
-  const raw = span / most;
-  const power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((part) => part * power).find((part) => part >= raw * 0.999);
-  const found = [];
-  for (let tick = Math.ceil(low / step - 1e-9) * step; tick <= high + 1e-9 * span; tick += step) found.push(Number(tick.toPrecision(12)));
-  return found;
-};

@@ -9,8 +9,6 @@ class Frames {
     this.outlines = data.outlines;
     this.startAngle = data.start_angle;
     this.time = decode(data.time);
-    this.energy = Object.entries(data.energy).map(([name, part]) => [name, decode(part)]);
-    this.contactCount = decode(data.contact_count);
     for (const [name, part] of Object.entries(data.channels)) this[name] = decode(part);
     this.systems = data.systems.map((one) => ({ ...one, x: decode(one.x), y: decode(one.y), shape: one.shape && decode(one.shape), shades: (one.shades ?? []).map((shade) => ({ ...shade, values: decode(shade.values) })) }));
     this.loads = data.loads && {
@@ -20,9 +18,6 @@ class Frames {
     };
     this.forces = data.forces && { ...data.forces, ...Object.fromEntries(["x", "y", "fx", "fy"].map((name) => [name, decode(data.forces[name])])) };
   }
-
-  // What was measured of one quantity of a block, if anything.
-  measuredOf(quantity, block) { return this.measured.find((row) => row.quantity === quantity && row.block === block); }
 
   // Height of the ground at rest (mm).
   groundAt(x) {
@@ -63,13 +58,6 @@ class Frames {
       else high = middle - 1;
     }
     return low;
-  }
-
-  // The blocks in the order of the ways of their centres from start to end, the longest first.
-  byWay() {
-    const last = (this.count - 1) * this.blocks;
-    const way = (block) => Math.hypot(this.x[last + block] - this.x[block], this.y[last + block] - this.y[block]);
-    return this.names.map((_, block) => block).sort((one, other) => way(other) - way(one) || one - other);
   }
 
   // Corners of a block that is no rectangle, along its own axes (mm); null for a rectangle.

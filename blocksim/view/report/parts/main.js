@@ -9,11 +9,12 @@ const build = (section) => {
   if (data.kind === "run") {
     if (!data.frames) return null;
     const player = new Player(section, data.frames);
-    return { player, histories: new Histories(section.querySelector(".histories"), player) };
+    const root = section.querySelector(".histories");
+    return { player, histories: root && new Histories(root, player, data.frames.histories) };
   }
   if (data.kind === "study") return null;
   const table = new CaseTable(section, data, open);
-  return { table, map: new OutcomeMap(section, data, table, open) };
+  return { table, map: data.pictures.length ? new Pictures(section, data, table, open) : null };
 };
 
 const show = () => {
