@@ -17,7 +17,7 @@ from blocksim.view.loads import length_in, outside, with_room
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import Canvas, Page, depth_of, draw_ruler, finish_panel, page_for
 from blocksim.view.run_data import Floats, FramesLike, Indices, Support, drawable_frames
-from blocksim.view.scene import draw_blocks, draw_standing
+from blocksim.view.scene import Scene, draw_blocks, draw_standing
 from blocksim.view.window import MILLIMETRES, extent_of, together
 
 if TYPE_CHECKING:
@@ -139,6 +139,7 @@ class Animation:
         self.drawable = drawable_frames(frames)
         self.has_trails = len(frames.names) <= FEW_BLOCKS if look.trails is None else look.trails
         self.paint = look.paint or by_block(frames)
+        self.scene = Scene(frames, support, self.paint)
         across = look.width / DOTS_PER_INCH
         tallest = HIGHEST * (across - 2.0 * MARGINS[0])
         margins = (*MARGINS[:2], MARGINS[2] + self.paint.height)
@@ -176,7 +177,7 @@ class Animation:
         if scales:
             self._tell("; ".join(scales))
         if self.support.is_still:
-            draw_standing(self.canvas, self.frames, int(self.drawable[0]), self.support)
+            draw_standing(self.canvas, self.scene, int(self.drawable[0]))
 
     def _tell(self, scales: str) -> None:
         """Write what leaves the view and the scale of arrows at the right, beside the time, where there is room."""
@@ -203,8 +204,8 @@ class Animation:
     def _draw(self, frame: int) -> None:
         """Add to the panel what has moved since the last picture."""
         if not self.support.is_still:
-            draw_standing(self.canvas, self.frames, frame, self.support)
-        draw_blocks(self.canvas, self.frames, frame, self.support, self.paint)
+            draw_standing(self.canvas, self.scene, frame)
+        draw_blocks(self.canvas, self.scene, frame)
         if self.has_trails:
             self._draw_trails(frame)
         index = int(np.searchsorted(self.drawable, frame))

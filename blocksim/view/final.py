@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, NamedTuple
 from blocksim.view import style
 from blocksim.view.forces import WithContacts, draw_forces, force_scale
 from blocksim.view.labels import LINE, SPACE, Label, arranged, depth, draw_label, labels_of, lines_of, row_height
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.layout import OWN, Paper, add_axes, write_text
 from blocksim.view.load_arrows import draw_marks, draw_outside
 from blocksim.view.loads import length_in, outside, with_room
 from blocksim.view.measured import MeasuredTable, widened
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import Canvas, Page, depth_of, draw_ruler, finish_panel, page_for
 from blocksim.view.run_data import FramesLike, Support, drawable_frames, moments_at
-from blocksim.view.scene import TOP, draw_centres, draw_scene
+from blocksim.view.scene import TOP, Scene, draw_centres, draw_scene
 from blocksim.view.window import Extent, extent_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 WIDTH = 7.2  # inches
 MARKS = 0.2  # inches, for what acts on all blocks, above the panel
@@ -65,17 +65,32 @@ def draw_final(
     length = length_in(extent)
     extent = widened(with_room(extent, acts, length), [])
     sheet = _sheet(frames, frame, extent, measured if frame == drawable[-1] else None, paper, around)
-    with style.styled_figure(sheet.page.width, sheet.height, paper.dots) as figure:
-        canvas = _draw_panel(figure, frames, frame, sheet, support, paint)
+    page, room = sheet.page, sheet.room
+    with style.styled_figure(page.width, sheet.height, paper.dots) as figure:
+        bottom = sheet.height - sheet.head - page.panel_height
+        canvas = Canvas(
+            add_axes(figure, SIDE, bottom, page.panel_width, page.panel_height), page.extent, page.points_per_mm
+        )
+        draw_scene(canvas, Scene(frames, support, paint), frame)
+        finish_panel(canvas, (page.panel_width, page.panel_height), labelled=True)
+        if page.extent.tilt:
+            draw_ruler(canvas, depth_of(0))
         if sheet.is_labelled and sheet.labels:
             draw_centres(canvas, frames, frame)
-            _draw_labels(figure, sheet)
+            _draw_labels(add_axes(figure, SIDE, sheet.height - page.height - room, page.panel_width, room), sheet)
         draw_outside(canvas, acts, 0, length)
         draw_marks(canvas, acts.marks[0])
         if scale is not None:
             draw_forces(canvas, frames, frame, scale)
         draw_key(figure, paint, SIDE, sheet.foot - paint.height)
-        _draw_texts(figure, title, _caption(frames, frame), "\n".join(sheet.notes))
+        caption = f"{float(frames.time[frame]):.3f} s" + (", final" if frame == len(frames.time) - 1 else "")
+        top = sheet.height - 0.08
+        write_text(figure, page.width - SIDE, top, caption, ha="right", va="top")
+        if title:
+            width = page.panel_width * style.POINTS_PER_INCH - style.width_of(caption, style.FONT_SIZE) - SPACE[0]
+            shown = style.cut_to(title, width, style.TITLE_SIZE)
+            write_text(figure, SIDE, top, shown, va="top", fontsize=style.TITLE_SIZE)
+        write_text(figure, SIDE, 0.06, "\n".join(sheet.notes), color=style.FAINT_INK, va="bottom")
         style.save_figure(figure, path)
 
 
@@ -139,50 +154,14 @@ def _tried(frames: FramesLike, frame: int, page: Page, measured: MeasuredTable |
     return replace(sheet, height=page.height + sheet.room + foot)
 
 
-def _draw_panel(
-    figure: "Figure", frames: FramesLike, frame: int, sheet: Sheet, support: Support, paint: Paint
-) -> Canvas:
-    """Draw the blocks at the top of the page."""
-    page, height = sheet.page, float(figure.get_figheight())
-    bottom = height - sheet.head - page.panel_height
-    place = SIDE / page.width, bottom / height, page.panel_width / page.width, page.panel_height / height
-    canvas = Canvas(figure.add_axes(place), page.extent, page.points_per_mm)
-    draw_scene(canvas, frames, frame, support, paint)
-    finish_panel(canvas, (page.panel_width, page.panel_height), labelled=True)
-    if page.extent.tilt:
-        draw_ruler(canvas, depth_of(0))
-    return canvas
-
-
-def _draw_labels(figure: "Figure", sheet: Sheet) -> None:
+def _draw_labels(axes: "Axes", sheet: Sheet) -> None:
     """Draw the labels below the axis, on a scale of points."""
-    page, room = sheet.page, sheet.room
-    bottom = sheet.height - page.height - room
-    axes = figure.add_axes(
-        (SIDE / page.width, bottom / sheet.height, page.panel_width / page.width, room / sheet.height)
-    )
     axes.set_axis_off()
-    axes.set_xlim(0.0, page.panel_width * style.POINTS_PER_INCH)
-    axes.set_ylim(-room * style.POINTS_PER_INCH, 0.0)
+    axes.set_xlim(0.0, sheet.page.panel_width * style.POINTS_PER_INCH)
+    axes.set_ylim(-sheet.room * style.POINTS_PER_INCH, 0.0)
     apart = row_height(sheet.labels)
     for label in sheet.labels:
         draw_label(axes, label, -label.row * apart)
-
-
-def _draw_texts(figure: "Figure", title: str | None, caption: str, legend: str) -> None:
-    height = float(figure.get_figheight())
-    width = float(figure.get_figwidth())
-    left, top = SIDE / width, 1.0 - 0.08 / height
-    figure.text(1.0 - left, top, caption, ha="right", va="top")
-    if title:
-        room = (width - 2.0 * SIDE) * style.POINTS_PER_INCH - style.width_of(caption, style.FONT_SIZE) - SPACE[0]
-        figure.text(left, top, style.cut_to(title, room, style.TITLE_SIZE), va="top", fontsize=style.TITLE_SIZE)
-    figure.text(left, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
-
-
-def _caption(frames: FramesLike, frame: int) -> str:
-    time = f"{float(frames.time[frame]):.3f} s"
-    return f"{time}, final" if frame == len(frames.time) - 1 else time
 
 
 def _legend(labels: Sequence[Label], *, is_labelled: bool) -> str:

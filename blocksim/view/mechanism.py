@@ -1,7 +1,7 @@
 """A mechanism beside its last stable neighbour: blocks coloured by displacement, joints that slide or rock marked."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,14 +10,14 @@ import numpy as np
 
 from blocksim.view import style
 from blocksim.view.forces import WithContacts
-from blocksim.view.joints import Joint, joints
+from blocksim.view.joints import joints
 from blocksim.view.layout import EDGE, LINE, OWN, Paper, add_axes, wrapped, write_heading, write_text
 from blocksim.view.load_arrows import draw_outside
 from blocksim.view.loads import SPEED, Outside, length_in, outside, with_room
-from blocksim.view.paint import Paint, by_displacement, displacements, draw_key
+from blocksim.view.paint import by_displacement, displacements, draw_key
 from blocksim.view.panel import Canvas, Page, finish_panel, page_for
 from blocksim.view.run_data import Support, drawable_frames, shortest_sides
-from blocksim.view.scene import corners, draw_scene
+from blocksim.view.scene import Scene, corners, draw_scene
 from blocksim.view.window import MILLIMETRES, Extent, extent_of
 
 if TYPE_CHECKING:
@@ -82,7 +82,8 @@ def draw_mechanisms(
     tallest = paper.panel(TALLEST, rows, HEAD + foot + rows * (HEAD + ROW_GAP), LOWEST)
     pages = [page_for(_extent(pair), across, min(tallest, TALLEST), (SIDE, HEAD, ROW_GAP)) for pair in brackets]
     height = paper.height(HEAD + sum(page.height for page in pages) + foot)
-    most = max(_most(side) for pair in brackets for side in pair)
+    sides = [side for pair in brackets for side in pair]
+    most = max(float(displacements(side.frames, side.support)[side.frame].max()) for side in sides)
     with style.styled_figure(width, height, paper.dots) as figure:
         top = height - HEAD
         for pair, page in zip(brackets, pages, strict=True):
@@ -98,27 +99,18 @@ def draw_mechanisms(
         style.save_figure(figure, path)
 
 
-def _most(side: Side) -> float:
-    """Return the largest displacement (m) in the frame that is drawn."""
-    return float(displacements(side.frames, side.support)[side.frame].max())
-
-
 def _extent(pair: tuple[Side, Side]) -> Extent:
     """Return what both panels of a row show: on one scale, all blocks of either."""
-    one, other = (_extent_of_side(side) for side in pair)
-    return Extent(
+    found = [extent_of(side.frames, np.array([side.frame]), side.support) for side in pair]
+    one, other = (with_room(extent, side.acts, length_in(extent)) for extent, side in zip(found, pair, strict=True))
+    return replace(
+        one,
         left=min(one.left, other.left),
         right=max(one.right, other.right),
         bottom=min(one.bottom, other.bottom),
         top=max(one.top, other.top),
         base=min(one.base, other.base),
-        tilt=one.tilt,
     )
-
-
-def _extent_of_side(side: Side) -> Extent:
-    extent = extent_of(side.frames, np.array([side.frame]), side.support)
-    return with_room(extent, side.acts, length_in(extent))
 
 
 def _told_of_loads(brackets: Sequence[tuple[Side, Side]]) -> list[str]:
@@ -132,35 +124,25 @@ def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, fl
     """Draw a panel with its upper left corner at a place in inches; ground is tilted as it is on that side."""
     left, top = corner
     axes = add_axes(figure, left, top - HEAD - page.panel_height, page.panel_width, page.panel_height)
-    extent = Extent(**{**vars(page.extent), "tilt": side.support.tilt})
+    extent = replace(page.extent, tilt=side.support.tilt)
     canvas = Canvas(axes, extent, page.points_per_mm)
-    paint: Paint = by_displacement(side.frames, side.support, most)
-    draw_scene(canvas, side.frames, side.frame, side.support, paint, with_tops=False)  # they read as sliding joints
+    paint = by_displacement(side.frames, side.support, most)
+    draw_scene(canvas, Scene(side.frames, side.support, paint, with_tops=False), side.frame)  # tops read as joints
     draw_outside(canvas, side.acts, 0, length_in(extent))
-    _mark_first(canvas, side)
-    _mark_joints(canvas, joints(side.frames, side.frame, side.support))
+    if side.first in side.frames.names:
+        outline = corners(side.frames, side.frame)[side.frames.names.index(side.first)]
+        canvas.axes.plot(*np.concatenate([outline, outline[:2]]).T, transform=canvas.scene, **FIRST)
+    for joint in joints(side.frames, side.frame, side.support):
+        if joint.slides:
+            canvas.axes.plot(*MILLIMETRES * joint.points.T, transform=canvas.scene, solid_capstyle="butt", **SLIDING)
+        for x, y in MILLIMETRES * joint.hinges:
+            canvas.axes.plot(x, y, transform=canvas.scene, **HINGE)
     finish_panel(canvas, (page.panel_width, page.panel_height), labelled=False)
     axes.xaxis.set_visible(False)
     room = page.panel_width * style.POINTS_PER_INCH
     for number, line in enumerate(side.caption.split("\n")):
         text = style.cut_to(line, room, style.FONT_SIZE)
         write_text(figure, left, top - LINE * (number + 1), text, color=style.FAINT_INK if number else style.INK)
-
-
-def _mark_first(canvas: Canvas, side: Side) -> None:
-    if side.first in side.frames.names:
-        outline = corners(side.frames, side.frame)[side.frames.names.index(side.first)]
-        closed = np.concatenate([outline, outline[:2]])
-        canvas.axes.plot(*closed.T, transform=canvas.scene, **FIRST)
-
-
-def _mark_joints(canvas: Canvas, found: Sequence[Joint]) -> None:
-    for joint in found:
-        points = MILLIMETRES * joint.points
-        if joint.slides:
-            canvas.axes.plot(*points.T, transform=canvas.scene, solid_capstyle="butt", **SLIDING)
-        for x, y in MILLIMETRES * joint.hinges:
-            canvas.axes.plot(x, y, transform=canvas.scene, **HINGE)
 
 
 def _draw_legend(figure: "Figure", columns: int, bottom: float) -> None:

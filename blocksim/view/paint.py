@@ -62,7 +62,8 @@ class Scale:
 class Paint:
     """The fills (#rrggbb) of all blocks in a frame, and what explains them: named colours, a scale, or nothing.
 
-    `elements` are those of the elements of each system beside the blocks; where there are any, the scale is theirs.
+    `elements` are those of the elements of each system beside the blocks, None for a system in one colour; where there
+    are any, the scale is theirs.
     """
 
     fills: Fills
@@ -82,10 +83,6 @@ class Paint:
         """Whether a block keeps its colour throughout the run."""
         return self.scale is None or any(self.elements)
 
-    def of_system(self, number: int) -> Fills | None:
-        """Return the fills of the elements of a system beside the blocks; None: all have the system's colour."""
-        return self.elements[number] if number < len(self.elements) else None
-
 
 def by_block(frames: FramesLike) -> Paint:
     """Return the default: blocks take turns in six colours."""
@@ -93,7 +90,7 @@ def by_block(frames: FramesLike) -> Paint:
     return Paint(lambda _: fills)
 
 
-def by_material(scenario: Scenario) -> Paint:
+def by_material(_: object, scenario: Scenario) -> Paint:
     """Return a colour for each material, in the order of the blocks; fixed bodies keep the ground's."""
     bodies = place_bodies(scenario)
     materials = list(dict.fromkeys(body.material for body in bodies))
@@ -114,11 +111,6 @@ def by_speed(frames: MovingFrames) -> Paint:
     high = factor * (usual if is_cut else largest)
     scale = Scale(f"speed ({unit})", SPEED_COLOURS, 0.0, high, "max" if is_cut else "neither")
     return _scaled(factor * speeds, scale)
-
-
-def shades_of(frames: Any) -> list[Shade]:
-    """Return by what the elements of the systems beside the blocks can be coloured."""
-    return [shade for track in others_of(frames) for shade in track.system.shades]
 
 
 def shade_scale(shade: Shade, values: Floats) -> Scale:
@@ -169,15 +161,10 @@ def by_displacement(frames: FramesLike, support: Support, most: float) -> Paint:
     )
 
 
-def material_paint(_: FramesLike, scenario: Scenario) -> Paint:
-    """Return `by_material`, called as all others are."""
-    return by_material(scenario)
-
-
 # Each takes the frames and the scenario; another way to colour is one function and one line here.
 PAINTS: dict[str, Callable[[Any, Scenario], Paint]] = {
     "block": lambda frames, _: by_block(frames),
-    "material": material_paint,
+    "material": by_material,
     "speed": lambda frames, _: by_speed(frames),
     "turn": lambda frames, _: by_turn(frames),
 }
@@ -194,7 +181,7 @@ def paint_named(name: str, frames: Any, scenario: Scenario) -> Paint:
     Elements of other systems have their first shade, unless the meaning is one of theirs: then blocks keep their own
     colours, and the scale is that of the elements.
     """
-    shades = [shade.name for shade in shades_of(frames)]
+    shades = [shade.name for track in others_of(frames) for shade in track.system.shades]
     known = tuple(dict.fromkeys((*PAINTS, *shades)))
     if name not in known:
         message = f"unknown colour {name!r} in this run; choose {', '.join(known)}"

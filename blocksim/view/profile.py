@@ -21,7 +21,7 @@ from blocksim.view.run_data import (
     moments_by_motion,
     others_of,
 )
-from blocksim.view.scene import draw_blocks, draw_standing
+from blocksim.view.scene import Scene, draw_blocks, draw_standing
 from blocksim.view.window import MILLIMETRES, extent_of
 
 WIDTH, LEAST_WIDTH, TALLEST = 7.2, 2.0, 6.0  # inches
@@ -67,8 +67,8 @@ def draw_profile(
     )
     with style.styled_figure(page.width, paper.height(page.height), paper.dots) as figure:
         canvas = Canvas(figure.add_axes(page.place), page.extent, page.points_per_mm)
-        draw_standing(canvas, frames, int(chosen[-1]), support)
-        draw_blocks(canvas, _alone(frames), int(chosen[-1]), support, key)
+        draw_standing(canvas, Scene(frames, support, key), int(chosen[-1]))
+        draw_blocks(canvas, Scene(_alone(frames), support, key), int(chosen[-1]))
         for shade, of_frame in zip(shades, lines, strict=True):
             for line in of_frame:
                 canvas.axes.plot(*(MILLIMETRES * line).T, color=shade, linewidth=THICK, transform=canvas.scene)

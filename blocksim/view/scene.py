@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from blocksim.view import style
 from blocksim.view.ground import draw_shift, draw_start, draw_support
-from blocksim.view.paint import Paint, by_block
+from blocksim.view.paint import Paint
 from blocksim.view.panel import Canvas
 from blocksim.view.run_data import Floats, FramesLike, Support, corners_of, others_of, outlines_of, shortest_sides
 from blocksim.view.window import MILLIMETRES
@@ -53,56 +53,71 @@ def readable_scale(frames: FramesLike) -> float:
     return float((np.maximum(wide * lengths, tall) / sizes).max(initial=0.0))
 
 
-def draw_scene(
-    canvas: Canvas,
-    frames: FramesLike,
-    frame: int,
-    support: Support,
-    paint: Paint | None = None,
-    *,
-    with_tops: bool = True,
-) -> None:
-    """Draw the support and the blocks of one frame, as `draw_standing` and `draw_blocks` do."""
-    draw_standing(canvas, frames, frame, support)
-    draw_blocks(canvas, frames, frame, support, paint, with_tops=with_tops)
+@dataclass(frozen=True)
+class Scene:
+    """Frames of a run on their support, and the colours of the blocks.
+
+    `with_tops` marks the top face that each free block had at the start.
+    """
+
+    frames: FramesLike
+    support: Support
+    paint: Paint
+    with_tops: bool = True
+
+    @property
+    def fixed(self) -> Flags:
+        """Whether each block is fixed or driven, (b,)."""
+        return np.array(self.support.fixed or (False,) * len(self.frames.names), dtype=bool)
 
 
-def draw_standing(canvas: Canvas, frames: FramesLike, frame: int, support: Support) -> None:
+def draw_scene(canvas: Canvas, scene: Scene, frame: int) -> None:
+    """Draw the support and the blocks of one frame."""
+    draw_standing(canvas, scene, frame)
+    draw_blocks(canvas, scene, frame)
+
+
+def draw_standing(canvas: Canvas, scene: Scene, frame: int) -> None:
     """Draw ground and walls at the time of one frame, and where they were at the start."""
-    offset = MILLIMETRES * support.offset(frames.time[frame : frame + 1])[0]
-    support = support.at(float(frames.time[frame]))
+    frames = scene.frames
+    offset = MILLIMETRES * scene.support.offset(frames.time[frame : frame + 1])[0]
+    support = scene.support.at(float(frames.time[frame]))
     draw_support(canvas, support, offset)
-    carried = _fixed(frames, support) & ~np.array(support.driven or (False,) * len(frames.names), dtype=bool)
+    carried = scene.fixed & ~np.array(support.driven or (False,) * len(frames.names), dtype=bool)
     draw_start(canvas, support, offset, corners(frames, frame)[carried & are_there(frames, frame)])
     draw_shift(canvas, support, offset, MILLIMETRES * (float(frames.x[0].mean()) if frames.names else 0.0))
 
 
-def draw_blocks(
-    canvas: Canvas,
-    frames: FramesLike,
-    frame: int,
-    support: Support,
-    paint: Paint | None = None,
-    *,
-    with_tops: bool = True,
-) -> None:
-    """Draw the blocks of one frame, free and fixed ones, with their names where there is room for all.
+def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
+    """Draw the blocks of one frame with their names, free ones each in its colour, fixed ones hatched in the ground's.
 
-    `with_tops` marks the top face that each free block had at the start. Other systems lie below the blocks, each in
-    one colour, or each element in that of the paint.
+    Other systems lie below the blocks, each in one colour, or each element in that of the paint.
     """
-    paint = paint or by_block(frames)
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    frames, paint, fixed, there = scene.frames, scene.paint, scene.fixed, are_there(scene.frames, frame)
     for number, track in enumerate(others_of(frames)):
-        of_elements = paint.of_system(number)
-        colours = style.block_colour(number + 1) if of_elements is None else of_elements(frame)
-        _draw_system(canvas, track, frame, colours)
-    fixed = _fixed(frames, support)
-    own = paint.fills(frame)
-    fills = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, own, strict=True)]
-    _draw_outlines(canvas, frames, frame, fixed, fills)
-    if with_tops:
-        _draw_tops(canvas, frames, frame, ~fixed)
-    _draw_names(canvas, frames, frame, fixed, fills)
+        of_elements = paint.elements[number] if number < len(paint.elements) else None
+        _draw_system(
+            canvas, track, frame, style.block_colour(number + 1) if of_elements is None else of_elements(frame)
+        )
+    fills = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, paint.fills(frame), strict=True)]
+    outlines = corners(frames, frame)
+    smallest = MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min(initial=np.inf))
+    thin = min(style.LINE_WIDTH, 0.05 * smallest)
+    edge: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
+    hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
+    colours = [fill for fill, is_free in zip(fills, ~fixed & there, strict=True) if is_free]
+    held = PolyCollection(list(outlines[fixed & there]), facecolors=style.GROUND_COLOUR, hatch=hatch, **edge)
+    canvas.axes.add_collection(held)
+    canvas.axes.add_collection(PolyCollection(list(outlines[~fixed & there]), facecolors=colours, **edge))
+    if scene.with_tops:
+        lines = placed_points(upper_sides(frames), frames.x[frame], frames.y[frame], frames.angle[frame])
+        shown = list(MILLIMETRES * lines[~fixed & there])
+        tops = LineCollection(shown, colors=style.INK, linewidths=2.0 * thin, transform=canvas.scene)
+        canvas.axes.add_collection(tops)
+    for kind in (fixed & there, ~fixed & there):
+        _draw_names(canvas, frames, frame, kind, fills)
 
 
 def _draw_system(canvas: Canvas, track: Track, frame: int, colours: str | Sequence[str]) -> None:
@@ -124,11 +139,6 @@ def are_there(frames: FramesLike, frame: int) -> Flags:
     """Return for every block whether it has not been removed by a frame, (b,): what is not there has no velocity."""
     vx = getattr(frames, "vx", None)
     return np.ones(len(frames.names), dtype=bool) if vx is None else np.asarray(~are_removed(vx[frame]))
-
-
-def _fixed(frames: FramesLike, support: Support) -> Flags:
-    """Return for every block whether it is fixed or driven, (b,)."""
-    return np.array(support.fixed or (False,) * len(frames.names), dtype=bool)
 
 
 def draw_centres(canvas: Canvas, frames: FramesLike, frame: int) -> None:
@@ -162,99 +172,42 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
             )
 
 
-def _draw_outlines(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
-    """Draw free blocks each in its colour, fixed ones hatched in that of the ground."""
-    from matplotlib.collections import PolyCollection
-
-    outlines = corners(frames, frame)
-    smallest = _smallest(canvas, frames)
-    thin = _edge_width(smallest)
-    line: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
-    there = are_there(frames, frame)
-    colours = [fill for fill, is_free in zip(fills, ~fixed & there, strict=True) if is_free]
-    hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
-    held = PolyCollection(list(outlines[fixed & there]), facecolors=style.GROUND_COLOUR, hatch=hatch, **line)
-    free = PolyCollection(list(outlines[~fixed & there]), facecolors=colours, **line)
-    for artist in (held, free):
-        canvas.axes.add_collection(artist)
-
-
-def _draw_tops(canvas: Canvas, frames: FramesLike, frame: int, free: Flags) -> None:
-    """Mark the top faces that free blocks had at the start."""
-    from matplotlib.collections import LineCollection
-
-    sides = LineCollection(
-        list(_upper_sides(frames, frame)[free & are_there(frames, frame)]),
-        colors=style.INK,
-        linewidths=2.0 * _edge_width(_smallest(canvas, frames)),
-        transform=canvas.scene,
-    )
-    canvas.axes.add_collection(sides)
-
-
-def _smallest(canvas: Canvas, frames: FramesLike) -> float:
-    """Return the shortest side of all blocks (points)."""
-    return MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min(initial=np.inf))
-
-
-def _edge_width(smallest: float) -> float:
-    """Return the width of the edges of blocks (points)."""
-    return min(style.LINE_WIDTH, 0.05 * smallest)
-
-
-def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, fixed: Flags, fills: Sequence[str]) -> None:
-    """Write the names of free and of fixed blocks, of either kind only where there is room for all."""
-    places = _centres(frames, frame)
-    from matplotlib.patheffects import withStroke
-
-    fonts = _label_fonts(frames, canvas.points_per_mm)
-    there = are_there(frames, frame)
-    for kind in (fixed & there, ~fixed & there):
-        if not all(fonts[kind]):
-            continue
-        for index in np.flatnonzero(kind):
-            fill = fills[int(index)]
-            canvas.axes.text(
-                float(places[index, 0]),
-                float(places[index, 1]),
-                style.shortened(frames.names[index], LETTERS),
-                fontsize=fonts[index],
-                color=style.text_colour(fill),
-                ha="center",
-                va="center_baseline",
-                clip_on=True,
-                transform=canvas.scene,
-                path_effects=[withStroke(linewidth=HALO, foreground=fill)],
-                bbox={"facecolor": fill, "linewidth": 0.0, "pad": 0.8} if fixed[index] else None,
-            )
-
-
-def _label_fonts(frames: FramesLike, points_per_mm: float) -> Floats:
-    """Return the font size of each block's name, 0 where it would be unreadable.
+def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, chosen: Flags, fills: Sequence[str]) -> None:
+    """Write the names of some blocks at their middles, of polygons their centroids, where there is room for all.
 
     Names on some blocks only would look like a difference between the blocks.
     """
-    sizes = MILLIMETRES * points_per_mm * shortest_sides(frames)
-    rooms = [(NAME_ROOM[0] * float(size), NAME_ROOM[1] * float(size)) for size in sizes]
-    return np.array([style.fitting_font(name, room) for name, room in zip(frames.names, rooms, strict=True)])
+    from matplotlib.patheffects import withStroke
 
-
-def _centres(frames: FramesLike, frame: int) -> Floats:
-    """Return where the names of blocks stand (mm), (b, 2): their middles, of polygons their centroids."""
+    sizes = MILLIMETRES * canvas.points_per_mm * shortest_sides(frames)
+    fonts = {
+        int(index): style.fitting_font(frames.names[index], (NAME_ROOM[0] * sizes[index], NAME_ROOM[1] * sizes[index]))
+        for index in np.flatnonzero(chosen)
+    }
+    if not all(fonts.values()):
+        return
+    places = MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
     if frames.outlines is None:
-        return np.asarray(corners(frames, frame).mean(axis=1))
-    return np.asarray(MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1))
-
-
-def _upper_sides(frames: FramesLike, frame: int) -> Floats:
-    """Return a line (mm) inside each block along its own upper side, which shows turns; (b, 2, 2)."""
-    return np.asarray(
-        MILLIMETRES * placed_points(upper_sides(frames), frames.x[frame], frames.y[frame], frames.angle[frame])
-    )
+        places = corners(frames, frame).mean(axis=1)
+    for index, font in fonts.items():
+        canvas.axes.text(
+            *places[index],
+            style.shortened(frames.names[index], LETTERS),
+            fontsize=font,
+            color=style.text_colour(fills[index]),
+            ha="center",
+            va="center_baseline",
+            clip_on=True,
+            transform=canvas.scene,
+            path_effects=[withStroke(linewidth=HALO, foreground=fills[index])],
+            bbox={"facecolor": fills[index], "linewidth": 0.0, "pad": 0.8}
+            if fills[index] == style.GROUND_COLOUR
+            else None,
+        )
 
 
 def upper_sides(frames: FramesLike) -> Floats:
-    """Return the same lines along the blocks' own axes (m, (b, 2, 2))."""
+    """Return a line inside each block along its upper side, which shows turns, in its own axes (m, (b, 2, 2))."""
     if frames.outlines is not None:
         return _upper_sides_of_polygons(frames.outlines, 0.5 * (1.0 - EDGE_INSET) * shortest_sides(frames))
     half_x, half_y = 0.5 * frames.size_x, 0.5 * frames.size_y

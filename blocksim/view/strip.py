@@ -3,35 +3,30 @@
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from blocksim.view import style
 from blocksim.view.forces import ForceScale, WithContacts, draw_forces, force_scale
-from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.layout import OWN, Paper, write_heading, write_text
 from blocksim.view.load_arrows import draw_marks, draw_outside
-from blocksim.view.loads import Outside, length_in, outside, with_room
+from blocksim.view.loads import length_in, outside, with_room
 from blocksim.view.measured import MeasuredTable, measured_ranges, rows_of, widened
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.panel import ROW_HEIGHT, Canvas, depth_of, draw_ruler, finish_panel
-from blocksim.view.run_data import FramesLike, Indices, Support, drawable_frames, moments_at, moments_by_motion
-from blocksim.view.scene import TOP, MeasuredRange, draw_centres, draw_measured, draw_scene, readable_scale
+from blocksim.view.run_data import FramesLike, Support, drawable_frames, moments_at, moments_by_motion
+from blocksim.view.scene import TOP, MeasuredRange, Scene, draw_centres, draw_measured, draw_scene, readable_scale
 from blocksim.view.strip_layout import (
     LEAST_WIDTH,
     LINE,
     POINTS,
     SIDE,
     WIDTH,
-    Layout,
     Lines,
     arrangement,
     plan_on,
 )
-from blocksim.view.window import MILLIMETRES, Extent, extent_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from blocksim.view.window import MILLIMETRES, extent_of
 
 LETTERS_AN_INCH = 15.0  # in a line below the strip
 CAPTION = 3.0  # points, from a panel to the text above it
@@ -64,7 +59,9 @@ def draw_strip(
     support, paint = support or Support(), paint or by_block(frames)
     drawable = drawable_frames(frames)
     scale = force_scale(frames) if forces else None
-    extent, length = _window(frames, drawable, support)
+    extent = extent_of(frames, drawable, support)
+    length = length_in(extent)
+    extent = with_room(extent, outside(frames, drawable, support), length)
     ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
     extent = widened(extent, ranges)
     columns, usual = arrangement(extent, readable_scale(frames))
@@ -78,72 +75,32 @@ def draw_strip(
     upper = [TOP] if frames.names else []
     told = [*upper, _legend(ranges, support, scale), acts.explanation]
     notes = wrap(" ".join(filter(None, told)), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
-    lines = Lines(_captions(support, acts), len(notes), rows_of(ranges), paint.height)
+    captions = 1 + (support.motion is not None) + any(acts.marks)
+    lines = Lines(captions, len(notes), rows_of(ranges), paint.height)
     layout = plan_on(paper, extent, columns, len(chosen), lines)
+    scene = Scene(frames, support, paint)
     with style.styled_figure(layout.width, layout.height, paper.dots) as figure:
-        _draw_panels(figure, frames, chosen, layout, ranges, support, paint)
-        _draw_acts(figure, acts, layout, length)
-        if scale is not None:
-            _draw_forces(figure, frames, chosen, layout, scale)
-        _draw_texts(figure, layout, title, notes)
+        for index, frame in enumerate(chosen.tolist()):
+            is_last = index == len(chosen) - 1
+            canvas = Canvas(figure.add_axes(layout.place(index)), layout.extent, layout.points_per_mm)
+            draw_scene(canvas, scene, frame)
+            if is_last and ranges:
+                draw_centres(canvas, frames, frame)
+                draw_measured(canvas, ranges, ROW_HEIGHT)
+            is_lowest = index + layout.columns >= len(chosen)
+            finish_panel(canvas, (layout.panel_width, layout.panel_height), labelled=is_lowest)
+            if layout.extent.tilt:
+                draw_ruler(canvas, depth_of(rows_of(ranges)))
+            draw_outside(canvas, acts, index, length)
+            draw_marks(canvas, acts.marks[index], up=2.0)
+            pad = CAPTION + (LINE * POINTS if acts.marks[index] else 0.0)  # marks stand below the time
+            canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=pad)
+            if scale is not None:
+                draw_forces(canvas, frames, frame, scale)
+        write_heading(figure, title, SIDE)
+        write_text(figure, SIDE, 0.05, "\n".join(notes), color=style.FAINT_INK, va="bottom")
         draw_key(figure, paint, SIDE, 0.05 + len(notes) * LINE)
         style.save_figure(figure, path)
-
-
-def _draw_panels(
-    figure: "Figure",
-    frames: FramesLike,
-    chosen: Indices,
-    layout: Layout,
-    ranges: list[MeasuredRange],
-    support: Support,
-    paint: Paint,
-) -> None:
-    last = len(chosen) - 1
-    for index, frame in enumerate(int(frame) for frame in chosen):
-        canvas = Canvas(figure.add_axes(layout.place(index)), layout.extent, layout.points_per_mm)
-        draw_scene(canvas, frames, frame, support, paint)
-        if ranges and index == last:
-            draw_centres(canvas, frames, frame)
-            draw_measured(canvas, ranges, ROW_HEIGHT)
-        finish_panel(canvas, (layout.panel_width, layout.panel_height), labelled=index + layout.columns > last)
-        if layout.extent.tilt:
-            draw_ruler(canvas, depth_of(rows_of(ranges)))
-        canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=CAPTION)
-
-
-def _window(frames: FramesLike, drawable: Indices, support: Support) -> tuple[Extent, float]:
-    """Return the extent that holds blocks and arrows of loads, and the length (mm) of the longest arrow."""
-    extent = extent_of(frames, drawable, support)
-    length = length_in(extent)
-    return with_room(extent, outside(frames, drawable, support), length), length
-
-
-def _captions(support: Support, acts: Outside) -> int:
-    """Return the lines of text above each panel: time, displacement of the support, loads on all bodies."""
-    return 1 + (support.motion is not None) + any(acts.marks)
-
-
-def _draw_acts(figure: "Figure", acts: Outside, layout: Layout, length: float) -> None:
-    """Add what acts from outside to all panels, and above them what acts on all bodies, below the time."""
-    for index, axes in enumerate(() if acts.is_empty else figure.axes):
-        canvas = Canvas(axes, layout.extent, layout.points_per_mm)
-        draw_outside(canvas, acts, index, length)
-        if acts.marks[index]:
-            draw_marks(canvas, acts.marks[index], up=2.0)
-            axes.set_title(axes.get_title(loc="left"), loc="left", pad=CAPTION + LINE * POINTS)
-
-
-def _draw_forces(figure: "Figure", frames: WithContacts, chosen: Indices, layout: Layout, scale: ForceScale) -> None:
-    """Add the contact forces of every moment to its panel."""
-    for axes, frame in zip(figure.axes, chosen, strict=True):
-        draw_forces(Canvas(axes, layout.extent, layout.points_per_mm), frames, int(frame), scale)
-
-
-def _draw_texts(figure: "Figure", layout: Layout, title: str | None, notes: Sequence[str]) -> None:
-    side = SIDE / layout.width
-    write_heading(figure, title, SIDE)
-    figure.text(side, 0.05 / layout.height, "\n".join(notes), color=style.FAINT_INK, va="bottom")
 
 
 def _caption(frames: FramesLike, frame: int, support: Support) -> str:

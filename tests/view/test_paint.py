@@ -22,7 +22,7 @@ def test_a_block_keeps_its_colour_and_others_take_turns() -> None:
 
 
 def test_blocks_of_one_material_are_alike_and_the_key_names_it() -> None:
-    found = by_material(load_scenario(SCENARIOS / "slope.toml"))
+    found = by_material(None, load_scenario(SCENARIOS / "slope.toml"))
     assert set(found.fills(0)) == {found.entries[0][1]}
     assert [name for name, _ in found.entries] == ["granite"]
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from blocksim.scenario.motion import MotionPieces
 from blocksim.scenario.outlines import holds, least_width, regular
 from blocksim.simulation.frames import Frames
+from blocksim.view.paint import by_block
 from blocksim.view.panel import Canvas
 from blocksim.view.run_data import Support
-from blocksim.view.scene import corners, draw_scene, readable_scale, upper_sides
+from blocksim.view.scene import Scene, corners, draw_scene, readable_scale, upper_sides
 from blocksim.view.style import GROUND_COLOUR, block_colour, styled_figure
 from blocksim.view.window import extent_of
 from tests.view.made_up import blocks_at, polygons
@@ -81,7 +82,7 @@ def drawn(frames: Frames, support: Support, points_per_mm: float = 1.0) -> Canva
     extent = extent_of(frames, np.arange(frame + 1), support)
     with styled_figure(1.0, 1.0) as figure:
         canvas = Canvas(figure.add_axes((0.0, 0.0, 1.0, 1.0)), extent, points_per_mm)
-        draw_scene(canvas, frames, frame, support)
+        draw_scene(canvas, Scene(frames, support, by_block(frames)), frame)
     return canvas
 
 
