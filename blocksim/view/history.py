@@ -37,20 +37,19 @@ from blocksim.view.history_panels import (
     panels_named,
     support_force,
 )
-from blocksim.view.layout import OWN, Paper, plain_numbers, write_heading
+from blocksim.view.layout import OWN, Paper, plain_numbers, write_heading, write_text
 from blocksim.view.measured import MeasuredTable
 from blocksim.view.paint import Paint, by_block
 from blocksim.view.run_data import Floats, Indices, Support, drawable_frames
+from blocksim.view.time_panels import WIDTH, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 7.2  # inches
 LEFT, RIGHT, HEAD, FOOT = 0.80, 1.60, 0.36, 0.62  # inches; the legends stand on the right
-LABEL = 0.16  # inches, from the edge of the page to the right of the name of an axis: seven digits fit beside it
 PANEL, GAP = 1.25, 0.14  # inches
-LOWEST, NARROWEST = 0.55, 1.0  # inches, of a panel on a page whose size was asked for
+LOWEST = 0.55  # inches, of a panel on a page whose size was asked for
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own, unless they are chosen
 MOST_POINTS = 2000  # of a line
 MOST_PATHS = 50  # grey lines in an SVG or PDF; more of them are stored as an image
@@ -146,17 +145,17 @@ def drawn_history(
     choice, support = choice or Choice(), support or Support()
     drawing = _drawing(frames, support, choice, paint or by_block(frames))
     names = _panel_names(drawing, choice, forces=forces)
-    notes = wrap(_legend(drawing, names, is_measured=measured is not None), int(LETTERS_AN_INCH * paper.width(WIDTH)))
-    width = paper.width(WIDTH, LEFT + RIGHT + NARROWEST)
-    foot = FOOT + (len(notes) - 1) * LINE
-    panel = _panel_height(paper, names, foot, len(drawing.shown))
-    height = paper.height(HEAD + len(names) * panel + (len(names) - 1) * GAP + foot)
-    with style.styled_figure(width, height, paper.dots) as figure:
-        panels = dict(zip(names, _panels(figure, foot, len(names), panel), strict=True))
-        for name, axes in panels.items():
-            _draw_panel(axes, drawing, name, measured)
+    legend = _legend(drawing, names, is_measured=measured is not None)
+    notes = wrap(legend, int(LETTERS_AN_INCH * paper.width(WIDTH)))
+    sides = LEFT, RIGHT, HEAD, FOOT + (len(notes) - 1) * LINE
+    heights = _panel_height(names, len(drawing.shown)), LOWEST
+    with stacked(len(names), sides, GAP, heights, paper) as (figure, axes):
+        panels = dict(zip(names, axes, strict=True))
+        for name in names:
+            _draw_panel(panels[name], drawing, name, measured)
         _finish(panels, drawing)
-        _draw_texts(figure, title, "\n".join(notes))
+        write_heading(figure, title, 0.12, 0.08)
+        write_text(figure, 0.12, 0.06, "\n".join(notes), color=style.FAINT_INK, va="bottom")
         yield figure, panels
 
 
@@ -179,7 +178,9 @@ def _drawing(frames: HistoryLike, support: Support, choice: Choice, paint: Paint
     if not frames.names:
         message = "no block to draw: a history is that of blocks, and a probe shows the thrust of soil"
         raise InvalidInputError(message)
-    chosen = _thinned(drawable_frames(frames))
+    chosen = drawable_frames(frames)
+    if len(chosen) > MOST_POINTS:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, MOST_POINTS).round().astype(np.intp)]
     named = blocks_named(frames, choice.blocks)
     shown = named or farthest_blocks(frames, chosen, support, MOST_BLOCKS)
     looks = line_looks(paint.fills(0), shown)
@@ -199,35 +200,12 @@ def _panel_names(drawing: _Drawing, choice: Choice, *, forces: bool) -> tuple[st
     return names if not forces or FORCE in names else (*names, FORCE)
 
 
-def _panel_height(paper: Paper, names: Sequence[str], foot: float, blocks: int) -> float:
+def _panel_height(names: Sequence[str], blocks: int) -> float:
     """Return the height of a panel (inches); names of many blocks need room before the next text at the side."""
     legend = LEGEND + blocks * LINE
     first = next((row for row, name in enumerate(names) if name in MOTIONS), 0)
     end = next((row for row, name in enumerate(names) if row > first and name not in {*MOTIONS, CONTACTS}), len(names))
-    own = max(PANEL, (legend + GAP) / (end - first) - GAP)
-    return paper.panel(own, len(names), HEAD + (len(names) - 1) * GAP + foot, LOWEST)
-
-
-def _thinned(drawable: Indices) -> Indices:
-    if len(drawable) <= MOST_POINTS:
-        return drawable
-    return drawable[np.linspace(0, len(drawable) - 1, MOST_POINTS).round().astype(np.intp)]
-
-
-def _panels(figure: "Figure", foot: float, count: int, panel: float) -> list["Axes"]:
-    """Add so many panels, one below the other, with one axis of time."""
-    across, up = (float(size) for size in figure.get_size_inches())
-    inside = across - LEFT - RIGHT
-    panels = []
-    for row in range(count):
-        bottom = foot + (count - 1 - row) * (panel + GAP)
-        axes = figure.add_axes((LEFT / across, bottom / up, inside / across, panel / up))
-        axes.spines[["right", "top"]].set_visible(False)
-        axes.tick_params(axis="x", labelbottom=row == count - 1)
-        axes.yaxis.set_label_coords((LABEL - LEFT) / inside, 0.5)
-        panels.append(axes)
-    panels[-1].set_xlabel("time (s)", labelpad=2.0)
-    return panels
+    return max(PANEL, (legend + GAP) / (end - first) - GAP)
 
 
 def _draw_panel(axes: "Axes", drawing: _Drawing, name: str, measured: MeasuredTable | None) -> None:
@@ -301,12 +279,6 @@ def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
         axes.set_xlim(start, start + 1.04 * max(end - start, 1e-9))
         axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10], integer=name == CONTACTS))
         plain_numbers(axes.yaxis)
-
-
-def _draw_texts(figure: "Figure", title: str | None, legend: str) -> None:
-    width, height = (float(size) for size in figure.get_size_inches())
-    write_heading(figure, title, 0.12, 0.08)
-    figure.text(0.12 / width, 0.06 / height, legend, color=style.FAINT_INK, va="bottom")
 
 
 def _legend(drawing: _Drawing, names: Sequence[str], *, is_measured: bool) -> str:

@@ -60,27 +60,48 @@ def time_panels_png(panels: Sequence[TimePanel], paper: Paper = OWN) -> bytes:
 
 @contextmanager
 def _drawn(panels: Sequence[TimePanel], title: str | None, note: str, paper: Paper) -> Iterator["Figure"]:
-    width = paper.width(WIDTH, LEFT + RIGHT + NARROWEST)
-    head = HEAD if title else GAP
-    others = head + FOOT + (LINE if note else 0.0) + (len(panels) - 1) * GAP
+    head, foot = HEAD if title else GAP, FOOT + (LINE if note else 0.0)
     own = max(PANEL, *(LINE * (_rows(panel) + 1) for panel in panels))
-    height = paper.panel(own, len(panels), others, LOWEST)
-    total = paper.height(others + len(panels) * height)
-    with style.styled_figure(width, total, paper.dots) as figure:
+    with stacked(len(panels), (LEFT, RIGHT, head, foot), GAP, (own, LOWEST), paper) as (figure, drawn):
         span = _span(panels)
-        drawn = []
-        for row, panel in enumerate(panels):
-            bottom = total - head - (row + 1) * height - row * GAP
-            axes = add_axes(figure, LEFT, bottom, width - LEFT - RIGHT, height)
+        across, up = (float(size) for size in figure.get_size_inches())
+        for axes, panel in zip(drawn, panels, strict=True):
             _draw(axes, panel, span)
-            drawn.append(axes)
-            axes.tick_params(axis="x", labelbottom=row == len(panels) - 1)
-            axes.yaxis.set_label_coords((LABEL - LEFT) / (width - LEFT - RIGHT), 0.5)
-            _write_beside(figure, panel, width - RIGHT + BESIDE, bottom + height)
-        drawn[-1].set_xlabel("time (s)", labelpad=2.0)
+            _write_beside(figure, panel, across - RIGHT + BESIDE, axes.get_position().y1 * up)
         write_heading(figure, title, 0.12, 0.08)
         write_text(figure, 0.12, 0.05, note, color=style.FAINT_INK, va="bottom")
         yield figure
+
+
+@contextmanager
+def stacked(
+    count: int,
+    sides: tuple[float, float, float, float],
+    gap: float,
+    heights: tuple[float, float],
+    paper: Paper,
+) -> Iterator[tuple["Figure", list["Axes"]]]:
+    """Give so many panels over one axis of time, one below the other, with room at left, right, top and bottom.
+
+    `heights` are those of a panel: its own, and the least on a page whose size was asked for. All in inches. Raises
+    InvalidInputError for too small a page.
+    """
+    left, right, head, foot = sides
+    width = paper.width(WIDTH, left + right + NARROWEST)
+    others = head + foot + (count - 1) * gap
+    height = paper.panel(heights[0], count, others, heights[1])
+    total = paper.height(others + count * height)
+    with style.styled_figure(width, total, paper.dots) as figure:
+        panels = []
+        for row in range(count):
+            bottom = foot + (count - 1 - row) * (height + gap)
+            axes = add_axes(figure, left, bottom, width - left - right, height)
+            axes.spines[["right", "top"]].set_visible(False)
+            axes.tick_params(axis="x", labelbottom=row == count - 1)
+            axes.yaxis.set_label_coords((LABEL - left) / (width - left - right), 0.5)
+            panels.append(axes)
+        panels[-1].set_xlabel("time (s)", labelpad=2.0)
+        yield figure, panels
 
 
 def _rows(panel: TimePanel) -> int:
@@ -108,7 +129,6 @@ def _draw(axes: "Axes", panel: TimePanel, span: tuple[float, float]) -> None:
     axes.margins(y=0.08)
     if panel.limits is not None:
         axes.set_ylim(*panel.limits)
-    axes.spines[["right", "top"]].set_visible(False)
     axes.set_ylabel(panel.label)
     number_axis(axes.yaxis)
     number_axis(axes.xaxis, 8)
