@@ -14,7 +14,7 @@ from blocksim.view.paint import ELEMENT_COLOURS, shade_scale
 from blocksim.view.report.packing import SHORT_BYTES, pack
 from blocksim.view.run_data import Floats, Indices, others_of, outlines_of
 from blocksim.view.window import MILLIMETRES
-from blocksim.world.systems.system import Shade, Track
+from blocksim.world.systems.system import Track
 
 STEPS = 24  # of the colours of elements: each is one path of the canvas
 SAME_SHAPE = 1e-6  # of its size, by which corners of an outline that only moves may be off
@@ -57,16 +57,15 @@ def pack_systems(frames: Frames, kept: Indices) -> list[dict[str, Any]]:
             "name": track.system.name,
             "colour": style.block_colour(number),
             **_packed(track, kept),
-            "shades": [_shade(shade, track, kept) for shade in track.system.shades],
+            "shades": [
+                {"label": shade.label, "high": shade_scale(shade, values).high, "values": pack(values)[0]}
+                for shade in track.system.shades
+                for values in [shade.of(track.some(kept))]
+            ],
             "palette": palette() if track.system.shades else [],
         }
         for number, track in enumerate(others_of(frames), start=1)
     ]
-
-
-def _shade(shade: Shade, track: Track, kept: Indices) -> dict[str, Any]:
-    values = shade.of(track.some(kept))
-    return {"label": shade.label, "high": shade_scale(shade, values).high, "values": pack(values)[0]}
 
 
 def palette() -> list[str]:
@@ -79,24 +78,17 @@ def palette() -> list[str]:
 
 def _packed(track: Track, kept: Indices) -> dict[str, Any]:
     first = _outlines(track, int(kept[0]))
+    sizes = {"count": first.shape[0], "corners": first.shape[1]}
     places = np.empty((len(kept), *first.shape[:1], 2))
     for number, frame in enumerate(kept):
         outlines = _outlines(track, int(frame))
         if not _only_move(np.stack([first, outlines])):
-            return _corners(np.stack([_outlines(track, int(one)) for one in kept]))
+            every = np.stack([_outlines(track, int(one)) for one in kept])
+            return {**sizes, "shape": None, **_axes(every)}
         places[number] = outlines.mean(axis=1)
     shapes = first - first.mean(axis=1, keepdims=True)
     is_one = _only_move(np.stack([shapes, np.broadcast_to(shapes[:1], shapes.shape)]))
-    shape = shapes[:1] if is_one else shapes
-    return {**_sizes(first), "shape": pack(shape, exact=True)[0], **_axes(places)}
-
-
-def _corners(outlines: Floats) -> dict[str, Any]:
-    return {**_sizes(outlines[0]), "shape": None, **_axes(outlines)}
-
-
-def _sizes(outlines: Floats) -> dict[str, int]:
-    return {"count": outlines.shape[0], "corners": outlines.shape[1]}
+    return {**sizes, "shape": pack(shapes[:1] if is_one else shapes, exact=True)[0], **_axes(places)}
 
 
 def _axes(places: Floats) -> dict[str, Any]:

@@ -38,7 +38,9 @@ def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version
 def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
     """Return the text of the page; those subjects that have a parent are reached from it only."""
     listed = [subject for subject in subjects if not subject.page.get("parent")]
-    style, script = _part("style.css"), _script()
+    style = _part("style.css")
+    # all scripts as one, whose names are seen by nothing else in the page
+    script = '\n(() => {\n"use strict";\n' + "\n".join(_part(f"{name}.js") for name in SCRIPTS) + "\n})();\n"
     return (
         _environment()
         .get_template("page.html")
@@ -53,12 +55,6 @@ def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
             script=script,
         )
     )
-
-
-def _script() -> str:
-    """Return all scripts as one, whose names are seen by nothing else in the page."""
-    parts = "\n".join(_part(f"{name}.js") for name in SCRIPTS)
-    return f'\n(() => {{\n"use strict";\n{parts}\n}})();\n'
 
 
 def _policy(style: str, script: str) -> str:
@@ -110,16 +106,17 @@ def labels(subjects: Sequence[Subject]) -> dict[str, str]:
 
 def _labelled(subjects: Sequence[Subject]) -> Iterator[tuple[Subject, str]]:
     flat = [dict(_leaves(subject.page["values"])) for subject in subjects]
-    keys = [key for key in dict.fromkeys(key for values in flat for key in values) if _differs(flat, key)]
+    known = dict.fromkeys(key for values in flat for key in values)
+    keys = [key for key in known if any(values.get(key) != flat[0].get(key) for values in flat)]
     kept = [key for key in keys if not _follows(key, keys, flat)]
     for subject, values in zip(subjects, flat, strict=True):
-        parts = [f"{key} = {_value_text(values.get(key))}" for key in kept[:MOST_KEYS]]
+        found = [(key, values.get(key)) for key in kept[:MOST_KEYS]]
+        parts = [
+            f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {'–' if value is None else value}"
+            for key, value in found
+        ]
         more = len(kept) - MOST_KEYS
         yield subject, ", ".join([*parts, *([f"{more} more"] if more > 0 else [])])
-
-
-def _differs(flat: Sequence[Mapping[str, object]], key: str) -> bool:
-    return any(values.get(key) != flat[0].get(key) for values in flat)
 
 
 def _follows(key: str, keys: Sequence[str], flat: Sequence[Mapping[str, object]]) -> bool:
@@ -139,7 +136,3 @@ def _leaves(node: object, path: KeyPath = ()) -> Iterator[tuple[str, object]]:
             yield from _leaves(entry, (*path, index))
     else:
         yield format_key(path), node
-
-
-def _value_text(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)

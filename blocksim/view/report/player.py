@@ -3,7 +3,6 @@
 Frames are thinned where there are too many, and rounded where they are large. Lengths in millimetres.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario
-from blocksim.simulation.contacts import Contacts
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.happened import Happened
 from blocksim.view import style
@@ -56,8 +54,9 @@ class Packed:
 def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
     """Return the drawable frames in mm and degrees. Raises InvalidInputError when there is none."""
     kept = frame_indices(frames, most_bytes)
-    channels = _channels(frames, kept)
-    packed = {name: pack(values) for name, values in channels.items()}
+    lengths = {name: MILLIMETRES * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
+    turns = {name: np.degrees(getattr(frames, name)[kept]) for name in ("rotation", "spin")}
+    packed = {name: pack({**lengths, **turns}[name]) for name in CHANNELS}
     data = {
         "time": pack(frames.time[kept], exact=True)[0],
         "names": list(frames.names),
@@ -72,11 +71,14 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
 
 
 def frame_indices(frames: Frames, most_bytes: int = MOST_BYTES) -> Indices:
-    """Return the frames that `pack_frames` keeps."""
-    contacts = frames.contacts
+    """Return the frames that `pack_frames` keeps: evenly chosen, first and last included, as many as fit."""
+    contacts, blocks, drawable = frames.contacts, len(frames.names), drawable_frames(frames)
     more = 0 if contacts is None else CONTACT_BYTES * len(contacts.rows) // len(contacts)
-    drawable = drawable_frames(frames)
-    return _thinned(drawable, len(frames.names), most_bytes, more + element_bytes(frames, drawable))
+    bytes_each = (4 if len(drawable) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS)
+    most = max(2, most_bytes // max(1, bytes_each + more + element_bytes(frames, drawable)))
+    if len(drawable) <= most or not blocks:
+        return drawable
+    return drawable[np.unique(np.rint(np.linspace(0.0, len(drawable) - 1.0, most)).astype(np.intp))]
 
 
 def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | None:
@@ -87,7 +89,8 @@ def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | 
     """
     if frames.contacts is None:
         return None
-    rows, ends = _of_frames(frames.contacts, kept)
+    tables = [frames.contacts.at(int(frame)) for frame in kept]
+    rows, ends = np.concatenate(tables), np.cumsum([len(table) for table in tables]).tolist()
     forces, scale = pushing_up(rows, tilt), force_scale(frames)
     columns = {"x": MILLIMETRES * rows["x"], "y": MILLIMETRES * rows["y"], "fx": forces[:, 0], "fy": forces[:, 1]}
     return {
@@ -97,28 +100,6 @@ def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | 
         "told": scale.explanation,
         **{name: pack(values, exact=True)[0] for name, values in columns.items()},
     }
-
-
-def _of_frames(contacts: Contacts, kept: Indices) -> tuple[NDArray[Any], list[int]]:
-    """Return the contacts of some frames, and how many there are up to and with each of them."""
-    tables = [contacts.at(int(frame)) for frame in kept]
-    return np.concatenate(tables), np.cumsum([len(table) for table in tables]).tolist()
-
-
-def _thinned(drawable: Indices, blocks: int, most_bytes: int, more: int) -> Indices:
-    """Return evenly chosen frames, first and last included, that fit; each has some bytes in addition to its blocks."""
-    values = len(drawable) * blocks * len(CHANNELS)
-    bytes_each = (4 if len(drawable) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS) + more
-    most = max(2, most_bytes // bytes_each)
-    if len(drawable) <= most or values == 0:
-        return drawable
-    return drawable[np.unique(np.rint(np.linspace(0.0, len(drawable) - 1.0, most)).astype(np.intp))]
-
-
-def _channels(frames: Frames, kept: Indices) -> dict[str, Floats]:
-    lengths = {name: MILLIMETRES * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
-    turns = {"rotation": np.degrees(frames.rotation[kept]), "spin": np.degrees(frames.spin[kept])}
-    return {name: {**lengths, **turns}[name] for name in CHANNELS}
 
 
 def _outlines(frames: Frames) -> dict[str, Any] | None:
@@ -187,13 +168,9 @@ def boundary_particles(scenario: Scenario, size_x: float, size_y: float) -> Floa
     inset = 0.0 if contact.model == "kernel" else 0.5 * contact.particle_spacing
     half = np.array([0.5 * size_x - inset, 0.5 * size_y - inset])
     corners = half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    counts = [_intervals(2.0 * float(side), contact.particle_spacing) for side in (*half, *half)]
+    intervals = 2.0 * np.array([*half, *half]) / contact.particle_spacing * (1.0 - ROUND_OFF)
     sides = [
         start + (end - start) * (np.arange(count) / count)[:, None]
-        for start, end, count in zip(corners, np.roll(corners, -1, axis=0), counts, strict=True)
+        for start, end, count in zip(corners, np.roll(corners, -1, axis=0), np.ceil(intervals).clip(1.0), strict=True)
     ]
     return np.concatenate(sides)
-
-
-def _intervals(side: float, spacing: float) -> int:
-    return max(1, math.ceil(side / spacing * (1.0 - ROUND_OFF)))

@@ -50,6 +50,7 @@ ROUND_OFF = 1e-12  # of the energy in play
 RATIOS = ("relative_residual",)  # in run.json beside energies
 
 DRAWN = ("x", "y", "rotation")  # measured quantities that have a curve
+NO_SUMMARY = "no summary: the run was killed, is still running, or its run.json cannot be read"
 NO_FORCES = "This run has stored no contacts, so their forces cannot be shown; --set output.contacts=true stores them."
 
 
@@ -108,25 +109,20 @@ def read_stored(folder: Path) -> PartialRun:
     summary = attempts.at(lambda: read_summary(folder / files.SUMMARY))
     frames = None if scenario is None else attempts.at(lambda: read_frames(folder / files.FRAMES, scenario))
     final = attempts.at(lambda: read_table(folder / files.FINAL))
-    text = _text(folder)
+    try:
+        text = read_limited(folder / files.SCENARIO, MAX_BYTES).decode(errors="replace")
+    except BlocksimError:
+        text = None
     if scenario is None and summary is None and final is None:
         message = "\n".join([f"{folder}: nothing of this run can be read", *attempts.problems])
         raise InvalidInputError(message)
-    probes = None if scenario is None or frames is None else attempts.at(lambda: _probes(folder, scenario))
-    found = (folder, scenario, text, summary, frames, final)
-    return PartialRun(*found, tuple(attempts.problems), tuple(attempts.damage), probes or {})
-
-
-def _probes(folder: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
-    return read_probes(folder / files.FRAMES, scenario)
-
-
-def _text(folder: Path) -> str | None:
-    """Return the resolved scenario as it lies in the folder."""
-    try:
-        return read_limited(folder / files.SCENARIO, MAX_BYTES).decode(errors="replace")
-    except BlocksimError:
-        return None
+    probes = (
+        None
+        if scenario is None or frames is None
+        else attempts.at(lambda: read_probes(folder / files.FRAMES, scenario))
+    )
+    problems, damage = tuple(attempts.problems), tuple(attempts.damage)
+    return PartialRun(folder, scenario, text, summary, frames, final, problems, damage, probes or {})
 
 
 @dataclass(frozen=True)
@@ -165,7 +161,7 @@ def run_subject(
         "parent": parent,
         "place": shared_path(str(run.folder)),
         "status": run.status,
-        "reason": _reason(run),
+        "reason": NO_SUMMARY if run.summary is None else shared_text(run.summary.reason),
         "summary": _summary(run),
         "problems": [shared_text(text) for text in (*run.problems, *problems, *remarks)],
         "scenario": run.scenario_text,
@@ -219,12 +215,6 @@ def _measured(names: Sequence[str], comparison: Mapping[str, Any] | None) -> lis
     ]
 
 
-def _reason(run: PartialRun) -> str:
-    if run.summary is not None:
-        return shared_text(run.summary.reason)
-    return "no summary: the run was killed, is still running, or its run.json cannot be read"
-
-
 def _summary(run: PartialRun) -> list[tuple[str, str]]:
     """Return names and values for people."""
     tracks = () if run.frames is None else run.frames.tracks
@@ -232,25 +222,16 @@ def _summary(run: PartialRun) -> list[tuple[str, str]]:
     if run.summary is None:
         last = [] if run.frames is None else [("recorded until", f"{run.frames.time[-1]:.4g} s")]
         return [*blocks, *last]
-    summary = run.summary
+    summary, error = run.summary, run.summary.energy_J.relative_residual
     return [
         *blocks,
         *(() if summary.movement is None else summary.movement.lines("{:.2f}".format)),
         ("simulated time", f"{summary.simulated_time_s:.4g} s"),
         ("steps", f"{summary.steps} of {summary.time_step_s:.3g} s"),
-        (
-            "solver time",
-            f"{summary.solver_seconds:.2f} s on {summary.threads} thread{'s' if summary.threads > 1 else ''}",
-        ),
-        ("relative energy error", _share(summary.energy_J.relative_residual)),
+        ("solver time", f"{summary.solver_seconds:.2f} s on {summary.threads} thread{'s' * (summary.threads > 1)}"),
+        ("relative energy error", "0" if error == 0.0 else f"{error:.1e}" if math.isfinite(error) else "unknown"),
         *(("warning", shared_text(warning)) for warning in summary.warnings),
     ]
-
-
-def _share(value: float) -> str:
-    if value == 0.0:
-        return "0"
-    return f"{value:.1e}" if math.isfinite(value) else "unknown"
 
 
 def _ledger(run: PartialRun) -> list[tuple[str, str]]:
@@ -261,11 +242,8 @@ def _ledger(run: PartialRun) -> list[tuple[str, str]]:
     names = [*(name for name in values if name not in (*LEDGER, *RATIOS)), *LEDGER]  # of other systems first
     least = ROUND_OFF * abs(values["in_play"])
     shown = [name for name in names if name in ALWAYS or not abs(values[name]) <= least]
-    return [(LEDGER.get(name, name.replace("_", " ")), _joule(values[name])) for name in shown]
-
-
-def _joule(value: float) -> str:
-    return f"{value:.6g}".replace("-", "−") if math.isfinite(value) else "–"
+    texts = {name: f"{values[name]:.6g}".replace("-", "−") if math.isfinite(values[name]) else "–" for name in shown}
+    return [(LEDGER.get(name, name.replace("_", " ")), text) for name, text in texts.items()]
 
 
 def _probe(probe: ProbeSeries) -> dict[str, str]:

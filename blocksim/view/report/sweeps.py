@@ -69,6 +69,12 @@ def sweep_subject(
     """
     name = table.folder.name if scenario is None else scenario.name
     shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
+    rows = [] if judged is None else judged["metrics"]["inside"]["rows"]
+    limits = {  # of inside, by the column of the table
+        f"{row['block']}.{COLUMN_OF[row['quantity']]}": list(row["limits"])
+        for row in rows
+        if row["quantity"] in COLUMN_OF and row["limits"]
+    }
     page = {
         "place": shared_path(str(table.folder)),
         "description": None if scenario is None else scenario.description,
@@ -85,17 +91,11 @@ def sweep_subject(
         "place": shared_path(str(table.folder)),
         "columns": _columns(table, shown),
         "left_out": list(left_out),
-        "measured": {} if judged is None else _limits(judged),
+        "measured": limits,
         "members": dict(members),
         "pictures": [one["data"] for one in pictures],
     }
     return Subject(key, "sweep", name, page, data)
-
-
-def _limits(judged: Mapping[str, Any]) -> dict[str, list[float]]:
-    """Return the limits of inside, by the column of the table."""
-    rows = [row for row in judged["metrics"]["inside"]["rows"] if row["quantity"] in COLUMN_OF and row["limits"]]
-    return {f"{row['block']}.{COLUMN_OF[row['quantity']]}": list(row["limits"]) for row in rows}
 
 
 def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
