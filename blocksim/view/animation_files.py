@@ -129,20 +129,16 @@ def write_mp4(path: Path, pictures: Iterator[NDArray[np.uint8]], seconds: NDArra
     encode = _encoder()
     rate = 1.0 / float(seconds[0])
     repeats = np.round(seconds * rate).astype(int)
+    shown = zip(repeats, pictures, strict=True)
+    repeated = (np.ascontiguousarray(picture) for repeat, picture in shown for _ in range(repeat))
     with replacing(path) as temporary:
         try:
-            is_whole = encode(temporary, _repeated(pictures, repeats), rate, int(repeats.sum()))
+            is_whole = encode(temporary, repeated, rate, int(repeats.sum()))
         except (OSError, RuntimeError):
             is_whole = False
         if not is_whole:  # nothing else reports a disk that was full at the end
             message = f"{path}: cannot be written: ffmpeg stopped before the end"
             raise OutputError(message)
-
-
-def _repeated(pictures: Iterator[Pixels], repeats: NDArray[np.int_]) -> Iterator[Pixels]:
-    for repeat, picture in zip(repeats, pictures, strict=True):
-        for _ in range(repeat):
-            yield np.ascontiguousarray(picture)
 
 
 def _encoder() -> Encode:

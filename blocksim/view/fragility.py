@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +9,6 @@ from blocksim.view import style
 from blocksim.view.layout import OWN, Paper, number_axis
 from blocksim.view.run_data import Floats
 from blocksim.view.sheet import sheet
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 LEFT = 0.55  # inches
 WIDE = 8.0  # ratio of the largest to the smallest intensity from which on the axis is logarithmic
@@ -65,38 +61,30 @@ def places(x: Floats) -> Floats:
 def draw_fragility(found: Fragility, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
     """Draw the picture and write it; raises as `sheet`."""
     with sheet(path, title, found.notes, paper, LEFT) as axes:
-        _draw_points(axes, found)
-        _finish(axes, found)
-
-
-def _draw_points(axes: "Axes", found: Fragility) -> None:
-    band = found.band
-    if band is not None:
-        axes.fill_between(band.x, band.low, band.high, color=CURVE_COLOUR, alpha=0.18, linewidth=0.0)
-        axes.plot(band.x, band.probability, color=CURVE_COLOUR, linewidth=1.4, label="lognormal curve, 95 % band")
-    reach = np.maximum([found.share - found.low, found.high - found.share], 0.0)
-    axes.errorbar(
-        found.x,
-        found.share,
-        yerr=reach,
-        fmt="o",
-        color=style.INK,
-        markersize=4.0,
-        linewidth=style.LINE_WIDTH,
-        capsize=2.5,
-        label="share of samples, 95 % limits",
-        clip_on=False,
-        zorder=3,
-    )
-
-
-def _finish(axes: "Axes", found: Fragility) -> None:
-    low, high, is_log = axis_of(found.x)
-    axes.set_xscale("log" if is_log else "linear")
-    axes.set_xlim(low, high)
-    axes.set_ylim(0.0, 1.0)
-    number_axis(axes.xaxis, MOST_NUMBERS, is_log=is_log)
-    axes.set_xlabel(f"{found.key} ({found.unit})" if found.unit else found.key, labelpad=2.0)
-    axes.set_ylabel("probability of failure")
-    handles, labels = axes.get_legend_handles_labels()
-    axes.legend(handles[::-1], labels[::-1], loc="best", frameon=False)
+        band = found.band
+        if band is not None:
+            axes.fill_between(band.x, band.low, band.high, color=CURVE_COLOUR, alpha=0.18, linewidth=0.0)
+            axes.plot(band.x, band.probability, color=CURVE_COLOUR, linewidth=1.4, label="lognormal curve, 95 % band")
+        reach = np.maximum([found.share - found.low, found.high - found.share], 0.0)
+        axes.errorbar(
+            found.x,
+            found.share,
+            yerr=reach,
+            fmt="o",
+            color=style.INK,
+            markersize=4.0,
+            linewidth=style.LINE_WIDTH,
+            capsize=2.5,
+            label="share of samples, 95 % limits",
+            clip_on=False,
+            zorder=3,
+        )
+        low, high, is_log = axis_of(found.x)
+        axes.set_xscale("log" if is_log else "linear")
+        axes.set_xlim(low, high)
+        axes.set_ylim(0.0, 1.0)
+        number_axis(axes.xaxis, MOST_NUMBERS, is_log=is_log)
+        axes.set_xlabel(f"{found.key} ({found.unit})" if found.unit else found.key, labelpad=2.0)
+        axes.set_ylabel("probability of failure")
+        handles, labels = axes.get_legend_handles_labels()
+        axes.legend(handles[::-1], labels[::-1], loc="best", frameon=False)

@@ -113,48 +113,31 @@ class Seen:
     def place(self, axis: int) -> Floats:
         """Return centres (mm) along x (0) or y (1)."""
         places = (self.frames.x, self.frames.y)[axis][self.chosen]
-        return np.asarray(MILLIMETRES * (places - self._carried[:, axis, None]))
+        carried = self.support.offset(self.frames.time[self.chosen]) * bool(self.from_ground)
+        return np.asarray(MILLIMETRES * (places - carried[:, axis, None]))
+
+    def displacement(self, axis: int) -> Floats:
+        """Return displacements (mm) from the first frame of the run."""
+        return np.asarray(self.place(axis) - MILLIMETRES * (self.frames.x, self.frames.y)[axis][0])
 
     def velocity(self, axis: int) -> Floats:
         """Return velocities (mm/s) along x (0) or y (1)."""
         velocities = (self.frames.vx, self.frames.vy)[axis][self.chosen]
-        carried = np.multiply.outer(self.support.velocity(self._time), self.support.direction)
+        carried = np.multiply.outer(self.support.velocity(self.frames.time[self.chosen]), self.support.direction)
         return np.asarray(MILLIMETRES * (velocities - carried[:, axis, None] * bool(self.from_ground)))
-
-    @property
-    def _time(self) -> Floats:
-        return self.frames.time[self.chosen]
-
-    @property
-    def _carried(self) -> Floats:
-        """Displacement of the ground (m), (n, 2); zero unless relative motion is wanted."""
-        return np.asarray(self.support.offset(self._time) * bool(self.from_ground))
-
-
-def _rotation(seen: Seen) -> Motion:
-    return Motion("rotation (°)", np.degrees(seen.frames.rotation[seen.chosen]), "rotation")
-
-
-def _displacement(seen: Seen, axis: int) -> Floats:
-    """Return displacements (mm) from the first frame of the run."""
-    start = MILLIMETRES * (seen.frames.x, seen.frames.y)[axis][0]
-    return np.asarray(seen.place(axis) - start)
-
-
-def _speed(seen: Seen) -> Motion:
-    name = "relative speed" if seen.from_ground else "speed"
-    return Motion(f"{name} (mm/s)", np.hypot(seen.velocity(0), seen.velocity(1)))
 
 
 MOTIONS: dict[str, Callable[[Seen], Motion]] = {
     "x": lambda seen: Motion(f"x{seen.from_ground} (mm)", seen.place(0), "" if seen.from_ground else "x"),
     "y": lambda seen: Motion(f"y{seen.from_ground} (mm)", seen.place(1), "" if seen.from_ground else "y"),
-    "dx": lambda seen: Motion(f"Δx{seen.from_ground} (mm)", _displacement(seen, 0)),
-    "dy": lambda seen: Motion(f"Δy{seen.from_ground} (mm)", _displacement(seen, 1)),
-    "rotation": _rotation,
+    "dx": lambda seen: Motion(f"Δx{seen.from_ground} (mm)", seen.displacement(0)),
+    "dy": lambda seen: Motion(f"Δy{seen.from_ground} (mm)", seen.displacement(1)),
+    "rotation": lambda seen: Motion("rotation (°)", np.degrees(seen.frames.rotation[seen.chosen]), "rotation"),
     "vx": lambda seen: Motion(f"vx{seen.from_ground} (mm/s)", seen.velocity(0)),
     "vy": lambda seen: Motion(f"vy{seen.from_ground} (mm/s)", seen.velocity(1)),
-    "speed": _speed,
+    "speed": lambda seen: Motion(
+        f"{'relative ' if seen.from_ground else ''}speed (mm/s)", np.hypot(seen.velocity(0), seen.velocity(1))
+    ),
     "spin": lambda seen: Motion("spin (°/s)", np.degrees(seen.frames.spin[seen.chosen])),
 }
 

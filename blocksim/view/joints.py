@@ -14,7 +14,6 @@ from collections import defaultdict
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blocksim.simulation.contacts import SUPPORT, Contacts, Rows
 from blocksim.simulation.movement import MOVED_SHARE
@@ -59,7 +58,9 @@ def _at_the_start(
     pressed = next((found for found in range(frame + 1) if len(contacts.at(found))), None)
     if pressed is None:
         return {}
-    has_moved = np.maximum.accumulate(_has_moved(frames, frame, support), axis=0)
+    share = displacements(frames, support)[: frame + 1] / shortest_sides(frames)
+    moved = np.column_stack([share > MOVED_SHARE, np.zeros(frame + 1, dtype=bool)])  # the last is the support, SUPPORT
+    has_moved = np.maximum.accumulate(moved, axis=0)
     found: dict[Pair, tuple[int, Rows]] = {}
     for time in range(pressed, frame + 1):
         for pair, rows in _by_pair(contacts.at(time)).items():
@@ -69,12 +70,6 @@ def _at_the_start(
         if has_moved[time, :-1].all():
             break
     return found
-
-
-def _has_moved(frames: WithContacts, frame: int, support: Support) -> NDArray[np.bool_]:
-    """Return which bodies have moved in each frame up to one, (n, b + 1); the last one is the support, as SUPPORT."""
-    share = displacements(frames, support)[: frame + 1] / shortest_sides(frames)
-    return np.column_stack([share > MOVED_SHARE, np.zeros(frame + 1, dtype=bool)])
 
 
 def _by_pair(rows: Rows) -> dict[Pair, Rows]:
@@ -88,8 +83,11 @@ def _by_pair(rows: Rows) -> dict[Pair, Rows]:
 def _joint(frames: WithContacts, times: tuple[int, int], support: Support, then: Rows, now: Rows) -> Joint:
     """Judge a joint by its points at the beginning and in the frame that is drawn."""
     pair = int(then["body_a"][0]), int(then["body_b"][0])
-    least = MOVED_SHARE * min(_shortest(frames, body) for body in pair)
-    early, late = _followed(frames, times, support, then), _back(frames, times, support, now)
+    least = MOVED_SHARE * min(float(shortest_sides(frames)[body]) for body in pair if body != SUPPORT)
+    early = _followed(frames, times, support, then)
+    # how far apart on both bodies in the first frame the points were where they touch in the second
+    slip = _followed(frames, times[::-1], support, now).slip
+    late = _Followed(np.stack([now["x"], now["y"]], axis=-1), -now["overlap"], slip)
     turn_a, turn_b = (_angle(frames, body, times) for body in pair)
     both = _Followed(*(np.concatenate(parts) for parts in zip(early, late, strict=True)))
     is_closed = both.opening <= least
@@ -110,16 +108,6 @@ def _followed(frames: WithContacts, times: tuple[int, int], support: Support, ro
     apart = on_a - on_b
     slip = np.abs(apart[:, 1] * normal[:, 0] - apart[:, 0] * normal[:, 1])
     return _Followed(on_b, (apart * normal).sum(axis=1), slip)
-
-
-def _back(frames: WithContacts, times: tuple[int, int], support: Support, rows: Rows) -> _Followed:
-    """Find how far apart on both bodies in the first frame the points were where they touch in the second."""
-    then = _followed(frames, times[::-1], support, rows)
-    return _Followed(np.stack([rows["x"], rows["y"]], axis=-1), -rows["overlap"], then.slip)
-
-
-def _shortest(frames: WithContacts, body: int) -> float:
-    return float("inf") if body == SUPPORT else float(shortest_sides(frames)[body])
 
 
 def _angle(frames: WithContacts, body: int, times: tuple[int, int]) -> float:

@@ -45,7 +45,8 @@ def labels_of(frames: FramesLike, frame: int, page: Page, measured: MeasuredTabl
     turns = np.degrees(frames.rotation[frame])
     labels = []
     for index, name in enumerate(frames.names):
-        lines = (style.shortened(name, LETTERS), f"x {centres[index, 0]:.2f} mm", f"{_plain(turns[index])}°")
+        turn = f"{turns[index] + 0.0:.2f}".replace("-0.00", "0.00").replace("-", "−")
+        lines = (style.shortened(name, LETTERS), f"x {centres[index, 0]:.2f} mm", f"{turn}°")
         labels.append(_label(lines, float(below[index]), page, ranges.get(name)))
     return labels
 
@@ -165,8 +166,3 @@ def _draw_bar(axes: "Axes", bar: tuple[float, float, float], y: float) -> None:
     for end in (smallest, largest):
         axes.plot([end, end], [y - CAP, y + CAP], **line)
     axes.plot(mean, y, marker="o", markersize=3.2, **line)
-
-
-def _plain(value: float) -> str:
-    """Return two decimals, with a proper minus sign and none before zero."""
-    return f"{value + 0.0:.2f}".replace("-0.00", "0.00").replace("-", "−")

@@ -98,8 +98,12 @@ def outside(frames: FramesLike, chosen: Indices, support: Support) -> Outside:
     """Return what acts from outside in the chosen frames."""
     poses = _Poses.of(frames, chosen)
     raw = [*_forces(poses, support.loads), *_pressures(poses, support), *_speeds(frames, chosen, support)]
+    sizes = [float(np.hypot(one.way[..., 0], one.way[..., 1]).max(initial=0.0)) for one in raw]
     turns, moment = _moments(frames, poses, support.loads)
-    largest = {kind: max(_size(one) for one in raw if one.kind == kind) for kind in {one.kind for one in raw}}
+    largest = {
+        kind: max(sizes[number] for number, one in enumerate(raw) if one.kind == kind)
+        for kind in {one.kind for one in raw}
+    }
     scaled = [replace(one, way=one.way / (largest[one.kind] or 1.0)) for one in raw]
     marks = _marks(frames.time[chosen], support)
     return Outside(tuple(scaled), turns, marks, {**largest, MOMENT: moment})
@@ -161,10 +165,6 @@ class _Poses:
         ways = ways * self.is_there[:, body, None, None]
         pushes = (ways * arms).sum(axis=-1) < 0.0
         return Arrows(kind, MILLIMETRES * (self.places[:, body, None] + arms), ways, pushes.astype(float))
-
-
-def _size(one: Arrows) -> float:
-    return float(np.hypot(*np.moveaxis(one.way, -1, 0)).max(initial=0.0))
 
 
 def _forces(poses: _Poses, loads: Sequence[Acting]) -> Iterator[Arrows]:

@@ -33,7 +33,11 @@ def draw_probes(
     Raises InvalidInputError for a run without probes, unknown names, too many panels, an unknown picture format or too
     small a page, and OutputError when the file cannot be written.
     """
-    panels = [panel for name in names or probes for panel in panels_of(_named(probes, name))]
+    unknown = next((name for name in names if name not in probes), None)
+    if unknown is not None:
+        message = f"--probe {unknown}: no such probe in this run, {did_you_mean_or_list(unknown, probes)}"
+        raise InvalidInputError(message)
+    panels = [panel for name in names or probes for panel in panels_of(probes[name])]
     if not panels:
         message = "this run has no samples of probes; [[probes]] in the scenario records them"
         raise InvalidInputError(message)
@@ -46,13 +50,6 @@ def draw_probes(
 def probe_picture(probe: ProbeSeries) -> bytes:
     """Return the picture (PNG) of one probe, for a report."""
     return time_panels_png(panels_of(probe))
-
-
-def _named(probes: Mapping[str, ProbeSeries], name: str) -> ProbeSeries:
-    if name not in probes:
-        message = f"--probe {name}: no such probe in this run, {did_you_mean_or_list(name, probes)}"
-        raise InvalidInputError(message)
-    return probes[name]
 
 
 def panels_of(probe: ProbeSeries) -> list[TimePanel]:
@@ -70,18 +67,14 @@ def _largest(columns: Mapping[str, Floats]) -> float:
     return max((float(np.nanmax(np.abs(values), initial=0.0)) for values in columns.values()), default=0.0)
 
 
-def _usual(forces: Mapping[str, Floats]) -> float:
-    """Return the size (N) that forces hardly exceed but in impacts."""
-    return max((float(np.percentile(np.abs(values), PERCENT)) for values in forces.values()), default=0.0)
-
-
 def _some(probe: ProbeSeries, *names: str) -> dict[str, Floats]:
     return {name.replace("_", " "): probe[name] for name in names}
 
 
 def _force(probe: ProbeSeries) -> list[TimePanel]:
     forces = _some(probe, "fx", "fy")
-    largest, usual = _largest(forces), _usual(forces)
+    largest = _largest(forces)
+    usual = max(float(np.percentile(np.abs(values), PERCENT)) for values in forces.values())  # hardly exceeded
     is_cut = usual > 0.0 and largest > MOST_USUAL * usual
     factor, unit = unit_for(usual if is_cut else largest, "N")
     panel = _panel(probe, "force", unit, factor, forces)

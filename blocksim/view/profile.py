@@ -1,6 +1,6 @@
 """The surface of soil at several times on one panel, with the blocks as they are at the last of them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +13,13 @@ from blocksim.view.measured import MeasuredTable
 from blocksim.view.paint import Paint, draw_key
 from blocksim.view.panel import Canvas, depth_of, draw_ruler, finish_panel, page_for
 from blocksim.view.run_data import (
-    Floats,
-    FramesLike,
     Support,
     drawable_frames,
     moments_at,
     moments_by_motion,
     others_of,
 )
-from blocksim.view.scene import Scene, draw_blocks, draw_standing
+from blocksim.view.scene import Scene, draw_scene
 from blocksim.view.window import MILLIMETRES, extent_of
 
 WIDTH, LEAST_WIDTH, TALLEST = 7.2, 2.0, 6.0  # inches
@@ -49,17 +47,24 @@ def draw_profile(
     Raises InvalidInputError for an unknown picture format, a run without soil, a time that was not stored or a page
     that is too small, and OutputError when the file cannot be written.
     """
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
     path = Path(path)
     style.picture_suffix(path)
     support = support or Support()
     drawable = drawable_frames(frames)
     chosen = moments_by_motion(frames, drawable, LINES) if times is None else moments_at(frames, drawable, times)
     chosen = np.unique(chosen)
-    lines = [list(_lines(frames, int(frame))) for frame in chosen]
+    soils = [track for track in others_of(frames) if track.system.profile is not None]
+    lines = [
+        [line for one in soils if one.system.profile for line in one.system.profile(one, frame)]
+        for frame in chosen.tolist()
+    ]
     if not any(lines):
         message = "no soil in this run: --kind profile draws its surface"
         raise InvalidInputError(message)
-    shades = _shades(len(chosen))
+    shades = [to_hex(colour) for colour in colormaps[COLOURS](np.linspace(0.0, 0.85, len(chosen)))]  # dark to light
     named = tuple((f"{float(frames.time[frame]):.3f} s", shade) for frame, shade in zip(chosen, shades, strict=True))
     key = Paint(lambda _: [PALE] * len(frames.names), named)
     page = page_for(
@@ -67,8 +72,7 @@ def draw_profile(
     )
     with style.styled_figure(page.width, paper.height(page.height), paper.dots) as figure:
         canvas = Canvas(figure.add_axes(page.place), page.extent, page.points_per_mm)
-        draw_standing(canvas, Scene(frames, support, key), int(chosen[-1]))
-        draw_blocks(canvas, Scene(_alone(frames), support, key), int(chosen[-1]))
+        draw_scene(canvas, Scene(frames, support, key, with_others=False), int(chosen[-1]))
         for shade, of_frame in zip(shades, lines, strict=True):
             for line in of_frame:
                 canvas.axes.plot(*(MILLIMETRES * line).T, color=shade, linewidth=THICK, transform=canvas.scene)
@@ -80,33 +84,3 @@ def draw_profile(
             shown = style.cut_to(f"{title}: surface", page.panel_width * style.POINTS_PER_INCH, style.TITLE_SIZE)
             figure.text(SIDE / page.width, 1.0 - 0.08 / page.height, shown, va="top", fontsize=style.TITLE_SIZE)
         style.save_figure(figure, path)
-
-
-def _lines(frames: FramesLike, frame: int) -> Iterator[Floats]:
-    for track in others_of(frames):
-        if track.system.profile is not None:
-            yield from track.system.profile(track, frame)
-
-
-def _shades(count: int) -> list[str]:
-    """Return a colour for each time, from dark to light."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    return [to_hex(colour) for colour in colormaps[COLOURS](np.linspace(0.0, 0.85, count))]
-
-
-class _Alone:
-    """Frames that know of no system but the blocks."""
-
-    def __init__(self, frames: FramesLike) -> None:
-        self._frames = frames
-        self.others = ()
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self._frames, name)
-
-
-def _alone(frames: FramesLike) -> FramesLike:
-    alone: FramesLike = _Alone(frames)  # type: ignore[assignment]  # it has all that frames have
-    return alone

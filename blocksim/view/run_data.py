@@ -1,6 +1,6 @@
 """A run as its pictures need it: frames and the choice among them, ground, walls and fixed bodies with their motion."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -254,14 +254,6 @@ def event_times(scenario: Scenario, happened: Sequence[Happened] = ()) -> list[f
     return times
 
 
-def _removals(scenario: Scenario, times: Sequence[float]) -> Iterator[float]:
-    """Yield for every wall the time (s) at which an event removes it."""
-    for name in wall_names(scenario):
-        yield min(
-            (at for event, at in zip(scenario.events, times, strict=True) if name in event.remove), default=np.inf
-        )
-
-
 def support_of(scenario: Scenario, happened: Sequence[Happened] = ()) -> Support:
     """Return the support of a scenario's runs, or of one in which these events have happened."""
     placed, times = place_bodies(scenario), event_times(scenario, happened)
@@ -270,7 +262,10 @@ def support_of(scenario: Scenario, happened: Sequence[Happened] = ()) -> Support
         walls=wall_segments(scenario),
         fixed=tuple(body.fixed and not body.freed for body in placed),
         driven=tuple(body.driven for body in placed) if any(body.driven for body in placed) else (),
-        gone=tuple(_removals(scenario, times)),
+        gone=tuple(
+            min((at for event, at in zip(scenario.events, times, strict=True) if name in event.remove), default=np.inf)
+            for name in wall_names(scenario)
+        ),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),
         motion=None if scenario.motion is None else motion_pieces(scenario),

@@ -57,13 +57,14 @@ def readable_scale(frames: FramesLike) -> float:
 class Scene:
     """Frames of a run on their support, and the colours of the blocks.
 
-    `with_tops` marks the top face that each free block had at the start.
+    `with_tops` marks the top face that each free block had at the start, `with_others` draws the systems beside them.
     """
 
     frames: FramesLike
     support: Support
     paint: Paint
     with_tops: bool = True
+    with_others: bool = True
 
     @property
     def fixed(self) -> Flags:
@@ -96,7 +97,7 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
     from matplotlib.collections import LineCollection, PolyCollection
 
     frames, paint, fixed, there = scene.frames, scene.paint, scene.fixed, are_there(scene.frames, frame)
-    for number, track in enumerate(others_of(frames)):
+    for number, track in enumerate(others_of(frames) if scene.with_others else ()):
         of_elements = paint.elements[number] if number < len(paint.elements) else None
         _draw_system(
             canvas, track, frame, style.block_colour(number + 1) if of_elements is None else of_elements(frame)

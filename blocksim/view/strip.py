@@ -24,7 +24,7 @@ from blocksim.view.strip_layout import (
     WIDTH,
     Lines,
     arrangement,
-    plan_on,
+    plan,
 )
 from blocksim.view.window import MILLIMETRES, extent_of
 
@@ -77,7 +77,7 @@ def draw_strip(
     notes = wrap(" ".join(filter(None, told)), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
     captions = 1 + (support.motion is not None) + any(acts.marks)
     lines = Lines(captions, len(notes), rows_of(ranges), paint.height)
-    layout = plan_on(paper, extent, columns, len(chosen), lines)
+    layout = plan(paper, extent, columns, len(chosen), lines)
     scene = Scene(frames, support, paint)
     with style.styled_figure(layout.width, layout.height, paper.dots) as figure:
         for index, frame in enumerate(chosen.tolist()):

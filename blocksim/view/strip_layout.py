@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from blocksim.view import style
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.layout import Paper
 from blocksim.view.panel import room_below
 from blocksim.view.window import Extent
 
@@ -70,15 +70,7 @@ def arrangement(extent: Extent, readable: float = 0.0) -> tuple[int, int]:
     return (2, 8) if aspect <= WIDEST_IN_PAIRS else (1, 6)
 
 
-def plan(extent: Extent, columns: int, panels: int, measured_rows: int, captions: int = 1, notes: int = 1) -> Layout:
-    """Fit the panels into the width of the strip, all at one scale, with room for what stands below the ground.
-
-    `captions` and `notes` count the lines of text above each panel and below the strip.
-    """
-    return plan_on(OWN, extent, columns, panels, Lines(captions, notes, measured_rows))
-
-
-def plan_on(paper: Paper, extent: Extent, columns: int, panels: int, lines: Lines) -> Layout:
+def plan(paper: Paper, extent: Extent, columns: int, panels: int, lines: Lines) -> Layout:
     """Fit the panels into a page. Where its size was asked for, as many columns as make them largest.
 
     Raises InvalidInputError for a page that is too small.

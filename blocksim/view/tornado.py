@@ -64,7 +64,7 @@ def draw_tornado(
         for panel, heading, count in zip(panels, titles, rows, strict=True):
             bottom -= bar * count + layout.LINE * heading.count("\n")
             axes = layout.add_axes(figure, left, bottom, width - left - 2.0 * layout.EDGE, bar * count)
-            _draw_bars(axes, panel, _font(bar, lines))
+            _draw_bars(axes, panel, min(style.FONT_SIZE, bar * style.POINTS_PER_INCH / (style.LETTER[1] * lines)))
             layout.write_text(figure, layout.EDGE, bottom + bar * count + 0.05, heading)
             bottom -= GAP
         place = (layout.EDGE / width, layout.EDGE / height)
@@ -88,11 +88,6 @@ def _room_for_keys(panels: Sequence[Bars]) -> float:
     lines = [line for panel in panels for key in panel.keys for line in key.split("\n")]
     widest = max(style.width_of(line, style.FONT_SIZE) for line in lines) / style.POINTS_PER_INCH
     return max(widest, LEAST_ROOM) + 0.2
-
-
-def _font(bar: float, lines: int) -> float:
-    """Return the size of the letters of keys in so many lines, for bars of a height (inches)."""
-    return min(style.FONT_SIZE, bar * style.POINTS_PER_INCH / (style.LETTER[1] * lines))
 
 
 def _draw_bars(axes: "Axes", panel: Bars, font: float) -> None:

@@ -26,6 +26,9 @@ BINS = 40
 RARE = 1.0  # percent at either end that may lie beyond the axis
 LEAST_BIN_MM = 0.01
 ALL_COLOUR, INSIDE_COLOUR = "#B5D6EA", "#0072B2"
+_MARK: dict[str, Any] = {"marker": "|", "color": style.MEASURED_COLOUR, "zorder": 4}
+_REPEATS: dict[str, Any] = {**_MARK, "linestyle": "", "markersize": 7.0, "markeredgewidth": 1.1}
+_INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 
 
 def refusal(_sweep: SweepData) -> str:
@@ -86,7 +89,11 @@ def _draw_block(axes: "Axes", sweep: SweepData, block: int, room: float) -> None
     interval = np.array(sweep.measured.prediction_mm.get(name, ()))
     limits = limits_of(x, np.concatenate([repeats, interval]))
     top = _draw_bars(axes, x, inside, len(sweep.finished), limits)
-    _draw_measured(axes, repeats, interval, top)
+    if repeats.size:
+        axes.axvspan(repeats.min(), repeats.max(), color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
+        axes.plot(repeats, np.full(len(repeats), 1.2 * top), **_REPEATS)
+    if interval.size:
+        axes.plot(interval, [1.08 * top] * 2, **_INTERVAL)
     axes.set_xlim(*limits)
     axes.set_ylim(0.0, top * (1.0 + room))
     axes.spines[["right", "top"]].set_visible(False)
@@ -108,32 +115,6 @@ def _draw_bars(axes: "Axes", x: Floats, inside: Flags | None, count: int, limits
         hits, _ = np.histogram(x[inside], edges)
         axes.stairs(100.0 * hits / count, edges, fill=True, color=INSIDE_COLOUR)
     return float(100.0 * shares.max() / count)
-
-
-def _draw_measured(axes: "Axes", repeats: Floats, interval: Floats, top: float) -> None:
-    """Draw the range as a band, and above the bars the repeats and the prediction interval of the next test."""
-    if repeats.size:
-        axes.axvspan(repeats.min(), repeats.max(), color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
-        axes.plot(repeats, np.full(len(repeats), 1.2 * top), **_REPEATS)
-    if interval.size:
-        axes.plot(interval, [1.08 * top] * 2, **_INTERVAL)
-
-
-_REPEATS: dict[str, Any] = {
-    "linestyle": "",
-    "marker": "|",
-    "markersize": 7.0,
-    "markeredgewidth": 1.1,
-    "color": style.MEASURED_COLOUR,
-    "zorder": 4,
-}
-_INTERVAL: dict[str, Any] = {
-    "marker": "|",
-    "markersize": 4.0,
-    "color": style.MEASURED_COLOUR,
-    "linewidth": 1.0,
-    "zorder": 4,
-}
 
 
 def _entries(sweep: SweepData) -> list[Any]:

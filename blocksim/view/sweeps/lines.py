@@ -184,7 +184,11 @@ def _draw_panels(
             size = page.panel / page.width, page.row / page.height
             axes = figure.add_axes((left / page.width, bottom / page.height, *size))
             axes.set_ylim(*limits)
-            _draw_band(axes, measured.get(name))
+            band = measured.get(name)
+            if band is not None:  # a line where all repeats are equal
+                axes.axhspan(*band, color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
+                for end in set(band):
+                    axes.axhline(end, color=style.MEASURED_COLOUR, linewidth=style.LINE_WIDTH, zorder=1)
             _draw_points(axes, one, block, page.axis, joined=joined)
             _finish(axes, is_log=page.axis.is_log, is_first=column == 0, is_last=row == len(rows) - 1)
             axes.set_title(page.captions[row][column], loc="left", pad=3.0)
@@ -236,14 +240,6 @@ def _draw_points(axes: "Axes", one: Series, block: int, axis: ValueAxis, *, join
         markeredgewidth=0.4,
         zorder=3,
     )
-
-
-def _draw_band(axes: "Axes", band: tuple[float, float] | None) -> None:
-    """Draw the measured range, a line where all repeats are equal."""
-    if band is not None:
-        axes.axhspan(*band, color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
-        for end in set(band):
-            axes.axhline(end, color=style.MEASURED_COLOUR, linewidth=style.LINE_WIDTH, zorder=1)
 
 
 def _finish(axes: "Axes", *, is_log: bool, is_first: bool, is_last: bool) -> None:

@@ -156,26 +156,21 @@ def map_of(sweep: SweepData, paper: Paper, axes: tuple[Input, ...] | None = None
     return OutcomeMap(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]), paper)
 
 
-def _panels(figure: "Figure", found: OutcomeMap, bottom: float) -> "list[Axes]":
-    """Return a row of empty panels."""
-    step = found.panel_width + COLUMN_GAP
-    return [
-        layout.add_axes(figure, LEFT + column * step, bottom, found.panel_width, found.row_height)
-        for column in range(len(found.columns))
-    ]
-
-
 def _draw_row(
     figure: "Figure", found: OutcomeMap, bottom: float, numbers: Floats, look: dict[str, Any], agrees: Flags | None
 ) -> None:
-    found.panels.append(_panels(figure, found, bottom))
-    for axes, (_, cases) in zip(found.panels[-1], found.columns, strict=True):
+    step = found.panel_width + COLUMN_GAP
+    found.panels.append([])
+    for column, (_, cases) in enumerate(found.columns):
+        axes = layout.add_axes(figure, LEFT + column * step, bottom, found.panel_width, found.row_height)
+        found.panels[-1].append(axes)
         plane = found.plane(cases)
         draw_panel(axes, plane, numbers[cases], look, None if agrees is None else agrees[cases])
         mark_failed(axes, plane, ~found.sweep.finished[cases])
         layout.number_axis(axes.xaxis, 4, is_log=found.axes[0].is_log)
         layout.number_axis(axes.yaxis, 4, is_log=found.axes[1].is_log)
-        axes.tick_params(axis="y", labelleft=cases is found.columns[0][1])
+        axes.tick_params(axis="y", labelleft=column == 0)
+        axes.tick_params(axis="x", labelbottom=len(found.panels) == found.rows)
 
 
 def _draw_block(figure: "Figure", found: OutcomeMap, block: int, bottom: float) -> None:
@@ -217,10 +212,7 @@ def _draw_classes(figure: "Figure", found: OutcomeMap, classes: Classes, bottom:
 
 
 def _name_axes(figure: "Figure", found: OutcomeMap, foot: float) -> None:
-    """Write the keys once below and at the left of all panels, numbers only at the outer ones, headings at the top."""
-    for axes in figure.axes:
-        if axes.get_label() != "<colorbar>":
-            axes.tick_params(axis="x", labelbottom=_bottom_of(axes, figure) < foot + 0.01)
+    """Write the keys once below and at the left of all panels, headings at the top."""
     middle, upright = 0.5 * (LEFT + found.width - RIGHT), foot + 0.5 * found.panels_height
     layout.write_text(figure, middle, foot - X_LABEL, "\n".join(found.x_label), ha="center", va="top")
     label = "\n".join(style.broken(found.axes[1].label, found.panels_height))
@@ -229,10 +221,6 @@ def _name_axes(figure: "Figure", found: OutcomeMap, foot: float) -> None:
     for column in range(len(found.columns) if len(found.columns) > 1 else 0):
         left = LEFT + column * (found.panel_width + COLUMN_GAP)
         layout.write_text(figure, left, top, "\n".join(found.heading(column)), weight="bold", va="bottom")
-
-
-def _bottom_of(axes: "Axes", figure: "Figure") -> float:
-    return float(axes.get_position().y0 * figure.get_figheight())
 
 
 def _shown_classes(classes: Classes) -> list[tuple[str, str]]:

@@ -107,27 +107,20 @@ def _draw_panel(axes: "Axes", panel: Panel, groups: Sequence[str]) -> None:
     for curve in panel.curves:
         number = drawn.get(curve.group, 0)
         drawn[curve.group] = number + 1
-        _draw_curve(axes, curve, _look(groups.index(curve.group), number), least)
+        look = _look(groups.index(curve.group), number)
+        axes.plot(curve.seconds, np.maximum(curve.error, least), **look, label=curve.label, zorder=3)
+        if curve.low is not None and curve.high is not None:
+            low, high = np.maximum(curve.low, least), np.maximum(curve.high, least)
+            axes.vlines(curve.seconds, low, high, color=look["color"], linewidth=style.LINE_WIDTH, alpha=0.6)
     if panel.level is not None:
-        _draw_level(axes, panel.level, panel.meaning)
+        axes.axhline(panel.level, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (5, 3)))
+        at = (0.0, panel.level), (2.0, 2.0), ("axes fraction", "data"), "offset points"
+        axes.annotate(panel.meaning, *at, color=style.FAINT_INK, ha="left")  # where quick settings have large errors
     _number_axes(axes)
     axes.spines[["right", "top"]].set_visible(False)
     axes.set_xlabel("CPU time of the steps (s)", labelpad=2.0)
     axes.set_ylabel(panel.quantity)
     axes.set_title(panel.title, loc="left")
-
-
-def _draw_level(axes: "Axes", level: float, meaning: str) -> None:
-    axes.axhline(level, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (5, 3)))
-    axes.annotate(
-        meaning,
-        (0.0, level),
-        (2.0, 2.0),
-        ("axes fraction", "data"),
-        "offset points",
-        color=style.FAINT_INK,
-        ha="left",  # where quick settings have large errors
-    )
 
 
 def _number_axes(axes: "Axes") -> None:
@@ -153,10 +146,3 @@ def _look(group: int, number: int) -> dict[str, Any]:
         "linewidth": 1.2,
         "linestyle": DASHES[min(number, len(DASHES) - 1)],
     }
-
-
-def _draw_curve(axes: "Axes", curve: Curve, look: dict[str, Any], least: float) -> None:
-    axes.plot(curve.seconds, np.maximum(curve.error, least), **look, label=curve.label, zorder=3)
-    if curve.low is not None and curve.high is not None:
-        low, high = np.maximum(curve.low, least), np.maximum(curve.high, least)
-        axes.vlines(curve.seconds, low, high, color=look["color"], linewidth=style.LINE_WIDTH, alpha=0.6)
