@@ -9,12 +9,12 @@ from blocksim.scenario.document import (
     replace_values,
     scenario_from_mapping,
 )
-from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
+from blocksim.scenario.models.contact import GROUND, Contact, Friction, Pair, PairFriction, Restitution
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.scenario import Scenario, json_schema
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
-from blocksim.scenario.pairs import GROUND, ResolvedPair, resolve_pair
+from blocksim.scenario.pairs import ResolvedPair, resolve_pair
 from blocksim.scenario.placement import PlacedBody, place_bodies
 from blocksim.scenario.resolved import body_table_contents, motion_table_content, scenario_hash, scenario_to_toml
 from blocksim.scenario.segments import PlacedSegment, place_segments, surface_height

@@ -4,11 +4,10 @@ from collections.abc import Iterator, Mapping
 
 from blocksim.scenario import keys
 from blocksim.scenario.findings import Finding
-from blocksim.scenario.models.contact import Contact, Pair
+from blocksim.scenario.models.contact import GROUND, Contact, Pair
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES
 from blocksim.scenario.overrides import Data
-from blocksim.scenario.pairs import GROUND
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.soil_places import unfit_soils
 from blocksim.scenario.spelling import did_you_mean_or_list

@@ -12,7 +12,6 @@ from blocksim.scenario.quantities import shown
 from blocksim.scenario.spelling import did_you_mean_or_list
 
 MAX_EVENTS = 1000
-WALL = "wall {}"
 GROUPS = ("remove", "fix", "free")
 FREE, FIXED, DRIVEN, GONE = "free", "fixed", "driven", "removed"
 RESULTS = {"remove": GONE, "fix": FIXED, "free": FREE}
@@ -22,7 +21,7 @@ MANY = 50
 
 def wall_names(scenario: Scenario) -> list[str]:
     """Return the names of the walls, in the order of the file."""
-    return [WALL.format(number) for number, _ in enumerate(scenario.walls, start=1)]
+    return [f"wall {number}" for number, _ in enumerate(scenario.walls, start=1)]
 
 
 def in_order(events: Sequence[Event]) -> list[int]:

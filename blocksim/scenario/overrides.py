@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from blocksim.scenario.keys import MISSING, KeyPath, field_at, follow, format_key, parse_key, read_key, skip_blank
-from blocksim.scenario.models.contact import Friction
-from blocksim.scenario.pairs import GROUND
+from blocksim.scenario.models.contact import GROUND, Friction
 from blocksim.scenario.quantities import shown
 from blocksim.scenario.spelling import did_you_mean_or_list
 

@@ -14,11 +14,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from blocksim.scenario.keys import format_key
-from blocksim.scenario.models.contact import Pair, PairFriction
+from blocksim.scenario.models.contact import GROUND, Pair, PairFriction
 from blocksim.scenario.models.scenario import Scenario
 
-GROUND = "ground"
-"""Stands for the ground where pairs name materials; no material can have this name."""
 DEFAULT = "default"
 MATERIALS = "materials"
 

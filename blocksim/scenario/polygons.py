@@ -25,7 +25,7 @@ def signed_area(corners: Floats) -> float:
     return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
-def edges_of(corners: Floats) -> tuple[Floats, Floats]:
+def edge_ends(corners: Floats) -> tuple[Floats, Floats]:
     """Return where the edges of a polygon begin and end, (k, 2) each."""
     return corners, np.roll(corners, -1, axis=0)
 
@@ -34,7 +34,7 @@ def inside(points: Floats, corners: Floats) -> Flags:
     """Return for points (n, 2) whether they lie in a polygon; on an edge either."""
     found = np.zeros(len(points), dtype=bool)
     x, y = points.T
-    for (x0, y0), (x1, y1) in zip(*edges_of(corners), strict=True):
+    for (x0, y0), (x1, y1) in zip(*edge_ends(corners), strict=True):
         if y0 != y1:
             crosses = (y0 > y) != (y1 > y)
             found ^= crosses & (x < x0 + (y - y0) * (x1 - x0) / (y1 - y0))
@@ -44,7 +44,7 @@ def inside(points: Floats, corners: Floats) -> Flags:
 def edge_distance(points: Floats, corners: Floats) -> Floats:
     """Return the distances (m) of points (n, 2) from the nearest edge."""
     nearest = np.full(len(points), np.inf)
-    for begin, end in zip(*edges_of(corners), strict=True):
+    for begin, end in zip(*edge_ends(corners), strict=True):
         along, beyond = end - begin, points - begin
         share = np.clip(beyond @ along / float(along @ along), 0.0, 1.0)
         nearest = np.minimum(nearest, np.hypot(*(beyond - np.outer(share, along)).T))
@@ -60,7 +60,7 @@ def cuts(begin: Floats, end: Floats, corners: Floats) -> bool:
     """Return True if a straight line (m) has a part inside a polygon."""
     along = end - begin
     shares = [0.0, 1.0]
-    for e0, e1 in zip(*edges_of(corners), strict=True):
+    for e0, e1 in zip(*edge_ends(corners), strict=True):
         edge, beyond = e1 - e0, e0 - begin
         across = along[0] * edge[1] - along[1] * edge[0]
         if across != 0.0:
@@ -76,7 +76,7 @@ def overlap(one: Floats, other: Floats) -> bool:
     if np.any(np.maximum(*lows) >= np.minimum(*highs) - ROUND_OFF):
         return False
     for a, b in ((one, other), (other, one)):
-        if any(cuts(begin, end, b) for begin, end in zip(*edges_of(a), strict=True)):
+        if any(cuts(begin, end, b) for begin, end in zip(*edge_ends(a), strict=True)):
             return True
     heights = np.unique(one[:, 1])  # neither cuts the other: a point in one of them tells whether one is in the other
     y = 0.5 * (heights[0] + heights[1])
@@ -87,7 +87,7 @@ def overlap(one: Floats, other: Floats) -> bool:
 def crossings_below(corners: Floats, places: Floats, axis: int) -> list[Floats]:
     """Return where lines at these places (m) along an axis cross the edges of a polygon, sorted, for each place."""
     other = 1 - axis
-    begins, ends = edges_of(corners)
+    begins, ends = edge_ends(corners)
     found = []
     for place in places:
         is_crossed = (begins[:, axis] > place) != (ends[:, axis] > place)
@@ -116,7 +116,7 @@ def self_crossings(corners: Floats) -> Iterator[tuple[int, int]]:
     def side(p: Floats, q: Floats, r: Floats) -> float:
         return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
 
-    edges = list(zip(*edges_of(corners), strict=True))
+    edges = list(zip(*edge_ends(corners), strict=True))
     for i, (a0, a1) in enumerate(edges):
         for j, (b0, b1) in enumerate(edges[i + 2 :], start=i + 2):
             low, high = (

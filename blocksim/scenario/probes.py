@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from blocksim.scenario.events import wall_names
 from blocksim.scenario.findings import Finding
 from blocksim.scenario.keys import KeyPath
 from blocksim.scenario.models.probe import ForceProbe, JointProbe, PointProbe
@@ -62,8 +63,7 @@ def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[F
 
 def support_words(scenario: Scenario) -> list[str]:
     """Return the words that mean supports: ground, walls together and one by one, all supports."""
-    walls = [f"{WALL} {number}" for number in range(1, len(scenario.walls) + 1)]
-    return [GROUND, SUPPORTS, *([WALLS] if walls else []), *walls]
+    return [GROUND, SUPPORTS, *([WALLS] if scenario.walls else []), *wall_names(scenario)]
 
 
 def _unknown(named: Sequence[tuple[KeyPath, str]], known: Sequence[str]) -> Iterator[Finding]:

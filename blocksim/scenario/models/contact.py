@@ -24,6 +24,10 @@ LEAST_SPACINGS = 0.8
 NO_FIXED_STIFFNESS = 'law "hertz-mindlin" takes it from the materials and contact_radius; use stiffness_scale'
 
 
+GROUND = "ground"
+"""Stands for the ground where pairs name materials; no material can have this name."""
+
+
 def or_bare(table: JsonSchemaValue, bare: JsonSchemaValue) -> JsonSchemaValue:
     """Let the JSON Schema accept the short form as well as the table."""
     return {"anyOf": [bare, table]}
