@@ -49,6 +49,7 @@ def outputs_of(finals: Sequence[Columns], table: ExperimentTable | None) -> list
     """Return every measured quantity (without a table: x of the first blocks), and indicators of the outcome."""
     blocks = finals[0]["block"]
     outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
+    are_in: list[bool] = []
     if table is None:
         places = np.array([final["x_mm"] for final in finals])
         found = [Output(f"x of block {name}", "mm", places[:, k]) for k, name in enumerate(blocks[:MOST_BLOCKS])]
@@ -61,6 +62,7 @@ def outputs_of(finals: Sequence[Columns], table: ExperimentTable | None) -> list
             for row, column in zip(summaries, np.array(values).T, strict=True)
         ]
         means = {row.block: row.mean for row in summaries if row.quantity == "rotation"}
+        are_in = [are_inside(row, ranges) for row in values]
     if set(blocks) <= set(means):
         name, wanted = "measured outcome", quarter_turns([means[block] for block in blocks])
     else:
@@ -72,8 +74,7 @@ def outputs_of(finals: Sequence[Columns], table: ExperimentTable | None) -> list
     hits = np.array([outcome == wanted for outcome in outcomes], dtype=np.float64)
     found.append(Output(f"{name} {shown}", INDICATOR, hits))
     if table is not None:
-        inside = np.array([are_inside(row, ranges) for row in values], dtype=np.float64)
-        found.append(Output("inside all measured ranges", INDICATOR, inside))
+        found.append(Output("inside all measured ranges", INDICATOR, np.array(are_in, dtype=np.float64)))
     return found
 
 
