@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from blocksim.study.compare import compare
     from blocksim.study.converge import converge
     from blocksim.study.fragility import fragility
-    from blocksim.study.limit import limit
-    from blocksim.study.limit_curve import limit_curve
+    from blocksim.study.limit import limit, limit_curve
     from blocksim.study.pictures import plot
     from blocksim.study.reporting import report
     from blocksim.study.run import open_run, run
@@ -61,7 +60,7 @@ _HOMES = {
     "converge": ("blocksim.study.converge", "converge"),
     "fragility": ("blocksim.study.fragility", "fragility"),
     "limit": ("blocksim.study.limit", "limit"),
-    "limit_curve": ("blocksim.study.limit_curve", "limit_curve"),
+    "limit_curve": ("blocksim.study.limit", "limit_curve"),
     "load": ("blocksim.scenario", "load_scenario"),
     "open_run": ("blocksim.study.run", "open_run"),
     "open_sweep": ("blocksim.study.sweep_table", "read_sweep"),

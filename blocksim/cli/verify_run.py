@@ -15,13 +15,12 @@ from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedE
 from blocksim.scenario import load_stored
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.run import Threads
-from blocksim.study.study_pictures import study_in
+from blocksim.study.study import Study, study_in
 from blocksim.study.sweep import kernels_for
-from blocksim.study.sweep_folder import FolderKind, read_plan
+from blocksim.study.sweep_folder import read_plan
 from blocksim.study.sweep_table import is_sweep
 from blocksim.study.verify_run import EntryDifference, Origin, RunVerdict, scenario_of, verify_run
-from blocksim.study.verify_study import verify_study
-from blocksim.study.verify_sweep import SAMPLE, SweepVerdict, verify_sweep
+from blocksim.study.verify_study import DEGREES, MM, SAMPLE, SweepVerdict, verify_study, verify_sweep
 
 INDENT = "  "
 MOST_CELLS = 5
@@ -103,9 +102,9 @@ def _sample_again(folder: Path, sample: int, seed: int, *, silent: bool) -> Swee
     return verify_sweep(folder, sample, seed)
 
 
-def _repeat_study(folder: Path, kind: FolderKind, sample: int, seed: int, *, silent: bool) -> tuple[SweepVerdict, ...]:
-    tell_compilation(kernels_of(load_stored(folder / kind.plan)), quiet=silent)
-    return verify_study(folder, kind, sample, seed)
+def _repeat_study(folder: Path, study: Study, sample: int, seed: int, *, silent: bool) -> tuple[SweepVerdict, ...]:
+    tell_compilation(kernels_of(load_stored(folder / study.answer.files.plan)), quiet=silent)
+    return verify_study(folder, study, sample, seed)
 
 
 def _of_study(verdicts: tuple[SweepVerdict, ...]) -> Verified:
@@ -219,7 +218,7 @@ def _cells(verdict: SweepVerdict) -> Iterator[str]:
     if len(verdict.cells) > MOST_CELLS:
         yield f"and {len(verdict.cells) - MOST_CELLS} cells more"
     if verdict.cells:
-        yield f"largest difference: {verdict.largest_mm:.3g} mm, {verdict.largest_deg:.3g}°"
+        yield f"largest difference: {verdict.largest(MM):.3g} mm, {verdict.largest(DEGREES):.3g}°"
     yield from _told_origins(verdict.origins)
 
 

@@ -6,51 +6,105 @@ criterion, or fewer members, runs nothing again.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+from pydantic import BaseModel, Field, InstanceOf
+
+from blocksim.analysis.intervals import interval
 from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit, inflation_of
+from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.extras import loaded
-from blocksim.scenario import Source, document_of
+from blocksim.scenario import Document, Source, document_of
 from blocksim.silence import silent
-from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.movement import MOVES_ON
+from blocksim.study.answer import Answer, Table, folder_kind
 from blocksim.study.criterion import falls_before_zero
 from blocksim.study.executors import Execution
-from blocksim.study.fragility_counts import Point
 from blocksim.study.fragility_plan import COLLAPSE, FragilityPlan, read_fragility
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, Timings
-from blocksim.study.rows import FINISHED, Row, check_experiment
+from blocksim.study.rows import FINISHED, Head, Row, check_experiment
+from blocksim.study.study import Replay, Study, folder_for
 from blocksim.study.sweep import TIMINGS, SweepRun, refuse_loss
-from blocksim.study.sweep_folder import FRAGILITY, INTENSITY, prepare, write_answer
+from blocksim.study.sweep_folder import SHARD, FolderKind, prepare
 from blocksim.study.sweep_table import SweepTable
+from blocksim.view import fragility as view
+from blocksim.view.layout import Paper
 
 if TYPE_CHECKING:
-    import numpy as np
-    import pandas as pd
     from numpy.typing import NDArray
 
-MEMBERS_TABLE, TABLE = "members.csv", "fragility.csv"
-COLUMNS = ("members", "failures", "share", "low", "high", "curve", "curve_low", "curve_high", "moving_on", "no_result")
+MEMBERS_TABLE = "members.csv"
+DIGITS = 3
+DOUBTFUL = 0.05  # probability of a larger deviance below which counts and curve do not agree
+HEADS = ("samples", "failures", "P", "95 % low", "high", "curve", "still moving", "no result")
 OnRow = Callable[[int, int, Row], None]
 
 
-@dataclass(frozen=True)
-class FragilityResult:
+class Point(BaseModel, frozen=True):
+    """One intensity: members with a result, those that failed, and the curve there; None where there is none."""
+
+    intensity: float = Field(gt=0.0, lt=1e300)
+    members: int = Field(ge=0)
+    failures: int = Field(ge=0)
+    share: float | None  # of failures
+    low: float  # 95 % limits of the probability after Clopper and Pearson, whatever other intensities came to
+    high: float
+    curve: float | None
+    curve_low: float | None
+    curve_high: float | None
+    moving_on: int = Field(ge=0)  # of those that have not failed: their runs end while blocks move
+    no_result: int = Field(ge=0)  # members whose runs did not finish; they count nowhere else
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The limits of the probability."""
+        return self.low, self.high
+
+
+class FragilityAnswer(Answer, frozen=True):
     """Counts at every intensity, and the curve through them."""
 
-    plan: FragilityPlan = field(repr=False)
-    folder: Path
+    files: ClassVar[FolderKind] = folder_kind(
+        "fragility",
+        "a fragility study",
+        "fragility",
+        {
+            rf"members{SHARD}\.csv": r"case,(?:.*,)?status,reason,seconds(?:,.*)?",
+            r"fragility\.csv": r"intensity(?: \[[^\[\]]*\])?,members,failures,.*",
+        },
+    )
+    picture: ClassVar[str] = "fragility"
+    caption: ClassVar[str] = "Failures over the intensity"
+    key: str
+    unit: str
+    fails: str
+    members: int
+    seed: int
+    scatter: dict[str, Any]
+    records: int = 0  # that intensities share
     points: tuple[Point, ...]
-    curve: Curve | NoCurve
-    run: int  # members of this call; the others were known
-    left: int = 0  # members that have not run: those of other shards
-    inflation: float | None = None  # of the curve's variance, as intensities share their records
+    left: int = Field(alias="missing")  # members that have not run: those of other shards
+    fitted: dict[str, Any] = Field(alias="curve")
+    inflation: float | None = Field(default=None, ge=1.0, lt=1e6)  # of variance: intensities share their records
+    plan: InstanceOf[FragilityPlan] | None = Field(default=None, exclude=True, repr=False)
+
+    @cached_property
+    def curve(self) -> Curve | NoCurve:
+        """The curve that is most likely, or why there is none."""
+        return fit(self.counts, inflation=self.inflation)
+
+    @property
+    def counts(self) -> Counts:
+        """The counts of all intensities."""
+        points = [one for one in self.points if one.failures <= one.members]
+        return Counts.of(*zip(*((one.intensity, one.failures, one.members) for one in points), strict=True))
 
     @property
     def failed(self) -> int:
@@ -60,66 +114,134 @@ class FragilityResult:
     @property
     def is_extrapolated(self) -> bool:
         """Return True if the median lies beyond all intensities that have been run."""
-        x = [point.intensity for point in self.points if point.members]
-        return isinstance(self.curve, Curve) and not min(x) <= self.curve.median <= max(x)
-
-    @property
-    def table(self) -> "pd.DataFrame":
-        """The counts as fragility.csv has them."""
-        import pandas as pd
-
-        return pd.DataFrame(list(_records(self)), columns=[_head(self.plan), *COLUMNS])
+        return _is_beyond(self.curve, self.points)
 
     def probability(self, intensity: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
         """Return the curve at intensities in the unit of the study, None where there is no curve."""
         return self.curve.probability(intensity) if isinstance(self.curve, Curve) else None
 
-    def to_dict(self) -> dict[str, object]:
-        """Return plain values for JSON; ends of intervals that are open are null."""
-        plan = self.plan
-        return {
-            "key": plan.head.key,
-            "unit": plan.head.unit,
-            "fails": plan.failure,
-            "members": plan.members,
-            "seed": plan.seed,
-            "scatter": plan.described(),
-            "records": plan.records,
-            "points": [dict(zip((INTENSITY, *COLUMNS), map(_finite, row), strict=True)) for row in _records(self)],
-            "missing": self.left,
-            "curve": {**_curve(self.curve), "median_extrapolated": self.is_extrapolated},
-            "inflation": self.inflation,
-        }
-
-    def __repr__(self) -> str:
-        """Return a line: key, median and dispersion, folder."""
-        return f"<FragilityResult {self.plan.head.key}: {self.summary}; {self.folder}>"
+    def value(self, number: float) -> str:
+        """Return an intensity for people."""
+        return f"{number:.6g} {self.unit}".rstrip()
 
     @property
-    def summary(self) -> str:
-        """The curve in words."""
-        if isinstance(self.curve, NoCurve):
-            return f"no curve, {self.curve.reason}"
-        return f"median {self.plan.shown(self.curve.median)}, dispersion {self.curve.dispersion:.4g}"
+    def code(self) -> ExitCode:
+        """77 where runs did not finish, 1 without a curve, unless that of a shard."""
+        if self.failed:
+            return ExitCode.SWEEP_HAS_FAILURES
+        return ExitCode.SUCCESS if isinstance(self.curve, Curve) or self.left else ExitCode.OUTSIDE
+
+    @property
+    def title(self) -> str:
+        """Key and criterion."""
+        return f'{self.key}: failure means "{self.fails}"'
+
+    def shown(self) -> Table:
+        """Return the counts of every intensity, with the curve beside them; columns without news are left out."""
+        rows: list[list[str | float]] = [
+            [
+                f"{one.intensity:.6g}",
+                str(one.members),
+                str(one.failures),
+                *(math.nan if value is None else value for value in (one.share, one.low, one.high, one.curve)),
+                str(one.moving_on),
+                str(one.no_result),
+            ]
+            for one in self.points
+        ]
+        heads = (self.unit or "value", *HEADS)
+        told = [
+            place for place in range(len(heads)) if place < len(heads) - 2 or any(row[place] != "0" for row in rows)
+        ]
+        return Table([heads[i] for i in told], [[row[i] for i in told] for row in rows], left=0, digits=DIGITS)
+
+    def lines(self) -> list[str]:
+        """Return the curve in words, or why there is none and what the counts still say of the median."""
+        curve = self.curve
+        if isinstance(curve, NoCurve):
+            return [f"no curve: {curve.reason}", *self._median_without_a_curve(curve)]
+        lines = [
+            f"median      {self.value(curve.median)}, 95 % {_span(curve.median_interval, self.unit)}",
+            f"dispersion  {curve.dispersion:.4g}, 95 % {_span(curve.dispersion_interval)}",
+        ]
+        if curve.freedom > 0 and math.isfinite(curve.fits):
+            agrees = "" if curve.fits >= DOUBTFUL else ": counts and curve do not agree"
+            lines.append(
+                f"deviance    {curve.deviance:.3g}, degrees of freedom {curve.freedom}, p = {curve.fits:.2g}{agrees}"
+            )
+        if self.inflation is not None:
+            wider = f"{self.inflation**0.5:.3g} times as wide as those of independent draws"
+            lines.append(f"intervals   {wider}: {self.records} records shared")
+        return lines
+
+    def _median_without_a_curve(self, curve: NoCurve) -> list[str]:
+        low, high = curve.low, curve.high
+        match low > 0.0, math.isfinite(high):
+            case True, True:
+                where = f"between {self.value(low)} and {self.value(high)}" if low < high else f"near {self.value(low)}"
+                return [f"the median lies {where}; intensities there would show the curve"]
+            case True, False:
+                return [f"the median lies above {self.value(low)}; larger intensities would show the curve"]
+            case False, True:
+                return [f"the median lies below {self.value(high)}; smaller intensities would show the curve"]
+        return []
+
+    def notes(self) -> list[str]:
+        """Say what is undecided or missing, and where the runs are."""
+        notes, moving = [], sum(one.moving_on for one in self.points)
+        if moving:
+            notes.append(f"{moving} surviving samples were still moving at the end; increase time.end to decide them")
+        if isinstance(self.curve, Curve) and self.is_extrapolated:
+            x = [one.intensity for one in self.points if one.members]
+            side, end = ("above", max(x)) if self.curve.median > max(x) else ("below", min(x))
+            notes.append(f"warning: the median lies {side} {self.value(end)}, beyond all intensities that were run")
+        if self.failed:
+            which = f"{self.failed} samples have no result, see {MEMBERS_TABLE}"
+            notes.append(f"{which}; they count neither as failures nor as survivors")
+        if self.left:
+            notes.append(f"{self.left} samples have not run; after all shards, rerun without --shard")
+        runs = sum(one.members + one.no_result for one in self.points)
+        return [*notes, f"{runs} runs, {self.run} of them now: {self.folder}"]
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Return key, criterion and the number of samples."""
+        samples = str(sum(one.members for one in self.points))
+        return [("intensity", self.key), ("failure", self.fails), ("samples", samples)]
+
+    def picture_of(self) -> view.Fragility:
+        """Return counts and curve as they are drawn. Raises InvalidInputError where there are none."""
+        points = [one for one in self.points if one.members and one.failures <= one.members]
+        if not points:
+            message = f"{self.folder}: no sample of this study has a result; nothing to draw"
+            raise InvalidInputError(message)
+        x, share, low, high = np.array([(one.intensity, one.share, *one.limits) for one in points], dtype=float).T
+        at, curve = view.places(x), self.curve
+        note, band = f"Failure: {self.fails}", None
+        if isinstance(curve, Curve):
+            band = view.Band(at, curve.probability(at), *curve.band(at))
+            (least, most), (narrow, wide) = curve.median_interval, curve.dispersion_interval
+            unit = f" {self.unit}" if self.unit else ""
+            median = f"median {curve.median:.4g}{unit} [{least:.4g}, {most:.4g}]"
+            note += f"; {median}, dispersion {curve.dispersion:.3g} [{narrow:.3g}, {wide:.3g}]"
+        else:
+            note += f"; no curve: {curve.reason}"
+        return view.Fragility(self.key, self.unit, x, share, low, high, band, notes=(f"{note}.",))
+
+    def draw(self, path: Path, title: str, paper: Paper) -> None:
+        """Draw counts and curve."""
+        view.draw_fragility(self.picture_of(), path, title, paper)
 
 
-def _finite(value: object) -> object:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def _is_beyond(curve: Curve | NoCurve, points: Sequence[Point]) -> bool:
+    x = [point.intensity for point in points if point.members]
+    return isinstance(curve, Curve) and not min(x) <= curve.median <= max(x)
 
 
-def _curve(found: Curve | NoCurve) -> dict[str, object]:
-    if isinstance(found, NoCurve):
-        return {"reason": found.reason, "median_interval": [found.low or None, _finite(found.high)]}
-    return {
-        "median": found.median,
-        "median_interval": [found.median_interval[0] or None, _finite(found.median_interval[1])],
-        "dispersion": found.dispersion,
-        "dispersion_interval": [found.dispersion_interval[0] or None, _finite(found.dispersion_interval[1])],
-        "confidence": found.confidence,
-        "deviance": found.deviance,
-        "degrees_of_freedom": found.freedom,
-        "fits": _finite(found.fits),
-    }
+def _span(ends: tuple[float, float], unit: str = "") -> str:
+    low, high = ends
+    if not math.isfinite(high):
+        return f"from {low:.5g} {unit}".rstrip() + ", open above" if low else "open: the counts do not bound it"
+    return (f"{low:.5g} to {high:.5g} {unit}" if low else f"up to {high:.5g} {unit}").rstrip()
 
 
 def fragility(  # noqa: PLR0913 - one argument for each option of the command
@@ -139,7 +261,7 @@ def fragility(  # noqa: PLR0913 - one argument for each option of the command
     overwrite: bool = False,
     retry_failed: bool = False,
     on_row: OnRow = silent,
-) -> FragilityResult:
+) -> FragilityAnswer:
     """Return how probable failure is at each intensity, and the lognormal curve that is most likely.
 
     `intensity` has one key and its values, {"motion.scale": [0.5, 1.0, 1.5]} or {"from": a, "to": b, "count": n};
@@ -177,55 +299,91 @@ def run_fragility(
     overwrite: bool = False,
     retry_failed: bool = False,
     on_row: OnRow = silent,
-) -> FragilityResult:
+) -> FragilityAnswer:
     """Run what is planned; see `fragility`."""
     loaded("scipy.special", PURPOSE)
     refuse_loss(shard, overwrite=overwrite)
     run, setting = execution.ready()
     base = plan.document.build()
     check_experiment(base)
-    cases = plan.cases
-    folder = Path(out) if out is not None else files.RESULTS / base.name / f"fragility-{plan.name}"
-    prepare(folder, base, plan.name, overwrite=overwrite, kind=FRAGILITY)
+    cases, kind = plan.cases, FragilityAnswer.files
+    folder = folder_for(out, base, kind, plan.name)
+    prepare(folder, base, plan.name, overwrite=overwrite, kind=kind)
     compile_kernels(kernels_of(base))
     with closing(Manifest(folder / shard.file(MANIFEST), "fragility study")) as kept:
         done = CaseIndex(folder, len(cases))
         if retry_failed:
             done.forget_failed(shard)
         before = sum(done.holds(number, settings) for number, settings in enumerate(cases.design))
-        table = SweepTable(folder / shard.file(MEMBERS_TABLE), cases, done, None, shard, FRAGILITY)
+        table = SweepTable(folder / shard.file(MEMBERS_TABLE), cases, done, None, shard, kind)
         timings = Timings(folder / shard.file(TIMINGS), execution.name)
         SweepRun(cases, shard, kept, done, table, timings, on_row).run(run, setting, fail_fast=False)
-        rows = _rows(plan, done)
-        points = tuple(_points(plan, rows))
-        counts = Counts.of(*zip(*((one.intensity, one.failures, one.members) for one in points), strict=True))
-        inflation = inflation_of(counts, *_by_record(plan, rows)) if plan.records else None
-        curve, missing = fit(counts, inflation=inflation), len(cases) - done.count()
-        result = FragilityResult(plan, folder, points, curve, done.count() - before, missing, inflation)
+        answer = _answer(plan, folder, done, before)
         if shard == WHOLE:
-            _write(result)
-    return result
+            answer.write()
+    return answer
 
 
-def _rows(plan: FragilityPlan, done: CaseIndex) -> dict[float, dict[int, Row]]:
-    """Return the rows that there are, by intensity and number of the member."""
-    rows: dict[float, dict[int, Row]] = {number: {} for number in plan.levels}
+def _answer(plan: FragilityPlan, folder: Path, done: CaseIndex, before: int) -> FragilityAnswer:
+    """Make the answer of all rows that there are."""
     numbers = list(plan.levels)
+    rows: dict[float, dict[int, Row]] = {number: {} for number in numbers}  # by intensity and number of the member
     with done.reader() as entry_of:
         for case, settings in enumerate(plan.cases.design):
             entry = entry_of(case) if done.holds(case, settings) else None
             if entry is not None:
                 rows[numbers[case % len(numbers)]][case // len(numbers)] = entry.row
-    return rows
-
-
-def _points(plan: FragilityPlan, rows: Mapping[float, Mapping[int, Row]]) -> Iterator[Point]:
-    """Count the members of every intensity that have a row."""
-    for number, found in rows.items():
-        ended = [row for row in found.values() if _has_ended(row)]
-        failures = [_has_failed(plan, row) for row in ended]
-        moving = sum(bool(row.get(MOVES_ON)) for row, fails in zip(ended, failures, strict=True) if not fails)
-        yield Point(number, len(ended), sum(failures), moving, len(found) - len(ended))
+    failed = {  # members with a result, and whether they have failed
+        number: {member: _has_failed(plan, row) for member, row in found.items() if _has_ended(row)}
+        for number, found in rows.items()
+    }
+    counts = Counts.of(numbers, [sum(one.values()) for one in failed.values()], [len(one) for one in failed.values()])
+    inflation = inflation_of(counts, *_by_record(plan.records, failed)) if plan.records else None
+    curve = fit(counts, inflation=inflation)
+    at, low, high = [np.full(len(numbers), np.nan)] * 3
+    if isinstance(curve, Curve):
+        at, (low, high) = curve.probability(np.array(numbers)), curve.band(np.array(numbers))
+    points = []
+    for i, (number, found) in enumerate(rows.items()):
+        ended = failed[number]
+        failures, members = sum(ended.values()), len(ended)
+        limits = interval(failures, members)
+        moving = sum(bool(found[member].get(MOVES_ON)) for member, fails in ended.items() if not fails)
+        points.append(
+            Point(
+                intensity=number,
+                members=members,
+                failures=failures,
+                share=failures / members if members else None,
+                low=limits[0],
+                high=limits[1],
+                curve=_finite(at[i]),
+                curve_low=_finite(low[i]),
+                curve_high=_finite(high[i]),
+                moving_on=moving,
+                no_result=len(found) - members,
+            )
+        )
+    return FragilityAnswer.model_validate(
+        {
+            "key": plan.head.key,
+            "unit": plan.head.unit,
+            "fails": plan.failure,
+            "members": plan.members,
+            "seed": plan.seed,
+            "scatter": plan.described(),
+            "records": plan.records,
+            "points": points,
+            "missing": len(plan.cases) - done.count(),
+            "curve": {**_described(curve), "median_extrapolated": _is_beyond(curve, points)},
+            "inflation": inflation,
+            "folder": folder,
+            "run": done.count() - before,
+            "heads": (str(Head("intensity", plan.head.unit)), *list(Point.model_fields)[1:]),
+            "cells": [list(dict(point).values()) for point in points],
+            "plan": plan,
+        }
+    )
 
 
 def _has_ended(row: Row) -> bool:
@@ -237,39 +395,55 @@ def _has_failed(plan: FragilityPlan, row: Row) -> bool:
 
 
 def _by_record(
-    plan: FragilityPlan, rows: Mapping[float, Mapping[int, Row]]
+    records: int, failed: Mapping[float, Mapping[int, bool]]
 ) -> tuple["NDArray[np.float64]", "NDArray[np.float64]"]:
     """Return failures and members by record, shape (records, intensities that have any)."""
-    import numpy as np  # noqa: PLC0415 - as pandas
-
-    ended = [{member: row for member, row in found.items() if _has_ended(row)} for found in rows.values()]
-    kept = [found for found in ended if found]
-    failed, members = np.zeros((plan.records, len(kept))), np.zeros((plan.records, len(kept)))
+    kept = [found for found in failed.values() if found]
+    failures, members = np.zeros((records, len(kept))), np.zeros((records, len(kept)))
     for place, found in enumerate(kept):
-        for member, row in found.items():
-            members[member % plan.records, place] += 1.0
-            failed[member % plan.records, place] += _has_failed(plan, row)
-    return failed, members
+        for member, fails in found.items():
+            members[member % records, place] += 1.0
+            failures[member % records, place] += fails
+    return failures, members
 
 
-def _head(plan: FragilityPlan) -> str:
-    return f"{INTENSITY} [{plan.head.unit}]" if plan.head.unit else INTENSITY
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
-def _records(result: FragilityResult) -> Iterator[list[Any]]:
-    """Yield the rows of fragility.csv."""
-    import numpy as np  # noqa: PLC0415 - as pandas
+def _described(curve: Curve | NoCurve) -> dict[str, object]:
+    """Return a curve for JSON; ends of intervals that are open are None."""
+    if isinstance(curve, NoCurve):
+        return {"reason": curve.reason, "median_interval": [curve.low or None, _finite(curve.high)]}
+    return {
+        "median": curve.median,
+        "median_interval": [curve.median_interval[0] or None, _finite(curve.median_interval[1])],
+        "dispersion": curve.dispersion,
+        "dispersion_interval": [curve.dispersion_interval[0] or None, _finite(curve.dispersion_interval[1])],
+        "confidence": curve.confidence,
+        "deviance": curve.deviance,
+        "degrees_of_freedom": curve.freedom,
+        "fits": _finite(curve.fits),
+    }
 
-    x = np.array([point.intensity for point in result.points])
-    at, low, high = [np.full(len(x), np.nan)] * 3
-    if isinstance(result.curve, Curve):
-        at, (low, high) = result.curve.probability(x), result.curve.band(x)
-    for i, one in enumerate(result.points):
-        curve = [float(values[i]) for values in (at, low, high)]
-        yield [one.intensity, one.members, one.failures, one.share, *one.limits, *curve, one.moving_on, one.no_result]
+
+def repeat_fragility(answer: FragilityAnswer, execution: Replay, out: Path) -> FragilityAnswer:
+    """Draw and count the members again."""
+    spread, stripes = dict(answer.scatter), {}
+    for key, values in answer.scatter.items():  # stripes come first
+        if not isinstance(values, list) or len(values) != answer.records:
+            break
+        stripes[key] = spread.pop(key)
+    plan = read_fragility(
+        Document.read(answer.folder / answer.files.plan, is_stored=True),
+        {answer.key: [f"{one.intensity!r} {answer.unit}" if answer.unit else one.intensity for one in answer.points]},
+        spread,
+        stripes=stripes,
+        members=answer.members,
+        fails=answer.fails.split(" or "),
+        seed=answer.seed,
+    )
+    return run_fragility(plan, execution, out=out)
 
 
-def _write(result: FragilityResult) -> None:
-    """Write fragility.csv, and the answer into fragility.json."""
-    rows = [["" if _finite(cell) is None else cell for cell in row] for row in _records(result)]
-    write_answer(result.folder / TABLE, FRAGILITY, [[_head(result.plan), *COLUMNS], *rows], result.to_dict())
+FRAGILITY = Study(FragilityAnswer, repeat_fragility, is_design=True)

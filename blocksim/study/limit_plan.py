@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from blocksim.errors import BlocksimError, InvalidInputError
@@ -13,16 +14,19 @@ from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
 from blocksim.scenario.models.variation import Uniform, is_descending
 from blocksim.scenario.units import parse_unit
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
-from blocksim.study.criterion import Criterion, read_criterion
+from blocksim.study.criterion import Criterion, Verdict, read_criterion
 from blocksim.study.limit_search import Number, Span
 from blocksim.study.limit_start import at_rest, comes_at_once
 from blocksim.study.plan import Values, Variations, varied
+from blocksim.study.rows import Head, Row
+from blocksim.study.typed_levels import typed_levels
 
 SCANNED = 9
-MOST_SCANNED = 1000
+MOST_SCANNED = MOST_VALUES = 1000
 TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
-OPTION = "--vary"
+OPTION, OVER = "--vary", "--over"
+NAMES = {name: time.contacts for name, time in SCHEMES.items()}
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,20 @@ class LimitPlan:
         """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
         return self.document.with_values(self.settings(number)).build()
 
+    @cached_property
+    def scheme(self) -> str:
+        """The stepping scheme of its runs."""
+        return self.document.build().time.scheme
+
+    @cached_property
+    def has_springs(self) -> bool:
+        """True where contacts are springs."""
+        return self.document.build().time.has_springs
+
+    def verdicts(self, rows: Mapping[Number, Row]) -> dict[Number, Verdict]:
+        """Return what runs came to, from the smallest value up."""
+        return {value: self.criterion.verdict(rows[value]) for value in sorted(rows)}
+
     @property
     def comes_at_once(self) -> bool:
         """True where sustained loads come at once, as the scenario says that it does not begin at rest."""
@@ -71,6 +89,49 @@ class LimitPlan:
         ends = [self.key, self.unit, *vars(self.span).values(), self.criterion.text, self.tolerance]
         text = json.dumps([scenario_hash(self.document.build()), ends, code_hash()])
         return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+
+
+@dataclass(frozen=True)
+class CurvePlan:
+    """A search at each number of another key."""
+
+    head: Head  # that key, and its unit
+    searches: Mapping[float, LimitPlan]
+
+    @property
+    def one(self) -> LimitPlan:
+        """Any of the searches: key, unit, range and criterion are those of all."""
+        return next(iter(self.searches.values()))
+
+    @property
+    def name(self) -> str:
+        """A hash of everything that decides the answer."""
+        text = json.dumps([self.head.key, *(plan.name for plan in self.searches.values())])
+        return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+
+
+def read_curve(
+    document: Document,
+    vary: Mapping[str, Values] | Variations,
+    over: Mapping[str, Values] | Variations,
+    *,
+    stands: str,
+    tolerance: float,
+    scan: int = SCANNED,
+) -> CurvePlan:
+    """Return the plan of a curve of limits. Raises as `read_limit`, for every value of the other key."""
+    given = over if isinstance(over, Variations) else Variations.of(over)
+    if len(given.tables) != 1:
+        message = f"limits are searched over one key, not {len(given.tables)}: give {OVER} KEY=a,b,c once"
+        raise InvalidInputError(message)
+    bare = document.without_sweep()
+    head, levels = typed_levels(bare, given, OVER)
+    if len(levels) > MOST_VALUES:
+        message = f"{len(levels)} values are too many; at most {MOST_VALUES} are searched"
+        raise InvalidInputError(message)
+    at = {number: bare.with_values({head.key: value}) for number, value in levels.items()}
+    read = {number: read_limit(one, vary, stands=stands, tolerance=tolerance, scan=scan) for number, one in at.items()}
+    return CurvePlan(head, read)
 
 
 def read_limit(
@@ -99,31 +160,29 @@ def read_limit(
     if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
-    count = _count(table.get("count", scan))
+    count = table.get("count", scan)
+    if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_SCANNED:
+        message = f"{count} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed"
+        raise InvalidInputError(message)
     ends: dict[str, Any] = {name: table[name] for name in table if name != "count"}
     if is_descending(ends):
         ends |= {"from": ends["to"], "to": ends["from"]}
     values = varied(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
     assert isinstance(values, Uniform)  # noqa: S101 - it has two ends
-    plan = LimitPlan(bare, key, _unit(values), _span(bare, key, values, ends, count), criterion, tolerance)
-    ends_of_range = _ends(plan)
-    return replace(plan, document=at_rest(bare, *ends_of_range))
+    unit = values.unit or ("rad" if values.angle else "")
+    plan = LimitPlan(bare, key, unit, _span(bare, key, values, unit, ends, count), criterion, tolerance)
+    found = []
+    for number in (plan.span.low, plan.span.high):
+        try:
+            found.append(plan.scenario_at(number))
+        except BlocksimError as error:
+            message = f"{key} = {plan.shown(number)}: {str(error).splitlines()[0]}"
+            raise InvalidInputError(message) from error
+    return replace(plan, document=at_rest(bare, *found))
 
 
-def _count(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 2 <= value <= MOST_SCANNED:
-        message = f"{value} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed"
-        raise InvalidInputError(message)
-    return value
-
-
-def _unit(values: Uniform) -> str:
-    return values.unit or ("rad" if values.angle else "")
-
-
-def _span(document: Document, key: str, values: Uniform, table: Mapping[str, Any], count: int) -> Span:
+def _span(document: Document, key: str, values: Uniform, unit: str, table: Mapping[str, Any], count: int) -> Span:
     """Return the range in the typed unit; of a key that takes whole numbers only, every one of them that fits."""
-    unit = _unit(values)
     factor = float(parse_unit(unit).factor) if unit else 1.0
     low, high = (float(f"{end / factor:.12g}") for end in (values.low, values.high))
     is_whole = takes_whole(document, key) and all(type(table[end]) is int for end in ("from", "to"))
@@ -135,18 +194,6 @@ def takes_whole(document: Document, key: str) -> bool:
     """Return True for a key whose values are whole numbers."""
     field = field_of(key, document.build())
     return field is not None and int in options(field.annotation) and float not in options(field.annotation)
-
-
-def _ends(plan: LimitPlan) -> list[Scenario]:
-    """Return the scenarios at both ends. Raises InvalidInputError where one cannot be built."""
-    found = []
-    for number in (plan.span.low, plan.span.high):
-        try:
-            found.append(plan.scenario_at(number))
-        except BlocksimError as error:
-            message = f"{plan.key} = {plan.shown(number)}: {str(error).splitlines()[0]}"
-            raise InvalidInputError(message) from error
-    return found
 
 
 def variants(document: Document, *, both_laws: bool = False) -> dict[str, Document]:

@@ -14,7 +14,7 @@ from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.study.index_pictures import TORNADO, anything_goes, draw_indices
 from blocksim.study.run_pictures import PlotOptions, draw_motion_of, draw_probes_of, draw_run
 from blocksim.study.stored_run import Place, folder_of
-from blocksim.study.study_pictures import draw_study, study_in
+from blocksim.study.study import draw_study, study_in
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
@@ -134,8 +134,8 @@ def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
     kind, paper, ready = options.kind, options.paper, options.ready
     study = study_in(place)
     if study is not None:
-        options.refuse(None, f"{place} is {study.what}")
-        return draw_study(place, study, out, kind, paper, ready, published=options.table), ""
+        options.refuse(None, f"{place} is {study.answer.files.what}")
+        return draw_study(place, study, out, kind, paper, ready, options.table), ""
     if is_sweep(place):
         options.refuse(None, f"{place} is a sweep")
         return draw_sweep(place, out, options.table, kind, paper, ready=ready), ""

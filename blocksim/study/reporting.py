@@ -16,8 +16,7 @@ from blocksim.simulation.own_files import refuse_foreign
 from blocksim.study.compare import compare_sweep
 from blocksim.study.rows import FINISHED, TABLE
 from blocksim.study.stored_run import Place, choice, find_run, folder_of
-from blocksim.study.study_pages import study_page
-from blocksim.study.study_pictures import study_in
+from blocksim.study.study import study_in, study_page
 from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.study.sweep_table import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, lines_in

@@ -85,7 +85,6 @@ class FolderKind:
 
 MANIFESTS: Mapping[str, Kind] = {rf"manifest{SHARD}\.jsonl": grows_from(b'{"number":')}
 ORIGINS = has_keys("began_at")
-UNIT = r"(?: \[[^\[\]]*\])?"
 OF_CASES = heads(rb"case,(?:.*,)?status,reason,seconds(?:,.*)?")
 SWEEP = FolderKind(
     what="a sweep",
@@ -100,41 +99,6 @@ SWEEP = FolderKind(
     },
     leftover=re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*"),
     tables=re.compile(rf"sweep{SHARD}\.csv"),
-)
-LIMIT = FolderKind(
-    what="a limit",
-    command="blocksim limit FILE",
-    plan="limit.toml",
-    head=b"# Limit ",
-    results={r"limit\.csv": heads(rf"value{UNIT},verdict,.*".encode()), r"limit\.json": ORIGINS, **MANIFESTS},
-    leftover=re.compile(r"\.(limit\.csv|limit\.json|limit\.toml)\..*"),
-    tables=re.compile(r"limit\.csv"),
-)
-OVER = "over"
-LIMIT_CURVE = FolderKind(
-    what="a curve of limits",
-    command="blocksim limit FILE",
-    plan="limits.toml",
-    head=b"# Limits ",
-    results={r"limits\.csv": heads(rf"{OVER}{UNIT},low.*,high.*".encode()), r"limits\.json": ORIGINS},
-    leftover=re.compile(r"\.(limits\.csv|limits\.json|limits\.toml)\..*"),
-    tables=re.compile(r"limits\.csv"),
-)
-INTENSITY = "intensity"
-FRAGILITY = FolderKind(
-    what="a fragility study",
-    command="blocksim fragility FILE",
-    plan="fragility.toml",
-    head=b"# Fragility ",
-    results={
-        rf"members{SHARD}\.csv": OF_CASES,
-        r"fragility\.csv": heads(rf"{INTENSITY}{UNIT},members,failures,.*".encode()),
-        r"fragility\.json": ORIGINS,
-        rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
-        **MANIFESTS,
-    },
-    leftover=re.compile(r"\.(members[-\w]*\.csv|fragility\.csv|fragility\.json|fragility\.toml)\..*"),
-    tables=re.compile(rf"members{SHARD}\.csv|fragility\.csv"),
 )
 
 

@@ -15,8 +15,7 @@ from typer.testing import CliRunner
 from blocksim.cli.app import app
 from blocksim.simulation.atomic import sha256_of
 from blocksim.study.fragility import fragility
-from blocksim.study.limit import limit
-from blocksim.study.limit_curve import limit_curve
+from blocksim.study.limit import limit, limit_curve
 from blocksim.study.progress import read_entries
 from tests.cli.conftest import SCENARIOS, Command
 from tests.cli.test_limit import on_soft_springs
@@ -329,7 +328,7 @@ STUDY_CHANGES: dict[str, tuple[str, Callable[[Path], object], str]] = {
     "point": (
         "limits",
         lambda folder: altered(folder, "limits.json", '"runs": ', '"runs": 9'),
-        "limits.json: over 0.05.runs",
+        "limits.json: points.0.runs",
     ),
     "count": (
         "fragility",

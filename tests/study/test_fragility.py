@@ -15,10 +15,9 @@ from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
-from blocksim.study.fragility import FragilityResult, fragility
+from blocksim.study.fragility import FragilityAnswer, fragility
 from blocksim.study.fragility_plan import read_fragility
 from blocksim.study.progress import Shard
-from blocksim.study.study_pictures import read_fragility_picture
 from tests.sizes import in_all
 
 MU = "friction.block_ground"
@@ -39,18 +38,19 @@ SLOPE: dict[str, Any] = {
 }
 
 
-def slides(out: Path, members: int = 8, **wanted: Any) -> FragilityResult:
+def slides(out: Path, members: int = 8, **wanted: Any) -> FragilityAnswer:
     return fragility(SLOPE, TILTS, FRICTION, out=out, **{"members": members, "fails": SLIDES, "jobs": 1, **wanted})
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> FragilityResult:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> FragilityAnswer:
     """Give a study that was run in one go; not to be changed."""
     return slides(tmp_path_factory.mktemp("whole") / "study")
 
 
-def test_each_member_slides_where_its_own_friction_is_less_than_the_tangent_of_the_tilt(whole: FragilityResult) -> None:
+def test_each_member_slides_where_its_own_friction_is_less_than_the_tangent_of_the_tilt(whole: FragilityAnswer) -> None:
     plan = whole.plan
+    assert plan is not None
     slopes = [math.tan(math.radians(number)) for number in plan.levels]
     below = [
         sum(float(str(case[MU])) < slope for case in plan.cases.design[i :: len(slopes)])
@@ -82,7 +82,7 @@ def test_a_member_depends_on_its_number_and_intensity_alone() -> None:
 
 
 def test_a_study_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_nothing_twice(
-    tmp_path: Path, whole: FragilityResult, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, whole: FragilityAnswer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(batches, "MOST", 7)  # the last batch is not yet under way
     for at in (1, 17):
@@ -114,7 +114,7 @@ def test_more_members_and_another_criterion_do_not_repeat_what_has_run(tmp_path:
     assert [point.failures for point in none.points] == [0] * 5
 
 
-def test_shards_in_any_order_give_the_study_that_one_process_gives(tmp_path: Path, whole: FragilityResult) -> None:
+def test_shards_in_any_order_give_the_study_that_one_process_gives(tmp_path: Path, whole: FragilityAnswer) -> None:
     parts = [slides(tmp_path, shard=Shard(index, 3)) for index in (2, 0, 1)]
     assert [part.left for part in parts] == [27, 13, 0]
     assert not (tmp_path / "fragility.csv").exists()
@@ -173,7 +173,7 @@ def test_keys_that_take_whole_numbers_are_drawn_as_such() -> None:
     assert np.bincount(drawn)[1:].tolist() == pytest.approx([50] * 4, abs=25)  # type: ignore[arg-type]
 
 
-def test_the_folder_holds_counts_curve_members_and_scenario(whole: FragilityResult) -> None:
+def test_the_folder_holds_counts_curve_members_and_scenario(whole: FragilityAnswer) -> None:
     head, first, *_ = (whole.folder / "fragility.csv").read_text().splitlines()
     assert head.startswith("intensity [deg],members,failures,share,low,high,curve,curve_low,curve_high")
     assert first.startswith(f"14.0,8,{whole.points[0].failures},")
@@ -246,14 +246,14 @@ def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path)
 
 
 @pytest.mark.long
-def test_counts_and_members_are_the_same_from_processes(tmp_path: Path, whole: FragilityResult) -> None:
+def test_counts_and_members_are_the_same_from_processes(tmp_path: Path, whole: FragilityAnswer) -> None:
     slides(tmp_path, executor="processes", jobs=2)
     for name in ("fragility.csv", "members.csv"):
         assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
 
 
 @pytest.mark.long
-def test_counts_and_members_are_the_same_from_a_cluster(tmp_path: Path, whole: FragilityResult) -> None:
+def test_counts_and_members_are_the_same_from_a_cluster(tmp_path: Path, whole: FragilityAnswer) -> None:
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
         slides(tmp_path, scheduler=cluster.scheduler_address)
@@ -275,7 +275,7 @@ def test_stripes_have_each_record_once_at_each_intensity_and_wider_intervals(tmp
     both = [found.curve, fit(Counts.of([14, 17, 20, 23, 26], [p.failures for p in found.points], [6] * 5))]
     narrow, wide = sorted(c.median_interval[1] - c.median_interval[0] for c in both if isinstance(c, Curve))
     assert narrow < 0.8 * wide
-    assert read_fragility_picture(tmp_path / "study").band is not None
+    assert FragilityAnswer.read(tmp_path / "study").picture_of().band is not None
     twice = fragility(SLOPE, TILTS, {"gravity": [9.8, 9.9]}, **stripes, members=12, out=tmp_path / "twice")
     assert [point.members for point in twice.points] == [12] * 5
     assert twice.to_dict()["records"] == 6
@@ -299,7 +299,7 @@ def test_stripes_that_are_not_equally_often_there_are_refused(
         read_fragility(document, {"ground.tilt": ["10 deg", "20 deg"]}, drawn, stripes=stripes, members=members)
 
 
-def test_a_median_beyond_what_was_run_is_known_as_such(whole: FragilityResult, tmp_path: Path) -> None:
+def test_a_median_beyond_what_was_run_is_known_as_such(whole: FragilityAnswer, tmp_path: Path) -> None:
     low = {"ground.tilt": ["14 deg", "17 deg"]}
     found = fragility(SLOPE, low, stripes={MU: [0.2, 0.26, *RECORDS[2:]]}, fails=SLIDES, jobs=1, out=tmp_path / "low")
     assert isinstance(found.curve, Curve)

@@ -60,7 +60,7 @@ def test_a_block_on_a_slope_slides_at_its_friction_angle_or_topples_about_its_ed
     assert change.high == pytest.approx(degrees, rel=2e-3)
     assert change.high - change.low <= 1e-3 * change.high
     assert (change.below, change.above) == (Verdict.STANDS, Verdict.FALLS)
-    assert found.seen(change.high)["outcome"] == outcome
+    assert found.brackets[0].above.outcome == outcome
     assert len(found.rows) <= 25
 
 
@@ -142,7 +142,7 @@ def test_whole_numbers_of_blocks_are_searched_as_such(tmp_path: Path) -> None:
     # shifted by 19 mm each, the blocks above the lowest have their centre at n 19 mm/2: beyond its edge for n = 6
     (change,) = found.limits
     assert (change.low, change.high) == (5.0, 6.0)
-    assert found.seen(6.0)["outcome"] == "fell"
+    assert found.brackets[0].above.outcome == "fell"
 
 
 def test_values_that_do_not_go_with_the_others_are_told_and_not_taken_for_falling(tmp_path: Path) -> None:
@@ -238,8 +238,9 @@ def test_limits_of_rigid_contacts_that_go_with_the_step_hold_those_of_half_of_it
     }
     near = {"ground.tilt": {"from": "16.4 deg", "to": "19 deg", "count": 4}}
     found = limit(ring, near, out=tmp_path / "long", tolerance=3e-3)
-    (given,), (answer,) = found.limits_as_given, found.limits
-    (half,) = found.finer.values()
+    (bracket,), (answer,) = found.brackets, found.limits
+    given, half = bracket.given, bracket.half_step
+    assert half is not None
     assert half.low > given.high
     assert (answer.low, answer.high) == pytest.approx((given.low, half.high + half.low - given.high))
     (short,) = limit(
@@ -255,7 +256,9 @@ def test_an_acceleration_that_passes_for_rest_is_in_the_bracket(tmp_path: Path) 
     scene = unsettled(block_on_a_slope(SQUAT, rest_hold=0.05, rest_speed=1e-4))
     near = {"from": f"{degrees - 0.1} deg", "to": f"{degrees + 0.1} deg", "count": 3}
     found = limit(scene, {"ground.tilt": near}, out=tmp_path, tolerance=1e-5)
-    (given,), (answer,), (margin,) = found.limits_as_given, found.limits, found.margins.values()
+    (bracket,), (answer,) = found.brackets, found.limits
+    given, margin = bracket.given, bracket.undecided
+    assert margin is not None
     assert given.low > degrees + 1e-3  # 2e-3 m/s2 for 50 ms is no motion
     assert answer.low < degrees < answer.high
     assert margin.rest == pytest.approx(1e-4 / 0.05 / 9.81 / math.radians(degrees), rel=0.01)

@@ -8,9 +8,8 @@ import pytest
 
 from blocksim.scenario import Document, load_scenario
 from blocksim.study.limit import limit
-from blocksim.study.limit_give import gives_of
+from blocksim.study.limit_margin import STIFFNESS
 from blocksim.study.limit_plan import with_scheme
-from blocksim.study.limit_stiff import STIFFNESS
 from blocksim.study.run import run
 
 SCHEMES = ("nonsmooth", "explicit")
@@ -79,7 +78,7 @@ def test_a_pulse_overturns_a_block_on_soft_springs_from_the_published_amplitude_
     pulse = with_scheme(Document.read(SCENARIOS / "pulse.toml"), "explicit").with_values(soft)
     span = {"motion.amplitude": {"from": 7.0, "to": 7.5, "count": 2}}
     found = limit(pulse, span, stands="turned < 80 deg", tolerance=5e-3, out=tmp_path, keep_runs=False)
-    (answer,), (given,) = found.changes, found.changes_as_given  # what does not fall rocks on at the end
+    (answer,), given = found.changes, found.brackets[0].given  # what does not fall rocks on at the end
     assert given.low > 0.745 * GRAVITY
     assert 0.99 * 0.7362 * GRAVITY < answer.low < 0.7362 * GRAVITY < answer.high < 1.01 * 0.7362 * GRAVITY
 
@@ -112,8 +111,9 @@ def test_the_limits_of_a_dry_wall_on_springs_agree_between_stiffnesses(tmp_path:
     for scale, off in ((0.001, 0.057), (0.01, 0.006)):
         soft = wall.with_values({STIFFNESS: scale})
         found = limit(soft, span, out=tmp_path / f"{scale}", tolerance=2e-3, keep_runs=False)
-        (answer,), (given,) = found.limits, found.limits_as_given
-        (give,) = gives_of(found)
+        (answer,), (bracket,) = found.limits, found.brackets
+        given, give = bracket.given, bracket.give
+        assert give is not None
         assert give.share == pytest.approx(off, rel=0.2)
         assert 1.0 - given.low / answer.low == pytest.approx(off, rel=0.1, abs=2e-3)
         # associated flow is a rigorous bound, with friction as it is the limit is near 0.6398

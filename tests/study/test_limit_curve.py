@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from blocksim.errors import InvalidInputError, OutputExistsError
-from blocksim.study.limit_curve import CurveResult, limit_curve
+from blocksim.study.limit import limit_curve
+from blocksim.study.limit_answer import CurveAnswer
 from blocksim.study.pictures import plot
 from blocksim.study.reporting import report
 from blocksim.view.limit_curve import Bracket, LimitCurve, Series, joined
@@ -18,17 +19,17 @@ SIZE = (0.05, 0.1)  # m: topples at atan 0.5
 OVER: dict[str, Any] = {"friction.block_ground": [0.7, 0.3]}
 
 
-def curve(out: Path, **wanted: Any) -> CurveResult:
+def curve(out: Path, **wanted: Any) -> CurveAnswer:
     return limit_curve(block_on_a_slope(SIZE), TILT, OVER, out=out, tolerance=0.02, **wanted)
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> CurveResult:
+def found(tmp_path_factory: pytest.TempPathFactory) -> CurveAnswer:
     """Give a curve; not to be changed."""
     return curve(tmp_path_factory.mktemp("curve") / "found")
 
 
-def test_a_block_slides_at_its_friction_angle_until_it_topples_before(found: CurveResult) -> None:
+def test_a_block_slides_at_its_friction_angle_until_it_topples_before(found: CurveAnswer) -> None:
     assert list(found.searches) == [0.3, 0.7]
     for search, tangent in zip(found.searches.values(), (0.3, 0.5), strict=True):
         (change,) = search.limits
@@ -37,14 +38,14 @@ def test_a_block_slides_at_its_friction_angle_until_it_topples_before(found: Cur
         assert change.high - change.low <= 0.02 * change.high
 
 
-def test_the_same_call_runs_nothing_and_another_one_is_refused(found: CurveResult) -> None:
+def test_the_same_call_runs_nothing_and_another_one_is_refused(found: CurveAnswer) -> None:
     again = curve(found.folder)
     assert [search.run for search in again.searches.values()] == [0, 0]
     with pytest.raises(OutputExistsError, match="contains another curve of limits"):
         curve(found.folder, stands="moved < 1 mm")
 
 
-def test_the_folder_holds_table_and_answer_and_is_drawn(found: CurveResult, tmp_path: Path) -> None:
+def test_the_folder_holds_table_and_answer_and_is_drawn(found: CurveAnswer, tmp_path: Path) -> None:
     head, first, second = (found.folder / "limits.csv").read_text().splitlines()
     assert head == "over,low [deg],high [deg],below,above"
     assert first.startswith("0.3,")
@@ -56,10 +57,10 @@ def test_the_folder_holds_table_and_answer_and_is_drawn(found: CurveResult, tmp_
 
 
 def test_a_table_of_others_is_drawn_beside_it(
-    found: CurveResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    found: CurveAnswer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[LimitCurve] = []
-    monkeypatch.setattr("blocksim.study.study_pictures.draw_limit_curve", lambda curve, *_: drawn.append(curve))
+    monkeypatch.setattr("blocksim.view.limit_curve.draw_limit_curve", lambda curve, *_: drawn.append(curve))
     table = tmp_path / "published.csv"
     table.write_text('# from a book\nover,limit [deg],series\n0.3,16.7,"a, b"\n0.5,26.6,c\n0.4,21.8,"a, b"\n')
     plot(found, experiment=table)
@@ -76,7 +77,7 @@ def test_a_table_of_others_is_drawn_beside_it(
     ],
 )
 def test_a_bad_table_beside_a_curve_is_refused_with_its_line(
-    found: CurveResult, tmp_path: Path, text: str, why: str
+    found: CurveAnswer, tmp_path: Path, text: str, why: str
 ) -> None:
     (tmp_path / "bad.csv").write_text(text)
     with pytest.raises(InvalidInputError, match=why):
@@ -84,7 +85,7 @@ def test_a_bad_table_beside_a_curve_is_refused_with_its_line(
     assert not (tmp_path / "limits.png").exists()
 
 
-def test_a_table_beside_a_single_limit_is_refused(found: CurveResult, tmp_path: Path) -> None:
+def test_a_table_beside_a_single_limit_is_refused(found: CurveAnswer, tmp_path: Path) -> None:
     single = next(iter(found.searches.values())).folder
     with pytest.raises(InvalidInputError, match=r"a table is drawn beside a curve of limits only, and .* is a limit"):
         plot(single, out=tmp_path / "limit.png", experiment=tmp_path / "any.csv")

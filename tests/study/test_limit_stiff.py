@@ -13,9 +13,9 @@ from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, document_of
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.limit import find_limit
+from blocksim.study.limit_answer import LimitAnswer
+from blocksim.study.limit_margin import Level, Levels, ratio_of
 from blocksim.study.limit_plan import read_limit
-from blocksim.study.limit_result import LimitResult
-from blocksim.study.limit_stiff import Level, Levels, ratio_of
 from blocksim.study.progress import MANIFEST
 from tests.study.test_limit import block_on_a_slope
 
@@ -67,7 +67,7 @@ def on_springs(**tables: Any) -> dict[str, Any]:
     return data | tables
 
 
-def found_with(execution: Execution, out: Path, data: Mapping[str, Any] | None = None, **wanted: Any) -> LimitResult:
+def found_with(execution: Execution, out: Path, data: Mapping[str, Any] | None = None, **wanted: Any) -> LimitAnswer:
     vary = {"ground.tilt": {"from": "5 deg", "to": "40 deg"}}
     plan = read_limit(document_of(data or on_springs()), vary, stands="outcome != fell", tolerance=1e-3)
     return find_limit(plan, execution, out=out, keep_runs=False, **wanted)
@@ -79,11 +79,11 @@ def test_a_limit_of_springs_becomes_that_of_stiff_contacts(tmp_path: Path, share
     (answer,) = found.limits
     assert answer.low < STIFF < answer.high
     assert answer.high - answer.low < 5e-3 * STIFF
-    (levels,) = found.levels.values()
-    assert [one.scale for one in levels.found] == [10.0**n for n in range(scales)]
-    assert all(one.low < linear(share)(one.scale) < one.high for one in levels.found)
+    levels = found.brackets[0].levels
+    assert [one.stiffness_scale for one in levels] == [10.0**n for n in range(scales)]
+    assert all(one.low < linear(share)(one.stiffness_scale) < one.high for one in levels)
     assert found.runs - len(found.rows) <= 8 * (scales - 1)
-    assert found_with(formula(linear(share)), tmp_path, stiffer=False).limits == found.limits_as_given
+    assert found_with(formula(linear(share)), tmp_path, stiffer=False).limits == [one.given for one in found.brackets]
 
 
 @pytest.mark.parametrize("share", [0.03, -0.03])
@@ -107,7 +107,7 @@ def test_what_moves_on_at_the_end_is_extrapolated_as_what_stands(tmp_path: Path)
 def test_where_springs_do_not_shift_a_limit_two_runs_say_so_and_none_where_they_cannot(tmp_path: Path) -> None:
     found = found_with(formula(linear(1e-4), is_known=False), tmp_path / "may")
     assert found.runs == len(found.rows) + 2
-    (answer,), (given,) = found.limits, found.limits_as_given
+    (answer,), (given,) = found.limits, [one.given for one in found.brackets]
     assert answer.low == given.low < STIFF < answer.high < given.high * (1.0 + 3e-3)  # they were looked for so far
     stiff = on_springs(contact={"restitution": 0})  # the stone's own stiffness
     assert found_with(formula(linear(1e-4), is_known=False), tmp_path / "cannot", stiff).runs == len(found.rows)
@@ -130,11 +130,11 @@ def test_without_a_start_at_rest_the_bracket_holds_what_goes_with_the_root_of_th
 
 def test_a_limit_that_stiffer_springs_do_not_have_is_told_and_left_as_given(tmp_path: Path) -> None:
     found = found_with(formula(lambda scale: 24.0 if scale == 1.0 else 50.0), tmp_path)
-    (levels,) = found.levels.values()
-    assert levels.problem == "with springs 10 times as stiff there is no such limit in the range"
-    assert found.limits == found.limits_as_given
+    (bracket,) = found.brackets
+    assert bracket.problem == "with springs 10 times as stiff there is no such limit in the range"
+    assert found.limits == [bracket.given]
     (change,) = json.loads((tmp_path / "limit.json").read_text())["changes"]
-    assert (change["extrapolated"], change["problem"]) == (False, levels.problem)
+    assert (change["extrapolated"], change["problem"]) == (False, bracket.problem)
 
 
 def test_a_search_stopped_after_any_run_goes_on_with_the_same_values_and_repeats_none(tmp_path: Path) -> None:
@@ -191,6 +191,8 @@ def test_what_is_left_out_of_second_order_is_within_the_bracket() -> None:
     def law(s: float) -> float:
         return 1.0 - s - s * s
 
-    (low, high) = Levels((Level(1.0, law(0.08), law(0.08)), Level(10.0, law(0.008), law(0.008))), 10.0).stiff or (0, 0)
+    softer = Level(stiffness_scale=1.0, low=law(0.08), high=law(0.08))
+    stiffer = Level(stiffness_scale=10.0, low=law(0.008), high=law(0.008))
+    (low, high) = Levels((softer, stiffer), 10.0).stiff or (0, 0)
     assert low < 1.0 < high
     assert high - low < 2e-3

@@ -7,26 +7,26 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import replace_values
-from blocksim.study.fragility import FragilityResult, fragility
+from blocksim.study.fragility import FragilityAnswer, fragility
 from blocksim.study.limit import limit
 from blocksim.study.pictures import plot
 from blocksim.study.reporting import report
 from blocksim.study.stored_run import stored_run
-from blocksim.study.study_pictures import read_fragility_picture
 from tests.study.test_fragility import FRICTION, SLIDES, SLOPE, TILTS
 from tests.study.test_limit import SQUAT, TILT, block_on_a_slope
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> FragilityResult:
+def study(tmp_path_factory: pytest.TempPathFactory) -> FragilityAnswer:
     """Give a study; not to be changed."""
     return fragility(
         SLOPE, TILTS, FRICTION, members=8, fails=SLIDES, jobs=1, out=tmp_path_factory.mktemp("s") / "study"
     )
 
 
-def test_the_picture_has_the_counts_and_the_curve_of_the_result(study: FragilityResult) -> None:
-    found = read_fragility_picture(study.folder)
+def test_the_picture_has_the_counts_and_the_curve_of_the_result(study: FragilityAnswer) -> None:
+    found = FragilityAnswer.read(study.folder).picture_of()
+    assert study.plan is not None
     assert found.x.tolist() == list(study.plan.levels)
     assert found.share.tolist() == [point.share for point in study.points]
     assert list(zip(found.low, found.high, strict=True)) == [point.limits for point in study.points]
@@ -38,7 +38,7 @@ def test_the_picture_has_the_counts_and_the_curve_of_the_result(study: Fragility
 
 
 def test_plot_and_report_take_the_study(
-    study: FragilityResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    study: FragilityAnswer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert plot(study) == Path("slope_fragility.png")
@@ -60,7 +60,7 @@ def test_plot_and_report_take_the_study(
         ({"points": []}, "no sample of this study has a result"),
     ],
 )
-def test_a_damaged_answer_is_told(study: FragilityResult, tmp_path: Path, change: dict[str, object], why: str) -> None:
+def test_a_damaged_answer_is_told(study: FragilityAnswer, tmp_path: Path, change: dict[str, object], why: str) -> None:
     data = json.loads((study.folder / "fragility.json").read_text())
     (tmp_path / "fragility.json").write_text(json.dumps({**data, **change}))
     (tmp_path / "fragility.toml").write_bytes((study.folder / "fragility.toml").read_bytes())
@@ -75,13 +75,15 @@ def test_a_limit_is_drawn_as_its_mechanism_beside_the_last_that_stands(
     monkeypatch.chdir(tmp_path)
     found = limit(block_on_a_slope(SQUAT), TILT, tolerance=0.02, out="found")
     (change,) = found.limits
+    assert found.plan is not None
     assert set(found.kept) == {change.low, change.high}
     for value, name in found.kept.items():
         run = stored_run(Path("found/cases") / name)
         release = "always" if value == change.high else "at rest"  # it falls before time zero
         kept = {"output.contacts": True, "start.release": release, "time.stop_at_rest": value != change.high}
         assert run.scenario == replace_values(found.plan.scenario_at(value), kept)
-        assert float(run.frames.time[-1]) == pytest.approx(found.seen(value)["seconds"])
+        if value == change.low:
+            assert float(run.frames.time[-1]) == pytest.approx(found.rows[value]["seconds"])
     assert plot(found) == Path("slope_mechanism.png")
     text = report(found, out="limit.html").read_text()
     assert "Both sides of every bracket" in text

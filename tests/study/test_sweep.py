@@ -23,8 +23,7 @@ from blocksim.simulation.result_files import is_resolved
 from blocksim.study.executors.ensemble import run_case
 from blocksim.study.fragility import fragility
 from blocksim.study.fragility_plan import read_fragility
-from blocksim.study.limit import limit
-from blocksim.study.limit_curve import limit_curve
+from blocksim.study.limit import limit, limit_curve
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.progress import Manifest, Shard
 from blocksim.study.run import run

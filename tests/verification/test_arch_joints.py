@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from blocksim.simulation.frames import Frames
-    from blocksim.study.limit_result import LimitResult
+    from blocksim.study.limit_answer import LimitAnswer
 
 HINGE, SLIP = 0.99, 0.999  # of half a joint from its middle, and of the friction that a joint has
 PULL = 0.37361  # along the ground over weight, under which the arch of tilting_arch.toml falls
@@ -137,7 +137,7 @@ def test_arch_about_to_fall_on_a_tilting_table_has_four_hinges_where_limit_analy
     assert_same(joints_of(run.frames, 7, 0.75), expected)
 
 
-def searched(name: str, friction: float, vary: dict[str, Any], folder: Path) -> LimitResult:
+def searched(name: str, friction: float, vary: dict[str, Any], folder: Path) -> LimitAnswer:
     """Return what `limit` finds for an arch on springs, from two values."""
     document = Document.read(SCENARIOS / f"{name}.toml").with_values(on_springs(friction))
     ((key, ends),) = vary.items()

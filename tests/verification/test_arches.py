@@ -15,7 +15,7 @@ from blocksim.scenario.outlines import centred
 from blocksim.simulation import simulate
 from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.settling import SettleError
-from blocksim.study.limit_curve import limit_curve
+from blocksim.study.limit import limit_curve
 from blocksim.verification.arches import COCCHETTI_RIZZI, HEAD, VOUSSOIRS, least_thickness
 from blocksim.verification.scene import Simulation
 from tests.kernels.nonsmooth.scenes import Block, posed

@@ -1,0 +1,143 @@
+"""What a study has come to: one model that is written as JSON and CSV, read back, printed, drawn and reported."""
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+
+from pydantic import BaseModel, Field, ValidationError
+
+from blocksim.errors import ExitCode, InvalidInputError
+from blocksim.scenario.bounded_read import MEGABYTE, read_limited
+from blocksim.simulation.result_files import grows_from, heads
+from blocksim.study.sweep_folder import MANIFESTS, ORIGINS, SHARD, FolderKind, write_answer
+from blocksim.view.layout import Paper
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_BYTES = 50 * MEGABYTE
+
+
+def folder_kind(name: str, what: str, command: str, tables: Mapping[str, str]) -> FolderKind:
+    """Return what distinguishes the folders of a study; `tables` has names of tables and the forms of their heads."""
+    names = "|".join(tables)
+    return FolderKind(
+        what=what,
+        command=f"blocksim {command} FILE",
+        plan=f"{name}.toml",
+        head=f"# {name.capitalize()} ".encode(),
+        results={
+            **{table: heads(form.encode()) for table, form in tables.items()},
+            rf"{name}\.json": ORIGINS,
+            rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
+            **MANIFESTS,
+        },
+        leftover=re.compile(rf"\.({names}|{name}\.json|{name}\.toml)\..*"),
+        tables=re.compile(names),
+    )
+
+
+class Table(NamedTuple):
+    """A table for people: texts, and numbers with so many digits, which a screen has on the right of `left` columns."""
+
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str | float]]
+    left: int = 1
+    digits: int = 2
+
+    def texts(self) -> list[list[str]]:
+        """Return the cells of all rows: fixed digits, no minus sign on zero, a dash where there is no number."""
+        return [[self._text(cell) for cell in row] for row in self.rows]
+
+    def _text(self, cell: str | float) -> str:
+        if not isinstance(cell, float):
+            return str(cell)
+        if not math.isfinite(cell):
+            return "–"
+        text = f"{cell:.{self.digits}f}"
+        return text[1:] if text.startswith("-") and not text.strip("-0.") else text
+
+
+class Answer(BaseModel, frozen=True):
+    """What a study has come to; its fields are those of NAME.json, in their order."""
+
+    files: ClassVar[FolderKind]
+    picture: ClassVar[str]  # name of its kind
+    caption: ClassVar[str]  # of the table in a report
+    takes_table: ClassVar[bool] = False  # of others in its picture
+    folder: Path = Field(default=Path(), exclude=True)
+    run: int = Field(default=0, exclude=True)  # runs of this call; the others were known
+    beside: Path | None = Field(default=None, exclude=True)  # table of others, to be drawn into the picture
+    heads: Sequence[str] = Field(default=(), exclude=True, repr=False)  # of NAME.csv
+    cells: Sequence[Sequence[object]] = Field(default=(), exclude=True, repr=False)  # its rows, all numbers given
+
+    @classmethod
+    def read(cls, folder: Path) -> Self:
+        """Return the answer that a folder holds. Raises InputMissingError or InvalidInputError."""
+        path = folder / cls.files.origin
+        try:
+            found = cls.model_validate_json(read_limited(path, MOST_BYTES))
+        except ValidationError as error:
+            message = f"{path}: not the answer of {cls.files.what}: {str(error).splitlines()[0]}"
+            raise InvalidInputError(message) from None
+        return found.model_copy(update={"folder": folder})
+
+    def write(self) -> None:
+        """Write NAME.csv and NAME.json. Raises OutputError."""
+        name = Path(self.files.plan).with_suffix(".csv").name
+        write_answer(self.folder / name, self.files, [self.heads, *self.cells], self.to_dict())
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON."""
+        text = self.model_dump_json(by_alias=True, exclude_unset=True)
+        return dict(json.loads(text))
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """The rows of NAME.csv."""
+        import pandas as pd
+
+        return pd.DataFrame(list(self.cells), columns=list(self.heads))
+
+    @property
+    def code(self) -> ExitCode:
+        """With which a command ends."""
+        return ExitCode.SUCCESS
+
+    @property
+    def title(self) -> str:
+        """What the table for people is about."""
+        raise NotImplementedError
+
+    def shown(self) -> Table:
+        """Return the table for people, on the screen and in a report."""
+        raise NotImplementedError
+
+    def lines(self) -> list[str]:
+        """Return what is said below that table; nothing where it says all."""
+        return []
+
+    def notes(self) -> list[str]:
+        """Return remarks that are no part of the answer, with where the files are."""
+        return [f"table: {self.folder / Path(self.files.plan).with_suffix('.csv')}"]
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Return what a report says above the table."""
+        return []
+
+    def draw(self, path: Path, title: str, paper: Paper) -> None:
+        """Draw the picture of an answer that was read. Raises InvalidInputError where there is nothing to draw."""
+        raise NotImplementedError
+
+    def comparable(self) -> Any:
+        """Return its values without the names of folders, in which the code has a part."""
+        return _without_cases(self.to_dict())
+
+
+def _without_cases(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {name: _without_cases(value) for name, value in data.items() if name != "case"}
+    return [_without_cases(one) for one in data] if isinstance(data, list) else data

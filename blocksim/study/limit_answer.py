@@ -1,0 +1,547 @@
+"""What a search for a limit has come to, and a curve of limits: JSON, tables, text and pictures.
+
+limit.csv has all runs of a search, limit.json its brackets; limits.csv the brackets of a curve over another key,
+limits.json the answers of all its searches.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_validator
+
+from blocksim.errors import ExitCode, InvalidInputError, Problem
+from blocksim.scenario.csv_table import raise_problems, read_table
+from blocksim.simulation.movement import PEAK, Manner, table_columns
+from blocksim.study.answer import Answer, Table, folder_kind
+from blocksim.study.criterion import Verdict
+from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
+from blocksim.study.limit_plan import NAMES, LimitPlan
+from blocksim.study.limit_search import Change, Number
+from blocksim.study.rows import Head, Row, as_cell
+from blocksim.study.stored_run import stored_run
+from blocksim.study.sweep_folder import FolderKind, case_folder
+from blocksim.view import limit_curve, mechanism
+from blocksim.view.layout import Paper
+from blocksim.view.run_data import support_of
+
+UNIT = r"(?: \[[^\[\]]*\])?"
+STEP = "time.step"
+HEADS = ("verdict", "outcome", "first to move", "at s", "moved mm", "turned °")
+LEAST_SAID = 1e-5  # share of a limit
+
+
+def observed_columns() -> list[str]:
+    """Return the observables that limit.csv has."""
+    return [*table_columns(), PEAK]
+
+
+def columns() -> list[str]:
+    """Return the columns of limit.csv after the value."""
+    return ["verdict", *observed_columns(), "status", "reason", "seconds", "stiffness_scale", "half_step_s"]
+
+
+class Side(BaseModel, frozen=True, extra="allow"):
+    """One side of a bracket: the value that was run, and what it came to, as it was seen."""
+
+    value: float
+    verdict: Verdict
+    outcome: str | None = None
+    first_mover: str | int | None = None
+    first_moved_s: float | None = None
+    displacement_mm: float | None = None
+    turn_deg: float | None = None
+    end_speed_mm_s: float | None = None
+    moves_on: bool | str | None = None
+    peak_deg: float | None = None
+    status: str | None = None
+    reason: str | None = None
+    case: str | None = None  # its folder in `cases`, with frames
+
+    @classmethod
+    def of(cls, value: Number, verdict: Verdict, row: Row) -> Self:
+        """Take what a row says."""
+        cells: dict[str, Any] = {name: row.get(name) for name in (*observed_columns(), "status", "reason")}
+        return cls(value=value, verdict=verdict, **cells, case=None)
+
+    def kept(self, case: str, seen: Row | None) -> "Side":
+        """Return it with the folder of its run; `seen` is the row of one that was released to be seen to fall."""
+        row = {} if seen is None else {name: seen.get(name) for name in observed_columns()}
+        return self.model_copy(update={**row, "case": case})
+
+    def cells(self) -> list[str | float]:
+        """Return its row of a table for people."""
+        value, nothing = f"{self.value:.8g}", [""] * 4
+        if self.verdict is Verdict.FAILED:
+            return [value, self.verdict.value, str(self.reason).splitlines()[0], *nothing]
+        if self.outcome is None:
+            return [value, self.verdict.value, "does not settle", *nothing]
+        amplitude = f" ±{self.peak_deg:.2g}°" if self.outcome == Manner.ROCKING and self.peak_deg is not None else ""
+        first = "" if self.first_mover is None else f"block {self.first_mover}"
+        at = "" if self.first_moved_s is None else f"{self.first_moved_s:.3f}"
+        moved = (self.displacement_mm or 0.0, self.turn_deg or 0.0)
+        return [value, self.verdict.value, f"{self.outcome}{amplitude}", first, at, *moved]
+
+
+class HalfStep(BaseModel, frozen=True):
+    """The bracket of a limit with half the time step (s), or why there is none."""
+
+    step: float
+    low: float
+    high: float
+    problem: str = ""
+
+
+class Bracket(BaseModel, frozen=True):
+    """Between which values what happens changes; its sides are those that were run with the scenario as given."""
+
+    low: float
+    high: float
+    below: Side
+    above: Side
+    extrapolated: bool = False  # to stiff contacts, from springs of several stiffnesses
+    levels: tuple[Level, ...] = ()
+    problem: str = ""
+    half_step: HalfStep | None = None
+    undecided: Margin | None = None
+    give: Give | None = Field(default=None, exclude=True)
+    stiff: tuple[float, float] | None = Field(default=None, exclude=True)  # as extrapolated
+
+    def corrected(self, levels: Levels | None, half: HalfStep | None, margin: Margin, give: Give | None) -> "Bracket":
+        """Return it with stiff contacts and short steps, as far as known, and as wide as is unknown."""
+        fields: dict[str, Any] = {"undecided": margin, "give": give}
+        low, high = self.low, self.high
+        if levels is not None:
+            stiff = levels.stiff
+            fields |= {"extrapolated": stiff is not None, "levels": levels.levels, "problem": levels.problem}
+            fields["stiff"] = stiff
+            low, high = stiff or (low, high)
+        if half is not None:
+            fields["half_step"] = half
+            if (half.low, half.high) != (low, high):
+                on = max(half.low - high, 0.0) + min(half.high - low, 0.0)  # what lies between both
+                low, high = min(low, half.low + min(on, 0.0)), max(high, half.high + max(on, 0.0))
+        ends = (margin.rest, margin.springs) if self.above.verdict is Verdict.FALLS else (margin.springs, margin.rest)
+        fields |= {"low": low - ends[0] * abs(low), "high": high + ends[1] * abs(high)}
+        return self.model_copy(update=fields)
+
+    @property
+    def given(self) -> Change[Verdict]:
+        """Both values that were run."""
+        return Change(self.below.value, self.above.value, self.below.verdict, self.above.verdict)
+
+    @property
+    def change(self) -> Change[Verdict]:
+        """The answer."""
+        return replace(self.given, low=self.low, high=self.high)
+
+    @property
+    def verdicts(self) -> set[Verdict]:
+        """What both sides came to."""
+        return {self.below.verdict, self.above.verdict}
+
+    @property
+    def is_limit(self) -> bool:
+        """True between standing and falling."""
+        return self.verdicts == {Verdict.STANDS, Verdict.FALLS}
+
+    def lines(self, key_unit: str) -> list[str]:
+        """Return the answer in words, after what it is made from."""
+
+        def shown(value: float) -> str:
+            return f"{value:.7g} {key_unit}".rstrip()
+
+        lines, half = [], self.half_step
+        low, high = self.below.value, self.above.value
+        if half is not None and (half.low, half.high) != (low, high):
+            moved = (half.low + half.high) / (low + high) - 1.0
+            halved = f"{shown(half.low)} to {shown(half.high)} with half of it ({moved:+.2%}): give a shorter {STEP}"
+            lines.append(f"{shown(low)} to {shown(high)} with the step as given, {halved}")
+        elif half is not None and half.problem:
+            lines.append(f"warning: {half.problem}")
+        if self.extrapolated:
+            stiff = 0.5 * sum(self.stiff or (self.low, self.high))
+            lines += [
+                f"stiffness scale {one.stiffness_scale:g}: {shown(one.low)} to {shown(one.high)} "
+                f"({one.middle / stiff - 1.0:+.2%})"
+                for one in self.levels
+            ]
+            lines.append("stiff contacts, extrapolated with 1/stiffness:")
+        width = (self.high - self.low) / max(abs(self.low), abs(self.high))
+        below = f"{self.below.verdict.value} up to {shown(self.low)}"
+        lines.append(f"{below}, {self.above.verdict.value} from {shown(self.high)} (bracket {width:.2%})")
+        margin = self.undecided or Margin(rest=0.0, springs=0.0)
+        parts = {"rest speed": margin.rest, "stiffness": margin.springs}
+        said = [f"{100 * share:.2g} % that {name} cannot decide" for name, share in parts.items() if share > LEAST_SAID]
+        return [*lines, f"in the bracket: {' and '.join(said)}"] if said else lines
+
+    def warnings(self, unit: str, *, is_as_given: bool) -> Iterator[str]:
+        """Yield what springs do to it, where it is not that of stiff contacts."""
+        if self.problem:
+            last = self.levels[-1]
+            near = f"limit near {last.middle:.7g} {unit}".rstrip()
+            yield f"warning: {near}, stiffness scale {last.stiffness_scale:g}: {self.problem}"
+        if self.is_limit and self.give is not None and self.give.share > GIVE and not self.extrapolated:
+            turned = f"blocks have turned by {self.give.turn:.2g}° at {self.give.value:.7g} {unit}".rstrip()
+            hint = "leave --as-given out" if is_as_given else "see --stiffer"
+            yield f"warning: {turned}, as springs give way; the limit is off by some {self.give.share:.1%}; {hint}"
+
+
+class LimitAnswer(Answer, frozen=True):
+    """The brackets of a search, from the smallest value up; none where nothing changes."""
+
+    files: ClassVar[FolderKind] = folder_kind("limit", "a limit", "limit", {r"limit\.csv": rf"value{UNIT},verdict,.*"})
+    picture: ClassVar[str] = "mechanism"
+    caption: ClassVar[str] = "Both sides of every bracket"
+    key: str
+    unit: str
+    low: float = Field(alias="from")
+    high: float = Field(alias="to")
+    count: int
+    is_log: bool
+    is_whole: bool
+    stands: str
+    tolerance: float
+    scheme: str
+    stiffness_scale: float | None
+    runs: int
+    brackets: tuple[Bracket, ...] = Field(alias="changes")
+    is_as_given: bool = Field(default=False, exclude=True)  # neither stiffness nor step was corrected
+    plan: InstanceOf[LimitPlan] | None = Field(default=None, exclude=True, repr=False)
+    rows: Mapping[float, Row] = Field(default={}, exclude=True, repr=False)  # of the scenario as given, by value
+
+    @classmethod
+    def of(
+        cls,
+        plan: LimitPlan,
+        folder: Path,
+        rows: Mapping[Number, Row],
+        brackets: list[Bracket],
+        stiffer: Mapping[float, Mapping[Number, Row]],
+        finer: Mapping[float, Mapping[Number, Row]],
+        *,
+        run: int,
+        is_as_given: bool,
+    ) -> Self:
+        """Make the answer of a search; `stiffer` has rows by stiffness scale, `finer` by time step (s)."""
+        contact = plan.document.build().contact
+        scale = contact.stiffness_scale if plan.has_springs else None
+        searches = [
+            (scale, None, rows),
+            *((stiff, None, more) for stiff, more in stiffer.items()),
+            *((scale, step, more) for step, more in finer.items()),
+        ]
+        cells = [
+            [
+                value,
+                plan.criterion.verdict(row).value,
+                *(as_cell(row.get(name)) for name in columns()[1:-2]),
+                stiff,
+                step,
+            ]
+            for stiff, step, more in searches
+            for value, row in sorted(more.items())
+        ]
+        span = plan.span
+        return cls.model_validate(
+            {
+                "key": plan.key,
+                "unit": plan.unit,
+                "from": span.low,
+                "to": span.high,
+                "count": span.count,
+                "is_log": span.is_log,
+                "is_whole": span.is_whole,
+                "stands": plan.criterion.text,
+                "tolerance": plan.tolerance,
+                "scheme": plan.scheme,
+                "stiffness_scale": scale,
+                "runs": len(cells),
+                "changes": brackets,
+                "folder": folder,
+                "run": run,
+                "is_as_given": is_as_given,
+                "heads": (str(Head("value", plan.unit)), *columns()),
+                "cells": cells,
+                "plan": plan,
+                "rows": rows,
+            }
+        )
+
+    def with_sides(self, sides: Mapping[float, Side]) -> "LimitAnswer":
+        """Return it with other sides, by their values."""
+        brackets = [
+            one.model_copy(update={"below": sides.get(one.below.value, one.below),
+                                   "above": sides.get(one.above.value, one.above)})
+            for one in self.brackets
+        ]  # fmt: skip
+        return self.model_copy(update={"brackets": tuple(brackets)})
+
+    @property
+    def changes(self) -> list[Change[Verdict]]:
+        """The brackets: of stiff contacts where springs of several stiffnesses were searched."""
+        return [one.change for one in self.brackets]
+
+    @property
+    def limits(self) -> list[Change[Verdict]]:
+        """Those between standing and falling."""
+        return [one.change for one in self.brackets if one.is_limit]
+
+    @property
+    def falls(self) -> list[Bracket]:
+        """The brackets on one side of which the structure falls; on the other it stands, or moves on at the end."""
+        others = {Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED}
+        return [one for one in self.brackets if others >= one.verdicts > {Verdict.FALLS}]
+
+    @property
+    def kept(self) -> dict[float, str]:
+        """Folders in `cases` of runs with frames, by value."""
+        sides = (side for one in self.brackets for side in (one.below, one.above))
+        return {side.value: side.case for side in sides if side.case is not None}
+
+    def value(self, number: float) -> str:
+        """Return a value for people."""
+        return f"{number:.7g} {self.unit}".rstrip()
+
+    @property
+    def code(self) -> ExitCode:
+        """1 where nothing changes."""
+        return ExitCode.SUCCESS if self.brackets else ExitCode.OUTSIDE
+
+    @property
+    def title(self) -> str:
+        """Key, contacts and criterion."""
+        return f'{self.key}, {NAMES.get(self.scheme, self.scheme)}: stands means "{self.stands}"'
+
+    def shown(self) -> Table:
+        """Return both sides of every change; where there is none, both ends of the range."""
+        sides = [side for one in self.brackets for side in (one.below, one.above)]
+        if not sides and self.plan is not None:
+            verdicts = list(self.plan.verdicts(self.rows).items())
+            sides = [Side.of(value, verdict, self.rows[value]) for value, verdict in (verdicts[0], verdicts[-1])]
+        unique = {(side.value, side.verdict): side for side in sides}
+        return Table((f"value {self.unit}".rstrip(), *HEADS), [side.cells() for side in unique.values()], left=4)
+
+    def lines(self) -> list[str]:
+        """Return every bracket, and what it is made from."""
+        if self.brackets:
+            return [line for one in self.brackets for line in one.lines(self.unit)]
+        span = f"no change from {self.value(self.low)} to {self.value(self.high)}"
+        if self.plan is None:
+            return [span]
+        verdict = next(iter(self.plan.verdicts(self.rows).values()))
+        return [f"{span}: {verdict.value} at all {len(self.rows)} values"]
+
+    def warnings(self) -> list[str]:
+        """Return what springs do to limits that are not those of stiff contacts."""
+        return [text for one in self.brackets for text in one.warnings(self.unit, is_as_given=self.is_as_given)]
+
+    def notes(self) -> list[str]:
+        """Say what is undecided, what springs shift, what is not seen, and where the runs are."""
+        plan, notes = self.plan, []
+        if plan is not None and Verdict.UNDECIDED in plan.verdicts(self.rows).values():
+            notes.append("undecided: blocks were still moving at the end; increase time.end to decide")
+        notes += self.warnings()
+        if plan is not None and not self.is_whole and (plan.has_islands or not self.brackets):
+            spacing = f"a {self.count - 1}th of the range" if self.is_log else plan.shown(plan.span.spacing)
+            which = f"islands narrower than {spacing}, between values of the scan, are not seen"
+            notes.append(f"{which}: --scan N for more values")
+        notes.append(f"{self.runs} runs, {self.run} of them now: {self.folder / 'limit.csv'}")
+        if any({one.below.value, one.above.value} <= self.kept.keys() for one in self.falls):
+            notes.append(f"picture of the mechanism: blocksim plot {self.folder}")
+        return notes
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Return key, criterion and brackets."""
+        contacts, runs = NAMES.get(self.scheme, self.scheme), str(self.runs)
+        lines = [("limit", line) for line in self.lines()] if self.brackets else []
+        return [
+            ("key", self.key),
+            ("stands means", self.stands),
+            ("contacts", contacts),
+            ("runs", runs),
+            *(lines or [("limit", "nothing changes within the range")]),
+        ]
+
+    def draw(self, path: Path, title: str, paper: Paper) -> None:
+        """Draw both sides of the brackets whose runs were kept."""
+        brackets = [pair for one in self.brackets if (pair := self._sides(one)) is not None]
+        if not brackets:
+            empty = "it holds no runs of both sides of a bracket"
+            why = empty if self.brackets else "nothing changes within its range"
+            message = f"{self.folder}: {why}; nothing to draw"
+            raise InvalidInputError(message)
+        mechanism.draw_mechanisms(brackets, path, title, paper)
+
+    def _sides(self, bracket: Bracket) -> tuple[mechanism.Side, mechanism.Side] | None:
+        """Return what is drawn of a bracket: what stands on the left; None where a run was not kept."""
+        ends = sorted((bracket.below, bracket.above), key=lambda side: side.verdict is not Verdict.STANDS)
+        first, second = (self._drawn(side) for side in ends)
+        return None if first is None or second is None else (first, second)
+
+    def _drawn(self, side: Side) -> mechanism.Side | None:
+        place = None if side.case is None else case_folder(self.folder, side.case)
+        if place is None:
+            return None
+        run = stored_run(place)
+        first = None if side.first_mover is None else str(side.first_mover)
+        head = f"{side.verdict.value} at {self.key} = {self.value(side.value)}"
+        came = side.outcome or ""
+        if first is not None:
+            came = f"{came}; first to move: block {first} at {side.first_moved_s or 0.0:.3g} s"
+        support, is_mechanism = support_of(run.scenario, run.events), side.verdict is not Verdict.STANDS
+        drawn = mechanism.Side(run.frames, support, first, head, is_mechanism=is_mechanism)
+        moment = float(run.frames.time[drawn.frame])
+        return replace(drawn, caption=f"{head}\n{came} (drawn at {moment:.3g} s)")
+
+
+class CurvePoint(BaseModel, frozen=True):
+    """The search at one value of the other key."""
+
+    over: float
+    search: LimitAnswer
+
+    @model_validator(mode="before")
+    @classmethod
+    def _nested(cls, data: Any) -> Any:
+        """Take the fields of the answer, which stand beside the value."""
+        is_flat = isinstance(data, dict) and "search" not in data
+        return {"over": data.get("over"), "search": data} if is_flat else data
+
+    @model_serializer
+    def _flat(self) -> dict[str, object]:
+        return {"over": self.over, **self.search.to_dict()}
+
+
+class CurveAnswer(Answer, frozen=True):
+    """The limits at the values of another key, from the smallest up."""
+
+    files: ClassVar[FolderKind] = folder_kind(
+        "limits", "a curve of limits", "limit", {r"limits\.csv": rf"over{UNIT},low.*,high.*"}
+    )
+    picture: ClassVar[str] = "limits"
+    caption: ClassVar[str] = "Limits"
+    takes_table: ClassVar[bool] = True
+    key: str
+    unit: str
+    over: str
+    over_unit: str
+    stands: str
+    points: tuple[CurvePoint, ...]
+
+    @classmethod
+    def of(cls, over: Head, folder: Path, searches: Mapping[float, LimitAnswer]) -> Self:
+        """Make the answer from those of the searches."""
+        cells: list[list[object]] = []
+        for value, search in searches.items():
+            cells += [[value, one.low, one.high, one.below.value, one.above.value] for one in search.changes]
+            if not search.brackets:
+                verdict = next(str(row[1]) for row in search.cells)
+                cells.append([value, None, None, verdict, verdict])
+        one = next(iter(searches.values()))
+        ends = (str(Head("low", one.unit)), str(Head("high", one.unit)))
+        return cls(
+            key=one.key,
+            unit=one.unit,
+            over=over.key,
+            over_unit=over.unit,
+            stands=one.stands,
+            points=tuple(CurvePoint(over=value, search=search) for value, search in searches.items()),
+            folder=folder,
+            run=sum(search.run for search in searches.values()),
+            heads=(str(Head("over", over.unit)), *ends, "below", "above"),
+            cells=cells,
+        )
+
+    def places(self) -> dict[float, Path]:
+        """Return the folders of the searches by the value of the other key."""
+        return {point.over: self.folder / place_of(point.over, self.over_unit) for point in self.points}
+
+    @property
+    def searches(self) -> dict[float, LimitAnswer]:
+        """The answers of the searches by the value of the other key."""
+        return {point.over: point.search for point in self.points}
+
+    @property
+    def code(self) -> ExitCode:
+        """1 where nothing changes at some value."""
+        return ExitCode.SUCCESS if all(point.search.brackets for point in self.points) else ExitCode.OUTSIDE
+
+    @property
+    def title(self) -> str:
+        """Both keys and the criterion."""
+        return f'{self.key} over {self.over}: stands means "{self.stands}"'
+
+    def shown(self) -> Table:
+        """Return a row for every bracket, and one for a value at which nothing changes."""
+        rows: list[list[str | float]] = []
+        for point in self.points:
+            search, value = point.search, f"{point.over:.6g} {self.over_unit}".rstrip()
+            rows += [
+                [value, f"{one.low:.7g}", f"{one.high:.7g}", one.below.value, one.above.value] for one in search.changes
+            ]
+            if not search.brackets:
+                verdict = next((str(row[1]) for row in search.cells), "no change")
+                rows.append([value, "–", "–", verdict, verdict])
+        return Table((self.over, f"from {self.unit}".rstrip(), f"to {self.unit}".rstrip(), "below", "above"), rows)
+
+    def notes(self) -> list[str]:
+        """Say what springs shift, and where the table is."""
+        warnings = [text for point in self.points for text in point.search.warnings()]
+        return [*warnings, f"limits: {self.folder / 'limits.csv'}; picture: blocksim plot {self.folder}"]
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Return both keys and the criterion."""
+        return [("key", self.key), ("over", self.over), ("stands means", self.stands)]
+
+    def draw(self, path: Path, title: str, paper: Paper) -> None:
+        """Draw limits over the other key, with a table of published or measured ones beside them."""
+        points = [
+            (point.over, [limit_curve.Bracket(one.low, one.high, one.below.value, one.above.value)
+                          for one in point.search.changes])
+            for point in self.points
+        ]  # fmt: skip
+        none = [f"{value:.6g}" for value, brackets in points if not brackets]
+        if len(none) == len(points):
+            message = f"{self.folder}: nothing changes within its range; nothing to draw"
+            raise InvalidInputError(message)
+        notes = [f"Stands means: {self.stands}.", *([f"Nothing changes at {', '.join(none)}."] if none else [])]
+        axes = [
+            f"{key} ({unit})" if unit else key for key, unit in ((self.over, self.over_unit), (self.key, self.unit))
+        ]
+        published = () if self.beside is None else read_published(self.beside, self.over_unit, self.unit)
+        curve = limit_curve.LimitCurve(axes[0], axes[1], points, tuple(notes), published)
+        limit_curve.draw_limit_curve(curve, path, title, paper)
+
+
+def place_of(number: float, unit: str) -> str:
+    """Return the name of the folder of a value of the other key, one that needs no quotes in a shell."""
+    return re.sub(r"[^A-Za-z0-9.+-]+", "-", f"{number:.6g} {unit}".rstrip())
+
+
+def read_published(path: Path, over_unit: str, unit: str) -> tuple[limit_curve.Series, ...]:
+    """Return the series of a table in the order of their first rows: value of the other key, limit, and name.
+
+    Its columns are `over`, `limit` and `series`, the first two with the units of the search in brackets where there
+    are any: `limit [m]`. Raises InputMissingError, and InvalidInputError with the place of every mistake.
+    """
+    over, limit = str(Head("over", over_unit)), str(Head("limit", unit))
+    table = read_table(path, (over, limit, "series"))
+    problems = list(table.problems)
+    series: dict[str, list[tuple[float, float]]] = {}
+    for row in table.rows:
+        place: list[float] = []
+        for cell in (row[over], row[limit]):
+            try:
+                place.append(cell.number())
+            except ValueError as error:
+                problems.append(cell.problem(str(error)))
+        if len(place) == 2:
+            series.setdefault(row["series"].text, []).append((place[0], place[1]))
+    if not problems and not series:
+        problems.append(Problem(str(path), "the table has no rows"))
+    if problems:
+        raise_problems(problems)
+    return tuple(limit_curve.Series(name, tuple(points)) for name, points in series.items())
