@@ -30,7 +30,7 @@ from blocksim.study.converge import (
     converge,
     refinements_of,
 )
-from blocksim.study.convergence import Convergence, Joint, Level, Study, Verdict
+from blocksim.study.convergence import Convergence, ConvergenceVerdict, Level, Recommendation, RefinementStudy
 from blocksim.study.pictures import draw_convergence
 from blocksim.study.rows import Row
 from blocksim.view.levels import refuse_small_page
@@ -142,7 +142,7 @@ def _answer_lines(result: Convergence, command: str) -> list[str]:
     return lines + _recommendation(result, command)
 
 
-def _table(result: Convergence, study: Study) -> list[str]:
+def _table(result: Convergence, study: RefinementStudy) -> list[str]:
     """Return the levels of a study with the blocks that its refinement moves most."""
     chosen = most_moved(study, MOST_BLOCKS)
     heads = [f"{_short(result.blocks[block])}: x mm" for block in chosen]
@@ -156,7 +156,7 @@ def _table(result: Convergence, study: Study) -> list[str]:
     return lines
 
 
-def most_moved(study: Study, count: int) -> list[int]:
+def most_moved(study: RefinementStudy, count: int) -> list[int]:
     """Return the blocks whose final x differs most between the levels, in their order."""
     finished = np.array([level.x_mm for level in study.levels if level.is_finished])
     if not finished.size:
@@ -175,29 +175,29 @@ def _cells(level: Level, chosen: list[int]) -> tuple[str, ...]:
     return (value, *places, number(level.change_mm, 4), number(level.order, 1), number(level.seconds))
 
 
-def _verdict(study: Study) -> list[str]:
+def _verdict(study: RefinementStudy) -> list[str]:
     match study.verdict:
-        case Verdict.CONVERGED:
+        case ConvergenceVerdict.CONVERGED:
             return [_told_convergence(study), *_flips(study)]
-        case Verdict.NOT_YET:
+        case ConvergenceVerdict.NOT_YET:
             more = sum(not level.is_own for level in study.levels[study.levels.index(study.own) :]) + 2
             return [f"not yet converged: the changes shrink; try --levels {more}", *_flips(study)]
-        case Verdict.SCATTERED:
+        case ConvergenceVerdict.SCATTERED:
             return [
                 "not converged: the changes do not shrink. Impacts amplify small differences, so",
                 "a single run means little: vary the start by a micrometre (blocksim sweep)",
             ]
-        case Verdict.FLIPS:
+        case ConvergenceVerdict.FLIPS:
             return [
                 "not converged: the outcome flips between levels. A single run says little:",
                 "vary the start by a micrometre (blocksim sweep) and report how often each occurs",
                 *_flips(study),
             ]
-        case Verdict.FAILED:
+        case ConvergenceVerdict.FAILED:
             return [f"not judged: {_told_failures(study)}"]
 
 
-def _flips(study: Study) -> list[str]:
+def _flips(study: RefinementStudy) -> list[str]:
     """Report between which levels blocks end in another place or on another side, a line each."""
     lines = []
     for before, level in pairwise(study.levels):
@@ -208,13 +208,13 @@ def _flips(study: Study) -> list[str]:
     return lines
 
 
-def _told_failures(study: Study) -> str:
+def _told_failures(study: RefinementStudy) -> str:
     failed = [level for level in study.levels if not level.is_finished]
     count = f"{len(failed)} of {len(study.levels)} levels did not finish"
     return f"{count}; the first, {failed[0].value:g}: {failed[0].reason}"
 
 
-def _told_convergence(study: Study) -> str:
+def _told_convergence(study: RefinementStudy) -> str:
     found = f"converged: the last two refinements move no block by more than {_small(study.last_change_mm)}"
     coarsest = study.recommended
     if coarsest is None or coarsest.is_own:
@@ -249,6 +249,6 @@ def _told_nothing(result: Convergence) -> str:
     return "no recommendation: no other setting stays near all finest levels"
 
 
-def _told_saving(joint: Joint) -> str:
+def _told_saving(joint: Recommendation) -> str:
     share = 1.0 - joint.seconds / max(joint.own_seconds, 1e-9)
     return f"{share:.0%} less" if share >= 0.0 else f"{-share:.0%} more"

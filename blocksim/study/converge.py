@@ -25,11 +25,11 @@ from blocksim.simulation.stopping import interruptible
 from blocksim.simulation.summary import read_summary
 from blocksim.study.convergence import (
     Convergence,
+    ConvergenceVerdict,
     Coordinates,
-    Joint,
+    Recommendation,
     Refinement,
-    Study,
-    Verdict,
+    RefinementStudy,
     distance,
     judge,
     with_setting,
@@ -46,11 +46,11 @@ TOLERANCE_MM = 0.1
 LEVELS = 4  # refinements of the scenario's own value
 FEWEST_LEVELS = 2  # refinements that it takes to converge
 DIED = "a worker process has died (out of memory?); rerun the command to repeat this case"
-UNFINISHED = {Verdict.NOT_YET, Verdict.SCATTERED, Verdict.FLIPS}
-UNRELIABLE = {Verdict.SCATTERED, Verdict.FLIPS}
+UNFINISHED = {ConvergenceVerdict.NOT_YET, ConvergenceVerdict.SCATTERED, ConvergenceVerdict.FLIPS}
+UNRELIABLE = {ConvergenceVerdict.SCATTERED, ConvergenceVerdict.FLIPS}
 OnRun = Callable[[str, Row], None]
 STEP, STIFFNESS, SPACING, TOLERANCE = "step", "stiffness", "spacing", "tolerance"
-STUDIES = (STEP, STIFFNESS, SPACING, TOLERANCE)
+REFINEMENTS = (STEP, STIFFNESS, SPACING, TOLERANCE)
 PARTICLE_MODELS = frozenset({"particles", "kernel"})
 SOFTEST = 1e-3  # stiffness scale
 
@@ -141,7 +141,7 @@ def _solver_seconds(place: Path, row: Row) -> object:
 
 def _refine(
     scenario: Scenario, refinements: tuple[Refinement, ...], runs: _Runs, tolerance_mm: float, levels: int
-) -> tuple[Study, ...]:
+) -> tuple[RefinementStudy, ...]:
     """Run all coarser levels and two finer ones of every study, then one finer at a time where it is needed."""
     finest = {one.study: FEWEST_LEVELS for one in refinements}
     coordinates = Coordinates(scenario)
@@ -160,7 +160,9 @@ def _refine(
             finest[name] += 1
 
 
-def _recommended(scenario: Scenario, studies: tuple[Study, ...], runs: _Runs, tolerance_mm: float) -> Joint | None:
+def _recommended(
+    scenario: Scenario, studies: tuple[RefinementStudy, ...], runs: _Runs, tolerance_mm: float
+) -> Recommendation | None:
     """Try all recommended values together, then each alone, the cheapest first; None where none holds the tolerance."""
     if any(study.verdict in UNRELIABLE for study in studies) or not studies[0].own.is_finished:
         return None
@@ -171,7 +173,9 @@ def _recommended(scenario: Scenario, studies: tuple[Study, ...], runs: _Runs, to
     return next((joint for joint in candidates if joint.to_finest_mm <= tolerance_mm), None)
 
 
-def _joint(scenario: Scenario, settings: dict[str, float], studies: tuple[Study, ...], runs: _Runs) -> Joint:
+def _joint(
+    scenario: Scenario, settings: dict[str, float], studies: tuple[RefinementStudy, ...], runs: _Runs
+) -> Recommendation:
     """Run the scenario with some settings and compare it with the finest level of every study."""
     changed = scenario
     for key, value in settings.items():
@@ -179,7 +183,7 @@ def _joint(scenario: Scenario, settings: dict[str, float], studies: tuple[Study,
     runs.run({"recommended settings together": changed})
     row, coordinates = runs.row(changed), Coordinates(scenario)
     finest = [runs.row(with_setting(scenario, study.key, study.levels[-1].value)) for study in studies]
-    return Joint(
+    return Recommendation(
         settings=settings,
         seconds=float(str(row["seconds"])),
         own_seconds=studies[0].own.seconds,
@@ -212,10 +216,10 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
 
     Raises InvalidInputError for an unknown name, and where nothing is left.
     """
-    asked = STUDIES if studies is None else tuple(studies)
-    unknown = [name for name in asked if name not in STUDIES]
+    asked = REFINEMENTS if studies is None else tuple(studies)
+    unknown = [name for name in asked if name not in REFINEMENTS]
     if unknown:
-        message = f"'{unknown[0]}' unknown convergence study; choose {', '.join(STUDIES)}"
+        message = f"'{unknown[0]}' unknown convergence study; choose {', '.join(REFINEMENTS)}"
         raise InvalidInputError(message)
     chosen = tuple(one for one in _possible(scenario) if one.study in asked)
     if studies is None:

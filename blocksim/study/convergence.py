@@ -61,7 +61,7 @@ def with_setting(scenario: Scenario, key: str, value: float) -> Scenario:
     return scenario.model_copy(update={table: changed})
 
 
-class Verdict(StrEnum):
+class ConvergenceVerdict(StrEnum):
     """What refining has shown."""
 
     CONVERGED = "converged"  # two refinements in a row change less than the tolerance
@@ -94,7 +94,7 @@ class Level:
 
 
 @dataclass(frozen=True)
-class Study:
+class RefinementStudy:
     """One setting refined, from its coarsest level to its finest."""
 
     study: str
@@ -103,7 +103,7 @@ class Study:
     factor: float
     tolerance_mm: float
     levels: tuple[Level, ...]
-    verdict: Verdict
+    verdict: ConvergenceVerdict
 
     @property
     def own(self) -> Level:
@@ -113,7 +113,7 @@ class Study:
     @property
     def recommended(self) -> Level | None:
         """The coarsest level that stays within the tolerance of the finest, with all levels between them."""
-        if self.verdict is not Verdict.CONVERGED:
+        if self.verdict is not ConvergenceVerdict.CONVERGED:
             return None
         chosen = None
         for level in reversed(self.levels):
@@ -129,7 +129,7 @@ class Study:
 
 
 @dataclass(frozen=True)
-class Joint:
+class Recommendation:
     """Recommended settings in one run; `to_finest_mm` is its distance to the farthest of all finest levels."""
 
     settings: dict[str, float]
@@ -145,9 +145,9 @@ class Convergence:
     name: str
     blocks: tuple[str, ...]
     tolerance_mm: float
-    studies: tuple[Study, ...]
+    studies: tuple[RefinementStudy, ...]
     notes: tuple[str, ...]
-    recommended: Joint | None
+    recommended: Recommendation | None
 
     @property
     def failed(self) -> bool:
@@ -157,7 +157,7 @@ class Convergence:
     @property
     def converged(self) -> bool:
         """Return True if every study has converged."""
-        return all(study.verdict is Verdict.CONVERGED for study in self.studies)
+        return all(study.verdict is ConvergenceVerdict.CONVERGED for study in self.studies)
 
 
 class Coordinates:
@@ -213,7 +213,9 @@ def observed_order(points: Sequence[Floats], factor: float) -> float:
     return log(before / after) / abs(log(factor))
 
 
-def judge(rows: dict[int, Row], refinement: Refinement, coordinates: Coordinates, tolerance_mm: float) -> Study:
+def judge(
+    rows: dict[int, Row], refinement: Refinement, coordinates: Coordinates, tolerance_mm: float
+) -> RefinementStudy:
     """Return what the rows of a study's levels say; `rows` is by level and complete from its first to its last."""
     order = sorted(rows)
     points = [coordinates.point(rows[level]) for level in order]
@@ -238,7 +240,7 @@ def judge(rows: dict[int, Row], refinement: Refinement, coordinates: Coordinates
         )
     flips = any(level.flipped for level in levels[-2:])
     verdict = verdict_of([level.change_mm for level in levels[1:]], tolerance_mm, flips=flips)
-    return Study(
+    return RefinementStudy(
         refinement.study,
         refinement.title,
         refinement.key,
@@ -249,18 +251,18 @@ def judge(rows: dict[int, Row], refinement: Refinement, coordinates: Coordinates
     )
 
 
-def verdict_of(changes_mm: Sequence[float], tolerance_mm: float, *, flips: bool) -> Verdict:
+def verdict_of(changes_mm: Sequence[float], tolerance_mm: float, *, flips: bool) -> ConvergenceVerdict:
     """Judge the changes from level to level, from coarse to fine; NaN is a change to or from a failed level.
 
     `flips` says that an outcome changes in one of the last two refinements.
     """
     last = changes_mm[-2:]
     if len(last) < 2 or not all(map(isfinite, last)):
-        return Verdict.FAILED
+        return ConvergenceVerdict.FAILED
     if flips:
-        return Verdict.FLIPS
+        return ConvergenceVerdict.FLIPS
     if max(last) < tolerance_mm:
-        return Verdict.CONVERGED
+        return ConvergenceVerdict.CONVERGED
     before = next((change for change in reversed(changes_mm[:-2]) if isfinite(change)), inf)
     shrinks = all(after <= SHRINKING * before for before, after in pairwise([before, *last]))
-    return Verdict.NOT_YET if shrinks else Verdict.SCATTERED
+    return ConvergenceVerdict.NOT_YET if shrinks else ConvergenceVerdict.SCATTERED

@@ -290,6 +290,11 @@ class LimitAnswer(Answer, frozen=True):
         return [one.change for one in self.brackets if one.is_limit]
 
     @property
+    def limits_as_given(self) -> list[Change[Verdict]]:
+        """The same for the springs and the time step of the scenario, as they were run."""
+        return [one.given for one in self.brackets if one.is_limit]
+
+    @property
     def falls(self) -> list[Bracket]:
         """The brackets on one side of which the structure falls; on the other it stands, or moves on at the end."""
         others = {Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED}

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Generic, TypeVar
 
-Answer = TypeVar("Answer")
+Kind = TypeVar("Kind")
 DIGITS = 12  # of a value that is tried: what people read is what was run
 PARTS = 3
 HALVINGS = 2  # of the spacing of a scan, beside a peak
@@ -85,16 +85,16 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Change(Generic[Answer]):
+class Change(Generic[Kind]):
     """Two neighbours among the values that were tried, with different answers."""
 
     low: Number
     high: Number
-    below: Answer
-    above: Answer
+    below: Kind
+    above: Kind
 
 
-def changes_in(known: Mapping[Number, Answer]) -> list[Change[Answer]]:
+def changes_in(known: Mapping[Number, Kind]) -> list[Change[Kind]]:
     """Return all changes between neighbours, from the smallest value up."""
     return [
         Change(low, high, known[low], known[high]) for low, high in pairwise(sorted(known)) if known[low] != known[high]
@@ -102,7 +102,7 @@ def changes_in(known: Mapping[Number, Answer]) -> list[Change[Answer]]:
 
 
 def next_values(
-    span: Span, known: Mapping[Number, Answer], tolerance: float, peaks: Mapping[Number, float] | None = None
+    span: Span, known: Mapping[Number, Kind], tolerance: float, peaks: Mapping[Number, float] | None = None
 ) -> list[Number]:
     """Return the values to try next; none when every change is as narrow as wanted.
 
@@ -116,7 +116,7 @@ def next_values(
     return [value for one in wide for value in span.between(one.low, one.high)]
 
 
-def _beside_peaks(span: Span, known: Mapping[Number, Answer], peaks: Mapping[Number, float]) -> list[Number]:
+def _beside_peaks(span: Span, known: Mapping[Number, Kind], peaks: Mapping[Number, float]) -> list[Number]:
     """Return the values half way to both neighbours of those with a larger peak, and the same answer."""
     values = sorted(known)
     found: list[Number] = []
@@ -128,7 +128,7 @@ def _beside_peaks(span: Span, known: Mapping[Number, Answer], peaks: Mapping[Num
     return [value for value in dict.fromkeys(found) if value not in known]
 
 
-def next_near(span: Span, known: Mapping[Number, Answer], near: Change[Answer], tolerance: float) -> list[Number]:
+def next_near(span: Span, known: Mapping[Number, Kind], near: Change[Kind], tolerance: float) -> list[Number]:
     """Return the values to try next where a change is expected near a bracket, that of `near`, and nothing is scanned.
 
     First its ends, then on in the direction in which the change must be until it is passed, by more every time, and
@@ -145,7 +145,7 @@ def next_near(span: Span, known: Mapping[Number, Answer], near: Change[Answer], 
     return [] if span.is_narrow(first.low, first.high, tolerance) else span.between(first.low, first.high)
 
 
-def _beyond(span: Span, known: Mapping[Number, Answer], near: Change[Answer], tolerance: float) -> list[Number]:
+def _beyond(span: Span, known: Mapping[Number, Kind], near: Change[Kind], tolerance: float) -> list[Number]:
     """Return the next value outwards of values with the same answer, on the side where the other one must be."""
     low, high = min(known), max(known)
     width = OUTWARD * ((high - low) or tolerance * abs(high))

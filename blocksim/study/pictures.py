@@ -24,7 +24,7 @@ from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.style import picture_suffix
 
 if TYPE_CHECKING:
-    from blocksim.study.convergence import Convergence, Study
+    from blocksim.study.convergence import Convergence, RefinementStudy
 
 FEWEST_LEVELS = 2  # to show a distance
 
@@ -85,7 +85,7 @@ def _kind_named(name: str) -> Kind:
     return SWEEP_KINDS[name]
 
 
-def _panel(result: "Convergence", study: "Study", unit: str) -> Panel:
+def _panel(result: "Convergence", study: "RefinementStudy", unit: str) -> Panel:
     levels = [level for level in study.levels if level.is_finished]
     x = np.array([level.x_mm for level in levels])
     return Panel(

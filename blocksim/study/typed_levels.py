@@ -9,8 +9,6 @@ from blocksim.study.design import levels_of
 from blocksim.study.plan import Variations, varied
 from blocksim.study.rows import Head, heads_of
 
-DIGITS = 12
-
 
 def typed_levels(document: Document, given: Variations, option: str) -> tuple[Head, dict[float, object]]:
     """Return the column of the only key, and its values by their numbers in its unit, from the smallest up.
@@ -38,4 +36,4 @@ def typed_levels(document: Document, given: Variations, option: str) -> tuple[He
 def _number(cell: object) -> float:
     """Return a number to the digits that are typed, NaN for anything else."""
     is_number = isinstance(cell, int | float) and not isinstance(cell, bool)
-    return float(f"{cell:.{DIGITS}g}") if is_number else math.nan
+    return float(f"{cell:.12g}") if is_number else math.nan

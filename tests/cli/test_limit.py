@@ -98,7 +98,7 @@ def test_springs_that_give_way_are_extrapolated_to_stiff_contacts_unless_wanted_
     assert change["low"] == pytest.approx(float(low), rel=1e-6)
     assert change["below"]["value"] == pytest.approx(float(soft), rel=1e-6)
     assert blocksim("report", "out").code == 0
-    assert "extrapolated from" in Path("report.html").read_text()
+    assert "extrapolated with 1/stiffness" in Path("report.html").read_text()
 
 
 def test_the_mechanism_of_a_limit_is_drawn_also_where_its_load_falls_before_time_zero(

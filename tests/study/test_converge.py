@@ -12,8 +12,8 @@ from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.soil_places import soil_tables
 from blocksim.study import converge as converging
-from blocksim.study.converge import STUDIES, converge, refinements_of
-from blocksim.study.convergence import Coordinates, Refinement, Study, Verdict, judge, with_setting
+from blocksim.study.converge import REFINEMENTS, converge, refinements_of
+from blocksim.study.convergence import ConvergenceVerdict, Coordinates, Refinement, RefinementStudy, judge, with_setting
 from blocksim.study.executors import Batch, Setting, Task
 from blocksim.study.executors import ensemble as folders
 from blocksim.study.executors.processes import DEAD
@@ -52,7 +52,7 @@ def finished(x_mm: float, rotation_deg: float = 0.0, seconds: float = 1.0, y_mm:
     }
 
 
-def judged(coordinates: Coordinates, places: list[float], tolerance_mm: float = 0.1) -> Study:
+def judged(coordinates: Coordinates, places: list[float], tolerance_mm: float = 0.1) -> RefinementStudy:
     """Judge made-up final places, the first of the next coarser level, the second of the scenario's own."""
     rows = {level: finished(x, seconds=2.0**level) for level, x in enumerate(places, start=-1)}
     return judge(rows, HALVED, coordinates, tolerance_mm)
@@ -81,26 +81,26 @@ def test_no_order_is_made_up(coordinates: Coordinates, places: list[float]) -> N
 @pytest.mark.parametrize(
     ("places", "verdict"),
     [
-        ([70.0, 70.05, 70.06, 70.09], Verdict.CONVERGED),
-        ([70.0, 75.0, 75.05, 75.0], Verdict.CONVERGED),
-        ([70.0, 74.0, 76.0, 77.0], Verdict.NOT_YET),
-        ([70.0, 74.0, 71.0, 73.9], Verdict.SCATTERED),
-        ([70.0, 70.01, 70.02, 70.2], Verdict.SCATTERED),
+        ([70.0, 70.05, 70.06, 70.09], ConvergenceVerdict.CONVERGED),
+        ([70.0, 75.0, 75.05, 75.0], ConvergenceVerdict.CONVERGED),
+        ([70.0, 74.0, 76.0, 77.0], ConvergenceVerdict.NOT_YET),
+        ([70.0, 74.0, 71.0, 73.9], ConvergenceVerdict.SCATTERED),
+        ([70.0, 70.01, 70.02, 70.2], ConvergenceVerdict.SCATTERED),
     ],
 )
 def test_verdict_looks_at_two_refinements_in_a_row(
-    coordinates: Coordinates, places: list[float], verdict: Verdict
+    coordinates: Coordinates, places: list[float], verdict: ConvergenceVerdict
 ) -> None:
     assert judged(coordinates, places).verdict is verdict
 
 
 def test_changes_that_shrink_from_outcome_to_outcome_are_no_convergence(coordinates: Coordinates) -> None:
     study = judged(coordinates, [70.0, 9000.0, 4900.0, 4900.0 - 2100.0])
-    assert study.verdict is Verdict.FLIPS
+    assert study.verdict is ConvergenceVerdict.FLIPS
     assert [level.flipped for level in study.levels] == [(), ("block",), ("block",), ("block",)]
     assert study.recommended is None
     settled = judged(coordinates, [9000.0, 70.0, 70.05, 70.02])
-    assert settled.verdict is Verdict.CONVERGED
+    assert settled.verdict is ConvergenceVerdict.CONVERGED
     assert [bool(level.flipped) for level in settled.levels] == [False, True, False, False]
 
 
@@ -140,11 +140,11 @@ def test_a_turn_counts_as_far_as_it_moves_a_corner(coordinates: Coordinates) -> 
 def test_a_failed_level_is_neither_near_nor_far(coordinates: Coordinates) -> None:
     failed: Row = {"status": "failed", "reason": "an overlap exceeds contact.max_overlap", "seconds": 0.1}
     study = judge({0: finished(10.0), 1: finished(10.0), 2: failed}, HALVED, coordinates, 0.1)
-    assert study.verdict is Verdict.FAILED
+    assert study.verdict is ConvergenceVerdict.FAILED
     assert isnan(study.levels[2].change_mm)
     assert study.levels[0].to_finest_mm == 0.0
     coarse = judge({-1: failed, 0: finished(10.0), 1: finished(10.0), 2: finished(10.0)}, HALVED, coordinates, 0.1)
-    assert coarse.verdict is Verdict.CONVERGED
+    assert coarse.verdict is ConvergenceVerdict.CONVERGED
     assert coarse.recommended is coarse.own
 
 
@@ -181,7 +181,7 @@ def test_slide_converges_with_the_order_of_its_static_deflections(slide: Scenari
     # what a sliding block owes to its springs are lengths such as m g / K: first order in the stiffness
     result = converge(slide, studies=["stiffness"], out=tmp_path)
     (study,) = result.studies
-    assert study.verdict is Verdict.CONVERGED
+    assert study.verdict is ConvergenceVerdict.CONVERGED
     assert [level.order for level in study.levels[2:]] == pytest.approx([1.0] * 3, abs=0.05)
     assert result.recommended is not None
     assert result.recommended.settings == {"contact.stiffness_scale": 0.001}
@@ -211,7 +211,7 @@ def test_refining_continues_until_the_tolerance_is_met(slide: Scenario, tmp_path
         converge(slide, studies=["stiffness"], out=tmp_path, tolerance_mm=1e-6, levels=count).studies[0]
         for count in (2, 6)
     )
-    assert (few.verdict, more.verdict) == (Verdict.NOT_YET, Verdict.CONVERGED)
+    assert (few.verdict, more.verdict) == (ConvergenceVerdict.NOT_YET, ConvergenceVerdict.CONVERGED)
     assert len(few.levels) < len(more.levels) < 2 + 1 + 6
     assert more.last_change_mm < 1e-6
 
@@ -231,7 +231,7 @@ def test_dead_worker_fails_its_runs_and_says_what_to_do(
 def test_scenario_that_fails_as_it_is_and_one_cut_by_the_end_of_time_say_so(slide: Scenario, tmp_path: Path) -> None:
     failing = converge(with_setting(slide, "contact.max_overlap", 1e-9), studies=["step"], out=tmp_path / "failing")
     assert failing.failed
-    assert (failing.recommended, failing.studies[0].verdict) == (None, Verdict.FAILED)
+    assert (failing.recommended, failing.studies[0].verdict) == (None, ConvergenceVerdict.FAILED)
     short = converge(with_setting(slide, "time.end", 0.01), studies=["step"], out=tmp_path / "short")
     assert any("depend on time.end" in text for text in short.notes)
 
@@ -277,12 +277,12 @@ def test_what_has_no_effect_is_not_studied(slide: Scenario, golden: Golden, is_r
     with pytest.raises(InvalidInputError) as caught:
         refinements_of(rigid("slide") if is_rigid else slide, studies.split())
     golden(str(caught.value))
-    assert {one.study for one in refinements_of(slide)} | {"spacing", "tolerance"} == set(STUDIES)
+    assert {one.study for one in refinements_of(slide)} | {"spacing", "tolerance"} == set(REFINEMENTS)
 
 
 def test_slide_converges_in_the_square_of_the_step(tmp_path: Path) -> None:
     found = converge(rigid("slide", contact__restitution=0.0), tolerance_mm=0.01, out=tmp_path)
     step, tolerance = found.studies
-    assert (step.verdict, tolerance.verdict) == (Verdict.CONVERGED, Verdict.CONVERGED)
+    assert (step.verdict, tolerance.verdict) == (ConvergenceVerdict.CONVERGED, ConvergenceVerdict.CONVERGED)
     assert tolerance.last_change_mm < 1e-3
     assert "contacts are rigid" in found.notes[0]
