@@ -30,7 +30,7 @@ from blocksim.study.converge import (
     converge,
     refinements_of,
 )
-from blocksim.study.convergence import Convergence, ConvergenceVerdict, Level, Recommendation, RefinementStudy
+from blocksim.study.convergence import Convergence, ConvergenceVerdict, Level, RefinementStudy
 from blocksim.study.pictures import draw_convergence
 from blocksim.study.rows import Row
 from blocksim.view.levels import refuse_small_page
@@ -194,7 +194,9 @@ def _verdict(study: RefinementStudy) -> list[str]:
                 *_flips(study),
             ]
         case ConvergenceVerdict.FAILED:
-            return [f"not judged: {_told_failures(study)}"]
+            failed = [level for level in study.levels if not level.is_finished]
+            count = f"{len(failed)} of {len(study.levels)} levels did not finish"
+            return [f"not judged: {count}; the first, {failed[0].value:g}: {failed[0].reason}"]
 
 
 def _flips(study: RefinementStudy) -> list[str]:
@@ -206,12 +208,6 @@ def _flips(study: RefinementStudy) -> list[str]:
             blocks = "block" if len(level.flipped) == 1 else "blocks"
             lines.append(f"outcome differs between {before.value:g} and {level.value:g}: {blocks} {named}")
     return lines
-
-
-def _told_failures(study: RefinementStudy) -> str:
-    failed = [level for level in study.levels if not level.is_finished]
-    count = f"{len(failed)} of {len(study.levels)} levels did not finish"
-    return f"{count}; the first, {failed[0].value:g}: {failed[0].reason}"
 
 
 def _told_convergence(study: RefinementStudy) -> str:
@@ -231,24 +227,17 @@ def _recommendation(result: Convergence, command: str) -> list[str]:
     if result.failed:
         return [f"the scenario as it is {result.studies[0].own.status}: {result.studies[0].own.reason}"]
     if joint is None:
-        return [_told_nothing(result)]
+        if not result.converged:
+            return ["no recommendation before every study has converged"]
+        if all(study.recommended == study.own for study in result.studies):
+            return ["recommended: the scenario as it is"]
+        return ["no recommendation: no other setting stays near all finest levels"]
+    share = 1.0 - joint.seconds / max(joint.own_seconds, 1e-9)
+    saving = f"{share:.0%} less" if share >= 0.0 else f"{-share:.0%} more"
     settings = ", ".join(f"{key}={value:g}" for key, value in joint.settings.items())
     times = f"{joint.seconds:.2f} s instead of {joint.own_seconds:.2f} s"
     return [
         f"recommended: {settings}",
-        f"within {_small(joint.to_finest_mm)} of the finest levels; {times} ({_told_saving(joint)}):",
+        f"within {_small(joint.to_finest_mm)} of the finest levels; {times} ({saving}):",
         command,
     ]
-
-
-def _told_nothing(result: Convergence) -> str:
-    if not result.converged:
-        return "no recommendation before every study has converged"
-    if all(study.recommended == study.own for study in result.studies):
-        return "recommended: the scenario as it is"
-    return "no recommendation: no other setting stays near all finest levels"
-
-
-def _told_saving(joint: Recommendation) -> str:
-    share = 1.0 - joint.seconds / max(joint.own_seconds, 1e-9)
-    return f"{share:.0%} less" if share >= 0.0 else f"{-share:.0%} more"

@@ -116,7 +116,7 @@ def _of_study(verdicts: tuple[SweepVerdict, ...]) -> Verified:
         told["searches"] = [one.data for one in found[:-1]]
         if verdicts[-1].agrees:
             found[-1] = replace(found[-1], lines=(f"{verdicts[-1].folder}: table and answer follow from the searches",))
-    return Verified(tuple(line for one in found for line in one.lines), told, _code(agrees=agrees))
+    return Verified(tuple(line for one in found for line in one.lines), told, ExitCode(not agrees))
 
 
 def _of_run(verdict: RunVerdict, *, told: bool) -> Verified:
@@ -127,7 +127,7 @@ def _of_run(verdict: RunVerdict, *, told: bool) -> Verified:
             note("\n".join(_told_origins(verdict.origins)))
     else:
         lines = [f"{verdict.folder}: differs", *(INDENT + line for line in _reasons(verdict))]
-    return Verified(tuple(lines), verdict.to_dict(), _code(agrees=verdict.agrees))
+    return Verified(tuple(lines), verdict.to_dict(), ExitCode(not verdict.agrees))
 
 
 def _reasons(verdict: RunVerdict) -> Iterator[str]:
@@ -207,7 +207,7 @@ def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> Ver
         lines += [INDENT + line for line in _entries(verdict.entries)]
         runs = [_of_run(run, told=False) for run in verdict.runs if not run.agrees]
         lines += [INDENT + line for run in runs for line in run.lines]
-    return Verified(tuple(lines), verdict.to_dict(), _code(agrees=verdict.agrees))
+    return Verified(tuple(lines), verdict.to_dict(), ExitCode(not verdict.agrees))
 
 
 def _cells(verdict: SweepVerdict) -> Iterator[str]:
@@ -220,7 +220,3 @@ def _cells(verdict: SweepVerdict) -> Iterator[str]:
     if verdict.cells:
         yield f"largest difference: {verdict.largest(MM):.3g} mm, {verdict.largest(DEGREES):.3g}°"
     yield from _told_origins(verdict.origins)
-
-
-def _code(*, agrees: bool) -> ExitCode:
-    return ExitCode.SUCCESS if agrees else ExitCode.OUTSIDE

@@ -195,20 +195,14 @@ def _notes(scenario: Scenario, runs: _Runs, studies: Iterable[str] | None) -> tu
     """Say what was not studied, and what the numbers cannot mean."""
     notes = []
     if soil_tables(scenario):
-        notes.append(_note_of_soil(studies))
+        more = "; --study spacing halves soils.spacing, eight times the cost a level" if studies is None else ""
+        notes.append(f"distances are those of blocks, not of soil{more}")
     elif studies is None and not has_particles(scenario):
         notes.append(f"{effects_note(scenario, ['spacing'])}: not studied")
     reasons = {str(row["reason"]) for row in runs.rows.values() if row["status"] == FINISHED}
     if scenario.time.stop_at_rest and "end of simulated time" in reasons:
         notes.append("some runs ended before everything was at rest: their final positions depend on time.end")
     return tuple(notes)
-
-
-def _note_of_soil(studies: Iterable[str] | None) -> str:
-    what = "distances are those of blocks, not of soil"
-    return (
-        what if studies is not None else f"{what}; --study spacing halves soils.spacing, eight times the cost a level"
-    )
 
 
 def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> tuple[Refinement, ...]:
@@ -230,11 +224,30 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
 
 
 def _possible(scenario: Scenario) -> list[Refinement]:
-    if scenario.time.has_rigid_contacts:
-        return [_rigid_step(scenario), _tolerance(scenario)]
-    spacing = [_spacing(scenario)] if has_particles(scenario) else []
-    soil = [_soil_spacing(scenario)] if soil_tables(scenario) else []
-    return [_step(scenario), _stiffness(scenario), *spacing, *soil]
+    """Return what can be refined, and how: by halves, or by half decades, also from coarser values that are cheap."""
+    time, contact = scenario.time, scenario.contact
+    if time.has_rigid_contacts:
+        step = float(build_scene(scenario).world.controls[0].step)  # as given or as it was chosen
+        tolerance = velocity_tolerance(scenario, len(place_bodies(scenario)))
+        key = "time.velocity_tolerance"
+        return [
+            _halved(scenario, "time.step", step),
+            Refinement(TOLERANCE, "velocity tolerance", key, tolerance, sqrt(0.1), 2),
+        ]
+    key, own = ("time.safety", safety_of(scenario)) if time.step == "auto" else ("time.step", time.step)
+    scale = contact.stiffness_scale
+    coarser = min(max(round(2.0 * log10(scale / SOFTEST)), 2), 6)
+    chosen = [
+        _halved(scenario, key, own),
+        Refinement(STIFFNESS, "stiffness", "contact.stiffness_scale", scale, sqrt(10.0), coarser),
+    ]
+    if has_particles(scenario):
+        key = "contact.particle_spacing"
+        chosen.append(Refinement(SPACING, "particle spacing", key, contact.particle_spacing, 0.5, 1))
+    soils = soil_tables(scenario)
+    if soils:  # twice the spacing may be too coarse to be admissible
+        chosen.append(Refinement(SPACING, "spacing of soil", SOIL_SPACING, soils[0].spacing, 0.5, 0))
+    return chosen
 
 
 def has_particles(scenario: Scenario) -> bool:
@@ -254,28 +267,10 @@ def effects_note(scenario: Scenario, asked: Iterable[str]) -> str:
     return "; ".join(note for name, note in notes.items() if name in asked and name not in possible)
 
 
-def _step(scenario: Scenario) -> Refinement:
-    """Halve the safety of the automatic step, or the step given by hand; double it where that is safe."""
-    step = scenario.time.step
-    key, own = ("time.safety", safety_of(scenario)) if step == "auto" else ("time.step", step)
-    return _halved(scenario, key, own)
-
-
-def _rigid_step(scenario: Scenario) -> Refinement:
-    """Halve the step, as given or as it was chosen; double it where that is safe."""
-    return _halved(scenario, "time.step", float(build_scene(scenario).world.controls[0].step))
-
-
 def _halved(scenario: Scenario, key: str, own: float) -> Refinement:
     halved = Refinement(STEP, "time step", key, own, 0.5, 0)
     coarser = next((n for n in (2, 1) if _is_safe(halved.at(scenario, -n))), 0)
     return replace(halved, coarser=coarser)
-
-
-def _tolerance(scenario: Scenario) -> Refinement:
-    """Tighten the tolerance of the velocity pass by half a decade, also from ten times the scenario's."""
-    own = velocity_tolerance(scenario, len(place_bodies(scenario)))
-    return Refinement(TOLERANCE, "velocity tolerance", "time.velocity_tolerance", own, sqrt(0.1), 2)
 
 
 def _is_safe(scenario: Scenario) -> bool:
@@ -286,22 +281,3 @@ def _is_safe(scenario: Scenario) -> bool:
     except (ValueError, InvalidInputError):
         return False
     return True
-
-
-def _stiffness(scenario: Scenario) -> Refinement:
-    """Raise the stiffness by half a decade, also from a thousandth of the materials' own, where runs are cheap."""
-    own = scenario.contact.stiffness_scale
-    coarser = min(max(round(2.0 * log10(own / SOFTEST)), 2), 6)
-    return Refinement(STIFFNESS, "stiffness", "contact.stiffness_scale", own, sqrt(10.0), coarser)
-
-
-def _spacing(scenario: Scenario) -> Refinement:
-    """Halve the spacing of the boundary particles, also from twice the scenario's."""
-    return Refinement(
-        SPACING, "particle spacing", "contact.particle_spacing", scenario.contact.particle_spacing, 0.5, 1
-    )
-
-
-def _soil_spacing(scenario: Scenario) -> Refinement:
-    """Halve the spacing of the particles of all soils; twice the scenario's may be too coarse to be admissible."""
-    return Refinement(SPACING, "spacing of soil", SOIL_SPACING, soil_tables(scenario)[0].spacing, 0.5, 0)
