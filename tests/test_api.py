@@ -13,8 +13,15 @@ import numpy as np
 import pytest
 
 import blocksim
+from blocksim.cli.commands import loaded
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError
+from blocksim.options import option_fields
 from blocksim.simulation import Result
+from blocksim.study.calibrate import CalibrateOptions
+from blocksim.study.run import RunOptions
+from blocksim.study.run_pictures import AnimateOptions, PlotOptions
+from blocksim.study.sensitivity import SensitivityOptions
+from blocksim.study.sweep import SweepOptions
 
 ROOT = Path(__file__).parent.parent
 SLIDE = ROOT / "scenarios" / "slide.toml"
@@ -44,6 +51,40 @@ def test_completion_of_the_package_offers_the_functions_for_users_alone() -> Non
 def test_defaults_in_help_are_readable(name: str) -> None:
     shown = str(inspect.signature(getattr(blocksim, name)))
     assert not re.search(r"lambda|0x[0-9a-f]+", shown), shown
+
+
+OPTIONS = {
+    "run": RunOptions,
+    "sweep": SweepOptions,
+    "calibrate": CalibrateOptions,
+    "sensitivity": SensitivityOptions,
+    "plot": PlotOptions,
+    "animate": AnimateOptions,
+}
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_a_function_takes_the_options_of_its_command_with_the_same_help(name: str) -> None:
+    function, command = getattr(blocksim, name), loaded(name)
+    texts = {param.name: param.help for param in command.params}
+    names = list(inspect.signature(function).parameters)
+    for field in option_fields(OPTIONS[name]):
+        assert field.name in names
+        if field.option is not None:
+            assert texts[field.name] == field.option.help
+            assert f"    {field.name}: " in function.__doc__
+
+
+def test_options_are_given_one_by_one_or_at_once(tmp_path: Path) -> None:
+    one = blocksim.sweep(SLIDE, {"gravity": [9.7, 9.8]}, out=tmp_path / "one", jobs=1)
+    other = blocksim.sweep(SLIDE, SweepOptions({"gravity": [9.7, 9.8]}, out=tmp_path / "other", jobs=1))
+    assert one.table.drop(columns="seconds", errors="ignore").equals(
+        other.table.drop(columns="seconds", errors="ignore")
+    )
+    with pytest.raises(TypeError, match="unexpected keyword argument 'mood'"):
+        blocksim.sweep(SLIDE, mood="grid")  # type: ignore[call-overload]
+    with pytest.raises(TypeError, match="missing a required argument: 'scenario'"):
+        blocksim.sweep()  # type: ignore[call-overload]
 
 
 @pytest.mark.parametrize("scenario", ["slide", "record_column", "tilting_arch"])

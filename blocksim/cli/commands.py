@@ -108,39 +108,9 @@ def loaded(name: str) -> Any:
 
         function = function_of(name)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-    alone.command(name, short_help=COMMANDS[name], context_settings=HELP)(expanded(function))
-    command: Any = typer.main.get_command(alone)
-    if name in WITH_SCENARIOS:
-        command.params.append(_allow_outside())
-    return command
-
-
-def _allow_outside() -> Any:
-    """Let typer make the option --allow-outside, as it makes all others."""
-    alone = typer.Typer(add_completion=False)
-    alone.command()(_asked)
-    return next(param for param in typer.main.get_command(alone).params if param.name == "allow_outside")
-
-
-def _allow(context: typer.Context, asked: bool) -> None:
-    from blocksim.scenario.path_policy import reaching
-
-    if asked:
-        context.with_resource(reaching(anywhere=True))
-
-
-def _asked(
-    allow_outside: Annotated[
-        bool,
-        typer.Option(
-            "--allow-outside",
-            callback=_allow,
-            expose_value=False,
-            help="Allow tables outside the scenario's folder and the current one.",
-        ),
-    ] = False,
-) -> None:
-    """Stand for a command that has the option."""
+    ready = expanded(function, reads_scenarios=name in WITH_SCENARIOS)
+    alone.command(name, short_help=COMMANDS[name], context_settings=HELP)(ready)
+    return typer.main.get_command(alone)
 
 
 def _listed() -> None:

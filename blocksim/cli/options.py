@@ -102,7 +102,23 @@ class TextScreen(Screen):
     as_json: bool = False
 
 
-def expanded(function: Callable[..., Report | None]) -> Callable[..., None]:
+def _allow_outside(context: typer.Context, asked: bool) -> None:
+    from blocksim.scenario.path_policy import reaching
+
+    if asked:
+        context.with_resource(reaching(anywhere=True))
+
+
+ALLOW_OUTSIDE = typer.Option(
+    False,
+    "--allow-outside",
+    callback=_allow_outside,
+    expose_value=False,
+    help="Allow tables outside the scenario's folder and the current one.",
+)
+
+
+def expanded(function: Callable[..., Report | None], *, reads_scenarios: bool = False) -> Callable[..., None]:
     """Return a command as typer takes it: groups of options are single ones, and its report is shown.
 
     A command that returns a report and has no parameter for the screen prints text, and has --quiet.
@@ -119,10 +135,14 @@ def expanded(function: Callable[..., Report | None]) -> Callable[..., None]:
             parameters.append(_parameter(field, field.option) if field.option else parameter)
     plain = own.return_annotation is Report and not any(issubclass(kind, Screen) for kind in groups.values())
     parameters += _parameters(TextScreen) if plain else ()
+    if reads_scenarios:  # directly or with results
+        outside = inspect.Parameter("outside", inspect.Parameter.KEYWORD_ONLY, default=ALLOW_OUTSIDE, annotation=bool)
+        parameters.append(outside)
 
     def call(**values: Any) -> None:
         screen = _made(TextScreen, values) if plain else None
         made = {name: _made(kind, values) for name, kind in groups.items()}
+        values.pop("outside", None)
         report = function(**made, **values)
         if report is not None:
             (screen or next(one for one in made.values() if isinstance(one, Screen))).show(report)
