@@ -37,7 +37,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
     "schema": "Print the JSON Schema of scenario files, for editors.",
 }
 
-MODULES = {"plot": "pictures", "animate": "pictures", "report": "pictures", "export": "pictures", "schema": "new"}
+MODULES = {"animate": "plot", "report": "plot", "export": "plot", "schema": "new"}
 GROUPS = {  # heads of the list in `blocksim --help`
     "Run": ("new", "run", "schema"),
     "Look": ("plot", "animate", "report", "export"),

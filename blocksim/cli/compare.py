@@ -1,18 +1,31 @@
-"""blocksim compare: judge runs and sweeps against measured repeats."""
+"""blocksim compare: judge runs and sweeps against measured repeats, and show their tables."""
 
 import inspect
+import textwrap
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.analysis.judgement import THRESHOLD, U_NUM, Settings
+from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict
+from blocksim.analysis.judgement import THRESHOLD, U_NUM, Judgement, Settings
+from blocksim.analysis.metrics import METRICS
+from blocksim.analysis.metrics.metric import BLOCK, Column, Findings, Form, Metric, Row, Value
 from blocksim.cli.options import Report, Screen
-from blocksim.cli.verdicts import comparison_table, judgement_lines, meanings, verdict_lines
+from blocksim.cli.output import number, table_lines, width_of_screen
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.path_policy import near
 from blocksim.study.compare import ExperimentTablePath, compare_run, compare_sweep
 from blocksim.study.stored_run import find_run
 from blocksim.study.sweep_table import is_sweep
+
+COLUMNS = ("block", "quantity", "simulated", "mean ± s", "[min, max]", "error", "verdict")
+DIGITS = 2
+SIGNS = {"deg": "°"}
+MOST_ROWS = 40  # of one table
+MOST_FAILURES = 3
+PERCENT = 100.0
+DASH = "–"
 
 
 def compare_command(
@@ -51,7 +64,7 @@ def compare_command(
     for place in runs:
         if is_sweep(place):
             judgement = compare_sweep(place, experiment, Settings(threshold, u_num))
-            head, source, lines = place, judgement.source, judgement_lines(judgement)
+            head, source, lines = place, judgement.source, list(_judgement_lines(judgement))
             data.append(judgement.to_dict())
             judged.append(judgement.inside)
         else:
@@ -65,4 +78,105 @@ def compare_command(
     return Report(["\n\n".join(texts)], data, code=ExitCode.SUCCESS if all(judged) else ExitCode.OUTSIDE)
 
 
-compare_command.__doc__ = inspect.cleandoc(compare_command.__doc__ or "").replace("{meanings}", meanings())
+def _meanings() -> Iterator[str]:
+    """Yield the names of all numbers with their meanings, for the help."""
+    for metric in METRICS.values():
+        numbers = [f"  {one.name:<13} {one.meaning}" for one in metric.columns if one not in BLOCK]
+        yield "\n".join(("\b", f"{metric.name}: {metric.meaning}", *numbers))
+
+
+compare_command.__doc__ = inspect.cleandoc(compare_command.__doc__ or "").replace(
+    "{meanings}", "\n\n".join(_meanings())
+)
+
+
+def comparison_table(comparison: Comparison) -> list[str]:
+    """Return the table of a comparison: the measured blocks, with a digit less where it would not fit the screen."""
+    measured = {row.block for row in comparison.rows if row.verdict != Verdict.NO_DATA}
+    rows = [row for row in comparison.rows if row.block in measured]
+    tables = (table_lines(COLUMNS, [_cells(row, digits) for row in rows], left=2) for digits in (DIGITS, DIGITS - 1))
+    return min(tables, key=lambda lines: (max(map(len, lines)) > width_of_screen(), any("…" in line for line in lines)))
+
+
+def _cells(row: ComparisonRow, digits: int) -> tuple[str, ...]:
+    return (
+        row.block,
+        f"{row.quantity} {SIGNS.get(row.unit, row.unit)}",
+        number(row.simulated, digits),
+        f"{number(row.mean, digits)} ± {number(row.s, digits)}",
+        f"[{number(row.minimum, digits)}, {number(row.maximum, digits)}]",
+        number(row.error, digits),
+        str(row.verdict),
+    )
+
+
+def verdict_lines(comparison: Comparison) -> list[str]:
+    """Return what is outside and by how much, or that all is inside."""
+    outside = []
+    for row in comparison.rows:
+        if row.verdict == Verdict.OUTSIDE:
+            least = 10.0**-DIGITS  # a distance is never shown as zero
+            distance = f"less than {least:g}" if row.distance < least else number(row.distance, DIGITS)
+            outside.append(f"outside: {row.quantity} of block {row.block} by {distance} {row.unit}")
+    return [*comparison.messages, *(outside or ["all inside"])]
+
+
+def _judgement_lines(judgement: Judgement) -> Iterator[str]:
+    """Yield all tables and their notes, after the first samples that failed."""
+    for one in judgement.failures[:MOST_FAILURES]:
+        yield textwrap.shorten(f"row {one.row}, case {one.case}: {one.status}: {one.reason}", width_of_screen())
+    more = len(judgement.failures) - MOST_FAILURES
+    if more > 0:
+        yield f"... and {more} more did not finish (--json names all)"
+    yield from _wrapped(judgement.messages)
+    for name, found in judgement.findings.items():
+        yield ""
+        yield from _wrapped([f"{name}: {METRICS[name].meaning}"])
+        yield from _table(METRICS[name], found)
+        yield from _wrapped(found.messages)
+    yield ""
+    share, asked = (f"{PERCENT * part:.1f} %" for part in (judgement.share_inside, judgement.settings.threshold))
+    count = f"{judgement.inside_all} of {judgement.members} samples ({share})"
+    yield f"{count} are within all measured ranges; threshold: {asked}"
+
+
+def _table(metric: Metric, found: Findings) -> list[str]:
+    if not found.rows:
+        return []
+    columns = [column for column in metric.columns if column.head]
+    rows = [[_cell(row, column) for column in columns] for row in found.rows[:MOST_ROWS]]
+    left = next(i for i, column in enumerate(columns) if column.form is not Form.TEXT)
+    lines = table_lines([column.head for column in columns], rows, left)
+    more = len(found.rows) - len(rows)
+    return [*lines, f"... and {more} more rows (--json has all)"] if more else lines
+
+
+def _cell(row: Row, column: Column) -> str:
+    value = row[column.name]
+    if column.name == "quantity" and row["unit"]:
+        return f"{value} {SIGNS.get(str(row['unit']), row['unit'])}"
+    return _shown(value, column)
+
+
+def _shown(value: Value, column: Column) -> str:
+    """Return a value for people; a dash where there is none."""
+    is_share = column.form is Form.SHARE
+    match value:
+        case None:
+            return DASH
+        case bool():
+            return "yes" if value else "no"
+        case (low, high) if is_share:
+            return f"{number(PERCENT * low, column.digits)}–{number(PERCENT * high, column.digits)} %"
+        case (low, high):
+            ends = [number(low, column.digits), number(high, column.digits)]
+            return DASH if ends == [DASH, DASH] else f"[{ends[0]}, {ends[1]}]"
+        case float():
+            return f"{number(PERCENT * value, column.digits)} %" if is_share else number(value, column.digits)
+        case _:
+            return str(value)
+
+
+def _wrapped(texts: Iterable[str]) -> list[str]:
+    width = width_of_screen()
+    return [line for text in texts for line in textwrap.wrap(text, width, break_long_words=False)]

@@ -10,11 +10,11 @@ from itertools import islice
 import click
 import typer
 
+from blocksim.cli.compare import comparison_table, verdict_lines
 from blocksim.cli.options import Report, Screen
 from blocksim.cli.output import note, number, table_lines
 from blocksim.cli.prepare import ScenarioInput, tell_compilation, warn_of_values
 from blocksim.cli.progress import watching
-from blocksim.cli.verdicts import comparison_table, verdict_lines
 from blocksim.simulation import Result
 from blocksim.simulation.folder import default_folder
 from blocksim.simulation.movement import FIRST, OUTCOME, Movement

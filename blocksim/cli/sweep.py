@@ -100,7 +100,9 @@ def _table_report(result: SweepResult) -> Report:
     names = [name for name in columns if name in short or name == "inside" or _varies(table[name])]
     heads, rows, fitting = _texts(result, names, short)
     if fitting < sum(name not in SHOWN_LAST for name in names):  # the first blocks of many may all stay where they are
-        heads, rows, fitting = _texts(result, sorted(names, key=_rank), short)
+        # columns of single blocks behind others, and last what a note below the table tells
+        names.sort(key=lambda name: (name in (FIRST_MOVER, FIRST_MOVED), name.endswith(POSITION)))
+        heads, rows, fitting = _texts(result, names, short)
     counts = {
         "row": len(table) - len(rows),
         "column": len(names) - fitting,
@@ -133,11 +135,6 @@ def _texts(result: SweepResult, names: list[str], short: dict[str, str]) -> tupl
             break
         fitting += 1
     return heads, rows, max(fitting, 1)
-
-
-def _rank(name: str) -> tuple[bool, bool]:
-    """Return a key that sorts columns of single blocks behind others, and last what a note below the table tells."""
-    return name in (FIRST_MOVER, FIRST_MOVED), name.endswith(POSITION)
 
 
 def _movement_lines(result: SweepResult) -> Iterator[str]:

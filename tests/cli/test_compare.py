@@ -13,7 +13,7 @@ from scipy import stats
 
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import ExperimentTable, Measurement
-from blocksim.cli.verdicts import verdict_lines
+from blocksim.cli.compare import verdict_lines
 from tests.cli.conftest import SOFT, Command
 from tests.golden import Golden
 
