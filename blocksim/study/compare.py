@@ -4,12 +4,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, overload
 
 from blocksim.analysis.compare import Comparison, compare_final
-from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.analysis.experiment import load_table
 from blocksim.analysis.judgement import Judgement, Settings, judge
 from blocksim.analysis.members import Members
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
-from blocksim.scenario import Scenario, load_scenario, load_stored
+from blocksim.scenario import load_scenario, load_stored
 from blocksim.simulation import Result
 from blocksim.simulation import folder as files
 from blocksim.simulation.result import read_final
@@ -21,6 +21,8 @@ from blocksim.study.sweep_table import SweepResult, is_sweep, read_sweep
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from blocksim.simulation.table import Columns
 
 ExperimentTablePath = Annotated[
     Path | str | None,
@@ -68,30 +70,21 @@ def compare_sweep(
     each other, UnavailableError without scipy.
     """
     result = sweep if isinstance(sweep, SweepResult) else read_sweep(Path(sweep))
-    scenario = _scenario(result.folder)
+    plan = result.folder / PLAN
+    scenario = load_stored(plan) if plan.exists() else None
     table = experiment or (scenario.experiment.table if scenario is not None and scenario.experiment else None)
     if table is None:
         message = f"{result.folder}: the sweep's scenario names no experiment; give a table with --experiment"
         raise InputMissingError(message)
     members = Members(result.table, str(result.folder / TABLE))
-    return judge(members, load_table(table), settings, _remarks(scenario))
-
-
-def _scenario(folder: Path) -> Scenario | None:
-    """Return the scenario of a sweep, None where its folder does not have it."""
-    plan = folder / PLAN
-    return load_stored(plan) if plan.exists() else None
-
-
-def _remarks(scenario: Scenario | None) -> tuple[str, ...]:
-    """Say where shares of members are no probabilities."""
-    plan = None if scenario is None else scenario.sweep
-    if plan is None or plan.is_sampled:
-        return ()
-    return (
-        f"mode {plan.mode!r} sets its members: shares are counts, not probabilities",
-        "the 95 % limits hold for samples only (modes lhs, sobol, normal)",
-    )
+    sweep_of = None if scenario is None else scenario.sweep
+    remarks: tuple[str, ...] = ()
+    if sweep_of is not None and not sweep_of.is_sampled:  # shares of members are no probabilities
+        remarks = (
+            f"mode {sweep_of.mode!r} sets its members: shares are counts, not probabilities",
+            "the 95 % limits hold for samples only (modes lhs, sobol, normal)",
+        )
+    return judge(members, load_table(table), settings, remarks)
 
 
 def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | str | None = None) -> Comparison:
@@ -100,28 +93,22 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
     Without `experiment` the table that the run's scenario names is taken. Raises InputMissingError without any table,
     InvalidInputError for a run that did not finish.
     """
+    final: Columns | pd.DataFrame
     if isinstance(run, Result):
-        _refuse_unfinished(run.name, run.status, run.reason)
-        return compare_final(run.columns, _table(experiment, run.experiment))
-    if not isinstance(run, Path | str):
-        return compare_final(run, _table(experiment, None))
-    folder = find_run(run)
-    summary = read_summary(folder / files.SUMMARY)
-    _refuse_unfinished(str(folder), summary.status, summary.reason)
-    was = load_stored(folder / files.SCENARIO)
-    # a scenario file may name another table by now than it did when it was run
-    named = (load_scenario(run) if Path(run).is_file() else was).experiment
-    return compare_final(read_final(folder, was), _table(experiment, named.table if named else None))
-
-
-def _table(given: Path | str | None, named: Path | None) -> ExperimentTable:
-    table = given or named
+        name, summary, final, named = run.name, run.summary, run.columns, run.experiment
+    elif not isinstance(run, Path | str):
+        name, summary, final, named = "", None, run, None
+    else:
+        folder = find_run(run)
+        name, summary, was = str(folder), read_summary(folder / files.SUMMARY), load_stored(folder / files.SCENARIO)
+        final = read_final(folder, was) if summary.status == FINISHED else {}
+        # a scenario file may name another table by now than it did when it was run
+        now = (load_scenario(run) if Path(run).is_file() else was).experiment
+        named = now.table if now else None
+    if summary is not None and summary.status != FINISHED:
+        how = how_it_ended(summary.status, summary.reason)
+        raise InvalidInputError(f"{name}: {how}; only a finished run can be compared")
+    table = experiment or named
     if table is None:
-        message = "the scenario names no experiment; give a table with --experiment"
-        raise InputMissingError(message)
-    return load_table(table)
-
-
-def _refuse_unfinished(name: str, status: str, reason: str) -> None:
-    if status != FINISHED:
-        raise InvalidInputError(f"{name}: {how_it_ended(status, reason)}; only a finished run can be compared")
+        raise InputMissingError("the scenario names no experiment; give a table with --experiment")
+    return compare_final(final, load_table(table))

@@ -15,7 +15,7 @@ import functools
 import math
 import re
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar, overload
@@ -139,7 +139,12 @@ def read_columns(path: Path) -> list[Column]:
 def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Column:
     found = HEAD.fullmatch(head.text)
     key, unit = (head.text, None) if found is None else (found["key"], found["unit"])
-    complaint = unfit_to_vary(key) or ("" if unit is None else _unit_complaint(unit))
+    complaint = unfit_to_vary(key)
+    if unit is not None and not complaint:
+        try:
+            q.parse_quantity(f"1 {unit}", q.LENGTH)
+        except ValueError as error:
+            complaint = str(error)
     if complaint:
         problems.append(head.problem(complaint))
         return Column(key, head, cells, ())
@@ -150,14 +155,6 @@ def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Colum
         except ValueError as error:
             problems.append(cell.problem(str(error)))
     return Column(key, head, cells, values)
-
-
-def _unit_complaint(unit: str) -> str:
-    try:
-        q.parse_quantity(f"1 {unit}", q.LENGTH)
-    except ValueError as error:
-        return str(error)
-    return ""
 
 
 def _value(cell: Cell, unit: str | None) -> object:
@@ -183,27 +180,21 @@ def _word(text: str) -> object:
 
 
 def refuse_wrong_values(document: Document, columns: Iterable[Column]) -> None:
-    """Try the values of each column by themselves; raises InvalidInputError with the cells of all wrong ones."""
-    problems = dict.fromkeys(problem for column in columns for problem in _wrong_values(document, column))
+    """Try the values of each column by themselves; raises InvalidInputError with the cells of all wrong ones.
+
+    Tried are the first different values, and the ends of all numbers.
+    """
+    problems: list[Problem] = []
+    for column in columns:
+        places = {value: index for index, value in reversed(list(enumerate(column.values)))}
+        numbers = [(cell.number(), index) for index, cell in enumerate(column.cells) if NUMBER.fullmatch(cell.text)]
+        ends = [min(numbers)[1], max(numbers)[1]] if numbers else []
+        findings = [
+            (index, finding)
+            for index in dict.fromkeys((*sorted(places.values())[:MOST_TRIED], *ends))
+            for finding in mistakes_of_value(document.data, document.folder, column.key, column.values[index])
+        ]
+        of_key = next((column.head.problem(one.message) for _, one in findings if one.at == "key"), None)
+        problems += [of_key] if of_key else [column.cells[index].problem(one.message) for index, one in findings]
     if problems:
-        raise_problems(list(problems))
-
-
-def _wrong_values(document: Document, column: Column) -> Iterator[Problem]:
-    """Yield what is wrong with a column: its key, or its values."""
-    for cell, value in _tried(column):
-        for finding in mistakes_of_value(document.data, document.folder, column.key, value):
-            if finding.at == "key":
-                yield column.head.problem(finding.message)
-                return
-            yield cell.problem(finding.message)
-
-
-def _tried(column: Column) -> Iterator[tuple[Cell, object]]:
-    """Yield different values: the first ones, and the ends of all numbers."""
-    places = {value: index for index, value in reversed(list(enumerate(column.values)))}
-    first = sorted(places.values())[:MOST_TRIED]
-    numbers = [(cell.number(), index) for index, cell in enumerate(column.cells) if NUMBER.fullmatch(cell.text)]
-    ends = [min(numbers)[1], max(numbers)[1]] if numbers else []
-    for index in dict.fromkeys((*first, *ends)):
-        yield column.cells[index], column.values[index]
+        raise_problems(list(dict.fromkeys(problems)))

@@ -19,7 +19,7 @@ from blocksim.scenario import Document, Scenario, scenario_hash, scenario_to_tom
 from blocksim.scenario.keys import KeyPath, follow, format_key
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import with_value
-from blocksim.scenario.source import Place, Span, locate
+from blocksim.scenario.source import Span, locate
 
 TABLES: tuple[KeyPath, ...] = (("experiment", "table"), ("motion", "table"), ("sweep", "table"))
 """Keys whose values are paths, relative to the scenario's folder."""
@@ -85,18 +85,18 @@ def _edited(text: str, path: KeyPath, wanted: Document, note: str) -> str:
     places = locate(text)
     known = next((path[:size] for size in range(len(path), 0, -1) if path[:size] in places), ())
     lines = text.split("\n")
-    if not known:
-        return _appended(text, path, wanted)
+    if not known:  # in a table of its own at the end, or before all tables where it stands in none
+        value = toml_value(follow(wanted.data, path))
+        if len(path) == 1:
+            return f"{format_key(path)} = {value}\n{text}"
+        return f"{text.rstrip()}\n\n[{format_key(path[:1])}]\n{format_key(path[1:])} = {value}\n"
     place = places[known]
-    if not _is_header(lines, place):
+    is_header = lines[place.key.line - 1].lstrip().startswith("[") and place.key == place.value
+    if not is_header:
         told = f"{path[-1]} {note}" if note and known != path else note
         return _replaced(lines, place.value, toml_value(follow(wanted.data, known)), told)
     line = f"{format_key(path[len(known) :])} = {toml_value(follow(wanted.data, path))}"
     return "\n".join([*lines[: place.key.line], line, *lines[place.key.line :]])
-
-
-def _is_header(lines: list[str], place: Place) -> bool:
-    return lines[place.key.line - 1].lstrip().startswith("[") and place.key == place.value
 
 
 def _replaced(lines: list[str], span: Span, value: str, note: str) -> str:
@@ -109,14 +109,6 @@ def _replaced(lines: list[str], span: Span, value: str, note: str) -> str:
         gap = " " * max(len(GAP), span.length + len(comment[2]) - len(value))  # the comment stays in its column
         rest = f"{comment[1]}{gap}# {note}{before}"
     return "\n".join([*lines[: span.line - 1], line[: span.column] + value + rest, *lines[span.line :]])
-
-
-def _appended(text: str, path: KeyPath, wanted: Document) -> str:
-    """Put a key into a table of its own at the end, or before all tables where it stands in none."""
-    if len(path) == 1:
-        return f"{format_key(path)} = {toml_value(follow(wanted.data, path))}\n{text}"
-    entry = f"[{format_key(path[:1])}]\n{format_key(path[1:])} = {toml_value(follow(wanted.data, path))}\n"
-    return f"{text.rstrip()}\n\n{entry}"
 
 
 def toml_value(value: object) -> str:

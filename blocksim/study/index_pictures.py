@@ -78,29 +78,24 @@ def read_indices(path: Path) -> tuple[list[Bars], tuple[str, str]]:
     if not rows:
         message = f"{path}: no result varies; nothing to draw"
         raise InvalidInputError(message)
-    outputs = dict.fromkeys(str(row["output"]) for row in rows)
-    return [_bars([row for row in rows if row["output"] == output], shown) for output in outputs], shown.labels
+    panels = []
+    for output in dict.fromkeys(str(row["output"]) for row in rows):
+        own = [row for row in rows if row["output"] == output]
+        columns = {name: np.array([row[name] for row in own], dtype=np.float64) for name in own[0] if name not in HEAD}
+        unit = str(own[0]["unit"])
+        bracket = f" ({unit})" if shown.has_unit and unit not in UNITLESS else ""
+        keys = tuple(str(row["key"]) for row in own)
+        value, half_width = columns[shown.value], columns[shown.half_width]
+        panels.append(Bars(f"{output}{bracket}", keys, value, half_width, columns.get(shown.part)))
+    return panels, shown.labels
 
 
 def _read(cell: Cell, problems: list[Problem]) -> str | float:
     """Return the text of a name or the number of an index; 0 after noting a problem."""
     if cell.column in HEAD:
         return cell.text
-    if cell.text in {"", "nan"}:
-        return float("nan")
     try:
-        return cell.number()
+        return cell.number() if cell.text not in {"", "nan"} else float("nan")
     except ValueError as error:
         problems.append(cell.problem(str(error)))
         return 0.0
-
-
-def _bars(rows: list[dict[str, str | float]], shown: Shown) -> Bars:
-    def column(name: str) -> np.ndarray:
-        return np.array([row[name] for row in rows], dtype=np.float64)
-
-    unit = str(rows[0]["unit"])
-    bracket = f" ({unit})" if shown.has_unit and unit not in UNITLESS else ""
-    part = column(shown.part) if shown.part and shown.part in rows[0] else None
-    keys = tuple(str(row["key"]) for row in rows)
-    return Bars(f"{rows[0]['output']}{bracket}", keys, column(shown.value), column(shown.half_width), part)

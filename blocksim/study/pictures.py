@@ -18,7 +18,7 @@ from blocksim.study.study import draw_study, study_in
 from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import is_sweep
-from blocksim.view.kinds import MOTION, PROBE, STRIP, SWEEP_KINDS, Kind, kind_for
+from blocksim.view.kinds import MOTION, PROBE, STRIP, SWEEP_KINDS, kind_for
 from blocksim.view.layout import OWN, Paper
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.style import picture_suffix
@@ -41,7 +41,9 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, pape
         if sum(level.is_finished for level in study.levels) >= FEWEST_LEVELS
     ]
     if panels:
-        widths = {block: high - low for block, (low, high) in _measured_ranges(scenario).items()}
+        table = None if scenario.experiment is None else load_table(scenario.experiment.table)
+        rows = [] if table is None else [row for row in table.summaries() if row.quantity == "x"]
+        widths = {row.block: row.maximum - row.minimum for row in rows}  # of the measured ranges
         draw_levels(panels, path, title=f"{result.name}: distance from the finest level", measured=widths, paper=paper)
     return bool(panels)
 
@@ -62,27 +64,21 @@ def draw_sweep(
     Raises what `read_sweep_data` raises, InvalidInputError for an unknown picture format or kind and for one that
     cannot show this sweep, OutputError.
     """
-    chosen = None if kind is None else _kind_named(kind)
-    found = read_sweep_data(folder, experiment)
-    reason = "" if chosen is None else chosen.refusal(found)
-    if reason:
-        message = f"{folder}: {reason}"
+    if kind == TORNADO:
+        message = f"a {TORNADO} is drawn from a table of indices: blocksim sensitivity SCENARIO --out TABLE.csv"
         raise InvalidInputError(message)
+    if kind is not None and kind not in SWEEP_KINDS:
+        message = f"--kind {kind}: unknown kind, {did_you_mean_or_list(kind, [*SWEEP_KINDS, TORNADO])}"
+        raise InvalidInputError(message)
+    found = read_sweep_data(folder, experiment)
+    chosen = kind_for(found) if kind is None else SWEEP_KINDS[kind]
+    if kind is not None and (reason := chosen.refusal(found)):
+        raise InvalidInputError(f"{folder}: {reason}")
     path = path or Path(f"{load_stored(folder / PLAN).name}.png")
     picture_suffix(path)
     ready(path)
-    (chosen or kind_for(found)).draw(found, path, paper)
+    chosen.draw(found, path, paper)
     return path
-
-
-def _kind_named(name: str) -> Kind:
-    if name == TORNADO:
-        message = f"a {TORNADO} is drawn from a table of indices: blocksim sensitivity SCENARIO --out TABLE.csv"
-        raise InvalidInputError(message)
-    if name not in SWEEP_KINDS:
-        message = f"--kind {name}: unknown kind, {did_you_mean_or_list(name, [*SWEEP_KINDS, TORNADO])}"
-        raise InvalidInputError(message)
-    return SWEEP_KINDS[name]
 
 
 def _panel(result: "Convergence", study: "RefinementStudy", unit: str) -> Panel:
@@ -100,17 +96,6 @@ def _panel(result: "Convergence", study: "RefinementStudy", unit: str) -> Panel:
         own=study.own.value,
         recommended=None if study.recommended is None else study.recommended.value,
     )
-
-
-def _measured_ranges(scenario: Scenario) -> dict[str, tuple[float, float]]:
-    """Return smallest and largest measured x (mm) by block."""
-    table = None if scenario.experiment is None else scenario.experiment.table
-    if table is None:
-        return {}
-    statistics = load_table(table).statistics()
-    centres = statistics[statistics["quantity"] == "x"]
-    ends = (centres[column].astype(float) for column in ("minimum", "maximum"))
-    return dict(zip(centres["block"], zip(*ends, strict=True), strict=True))
 
 
 @takes(PlotOptions)

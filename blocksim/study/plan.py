@@ -1,10 +1,10 @@
 """What a sweep varies, the scenario of each of its cases, and what they will cost."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from statistics import fmean
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from blocksim.simulation.provenance import run_hash
 from blocksim.study.design import Design, MadeOnDemand, Settings, read_columns, refuse_wrong_values
 from blocksim.study.rows import Head, check_experiment, heads_of
 from blocksim.study.sampling import design_of, remarks
-
-if TYPE_CHECKING:
-    from blocksim.world.describe import Description
 
 MOST_CASES = 1_000_000
 TABLE = "table"  # last part of keys that name a file
@@ -62,7 +59,17 @@ class Cases(MadeOnDemand[Case]):
 
     def row(self, number: int) -> Case:
         """Return one case."""
-        return _case(self.document, self.design[number])
+        values = self.design[number]
+        try:
+            scenario = self.document.with_values(values).build()
+        except BlocksimError as error:  # mistakes that only show in the combination
+            return Case(values, None, problem=str(error).splitlines()[0])
+        return Case(values, scenario, name=run_hash(scenario))
+
+
+def _plain(value: object) -> object:
+    """Return a number of numpy's as Python has it."""
+    return value.item() if hasattr(value, "item") else value
 
 
 def with_sweep(
@@ -82,7 +89,7 @@ def with_sweep(
     table = dict(present) if isinstance(present, Mapping) and not vary else {}
     overrides = list(document.overrides)
     for key, values in (vary or {}).items():
-        table[key] = frozen(values) if isinstance(values, Mapping) else tuple(_plain(value) for value in values)
+        table[key] = frozen(values) if isinstance(values, Mapping) else tuple(map(_plain, values))
         text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={shown(table[key])}"
         label = f"--vary {text}" if isinstance(vary, Variations) else "vary"
         overrides.append(Override(label, text, ("sweep", key)))
@@ -94,11 +101,6 @@ def with_sweep(
             overrides.append(Override(label, f"{name}={value}", ("sweep", name)))
     data = {**document.data, "sweep": table} if table else document.data
     return _with_table_read(replace(document, data=data, overrides=tuple(overrides)))
-
-
-def _plain(value: object) -> object:
-    """Return the Python number in a number of numpy's."""
-    return value.item() if hasattr(value, "item") else value
 
 
 def _with_table_read(document: Document) -> Document:
@@ -148,25 +150,18 @@ def _for_cases(document: Document) -> Document:
 
 def refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None:
     """Try the least and the greatest value that was drawn from each normal distribution."""
-    findings = [
-        Finding(("sweep", key), f"drawn: {message}; cut the distribution with from and to")
-        for key, values in sweep.vary.items()
-        if isinstance(values, Normal)
-        for value in _ends(values, design.columns[key])
-        for message in _mistakes(document, key, value)
-    ]
+    findings = []
+    for key, values in sweep.vary.items():
+        if not isinstance(values, Normal):
+            continue
+        drawn = [float(str(value).removesuffix(" rad")) for value in design.columns[key]]
+        for end in (min(drawn), max(drawn)):
+            mistakes = mistakes_of_value(document.data, document.folder, key, written(end, angle=values.angle))
+            for message in dict.fromkeys(one.message for one in mistakes):  # one number may set two keys
+                text = f"drawn: {message}; cut the distribution with from and to"
+                findings.append(Finding(("sweep", key), text))
     if findings:
         raise ScenarioError([document.problem(finding) for finding in findings])
-
-
-def _ends(values: Normal, drawn: Iterable[object]) -> tuple[object, object]:
-    numbers = [float(str(value).removesuffix(" rad")) for value in drawn]
-    return written(min(numbers), angle=values.angle), written(max(numbers), angle=values.angle)
-
-
-def _mistakes(document: Document, key: str, value: object) -> Iterable[str]:
-    """Return what is wrong with a value, each thing once: one number may set two keys."""
-    return dict.fromkeys(found.message for found in mistakes_of_value(document.data, document.folder, key, value))
 
 
 def table_digests(document: Document, vary: Mapping[str, Variation]) -> dict[str, list[str]]:
@@ -175,27 +170,14 @@ def table_digests(document: Document, vary: Mapping[str, Variation]) -> dict[str
     A plan that is named by the paths alone would take rows of one record for those of another one of the same name.
     """
     bare = document.without_sweep()
-    return {
-        key: [_digest_of(bare, key, value) for value in values]
-        for key, values in vary.items()
-        if parse_key(key)[-1] == TABLE and isinstance(values, tuple)
-    }
-
-
-def _digest_of(document: Document, key: str, value: object) -> str:
-    try:
-        return scenario_hash(document.with_values({key: value}).build())
-    except BlocksimError:  # the case says so
-        return ""
-
-
-def _case(document: Document, values: Settings) -> Case:
-    """Return the case with these values; mistakes that only show in the combination are kept in it."""
-    try:
-        scenario = document.with_values(values).build()
-    except BlocksimError as error:
-        return Case(values, None, problem=str(error).splitlines()[0])
-    return Case(values, scenario, name=run_hash(scenario))
+    digests: dict[str, list[str]] = {}
+    for key, values in vary.items():
+        for value in values if parse_key(key)[-1] == TABLE and isinstance(values, tuple) else ():
+            digest = ""
+            with suppress(BlocksimError):  # the case says so
+                digest = scenario_hash(bare.with_values({key: value}).build())
+            digests.setdefault(key, []).append(digest)
+    return digests
 
 
 @dataclass(frozen=True)
@@ -268,31 +250,23 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
         raise InvalidInputError(message)
     check_experiment(base)
     cases = cases_of(document, base.sweep)
-    chosen = [cases[number] for number in _spread_out(len(cases))]
+    if len(cases) > LOOKED_AT:  # a random choice: evenly spaced ones may meet one value of a key only
+        drawn = np.random.default_rng(0).choice(len(cases), LOOKED_AT, replace=False)
+        chosen = [cases[number] for number in sorted(drawn.tolist())]
+    else:
+        chosen = list(cases)
     described = [describe(case.scenario) for case in chosen if case.scenario is not None]
     problems = [case.problem for case in chosen if case.scenario is None]
     share = len(described) / len(chosen)
+    rows = [ROW + ROW_OF_BLOCK * len(one.bodies) + keep_cases * (one.bytes + SMALL_FILES) for one in described]
     return Estimate(
         cases=len(cases),
         looked_at=len(chosen),
         impossible=len(problems),
         reason=problems[0] if problems else "",
         seconds=share * len(cases) * fmean([one.seconds for one in described] or [0.0]),
-        bytes=round(share * len(cases) * fmean([_bytes(one, keep_cases=keep_cases) for one in described] or [0.0])),
+        bytes=round(share * len(cases) * fmean(rows or [0.0])),
         memory=max((one.memory for one in described), default=0),
         stop_at_rest=sum(case.scenario.time.stop_at_rest for case in chosen if case.scenario is not None),
         remarks=tuple(remarks(base.sweep)),
     )
-
-
-def _bytes(one: "Description", *, keep_cases: bool) -> int:
-    row = ROW + ROW_OF_BLOCK * len(one.bodies)
-    return row + one.bytes + SMALL_FILES if keep_cases else row
-
-
-def _spread_out(count: int) -> list[int]:
-    """Return numbers of cases, all of them or a random choice: evenly spaced ones may meet one value of a key only."""
-    if count <= LOOKED_AT:
-        return list(range(count))
-    chosen = np.random.default_rng(0).choice(count, LOOKED_AT, replace=False)
-    return sorted(chosen.tolist())

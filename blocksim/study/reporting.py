@@ -1,12 +1,12 @@
 """Runs and sweeps brought into the form of a report, as `blocksim report` and `blocksim.report` ask for it."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from blocksim import __version__
 from blocksim.analysis.compare import Comparison, compare_final
-from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.analysis.experiment import load_table
 from blocksim.analysis.judgement import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import Scenario, load_stored
@@ -68,25 +68,19 @@ def report_on(
         if study is not None:
             shown.append(study_subject(key, study_page(place, study), str(place)))
             continue
-        subjects, found = _sweep(key, place, experiment, members) if is_sweep(place) else _run(key, place, experiment)
-        remark = "" if is_sweep(place) else choice(place, _folder(place))
-        if remark:
-            on_remark(remark)
+        if is_sweep(place):
+            subjects, damage = _sweep(key, place, experiment, members)
+        else:
+            folder = _folder(place)
+            run = read_stored(folder)
+            subjects, damage = [run_subject(key, run, *_compared(run, experiment))], run.damage
+            remark = choice(place, folder)
+            if remark:
+                on_remark(remark)
         shown += subjects
-        problems += found
-    return write_report(shown, out, title=_title(shown), version=__version__), problems
-
-
-def _title(subjects: Sequence[Subject]) -> str:
-    names = dict.fromkeys(subject.name for subject in subjects if not subject.page.get("parent"))
-    return ", ".join(names) + " – blocksim report"
-
-
-def _run(key: str, place: Path, experiment: Path | None) -> tuple[list[Subject], tuple[str, ...]]:
-    """Return the run that a place means as a subject, and what is damaged in it."""
-    stored = read_stored(_folder(place))
-    comparison, remarks = _compared(stored, experiment)
-    return [run_subject(key, stored, comparison, remarks)], stored.damage
+        problems += damage
+    names = dict.fromkeys(subject.name for subject in shown if not subject.page.get("parent"))
+    return write_report(shown, out, title=f"{', '.join(names)} – blocksim report", version=__version__), problems
 
 
 def _folder(place: Path) -> Path:
@@ -99,13 +93,13 @@ def _folder(place: Path) -> Path:
 def _compared(run: PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
     """Return the comparison of a finished run, or why there is none though there is a measurement."""
     try:
-        table = _measured(run.scenario, experiment)
+        named = None if run.scenario is None or run.scenario.experiment is None else run.scenario.experiment.table
+        table = experiment or named
         if table is None or run.final is None:
             return None, ()
         if run.status != FINISHED:
             return None, ("only a finished run is compared with the measurement",)
-        found = compare_final(run.final, table)
-        return _shown(found), ()
+        return _shown(compare_final(run.final, load_table(table))), ()
     except BlocksimError as error:
         if experiment is not None:
             raise
@@ -118,19 +112,20 @@ def _shown(found: Comparison | Judgement) -> dict[str, Any]:
     return {**found.to_dict(), "experiment": shared_path(found.source), "messages": messages}
 
 
-def _measured(scenario: Scenario | None, experiment: Path | None) -> ExperimentTable | None:
-    named = None if scenario is None or scenario.experiment is None else scenario.experiment.table
-    path = experiment or named
-    return None if path is None else load_table(path)
-
-
 def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[list[Subject], tuple[str, ...]]:
     """Return a sweep and those of its members that have frames as subjects, and what is damaged in them."""
     table = _case_table(place)
-    scenario, problems = _plan(place)
+    scenario, problems = None, []
+    try:
+        scenario = load_stored(place / PLAN)
+    except InputMissingError:
+        pass
+    except BlocksimError as error:
+        problems.append(str(error))
     judged, remarks = _judged(place, scenario, experiment)
     pictures, undrawn = _pictures(place, experiment, len(table.rows))
-    cases = _kept(table)
+    folders = {case: case_folder(table.folder, case) for case in table.column("case")}
+    cases = {case: one for case, one in folders.items() if one is not None and (one / files.FRAMES).is_file()}
     found = [(case, read_stored(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
     sweep = sweep_subject(
@@ -166,8 +161,7 @@ def _judged(
     if experiment is None and (scenario is None or scenario.experiment is None):
         return None, ()
     try:
-        found = compare_sweep(place, experiment)
-        return _shown(found), ()
+        return _shown(compare_sweep(place, experiment)), ()
     except BlocksimError as error:
         if experiment is not None and not isinstance(error, UnavailableError):
             raise
@@ -183,24 +177,3 @@ def _pictures(place: Path, experiment: Path | None, cases: int) -> tuple[list[di
     if len(sweep.finished) != cases:
         return [], ("no picture of the sweep: its table is damaged",)
     return pictures_of(sweep), ()
-
-
-def _plan(place: Path) -> tuple[Scenario | None, tuple[str, ...]]:
-    try:
-        return load_stored(place / PLAN), ()
-    except InputMissingError:
-        return None, ()
-    except BlocksimError as error:
-        return None, (str(error),)
-
-
-def _kept(table: CaseTable) -> Mapping[str, Path]:
-    """Return the folders of the members that have frames, by case, in the order of the table."""
-    return dict(_folders(table))
-
-
-def _folders(table: CaseTable) -> Iterator[tuple[str, Path]]:
-    for case in table.column("case"):
-        folder = case_folder(table.folder, case)
-        if folder is not None and (folder / files.FRAMES).is_file():
-            yield case, folder

@@ -147,19 +147,13 @@ def as_cell(value: object) -> object:
 
     Values and reasons may come from the scenario of a stranger. Numbers and quantities ("-5 deg") stay as they are.
     """
-    is_suspect = isinstance(value, str) and value.startswith(FORMULA)
-    return f"{MARK}{value}" if is_suspect and not _is_quantity(str(value)) else value
-
-
-def _is_quantity(text: str) -> bool:
-    with suppress(ValueError):
-        float(text)
-        return True
-    try:
-        q.parse_quantity(text, q.NUMBER)
-    except ValueError:
-        return False
-    return True
+    if not isinstance(value, str) or not value.startswith(FORMULA):
+        return value
+    for read in (float, lambda text: q.parse_quantity(text, q.NUMBER)):
+        with suppress(ValueError):
+            read(value)
+            return value
+    return f"{MARK}{value}"
 
 
 @dataclass(frozen=True)

@@ -67,8 +67,13 @@ def run(scenario: Source, options: RunOptions) -> Result:
         return simulate(scenario, threads=threads, on_progress=on_progress, wall_time=precautions.wall_time)
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
-        _refuse_changed(folder)
-        _clear_after_kill(folder)
+        changed = changed_results(folder, read_summary(folder / files.SUMMARY))
+        if changed:
+            path = folder / changed[0]
+            what = "does not have the checksum in run.json" if path.is_file() else "no such file"
+            raise InvalidInputError(f"{path}: {what}: changed since the run; rerun with --overwrite")
+        with suppress(OutputExistsError, OutputError), files.folder_lock(folder):  # it was killed right after its end
+            files.clear_remains(folder, files.CHECKPOINTS)
         renew_copies(scenario, folder)
         result = read_result(folder)
         options.listener.on_remark(f"already computed; rerun with --overwrite: {folder}")
@@ -83,21 +88,6 @@ def run(scenario: Source, options: RunOptions) -> Result:
         on_progress=on_progress,
         listener=options.listener,
     )
-
-
-def _clear_after_kill(folder: Path) -> None:
-    """Remove what a run left beside its results that was killed right after its end."""
-    with suppress(OutputExistsError, OutputError), files.folder_lock(folder):
-        files.clear_remains(folder, files.CHECKPOINTS)
-
-
-def _refuse_changed(folder: Path) -> None:
-    """Raise InvalidInputError where frames or final table are not those that the run has written."""
-    changed = changed_results(folder, read_summary(folder / files.SUMMARY))
-    if changed:
-        name = changed[0]
-        what = "does not have the checksum in run.json" if (folder / name).is_file() else "no such file"
-        raise InvalidInputError(f"{folder / name}: {what}: changed since the run; rerun with --overwrite")
 
 
 def open_run(place: Path | str) -> Result:

@@ -41,16 +41,11 @@ CHUNK = 4096
 
 def drawn(values: Variation, places: Places) -> Sequence[object]:
     """Return the value at each place: numbers in SI, angles as texts in rad, levels as they were written."""
-    if isinstance(values, tuple):
-        return _levels(values, places)
+    if isinstance(values, tuple):  # equally likely levels
+        return [values[index] for index in np.minimum(places * len(values), len(values) - 1).astype(int).tolist()]
     low, high = values.low, values.high
     numbers = (min(max(rounded(number), low), high) for number in QUANTILES[type(values)](values, places).tolist())
     return [written(number, angle=values.angle) for number in numbers]
-
-
-def _levels(levels: tuple[object, ...], places: Places) -> Sequence[object]:
-    """Return equally likely levels."""
-    return [levels[index] for index in np.minimum(places * len(levels), len(levels) - 1).astype(int).tolist()]
 
 
 def uniform_quantile(values: Uniform, places: Places) -> Places:
@@ -82,14 +77,9 @@ def generator(seed: int, text: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *words])))
 
 
-def key_generator(seed: int, key: str) -> np.random.Generator:
-    """Return the stream of a key, however its quotes are set."""
-    return generator(seed, format_key(parse_key(key)))
-
-
 def each_by_itself(sweep: Sweep, draw: Callable[[np.random.Generator, int], NDArray[np.float64]]) -> Design:
     """Return cases whose columns are drawn independently, each from the stream of its own key."""
-    places = {key: draw(key_generator(sweep.seed, key), sweep.samples) for key in sweep.vary}
+    places = {key: draw(generator(sweep.seed, format_key(parse_key(key))), sweep.samples) for key in sweep.vary}
     return from_places(sweep, places)
 
 

@@ -17,7 +17,7 @@ from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.table import Columns
 from blocksim.study.executors.ensemble import run_members
 from blocksim.study.plan import Values, Variations, varied
-from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
+from blocksim.study.rows import are_inside, quarter_turns, values_at
 from blocksim.study.sampling import drawn, open_interval
 from blocksim.study.sensitivity_methods import METHODS, Floats, Method
 from blocksim.study.vary import SPREAD, variations_option
@@ -50,10 +50,10 @@ def outputs_of(finals: Sequence[Columns], table: ExperimentTable | None) -> list
     blocks = finals[0]["block"]
     outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
     are_in: list[bool] = []
+    means: dict[str, float] = {}
     if table is None:
         places = np.array([final["x_mm"] for final in finals])
         found = [Output(f"x of block {name}", "mm", places[:, k]) for k, name in enumerate(blocks[:MOST_BLOCKS])]
-        means: dict[str, float] = {}
     else:
         ranges, summaries = ranges_of(table), table.summaries()
         values = [values_at(final, ranges) for final in finals]

@@ -63,17 +63,13 @@ def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Pat
         raise InvalidInputError(message)
     folder = files.default_folder(load_scenario(place))
     if not files.is_finished(folder):
-        raise InputMissingError(_not_run(place, folder))
+        message = f"{place}: no finished run of this scenario without changes; first: blocksim run {place}"
+        newest = files.newest_finished(folder.parent) if folder.parent.is_dir() else None
+        if newest is not None:
+            others = "runs with other values (--set, or an older file) are in"
+            message += f"\n{others} {folder.parent}; the newest: {newest}"
+        raise InputMissingError(message)
     return folder
-
-
-def _not_run(scenario: Path, folder: Path) -> str:
-    """Say that a scenario has not been run as it is, and where runs of it with other values are."""
-    newest = files.newest_finished(folder.parent) if folder.parent.is_dir() else None
-    message = f"{scenario}: no finished run of this scenario without changes; first: blocksim run {scenario}"
-    if newest is None:
-        return message
-    return f"{message}\nruns with other values (--set, or an older file) are in {folder.parent}; the newest: {newest}"
 
 
 def _run_in(place: Path, needed: Sequence[str]) -> Path:
@@ -86,23 +82,17 @@ def _run_in(place: Path, needed: Sequence[str]) -> Path:
     newest = files.newest_finished(place)
     if newest is not None:
         return newest
-    message = f"{place}: {_instead(place)}"
-    raise InputMissingError(message)
-
-
-def _instead(place: Path) -> str:
-    """Say what a folder without a finished run holds instead."""
     if (place / TABLE).is_file():
-        return (
-            "this is a sweep, not a run; blocksim plot draws it, sweep --keep-cases keeps a run folder for every case"
-        )
+        instead = "blocksim plot draws it, sweep --keep-cases keeps a run folder for every case"
+        raise InputMissingError(f"{place}: this is a sweep, not a run; {instead}")
     begun = [path.parent for path in sorted(place.glob(f"*/{files.FRAMES}"))]
     sweeps = [path.parent for path in sorted(place.glob(f"*/{TABLE}"))]
     below = sorted({path.parents[1] for path in place.glob(f"*/*/{files.DONE}")})
-    for found, told in ((begun, "but an unfinished run"), (sweeps, "but a sweep"), (below, "but runs of scenarios")):
+    for found, what in ((begun, "but an unfinished run"), (sweeps, "but a sweep"), (below, "but runs of scenarios")):
         if found:
-            return f"no finished run in this folder, {told}: {listed(found, MOST_FOLDERS)}"
-    return "no finished run in this folder; blocksim run SCENARIO makes one"
+            message = f"{place}: no finished run in this folder, {what}: {listed(found, MOST_FOLDERS)}"
+            raise InputMissingError(message)
+    raise InputMissingError(f"{place}: no finished run in this folder; blocksim run SCENARIO makes one")
 
 
 @dataclass(frozen=True)
@@ -124,9 +114,17 @@ class StoredRun:
     @cached_property
     def remark(self) -> str:
         """What somebody who examines the frames has to know; empty for a finished run that was meant for certain."""
-        state = _state(self.folder)
-        if not state:
-            return self.choice
+        if not (self.folder / files.SUMMARY).is_file():
+            state = "this run was killed or is still running"
+        else:
+            try:
+                summary = read_summary(self.folder / files.SUMMARY)
+            except BlocksimError:
+                state = f"{files.SUMMARY} of this run is damaged"
+            else:
+                if summary.status == FINISHED:
+                    return self.choice
+                state = how_it_ended(summary.status, summary.reason)
         return f"{self.folder}: {state}; its {len(self.frames)} frames end at {float(self.frames.time[-1]):.4g} s"
 
 
@@ -144,17 +142,6 @@ def choice(place: Path, folder: Path) -> str:
     """Say which run was taken where a folder holds several; changed by --set, they have the same name."""
     count = sum(1 for _ in place.glob(f"*/{files.DONE}")) if place.is_dir() and place != folder else 0
     return f"{place}: the newest of {count} runs is taken: {folder}" if count > 1 else ""
-
-
-def _state(folder: Path) -> str:
-    """Return what is wrong with a run, in words; nothing for a finished one."""
-    if not (folder / files.SUMMARY).is_file():
-        return "this run was killed or is still running"
-    try:
-        summary = read_summary(folder / files.SUMMARY)
-    except BlocksimError:
-        return f"{files.SUMMARY} of this run is damaged"
-    return "" if summary.status == FINISHED else how_it_ended(summary.status, summary.reason)
 
 
 def how_it_ended(status: str, reason: str) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from blocksim.errors import InputMissingError, InvalidInputError, StoppedEarlyError, UnavailableError
 from blocksim.options import Option, takes
@@ -23,7 +23,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernel_set, kernels_of
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import stop_requests
-from blocksim.study.design import levels_of
+from blocksim.study.design import Settings, levels_of
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task, chosen_executor, executor_named
 from blocksim.study.plan import Cases, Values, cases_of, table_digests, with_sweep
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Entry, Manifest, Shard, Timings, values_hash
@@ -177,15 +177,6 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     return tuple(dict.fromkeys((kernels_of(base), *sets)))
 
 
-class Ended(NamedTuple):
-    """A case that has its row."""
-
-    number: int
-    name: str
-    settings: dict[str, object]
-    row: Row
-
-
 @dataclass
 class SweepRun:
     """One process's share of a sweep."""
@@ -197,7 +188,9 @@ class SweepRun:
     table: SweepTable
     timings: Timings
     on_row: OnRow
-    invalid: list[Ended] = field(default_factory=list)  # cases that cannot be run, until they are written
+    invalid: list[tuple[Entry, Settings]] = field(
+        default_factory=list
+    )  # cases that cannot be run, until they are written
 
     @property
     def count(self) -> int:
@@ -239,31 +232,33 @@ class SweepRun:
             if case.scenario is not None:
                 yield Task(number, case.name, case.settings, case.scenario)
                 continue
-            self.invalid.append(Ended(number, case.name, case.settings, invalid_row(case.problem)))
+            entry = Entry(number, case.name, values_hash(case.settings), invalid_row(case.problem))
+            self.invalid.append((entry, case.settings))
             if len(self.invalid) >= MOST_INVALID:
                 self._keep()
 
     def _keep_batch(self, batch: Batch) -> bool:
         """Keep rows, and return whether one of them is of a case that failed."""
         ended = [
-            Ended(task.number, task.name, task.settings, row) for task, row in zip(batch.tasks, batch.rows, strict=True)
+            (Entry(task.number, task.name, values_hash(task.settings), row), task.settings)
+            for task, row in zip(batch.tasks, batch.rows, strict=True)
         ]
-        has_failed = bool(self.invalid) or any(one.row["status"] != FINISHED for one in ended)
+        has_failed = bool(self.invalid) or any(row["status"] != FINISHED for row in batch.rows)
         self._keep(ended)
-        self.timings.append((one.name for one in ended), batch.seconds, batch.host)
+        self.timings.append((task.name for task in batch.tasks), batch.seconds, batch.host)
         return has_failed
 
-    def _keep(self, ended: Sequence[Ended] = ()) -> None:
+    def _keep(self, ended: Sequence[tuple[Entry, Settings]] = ()) -> None:
         """Bring rows to the disk, with those of cases that cannot be run, and then report them."""
         ended, self.invalid = [*ended, *self.invalid], []
         if not ended:
             return
-        entries = [Entry(one.number, one.name, values_hash(one.settings), one.row) for one in ended]
+        entries = [entry for entry, _ in ended]
         for start, entry in zip(self.manifest.append(entries), entries, strict=True):
             self.done.note(self.manifest.path, start, entry)
         before = self.done.count(self.shard) - len(ended)
-        for position, one in enumerate(ended, start=1):
-            self.on_row(before + position, self.count, {"case": one.name, **one.settings, **one.row})
+        for position, (entry, settings) in enumerate(ended, start=1):
+            self.on_row(before + position, self.count, {"case": entry.case, **settings, **entry.row})
 
 
 def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
@@ -282,19 +277,16 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
         raise InputMissingError(message)
     for number, settings in enumerate(cases.design):
         done.holds(number, settings)
-    if done.count() < len(cases) and not allow_missing:
-        raise InvalidInputError("\n".join(_what_is_missing(folder, done, len(cases))))
+    count = len(cases)
+    if done.count() < count and not allow_missing:
+        lines = [f"{folder}: {count - done.count()} of {count} cases are missing; --allow-missing merges the others"]
+        of = max((int(match[1]) for path in done.paths if (match := SHARDED.fullmatch(path.name))), default=1)
+        shards = [(shard, len(shard.numbers(count))) for shard in (Shard(index, of) for index in range(of))]
+        missing = [(shard, size - done.count(shard), size) for shard, size in shards if done.count(shard) < size]
+        if of > 1:  # by shards, those of the job array with the most jobs where there were several
+            lines += [f"  --shard {shard}: {left} of {size} missing" for shard, left, size in missing[:MOST_SHARDS]]
+        if of > 1 and len(missing) > MOST_SHARDS:
+            lines.append(f"  and {len(missing) - MOST_SHARDS} more shards")
+        raise InvalidInputError("\n".join(lines))
     SweepTable(folder / TABLE, cases, done, measured_ranges(base)).write()
     return SweepResult(folder, planned=len(cases))
-
-
-def _what_is_missing(folder: Path, done: CaseIndex, count: int) -> Iterator[str]:
-    """Yield it by shards, those of the job array with the most jobs where there were several."""
-    yield f"{folder}: {count - done.count()} of {count} cases are missing; --allow-missing merges the others"
-    of = max((int(match[1]) for path in done.paths if (match := SHARDED.fullmatch(path.name))), default=1)
-    shards = [(shard, len(shard.numbers(count))) for shard in (Shard(index, of) for index in range(of))]
-    missing = [(shard, size - done.count(shard), size) for shard, size in shards if done.count(shard) < size]
-    if of > 1:
-        yield from (f"  --shard {shard}: {left} of {size} missing" for shard, left, size in missing[:MOST_SHARDS])
-        if len(missing) > MOST_SHARDS:
-            yield f"  and {len(missing) - MOST_SHARDS} more shards"

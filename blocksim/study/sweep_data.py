@@ -14,7 +14,7 @@ from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario import quantities as q
 from blocksim.scenario.keys import field_of, si_unit
 from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
+from blocksim.study.rows import FINISHED, NUMBERS, TABLE, Head, Ranges, blocks_in, quarter_turns
 from blocksim.study.sweep_folder import PLAN
 from blocksim.study.sweep_table import read_sweep
 from blocksim.view.sweeps.data import Input, Measured, SweepData, Typed
@@ -40,8 +40,15 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
         message = f"{folder}: no case of this sweep has finished; nothing to draw"
         raise InvalidInputError(message)
     members = Members(table, str(folder / TABLE))
-    x_mm, rotation_deg = (_columns(members, quantity) for quantity in ("x", "rotation"))
-    _refuse_cut(members, finished & ~np.isfinite(x_mm + rotation_deg).all(axis=1))
+    x_mm, rotation_deg = (
+        np.stack([members.values(block, quantity) for block in blocks], axis=1) for quantity in ("x", "rotation")
+    )
+    if max(np.nanmax(np.abs(one), initial=0.0) for one in (x_mm, rotation_deg)) > LARGEST:
+        raise InvalidInputError(f"{members.source}: a block has moved too far to be drawn")
+    is_cut = finished & ~np.isfinite(x_mm + rotation_deg).all(axis=1)
+    if is_cut.any():  # it has neither ended nor failed
+        case = table["case"].iloc[int(np.argmax(is_cut))]
+        raise InvalidInputError(f"{members.source}: case {case} has finished, but its row lacks positions of blocks")
     path = experiment or (None if scenario.experiment is None else scenario.experiment.table)
     return SweepData(
         title=scenario.description or scenario.name,
@@ -51,7 +58,7 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
         x_mm=x_mm,
         rotation_deg=rotation_deg,
         finished=finished,
-        inside=None if path is None else _inside(table, Ranges.read(path)) & finished,
+        inside=None if path is None else Ranges.read(path).inside(table).to_numpy(dtype=bool) & finished,
         measured=Measured() if path is None else measured_of(load_table(path), blocks),
         manners=tuple(table["outcome"].fillna("").astype(str)) if "outcome" in table.columns else (),
     )
@@ -74,25 +81,6 @@ def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measured:
     )
 
 
-def _columns(members: Members, quantity: str) -> Floats:
-    """Return one quantity of all blocks, (count, b); NaN where a member has none. Raises InvalidInputError."""
-    found = np.stack([members.values(block, quantity) for block in blocks_in(map(str, members.table.columns))], axis=1)
-    if np.nanmax(np.abs(found), initial=0.0) > LARGEST:
-        raise InvalidInputError(f"{members.source}: a block has moved too far to be drawn")
-    return found
-
-
-def _refuse_cut(members: Members, cut: NDArray[np.bool_]) -> None:
-    """Raise InvalidInputError where the row of a finished case is not whole; it has neither ended nor failed."""
-    if cut.any():
-        case = members.table["case"].iloc[int(np.argmax(cut))]
-        raise InvalidInputError(f"{members.source}: case {case} has finished, but its row lacks positions of blocks")
-
-
-def _inside(table: "pd.DataFrame", ranges: Ranges) -> NDArray[np.bool_]:
-    return np.array(ranges.inside(table), dtype=np.bool_)
-
-
 def _inputs(scenario: Scenario, table: "pd.DataFrame") -> tuple[Input, ...]:
     """Return the keys that take more than one value, or the first where none does."""
     vary = {} if scenario.sweep is None else scenario.sweep.vary
@@ -108,23 +96,19 @@ def _inputs(scenario: Scenario, table: "pd.DataFrame") -> tuple[Input, ...]:
 
 def _input(scenario: Scenario, head: Head, column: "pd.Series") -> Input:
     key = head.key
-    numbers = [None if (number := _number(value)) is None else head.si(number) for value in column]
-    if not all(number is None or abs(number) <= LARGEST for number in numbers):
+    numbers = column.to_list() if column.dtype.kind in NUMBERS else [*map(_number, column)]
+    known = np.array([number for number in numbers if number is not None], dtype=np.float64)
+    values = known * head.si(1.0)
+    if not (np.abs(values) <= LARGEST).all():
         raise InvalidInputError(f"{TABLE}: the column {key} holds values that are not numbers or too large")
-    if all(number is not None for number in numbers):
+    if len(values) == len(numbers):
         typed = Typed(head.unit, head.si(1.0)) if head.unit else None
-        values = np.array(numbers, dtype=np.float64)
-        unit = unit_of(scenario, key) or head.si_unit
-        return Input(key, unit, values, is_even=_is_even(scenario, key), typed=typed)
+        vary = scenario.sweep.vary[key] if scenario.sweep is not None else ()
+        is_even = isinstance(vary, Normal) or (isinstance(vary, Uniform) and vary.scale == "linear")
+        return Input(key, unit_of(scenario, key) or head.si_unit, values, is_even=is_even, typed=typed)
     words = [q.shown(value).strip('"') for value in column]
     levels = tuple(dict.fromkeys(words))
     return Input(key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)
-
-
-def _is_even(scenario: Scenario, key: str) -> bool:
-    """Return True if values are drawn from a distribution that is not over decades."""
-    values = None if scenario.sweep is None else scenario.sweep.vary[key]
-    return isinstance(values, Normal) or (isinstance(values, Uniform) and values.scale == "linear")
 
 
 def _number(value: object) -> float | None:

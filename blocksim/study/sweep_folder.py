@@ -116,7 +116,8 @@ class Origin(BaseModel, frozen=True):
 def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: FolderKind = SWEEP) -> None:
     """Make the folder and write the plan into it. Raises OutputExistsError when something else is there."""
     head = f"{kind.head.decode()}{name}. To run it again: {kind.command}\n"
-    tables = read_tables(base)
+    tables, plan = read_tables(base), base.sweep
+    sums = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
     make_folder(folder)
     with brief_lock(folder):
         try:
@@ -125,28 +126,17 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: F
             message = f"{folder}: cannot be created: {error.strerror}"
             raise OutputExistsError(message) from error
         keep_scenario(base, tables, folder, kind.plan, head)
-        _keep_origin(folder, base, tables, kind)
-
-
-def _keep_origin(folder: Path, base: Scenario, tables: Mapping[str, bytes], kind: FolderKind) -> None:
-    """Write it where there is none: whoever continues with a study did not begin it; renew its checksums."""
-    known = read_origin(folder, kind)
-    sums = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
-    if known is None or known.sha256 != sums:
-        origin = (known or _origin_of(base)).model_copy(update={"sha256": sums})
-        write_text(folder / kind.origin, origin.model_dump_json(indent=2) + "\n")
-
-
-def _origin_of(base: Scenario) -> Origin:
-    plan = base.sweep
-    seed = plan.seed if plan is not None and plan.is_sampled else None
-    return Origin(
-        began_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        mode=None if plan is None else plan.mode,
-        seed=seed,
-        environment=environment(),
-        tables={},
-    )
+        known = read_origin(folder, kind)  # whoever continues with a study did not begin it
+        if known is None or known.sha256 != sums:
+            origin = known or Origin(
+                began_at=datetime.now(UTC).isoformat(timespec="seconds"),
+                mode=None if plan is None else plan.mode,
+                seed=plan.seed if plan is not None and plan.is_sampled else None,
+                environment=environment(),
+                tables={},
+            )
+            text = origin.model_copy(update={"sha256": sums}).model_dump_json(indent=2)
+            write_text(folder / kind.origin, text + "\n")
 
 
 def read_origin(folder: Path, kind: FolderKind = SWEEP) -> Origin | None:
@@ -174,12 +164,20 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
         which = kind.what.replace("a ", "another ", 1)
         message = f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere"
         raise OutputExistsError(message)
-    if overwrite:
-        _refuse_use(present, kind)
+    if overwrite and any(path.suffix == ".jsonl" and kind.is_ours(path) and is_in_use(path) for path in present):
+        message = f"{folder}: {kind.what} is running here; wait for it, or write elsewhere with --out DIR"
+        raise OutputExistsError(message)
     refuse_foreign_copies(tables, folder, kind.plan)
     changed = _refuse_foreign(present, kind, overwrite=overwrite)
-    if overwrite:
-        _empty(folder, kind, changed)
+    if overwrite:  # whatever else lies there stays
+        for path in {*changed, *(one for one in folder.iterdir() if one.name != kind.plan and kind.is_ours(one))}:
+            path.unlink()
+        cases = folder / CASES
+        if cases.is_dir() and not cases.is_symlink():
+            for case in cases.iterdir():
+                remove_run(case)
+            with suppress(OSError):  # not empty
+                cases.rmdir()
 
 
 def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: bool = False) -> list[Path]:
@@ -191,8 +189,12 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
     changed = [path for path in present if kind.kind_of(path.name) and not kind.is_ours(path)]
     told = []
     for path in changed:
-        added = _columns_added(path, kind)
-        which = f" (columns added: {_shown(added)})" if added else ""
+        added = None  # of what is no table of the study any more
+        if kind.is_table(path.name) and path.is_file() and not path.is_symlink():
+            added = columns_added(path, _records_of(path, kind) or ())
+        shown = [repr(name[:LONGEST_NAME]) for name in (added or ())[:MOST_SHOWN]]
+        more = f" and {len(added) - MOST_SHOWN} more" if added and len(added) > MOST_SHOWN else ""
+        which = f" (columns added: {', '.join(shown)}{more})" if added else ""
         text = f"{path}: changed since {whose} wrote it{which}; "
         if not overwrite or added is None:
             again = "" if added is None else "--overwrite replaces it, or "
@@ -202,18 +204,6 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
     for text in told:
         log.warning("%s", text)
     return changed
-
-
-def _shown(names: Sequence[str]) -> str:
-    more = f" and {len(names) - MOST_SHOWN} more" if len(names) > MOST_SHOWN else ""
-    return ", ".join(repr(name[:LONGEST_NAME]) for name in names[:MOST_SHOWN]) + more
-
-
-def _columns_added(path: Path, kind: FolderKind) -> list[str] | None:
-    """Return the columns that somebody has added to a table; None for what is no table of the study any more."""
-    if not kind.is_table(path.name) or path.is_symlink() or not path.is_file():
-        return None
-    return columns_added(path, _records_of(path, kind) or ())
 
 
 def _records_of(path: Path, kind: FolderKind) -> tuple[TableRecord, ...] | None:
@@ -255,27 +245,6 @@ def write_answer(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]],
     origin = read_origin(path.parent, kind)
     begun = {} if origin is None else origin.model_dump(mode="json", exclude_none=True)
     write_text(path.parent / kind.origin, json.dumps({**begun, **answer}, indent=2) + "\n")
-
-
-def _refuse_use(present: Sequence[Path], kind: FolderKind) -> None:
-    """Raise OutputExistsError where somebody is writing the results of a study."""
-    for path in present:
-        if path.suffix == ".jsonl" and kind.is_ours(path) and is_in_use(path):
-            message = f"{path.parent}: {kind.what} is running here; wait for it, or write elsewhere with --out DIR"
-            raise OutputExistsError(message)
-
-
-def _empty(folder: Path, kind: FolderKind, changed: Sequence[Path]) -> None:
-    """Remove the results of a study, and those which somebody has changed; whatever else lies there stays."""
-    results = [path for path in folder.iterdir() if path.name != kind.plan and kind.is_ours(path)]
-    for path in {*results, *changed}:
-        path.unlink()
-    cases = folder / CASES
-    if cases.is_dir() and not cases.is_symlink():
-        for case in cases.iterdir():
-            remove_run(case)
-        with suppress(OSError):  # not empty
-            cases.rmdir()
 
 
 def case_folder(sweep: Path, case: str) -> Path | None:

@@ -1,4 +1,4 @@
-"""What runs the cases of a sweep. A new executor is one module with `check` and `run_tasks`, and one line here."""
+"""What runs the cases of a sweep. A new executor is one module with `run_tasks`, and one line here."""
 
 import os
 import time
@@ -64,10 +64,6 @@ class Setting:
         return None if self.folder is None else self.folder / task.name
 
 
-def needs_nothing(_: Setting) -> None:
-    """Check nothing: this executor is always there."""
-
-
 Run = Callable[[Iterator[Task], Setting], Generator[Batch, None, None]]
 """Take tasks one by one, as many as are needed to keep busy, and yield them in batches, in any order.
 
@@ -113,8 +109,9 @@ def executor_named(name: str) -> Executor:
         message = f"unknown executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}"
         raise InvalidInputError(message)
     module = import_module(EXECUTORS[name])
-    for_rounds = getattr(module, "for_rounds", None)  # where it has something that is worth keeping
-    return Executor(module.run_tasks, module.check, for_rounds or (lambda: nullcontext(module.run_tasks)))
+    check = getattr(module, "check", lambda _: None)  # where it may be missing
+    for_rounds = getattr(module, "for_rounds", lambda: nullcontext(module.run_tasks))
+    return Executor(module.run_tasks, check, for_rounds)
 
 
 @dataclass(frozen=True)
@@ -163,13 +160,7 @@ def chosen_executor(executor: str | None, scheduler: str | None, *, keep_cases: 
         raise InvalidInputError(message)
     if needed == WITH_SCHEDULER and scheduler is None:
         raise InvalidInputError("the executor dask needs the address of a scheduler: --scheduler tcp://HOST:PORT")
-    if needed == WITH_FOLDERS:
-        _refuse_in_worker()
-    return needed
-
-
-def _refuse_in_worker() -> None:
-    """Stop a worker process that runs the user's script again because the script has no main guard."""
-    if getattr(current_process(), "_inheriting", False):
+    if needed == WITH_FOLDERS and getattr(current_process(), "_inheriting", False):  # the script has no main guard
         message = 'worker processes import this script: what starts them belongs below if __name__ == "__main__":'
         raise InvalidInputError(message)
+    return needed

@@ -17,7 +17,7 @@ from blocksim.extras import CLUSTER, loaded
 from blocksim.simulation.provenance import code_hash
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
 from blocksim.study.executors.ensemble import run_batch
-from blocksim.study.rows import Row, row_of_error
+from blocksim.study.rows import row_of_error
 
 PATIENCE = 3.0  # s until a scheduler has answered
 GATHERING = 1.0  # s until the rows of a batch that has ended are here
@@ -97,13 +97,17 @@ class Submission:
             try:
                 key = self.ended.get(timeout=POLL)
             except queue.Empty:
-                self._look_for_the_scheduler()
+                if self.client.status not in {"running", "connecting"}:
+                    self._scheduler_has_gone()
             else:
                 yield from self._gathered(*self.pending.pop(key))
 
     def _fill(self) -> None:
         if time.monotonic() - self.counted_at > COUNT_EVERY:
-            self.room = AHEAD * max(1, self._threads())
+            try:  # how many batches the workers run at a time, all together
+                self.room = AHEAD * max(1, sum(self.client.nthreads().values()))
+            except (OSError, TimeoutError):
+                self._scheduler_has_gone()
             self.counted_at = time.monotonic()
         while len(self.pending) < self.room:
             tasks = self.again.popleft() if self.again else take(self.tasks, self.size.count, self.setting.is_stopped)
@@ -112,13 +116,6 @@ class Submission:
             payload = [(task.scenario, None) for task in tasks]
             future = self.client.submit(run_batch, payload, code_hash(), peaks=self.setting.peaks, pure=False)
             self._await(future, tasks)
-
-    def _threads(self) -> int:
-        """Return how many batches the workers run at a time, all together."""
-        try:
-            return sum(self.client.nthreads().values())
-        except (OSError, TimeoutError):
-            self._scheduler_has_gone()
 
     def _await(self, future: Any, tasks: tuple[Task, ...]) -> None:
         self.pending[future.key] = (future, tasks)
@@ -138,21 +135,12 @@ class Submission:
             if len(tasks) > 1:
                 self.again.extend((task,) for task in tasks)
             else:
-                yield Batch(tasks, (_dead(error),), 0.0, "")
+                reason = f"no worker finished it ({type(error).__name__}); --retry-failed runs it again"
+                yield Batch(tasks, ({**row_of_error(error), "reason": reason},), 0.0, "")
         else:
             self.size.measured(len(tasks), seconds)
             yield Batch(tasks, rows, seconds, host)
 
-    def _look_for_the_scheduler(self) -> None:
-        if self.client.status not in {"running", "connecting"}:
-            self._scheduler_has_gone()
-
     def _scheduler_has_gone(self) -> NoReturn:
         message = f"the Dask scheduler at {self.setting.scheduler} is gone; rerun the command to finish"
         raise UnavailableError(message)
-
-
-def _dead(error: Exception) -> Row:
-    """Return the row of a case whose workers have died again and again."""
-    row = row_of_error(error)
-    return {**row, "reason": f"no worker finished it ({type(error).__name__}); --retry-failed runs it again"}

@@ -16,19 +16,18 @@ from typing import NamedTuple
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.simulation import MemberEnd, MemberFailure, Result, Summary, run_in_batches
+from blocksim.simulation import MemberEnd, MemberFailure, Summary, run_in_batches
 from blocksim.simulation import folder as files
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
 from blocksim.simulation.summary import changed_results, read_summary
 from blocksim.simulation.table import Columns, read_table
-from blocksim.study.executors import Batch, BatchSize, Setting, Task, needs_nothing, take
+from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
 from blocksim.study.run import run
 
 PATIENCE = 0.7  # s that a batch has to end once the user wants to stop
 POLL = 0.05  # s
 THREAD = "blocksim-batch"
-check = needs_nothing
 BATCH = 64  # members run together: enough for all cores, few enough to report progress
 Values = Mapping[str, object]
 INTERRUPTED = "interrupted"
@@ -117,7 +116,10 @@ def run_members(document: Document, values: Iterable[Values]) -> Iterator[Member
     """
     rest = iter(values)
     while batch := list(islice(rest, BATCH)):
-        yield from _run_batch([_built(document, one) for one in batch])
+        built = [_built(document, one) for one in batch]
+        ends = chain(*run_in_batches([one for one in built if isinstance(one, Scenario)]))
+        for one in built:
+            yield one if isinstance(one, Member) else _member(next(ends))
 
 
 def _built(document: Document, values: Values) -> Scenario | Member:
@@ -127,47 +129,28 @@ def _built(document: Document, values: Values) -> Scenario | Member:
         return Member(None, str(error).splitlines()[0])
 
 
-def _run_batch(built: Sequence[Scenario | Member]) -> Iterator[Member]:
-    scenarios = [one for one in built if isinstance(one, Scenario)]
-    ends = (_member(one) for ended in run_in_batches(scenarios) for one in ended)
-    for one in built:
-        yield one if isinstance(one, Member) else next(ends)
-
-
-def _member(member: MemberEnd | MemberFailure) -> Member:
-    if isinstance(member, MemberFailure) or not member.outcome.is_finished:
-        return Member(None, member.outcome.reason.splitlines()[0])
-    return Member(member.columns)
+def _member(end: MemberEnd | MemberFailure) -> Member:
+    if isinstance(end, MemberFailure) or not end.outcome.is_finished:
+        return Member(None, end.outcome.reason.splitlines()[0])
+    return Member(end.columns)
 
 
 def run_case(scenario: Scenario, folder: Path) -> Row:
     """Run one case into its folder, or what is left of it, unless it is there already, and return its row."""
     try:
-        row = _known_row(scenario, folder)
-        if row is None:
-            result = _run_on(scenario, folder)
-            row = _row_of(result.summary, result.columns)
+        with suppress(BlocksimError):
+            summary = read_summary(folder / files.SUMMARY)
+            # a case that failed has come to its end too
+            has_ended = files.is_finished(folder) if summary.status == FINISHED else summary.status != INTERRUPTED
+            if has_ended and summary.run == run_hash(scenario) and not changed_results(folder, summary):
+                return _row_of(summary, read_table(folder / files.FINAL))
+        try:
+            result = run(scenario, out=folder, resume=True)
+        except (InvalidInputError, InputMissingError, OutputExistsError):  # it cannot be taken up, or there was none
+            result = run(scenario, out=folder, overwrite=True)
+        return _row_of(result.summary, result.columns)
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
         return row_of_error(error)
-    return row
-
-
-def _run_on(scenario: Scenario, folder: Path) -> Result:
-    """Run a case from where an interruption has left it; again, where that cannot be taken up, or there was none."""
-    try:
-        return run(scenario, out=folder, resume=True)
-    except (InvalidInputError, InputMissingError, OutputExistsError):
-        return run(scenario, out=folder, overwrite=True)
-
-
-def _known_row(scenario: Scenario, folder: Path) -> Row | None:
-    """Return the row of a case that came to its end before, well or not; None where it has to be run."""
-    with suppress(BlocksimError):
-        summary = read_summary(folder / files.SUMMARY)
-        is_same = summary.run == run_hash(scenario)
-        if is_same and _has_ended(folder, summary) and not changed_results(folder, summary):
-            return _row_of(summary, read_table(folder / files.FINAL))
-    return None
 
 
 def _row_of(summary: Summary, final: Columns) -> Row:
@@ -175,11 +158,7 @@ def _row_of(summary: Summary, final: Columns) -> Row:
     return row_of(summary, summary.simulated_time_s, {} if moved is None else moved.row, final)
 
 
-def _has_ended(folder: Path, summary: Summary) -> bool:
-    return files.is_finished(folder) if summary.status == FINISHED else summary.status != INTERRUPTED
-
-
-class Outcome(NamedTuple):
+class BatchResult(NamedTuple):
     """Rows in the order of the scenarios, wall time (s), name of the machine."""
 
     rows: tuple[Row, ...]
@@ -187,7 +166,7 @@ class Outcome(NamedTuple):
     host: str
 
 
-def run_batch(payload: Payload, code: str, *, peaks: bool = False) -> Outcome:
+def run_batch(payload: Payload, code: str, *, peaks: bool = False) -> BatchResult:
     """Run scenarios on one thread, by the same code as whoever asks. Raises InvalidInputError where it is another."""
     if code != code_hash():
         message = (
@@ -200,7 +179,7 @@ def run_batch(payload: Payload, code: str, *, peaks: bool = False) -> Outcome:
         rows = [_kept(scenario, folder) for scenario, folder in payload if folder is not None]
     else:
         rows = rows_of([scenario for scenario, _ in payload], 1, peaks=peaks)
-    return Outcome(tuple(rows), time.perf_counter() - began, platform.node())
+    return BatchResult(tuple(rows), time.perf_counter() - began, platform.node())
 
 
 def _kept(scenario: Scenario, folder: Path) -> Row:

@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 
 from blocksim.simulation.provenance import code_hash
 from blocksim.simulation.stopping import FOR_ALL
-from blocksim.study.executors import Batch, BatchSize, Run, Setting, Task, needs_nothing, take
-from blocksim.study.executors.ensemble import Outcome, run_batch
+from blocksim.study.executors import Batch, BatchSize, Run, Setting, Task, take
+from blocksim.study.executors.ensemble import BatchResult, run_batch
 from blocksim.study.rows import Row
 
 AHEAD = 2  # batches a process: it need not wait for the next one
@@ -29,14 +29,14 @@ DEAD: Row = {
     "seconds": 0.0,
 }
 PoolOf = Callable[[int], AbstractContextManager[ProcessPoolExecutor]]  # of so many processes
-check = needs_nothing
 
 
 @contextmanager
 def pool_of(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Give a pool that ends at once when something goes wrong here: what is cut off is run again next time."""
     others = set(active_children())
-    _start_tracker()
+    with _signals_held():  # Python counts semaphores in a process that has to outlive what a terminal sends to all
+        resource_tracker.ensure_running()
     # spawned, not forked: threads of numerical libraries do not survive a fork
     pool = _Pool(workers, mp_context=get_context("spawn"), initializer=_start_worker)
     try:
@@ -69,15 +69,6 @@ def _signals_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _start_tracker() -> None:
-    """Start the process in which Python counts semaphores so that it outlives what a terminal sends to all processes.
-
-    It would be killed otherwise, and its successor complain.
-    """
-    with _signals_held():
-        resource_tracker.ensure_running()
 
 
 def _start_worker() -> None:
@@ -143,16 +134,28 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
 
 
 def _run_on(tasks: Iterator[Task], setting: Setting, pool_of: PoolOf) -> Generator[Batch, None, None]:
-    duplicates = Duplicates()
-    work = Work(tasks if setting.folder is None else duplicates.without(tasks), setting)
+    rows: dict[str, Row | None] = {}  # by run
+    later: list[Task] = []
+
+    def first_of_each() -> Iterator[Task]:
+        """Yield the first task of every run: "10 mm" and 0.01 come to one, and its folder has one writer."""
+        for task in tasks:
+            if task.name in rows:
+                later.append(task)
+            else:
+                rows[task.name] = None
+                yield task
+
+    work = Work(tasks if setting.folder is None else first_of_each(), setting)
     with suppress(StoppedError):
         while not work.is_done:
             with suppress(BrokenProcessPool), pool_of(setting.jobs) as pool:
                 for batch in work.run_on(pool):
-                    duplicates.note(batch)
+                    rows |= {task.name: row for task, row in zip(batch.tasks, batch.rows, strict=True)}
                     yield batch
             yield from work.after_death()
-        yield from duplicates.batches()
+        if later:
+            yield Batch(tuple(later), tuple(rows[task.name] or DEAD for task in later), 0.0, "")
 
 
 def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, None]:
@@ -168,7 +171,7 @@ class Work:
         """Begin nothing yet."""
         self.tasks, self.setting = tasks, setting
         self.size = BatchSize()
-        self.pending: dict[Future[Outcome], Job] = {}
+        self.pending: dict[Future[BatchResult], Job] = {}
         self.suspects: deque[Job] = deque()
         self.is_done = False
 
@@ -203,7 +206,7 @@ class Work:
             self.suspects.append(job)
             raise
 
-    def _ended(self, future: Future[Outcome]) -> Batch:
+    def _ended(self, future: Future[BatchResult]) -> Batch:
         rows, seconds, host = future.result()
         tasks = self.pending.pop(future).tasks
         self.size.measured(len(tasks), seconds)
@@ -219,31 +222,3 @@ class Work:
             else:
                 self.suspects.extend(Job((task,), is_suspect=True) for task in job.tasks)
         self.pending.clear()
-
-
-class Duplicates:
-    """Cases that come to the same run, such as "10 mm" and 0.01: one folder cannot be written by two processes."""
-
-    def __init__(self) -> None:
-        """Know of none yet."""
-        self.rows: dict[str, Row] = {}
-        self.names: set[str] = set()
-        self.later: list[Task] = []
-
-    def without(self, tasks: Iterator[Task]) -> Iterator[Task]:
-        """Yield the first of every run."""
-        for task in tasks:
-            if task.name in self.names:
-                self.later.append(task)
-            else:
-                self.names.add(task.name)
-                yield task
-
-    def note(self, batch: Batch) -> None:
-        """Remember rows."""
-        self.rows |= {task.name: row for task, row in zip(batch.tasks, batch.rows, strict=True)}
-
-    def batches(self) -> Iterator[Batch]:
-        """Yield the others, once all have ended."""
-        if self.later:
-            yield Batch(tuple(self.later), tuple(self.rows.get(task.name, DEAD) for task in self.later), 0.0, "")
