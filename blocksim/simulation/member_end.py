@@ -14,7 +14,7 @@ from blocksim.scenario import PlacedBody
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.ledger import EnergyLedger, InPlay, ledger_of
 from blocksim.simulation.loop import outcome_of
-from blocksim.simulation.movement import OBSERVABLES, Value, Watch, observed
+from blocksim.simulation.movement import OBSERVABLES, Value, Watch, observe
 from blocksim.simulation.outcome import Outcome, diagnosed
 from blocksim.simulation.recorder import Rows, frames_from_rows
 from blocksim.simulation.schemes import AnyScene, ledger_names, mass_of_systems
@@ -39,7 +39,7 @@ class MemberEnd:
     placed: Placed = field(repr=False)
     time_step: float  # s
     rows: Rows = field(repr=False)  # one: the last
-    observed: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
+    observables: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
 
     @cached_property
     def frames(self) -> Frames:
@@ -103,7 +103,7 @@ class Closing:
         self.columns = final_values(self.motion, _shapes(placed), _outlines(placed)).tolist()
         support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
         ends = watch.ends(self.motion, support, [self._seconds(m) for m in range(len(placed))], turned)
-        self.observed = observed(ends, [one.name for one in OBSERVABLES.values() if one.in_rows])
+        self.observables = observe(ends, [one.name for one in OBSERVABLES.values() if one.in_rows])
 
     def _seconds(self, m: int) -> float:
         return float(self.steps[m, 0]) * self.time_steps[m]
@@ -124,7 +124,7 @@ class Closing:
             placed=self.placed[m],
             time_step=self.time_steps[m],
             rows=Rows(self.steps[m], (self.motion[some],), self.measured[some], self.names),
-            observed=self.observed[m],
+            observables=self.observables[m],
         )
 
 

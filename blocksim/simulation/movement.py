@@ -260,7 +260,7 @@ def table_columns() -> list[str]:
     return [one.name for one in OBSERVABLES.values() if one.in_rows and one.in_tables]
 
 
-def observed(ends: Ends, names: Sequence[str]) -> list[dict[str, Value]]:
+def observe(ends: Ends, names: Sequence[str]) -> list[dict[str, Value]]:
     """Return some observables of every scene, by name; none where there are no blocks."""
     if not ends.motion.shape[2]:
         return [{} for _ in ends.placed]
@@ -359,7 +359,7 @@ class Movement(BaseModel, frozen=True, extra="allow"):
     def of(cls, watch: Watch, motion: Floats, support: tuple[float, float], time: float) -> "Movement | None":
         """Return those of a run: its last frame (6, b), the velocity of the support (m/s) and the time (s) then."""
         ends = replace(watch.ends(motion[None], np.array([support]), [time], watch.turned), moved=watch.moved)
-        (values,) = observed(ends, [one.name for one in OBSERVABLES.values() if one.in_runs])
+        (values,) = observe(ends, [one.name for one in OBSERVABLES.values() if one.in_runs])
         return cls(**values) if values else None
 
     @property

@@ -168,12 +168,6 @@ class Manifest:
         os.close(self._file)
 
 
-def is_in_use(path: Path) -> bool:
-    """Return True if another process appends to a manifest."""
-    with open_regular(path) as file:
-        return not takes_lock(file.fileno())
-
-
 def read_entries(path: Path) -> Iterator[tuple[int, Entry]]:
     """Yield where each whole line of a manifest begins, and its entry."""
     start = 0

@@ -17,7 +17,7 @@ from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.table import Columns
 from blocksim.study.executors.ensemble import run_members
 from blocksim.study.plan import Values, Variations, varied
-from blocksim.study.rows import are_inside, quarter_turns, values_at
+from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
 from blocksim.study.sampling import drawn, open_interval
 from blocksim.study.sensitivity_methods import METHODS, Floats, Method
 from blocksim.study.vary import SPREAD, variations_option

@@ -16,9 +16,9 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.scenario.bounded_read import MEGABYTE, read_head, read_limited
+from blocksim.scenario.bounded_read import MEGABYTE, open_regular, read_head, read_limited
 from blocksim.simulation.atomic import replacing, sync_file, write_text
-from blocksim.simulation.folder import brief_lock, make_folder, remove_run
+from blocksim.simulation.folder import brief_lock, make_folder, remove_run, takes_lock
 from blocksim.simulation.provenance import environment
 from blocksim.simulation.result_files import (
     Kind,
@@ -36,7 +36,6 @@ from blocksim.simulation.result_files import (
     read_tables,
     refuse_foreign_copies,
 )
-from blocksim.study.progress import is_in_use
 
 MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each
 log = logging.getLogger(__name__)
@@ -164,7 +163,7 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
         which = kind.what.replace("a ", "another ", 1)
         message = f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere"
         raise OutputExistsError(message)
-    if overwrite and any(path.suffix == ".jsonl" and kind.is_ours(path) and is_in_use(path) for path in present):
+    if overwrite and any(path.suffix == ".jsonl" and kind.is_ours(path) and _is_in_use(path) for path in present):
         message = f"{folder}: {kind.what} is running here; wait for it, or write elsewhere with --out DIR"
         raise OutputExistsError(message)
     refuse_foreign_copies(tables, folder, kind.plan)
@@ -178,6 +177,12 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
                 remove_run(case)
             with suppress(OSError):  # not empty
                 cases.rmdir()
+
+
+def _is_in_use(manifest: Path) -> bool:
+    """Return True if another process appends to a manifest."""
+    with open_regular(manifest) as file:
+        return not takes_lock(file.fileno())
 
 
 def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: bool = False) -> list[Path]:

@@ -37,7 +37,7 @@ def assert_same(end: MemberEnd, scenario: Scenario) -> None:
     assert alone.summary.energy_J == end.ledger
     assert alone.columns == end.columns
     assert alone.summary.movement is not None
-    assert end.observed.items() <= alone.summary.movement.row.items()  # one that ran alone lacks peaks
+    assert end.observables.items() <= alone.summary.movement.row.items()  # one that ran alone lacks peaks
     assert (alone.summary.status, alone.summary.reason) == (end.outcome.status, end.outcome.reason)
     assert alone.summary.simulated_time_s == end.seconds == end.frames.time[-1]
     assert np.array_equal(alone.frames.x[-1:], end.frames.x)
@@ -143,7 +143,7 @@ def test_a_pair_list_that_fills_up_on_the_way_changes_no_bit(scheme: str, monkey
         assert end.columns == single.columns
         assert end.ledger == single.summary.energy_J
         assert single.summary.movement is not None
-        assert end.observed.items() <= single.summary.movement.row.items()
+        assert end.observables.items() <= single.summary.movement.row.items()
 
 
 def test_members_that_cannot_be_built_fail_in_their_place_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -85,7 +85,7 @@ def test_run_and_member_of_an_ensemble_move_alike(scheme: str) -> None:
     assert found is not None
     assert found.first_mover == "3"  # it stands on nothing but its left corner
     assert 0.0 < (found.first_moved_s or 0.0) < 0.05
-    assert member.observed == found.row
+    assert member.observables == found.row
     assert found.outcome == "fell"
     assert found.largest_displacement_mm >= found.displacement_mm - 1e-9
 
@@ -107,13 +107,13 @@ def rocking(spin: float = 2.0, **time: object) -> Scenario:
 def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
     scenarios = [rocking(), rocking(step=2e-6), rocking(end=0.005), rocking(spin=4.5, end=0.2)]
     members = run_ensemble(scenarios, threads=1, peaks=True)
-    ends = [one.observed["outcome"] for one in members]
+    ends = [one.observables["outcome"] for one in members]
     # the last ones are caught on their way, the first of them long before it would be seen to go on
     assert ends == [Manner.ROCKED, Manner.ROCKED, Manner.SLID, Manner.ROCKING]
     for scenario, member in zip(scenarios, members, strict=True):
         found = simulate(scenario).summary.movement
         assert found is not None
-        assert found.row == member.observed
+        assert found.row == member.observables
         assert found.largest_rotation_deg > 0.5
 
 
@@ -161,8 +161,8 @@ def test_members_end_as_fast_as_the_same_runs_alone() -> None:
     for scenario, member in zip(scenarios, run_ensemble(scenarios), strict=True):
         alone = simulate(scenario).summary.movement
         assert alone is not None
-        assert member.observed == alone.row
-        assert member.observed["moves_on"] is True
+        assert member.observables == alone.row
+        assert member.observables["moves_on"] is True
 
 
 def on_a_table(scheme: str, **motion: object) -> Scenario:
@@ -193,7 +193,7 @@ def test_what_rides_on_a_moving_table_has_not_moved(scheme: str) -> None:
         found = run.summary.movement
         assert found is not None
         assert found.outcome == outcome
-        assert member.observed == found.row
+        assert member.observables == found.row
         assert np.hypot(*MovingSupport(scenario).way(member.seconds)) > 3e-3
         assert str(member.columns) == str(run.columns)
         assert found.displacement_mm <= found.largest_displacement_mm + 1e-9
@@ -229,4 +229,4 @@ def test_blocks_on_a_shaking_table_are_as_fast_as_they_move_on_it() -> None:
     movement = simulate(shaking).summary.movement
     (member,) = run_ensemble([shaking])
     assert movement is not None
-    assert member.observed == movement.row
+    assert member.observables == movement.row

@@ -29,7 +29,6 @@ PATIENCE = 0.7  # s that a batch has to end once the user wants to stop
 POLL = 0.05  # s
 THREAD = "blocksim-batch"
 BATCH = 64  # members run together: enough for all cores, few enough to report progress
-Values = Mapping[str, object]
 INTERRUPTED = "interrupted"
 Payload = Sequence[tuple[Scenario, Path | None]]  # None: nothing is kept but the row
 
@@ -90,7 +89,7 @@ def rows_of(scenarios: Sequence[Scenario], threads: int, *, peaks: bool = False)
         return [
             row_of_error(end.error)
             if isinstance(end, MemberFailure)
-            else row_of(end.outcome, end.seconds, end.observed, end.columns)
+            else row_of(end.outcome, end.seconds, end.observables, end.columns)
             for end in chain(*run_in_batches(scenarios, threads=threads, peaks=peaks))
         ]
     except Exception as error:  # noqa: BLE001 - one broken case must not end the others
@@ -108,7 +107,7 @@ class Member:
     problem: str = ""
 
 
-def run_members(document: Document, values: Iterable[Values]) -> Iterator[Member]:
+def run_members(document: Document, values: Iterable[Mapping[str, object]]) -> Iterator[Member]:
     """Yield where the scenario ends with each set of values (dotted key: value), in order.
 
     A member whose values do not go together, or whose run fails, has a problem instead of a final table; the others do
@@ -122,7 +121,7 @@ def run_members(document: Document, values: Iterable[Values]) -> Iterator[Member
             yield one if isinstance(one, Member) else _member(next(ends))
 
 
-def _built(document: Document, values: Values) -> Scenario | Member:
+def _built(document: Document, values: Mapping[str, object]) -> Scenario | Member:
     try:
         return document.with_values(values).build().model_copy(update={"sweep": None})
     except BlocksimError as error:

@@ -151,7 +151,8 @@ def _run_on(tasks: Iterator[Task], setting: Setting, pool_of: PoolOf) -> Generat
         while not work.is_done:
             with suppress(BrokenProcessPool), pool_of(setting.jobs) as pool:
                 for batch in work.run_on(pool):
-                    rows |= {task.name: row for task, row in zip(batch.tasks, batch.rows, strict=True)}
+                    if setting.folder is not None:
+                        rows |= zip((task.name for task in batch.tasks), batch.rows, strict=True)
                     yield batch
             yield from work.after_death()
         if later:
