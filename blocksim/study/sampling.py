@@ -77,64 +77,40 @@ def generator(seed: int, text: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *words])))
 
 
-def each_by_itself(sweep: Sweep, draw: Callable[[np.random.Generator, int], NDArray[np.float64]]) -> Design:
-    """Return cases whose columns are drawn independently, each from the stream of its own key."""
-    places = {key: draw(generator(sweep.seed, format_key(parse_key(key))), sweep.samples) for key in sweep.vary}
-    return from_places(sweep, places)
-
-
-def from_places(sweep: Sweep, places: dict[str, Places]) -> Design:
-    """Return the cases at places of the unit cube."""
-    return Together({key: drawn(values, open_interval(places[key])) for key, values in sweep.vary.items()})
-
-
 def open_interval(places: Places) -> Places:
     """Move places at 0 and 1 inside by less than anybody can see."""
     return np.clip(places, LEAST, 1.0 - 2.0 * LEAST)
 
 
-def lhs(sweep: Sweep) -> Design:
-    """Return the cases of a Latin hypercube; raises UnavailableError without scipy."""
-    return each_by_itself(sweep, _strata)
+def _streams(sweep: Sweep) -> list[np.random.Generator]:
+    """Return the stream of every key, however its quotes are set."""
+    return [generator(sweep.seed, format_key(parse_key(key))) for key in sweep.vary]
 
 
-def _strata(stream: np.random.Generator, samples: int) -> NDArray[np.float64]:
-    """Return a place in each interval, in random order."""
-    column: NDArray[np.float64] = (
-        loaded("scipy.stats.qmc", "sampled sweeps").LatinHypercube(1, seed=stream).random(samples)[:, 0]
-    )
-    return column
+def lhs(sweep: Sweep) -> Places:
+    """Return a place in each of equally likely intervals, in random order, for every key."""
+    hypercube = loaded("scipy.stats.qmc", "sampled sweeps").LatinHypercube
+    return np.stack([hypercube(1, seed=stream).random(sweep.samples)[:, 0] for stream in _streams(sweep)])
 
 
-def normal(sweep: Sweep) -> Design:
-    """Return independent cases."""
-    return each_by_itself(sweep, lambda stream, samples: stream.random(samples))
+def normal(sweep: Sweep) -> Places:
+    """Return independent places."""
+    return np.stack([stream.random(sweep.samples) for stream in _streams(sweep)])
 
 
-def sobol(sweep: Sweep) -> Design:
-    """Return the first points of the sequence; raises UnavailableError without scipy."""
-    points = _points(sweep.seed, sweep.samples, len(sweep.vary))
-    return from_places(sweep, {key: points[:, column] for column, key in enumerate(sweep.vary)})
-
-
-def _points(seed: int, samples: int, dimensions: int) -> NDArray[np.float64]:
-    """Return points in the middles of the finest cells of the net, shape (samples, dimensions)."""
+def sobol(sweep: Sweep) -> Places:
+    """Return the first points of the sequence, in the middles of the finest cells of the net."""
     sequence = loaded("scipy.stats.qmc", "sampled sweeps").Sobol(
-        DIMENSIONS, scramble=True, bits=BITS, seed=generator(seed, "sobol")
+        DIMENSIONS, scramble=True, bits=BITS, seed=generator(sweep.seed, "sobol")
     )
-    size = min(CHUNK, 1 << (samples - 1).bit_length())
-    chunks = [sequence.random(size)[:, :dimensions].copy() for _ in range(0, samples, size)]
-    return np.concatenate(chunks)[:samples] + 0.5 ** (BITS + 1)
+    size = min(CHUNK, 1 << (sweep.samples - 1).bit_length())
+    chunks = [sequence.random(size)[:, : len(sweep.vary)].copy() for _ in range(0, sweep.samples, size)]
+    return np.asarray(np.concatenate(chunks)[: sweep.samples].T + 0.5 ** (BITS + 1))
 
 
-MODES: dict[str, Callable[[Sweep], Design]] = {
-    "grid": grid,
-    "list": listed,
-    "table": table,
-    "lhs": lhs,
-    "sobol": sobol,
-    "normal": normal,
-}
+GIVEN: dict[str, Callable[[Sweep], Design]] = {"grid": grid, "list": listed, "table": table}
+DRAWN: dict[str, Callable[[Sweep], Places]] = {"lhs": lhs, "sobol": sobol, "normal": normal}
+"""Modes of sweeps; those that draw give places of the unit cube, shape (keys, samples)."""
 
 
 def design_of(sweep: Sweep) -> Design:
@@ -142,7 +118,12 @@ def design_of(sweep: Sweep) -> Design:
 
     Raises what reading a table raises, UnavailableError where a sampled mode has no scipy.
     """
-    return MODES[sweep.mode](sweep)
+    if sweep.mode in GIVEN:
+        return GIVEN[sweep.mode](sweep)
+    places = open_interval(DRAWN[sweep.mode](sweep))
+    return Together(
+        {key: drawn(values, column) for (key, values), column in zip(sweep.vary.items(), places, strict=True)}
+    )
 
 
 def remarks(sweep: Sweep) -> list[str]:
