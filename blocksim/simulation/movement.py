@@ -193,8 +193,8 @@ class Observable:
 
     @property
     def label(self) -> str:
-        """The name along an axis, with its unit."""
-        return f"{self.title or self.name}{f' ({self.unit})' if self.unit else ''}"
+        """The title along an axis, with its unit; the name where there is no title."""
+        return f"{self.title}{f' ({self.unit})' if self.unit else ''}" if self.title else self.name
 
     def text(self, value: float, number: Callable[[float], str]) -> str:
         """Return a value with its unit, for people."""

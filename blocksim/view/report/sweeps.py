@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from blocksim.scenario import Scenario
+from blocksim.simulation.movement import OBSERVABLES
 from blocksim.view.report.runs import Subject
 from blocksim.view.report.shared import shared_path, shared_text
 
@@ -104,8 +105,14 @@ def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
     roles = {"varied": table.varied, "case": (CASE,), "outcome": table.results, "block": ends}
     order = [CASE, *table.varied, *table.results, *ends]
     role = {name: kind for kind, names in roles.items() for name in names}
+    labels = {one.name: {"label": one.label} for one in OBSERVABLES.values() if one.title}
     return [
-        {"name": name, "role": role[name], "values": _values(table.column(name), is_text=name == CASE)}
+        {
+            "name": name,
+            **labels.get(name, {}),
+            "role": role[name],
+            "values": _values(table.column(name), is_text=name == CASE),
+        }
         for name in order
         if name in table.columns
     ]
