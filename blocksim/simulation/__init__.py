@@ -32,8 +32,8 @@ __all__ = [
 # found when first asked for, so that stored results can be read without waiting for numba and the kernels
 _HOMES = {
     "Frames": "frames",
-    "MemberEnd": "member_end",
-    "MemberFailure": "member_end",
+    "MemberEnd": "ensemble",
+    "MemberFailure": "ensemble",
     "Progress": "loop",
     "Result": "result",
     "Summary": "summary",

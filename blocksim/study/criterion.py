@@ -1,11 +1,11 @@
 """What counts as standing, or as failure: conditions on the end of a run, such as "moved < 5 mm, outcome != fell".
 
-Conditions are joined by commas, and all of them must hold. They name observables by their words (see
-`blocksim.simulation.movement`): `moved` is the largest displacement of a centre from start to end, `turned` the largest
-rotation; `outcome` is one of stands, rocked back, rocking, slid, fell, several of them with "|" between.
+Conditions are joined by commas, and all of them must hold. They name observables by their words: `moved` is the largest
+displacement of a centre from start to end, `turned` the largest rotation; `outcome` is one of stands, rocked back,
+rocking, slid, fell, several of them with "|" between.
 
-A run that meets all conditions but moves on at its end (as `blocksim.simulation.movement` has it) is undecided. A scene
-that does not come to rest before time zero (`start.settle`) falls.
+A run that meets all conditions but moves on at its end is undecided. A scene that does not come to rest before time
+zero (`start.settle`) falls.
 """
 
 import math
