@@ -75,17 +75,16 @@ def test_report_names_the_outcome_and_the_block_that_moved_first(tmp_path: Path)
     write_run(tmp_path / "run", count=2)
     stored = read_stored(tmp_path / "run")
     assert stored.summary is not None
-    movement = Movement.model_validate(
-        {
-            "outcome": Manner.FELL,
-            "largest_displacement_mm": 12.3,
-            "displaced_block": "2",
-            "largest_rotation_deg": 90.0,
-            "rotated_block": "3",
-            "first_mover": "3",
-            "first_moved_s": 0.045,
-        }
-    )
+    known = {
+        "outcome": Manner.FELL,
+        "largest_displacement_mm": 12.3,
+        "displaced_block": "2",
+        "largest_rotation_deg": 90.0,
+        "rotated_block": "3",
+        "first_mover": "3",
+        "first_moved_s": 0.045,
+    }
+    movement = Movement.model_validate(known)
     moved = replace(stored, summary=stored.summary.model_copy(update={"movement": movement}))
     rows = dict(run_subject("a", moved).page["summary"])
     assert rows["outcome"] == "fell"
