@@ -11,7 +11,7 @@ from blocksim.scenario import Scenario, place_bodies
 from blocksim.scenario.models.history import Stretch
 from blocksim.scenario.models.loads import AnyLoad, Gravity, OnBody
 
-Floats = NDArray[np.float64]
+_Floats = NDArray[np.float64]
 
 
 class Acting(NamedTuple):
@@ -22,7 +22,7 @@ class Acting(NamedTuple):
     stretches: tuple[Stretch, ...]
     end: float
 
-    def values(self, times: Floats) -> Floats:
+    def values(self, times: _Floats) -> _Floats:
         """Return its factor, or the tilt (rad) of gravity, at these times (s)."""
         starts, values, rates = np.array(self.stretches).T
         piece = (np.searchsorted(starts, times, side="right") - 1).clip(min=0)

@@ -28,8 +28,8 @@ FILLS, SHARES = 16, np.array([[0.2], [0.4], [0.6], [0.8]])  # so many colours ge
 UNKNOWN = 255
 MOST_BYTES = 1 << 30  # of all pictures together, which Pillow keeps in memory
 
-Pixels = NDArray[np.uint8]
-Encode = Callable[[Path, Iterator[Pixels], float, int], bool]
+_Pixels = NDArray[np.uint8]
+Encode = Callable[[Path, Iterator[_Pixels], float, int], bool]
 
 PROGRAM = "ffmpeg"
 QUALITY = 8.0  # of 10; thin lines stay sharp
@@ -41,7 +41,7 @@ CODECS = {  # of the system's ffmpeg, the best first
 OPTIONS = ["-movflags", "+faststart", "-metadata", f"comment={NAME.decode()}"]  # a browser may begin before it has all
 
 
-def write_gif(path: Path, pictures: Iterator[Pixels], seconds: NDArray[np.float64]) -> None:
+def write_gif(path: Path, pictures: Iterator[_Pixels], seconds: NDArray[np.float64]) -> None:
     """Write pictures (height, width, 3) that are shown for the given seconds each; the GIF repeats for ever.
 
     Raises InvalidInputError for more than 50 pictures a second or more pictures than fit into memory, OutputError.
@@ -80,7 +80,7 @@ class Palette:
     All others become the nearest.
     """
 
-    def __init__(self, picture: Pixels) -> None:
+    def __init__(self, picture: _Pixels) -> None:
         """Choose the colours."""
         colours, counts = np.unique(_packed(picture), return_counts=True)
         frequent = colours[np.argsort(-counts, kind="stable")[:COLOURS]]
@@ -88,7 +88,7 @@ class Palette:
         self.numbers = np.full(1 << 24, UNKNOWN, dtype=np.uint8)  # of every colour, found when first met
         self.numbers[frequent] = np.arange(len(frequent))
 
-    def reduced(self, picture: Pixels) -> "Image":
+    def reduced(self, picture: _Pixels) -> "Image":
         """Return a picture in these colours."""
         from PIL import Image
 
@@ -109,7 +109,7 @@ def _mixed(colours: NDArray[np.int32]) -> NDArray[np.int32]:
     return mixed
 
 
-def _packed(picture: Pixels) -> NDArray[np.int32]:
+def _packed(picture: _Pixels) -> NDArray[np.int32]:
     """Return the colours of pixels as one number each."""
     red, green, blue = np.moveaxis(picture.astype(np.int32), -1, 0)
     packed: NDArray[np.int32] = red << 16 | green << 8 | blue
@@ -158,7 +158,7 @@ def _encoder() -> Encode:
     return partial(_by_package, package)
 
 
-def _by_package(package: Any, path: Path, pictures: Iterator[Pixels], rate: float, count: int) -> bool:
+def _by_package(package: Any, path: Path, pictures: Iterator[_Pixels], rate: float, count: int) -> bool:
     """Encode pictures and return whether all of them are in the file."""
     first = next(pictures)
     size = first.shape[1], first.shape[0]
@@ -174,7 +174,7 @@ def _by_package(package: Any, path: Path, pictures: Iterator[Pixels], rate: floa
     return bool(written == count)
 
 
-def _by_program(program: str, path: Path, pictures: Iterator[Pixels], rate: float, count: int) -> bool:
+def _by_program(program: str, path: Path, pictures: Iterator[_Pixels], rate: float, count: int) -> bool:
     """Encode pictures by the ffmpeg of the system and return whether it has taken all of them and written its end."""
     first = next(pictures)
     size = f"{first.shape[1]}x{first.shape[0]}"

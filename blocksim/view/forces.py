@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 USUAL = 0.9  # share of all recorded forces that are no larger than the one the scale is made for
 USUAL_LENGTH = 0.6  # of the mean side of the blocks: length of the arrow of that force
 LONGEST = 2.0  # of that length; longer arrows are cut
-HEAD = 4.0, 1.7  # points: length and half width of a head
+_HEAD = 4.0, 1.7  # points: length and half width of a head
 LEAST = 0.5  # points; shorter arrows are left out
 WIDTH, HALO = 1.1, 2.6  # points: of a shaft, and of the light line below it
 WHOLE = 24.0  # points: where the longest arrow is shorter, all of that is smaller in proportion
@@ -133,9 +133,9 @@ def arrow_parts(found: Floats, canvas: Canvas, size: float, colour: str = style.
     lengths = np.hypot(*ways.T)
     found, ways, lengths = (one[lengths * canvas.points_per_mm >= LEAST] for one in (found, ways, lengths))
     along = ways / lengths[:, None]
-    head = np.minimum(size * HEAD[0] / canvas.points_per_mm, lengths)
+    head = np.minimum(size * _HEAD[0] / canvas.points_per_mm, lengths)
     necks = found[:, 1] - head[:, None] * along
-    across = np.stack([-along[:, 1], along[:, 0]], axis=-1) * (head * HEAD[1] / HEAD[0])[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=-1) * (head * _HEAD[1] / _HEAD[0])[:, None]
     heads = list(np.stack([found[:, 1], necks + across, necks - across], axis=1))
     shafts = list(np.stack([found[:, 0], necks], axis=1))
     at: dict[str, Any] = {"transform": canvas.scene}

@@ -10,12 +10,12 @@ from blocksim.view.layout import OWN, Paper, number_axis
 from blocksim.view.run_data import Floats
 from blocksim.view.sheet import sheet
 
-LEFT = 0.55  # inches
+_LEFT = 0.55  # inches
 WIDE = 8.0  # ratio of the largest to the smallest intensity from which on the axis is logarithmic
-MARGIN = 0.06  # of the axis beside the outermost points
+_MARGIN = 0.06  # of the axis beside the outermost points
 CURVE_COLOUR = "#0072B2"
 POINTS = 200
-MOST_NUMBERS = 6
+_MOST_NUMBERS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +46,9 @@ def axis_of(x: Floats) -> tuple[float, float, bool]:
     """Return the ends of the axis of intensities, and whether it is logarithmic."""
     low, high = float(x.min()), float(x.max())
     if high > WIDE * low:
-        margin = (high / low) ** MARGIN
+        margin = (high / low) ** _MARGIN
         return low / margin, high * margin, True
-    margin = MARGIN * (high - low) or MARGIN * high
+    margin = _MARGIN * (high - low) or _MARGIN * high
     return max(low - margin, 0.5 * low), high + margin, False
 
 
@@ -60,7 +60,7 @@ def places(x: Floats) -> Floats:
 
 def draw_fragility(found: Fragility, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
     """Draw the picture and write it; raises as `sheet`."""
-    with sheet(path, title, found.notes, paper, LEFT) as axes:
+    with sheet(path, title, found.notes, paper, _LEFT) as axes:
         band = found.band
         if band is not None:
             axes.fill_between(band.x, band.low, band.high, color=CURVE_COLOUR, alpha=0.18, linewidth=0.0)
@@ -83,7 +83,7 @@ def draw_fragility(found: Fragility, path: Path | str, title: str | None = None,
         axes.set_xscale("log" if is_log else "linear")
         axes.set_xlim(low, high)
         axes.set_ylim(0.0, 1.0)
-        number_axis(axes.xaxis, MOST_NUMBERS, is_log=is_log)
+        number_axis(axes.xaxis, _MOST_NUMBERS, is_log=is_log)
         axes.set_xlabel(f"{found.key} ({found.unit})" if found.unit else found.key, labelpad=2.0)
         axes.set_ylabel("probability of failure")
         handles, labels = axes.get_legend_handles_labels()

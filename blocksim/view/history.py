@@ -53,7 +53,7 @@ LOWEST = 0.55  # inches, of a panel on a page whose size was asked for
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own, unless they are chosen
 MOST_POINTS = 2000  # of a line
 MOST_PATHS = 50  # grey lines in an SVG or PDF; more of them are stored as an image
-LETTERS = 16  # of a name
+_LETTERS = 16  # of a name
 LETTERS_AN_INCH = 14.5  # in a line below the panels
 NAME_ROOM = 1.2  # inches, for a name at the right of the panels
 LINE = 0.155  # inches, of each further line below the panels or beside them
@@ -271,7 +271,7 @@ def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
     if drawing.shown and first is not None:
         room = NAME_ROOM * style.POINTS_PER_INCH
         handles = [Line2D([], [], **drawing.looks[block]) for block in drawing.shown]
-        names = [style.shortened(drawing.frames.names[block], LETTERS) for block in drawing.shown]
+        names = [style.shortened(drawing.frames.names[block], _LETTERS) for block in drawing.shown]
         cut = [style.cut_to(name, room, style.FONT_SIZE) for name in names]
         first.legend(handles, cut, **BESIDE, title="block", alignment="left")
     start, end = float(drawing.frames.time[0]), float(drawing.frames.time[-1])

@@ -14,8 +14,10 @@ from blocksim.view.history import draw_history
 from blocksim.view.layout import OWN, Paper
 from blocksim.view.profile import draw_profile
 from blocksim.view.strip import draw_strip
-from blocksim.view.sweeps import histogram, lines, matrix, outcome_map
+from blocksim.view.sweeps import lines, outcome_map
 from blocksim.view.sweeps.data import SweepData
+from blocksim.view.sweeps.histogram import drawn_histogram
+from blocksim.view.sweeps.matrix import drawn_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,8 +64,8 @@ def _map(sweep: SweepData, paper: Paper) -> "Iterator[Figure]":
 SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
     "lines": Kind(lines.refusal, lines.suits, lines.drawn),
     "map": Kind(outcome_map.refusal, outcome_map.suits, _map),
-    "matrix": Kind(matrix.refusal, matrix.suits, matrix.drawn),
-    "histogram": Kind(histogram.refusal, histogram.suits, histogram.drawn),
+    "matrix": Kind(lambda _: "", lambda sweep: len(sweep.inputs) > 1, drawn_matrix),
+    "histogram": Kind(lambda _: "", lambda _: True, drawn_histogram),
 }
 
 

@@ -15,9 +15,9 @@ from blocksim.view.run_data import Floats
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WIDTH, UPPER, LOWER = 7.2, 2.4, 1.0  # inches
-LEFT, RIGHT, HEAD, FOOT, GAP = 0.75, 0.15, 0.38, 0.42, 0.16  # inches
-LOWEST = 0.5  # inches, of the lower panel on a page whose size was asked for
+_WIDTH, UPPER, LOWER = 7.2, 2.4, 1.0  # inches
+_LEFT, _RIGHT, _HEAD, _FOOT, _GAP = 0.75, 0.15, 0.38, 0.42, 0.16  # inches
+_LOWEST = 0.5  # inches, of the lower panel on a page whose size was asked for
 SIMULATED: dict[str, Any] = {"color": "#0072B2", "linewidth": 3.0, "alpha": 0.55, "solid_capstyle": "butt"}
 EXPECTED: dict[str, Any] = {"color": style.INK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
 
@@ -56,15 +56,15 @@ def draw_law(law: Law, path: Path | str, title: str, paper: Paper = OWN) -> None
     """
     path = Path(path)
     style.picture_suffix(path)
-    width = paper.width(WIDTH, LEFT + RIGHT + 1.0)
-    lower = paper.panel(LOWER, 1, HEAD + UPPER + GAP + FOOT, LOWEST)
+    width = paper.width(_WIDTH, _LEFT + _RIGHT + 1.0)
+    lower = paper.panel(LOWER, 1, _HEAD + UPPER + _GAP + _FOOT, _LOWEST)
     lower = lower if paper.size is None else min(lower, LOWER)
-    height = paper.height(HEAD + UPPER + GAP + lower + FOOT)
-    upper = height - HEAD - GAP - lower - FOOT
+    height = paper.height(_HEAD + UPPER + _GAP + lower + _FOOT)
+    upper = height - _HEAD - _GAP - lower - _FOOT
     with style.styled_figure(width, height, paper.dots) as figure:
-        inside = (width - LEFT - RIGHT) / width
-        above = figure.add_axes((LEFT / width, (FOOT + lower + GAP) / height, inside, upper / height))
-        below = figure.add_axes((LEFT / width, FOOT / height, inside, lower / height))
+        inside = (width - _LEFT - _RIGHT) / width
+        above = figure.add_axes((_LEFT / width, (_FOOT + lower + _GAP) / height, inside, upper / height))
+        below = figure.add_axes((_LEFT / width, _FOOT / height, inside, lower / height))
         above.plot(law.time, law.simulated, label="simulated", **SIMULATED)
         above.plot(law.time, law.expected, label=law.formula, **EXPECTED)
         above.legend(loc="upper right", frameon=False)

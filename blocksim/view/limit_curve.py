@@ -12,9 +12,9 @@ from blocksim.view.sheet import sheet
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LEFT = 0.62  # inches
-MARGIN = 0.06  # of an axis
-MOST_NUMBERS = 6
+_LEFT = 0.62  # inches
+_MARGIN = 0.06  # of an axis
+_MOST_NUMBERS = 6
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")  # by the kind of the change
 LINE_COLOUR = "#777777"
 OTHERS = ("#D55E00", "#000000", "#56B4E9", "#777777")  # of what others found
@@ -64,14 +64,14 @@ def _middle(one: Bracket) -> float:
 
 def draw_limit_curve(curve: LimitCurve, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
     """Draw the picture and write it; raises as `sheet`."""
-    with sheet(path, title, curve.notes, paper, LEFT) as axes:
+    with sheet(path, title, curve.notes, paper, _LEFT) as axes:
         for start, end in joined(curve):
             axes.plot(*zip(start, end, strict=True), color=LINE_COLOUR, linewidth=1.0, zorder=2)
         _draw_others(axes, curve.beside)
         _draw_brackets(axes, [(x, one) for x, found in curve.points for one in found])
-        axes.margins(MARGIN)
+        axes.margins(_MARGIN)
         for axis in (axes.xaxis, axes.yaxis):
-            number_axis(axis, MOST_NUMBERS)
+            number_axis(axis, _MOST_NUMBERS)
         axes.set_xlabel(curve.across, labelpad=2.0)
         axes.set_ylabel(curve.up, labelpad=2.0)
         axes.legend(loc="best", frameon=False)

@@ -12,7 +12,7 @@ from blocksim.view.run_data import Floats
 
 COLOUR = "#A50026"
 ARC_POINTS = 24
-HEAD = 4.0  # points, of round arrows
+_HEAD = 4.0  # points, of round arrows
 LEAST_SWEEP = 0.02  # rad
 MARK, MARK_SIDE = 9.0, 12.0  # points: length of the arrow of a mark, and room for it
 MARK_LETTER = 5.0  # points
@@ -44,7 +44,7 @@ def _draw_turn(canvas: Canvas, points: Floats) -> None:
 
     way = points[-1] - points[-2]
     way /= np.hypot(*way)
-    head = min(HEAD / canvas.points_per_mm, float(np.hypot(*(points[-1] - points[0]))) or HEAD)
+    head = min(_HEAD / canvas.points_per_mm, float(np.hypot(*(points[-1] - points[0]))) or _HEAD)
     across = 0.5 * head * np.array([-way[1], way[0]])
     tip = np.stack([points[-1] + 0.5 * head * way, points[-1] - 0.5 * head * way + across])
     outline = np.stack([*tip, points[-1] - 0.5 * head * way - across])

@@ -16,7 +16,7 @@ from blocksim.view.time_panels import TimePanel, draw_time_panels, time_panels_p
 from blocksim.view.window import MILLIMETRES
 
 MOST_PANELS = 12
-LETTERS = 24  # of a line beside a panel
+_LETTERS = 24  # of a line beside a panel
 PERCENT = 98.0  # of the samples of a force that are not those of an impact
 MOST_USUAL, CUT = 3.0, 1.5  # times what they hardly exceed: forces beyond are cut, there
 
@@ -60,7 +60,7 @@ def panels_of(probe: ProbeSeries) -> list[TimePanel]:
 def _panel(probe: ProbeSeries, quantity: str, unit: str, factor: float, columns: Mapping[str, Floats]) -> TimePanel:
     lines = {name: (probe.time, factor * values) for name, values in columns.items()}
     several = "" if len(lines) > 1 else f"\n{next(iter(lines))}"
-    return TimePanel(f"{quantity} ({unit})" if unit else quantity, lines, f"probe {probe.name}"[:LETTERS] + several)
+    return TimePanel(f"{quantity} ({unit})" if unit else quantity, lines, f"probe {probe.name}"[:_LETTERS] + several)
 
 
 def _largest(columns: Mapping[str, Floats]) -> float:

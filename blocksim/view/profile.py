@@ -22,8 +22,8 @@ from blocksim.view.run_data import (
 from blocksim.view.scene import Scene, draw_scene
 from blocksim.view.window import MILLIMETRES, extent_of
 
-WIDTH, LEAST_WIDTH, TALLEST = 7.2, 2.0, 6.0  # inches
-SIDE, HEAD, AXIS = 0.25, 0.40, 0.42  # inches
+_WIDTH, _LEAST_WIDTH, TALLEST = 7.2, 2.0, 6.0  # inches
+_SIDE, _HEAD, AXIS = 0.25, 0.40, 0.42  # inches
 LINES = 6  # by default
 COLOURS = "viridis"
 PALE = "#e8e8e8"
@@ -68,7 +68,10 @@ def draw_profile(
     named = tuple((f"{float(frames.time[frame]):.3f} s", shade) for frame, shade in zip(chosen, shades, strict=True))
     key = Paint(lambda _: [PALE] * len(frames.names), named)
     page = page_for(
-        extent_of(frames, drawable, support), paper.width(WIDTH, LEAST_WIDTH), TALLEST, (SIDE, HEAD, AXIS + key.height)
+        extent_of(frames, drawable, support),
+        paper.width(_WIDTH, _LEAST_WIDTH),
+        TALLEST,
+        (_SIDE, _HEAD, AXIS + key.height),
     )
     with style.styled_figure(page.width, paper.height(page.height), paper.dots) as figure:
         canvas = Canvas(figure.add_axes(page.place), page.extent, page.points_per_mm)
@@ -79,8 +82,8 @@ def draw_profile(
         finish_panel(canvas, (page.panel_width, page.panel_height), labelled=True)
         if page.extent.tilt:
             draw_ruler(canvas, depth_of(0))
-        draw_key(figure, key, SIDE, 0.06)
+        draw_key(figure, key, _SIDE, 0.06)
         if title:
             shown = style.cut_to(f"{title}: surface", page.panel_width * style.POINTS_PER_INCH, style.TITLE_SIZE)
-            figure.text(SIDE / page.width, 1.0 - 0.08 / page.height, shown, va="top", fontsize=style.TITLE_SIZE)
+            figure.text(_SIDE / page.width, 1.0 - 0.08 / page.height, shown, va="top", fontsize=style.TITLE_SIZE)
         style.save_figure(figure, path)

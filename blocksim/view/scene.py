@@ -192,8 +192,8 @@ def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, chosen: Flags, f
         places = corners(frames, frame).mean(axis=1)
     for index, font in fonts.items():
         canvas.axes.text(
-            float(places[index][0]),
-            float(places[index][1]),
+            float(places[index, 0]),
+            float(places[index, 1]),
             style.shortened(frames.names[index], LETTERS),
             fontsize=font,
             color=style.text_colour(fills[index]),

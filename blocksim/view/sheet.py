@@ -11,9 +11,9 @@ from blocksim.view.layout import EDGE, LINE, Paper, add_axes, wrapped, write_hea
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WIDTH, PANEL_HEIGHT = 5.2, 3.0  # inches
-RIGHT, HEAD, FOOT = 0.15, 0.38, 0.48  # inches
-NARROWEST, LOWEST = 1.8, 1.0  # inches, of the panel on a page whose size was asked for
+_WIDTH, PANEL_HEIGHT = 5.2, 3.0  # inches
+_RIGHT, _HEAD, _FOOT = 0.15, 0.38, 0.48  # inches
+_NARROWEST, _LOWEST = 1.8, 1.0  # inches, of the panel on a page whose size was asked for
 
 
 @contextmanager
@@ -25,12 +25,12 @@ def sheet(path: Path | str, title: str | None, notes: Sequence[str], paper: Pape
     """
     path = Path(path)
     style.picture_suffix(path)
-    width = paper.width(WIDTH, left + RIGHT + NARROWEST)
+    width = paper.width(_WIDTH, left + _RIGHT + _NARROWEST)
     lines = wrapped(list(notes), width - left - EDGE)
-    foot = FOOT + LINE * len(lines)
-    row = paper.panel(PANEL_HEIGHT, 1, HEAD + foot, LOWEST)
-    with style.styled_figure(width, paper.height(HEAD + row + foot), paper.dots) as figure:
-        axes = add_axes(figure, left, foot, width - left - RIGHT, row)
+    foot = _FOOT + LINE * len(lines)
+    row = paper.panel(PANEL_HEIGHT, 1, _HEAD + foot, _LOWEST)
+    with style.styled_figure(width, paper.height(_HEAD + row + foot), paper.dots) as figure:
+        axes = add_axes(figure, left, foot, width - left - _RIGHT, row)
         axes.spines[["right", "top"]].set_visible(False)
         yield axes
         for number, line in enumerate(reversed(lines)):

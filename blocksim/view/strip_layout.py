@@ -9,7 +9,7 @@ from blocksim.view.window import Extent
 
 WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
-HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
+_HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
 LINE = 0.155  # inches, of each further line of text above a panel or below the strip
 LEAST_WIDTH, NARROWEST_PANEL, LOWEST_PANEL = 1.75, 1.25, 0.25  # inches, on a page whose size was asked for
 POINTS = style.POINTS_PER_INCH
@@ -40,7 +40,7 @@ class Layout:
     points_per_mm: float
     height: float
     extent: Extent
-    head: float = HEAD
+    head: float = _HEAD
     foot: float = FOOT
     width: float = WIDTH
 
@@ -124,7 +124,7 @@ def _laid_out(extent: Extent, columns: int, panels: int, lines: Lines, page: tup
 def _heights(extent: Extent, lines: Lines) -> tuple[float, float, float]:
     """Return the heights (inches) of the numbers below a panel, the text above it, and all below the strip."""
     ticks = 0.0 if extent.tilt else TICKS
-    return ticks, HEAD + (lines.captions - 1) * LINE, FOOT - TICKS + ticks + (lines.notes - 1) * LINE + lines.key
+    return ticks, _HEAD + (lines.captions - 1) * LINE, FOOT - TICKS + ticks + (lines.notes - 1) * LINE + lines.key
 
 
 def _panel_width(columns: int, width: float = WIDTH) -> float:

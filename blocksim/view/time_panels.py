@@ -21,7 +21,7 @@ LEFT, RIGHT, HEAD, FOOT = 0.78, 1.75, 0.40, 0.42  # inches; texts stand on the r
 LABEL = 0.16  # inches, from the edge of the page to the right of the name of an axis
 PANEL, GAP = 1.3, 0.16  # inches
 LOWEST, NARROWEST = 0.6, 1.0  # inches, of a panel on a page whose size was asked for
-BESIDE = 0.1  # inches, from a panel to its text
+_BESIDE = 0.1  # inches, from a panel to its text
 LINE = 0.155  # inches, of a line of text
 MOST_POINTS = 4000  # of a line; each that stands for many shows their range
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -67,7 +67,7 @@ def _drawn(panels: Sequence[TimePanel], title: str | None, note: str, paper: Pap
         across, up = (float(size) for size in figure.get_size_inches())
         for axes, panel in zip(drawn, panels, strict=True):
             _draw(axes, panel, span)
-            _write_beside(figure, panel, across - RIGHT + BESIDE, axes.get_position().y1 * up)
+            _write_beside(figure, panel, across - RIGHT + _BESIDE, axes.get_position().y1 * up)
         write_heading(figure, title, 0.12, 0.08)
         write_text(figure, 0.12, 0.05, note, color=style.FAINT_INK, va="bottom")
         yield figure
@@ -135,7 +135,7 @@ def _draw(axes: "Axes", panel: TimePanel, span: tuple[float, float]) -> None:
 
 
 def _write_beside(figure: "Figure", panel: TimePanel, left: float, top: float) -> None:
-    room = (RIGHT - 2.0 * BESIDE) * style.POINTS_PER_INCH
+    room = (RIGHT - 2.0 * _BESIDE) * style.POINTS_PER_INCH
     names = [*panel.lines] if len(panel.lines) > 1 else []
     for number, name in enumerate(names):
         cut = style.cut_to(name, room, style.FONT_SIZE)

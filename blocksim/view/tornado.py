@@ -14,10 +14,10 @@ from blocksim.view.sweeps.data import Floats, short_names
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-BAR, GAP, FOOT = 0.15, 0.46, 0.34  # inches: height of a bar, between panels, below them
+BAR, _GAP, _FOOT = 0.15, 0.46, 0.34  # inches: height of a bar, between panels, below them
 LEAST_ROOM, MOST_ROOM = 0.5, 1.75  # inches, for the name of a key; longer ones take several lines
 BROKEN = 0.95  # of the height of a bar, for each line of keys
-NARROWEST, LEAST_BAR = 0.8, 0.12  # inches, on a page whose size was asked for
+_NARROWEST, LEAST_BAR = 0.8, 0.12  # inches, on a page whose size was asked for
 MOST_KEYS, MOST_PANELS = 10, 8
 MOST_INTERVAL = 0.6  # of the longest bar, that an axis makes room for
 BEYOND: dict[str, Any] = {"linestyle": "", "marker": ">", "markersize": 3.0, "color": style.INK, "clip_on": False}
@@ -48,12 +48,12 @@ def draw_tornado(
     varying = [panel for panel in panels if np.any(panel.values)] or list(panels)
     panels = [replace(panel, keys=tuple(map(broken, short_names(panel.keys)))) for panel in varying[:MOST_PANELS]]
     left = _room_for_keys(panels)
-    width = paper.width(layout.COLUMN_WIDTH, left + NARROWEST)
+    width = paper.width(layout.COLUMN_WIDTH, left + _NARROWEST)
     titles = ["\n".join(style.broken(panel.title, width - 2.0 * layout.EDGE)) for panel in panels]
     rows = [min(len(panel.keys), MOST_KEYS) + 0.6 for panel in panels]
-    foot = FOOT + layout.LINE * (2 if labels[1] else 1) + layout.EDGE
+    foot = _FOOT + layout.LINE * (2 if labels[1] else 1) + layout.EDGE
     head = layout.title_height(title, width) + 0.2
-    gaps = GAP * (len(panels) - 1) + layout.LINE * sum(one.count("\n") for one in titles)
+    gaps = _GAP * (len(panels) - 1) + layout.LINE * sum(one.count("\n") for one in titles)
     lines = max(key.count("\n") + 1 for panel in panels for key in panel.keys)
     bar = paper.panel(BAR * (1.0 if lines == 1 else BROKEN * lines), 1, head + gaps + foot, LEAST_BAR * sum(rows))
     bar = bar if paper.size is None else bar / sum(rows)
@@ -66,7 +66,7 @@ def draw_tornado(
             axes = layout.add_axes(figure, left, bottom, width - left - 2.0 * layout.EDGE, bar * count)
             _draw_bars(axes, panel, min(style.FONT_SIZE, bar * style.POINTS_PER_INCH / (style.LETTER[1] * lines)))
             layout.write_text(figure, layout.EDGE, bottom + bar * count + 0.05, heading)
-            bottom -= GAP
+            bottom -= _GAP
         place = (layout.EDGE / width, layout.EDGE / height)
         look: dict[str, Any] = {"frameon": False, "borderpad": 0.0, "borderaxespad": 0.0, "labelspacing": 0.25}
         figure.legend(handles=_entries(labels), loc="lower left", bbox_to_anchor=place, **look)

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LEFT, RIGHT, FOOT = 0.55, 0.2, 0.42  # inches
-PANEL_HEIGHT, GAP, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
-NARROWEST, LOWEST = 2.6, 0.6  # inches, of a page and a panel where a size was asked for
-NAME_ROOM = 1.2  # inches, for the name of a block
+_LEFT, RIGHT, _FOOT = 0.55, 0.2, 0.42  # inches
+PANEL_HEIGHT, _GAP, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
+NARROWEST, _LOWEST = 2.6, 0.6  # inches, of a page and a panel where a size was asked for
+_NAME_ROOM = 1.2  # inches, for the name of a block
 CAPTION = 0.2  # inches, of the text above a panel
 LINE = 0.145  # inches, of a row of text
-MOST_BLOCKS = 4
-BINS = 40
-RARE = 1.0  # percent at either end that may lie beyond the axis
+_MOST_BLOCKS = 4
+_BINS = 40
+_RARE = 1.0  # percent at either end that may lie beyond the axis
 LEAST_BIN_MM = 0.01
 ALL_COLOUR, INSIDE_COLOUR = "#B5D6EA", "#0072B2"
 _MARK: dict[str, Any] = {"marker": "|", "color": style.MEASURED_COLOUR, "zorder": 4}
@@ -31,32 +31,22 @@ _REPEATS: dict[str, Any] = {**_MARK, "linestyle": "", "markersize": 7.0, "marker
 _INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 
 
-def refusal(_sweep: SweepData) -> str:
-    """Return why a sweep cannot be shown: never."""
-    return ""
-
-
-def suits(_sweep: SweepData) -> bool:
-    """Return True: any sweep may be shown."""
-    return True
-
-
 @contextmanager
-def drawn(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
+def drawn_histogram(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
     """Give a panel for each block that moves."""
-    blocks = sweep.moving[-MOST_BLOCKS:]
+    blocks = sweep.moving[-_MOST_BLOCKS:]
     legend = _entries(sweep)
-    foot = FOOT + LINE * -(-len(legend) // 2) + 2.0 * layout.EDGE
+    foot = _FOOT + LINE * -(-len(legend) // 2) + 2.0 * layout.EDGE
     width = paper.width(layout.COLUMN_WIDTH, NARROWEST)
     head = layout.title_height(sweep.title, width) + CAPTION
-    others = head + (len(blocks) - 1) * GAP + foot
-    panel = paper.panel(PANEL_HEIGHT, len(blocks), others, LOWEST)
+    others = head + (len(blocks) - 1) * _GAP + foot
+    panel = paper.panel(PANEL_HEIGHT, len(blocks), others, _LOWEST)
     height = paper.height(others + len(blocks) * panel)
     with style.styled_figure(width, height, paper.dots) as figure:
         layout.write_title(figure, sweep.title)
         for row, block in enumerate(blocks):
-            bottom = foot + (len(blocks) - 1 - row) * (panel + GAP)
-            axes = layout.add_axes(figure, LEFT, bottom, width - LEFT - RIGHT, panel)
+            bottom = foot + (len(blocks) - 1 - row) * (panel + _GAP)
+            axes = layout.add_axes(figure, _LEFT, bottom, width - _LEFT - RIGHT, panel)
             _draw_block(axes, sweep, block, ROOM / (panel - ROOM))
         figure.legend(
             handles=legend,
@@ -74,9 +64,9 @@ def drawn(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
 
 def limits_of(x_mm: Floats, others: Floats) -> tuple[float, float]:
     """Return the ends of an axis (mm) around all but the rarest run-outs and everything measured."""
-    ends = np.concatenate([np.percentile(x_mm, [RARE, 100.0 - RARE]), others])
+    ends = np.concatenate([np.percentile(x_mm, [_RARE, 100.0 - _RARE]), others])
     low, high = float(ends.min()), float(ends.max())
-    margin = max(0.04 * (high - low), 0.5 * BINS * LEAST_BIN_MM)
+    margin = max(0.04 * (high - low), 0.5 * _BINS * LEAST_BIN_MM)
     return low - margin, high + margin
 
 
@@ -101,14 +91,14 @@ def _draw_block(axes: "Axes", sweep: SweepData, block: int, room: float) -> None
         layout.number_axis(side)
     axes.set_yticks([tick for tick in axes.get_yticks() if tick <= top])
     axes.set_ylabel("cases (%)")
-    shown = style.cut_to(name, NAME_ROOM * style.POINTS_PER_INCH, style.FONT_SIZE)
+    shown = style.cut_to(name, _NAME_ROOM * style.POINTS_PER_INCH, style.FONT_SIZE)
     axes.set_xlabel(f"final x of block {shown} (mm)", labelpad=2.0)
     axes.set_title(_caption(x, limits), loc="left", pad=4.0)
 
 
 def _draw_bars(axes: "Axes", x: Floats, inside: Flags | None, count: int, limits: tuple[float, float]) -> float:
     """Draw shares of all cases (%) and return the largest."""
-    edges = np.linspace(*limits, BINS + 1)
+    edges = np.linspace(*limits, _BINS + 1)
     shares, _ = np.histogram(x, edges)
     axes.stairs(100.0 * shares / count, edges, fill=True, color=ALL_COLOUR)
     if inside is not None:

@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-LEFT, FOOT = 0.46, 0.34  # inches; more where names of levels stand there
-GAP = 0.05  # inches, between panels
-LARGEST_PANEL, LOWEST = 1.1, 0.35  # inches
+_LEFT, _FOOT = 0.46, 0.34  # inches; more where names of levels stand there
+_GAP = 0.05  # inches, between panels
+LARGEST_PANEL, _LOWEST = 1.1, 0.35  # inches
 SMALL_FONT, NAME_FONT = 6.0, style.FONT_SIZE - 1.0  # points
-NAME_ROOM = 1.5  # inches, of a line of a name; longer ones take several
+_NAME_ROOM = 1.5  # inches, of a line of a name; longer ones take several
 LONGEST_LEVEL = 1.0  # inches
 FITTINGS = 4  # smaller panels leave less room for names beside them
 CROWDED = 0.08  # of an axis; a number this near to its start runs into the last one of the panel before
-MOST_INPUTS, MOST_BLOCKS = 9, 3
-BINS = 16
-RARE = 0.5  # percent of run-outs at either end that may lie beyond an axis
+MOST_INPUTS, _MOST_BLOCKS = 9, 3
+_BINS = 16
+_RARE = 0.5  # percent of run-outs at either end that may lie beyond an axis
 MARGIN = 0.04
 SCATTER = 0.5  # of the distance between levels, over which their dots are spread
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # multiples of it, cut to their fractions, are evenly spread
@@ -50,29 +50,18 @@ class Variable:
     repeats: Floats | None = None
 
 
-def refusal(sweep: SweepData) -> str:
-    """Return why a sweep cannot be shown: never."""
-    del sweep
-    return ""
-
-
-def suits(sweep: SweepData) -> bool:
-    """Return True if two or more inputs vary."""
-    return len(sweep.inputs) > 1
-
-
 def variables_of(sweep: SweepData) -> list[Variable]:
     """Return the first inputs and the blocks that move, in this order."""
     inputs = sweep.inputs[:MOST_INPUTS]
     named = zip(inputs, short_names([one.key for one in sweep.inputs])[: len(inputs)], strict=True)
     return [
         *(_of_input(one, name) for one, name in named),
-        *(_of_block(sweep, block) for block in sweep.moving[-MOST_BLOCKS:]),
+        *(_of_block(sweep, block) for block in sweep.moving[-_MOST_BLOCKS:]),
     ]
 
 
 @contextmanager
-def drawn(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
+def drawn_matrix(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
     """Give the lower half of the matrix, with histograms on its diagonal."""
     variables = variables_of(sweep)
     count, legend = len(variables), _entries(sweep)
@@ -82,17 +71,17 @@ def drawn(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
     across = paper.width(max(sides.left + _right_of(variables, size) + _grid(count, size), layout.COLUMN_WIDTH))
     head = layout.title_height(sweep.title, across)
     if paper.size is not None:
-        size = min(size, paper.panel(0.0, count, head + foot + (count - 1) * GAP, LOWEST))
+        size = min(size, paper.panel(0.0, count, head + foot + (count - 1) * _GAP, _LOWEST))
     height = paper.height(head + _grid(count, size) + foot)
     with style.styled_figure(across, height, paper.dots) as figure:
         layout.write_title(figure, sweep.title)
         for row in range(count):
-            bottom = foot + (count - 1 - row) * (size + GAP)
+            bottom = foot + (count - 1 - row) * (size + _GAP)
             for column in range(row + 1):
-                axes = layout.add_axes(figure, sides.left + column * (size + GAP), bottom, size, size)
+                axes = layout.add_axes(figure, sides.left + column * (size + _GAP), bottom, size, size)
                 _draw_panel(axes, sweep, variables[row], variables[column])
                 _finish(axes, variables[row], variables[column], is_left=column == 0 < row, is_last=row == count - 1)
-            place = (sides.left + row * (size + GAP) + size + 0.04, bottom + 0.5 * size)
+            place = (sides.left + row * (size + _GAP) + size + 0.04, bottom + 0.5 * size)
             layout.write_text(figure, *place, variables[row].name, va="center", fontsize=NAME_FONT)
         figure.legend(handles=legend, **_legend_place(across, height))
         yield figure
@@ -110,20 +99,20 @@ def _sides_of(variables: Sequence[Variable]) -> _Sides:
     """Return the room that numbers and names of levels need."""
     levels = [level for one in variables for level in one.levels]
     if not levels:
-        return _Sides(LEFT, FOOT)
+        return _Sides(_LEFT, _FOOT)
     widest = max(style.width_of(level, SMALL_FONT) for level in levels) / style.POINTS_PER_INCH + 0.12
-    return _Sides(max(LEFT, widest), max(FOOT, widest))
+    return _Sides(max(_LEFT, widest), max(_FOOT, widest))
 
 
 def _grid(count: int, size: float) -> float:
-    return count * size + (count - 1) * GAP
+    return count * size + (count - 1) * _GAP
 
 
 def _right_of(variables: Sequence[Variable], size: float) -> float:
     """Return the room (inches) to the right of the panels that the names beside the diagonal need."""
     lines = [(row, line) for row, one in enumerate(variables) for line in one.name.split("\n")]
     widths = [
-        style.width_of(line, NAME_FONT) / style.POINTS_PER_INCH - (len(variables) - 1 - row) * (size + GAP)
+        style.width_of(line, NAME_FONT) / style.POINTS_PER_INCH - (len(variables) - 1 - row) * (size + _GAP)
         for row, line in lines
     ]
     return max(*widths, 0.0) + 0.04 + layout.EDGE
@@ -132,11 +121,11 @@ def _right_of(variables: Sequence[Variable], size: float) -> float:
 def _panel_size(variables: Sequence[Variable], sides: _Sides, paper: Paper) -> float:
     """Return the side of a panel (inches) so that the matrix fills the width of the page. Raises InvalidInputError."""
     count, size = len(variables), LARGEST_PANEL
-    least = sides.left + _right_of(variables, LOWEST) + _grid(count, LOWEST)
+    least = sides.left + _right_of(variables, _LOWEST) + _grid(count, _LOWEST)
     width = paper.width(layout.PAGE_WIDTH, least)
     for _ in range(FITTINGS):
-        size = min(size, (width - sides.left - _right_of(variables, size) - (count - 1) * GAP) / count)
-    return max(size, LOWEST)
+        size = min(size, (width - sides.left - _right_of(variables, size) - (count - 1) * _GAP) / count)
+    return max(size, _LOWEST)
 
 
 def _of_input(one: Input, name: str) -> Variable:
@@ -151,13 +140,13 @@ def _of_input(one: Input, name: str) -> Variable:
 
 
 def _in_lines(name: str) -> str:
-    return "\n".join(style.broken(name, NAME_ROOM, NAME_FONT))
+    return "\n".join(style.broken(name, _NAME_ROOM, NAME_FONT))
 
 
 def _of_block(sweep: SweepData, block: int) -> Variable:
     x, name = sweep.x_mm[:, block], sweep.blocks[block]
     repeats = sweep.measured.x_mm.get(name)
-    ends = np.nanpercentile(x, [RARE, 100.0 - RARE])
+    ends = np.nanpercentile(x, [_RARE, 100.0 - _RARE])
     known = ends if repeats is None else np.concatenate([ends, repeats])
     return Variable(_in_lines(f"x of {name} (mm)"), x, _around(known, None), repeats=repeats)
 
@@ -198,7 +187,7 @@ def _draw_repeats(axes: "Axes", up: Variable, across: Variable) -> None:
 def _draw_histogram(axes: "Axes", sweep: SweepData, one: Variable) -> None:
     """Draw how many cases have which value, and the same of those that agree, both to the height of the panel."""
     spread = np.geomspace if one.is_log else np.linspace
-    edges = spread(*one.limits, BINS + 1)
+    edges = spread(*one.limits, _BINS + 1)
     drawn = [(sweep.finished, OUTSIDE["color"], True)]
     if sweep.inside is not None:
         drawn.append((sweep.inside, INSIDE["color"], False))
