@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from blocksim.errors import InvalidInputError
-from blocksim.view import style
+from blocksim.view.style import FONT_SIZE, POINTS_PER_INCH, TITLE_SIZE, cut_to
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,23 +89,23 @@ def write_text(figure: "Figure", left: float, bottom: float, text: str, **look: 
 
 def title_height(title: str, width: float) -> float:
     """Return the height (inches) that a title takes with the gap below it."""
-    return EDGE + TITLE_LINE * len(wrapped([title], width - 2.0 * EDGE, style.TITLE_SIZE)) + TITLE_GAP
+    return EDGE + TITLE_LINE * len(wrapped([title], width - 2.0 * EDGE, TITLE_SIZE)) + TITLE_GAP
 
 
 def write_title(figure: "Figure", title: str) -> None:
     """Write the title at the top, in as many lines as it needs."""
     across, up = (float(size) for size in figure.get_size_inches())
-    lines = wrapped([title], across - 2.0 * EDGE, style.TITLE_SIZE)
+    lines = wrapped([title], across - 2.0 * EDGE, TITLE_SIZE)
     for number, line in enumerate(lines):
-        write_text(figure, EDGE, up - EDGE - number * TITLE_LINE, line, va="top", fontsize=style.TITLE_SIZE)
+        write_text(figure, EDGE, up - EDGE - number * TITLE_LINE, line, va="top", fontsize=TITLE_SIZE)
 
 
 def write_heading(figure: "Figure", title: str | None, side: float, top: float = 0.06) -> None:
     """Write a title in one line, cut where it is too long, `side` and `top` inches from the edges of the figure."""
     if title:
         across, up = (float(size) for size in figure.get_size_inches())
-        shown = style.cut_to(title, (across - 2.0 * side) * style.POINTS_PER_INCH, style.TITLE_SIZE)
-        figure.text(side / across, 1.0 - top / up, shown, va="top", fontsize=style.TITLE_SIZE)
+        shown = cut_to(title, (across - 2.0 * side) * POINTS_PER_INCH, TITLE_SIZE)
+        figure.text(side / across, 1.0 - top / up, shown, va="top", fontsize=TITLE_SIZE)
 
 
 def plain_numbers(side: "Axis") -> None:
@@ -125,9 +125,9 @@ def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None
         side.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]))
 
 
-def wrapped(texts: list[str], width: float, font: float = style.FONT_SIZE) -> list[str]:
+def wrapped(texts: list[str], width: float, font: float = FONT_SIZE) -> list[str]:
     """Fill lines of `width` inches with sentences, words kept whole."""
-    letters = int(width * style.POINTS_PER_INCH / (WIDE_LETTER * font))
+    letters = int(width * POINTS_PER_INCH / (WIDE_LETTER * font))
     lines = [""]
     for word in " ".join(texts).split():
         if lines[-1] and len(lines[-1]) + 1 + len(word) > letters:
