@@ -1,12 +1,15 @@
 """Layout of a page: its size and dots per inch, and places on it in inches from its lower left corner."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from blocksim.errors import InvalidInputError
 from blocksim.view.style import FONT_SIZE, POINTS_PER_INCH, TITLE_SIZE, cut_to
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
@@ -85,6 +88,13 @@ def write_text(figure: "Figure", left: float, bottom: float, text: str, **look: 
     """Write text at a place given in inches."""
     across, up = (float(size) for size in figure.get_size_inches())
     figure.text(left / across, bottom / up, text, **look)  # type: ignore[arg-type]
+
+
+def write_legend(figure: "Figure", handles: "Sequence[Artist]", left: float, bottom: float, **look: Any) -> None:
+    """Draw a legend without a frame, its lower left corner at a place given in inches."""
+    across, up = (float(size) for size in figure.get_size_inches())
+    own: dict[str, Any] = {"loc": "lower left", "frameon": False, "borderpad": 0.0, "borderaxespad": 0.0}
+    figure.legend(handles=handles, bbox_to_anchor=(left / across, bottom / up), **{**own, **look})
 
 
 def title_height(title: str, width: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.view import style
 from blocksim.view.forces import WithContacts
 from blocksim.view.joints import joints
-from blocksim.view.layout import EDGE, LINE, OWN, Paper, add_axes, wrapped, write_heading, write_text
+from blocksim.view.layout import EDGE, LINE, OWN, Paper, add_axes, wrapped, write_heading, write_legend, write_text
 from blocksim.view.load_arrows import draw_outside
 from blocksim.view.loads import SPEED, Outside, length_in, outside, with_room
 from blocksim.view.paint import by_displacement, displacements, draw_key
@@ -150,20 +150,9 @@ def _draw_legend(figure: "Figure", columns: int, bottom: float) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    across, up = (float(size) for size in figure.get_size_inches())
     handles = [
         Patch(facecolor="none", edgecolor=FIRST["color"], linewidth=FIRST["linewidth"], label="first block to move"),
         Line2D([], [], label="sliding joint", **SLIDING),
         Line2D([], [], linestyle="none", label="hinge", **HINGE),
     ]
-    figure.legend(
-        handles=handles,
-        ncol=columns,
-        loc="lower left",
-        bbox_to_anchor=(SIDE / across, bottom / up),
-        borderaxespad=0.0,
-        borderpad=0.0,
-        labelspacing=0.3,
-        handlelength=1.6,
-        frameon=False,
-    )
+    write_legend(figure, handles, SIDE, bottom, ncols=columns, labelspacing=0.3, handlelength=1.6)

@@ -12,6 +12,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.view import style
+from blocksim.view.layout import write_legend
 from blocksim.view.run_data import Floats, FramesLike, Support, drawable_frames, others_of
 from blocksim.world.systems.system import Shade
 
@@ -233,15 +234,6 @@ def _draw_scale(figure: "Figure", scale: Scale, left: float, bottom: float) -> N
 def _draw_entries(figure: "Figure", entries: Sequence[tuple[str, str]], left: float, bottom: float) -> None:
     from matplotlib.patches import Patch
 
-    across, up = (float(size) for size in figure.get_size_inches())
     handles = [Patch(facecolor=colour, edgecolor=style.INK, linewidth=0.5, label=name) for name, colour in entries]
-    figure.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(left / across, bottom / up),
-        ncols=max(1, min(len(handles), int(across / 1.6))),
-        frameon=False,
-        borderpad=0.0,
-        borderaxespad=0.0,
-        handlelength=1.2,
-    )
+    columns = max(1, min(len(handles), int(float(figure.get_figwidth()) / 1.6)))
+    write_legend(figure, handles, left, bottom, ncols=columns, handlelength=1.2)

@@ -67,9 +67,7 @@ def draw_tornado(
             _draw_bars(axes, panel, min(style.FONT_SIZE, bar * style.POINTS_PER_INCH / (style.LETTER[1] * lines)))
             layout.write_text(figure, layout.EDGE, bottom + bar * count + 0.05, heading)
             bottom -= _GAP
-        place = (layout.EDGE / width, layout.EDGE / height)
-        look: dict[str, Any] = {"frameon": False, "borderpad": 0.0, "borderaxespad": 0.0, "labelspacing": 0.25}
-        figure.legend(handles=_entries(labels), loc="lower left", bbox_to_anchor=place, **look)
+        layout.write_legend(figure, _entries(labels), layout.EDGE, layout.EDGE, labelspacing=0.25)
         style.save_figure(figure, path)
 
 

@@ -48,17 +48,8 @@ def drawn_histogram(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
             bottom = foot + (len(blocks) - 1 - row) * (panel + _GAP)
             axes = layout.add_axes(figure, _LEFT, bottom, width - _LEFT - RIGHT, panel)
             _draw_block(axes, sweep, block, ROOM / (panel - ROOM))
-        figure.legend(
-            handles=legend,
-            loc="lower left",
-            bbox_to_anchor=(layout.EDGE / width, layout.EDGE / height),
-            ncols=2,
-            frameon=False,
-            borderpad=0.0,
-            borderaxespad=0.0,
-            labelspacing=0.25,
-            columnspacing=1.0,
-        )
+        look: dict[str, Any] = {"ncols": 2, "labelspacing": 0.25, "columnspacing": 1.0}
+        layout.write_legend(figure, legend, layout.EDGE, layout.EDGE, **look)
         yield figure
 
 

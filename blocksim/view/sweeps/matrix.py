@@ -83,7 +83,8 @@ def drawn_matrix(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
                 _finish(axes, variables[row], variables[column], is_left=column == 0 < row, is_last=row == count - 1)
             place = (sides.left + row * (size + _GAP) + size + 0.04, bottom + 0.5 * size)
             layout.write_text(figure, *place, variables[row].name, va="center", fontsize=NAME_FONT)
-        figure.legend(handles=legend, **_legend_place(across, height))
+        look: dict[str, Any] = {"ncols": 4, "handletextpad": 0.3, "columnspacing": 1.2}
+        layout.write_legend(figure, legend, layout.EDGE, layout.EDGE, **look)
         yield figure
 
 
@@ -258,16 +259,3 @@ def _entries(sweep: SweepData) -> list[Any]:
         look: dict[str, Any] = {"linestyle": "-", "marker": "D", "markersize": 3.0, "linewidth": 0.8}
         entries.append(Line2D([], [], **look, color=style.MEASURED_COLOUR, label="repeats"))
     return entries
-
-
-def _legend_place(across: float, height: float) -> dict[str, Any]:
-    return {
-        "loc": "lower left",
-        "bbox_to_anchor": (layout.EDGE / across, layout.EDGE / height),
-        "ncols": 4,
-        "frameon": False,
-        "borderpad": 0.0,
-        "borderaxespad": 0.0,
-        "handletextpad": 0.3,
-        "columnspacing": 1.2,
-    }

@@ -239,19 +239,13 @@ def _draw_legend(figure: "Figure", found: OutcomeMap, classes: Classes, top: flo
             handles.append(Line2D([], [], linestyle="", marker="x", markersize=4.0, color=style.INK, label=label))
         else:
             handles.append(Patch(facecolor=colour, label=label))
-    width, height = (float(size) for size in figure.get_size_inches())
-    place = (layout.EDGE / width, top / height)
-    figure.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=place,
-        ncols=found.legend_columns,
-        frameon=False,
-        borderpad=0.0,
-        borderaxespad=0.0,
-        labelspacing=0.25,
-        handlelength=1.2,
-    )
+    look: dict[str, Any] = {
+        "loc": "upper left",
+        "ncols": found.legend_columns,
+        "labelspacing": 0.25,
+        "handlelength": 1.2,
+    }
+    layout.write_legend(figure, handles, layout.EDGE, top, **look)
 
 
 def _notes(found: OutcomeMap) -> list[str]:
