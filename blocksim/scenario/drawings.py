@@ -47,7 +47,20 @@ def read_drawing(path: Path) -> list[Drawn]:
     Raises DrawingError, and UnavailableError for DXF without its package.
     """
     is_dxf = path.suffix.lower() == f".{DXF}"
-    found = _dxf(path) if is_dxf else _geojson(path)
+    ezdxf = loaded("ezdxf", f"reading {path.name}", DXF) if is_dxf else None
+    damage = DAMAGE if ezdxf is None else (ezdxf.DXFError, *DAMAGE)
+    try:
+        content = read_limited(path, MOST_BYTES)  # no file that is larger, no pipe
+        if ezdxf is not None:
+            found = [*_polylines(ezdxf.readfile(path).modelspace())]
+        else:
+            found = [*_polygons(json.loads(content), "", {}, DEEPEST)]
+    except DrawingError:
+        raise
+    except BlocksimError as error:
+        raise DrawingError(str(error)) from None
+    except damage as error:
+        raise DrawingError(f"not a {'DXF' if is_dxf else 'GeoJSON'} file: {str(error)[:100]}") from None
     if not found:
         raise DrawingError("no closed polyline in it" if is_dxf else "no polygon in it")
     if len(found) > MOST_OUTLINES or sum(len(one.outline) for one in found) > MOST_CORNERS:
@@ -69,30 +82,13 @@ def simplified(points: Sequence[Corner]) -> list[Corner]:
     number = 0
     while number < len(corners) > outlines.FEWEST:
         before, here, after = corners[number - 1], corners[number], corners[(number + 1) % len(corners)]
-        if _is_between(before, here, after, near):
+        (x, y), (u, v) = ((x1 - before[0], y1 - before[1]) for x1, y1 in (after, here))
+        length = math.hypot(x, y)
+        if length > 0.0 and abs(x * v - y * u) <= near * length and 0.0 <= x * u + y * v <= length * length:
             corners.pop(number)
         else:
             number += 1
     return corners
-
-
-def _is_between(before: Corner, here: Corner, after: Corner, near: float) -> bool:
-    x, y = after[0] - before[0], after[1] - before[1]
-    u, v = here[0] - before[0], here[1] - before[1]
-    length = math.hypot(x, y)
-    return length > 0.0 and abs(x * v - y * u) <= near * length and 0.0 <= x * u + y * v <= length * length
-
-
-def _geojson(path: Path) -> list[Drawn]:
-    try:
-        data = json.loads(read_limited(path, MOST_BYTES))
-        return [*_polygons(data, "", {}, DEEPEST)]
-    except DrawingError:
-        raise
-    except BlocksimError as error:
-        raise DrawingError(str(error)) from None
-    except DAMAGE as error:
-        raise DrawingError(f"not a GeoJSON file: {str(error)[:100]}") from None
 
 
 def _polygons(node: Any, name: str, properties: Mapping[str, Any], depth: int) -> Iterator[Drawn]:
@@ -145,20 +141,6 @@ def _point(values: Any) -> Corner:
     return x, y
 
 
-def _dxf(path: Path) -> list[Drawn]:
-    ezdxf = loaded("ezdxf", f"reading {path.name}", DXF)
-    try:
-        read_limited(path, MOST_BYTES)  # no file that is larger, no pipe
-        document = ezdxf.readfile(path)
-        return [*_polylines(document.modelspace())]
-    except DrawingError:
-        raise
-    except BlocksimError as error:
-        raise DrawingError(str(error)) from None
-    except (ezdxf.DXFError, *DAMAGE) as error:
-        raise DrawingError(f"not a DXF file: {str(error)[:100]}") from None
-
-
 def _polylines(space: Any) -> Iterator[Drawn]:
     for entity in space.query("LWPOLYLINE POLYLINE"):
         name = f"polyline {entity.dxf.handle} in layer {entity.dxf.layer}"
@@ -170,13 +152,8 @@ def _polylines(space: Any) -> Iterator[Drawn]:
         if entity.has_arc:
             raise DrawingError(f"{name}: has arcs; blocks have straight edges")
         layer = {} if entity.dxf.layer == "0" else {"block": entity.dxf.layer}
-        yield Drawn(points, name, layer | _extended(entity))
-
-
-def _extended(entity: Any) -> dict[str, Any]:
-    """Return name and fixed as `blocksim export` has written them; nothing for lines of other programs."""
-    if not entity.has_xdata(DXF_APPLICATION):
-        return {}
-    tags = {tag.code: tag.value for tag in entity.get_xdata(DXF_APPLICATION)}
-    names = {"name": str(tags[DXF_TEXT])} if DXF_TEXT in tags else {}
-    return names | ({"fixed": bool(tags[DXF_INTEGER])} if DXF_INTEGER in tags else {})
+        tags = entity.get_xdata(DXF_APPLICATION) if entity.has_xdata(DXF_APPLICATION) else ()
+        values = {tag.code: tag.value for tag in tags}  # as `blocksim export` has written them
+        names = {"name": str(values[DXF_TEXT])} if DXF_TEXT in values else {}
+        fixed = {"fixed": bool(values[DXF_INTEGER])} if DXF_INTEGER in values else {}
+        yield Drawn(points, name, layer | names | fixed)

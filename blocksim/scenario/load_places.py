@@ -29,12 +29,12 @@ PARALLEL = 1e-6
 
 
 def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    """Find loads that do not fit the placed bodies; all values are valid otherwise."""
+    """Find loads that do not fit the placed bodies, and bodies that cannot be held; all is valid otherwise."""
     loads = scenario.loads
     if len(loads) > MAX_LOADS:
         yield Finding(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
         return
-    by_name = {body.name: body for body in bodies} if loads else {}
+    by_name = {body.name: body for body in bodies} if loads or scenario.start.hold else {}
     names: set[str] = set()
     turns = False
     for number, load in enumerate(loads):
@@ -47,15 +47,11 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Fi
             turns = True
         elif isinstance(load, OnBody):
             yield from _on_body(scenario, number, load, by_name)
-
-
-def unfit_holds(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
-    """Find bodies to hold that do not exist, or need not be held."""
-    known = {body.name: body for body in bodies} if scenario.start.hold else {}
     for number, name in enumerate(scenario.start.hold):
-        if name not in known:
-            yield Finding(("start", "hold", number), f"unknown body {shown(name)}, {did_you_mean_or_list(name, known)}")
-        elif known[name].fixed:
+        if name not in by_name:
+            hint = did_you_mean_or_list(name, by_name)
+            yield Finding(("start", "hold", number), f"unknown body {shown(name)}, {hint}")
+        elif by_name[name].fixed:
             yield Finding(("start", "hold", number), f"body {shown(name)} is fixed and cannot be released")
 
 

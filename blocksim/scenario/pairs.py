@@ -54,16 +54,7 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
             pair = scenario.pairs.get(left, {}).get(right)
             if pair is not None:
                 overrides.append((format_key(("pairs", left, right)), pair))
-    values: dict[str, Any] = {}
-    rules: dict[str, str] = {}
-    for quantity, general in _general(scenario, "block_ground" if ground else "block_block").items():
-        special = ((getattr(pair, quantity), f"{key}.{quantity}") for key, pair in overrides)
-        values[quantity], rules[quantity] = next((found for found in special if found[0] is not None), general)
-    return ResolvedPair(**values, rules=rules)
-
-
-def _general(scenario: Scenario, side: str) -> dict[str, tuple[object, str]]:
-    """Return the values for all pairs of this side without a table of their own, and the keys that set them."""
+    side = "block_ground" if ground else "block_block"
     contact = scenario.contact
     general: dict[str, tuple[object, str]] = {}
     for name, table, place in (
@@ -75,4 +66,9 @@ def _general(scenario: Scenario, side: str) -> dict[str, tuple[object, str]]:
         otherwise = DEFAULT if name == "shear_damping_ratio" else MATERIALS
         value = getattr(contact, name)
         general[name] = value, otherwise if value is None else f"contact.{name}"
-    return general
+    values: dict[str, Any] = {}
+    rules: dict[str, str] = {}
+    for quantity, usual in general.items():
+        special = ((getattr(pair, quantity), f"{key}.{quantity}") for key, pair in overrides)
+        values[quantity], rules[quantity] = next((found for found in special if found[0] is not None), usual)
+    return ResolvedPair(**values, rules=rules)

@@ -10,7 +10,7 @@ import numpy as np
 from blocksim.scenario import keys, overlap
 from blocksim.scenario.events import impossible_events
 from blocksim.scenario.findings import MAX_FINDINGS, Finding
-from blocksim.scenario.load_places import unfit_holds, unfit_loads
+from blocksim.scenario.load_places import unfit_loads
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.drive import MOST_BODY_TABLES
 from blocksim.scenario.models.motion import PIECES_PER_CYCLE, Harmonic
@@ -82,7 +82,6 @@ def impossible_starts(scenario: Scenario) -> Iterator[Finding]:
         seen.add(body.name)
     yield from _overlaps(scenario, origins, bodies)
     yield from unfit_loads(scenario, bodies)
-    yield from unfit_holds(scenario, bodies)
     for name, tables in scenario.systems.items():
         for number, table in enumerate(tables):
             yield from (Finding((name, number, key), message) for key, message in table.impossible(scenario))

@@ -5,7 +5,7 @@ The file also declares what the system is to all other rooms (blocksim/world/REA
 says where, as its arrays and kernels are no affair of this room.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import ValidationInfo, create_model
@@ -31,14 +31,6 @@ class SystemTable(Table):
 
 SYSTEMS: dict[str, type[SystemTable]] = {}
 """Table of a scenario and its model."""
-
-
-def gathered(data: object) -> object:
-    """Return the data of a scenario with the tables of all systems under one key, where there are any."""
-    if not isinstance(data, Mapping) or not any(name in SYSTEMS for name in data):
-        return data
-    held = {name: entry for name, entry in data.items() if name in SYSTEMS}
-    return {**{key: entry for key, entry in data.items() if key not in held}, HELD: held}
 
 
 def read_tables(held: Any, info: ValidationInfo) -> dict[str, tuple[SystemTable, ...]]:

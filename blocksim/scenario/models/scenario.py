@@ -1,5 +1,6 @@
 """The whole scenario, and its JSON Schema."""
 
+from collections.abc import Mapping
 from html import escape
 from typing import Annotated, Any, Literal
 
@@ -25,7 +26,7 @@ from blocksim.scenario.models.start import Start
 from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
-from blocksim.scenario.systems import HELD, SYSTEMS, SystemTable, gathered, read_tables
+from blocksim.scenario.systems import HELD, SYSTEMS, SystemTable, read_tables
 from blocksim.scenario.units import USUAL_GRAVITY
 
 SCHEMA_VERSION = 1
@@ -77,7 +78,10 @@ class Scenario(Table):
     @model_validator(mode="before")
     @classmethod
     def _with_systems(cls, data: object) -> object:
-        return gathered(data)
+        if not isinstance(data, Mapping) or not any(name in SYSTEMS for name in data):
+            return data
+        held = {name: entry for name, entry in data.items() if name in SYSTEMS}
+        return {**{key: entry for key, entry in data.items() if key not in held}, HELD: held}
 
     @model_serializer(mode="wrap")
     def _without_systems(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:

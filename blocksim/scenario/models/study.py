@@ -20,7 +20,7 @@ from pydantic_core import CoreSchema
 
 from blocksim.scenario import quantities as q
 from blocksim.scenario.models.base import OneOf, Table, Whole, table_path
-from blocksim.scenario.models.variation import VALUES_SCHEMA, Variation, read_any, read_sampled, read_spread
+from blocksim.scenario.models.variation import VALUES_SCHEMA, Variation, read_sampled, read_spread
 from blocksim.scenario.spelling import nearest
 
 MAX_SAMPLES = 1_000_000
@@ -64,9 +64,10 @@ def _variation(value: object, info: ValidationInfo) -> Variation:
     mode = info.data.get("mode")
     if mode == "table":
         raise q.invalid('mode "table" takes keys and values from its table', at="key")
-    if mode is None:
-        return read_any(value)
-    return read_sampled(value) if mode in SAMPLED else read_spread(value)
+    is_sampled = mode in SAMPLED
+    if mode is None and isinstance(value, Mapping):
+        is_sampled = "count" not in value and bool({"from", "to", "mean", "sd"} & set(value))
+    return read_sampled(value) if is_sampled else read_spread(value)
 
 
 def _of_the_mode(value: object, info: ValidationInfo) -> object:

@@ -117,13 +117,6 @@ def read_sampled(value: object) -> Variation:
     return Uniform(low, high, scale, angle, _unit(value, "from", "to"))
 
 
-def read_any(value: object) -> Variation:
-    """Return what a value says where the mode is not known."""
-    if isinstance(value, Mapping) and "count" not in value and {"from", "to", "mean", "sd"} & set(value):
-        return read_sampled(value)
-    return read_spread(value)
-
-
 def _levels(value: object, tables: str) -> tuple[Any, ...]:
     if not isinstance(value, list | tuple):
         raise q.invalid(f"{q.shown(value)} is not a variation; write a list or {tables}, and the key in quotes")
