@@ -1,7 +1,7 @@
 """The systems of scenes and how pairs of them act on one another; see blocksim/world/README.md.
 
-A system of the user's choice is one file, and one line in `blocksim.scenario.systems.SYSTEMS`; every pair that can meet
-is one line in `INTERACTIONS`.
+A system of the user's choice is one file, and one line in `blocksim.scenario.systems.SYSTEMS`;
+every pair that can meet is one line in `INTERACTIONS`.
 """
 
 from collections.abc import Callable, Iterator
