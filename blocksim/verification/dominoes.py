@@ -17,18 +17,16 @@ from math import asin, cos, sin, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.verification.case import Row, Setting, relative
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
     from blocksim.verification.scene import Simulation
 
-    Floats = NDArray[np.float64]
-
+Floats = NDArray[np.float64]
 STEPS = 400  # of the foremost domino's angle between two collisions of the model
 TALL, THICK = 0.048, 0.0075  # m
 COUNT = 24
