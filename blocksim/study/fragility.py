@@ -30,7 +30,8 @@ from blocksim.study.fragility_plan import COLLAPSE, FragilityPlan, read_fragilit
 from blocksim.study.plan import Values
 from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, Timings
 from blocksim.study.rows import FINISHED, Head, Row, check_experiment
-from blocksim.study.study import Replay, Study, folder_for
+from blocksim.study.runs import Replay, folder_for
+from blocksim.study.study import Study
 from blocksim.study.sweep import TIMINGS, SweepRun, refuse_loss
 from blocksim.study.sweep_folder import SHARD, FolderKind, prepare
 from blocksim.study.sweep_table import SweepTable

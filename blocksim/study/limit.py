@@ -49,7 +49,8 @@ from blocksim.study.limit_plan import (
 from blocksim.study.limit_search import Change, Number, changes_in, next_near, next_values
 from blocksim.study.plan import Values
 from blocksim.study.rows import FINISHED, Head, Row
-from blocksim.study.study import Replay, Runs, Study, folder_for, runs_of
+from blocksim.study.runs import Replay, Runs, folder_for, runs_of
+from blocksim.study.study import Study
 from blocksim.study.sweep_folder import CASES, prepare
 
 SHIFT = 2.5e-3  # share of a limit by which springs may shift it unasked: half of what is warned of, as it is foretold

@@ -21,7 +21,8 @@ from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.plan import Case, Cases
 from blocksim.study.progress import PATTERN, CaseIndex, read_entries
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row, varied_cells
-from blocksim.study.study import Replay, Study, study_in
+from blocksim.study.runs import Replay
+from blocksim.study.study import Study, study_in
 from blocksim.study.sweep import cases_in, measured_ranges
 from blocksim.study.sweep_folder import CASES, SWEEP, FolderKind, case_folder, read_origin, read_plan
 from blocksim.study.sweep_table import NO_TABLE, OUTCOME, lines_in

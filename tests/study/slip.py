@@ -11,7 +11,8 @@ from blocksim.silence import silent
 from blocksim.study.answer import Answer, Table, folder_kind
 from blocksim.study.executors import Execution
 from blocksim.study.rows import Row
-from blocksim.study.study import Replay, Study, runs_of
+from blocksim.study.runs import Replay, runs_of
+from blocksim.study.study import Study
 from blocksim.study.sweep_folder import FolderKind
 from blocksim.view.layout import Paper
 from tests.study.test_limit import SQUAT, block_on_a_slope
