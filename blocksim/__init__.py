@@ -24,13 +24,12 @@ if TYPE_CHECKING:
     from blocksim.study.converge import converge
     from blocksim.study.fragility import fragility
     from blocksim.study.limit import limit, limit_curve
-    from blocksim.study.pictures import plot
+    from blocksim.study.manifest import read_sweep as open_sweep
+    from blocksim.study.pictures import animate, plot
     from blocksim.study.reporting import report
     from blocksim.study.run import open_run, run
-    from blocksim.study.run_pictures import animate
     from blocksim.study.sensitivity import sensitivity
     from blocksim.study.sweep import sweep
-    from blocksim.study.sweep_table import read_sweep as open_sweep
 
 __version__ = "0.3.0"
 __all__ = [
@@ -54,7 +53,7 @@ __all__ = [
 
 # found when first asked for, so that `blocksim --help` need not wait for numba and pandas
 _HOMES = {
-    "animate": ("blocksim.study.run_pictures", "animate"),
+    "animate": ("blocksim.study.pictures", "animate"),
     "calibrate": ("blocksim.study.calibrate", "calibrate"),
     "compare": ("blocksim.study.compare", "compare"),
     "converge": ("blocksim.study.converge", "converge"),
@@ -63,7 +62,7 @@ _HOMES = {
     "limit_curve": ("blocksim.study.limit", "limit_curve"),
     "load": ("blocksim.scenario", "load_scenario"),
     "open_run": ("blocksim.study.run", "open_run"),
-    "open_sweep": ("blocksim.study.sweep_table", "read_sweep"),
+    "open_sweep": ("blocksim.study.manifest", "read_sweep"),
     "plot": ("blocksim.study.pictures", "plot"),
     "replace": ("blocksim.scenario", "replace_values"),
     "report": ("blocksim.study.reporting", "report"),

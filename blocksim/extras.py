@@ -10,7 +10,7 @@ from blocksim.errors import UnavailableError
 STUDY, CLUSTER = "study", "cluster"
 
 
-def loaded(module: str, purpose: str, extra: str = STUDY) -> Any:
+def load_module(module: str, purpose: str, extra: str = STUDY) -> Any:
     """Return a module; the message says what needs it.
 
     Raises UnavailableError.

@@ -9,8 +9,9 @@ How to write them, as in `study/sweep.py`:
   position, as in `sweep(scenario, {"gravity": [9.7, 9.8]})`.
 * `@takes(SweepOptions)` above `def sweep(scenario, options: SweepOptions)` lets callers give `SweepOptions(...)` or the
   same names as arguments. Signature and docstring list all of them, and type checkers know them.
-* A parameter `options: SweepOptions` of a command (`cli/options.py`) becomes its options: own fields, then inherited.
-  `Option` says what differs there: flags, choices, a reader of the text. `replace(options, on_row=...)` adds the rest.
+* A parameter `options: SweepOptions` of a command (`cli/command_line.py`) becomes its options: own fields, then
+  inherited ones. `Option` says what differs there: flags, choices, a reader of the text. `replace(options,
+  on_row=...)` adds the rest.
 """
 
 import inspect

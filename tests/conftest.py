@@ -56,7 +56,7 @@ class Start(Protocol):
 def same_disk() -> Iterator[None]:
     """Let runs find a gigabyte on every disk: a test that asks for more fails on all machines, not on small ones."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("blocksim.simulation.disk_room.shutil", SimpleNamespace(disk_usage=lambda _: ROOM))
+        patch.setattr("blocksim.simulation.run.shutil", SimpleNamespace(disk_usage=lambda _: ROOM))
         yield
 
 

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import blocksim
-from blocksim.cli.commands import loaded
+from blocksim.cli.commands import load_command
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError
 from blocksim.options import option_fields
 from blocksim.simulation import Result
 from blocksim.study.calibrate import CalibrateOptions
+from blocksim.study.pictures import AnimateOptions, PlotOptions
 from blocksim.study.run import RunOptions
-from blocksim.study.run_pictures import AnimateOptions, PlotOptions
 from blocksim.study.sensitivity import SensitivityOptions
 from blocksim.study.sweep import SweepOptions
 
@@ -65,7 +65,7 @@ OPTIONS = {
 
 @pytest.mark.parametrize("name", OPTIONS)
 def test_a_function_takes_the_options_of_its_command_with_the_same_help(name: str) -> None:
-    function, command = getattr(blocksim, name), loaded(name)
+    function, command = getattr(blocksim, name), load_command(name)
     texts = {param.name: param.help for param in command.params}
     names = list(inspect.signature(function).parameters)
     for field in option_fields(OPTIONS[name]):

@@ -15,9 +15,9 @@ FLAGS = {"shell", "allow_pickle"}
 
 EXCEPTIONS = {
     "bench/startup.py: subprocess.run": "measures how long `blocksim --help` takes to start: its own fixed command",
-    "kernels/common/cache.py: pickle": "machine code, as numba keeps it: from a cache folder of this user",
-    "view/animation_files.py: subprocess.run": "asks the ffmpeg on the PATH which encoders it has: a fixed command",
-    "view/animation_files.py: subprocess.Popen": "gives pixels to the ffmpeg on the PATH: fixed options, its path",
+    "kernels/common/jit.py: pickle": "machine code, as numba keeps it: from a cache folder of this user",
+    "view/animation.py: subprocess.run": "asks the ffmpeg on the PATH which encoders it has: a fixed command",
+    "view/animation.py: subprocess.Popen": "gives pixels to the ffmpeg on the PATH: fixed options, its path",
 }
 """Places that may do it, and why no data of others reach them. Not in our source, and so not found here: processes of a
 sweep, and Dask with --scheduler, pass scenarios between each other with pickle. Nothing of this reads what comes with

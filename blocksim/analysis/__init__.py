@@ -1,8 +1,7 @@
 """Measured tables, comparison with them, and closed forms: functions of tables and numbers only."""
 
 from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict, compare_final
-from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
-from blocksim.analysis.properties import PropertyTable, load_properties
+from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, PropertyTable, load_properties, load_table
 
 __all__ = [
     "QUANTITIES",

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.simulation.contacts import CONTACT_ROW, UNITS, Contacts, Rows
-from blocksim.simulation.frames import Floats, Frames
+from blocksim.simulation.frames import CONTACT_ROW, UNITS, Contacts, Floats, Frames, Rows
 
 MILLI = 1e3
 MOTION = {  # quantity of a frame: its name in tables, and SI -> that unit

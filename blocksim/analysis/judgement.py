@@ -6,10 +6,9 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from blocksim.analysis.compare import html_of, plain
+from blocksim.analysis.evidence import Evidence, Failure, Findings, Members
 from blocksim.analysis.experiment import ExperimentTable
-from blocksim.analysis.members import Failure, Members
 from blocksim.analysis.metrics import METRICS
-from blocksim.analysis.metrics.metric import Evidence, Findings
 from blocksim.errors import InvalidInputError
 
 if TYPE_CHECKING:

@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.analysis.intervals import CONFIDENCE, interval
-from blocksim.extras import loaded
+from blocksim.analysis.compare import CONFIDENCE, interval
+from blocksim.extras import load_module
 
 Floats = NDArray[np.float64]
 PURPOSE = "fitting a fragility curve"
@@ -142,7 +142,7 @@ def inflation_of(counts: Counts, failed: Floats, members: Floats) -> float:
 
 
 def _special() -> Any:
-    return loaded("scipy.special", PURPOSE)
+    return load_module("scipy.special", PURPOSE)
 
 
 def _refusal(counts: Counts, confidence: float) -> NoCurve | None:

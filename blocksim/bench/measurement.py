@@ -1,17 +1,19 @@
-"""A measurement of speed: its definition, its run, its numbers with their samples, and the whole as data."""
+"""A measurement of speed: definition, run, numbers with their samples, machine, and the whole as data."""
 
 from __future__ import annotations
 
 import json
+import os
 import statistics
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
+
+from blocksim.simulation.provenance import environment
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from blocksim.bench.machine import Machine
 
 REPEATS = 5
 
@@ -117,7 +119,7 @@ def report(machine: Machine, outcomes: Sequence[Outcome]) -> dict[str, object]:
     return plain
 
 
-def repeated(quantity: str, unit: str, sample: Callable[[], float], repeats: int) -> Number:
+def repeat(quantity: str, unit: str, sample: Callable[[], float], repeats: int) -> Number:
     """Return a number with its samples."""
     return Number(quantity, unit, tuple(float(sample()) for _ in range(repeats)))
 
@@ -125,3 +127,56 @@ def repeated(quantity: str, unit: str, sample: Callable[[], float], repeats: int
 def single(quantity: str, unit: str, value: float) -> Number:
     """Return a number that needs no repeats: counted, or computed from others."""
     return Number(quantity, unit, (float(value),))
+
+
+BUSY = 0.5  # processes at work on average over the last minute, before anything was measured
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Processor, system, versions, and load at the start."""
+
+    processor: str
+    cores: int
+    platform: str
+    python: str
+    numba: str
+    numpy: str
+    blocksim: str
+    code: str
+    load: float | None  # None where the system does not report it
+
+    @property
+    def is_busy(self) -> bool:
+        """Return True if other processes share the machine, so that times are too long and scatter."""
+        return self.load is not None and self.load > BUSY
+
+    def lines(self) -> list[str]:
+        """Return it as text."""
+        load = "unknown" if self.load is None else f"{self.load:.2f}"
+        found = [
+            f"{self.processor}, {self.cores} cores, load {load} at the start",
+            f"blocksim {self.blocksim}, Python {self.python}, numba {self.numba}, numpy {self.numpy}",
+            self.platform,
+        ]
+        if self.is_busy:
+            found.append("Other processes are running: times are upper bounds and scatter.")
+        return found
+
+    def to_dict(self) -> dict[str, object]:
+        """Return it for programs."""
+        return {**asdict(self), "busy": self.is_busy}
+
+
+def this_machine() -> Machine:
+    """Return this machine with its present load."""
+    found = environment()
+    names = ("processor", "platform", "python", "numba", "numpy", "blocksim", "code")
+    return Machine(cores=os.cpu_count() or 1, load=_load(), **{name: found[name] for name in names})
+
+
+def _load() -> float | None:
+    try:
+        return round(os.getloadavg()[0], 2)
+    except (AttributeError, OSError):  # some systems have none
+        return None

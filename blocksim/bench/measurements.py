@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from blocksim.bench import ensemble, soils, startup, threads, three_blocks, walls
+from blocksim.bench import soils, startup, three_blocks, walls
 from blocksim.bench.measurement import Measurement
 from blocksim.errors import BlocksimError, ExitCode
 from blocksim.scenario.spelling import nearest
@@ -11,12 +11,12 @@ MOST_SLIPS = 3
 
 MEASUREMENTS = (
     three_blocks.EXPLICIT,
-    ensemble.ENSEMBLE,
+    three_blocks.ENSEMBLE,
     walls.EXPLICIT,
-    threads.EXPLICIT_THREADS,
+    walls.EXPLICIT_THREADS,
     three_blocks.NONSMOOTH,
     walls.NONSMOOTH,
-    threads.NONSMOOTH_THREADS,
+    walls.NONSMOOTH_THREADS,
     soils.SOILS,
     startup.START_UP,
 )
@@ -28,7 +28,7 @@ class UnknownMeasurementError(BlocksimError):
     exit_code = ExitCode.USAGE
 
 
-def chosen(names: Sequence[str], table: Sequence[Measurement] | None = None) -> tuple[Measurement, ...]:
+def choose(names: Sequence[str], table: Sequence[Measurement] | None = None) -> tuple[Measurement, ...]:
     """Return the measurements of some names, in the order of a table, by default MEASUREMENTS; all without names.
 
     Raises UnknownMeasurementError.

@@ -6,10 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
-from blocksim.bench.scenes import MATERIAL, PUSH, SIDES
-from blocksim.bench.threads import Case, thread_numbers
-from blocksim.bench.timing import Rerun
-from blocksim.bench.walls import Size, explicit_wall
+from blocksim.bench.scenes import MATERIAL, PUSH, SIDES, Rerun
+from blocksim.bench.walls import Case, Size, explicit_wall, thread_numbers
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes.scheme import BODIES_A_THREAD
 

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeat
 from blocksim.bench.scenes import three_blocks
 from blocksim.errors import BlocksimError
 from blocksim.scenario import scenario_to_toml
@@ -28,12 +28,12 @@ def measure(setting: Setting) -> Findings:
     with tempfile.TemporaryDirectory(prefix="blocksim-bench-") as name:
         folder = Path(name)
         numbers = [
-            repeated("blocksim --version", "s", lambda: _seconds(MAIN, "--version"), setting.repeats),
+            repeat("blocksim --version", "s", lambda: _seconds(MAIN, "--version"), setting.repeats),
             _run(folder, setting.repeats),
         ]
         if not setting.quick:
             empty = {CACHE: str(folder / "cache")}
-            numbers.append(repeated("first compilation", "s", lambda: _seconds(COMPILE, **empty), 1))
+            numbers.append(repeat("first compilation", "s", lambda: _seconds(COMPILE, **empty), 1))
     return Findings(tuple(numbers), notes=("wall time of a new process; the first compilation happens once",))
 
 
@@ -43,7 +43,7 @@ def _run(folder: Path, repeats: int) -> Number:
     scenario.write_text(scenario_to_toml(three_blocks()), encoding="utf-8")
     arguments = ("run", str(scenario), "--out", str(folder / "run"), "--overwrite", "--quiet")
     _seconds(MAIN, *arguments)
-    return repeated("blocksim run, three blocks", "s", lambda: _seconds(MAIN, *arguments), repeats)
+    return repeat("blocksim run, three blocks", "s", lambda: _seconds(MAIN, *arguments), repeats)
 
 
 def _seconds(code: str, *arguments: str, **environment: str) -> float:

@@ -1,20 +1,24 @@
-"""The three blocks: time of a step, and time to an answer that finer settings do not change, by both schemes."""
+"""The three blocks by both schemes: time of a step, time to a converged answer, and ensembles."""
 
 from __future__ import annotations
 
 import itertools
 import statistics
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.ensemble import MEMBERS, QUICK_MEMBERS, rates
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated
-from blocksim.bench.scenes import RESTITUTION, Stepping, three_blocks
-from blocksim.bench.timing import Rerun
-from blocksim.scenario.models.stepping import IMPULSES
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeat
+from blocksim.bench.scenes import FRICTION, RESTITUTION, Rerun, Stepping, Table, three_blocks
+from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
+from blocksim.scenario.structures.base import draws
+from blocksim.simulation.ensemble import Ensemble, run_ensemble
 from blocksim.simulation.loop import last_step_of
+from blocksim.simulation.schemes import build_stacks
+from blocksim.world.build import only_stack
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -22,6 +26,76 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from blocksim.scenario import Scenario
+
+
+MEMBERS, QUICK_MEMBERS = 256, 8
+SCATTER = 0.1  # of both coefficients of friction, uniform
+SEED = 1
+THREADS = (1, 2)
+
+
+class SchemeSetting(NamedTuple):
+    """A scheme with the cheapest setting that ends within 0.2 mm, as the measurements of the three blocks find it."""
+
+    scheme: str
+    contact: Table
+    time: Table
+    text: str
+
+
+CONVERGED = Stepping(5e-4, substeps=1)
+SETTINGS = (
+    SchemeSetting(SPRINGS, {"stiffness_scale": 3e-4}, {"safety": 0.1}, "stiffness_scale 0.0003, safety 0.1"),
+    SchemeSetting(IMPULSES, {}, CONVERGED.time(), CONVERGED.setting),
+)
+
+
+def measure_ensemble(setting: Setting) -> Findings:
+    """Advance the same members on one thread and on two, by either scheme."""
+    count = QUICK_MEMBERS if setting.quick else MEMBERS
+    numbers = [
+        number for one in SETTINGS for number in _numbers(one.scheme, scatter_friction(count, one), setting.repeats)
+    ]
+    note = (
+        f"{count} members with friction scattered by {SCATTER:.0%}, until rest, each scheme within 0.2 mm of its own "
+        f"finest run ({'; '.join(f'{one.scheme}: {one.text}' for one in SETTINGS)}); building the scenes is not counted"
+    )
+    return Findings(tuple(numbers), notes=(note,))
+
+
+def scatter_friction(count: int, setting: SchemeSetting) -> list[Scenario]:
+    """Return three blocks with different friction."""
+    scatter = SCATTER * (2.0 * draws(SEED, count, len(FRICTION)) - 1.0)
+    values = np.array([*FRICTION.values()]) * (1.0 + scatter)
+    frictions = (dict(zip(FRICTION, row, strict=True)) for row in values.tolist())
+    return [three_blocks(setting.contact, setting.time, friction) for friction in frictions]
+
+
+def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[Number, Number]:
+    """Return collapses per CPU second, and per second of the clock."""
+    run_ensemble(members[:1])  # compiles what single runs do not need
+    clock: list[float] = []
+
+    def sample() -> float:
+        ensemble = Ensemble(members, only_stack(build_stacks(members)), peaks=False)
+        with ThreadPoolExecutor(threads) as pool:
+            cpu, began = time.process_time(), time.perf_counter()
+            ensemble.advance(pool, threads)
+            clock.append(len(members) / (time.perf_counter() - began))
+            return len(members) / (time.process_time() - cpu)
+
+    rate = repeat("a second and core", "1/s", sample, repeats)
+    return rate, Number(f"a second, {threads} thread{'s' if threads > 1 else ''}", "1/s", tuple(clock))
+
+
+def _numbers(scheme: str, members: Sequence[Scenario], repeats: int) -> Iterable[Number]:
+    found = [rates(members, threads, repeats) for threads in THREADS]
+    for number in (found[0][0], *(clock for _, clock in found)):
+        yield Number(f"{scheme}: {number.quantity}", number.unit, number.samples)
+
+
+ENSEMBLE = Measurement("ensemble", "many collapses together", measure_ensemble, quick="8 members instead of 256")
+
 
 CLOSE = 0.2e-3  # m
 DURATION, QUICK_DURATION = 0.4, 0.01  # s
@@ -73,12 +147,12 @@ class Level:
         }
 
 
-def settled(levels: Sequence[Level], finest: Level) -> list[Level]:
+def converged_levels(levels: Sequence[Level], finest: Level) -> list[Level]:
     """Return the levels, coarse to fine, that are close to the finest, all finer ones too: one can be so by chance."""
     return list(itertools.takewhile(lambda level: level.off(finest) <= CLOSE, reversed(levels)))
 
 
-def solved(setting: Mapping[str, float], scenario: Scenario, repeats: int) -> Level:
+def solve_level(setting: Mapping[str, float], scenario: Scenario, repeats: int) -> Level:
     """Run until the blocks rest."""
     scene = Rerun(scenario)
     last = last_step_of(scenario.time.end, scene.step)
@@ -93,7 +167,7 @@ def measure_explicit(setting: Setting) -> Findings:
     rows = [[_explicit(scale, safety, setting.repeats) for scale in scales] for safety in SAFETIES]
     levels = [level for row in rows for level in row]
     finest = levels[-1]
-    close = [level for row in rows for level in settled(row, finest)]
+    close = [level for row in rows for level in converged_levels(row, finest)]
     cheapest = min(close, key=lambda level: level.median)
     numbers = (
         _step_time(setting),
@@ -112,12 +186,12 @@ def _step_time(setting: Setting) -> Number:
     """At the aluminium's own stiffness, with the blocks at rest for the last quarter."""
     scene = Rerun(three_blocks(time={"stop_at_rest": False}))
     last = last_step_of(QUICK_DURATION if setting.quick else DURATION, scene.step)
-    return repeated("a step", "ns", lambda: 1e9 * scene.run(last).seconds / last, setting.repeats)
+    return repeat("a step", "ns", lambda: 1e9 * scene.run(last).seconds / last, setting.repeats)
 
 
 def _explicit(scale: float, safety: float, repeats: int) -> Level:
     scenario = three_blocks(contact={"stiffness_scale": scale}, time={"safety": safety})
-    return solved({"stiffness_scale": scale, "safety": safety}, scenario, repeats)
+    return solve_level({"stiffness_scale": scale, "safety": safety}, scenario, repeats)
 
 
 def measure_nonsmooth(setting: Setting) -> Findings:
@@ -126,7 +200,7 @@ def measure_nonsmooth(setting: Setting) -> Findings:
     steps, finest_step = (QUICK_STEPS, QUICK_FINEST) if setting.quick else (STEPS, FINEST)
     finest = _nonsmooth(Stepping(finest_step, substeps=1), RESTITUTION, setting)
     rows = [[_nonsmooth(Stepping(step, parts), RESTITUTION, setting) for step in steps] for parts in SUBSTEPS]
-    close = [level for row in rows for level in settled(row, finest)] or [finest]
+    close = [level for row in rows for level in converged_levels(row, finest)] or [finest]
     cheapest = min(close, key=lambda level: level.median)
     members = QUICK_MEMBERS if setting.quick else MEMBERS
     numbers = (*_alone_and_among(members, 0.0, without), *_alone_and_among(members, RESTITUTION, cheapest))
@@ -145,7 +219,7 @@ def measure_nonsmooth(setting: Setting) -> Findings:
 
 
 def _nonsmooth(stepping: Stepping, restitution: float, setting: Setting) -> Level:
-    return solved(stepping.keys, three_blocks({"restitution": restitution}, stepping.time()), setting.repeats)
+    return solve_level(stepping.keys, three_blocks({"restitution": restitution}, stepping.time()), setting.repeats)
 
 
 def _places(level: Level) -> str:

@@ -26,8 +26,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without ± is no reason to fail
-    from blocksim.cli.commands import app
-    from blocksim.cli.failures import tell_internal_error
+    from blocksim.cli.commands import app, report_internal_error
     from blocksim.errors import ExitCode
 
     try:
@@ -35,7 +34,7 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(ExitCode.STOPPED_EARLY)
     except Exception as error:  # noqa: BLE001 - the last line of defence
-        tell_internal_error(error)
+        report_internal_error(error)
         sys.exit(ExitCode.INTERNAL)
     finally:
         leave_all()

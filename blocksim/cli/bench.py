@@ -7,17 +7,16 @@ from typing import Annotated
 
 import typer
 
-from blocksim.bench.machine import Machine, this_machine
-from blocksim.bench.measurement import REPEATS, Number, Outcome, Setting, report
-from blocksim.bench.measurements import chosen
-from blocksim.cli import options
+from blocksim.bench.measurement import REPEATS, Machine, Number, Outcome, Setting, report, this_machine
+from blocksim.bench.measurements import choose
+from blocksim.cli import command_line
 from blocksim.cli.output import grouped_lines, note, show
-from blocksim.cli.prepare import tell_compilation
+from blocksim.cli.prepare import announce_compilation
 from blocksim.cli.progress import one_by_one
 from blocksim.errors import OutputError
 from blocksim.simulation.atomic import write_text
-from blocksim.simulation.own_files import refuse_foreign
-from blocksim.verification.verify import number
+from blocksim.simulation.folder import refuse_foreign
+from blocksim.verification.case import number
 
 COLUMNS = ("quantity", "unit", "median", "smallest", "largest")
 DIGITS = 3
@@ -42,9 +41,9 @@ def bench_command(
         Path | None,
         typer.Option("--out", metavar="FILE", help="Write everything as JSON."),
     ] = None,
-    overwrite: options.Replace = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
+    overwrite: command_line.Replace = False,
+    as_json: command_line.Json = False,
+    quiet: command_line.Quiet = False,
 ) -> None:
     """Measure speed and memory, and show the table.
 
@@ -54,14 +53,14 @@ def bench_command(
     Example: blocksim bench walls --out bench.json
     """
     silent = quiet or as_json
-    wanted = chosen(names or [])
+    wanted = choose(names or [])
     if out is not None:  # checked before minutes of measuring
         if out.is_dir() or not out.absolute().parent.is_dir():
             message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}"
             raise OutputError(message)
         refuse_foreign(out, overwrite=overwrite)
     machine = this_machine()
-    tell_compilation("surface", quiet=silent)
+    announce_compilation("surface", quiet=silent)
     outcomes: list[Outcome] = []
     try:
         told = one_by_one(wanted, lambda one: f"{one.name}: {one.title}", quiet=silent)

@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
-from blocksim.cli.options import Report, Screen
+from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import note, number, table_lines
-from blocksim.cli.prepare import ScenarioInput, tell_compilation
+from blocksim.cli.prepare import ScenarioInput, announce_compilation
 from blocksim.errors import ExitCode
 from blocksim.silence import silent
 from blocksim.study.calibrate import CalibrateOptions, Fit, calibrate
-from blocksim.study.calibrate_search import Trial
+from blocksim.study.calibrate_plan import Trial
 
 COLUMNS = ("key", "prior", "fitted")
 TIED = ("key", "prior", "equally good", "written")
@@ -35,7 +35,7 @@ def calibrate_command(source: ScenarioInput, options: CalibrateOptions, screen: 
         source.document(),
         replace(
             options,
-            on_start=partial(tell_compilation, quiet=screen.silent),
+            on_start=partial(announce_compilation, quiet=screen.silent),
             on_trial=silent if screen.silent else _trial_lines(),
         ),
     )

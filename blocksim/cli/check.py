@@ -7,23 +7,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated
 
-from blocksim.cli.options import Report, Screen
+from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import GAP, duration, number, table_lines, width_of_screen
 from blocksim.cli.prepare import ScenarioInput
 from blocksim.options import Option
 from blocksim.scenario import PlacedBody, Scenario, place_bodies, scenario_to_toml
-from blocksim.scenario.drives import drives_of, greatest_rate
-from blocksim.scenario.events import in_order
-from blocksim.scenario.models.history import Constant, Ramp
-from blocksim.scenario.models.loads import AnyLoad, Force, Gravity, Horizontal, Moment, Pressure
-from blocksim.scenario.models.probe import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
-from blocksim.scenario.motion import settles
-from blocksim.scenario.pairs import DEFAULT, MATERIALS
-from blocksim.scenario.plausible import implausible_values
-from blocksim.scenario.probes import probe_names
+from blocksim.scenario.check import implausible_values
+from blocksim.scenario.events import in_order, probe_names
+from blocksim.scenario.models.loads import AnyLoad, Constant, Force, Gravity, Horizontal, Moment, Pressure, Ramp
+from blocksim.scenario.models.stepping import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
+from blocksim.scenario.motion import drives_of, greatest_rate, settles
+from blocksim.scenario.resolved import DEFAULT, MATERIALS
 from blocksim.scenario.units import STANDARD_GRAVITY
-from blocksim.simulation.happened import in_words
-from blocksim.simulation.probe_series import bytes_of_series
+from blocksim.simulation.probes import bytes_of_series
+from blocksim.simulation.result import describe_event
 from blocksim.study.rows import check_experiment
 from blocksim.world.describe import Description, PairDescription, StepLimits, describe
 from blocksim.world.free_memory import readable
@@ -142,7 +139,7 @@ def _acting(scenario: Scenario) -> Iterator[str]:
         yield f"driven     {place_bodies(scenario)[drive.body].name}{kind}, at most {' and '.join(rates)}{rests}"
     events = [scenario.events[k] for k in in_order(scenario.events)]
     yield from _some(
-        "event", [f"{'at rest' if one.at is None else f'{one.at:.3f} s'}: {in_words(one)}" for one in events]
+        "event", [f"{'at rest' if one.at is None else f'{one.at:.3f} s'}: {describe_event(one)}" for one in events]
     )
     loads = enumerate(scenario.loads)
     yield from _some("load", [f"{load.name or f'loads.{number}'}: {_load(load)}" for number, load in loads])

@@ -1,9 +1,12 @@
-"""The command `blocksim`: its options, and the table of its subcommands, each imported only when it is called.
+"""The command `blocksim`: its subcommands, each imported when it is called, and errors as messages and exit codes."""
 
-So `blocksim --help` need not wait for numba, pandas and HDF5, and `blocksim check` not for matplotlib.
-"""
-
+import errno
 import re
+import sys
+import tempfile
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,9 +15,95 @@ import typer
 from typer.core import TyperGroup
 
 from blocksim import __version__
-from blocksim.cli.failures import told
-from blocksim.cli.process import clearing_up, loading
-from blocksim.errors import InputMissingError
+from blocksim.cli.output import abandon, note
+from blocksim.cli.process import cleanup_state, pause_collector
+from blocksim.errors import BlocksimError, ExitCode, InputMissingError
+
+PATH_TROUBLE = {errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES}
+DISK_TROUBLE = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS}
+
+MEMORY = "memory; close other programs, or raise the limit (ulimit -v)"
+FILES = "file handles; raise the limit (ulimit -n)"
+THREADS = "threads or processes; use fewer (--threads, --jobs), or raise the limit (ulimit -u, ulimit -v)"
+SHORTAGES = (
+    (MEMORY, {errno.ENOMEM}, ("Cannot allocate memory", "failed to map segment", "nable to allocate")),
+    (FILES, {errno.EMFILE, errno.ENFILE}, ("Too many open files",)),
+    (THREADS, {errno.EAGAIN}, ("can't start new thread",)),
+)
+
+LONGEST_NAME = 200  # characters of a path that a message shows
+
+
+@contextmanager
+def errors_as_messages() -> Iterator[None]:
+    """Report every error that a user can cause and leave with its exit code; flush the answer first."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BlocksimError as error:
+        note(str(error))
+        raise typer.Exit(error.exit_code) from None
+    except KeyboardInterrupt:
+        note("stopped")
+        raise typer.Exit(ExitCode.STOPPED_EARLY) from None
+    except Exception as error:
+        missing = _shortage(error)
+        if missing:
+            note(f"the system has run out of {missing}")
+            raise typer.Exit(ExitCode.INPUT_OUTPUT) from None
+        if not isinstance(error, OSError):
+            raise
+        raise typer.Exit(_tell_trouble(error)) from None
+
+
+def _shortage(error: BaseException | None) -> str:
+    """Return what the system ran out of, in words; nothing where that was not the cause of an error.
+
+    Libraries wrap such an error in others, and the loader of shared libraries reports it as a text.
+    """
+    while error is not None:
+        for words, numbers, texts in SHORTAGES:
+            number = getattr(error, "errno", None)
+            if number in numbers or any(text in str(error) for text in texts):
+                return words
+        if isinstance(error, MemoryError):
+            return MEMORY
+        error = error.__cause__ or error.__context__
+    return ""
+
+
+def _tell_trouble(error: OSError) -> ExitCode:
+    """Report an input or output error; raise it again where the user did not cause it."""
+    if isinstance(error, BrokenPipeError):  # the reader of our answer has gone: nothing to report
+        abandon(sys.stdout)
+        return ExitCode.INPUT_OUTPUT
+    if error.errno in PATH_TROUBLE and error.filename is not None:
+        note(f"{_shortened(error.filename)}: cannot be reached: {error.strerror}")
+        return ExitCode.INPUT_OUTPUT
+    if error.errno not in DISK_TROUBLE:
+        raise error
+    note(f"{error.filename or 'the answer'}: cannot be written: {error.strerror}")
+    abandon(sys.stdout)
+    return ExitCode.INPUT_OUTPUT
+
+
+def _shortened(name: object) -> str:
+    """Return a name for a line of a message."""
+    text = "".join(c if c.isprintable() else "\ufffd" for c in str(name))
+    return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}…"
+
+
+def report_internal_error(error: Exception) -> None:
+    """Print one line; the traceback goes to a file."""
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="blocksim-error-", suffix=".txt", delete=False) as file:
+            traceback.print_exception(error, file=file)
+    except OSError:
+        note(f"internal error: {what}; please report it (a file with the details could not be written)")
+    else:
+        note(f"internal error: {what}; please report it with the file {file.name}")
+
 
 COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command, in verify_run.py unless in MODULES
     "run": "Simulate a scenario and print the final positions.",
@@ -65,11 +154,11 @@ class CommandGroup(TyperGroup):
         """Import the command that the user named."""
         name, command, rest = super().resolve_command(ctx, args)
         _refuse_no_folder()
-        return name, loaded(name) if name in COMMANDS else command, rest
+        return name, load_command(name) if name in COMMANDS else command, rest
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
-        with told(), clearing_up(wanted=True):
+        with errors_as_messages(), cleanup_state(wanted=True):
             try:
                 return super().invoke(ctx)
             except UsageError as error:
@@ -82,7 +171,7 @@ def _quoting_hint(message: str) -> str:
     found = re.fullmatch(r"Got unexpected extra argument\w*(?:\(s\))? \((\S+)\)", message)
     if found is None:
         return ""
-    from blocksim.scenario.quantities import unit_in
+    from blocksim.scenario.units import unit_in
 
     return f'; quote a value that has a unit: "KEY=10 {found[1]}"' if unit_in(f"1 {found[1]}") else ""
 
@@ -101,14 +190,14 @@ def function_of(name: str) -> Any:
     return getattr(import_module(f"blocksim.cli.{MODULES.get(name, plain)}"), f"{plain}_command")
 
 
-def loaded(name: str) -> Any:
+def load_command(name: str) -> Any:
     """Return the command of a name, ready to be called."""
-    with loading(), clearing_up(wanted=False):
-        from blocksim.cli.options import expanded
+    with pause_collector(), cleanup_state(wanted=False):
+        from blocksim.cli.command_line import as_typer_command
 
         function = function_of(name)
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-    ready = expanded(function, reads_scenarios=name in WITH_SCENARIOS)
+    ready = as_typer_command(function, reads_scenarios=name in WITH_SCENARIOS)
     alone.command(name, short_help=COMMANDS[name], context_settings=HELP)(ready)
     return typer.main.get_command(alone)
 

@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Annotated
 
 from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict
+from blocksim.analysis.evidence import BLOCK, Column, Findings, Form, Metric, Row, Value
 from blocksim.analysis.judgement import THRESHOLD, U_NUM, Judgement, Settings
 from blocksim.analysis.metrics import METRICS
-from blocksim.analysis.metrics.metric import BLOCK, Column, Findings, Form, Metric, Row, Value
-from blocksim.cli.options import Report, Screen
+from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import number, table_lines, width_of_screen
 from blocksim.errors import ExitCode
 from blocksim.options import Option
-from blocksim.scenario.path_policy import near
+from blocksim.scenario.input_files import relative_path
 from blocksim.study.compare import ExperimentTablePath, compare_run, compare_sweep
+from blocksim.study.manifest import is_sweep
 from blocksim.study.stored_run import find_run
-from blocksim.study.sweep_table import is_sweep
 
 COLUMNS = ("block", "quantity", "simulated", "mean ± s", "[min, max]", "error", "verdict")
 DIGITS = 2
@@ -74,7 +74,7 @@ def compare_command(
             data.append({"run": str(head), **comparison.to_dict()})
             judged.append(comparison.inside)
         is_alone = screen.quiet and len(runs) == 1
-        texts.append("\n".join(lines if is_alone else (f"{head} against {near(source)}:", *lines)))
+        texts.append("\n".join(lines if is_alone else (f"{head} against {relative_path(source)}:", *lines)))
     return Report(["\n\n".join(texts)], data, code=ExitCode.SUCCESS if all(judged) else ExitCode.OUTSIDE)
 
 

@@ -73,7 +73,7 @@ def _keys_in(path: Path) -> list[str]:
     import tomllib
 
     from blocksim.scenario import load_scenario, scenario_to_toml
-    from blocksim.scenario.keys import format_key
+    from blocksim.scenario.overrides import format_key
 
     with suppress(Exception):
         paths = _paths(tomllib.loads(scenario_to_toml(load_scenario(path))))

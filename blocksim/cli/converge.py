@@ -11,14 +11,13 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import command_line
 from blocksim.cli.output import note, number, show, table_lines
-from blocksim.cli.prepare import read_scenario, tell_compilation
+from blocksim.cli.prepare import announce_compilation, read_scenario
 from blocksim.errors import ExitCode
-from blocksim.scenario.spelling import listed
+from blocksim.scenario.spelling import list_names
 from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.folder import RESULTS
-from blocksim.simulation.own_files import refuse_foreign
+from blocksim.simulation.folder import RESULTS, refuse_foreign
 from blocksim.study.converge import (
     FEWEST_LEVELS,
     LEVELS,
@@ -27,10 +26,13 @@ from blocksim.study.converge import (
     STIFFNESS,
     TOLERANCE,
     TOLERANCE_MM,
+    Convergence,
+    ConvergenceVerdict,
+    Level,
+    RefinementStudy,
     converge,
     refinements_of,
 )
-from blocksim.study.convergence import Convergence, ConvergenceVerdict, Level, RefinementStudy
 from blocksim.study.pictures import draw_convergence
 from blocksim.study.rows import Row
 from blocksim.view.levels import refuse_small_page
@@ -53,7 +55,7 @@ class Which(StrEnum):
 
 def converge_command(
     *,
-    scenario: options.ScenarioPath,
+    scenario: command_line.ScenarioPath,
     study: Annotated[
         list[Which] | None, typer.Option(help="What to refine (default: all that matters). Repeatable.")
     ] = None,
@@ -64,7 +66,7 @@ def converge_command(
         int,
         typer.Option(min=FEWEST_LEVELS, metavar="N", help="Maximum number of refinements of the scenario's own value."),
     ] = LEVELS,
-    settings: options.Settings = None,
+    settings: command_line.Settings = None,
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes (default: one a core).")] = None,
     out: Annotated[
         Path | None,
@@ -72,9 +74,9 @@ def converge_command(
     ] = None,
     picture: Annotated[bool, typer.Option(help="Draw a picture.")] = True,
     page: PageOptions,
-    overwrite: options.Replace = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
+    overwrite: command_line.Replace = False,
+    as_json: command_line.Json = False,
+    quiet: command_line.Quiet = False,
 ) -> None:
     """Refine step, stiffness and spacing until the run-out converges.
 
@@ -96,7 +98,7 @@ def converge_command(
             refuse_small_page(len(refinements_of(ready, chosen)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture
                 refuse_foreign(path, overwrite=overwrite)
-        tell_compilation(kernels_of(ready), quiet=silent)
+        announce_compilation(kernels_of(ready), quiet=silent)
         result = converge(
             ready,
             tolerance_mm=tolerance,
@@ -204,7 +206,7 @@ def _flips(study: RefinementStudy) -> list[str]:
     lines = []
     for before, level in pairwise(study.levels):
         if level.flipped:
-            named = listed(list(map(_short, level.flipped)), MOST_BLOCKS)
+            named = list_names(list(map(_short, level.flipped)), MOST_BLOCKS)
             blocks = "block" if len(level.flipped) == 1 else "blocks"
             lines.append(f"outcome differs between {before.value:g} and {level.value:g}: {blocks} {named}")
     return lines

@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import completion, options
+from blocksim.cli import command_line, completion
 from blocksim.cli.output import show_answers
-from blocksim.cli.prepare import tell_compilation, warn_of_values
-from blocksim.cli.progress import leaving_unfinished_cases, reporting
+from blocksim.cli.prepare import announce_compilation, warn_of_values
+from blocksim.cli.progress import case_progress, exit_when_stopped
 from blocksim.scenario import Document
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.executors import Execution
@@ -22,12 +22,12 @@ from blocksim.study.fragility_plan import (
     STRIPES,
     read_fragility,
 )
-from blocksim.study.progress import WHOLE, Shard
+from blocksim.study.manifest import WHOLE, Shard
 from blocksim.study.vary import read_variations
 
 
 def fragility_command(
-    scenario: options.ScenarioPath,
+    scenario: command_line.ScenarioPath,
     intensity: Annotated[
         str,
         typer.Option(
@@ -78,10 +78,10 @@ def fragility_command(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed.")] = 0,
-    settings: options.Settings = None,
-    executor: options.ExecutorName = None,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
+    settings: command_line.Settings = None,
+    executor: command_line.ExecutorName = None,
+    jobs: command_line.Jobs = None,
+    scheduler: command_line.Scheduler = None,
     shard: Annotated[
         str | None,
         typer.Option(
@@ -93,9 +93,9 @@ def fragility_command(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Folder to write (default: results/NAME/fragility-HASH)."),
     ] = None,
-    overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
+    overwrite: command_line.Overwrite = False,
+    as_json: command_line.Json = False,
+    quiet: command_line.Quiet = False,
 ) -> None:
     """Find the probability of collapse over an intensity.
 
@@ -120,9 +120,9 @@ def fragility_command(
     base = plan.document.build()
     if not silent:
         warn_of_values(base)
-    tell_compilation(kernels_of(base), quiet=silent)
+    announce_compilation(kernels_of(base), quiet=silent)
     heads = {head.key: head for head in plan.cases.heads}
-    with leaving_unfinished_cases(), reporting(heads.values(), quiet=silent) as on_row:
+    with exit_when_stopped(), case_progress(heads.values(), quiet=silent) as on_row:
         found = run_fragility(
             plan,
             Execution(executor=None if executor is None else executor.value, jobs=jobs, scheduler=scheduler),

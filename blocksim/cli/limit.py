@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import completion, options
+from blocksim.cli import command_line, completion
 from blocksim.cli.output import answer, note, show_answers
-from blocksim.cli.prepare import tell_compilation
-from blocksim.cli.progress import leaving_unfinished_cases
+from blocksim.cli.prepare import announce_compilation
+from blocksim.cli.progress import exit_when_stopped
 from blocksim.scenario import Document
+from blocksim.scenario.check import implausible_values
 from blocksim.scenario.models.stepping import SPRINGS
-from blocksim.scenario.plausible import implausible_values
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.criterion import DEFAULT, Verdict
 from blocksim.study.executors import Execution
@@ -54,7 +54,7 @@ def _share(text: object) -> float:
 
 
 def limit_command(
-    scenario: options.ScenarioPath,
+    scenario: command_line.ScenarioPath,
     vary: Annotated[
         list[str],
         typer.Option(
@@ -109,19 +109,19 @@ def limit_command(
             "contacts as it is, which is halved once otherwise.",
         ),
     ] = None,
-    settings: options.Settings = None,
-    executor: options.ExecutorName = None,
-    jobs: options.Jobs = None,
-    scheduler: options.Scheduler = None,
+    settings: command_line.Settings = None,
+    executor: command_line.ExecutorName = None,
+    jobs: command_line.Jobs = None,
+    scheduler: command_line.Scheduler = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder to write (default: results/NAME/limit-HASH).")
     ] = None,
-    overwrite: options.Overwrite = False,
+    overwrite: command_line.Overwrite = False,
     no_runs: Annotated[
         bool, typer.Option("--no-runs", help="Keep no runs of both sides of a bracket, which plot and report show.")
     ] = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
+    as_json: command_line.Json = False,
+    quiet: command_line.Quiet = False,
 ) -> None:
     """Find the critical value of a parameter (collapse threshold).
 
@@ -149,7 +149,7 @@ def limit_command(
                 shown = f"{value:.6g} {curve.head.unit}".rstrip()
                 note(f"{curve.head.key} = {shown}: {search.runs} runs, {search.run} of them now")
 
-        with leaving_unfinished_cases():
+        with exit_when_stopped():
             points = find_curve(curve, execution, out=out, overwrite=overwrite, stiffer=stiffer, on_limit=tell)
         data = {"folder": str(points.folder), **points.to_dict()}
         show_answers([points], data, as_json=as_json, quiet=quiet)
@@ -163,14 +163,14 @@ def limit_command(
     _warn(next(iter(plans.values())), silent=silent)
     found = {}
     for name, plan in plans.items():
-        tell_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=silent)
+        announce_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=silent)
 
         def tell_run(value: float, verdict: Verdict, row: Row, plan: LimitPlan = plan) -> None:
             if not silent:
                 note(f"{plan.shown(value)}: {verdict.value} ({row['reason']})")
 
         folder = re.sub(r"[^a-z0-9.]+", "-", name)  # needs no quotes in a shell
-        with leaving_unfinished_cases():
+        with exit_when_stopped():
             found[name] = find_limit(
                 plan,
                 execution,
@@ -190,7 +190,7 @@ def limit_command(
 
 def _warn(plan: LimitPlan, *, silent: bool) -> None:
     """Warn of implausible values of the scenario, and of those at both ends of the range; compile what it needs."""
-    tell_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=silent)
+    announce_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=silent)
     if silent:
         return
     ends = (plan.scenario_at(value) for value in (plan.span.low, plan.span.high))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli.options import Report
+from blocksim.cli.command_line import Report
 from blocksim.cli.output import print_json
 from blocksim.errors import OutputError, OutputExistsError
 from blocksim.options import Option

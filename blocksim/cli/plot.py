@@ -4,19 +4,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli.options import Report, TextScreen
+from blocksim.cli.command_line import Report, TextScreen
 from blocksim.cli.output import note
-from blocksim.cli.progress import counting
+from blocksim.cli.progress import count_progress
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.options import Option
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
-from blocksim.simulation.own_files import refuse_foreign
-from blocksim.simulation.stores.formats import format_named
+from blocksim.simulation.folder import refuse_foreign
+from blocksim.simulation.stores.exports import format_named
 from blocksim.study.compare import ExperimentTablePath
-from blocksim.study.pictures import draw
+from blocksim.study.pictures import AnimateOptions, PlotOptions, Replace, draw, draw_film
 from blocksim.study.reporting import MEMBERS, report_on
-from blocksim.study.run_pictures import AnimateOptions, PlotOptions, Replace, draw_film
 from blocksim.study.stored_run import stored_run
 
 MEGABYTE = 1e6
@@ -72,7 +71,7 @@ def animate_command(run: RunPath, options: AnimateOptions, screen: TextScreen) -
 
     Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
     """
-    with counting("frames", quiet=screen.quiet) as on_picture:
+    with count_progress("frames", quiet=screen.quiet) as on_picture:
         film = draw_film(run, replace(options, on_picture=on_picture))
     older, beyond = OLDER if film.is_replaced else "", f"; {film.beyond}" if film.beyond else ""
     told = f"animation: {film.path} ({older}{film.pictures} frames{beyond})"

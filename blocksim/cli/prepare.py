@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli.options import Settings
+from blocksim.cli.command_line import Settings
 from blocksim.cli.output import note
-from blocksim.cli.process import loading
+from blocksim.cli.process import pause_collector
 from blocksim.errors import ScenarioError
 from blocksim.options import Option
 from blocksim.scenario import Document, Scenario
-from blocksim.scenario.findings import Finding
-from blocksim.scenario.plausible import implausible_values
+from blocksim.scenario.check import implausible_values
+from blocksim.scenario.mistakes import Mistake
 from blocksim.world.step import SkinTooSmallError, StepError
 
 
@@ -40,9 +40,9 @@ def read_scenario(path: Path, settings: Sequence[str]) -> Iterator[Scenario]:
     try:
         yield document.build()
     except StepError as error:
-        raise ScenarioError([document.problem(Finding(("time", "step"), str(error)))]) from None
+        raise ScenarioError([document.problem(Mistake(("time", "step"), str(error)))]) from None
     except SkinTooSmallError as error:
-        raise ScenarioError([document.problem(Finding(("contact", "skin"), str(error)))]) from None
+        raise ScenarioError([document.problem(Mistake(("contact", "skin"), str(error)))]) from None
 
 
 def warn_of_values(scenario: Scenario) -> None:
@@ -51,13 +51,13 @@ def warn_of_values(scenario: Scenario) -> None:
         note(f"warning: {text}")
 
 
-def tell_compilation(kernels: str, *, quiet: bool) -> None:
+def announce_compilation(kernels: str, *, quiet: bool) -> None:
     """Compile a set of kernels unless that is done, and report it: it is not part of a run."""
     from blocksim.kernels.common import jit
     from blocksim.simulation.compilation import compile_kernels, is_compiled
 
     if is_compiled(kernels):
-        with loading():
+        with pause_collector():
             compile_kernels(kernels)
         return
     if quiet:

@@ -64,7 +64,7 @@ def take_interrupts() -> None:
 
 
 @contextmanager
-def clearing_up(*, wanted: bool) -> Iterator[None]:
+def cleanup_state(*, wanted: bool) -> Iterator[None]:
     """State for a while whether something has been started that must be cleared up.
 
     If not, as during an import, Ctrl-C ends the process; else the first one raises KeyboardInterrupt.
@@ -88,7 +88,7 @@ def leave_now() -> NoReturn:
 
 
 @contextmanager
-def loading() -> Iterator[None]:
+def pause_collector() -> Iterator[None]:
     """Keep the collector away while code is loaded, and from what has been loaded afterwards."""
     was_enabled = gc.isenabled()
     gc.disable()

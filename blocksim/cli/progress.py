@@ -25,7 +25,7 @@ LIVE_SECONDS = 0.1
 
 
 @contextmanager
-def watching(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
+def run_progress(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
     """Give a function that shows the progress of a run; on a terminal the line disappears at the end."""
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
@@ -58,7 +58,7 @@ def watching(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
 
 
 @contextmanager
-def counting(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+def count_progress(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
     """Give a function that shows how many of all are done; on a terminal the line disappears at the end."""
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
@@ -117,7 +117,7 @@ def _plain_lines() -> "Callable[[Where], None]":
 
 
 @contextmanager
-def leaving_unfinished_cases() -> Iterator[None]:
+def exit_when_stopped() -> Iterator[None]:
     """End the process at once where a study is stopped early, without waiting for a case that takes minutes."""
     from blocksim.study.executors.ensemble import is_still_running
 
@@ -131,12 +131,12 @@ def leaving_unfinished_cases() -> Iterator[None]:
 
 
 @contextmanager
-def reporting(heads: "Iterable[Head]", *, quiet: bool) -> "Iterator[Callable[[int, int, Row], None]]":
+def case_progress(heads: "Iterable[Head]", *, quiet: bool) -> "Iterator[Callable[[int, int, Row], None]]":
     """Give a function that takes every row of a study of these columns: a bar on a terminal, lines elsewhere."""
     if quiet:
         yield lambda *_: None
     elif Console(stderr=True).is_terminal:
-        with counting("cases", quiet=False) as show:
+        with count_progress("cases", quiet=False) as show:
             yield lambda done, total, _: show(done, total)
     else:
         yield _case_lines(list(heads))
@@ -156,7 +156,7 @@ def _case_lines(heads: "Sequence[Head]") -> "Callable[[int, int, Row], None]":
         new += 1
         failed += row["status"] != FINISHED
         if total <= FEW:
-            cells = (f"{shown(head.cell(row[head.key]))} {head.unit}".rstrip() for head in heads)
+            cells = (f"{cell_text(head.cell(row[head.key]))} {head.unit}".rstrip() for head in heads)
             values = ", ".join(f"{name} = {cell}" for name, cell in zip(names, cells, strict=True))
             note(f"{done}/{total} {row['status']}: {values}")
         elif done == total or time.monotonic() - shown_at > PLAIN_SECONDS:
@@ -169,7 +169,7 @@ def _case_lines(heads: "Sequence[Head]") -> "Callable[[int, int, Row], None]":
     return show
 
 
-def shown(value: object) -> str:
+def cell_text(value: object) -> str:
     """Return a cell of the table for people."""
     match value:
         case bool():

@@ -10,17 +10,17 @@ from itertools import islice
 import click
 import typer
 
+from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.compare import comparison_table, verdict_lines
-from blocksim.cli.options import Report, Screen
 from blocksim.cli.output import note, number, table_lines
-from blocksim.cli.prepare import ScenarioInput, tell_compilation, warn_of_values
-from blocksim.cli.progress import watching
+from blocksim.cli.prepare import ScenarioInput, announce_compilation, warn_of_values
+from blocksim.cli.progress import run_progress
 from blocksim.simulation import Result
 from blocksim.simulation.folder import default_folder
-from blocksim.simulation.movement import FIRST, OUTCOME, Movement
-from blocksim.simulation.outcome import REST
-from blocksim.simulation.running import Listener
-from blocksim.simulation.table import rows_of
+from blocksim.simulation.frames import rows_of
+from blocksim.simulation.loop import REST
+from blocksim.simulation.observables import FIRST, OUTCOME, Movement
+from blocksim.simulation.run import RunCallbacks
 from blocksim.study.compare import compare_run
 from blocksim.study.rows import FINISHED
 from blocksim.study.run import RunOptions, run
@@ -48,10 +48,10 @@ def run_command(source: ScenarioInput, options: RunOptions, screen: Screen) -> N
         if options.threads > (count := cores()):  # all wait for one another at every step
             plural = "s" if count > 1 else ""
             note(f"warning: {options.threads} threads on {count} core{plural}: oversubscribed, use {count}")
-        tell_compilation(kernels, quiet=screen.silent)
+        announce_compilation(kernels, quiet=screen.silent)
 
-    listener = Listener(on_start=start) if screen.silent else Listener(note, start)
-    with source.built() as ready, watching(quiet=screen.silent) as on_progress:
+    listener = RunCallbacks(on_start=start) if screen.silent else RunCallbacks(note, start)
+    with source.built() as ready, run_progress(quiet=screen.silent) as on_progress:
         if not screen.silent:
             warn_of_values(ready)
         out = options.out or default_folder(ready)

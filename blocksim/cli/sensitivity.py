@@ -8,10 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli.options import Report, Screen
+from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import number, table_lines
-from blocksim.cli.prepare import ScenarioInput, tell_compilation
-from blocksim.cli.progress import counting
+from blocksim.cli.prepare import ScenarioInput, announce_compilation
+from blocksim.cli.progress import count_progress
 from blocksim.errors import OutputExistsError
 from blocksim.options import Option
 from blocksim.simulation.atomic import write_text
@@ -38,8 +38,8 @@ def sensitivity_command(
     Example: blocksim sensitivity scenarios/slide.toml --vary gravity=9.7:9.9
     """
     _refuse_present(out, overwrite=overwrite)
-    start = partial(tell_compilation, quiet=screen.silent)
-    with counting("runs", quiet=screen.silent) as on_member:
+    start = partial(announce_compilation, quiet=screen.silent)
+    with count_progress("runs", quiet=screen.silent) as on_member:
         found = sensitivity(source.document(), replace(options, on_start=start, on_member=on_member))
     if out is not None:
         write_text(out, _csv(found))

@@ -8,18 +8,18 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli.options import Report, Screen, Settings
+from blocksim.cli.command_line import Report, Screen, Settings
 from blocksim.cli.output import GAP, duration, table_lines, width_of_screen
-from blocksim.cli.prepare import tell_compilation, warn_of_values
-from blocksim.cli.progress import leaving_unfinished_cases, reporting, shown
+from blocksim.cli.prepare import announce_compilation, warn_of_values
+from blocksim.cli.progress import case_progress, cell_text, exit_when_stopped
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario import Document
-from blocksim.simulation.movement import DISPLACEMENT, END_SPEED, FIRST_MOVED, FIRST_MOVER, MOVES_ON, OUTCOME, TURN
+from blocksim.simulation.observables import DISPLACEMENT, END_SPEED, FIRST_MOVED, FIRST_MOVER, MOVES_ON, OUTCOME, TURN
+from blocksim.study.manifest import SweepResult
 from blocksim.study.plan import Estimate, estimate
 from blocksim.study.rows import FINISHED, heads_of
 from blocksim.study.sweep import SweepOptions, kernels_for, merge, run_sweep
-from blocksim.study.sweep_table import SweepResult
 from blocksim.view.sweeps.data import short_names
 from blocksim.world.free_memory import readable
 
@@ -68,9 +68,9 @@ def sweep_command(
         remarks = () if screen.as_json else found.remarks
         return Report(_estimate_lines(found, cores), {**asdict(found), "jobs": cores}, always=remarks)
     for kernels in kernels_for(document):
-        tell_compilation(kernels, quiet=screen.silent)
+        announce_compilation(kernels, quiet=screen.silent)
     heads = () if base.sweep is None else heads_of(base.sweep)
-    with leaving_unfinished_cases(), reporting(heads, quiet=screen.silent) as on_row:
+    with exit_when_stopped(), case_progress(heads, quiet=screen.silent) as on_row:
         result = run_sweep(document, replace(options, on_row=on_row))
     return _table_report(result)
 
@@ -127,7 +127,7 @@ def _table_report(result: SweepResult) -> Report:
 def _texts(result: SweepResult, names: list[str], short: dict[str, str]) -> tuple[list[str], list[list[str]], int]:
     """Return heads and rows of a table of some columns, and how many of these fit on the screen, at least one."""
     heads = [short.get(name, name) for name in names]
-    rows = [[shown(value) for value in row] for row in result.table[names].head(MOST_ROWS).itertuples(index=False)]
+    rows = [[cell_text(value) for value in row] for row in result.table[names].head(MOST_ROWS).itertuples(index=False)]
     width, fitting = -len(GAP), 0
     for column in zip(heads, *rows, strict=True):
         width += len(GAP) + max(map(len, column))
@@ -162,7 +162,7 @@ def _failure_lines(result: SweepResult, short: dict[str, str]) -> Iterator[str]:
     failed = result.table[result.table["status"] != FINISHED]
     yield f"{result.failed} of {len(result.table)} cases did not finish; the first: {failed.iloc[0]['reason']}"
     for _, row in failed.head(MOST_FAILURES).iterrows():
-        values = ", ".join(f"{name} = {shown(row[key])}" for key, name in short.items())
+        values = ", ".join(f"{name} = {cell_text(row[key])}" for key, name in short.items())
         yield f"  {row['status']}: {values}: {str(row['reason']).splitlines()[0]}"
     if len(failed) > MOST_FAILURES:
         yield f"  and {len(failed) - MOST_FAILURES} more; --retry-failed runs them again"

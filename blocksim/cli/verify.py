@@ -4,24 +4,26 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated
 
-from blocksim.cli.options import Report, Screen
+from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import grouped_lines
-from blocksim.cli.prepare import tell_compilation
+from blocksim.cli.prepare import announce_compilation
 from blocksim.cli.progress import one_by_one
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.simulation.compilation import kernel_set
-from blocksim.verification.case import Row, Setting, Verdict
-from blocksim.verification.cases import SettingError, chosen, chosen_of_soil, left_out, refuse_springs
-from blocksim.verification.verify import (
+from blocksim.verification.case import (
     Outcome,
+    Row,
+    Setting,
+    Verdict,
     error_text,
     expected_text,
     number,
     run_case,
     tolerance_text,
 )
+from blocksim.verification.cases import SettingError, choose_cases, choose_soil_cases, excluded_cases, refuse_springs
 
 COLUMNS = ("quantity", "expected", "measured", "error", "tolerance", "verdict")
 
@@ -50,8 +52,8 @@ def verify_command(
     refuse_springs(setting)
     if soil and (not setting.has_springs or setting != replace(Setting(), quick=quick)):
         raise SettingError("--soil has one setting: the surface model, linear springs, the explicit scheme")
-    wanted = chosen_of_soil(cases or []) if soil else chosen(cases or [], setting.scheme)
-    tell_compilation(kernel_set(setting.scheme, setting.model), quiet=screen.silent)
+    wanted = choose_soil_cases(cases or []) if soil else choose_cases(cases or [], setting.scheme)
+    announce_compilation(kernel_set(setting.scheme, setting.model), quiet=screen.silent)
     outcomes: list[Outcome] = []
     try:
         under_way = one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=screen.silent)
@@ -61,7 +63,7 @@ def verify_command(
             screen.print(_report(outcomes))
         raise
     report = _report(outcomes)
-    missing = () if cases or soil else left_out(setting.scheme)
+    missing = () if cases or soil else excluded_cases(setting.scheme)
     return replace(report, notes=[*report.notes, f"left out: {'; '.join(missing)}"]) if missing else report
 
 

@@ -7,18 +7,18 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import options
+from blocksim.cli import command_line
 from blocksim.cli.output import note, show
-from blocksim.cli.prepare import tell_compilation
-from blocksim.cli.progress import watching
+from blocksim.cli.prepare import announce_compilation
+from blocksim.cli.progress import run_progress
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.scenario import load_stored
 from blocksim.simulation.compilation import kernels_of
+from blocksim.study.manifest import is_sweep
 from blocksim.study.run import Threads
 from blocksim.study.study import Study, study_in
 from blocksim.study.sweep import kernels_for
 from blocksim.study.sweep_folder import read_plan
-from blocksim.study.sweep_table import is_sweep
 from blocksim.study.verify_run import EntryDifference, Origin, RunVerdict, scenario_of, verify_run
 from blocksim.study.verify_study import DEGREES, MM, SAMPLE, SweepVerdict, verify_study, verify_sweep
 
@@ -53,8 +53,8 @@ def verify_run_command(
         int, typer.Option(min=1, metavar="N", help="Number of rows of a sweep or study to run again.")
     ] = SAMPLE,
     seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed for the choice of rows.")] = 0,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
+    as_json: command_line.Json = False,
+    quiet: command_line.Quiet = False,
 ) -> None:
     """Run stored results again and check bitwise reproducibility.
 
@@ -91,19 +91,19 @@ def _verified(place: Path, threads: int, sample: int, seed: int, *, silent: bool
 
 
 def _run_again(place: Path, threads: int, *, silent: bool) -> RunVerdict:
-    tell_compilation(kernels_of(scenario_of(place)), quiet=silent)
-    with watching(quiet=silent) as on_progress:
+    announce_compilation(kernels_of(scenario_of(place)), quiet=silent)
+    with run_progress(quiet=silent) as on_progress:
         return verify_run(place, threads=threads, on_progress=on_progress)
 
 
 def _sample_again(folder: Path, sample: int, seed: int, *, silent: bool) -> SweepVerdict:
     for kernels in kernels_for(read_plan(folder)):
-        tell_compilation(kernels, quiet=silent)
+        announce_compilation(kernels, quiet=silent)
     return verify_sweep(folder, sample, seed)
 
 
 def _repeat_study(folder: Path, study: Study, sample: int, seed: int, *, silent: bool) -> tuple[SweepVerdict, ...]:
-    tell_compilation(kernels_of(load_stored(folder / study.answer.files.plan)), quiet=silent)
+    announce_compilation(kernels_of(load_stored(folder / study.answer.files.plan)), quiet=silent)
     return verify_study(folder, study, sample, seed)
 
 

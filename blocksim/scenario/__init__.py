@@ -14,10 +14,15 @@ from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material,
 from blocksim.scenario.models.scenario import Scenario, json_schema
 from blocksim.scenario.models.stepping import Output, Time
 from blocksim.scenario.models.study import Experiment, Sweep
-from blocksim.scenario.pairs import ResolvedPair, resolve_pair
-from blocksim.scenario.placement import PlacedBody, place_bodies
-from blocksim.scenario.resolved import body_table_contents, motion_table_content, scenario_hash, scenario_to_toml
-from blocksim.scenario.segments import PlacedSegment, place_segments, surface_height
+from blocksim.scenario.placement import PlacedBody, PlacedSegment, place_bodies, place_segments, surface_height
+from blocksim.scenario.resolved import (
+    ResolvedPair,
+    body_table_contents,
+    motion_table_content,
+    resolve_pair,
+    scenario_hash,
+    scenario_to_toml,
+)
 
 __all__ = [
     "GROUND",

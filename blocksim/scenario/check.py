@@ -1,20 +1,214 @@
-"""Everything that must hold before a scenario may be used."""
+"""Everything that must hold before a scenario may be used, and warnings of values that are hardly meant."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
+from math import ceil, dist
 from pathlib import Path
+from statistics import median
 from typing import NamedTuple, get_args
 
 from pydantic import ValidationError
 
-from blocksim.scenario import keys
-from blocksim.scenario.consistency import unfit_choices, unknown_provenance, wrong_names
-from blocksim.scenario.findings import MAX_FINDINGS, Finding, findings_of
+from blocksim.scenario import geometry, overrides
+from blocksim.scenario.geometry import count_across
+from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, mistakes_of
+from blocksim.scenario.models.base import SYSTEMS
+from blocksim.scenario.models.contact import GROUND, Contact, Pair
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.study import OWN_KEYS, Mode, Sweep
+from blocksim.scenario.models.stepping import SCHEMES
+from blocksim.scenario.models.study import OWN_KEYS, Mode, Normal, Sweep, Uniform
 from blocksim.scenario.overrides import SYNONYMS, Data, UnfitOverrideError, with_value
-from blocksim.scenario.quantities import shown
-from blocksim.scenario.start import impossible_starts
+from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario.start import impossible_starts, soil_tables, unfit_soils
+from blocksim.scenario.structures import Shaped
+from blocksim.scenario.structures.polygons import Polygons
+from blocksim.scenario.units import toml
+
+BLOCKS_BY_NAME = ("structures", "bodies")
+SPRING_CHOICES = ("model", "law")
+"""Keys of [contact] that rigid contacts do not have."""
+
+
+def wrong_names(data: Data) -> Iterator[Mistake]:
+    """Find names of blocks and materials that do not exist, and scenarios without a body."""
+    if all(data.get(group, ()) == () for group in (*BLOCKS_BY_NAME, *SYSTEMS)):
+        *tables, last = (f"[[{name}]]" for name in (*BLOCKS_BY_NAME, *SYSTEMS))
+        yield Mistake((), f"nothing to simulate: add a {', '.join(tables)} or {last} table")
+    blocks = data.get("blocks")
+    for name in blocks if isinstance(blocks, Mapping) else ():
+        yield from _unknown(data, ("blocks", name, "material"), "materials")
+    yield from _unknown(data, ("ground", "material"), "materials")
+    named = (("walls", "material", "materials"), *((group, "block", "blocks") for group in BLOCKS_BY_NAME))
+    for group, key, kind in named:
+        entries = data.get(group)
+        for index in range(len(entries) if isinstance(entries, tuple) else 0):
+            yield from _unknown(data, (group, index, key), kind)
+    yield from _wrong_pairs(data)
+
+
+def _unknown(data: Data, path: overrides.KeyPath, group: str) -> Iterator[Mistake]:
+    name = overrides.follow(data, path)
+    known = data.get(group, {} if group == "blocks" else None)  # materials that are missing are told of by themselves
+    if isinstance(name, str) and isinstance(known, Mapping) and name not in known:
+        hint = did_you_mean_or_list(name, known)
+        yield Mistake(path, f"unknown {group.removesuffix('s')} {toml(name)}, {hint}")
+
+
+def _wrong_pairs(data: Data) -> Iterator[Mistake]:
+    materials, pairs = data.get("materials"), data.get("pairs")
+    known = [*materials, GROUND] if isinstance(materials, Mapping) else []
+    if GROUND in known[:-1]:
+        message = f"{toml(GROUND)} means the ground in [pairs]; give this material another name"
+        yield Mistake(("materials", GROUND), message, at="key")
+    found: set[frozenset[str]] = set()
+    for one, partners in pairs.items() if isinstance(pairs, Mapping) else ():
+        if known and one not in known:
+            yield Mistake(("pairs", one), f"unknown material {toml(one)}, {did_you_mean_or_list(one, known)}", at="key")
+        missing = f"name the other material too, as in [{overrides.format_key(('pairs', one, GROUND))}]"
+        if partners == {}:
+            yield Mistake(("pairs", one), missing, at="key")
+        for other in partners if isinstance(partners, Mapping) else ():
+            path = ("pairs", one, other)
+            if other in Pair.model_fields and other not in known:
+                yield Mistake(path, missing, at="key")
+            elif known and other not in known:
+                yield Mistake(path, f"unknown material {toml(other)}, {did_you_mean_or_list(other, known)}", at="key")
+            if one == other == GROUND:
+                yield Mistake(path, "the ground is not in contact with itself", at="key")
+            elif frozenset((one, other)) in found:
+                twin = overrides.format_key(("pairs", other, one))
+                yield Mistake(path, f"the same pair is given as {twin}; keep one of the two", at="key")
+            found.add(frozenset((one, other)))
+
+
+def unfit_choices(scenario: Scenario) -> Iterator[Mistake]:
+    """Find contact model and force law that the non-smooth scheme does not have.
+
+    Numbers of springs and dashpots are not refused, so that a scenario can be run by both schemes; they have no effect.
+    """
+    for name in () if scenario.time.has_systems else scenario.systems:
+        message = f"{name} need another scheme: {toml(scenario.time.scheme)} advances blocks and supports only"
+        yield Mistake((name,), message, at="key", relation=True)
+    yield from unfit_soils(scenario)
+    if scenario.start.settle and scenario.systems:
+        message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
+        yield Mistake(("start", "settle"), message, relation=True)
+    why = _why_without_outlines(scenario)
+    for name, block in scenario.blocks.items():
+        if why and block.polygon:
+            key = "outline" if block.outline is not None else "sides"
+            yield Mistake(("blocks", name, key), why, at="key", relation=True)
+    for number, structure in enumerate(scenario.structures):
+        if why and isinstance(structure, Shaped):
+            yield Mistake(("structures", number, "kind"), why, relation=True)
+    springs = next(name for name, one in SCHEMES.items() if one.has_springs)
+    for key in () if scenario.time.has_springs else SPRING_CHOICES:
+        chosen = getattr(scenario.contact, key)
+        if chosen != Contact.model_fields[key].default:
+            message = f"{toml(chosen)} needs springs, time.scheme = {toml(springs)}; here contacts are rigid"
+            yield Mistake(("contact", key), message, relation=True)
+
+
+def _why_without_outlines(scenario: Scenario) -> str:
+    """Return why no block of a scenario can have an outline; nothing where blocks can."""
+    scheme, model = scenario.time.scheme, scenario.contact.model
+    if model not in scenario.time.models_of_outlines:
+        why = ": its boundary particles lie on rectangles only" if scenario.time.has_springs else ""
+        known = ((name, one) for name, time in sorted(SCHEMES.items()) for one in time.models_of_outlines)
+        modelled = " or ".join(f"{toml(name)} and {toml(one)}" for name, one in known)
+        where = f"with time.scheme = {toml(scheme)} and contact.model = {toml(model)}"
+        return f"outlines are not modelled {where}{why}; use {modelled}"
+    if scenario.systems:
+        return f"outlines are not modelled beside {', '.join(scenario.systems)}, whose particles meet rectangles only"
+    return ""
+
+
+def unknown_provenance(data: Data) -> Iterator[Mistake]:
+    """Find provenance of keys that no scenario has."""
+    table = data.get("provenance")
+    for key, text in table.items() if isinstance(table, Mapping) else ():
+        try:
+            path = tuple(int(part) if part.isdecimal() else part for part in overrides.parse_key(str(key)))
+        except ValueError:
+            path = ()
+        if isinstance(text, str) and not (path and overrides.is_known(path, data)):
+            yield Mistake(("provenance", key), f"{toml(key)} is not a key of this scenario", at="key")
+
+
+STEEPEST = 5.0
+"""Friction coefficient (79 degrees) above which a friction angle without its unit is more likely."""
+LIGHTEST, HEAVIEST = 25.0, 25_000.0  # kg/m3: foams and osmium
+SOFTEST = 1e4  # Pa: gels
+LONGEST = 50.0  # m
+LONGEST_DRAWN = 10.0  # m, of most blocks of a drawing: bricks and stones in mm come out larger
+MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the square of the height
+
+
+def implausible_values(scenario: Scenario) -> list[str]:
+    """Return a warning for each value that looks like one in another unit; of frictions swept ones too."""
+    return [*_bare_numbers(scenario), *_friction_angles(scenario), *_unfilled_soils(scenario)]
+
+
+def _unfilled_soils(scenario: Scenario) -> Iterator[str]:
+    """Find soils of whose width or height no whole number of particles takes all, and a finer spacing that does."""
+    for soil in soil_tables(scenario):
+        extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
+        counts = count_across(soil.corners, soil.spacing)
+        for way, extent, count in zip(("width", "height"), extents, counts, strict=True):
+            if extent - count * soil.spacing > MOST_EMPTY * extent:
+                fits = 1e3 * extent / ceil(extent / soil.spacing)
+                yield (
+                    f"{overrides.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
+                    f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
+                )
+
+
+def _bare_numbers(scenario: Scenario) -> Iterator[str]:
+    for name, material in scenario.materials.items():
+        key = overrides.format_key(("materials", name))
+        if not LIGHTEST <= material.density <= HEAVIEST:
+            given = "density" if material.unit_weight is None else "unit_weight"
+            yield f"{key}.{given} makes {material.density:.4g} kg/m^3; add the intended unit"
+        if material.young_modulus < SOFTEST:
+            yield f"{key}.young_modulus = {material.young_modulus:.4g} Pa; add the intended unit"
+    for name, block in scenario.blocks.items():
+        for side in ("width", "height", "length", "radius"):
+            if (size := getattr(block, side)) is not None and size > LONGEST:
+                yield f"{overrides.format_key(('blocks', name, side))} = {size:.4g} m; add the intended unit"
+    for number, structure in enumerate(scenario.structures):
+        if isinstance(structure, Polygons):
+            size = median(dist(*geometry.box_of(one.outline)) for one in structure.cells_given)
+            if size > LONGEST_DRAWN:
+                key = overrides.format_key(("structures", number))
+                yield f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"'
+
+
+def _friction_angles(scenario: Scenario) -> Iterator[str]:
+    """Find frictions that look like angles, the largest bare value of each that the sweep varies too."""
+    frictions: list[tuple[str, float]] = [
+        ("friction.block_block", scenario.friction.block_block.static),
+        ("friction.block_ground", scenario.friction.block_ground.static),
+    ]
+    for left, others in scenario.pairs.items():
+        for right, pair in others.items():
+            if pair.friction is not None:
+                frictions.append((overrides.format_key(("pairs", left, right, "friction")), pair.friction.static))
+    for key, values in {} if scenario.sweep is None else scenario.sweep.vary.items():
+        parts = overrides.parse_key(key)
+        if "friction" not in (parts[0], *parts[3:4]) or parts[-1] in ("kinetic_ratio", "transition_speed"):
+            continue
+        match values:
+            case Uniform(angle=False):
+                frictions.append((key, values.high))
+            case Normal(angle=False):
+                frictions.append((key, values.mean))
+            case tuple():
+                bare = [float(value) for value in values if isinstance(value, int | float)]
+                frictions += [(key, max(bare))] if bare else []
+    for key, value in frictions:
+        if value > STEEPEST:
+            yield f'{key} = {value:g} is a friction coefficient; for an angle write "{value:g} deg"'
+
 
 MAX_TRIED = 100
 MAX_VARIED = 100
@@ -29,36 +223,36 @@ class Trial(NamedTuple):
 
     data: Data
     folder: Path
-    before: Sequence[Finding]
+    before: Sequence[Mistake]
 
 
-def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]]:
+def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
     """Validate data (tuples for lists): the scenario, or None and all mistakes.
 
     Mistakes of placement, such as overlapping bodies, can only be found once everything else is right.
     """
     scenario, findings = _validated(data, folder)
-    findings += islice(wrong_names(data), MAX_FINDINGS)
+    findings += islice(wrong_names(data), MAX_MISTAKES)
     findings += [*_sweep(data, folder), *unknown_provenance(data)]
     if scenario is not None and not findings:
         findings += [*unfit_choices(scenario), *impossible_starts(scenario)]
     return (None if findings else scenario), findings
 
 
-def _validated(data: Data, folder: Path) -> tuple[Scenario | None, list[Finding]]:
+def _validated(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
     try:
         return Scenario.model_validate(data, context={"folder": folder}), []
     except ValidationError as error:
-        return None, findings_of(error, data)
+        return None, mistakes_of(error, data)
 
 
-def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
+def _sweep(data: Data, folder: Path) -> Iterator[Mistake]:
     """Try the values of a sweep one by one; whether values are compatible shows in each case of the sweep."""
     sweep = data.get("sweep")
     if not isinstance(sweep, Mapping):
         return
     if len(sweep) > MAX_VARIED:
-        yield Finding(("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key")
+        yield Mistake(("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key")
         return
     trial = _trial(data, folder)
     mode = {"mode": sweep["mode"]} if sweep.get("mode") in MODES else {}
@@ -74,14 +268,14 @@ def _sweep(data: Data, folder: Path) -> Iterator[Finding]:
         synonym = f"{table}{dot}{SYNONYMS.get(word, word)}"
         if word == "kinetic_ratio" and synonym in sweep:
             message = f"{synonym}, which means the same, is varied too; keep one of the two"
-            yield Finding(("sweep", key), message, at="key")
+            yield Mistake(("sweep", key), message, at="key")
 
 
-def _varied(trial: Trial, key: str, values: object) -> Iterator[Finding]:
+def _varied(trial: Trial, key: str, values: object) -> Iterator[Mistake]:
     """Yield the mistakes in a swept key, then in its values as written, so that their dimension is checked too."""
-    complaint = unfit_to_vary(key)
+    complaint = variation_fault(key)
     if complaint:
-        yield Finding(("sweep", key), complaint, at="key")
+        yield Mistake(("sweep", key), complaint, at="key")
         return
     parts: Iterable[tuple[str | int, object]] = ()
     if isinstance(values, Mapping):
@@ -89,21 +283,21 @@ def _varied(trial: Trial, key: str, values: object) -> Iterator[Finding]:
     elif isinstance(values, tuple):
         parts = enumerate(values[:MAX_TRIED])
     for part, value in parts:
-        yield from _tried(trial, keys.parse_key(key), value, ("sweep", key, part))
+        yield from _tried(trial, overrides.parse_key(key), value, ("sweep", key, part))
 
 
-def unfit_to_vary(key: str) -> str:
+def variation_fault(key: str) -> str:
     """Return why a key cannot be swept, or nothing; whether the scenario has the key shows when it is tried."""
     try:
-        first = keys.parse_key(key)[0]
+        first = overrides.parse_key(key)[0]
     except ValueError:
-        return f"{shown(key)} is not a dotted key"
+        return f"{toml(key)} is not a dotted key"
     return f"{first} cannot be varied" if first in UNVARIED else ""
 
 
-def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list[Finding]:
+def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list[Mistake]:
     """List the mistakes in one value of one key by itself, in data that may have a sweep."""
-    return list(_tried(_trial(data, folder), keys.parse_key(key), value, ("sweep", key)))
+    return list(_tried(_trial(data, folder), overrides.parse_key(key), value, ("sweep", key)))
 
 
 def _trial(data: Data, folder: Path) -> Trial:
@@ -111,20 +305,20 @@ def _trial(data: Data, folder: Path) -> Trial:
     return Trial(bare, folder, _single_mistakes(bare, folder))
 
 
-def _tried(trial: Trial, path: keys.KeyPath, value: object, place: keys.KeyPath) -> Iterator[Finding]:
+def _tried(trial: Trial, path: overrides.KeyPath, value: object, place: overrides.KeyPath) -> Iterator[Mistake]:
     """Yield the mistakes that setting one value adds."""
     try:
         changed, _ = with_value(trial.data, path, value)
     except UnfitOverrideError as error:
-        yield Finding(place[:2], str(error), at="key")
+        yield Mistake(place[:2], str(error), at="key")
         return
     for finding in _single_mistakes(changed, trial.folder):
         if finding not in trial.before:
             unknown = finding.at == "key"
-            yield Finding(place[:2] if unknown else place, finding.message, at=finding.at)
+            yield Mistake(place[:2] if unknown else place, finding.message, at=finding.at)
 
 
-def _single_mistakes(data: Data, folder: Path) -> list[Finding]:
+def _single_mistakes(data: Data, folder: Path) -> list[Mistake]:
     """List the mistakes of values by themselves."""
     _, findings = _validated(data, folder)
-    return [finding for finding in (*findings, *islice(wrong_names(data), MAX_FINDINGS)) if not finding.relation]
+    return [finding for finding in (*findings, *islice(wrong_names(data), MAX_MISTAKES)) if not finding.relation]

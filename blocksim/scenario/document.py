@@ -1,32 +1,266 @@
-"""Loading: a scenario file as read, the values set over it, and the scenario in it or all mistakes with their place."""
+"""Loading: the text of a scenario with the places of its keys, the values set over it, and the scenario in it."""
 
+import bisect
 import difflib
+import functools
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
-from blocksim.scenario.bounded_read import NoSuchFileError, is_folder, read_head
 from blocksim.scenario.check import examine
-from blocksim.scenario.findings import Finding
-from blocksim.scenario.keys import MAX_PARTS
+from blocksim.scenario.input_files import NoSuchFileError, file_access, is_anywhere, is_folder, read_head, user_value
+from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import (
+    MAX_PARTS,
     Data,
+    KeyPath,
     Override,
     TooDeepError,
     UnfitOverrideError,
-    frozen,
+    format_key,
+    freeze,
     parse_override,
+    read_key,
+    skip_blank,
     with_value,
 )
-from blocksim.scenario.path_policy import is_anywhere, reaching, said_by_hand
-from blocksim.scenario.quantities import shown
 from blocksim.scenario.resolved import scenario_to_toml
-from blocksim.scenario.source import ScenarioText, clipped, override_problem
+from blocksim.scenario.units import toml
+
+MAX_SHOWN = 110
+"""Characters of a line that a message shows; a longer line is cut on both sides of the caret."""
+
+_SYNTAX_PLACE = re.compile(r" \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
+_TWICE = (
+    "Cannot overwrite a value",
+    "Cannot declare",
+    "Duplicate inline table key",
+    "Cannot mutate",
+    "Cannot redefine",
+)
+_CLEARER = {
+    "Illegal character '\\n'": "a string in quotes must end on its line",
+    "Expected newline or end of document after a statement": "this cannot follow here; strings need quotes",
+}
+_SPACE = re.compile(r"(?:[ \t\n]|#[^\n]*)*")
+_SCALAR = re.compile(r"[^,\]}#\n]*")
+_STRINGS = (
+    re.compile(r'"""(?:[^\\"]|\\.|"{1,2}(?!"))*"{3,5}', re.DOTALL),
+    re.compile(r"'''(?:[^']|'{1,2}(?!'))*'{3,5}"),
+    re.compile(r'"(?:[^"\\\n]|\\.)*"'),
+    re.compile(r"'[^'\n]*'"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Part of one line: line from 1, column from 0, length in characters."""
+
+    line: int
+    column: int
+    length: int
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Positions of a key and its value; for a [table] both are the name in its header."""
+
+    key: Span
+    value: Span
+
+
+@dataclass(frozen=True)
+class ScenarioText:
+    """A named text; the name is used in messages. Scenarios made in Python have no text."""
+
+    where: str
+    text: str = ""
+
+    @functools.cached_property
+    def lines(self) -> list[str]:
+        """The lines of the text."""
+        return self.text.split("\n")
+
+    @functools.cached_property
+    def places(self) -> dict[KeyPath, Place]:
+        """Every key and value of the text; only located once a mistake must be shown."""
+        return locate(self.text)
+
+    def problem(self, path: KeyPath, message: str, at: str) -> Problem:
+        """Show a mistake at its key or value, or at the nearest table around it."""
+        prefix = next((path[:size] for size in range(len(path), 0, -1) if path[:size] in self.places), ())
+        key = format_key(path)
+        if not prefix:
+            first = Span(1, 0, len(self.lines[0])) if self.text else None
+            return self.shown(message, key, first)
+        place = self.places[prefix]
+        return self.shown(message, key, place.key if at == "key" else place.value)
+
+    def span_at(self, index: int) -> Span:
+        """Return the place of one character of the text."""
+        before = self.text[:index]
+        return Span(before.count("\n") + 1, index - (before.rfind("\n") + 1), 1)
+
+    def shown(self, message: str, key: str, span: Span | None) -> Problem:
+        """Make the problem with its line."""
+        if span is None:
+            return Problem(self.where, message, key)
+        line, start = clip_line(self.lines[span.line - 1], span.column)
+        length = max(1, min(span.length, len(line) - start))
+        return Problem(self.where, message, key, span.line, line, start, length)
+
+    def syntax_problem(self, error: tomllib.TOMLDecodeError) -> Problem:
+        """Show where tomllib stopped."""
+        text = str(error)
+        found = _SYNTAX_PLACE.search(text)
+        message = text if found is None else text[: found.start()]
+        at_end = found is None or found["line"] is None
+        number = len(self.text.rstrip("\n").split("\n")) if at_end else int(found["line"])  # type: ignore[index]
+        line = self.lines[number - 1]
+        column = len(line) if at_end else int(found["column"]) - 1  # type: ignore[index]
+        if message.startswith(_TWICE):
+            head = re.match(r"\s*(\[*)([^=\]]*[^=\]\s])?", line)
+            start, end = (head.start(2), head.end(2)) if head is not None and head[2] else (0, len(line))
+            return self.shown("this key or table is defined further up", "", Span(number, start, end - start))
+        message = _CLEARER.get(message) or f"not valid TOML: {message[:1].lower()}{message[1:]}"
+        return self.shown(message, "", Span(number, column, 1))
+
+
+def override_problem(override: Override, path: KeyPath, message: str, at: str) -> Problem:
+    """Show a mistake in a value that was set from outside."""
+    text, end = override.text, override.key_length
+    equals = text.find("=", end)
+    value = len(text) - len(text[equals + 1 :].lstrip())
+    in_key = equals < 0 or (at == "key" and len(path) <= len(override.path))
+    start, stop = (0, end) if in_key else (value, len(text))
+    line, shift = clip_line(text, start)
+    length = max(1, min(stop - start, len(line) - shift))
+    depth, key = len(override.path), format_key(path)
+    if path == override.path:
+        key = ""  # it stands in the text
+    elif path[0] == "sweep" and path[:depth] == override.path:  # what lies below a key that a study varies
+        key = "" if isinstance(path[depth], int) else format_key(path[depth:])
+    return Problem(override.label, message, key, None, line, shift, length)
+
+
+def clip_line(line: str, start: int) -> tuple[str, int]:
+    """Return a line for the screen and the place of the caret: no control characters, no endless lines."""
+    clean = "".join(c if c.isprintable() else " " if c == "\t" else "\ufffd" for c in line)
+    if len(clean) <= MAX_SHOWN:
+        return clean, start
+    first = max(0, min(start - MAX_SHOWN // 3, len(clean) - MAX_SHOWN))
+    left = "…" if first else ""
+    right = "…" if first + MAX_SHOWN < len(clean) else ""
+    return left + clean[first : first + MAX_SHOWN] + right, start - first + len(left)
+
+
+def locate(text: str) -> dict[KeyPath, Place]:
+    """Map every path of a valid TOML text (lines end with a line feed) to its place; the first one of a table."""
+    scanner = _Scanner(text)
+    table: KeyPath = ()
+    at = scanner.skip(0)
+    while at < len(text):
+        if text[at] == "[":
+            table, at = scanner.header(at)
+        else:
+            at = scanner.pair(table, at)
+        at = scanner.skip(at)
+    return scanner.places
+
+
+class _Scanner:
+    """One walk over a text; the first mention of a table counts."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.line_starts = [0, *(match.end() for match in re.finditer("\n", text))]
+        self.after = 0
+        self.places: dict[KeyPath, Place] = {}
+        self.list_sizes: dict[KeyPath, int] = {}
+
+    def skip(self, at: int) -> int:
+        """Pass white space, line ends and comments."""
+        found = _SPACE.match(self.text, at)
+        return at if found is None else found.end()
+
+    def header(self, at: int) -> tuple[KeyPath, int]:
+        """Read [a.b] or [[a.b]]: the path of the table that starts here, and the end of the header."""
+        brackets = 2 if self.text.startswith("[[", at) else 1
+        start = skip_blank(self.text, at + brackets)
+        parts, end = read_key(self.text, start)
+        span = self.span(start, end)
+        path: KeyPath = ()
+        for part in parts[:-1]:
+            path = self.latest((*path, part))
+            self.places.setdefault(path, Place(span, span))
+        path = (*path, parts[-1])
+        self.places.setdefault(path, Place(span, span))
+        if brackets == 2:
+            self.list_sizes[path] = self.list_sizes.get(path, 0) + 1
+            path = self.latest(path)
+            self.places[path] = Place(span, span)
+        return path, skip_blank(self.text, end) + brackets
+
+    def latest(self, path: KeyPath) -> KeyPath:
+        """Step into the newest element where the path is an array of tables."""
+        size = self.list_sizes.get(path, 0)
+        return (*path, size - 1) if size else path
+
+    def pair(self, table: KeyPath, at: int) -> int:
+        """Read key = value below a table."""
+        parts, end = read_key(self.text, at)
+        key = self.span(at, end)
+        start = skip_blank(self.text, skip_blank(self.text, end) + 1)
+        path = (*table, *parts)
+        after = self.value(path, start)
+        place = Place(key, self.span(start, after))
+        for size in range(len(table) + 1, len(path)):
+            self.places.setdefault(path[:size], place)
+        self.places[path] = place
+        return after
+
+    def value(self, path: KeyPath, at: int) -> int:
+        """Pass one value and record what is inside it; return its end."""
+        opening = self.text[at : at + 1]
+        if opening == "[":
+            for index, start in enumerate(self.elements(at, "]")):
+                element = (*path, index)
+                self.after = self.value(element, start)
+                span = self.span(start, self.after)
+                self.places[element] = Place(span, span)
+            return self.after
+        if opening == "{":
+            for start in self.elements(at, "}"):
+                self.after = self.pair(path, start)
+            return self.after
+        found = next((m for p in _STRINGS if (m := p.match(self.text, at))), None)
+        if found is not None:
+            return found.end()
+        scalar = _SCALAR.match(self.text, at)
+        return at if scalar is None else at + len(scalar[0].rstrip())
+
+    def elements(self, at: int, closing: str) -> Iterator[int]:
+        """Yield the start of each element; the caller sets `after` to its end, and finally to that of the list."""
+        at = self.skip(at + 1)
+        while at < len(self.text) and self.text[at] != closing:
+            yield at
+            at = self.skip(self.after)
+            if self.text.startswith(",", at):
+                at = self.skip(at + 1)
+        self.after = at + 1
+
+    def span(self, start: int, end: int) -> Span:
+        """Return line and column of a part, cut at the end of its first line."""
+        line = bisect.bisect_right(self.line_starts, start)
+        first = self.line_starts[line - 1]
+        newline = self.text.find("\n", start, end)
+        return Span(line, start - first, (end if newline < 0 else newline) - start)
+
 
 MAX_BYTES = 1_000_000
 MAX_PROBLEMS = 50
@@ -80,7 +314,7 @@ class Document:
         if endless is not None:
             raise ScenarioError([source.shown(TOO_DEEP, "", source.span_at(endless.start()))])
         try:
-            data = cast("Data", frozen(tomllib.loads(source.text)))
+            data = cast("Data", freeze(tomllib.loads(source.text)))
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError([source.syntax_problem(error)]) from None
         except (RecursionError, TooDeepError):
@@ -95,17 +329,17 @@ class Document:
     def from_mapping(cls, data: Mapping[str, object], folder: Path = Path()) -> Self:
         """Take data from Python in the form of a file; raises ScenarioError where it is nested too deeply."""
         try:
-            return cls(cast("Data", frozen(data)), ScenarioText("scenario"), folder)
+            return cls(cast("Data", freeze(data)), ScenarioText("scenario"), folder)
         except TooDeepError:
             raise _unusable("scenario", TOO_DEEP) from None
 
     def with_values(self, values: Mapping[str, object]) -> Self:
         """Set values by dotted key; raises ScenarioError where a key leads nowhere."""
-        return self._with([(f"value {key}", f"{key} = {shown(value)}", (key, value)) for key, value in values.items()])
+        return self._with([(f"value {key}", f"{key} = {toml(value)}", (key, value)) for key, value in values.items()])
 
     def with_settings(self, settings: Sequence[str]) -> Self:
         """Set values as --set takes them ("contact.stiffness_scale=0.1"); raises ScenarioError."""
-        return self._with([(f"--set {clipped(text, 0)[0]}", text, None) for text in settings])
+        return self._with([(f"--set {clip_line(text, 0)[0]}", text, None) for text in settings])
 
     def without_sweep(self) -> Self:
         """Leave out the table [sweep]: what a study varies itself."""
@@ -120,7 +354,7 @@ class Document:
         for label, text, pair in settings:
             try:
                 key, value = parse_override(text) if pair is None else pair
-                data, path = with_value(data, key, said_by_hand(key, value) if pair is None else value)
+                data, path = with_value(data, key, user_value(key, value) if pair is None else value)
                 overrides.append(Override(label, text, path))
             except (UnfitOverrideError, TooDeepError) as error:
                 problems.append(override_problem(Override(label, text, ()), (), str(error), "key"))
@@ -130,19 +364,19 @@ class Document:
 
     def build(self) -> Scenario:
         """Validate; raises ScenarioError with every mistake, those in the file first and by line."""
-        with reaching(anywhere=self.allow_outside, links=not self.is_stored):
+        with file_access(anywhere=self.allow_outside, links=not self.is_stored):
             scenario, findings = examine(self.data, self.folder)
         if scenario is None:
             raise ScenarioError(self._problems(findings))
         return scenario
 
-    def _problems(self, findings: Sequence[Finding]) -> list[Problem]:
+    def _problems(self, findings: Sequence[Mistake]) -> list[Problem]:
         problems = list(dict.fromkeys(self.problem(finding) for finding in findings))
         problems.sort(key=lambda p: (p.line_number is None, p.line_number or 0, p.caret_start))
         more = [Problem(self.source.where, "more mistakes follow")] if len(problems) > MAX_PROBLEMS else []
         return [*problems[:MAX_PROBLEMS], *more]
 
-    def problem(self, finding: Finding) -> Problem:
+    def problem(self, finding: Mistake) -> Problem:
         """Show a finding where it can be corrected: in a value set from outside, or else in the text."""
         override = next((one for one in reversed(self.overrides) if self._is_cause(one, finding)), None)
         if override is None:  # something may be missing in a table that is not in the text but was created from outside
@@ -153,7 +387,7 @@ class Document:
             return override_problem(override, finding.path, finding.message, finding.at)
         return self.source.problem(finding.path, finding.message, finding.at)
 
-    def _is_cause(self, override: Override, finding: Finding) -> bool:
+    def _is_cause(self, override: Override, finding: Mistake) -> bool:
         path, found = override.path, finding.path
         inside = found[: len(path)] == path
         on_the_way = path[: len(found)] == found and found not in self.source.places
@@ -188,7 +422,7 @@ def load_scenario(
     document = document_of(source)
     document = replace(document, allow_outside=allow_outside or document.allow_outside)
     if isinstance(overrides, Mapping):
-        return document.with_values({key: said_by_hand(key, value) for key, value in overrides.items()}).build()
+        return document.with_values({key: user_value(key, value) for key, value in overrides.items()}).build()
     return document.with_settings(overrides).build()
 
 
@@ -209,7 +443,7 @@ def replace_values(scenario: Scenario, changes: Mapping[str, object]) -> Scenari
     `changes` are dotted keys with Python values or strings with a unit: {"ground.tilt": "10 deg"}. The given
     scenario is unchanged. Raises ScenarioError with all mistakes together.
     """
-    return document_of(scenario).with_values({key: said_by_hand(key, value) for key, value in changes.items()}).build()
+    return document_of(scenario).with_values({key: user_value(key, value) for key, value in changes.items()}).build()
 
 
 def document_of(source: Source) -> Document:

@@ -1,15 +1,21 @@
-"""Events of a scenario: their order, and those that cannot happen."""
+"""Events and probes of a scenario: their order and names, joints between bodies, and what cannot be."""
 
+import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-from blocksim.scenario import keys
-from blocksim.scenario.findings import Finding
-from blocksim.scenario.models.events import Event
+import numpy as np
+
+from blocksim.scenario import overrides
+from blocksim.scenario.geometry import edges_of
+from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.placement import PlacedBody
-from blocksim.scenario.quantities import shown
+from blocksim.scenario.models.stepping import Event, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.overrides import KeyPath
+from blocksim.scenario.placement import TOLERANCE, PlacedBody
 from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario.units import toml
 
 MAX_EVENTS = 1000
 GROUPS = ("remove", "fix", "free")
@@ -29,42 +35,42 @@ def in_order(events: Sequence[Event]) -> list[int]:
     return sorted(range(len(events)), key=lambda number: (events[number].at is None, events[number].at or 0.0))
 
 
-def impossible_events(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+def impossible_events(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find events that cannot happen: in themselves, or after others."""
     if not scenario.events:
         return
     if len(scenario.events) > MAX_EVENTS:
-        yield Finding(("events",), f"{len(scenario.events)} events are too many; at most {MAX_EVENTS} are allowed")
+        yield Mistake(("events",), f"{len(scenario.events)} events are too many; at most {MAX_EVENTS} are allowed")
         return
     if scenario.systems:
-        yield Finding(("events",), f"events are not available beside {', '.join(scenario.systems)}", at="key")
+        yield Mistake(("events",), f"events are not available beside {', '.join(scenario.systems)}", at="key")
     found = [*_wrong_moments_and_names(scenario, [body.name for body in bodies]), *_wrong_unloads(scenario)]
     yield from found
     if not found:
         yield from _in_turn(scenario, bodies)
 
 
-def _wrong_moments_and_names(scenario: Scenario, known: Sequence[str]) -> Iterator[Finding]:
+def _wrong_moments_and_names(scenario: Scenario, known: Sequence[str]) -> Iterator[Mistake]:
     """Find what is wrong with single events by themselves."""
     walls = wall_names(scenario)
     for number, event in enumerate(scenario.events):
         path = ("events", number)
         if event.at is not None and event.at > scenario.time.end:
             message = f"{event.at:g} s is after the end of the run, time.end = {scenario.time.end:g} s"
-            yield Finding((*path, "at"), message, relation=True)
+            yield Mistake((*path, "at"), message, relation=True)
         if event.when is not None and not scenario.time.stop_at_rest:
-            yield Finding((*path, "when"), "rest is looked for only with time.stop_at_rest = true", relation=True)
+            yield Mistake((*path, "when"), "rest is looked for only with time.stop_at_rest = true", relation=True)
         for place, name in _names(event, path):
             is_removed = place[2] == "remove"
             allowed = [*known, *walls] if is_removed else known
             if name in walls and not is_removed:
-                yield Finding(place, f"{shown(name)} is a wall, which can only be removed")
+                yield Mistake(place, f"{toml(name)} is a wall, which can only be removed")
             elif name not in set(allowed):
                 hint = f", {did_you_mean_or_list(name, allowed)}" if len(allowed) <= MANY else ""
-                yield Finding(place, f"there is no {'body or wall' if is_removed else 'body'} {shown(name)}{hint}")
+                yield Mistake(place, f"there is no {'body or wall' if is_removed else 'body'} {toml(name)}{hint}")
 
 
-def _wrong_unloads(scenario: Scenario) -> Iterator[Finding]:
+def _wrong_unloads(scenario: Scenario) -> Iterator[Mistake]:
     """Find loads to end that do not exist, cannot end, or end twice."""
     loads = {load.name: load for load in scenario.loads if load.name is not None}
     ends: dict[str, int] = {}
@@ -72,15 +78,15 @@ def _wrong_unloads(scenario: Scenario) -> Iterator[Finding]:
         for place, name in enumerate(scenario.events[number].unload):
             path = ("events", number, "unload", place)
             if name not in loads:
-                yield Finding(path, f"there is no load {shown(name)}, {did_you_mean_or_list(name, loads)}")
+                yield Mistake(path, f"there is no load {toml(name)}, {did_you_mean_or_list(name, loads)}")
             elif isinstance(loads[name], Gravity):
-                yield Finding(path, f"{shown(name)} is gravity, which does not end; a table of tilts turns it back")
+                yield Mistake(path, f"{toml(name)} is gravity, which does not end; a table of tilts turns it back")
             elif name in ends:
-                yield Finding(path, f"{shown(name)} has ended already, by events.{ends[name]}")
+                yield Mistake(path, f"{toml(name)} has ended already, by events.{ends[name]}")
             ends.setdefault(name, number)
 
 
-def _names(event: Event, path: keys.KeyPath) -> Iterator[tuple[keys.KeyPath, str]]:
+def _names(event: Event, path: overrides.KeyPath) -> Iterator[tuple[overrides.KeyPath, str]]:
     """Yield all names in an event with their places."""
     for group in GROUPS:
         yield from (((*path, group, place), name) for place, name in enumerate(getattr(event, group)))
@@ -88,7 +94,7 @@ def _names(event: Event, path: keys.KeyPath) -> Iterator[tuple[keys.KeyPath, str
         yield (*path, "velocity", "body"), event.velocity.body
 
 
-def _in_turn(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Finding]:
+def _in_turn(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find what events before make impossible.
 
     Nobody knows whether a rest comes before or after a time: of what events of both kinds name, only that it goes once
@@ -107,7 +113,7 @@ def _in_turn(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Findi
                 scenario, str(place[2]), name, states[name], number, is_sure=name not in timed & untimed
             )
             if message:
-                yield Finding(place, message)
+                yield Mistake(place, message)
             states[name] = (RESULTS.get(str(place[2]), states[name][0]), number)
 
 
@@ -118,17 +124,139 @@ def _conflict(
     state, cause = present
     is_new_velocity = action == "velocity" and state == FREE
     if cause is not None and _moment(scenario, cause) == _moment(scenario, number) and not is_new_velocity:
-        return f"{shown(name)} is {state} at the same moment, by events.{cause}"
+        return f"{toml(name)} is {state} at the same moment, by events.{cause}"
     since = "" if cause is None else f" since {_moment(scenario, cause)}, by events.{cause}"
     if state == GONE:
-        return f"{shown(name)} is removed{since}" if is_sure or action == "remove" else ""
+        return f"{toml(name)} is removed{since}" if is_sure or action == "remove" else ""
     if is_sure and RESULTS.get(action) == state:
-        return f"{shown(name)} is {state} already{since}"
+        return f"{toml(name)} is {state} already{since}"
     if is_sure and action == "velocity" and state != FREE:
-        return f"{shown(name)} is {state}{since}: free it first"
+        return f"{toml(name)} is {state}{since}: free it first"
     return ""
 
 
 def _moment(scenario: Scenario, number: int) -> str:
     event = scenario.events[number]
     return f"rest ({number})" if event.at is None else f"{event.at:g} s"
+
+
+GROUND, WALL, WALLS, SUPPORTS = "ground", "wall", "walls", "supports"
+LEAST_ANGLE = 1.0
+PARALLEL = math.sin(math.radians(LEAST_ANGLE))
+"""Sine of the angle between two faces up to which they make a joint: corners of drawings are rounded."""
+LEAST_SHARE = 1e-6
+"""Of the smallest width of both: what faces share at least, and by how much they may overlap across."""
+Point = tuple[float, float]
+
+
+def probe_names(scenario: Scenario) -> list[str]:
+    """Return the names of all probes; one without a name is called by its kind and its number from 1."""
+    return [probe.name or f"{probe.kind}{number}" for number, probe in enumerate(scenario.probes, start=1)]
+
+
+def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Mistake]:
+    """Find names given twice, bodies and supports that do not exist, and bodies without a joint."""
+    seen: set[str] = set()
+    for number, name in enumerate(probe_names(scenario)):
+        if name in seen:
+            yield Mistake(("probes", number, "name"), f"two probes are named {toml(name)}")
+        seen.add(name)
+    bodies = {body.name: body for body in placed}
+    others = [str(name) for tables in scenario.systems.values() for one in tables if (name := getattr(one, "name", ""))]
+    known = [*bodies, *support_words(scenario), *others]
+    for number, probe in enumerate(scenario.probes):
+        path = ("probes", number)
+        match probe:
+            case ForceProbe():
+                named = {"on": probe.on} if probe.by is None else {"on": probe.on, "by": probe.by}
+                yield from _unknown([((*path, key), name) for key, name in named.items()], known)
+                if probe.by == probe.on:
+                    yield Mistake((*path, "by"), f"{toml(probe.by)} exerts no force on itself")
+            case PointProbe():
+                yield from _unknown([((*path, "body"), probe.body)], [*bodies])
+            case JointProbe():
+                unknown = [*_unknown([((*path, "bodies", i), name) for i, name in enumerate(probe.bodies)], [*bodies])]
+                yield from unknown
+                if not unknown and joint_between(*(bodies[name] for name in probe.bodies)) is None:
+                    message = (
+                        f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no faces that lie opposite each other"
+                    )
+                    yield Mistake((*path, "bodies"), f"{message} at the start, parallel within {LEAST_ANGLE:g} deg")
+
+
+def support_words(scenario: Scenario) -> list[str]:
+    """Return the words that mean supports: ground, walls together and one by one, all supports."""
+    return [GROUND, SUPPORTS, *([WALLS] if scenario.walls else []), *wall_names(scenario)]
+
+
+def _unknown(named: Sequence[tuple[KeyPath, str]], known: Sequence[str]) -> Iterator[Mistake]:
+    for path, name in named:
+        if name not in known:
+            yield Mistake(path, f"unknown body {toml(name)}, {did_you_mean_or_list(name, known)}")
+
+
+class Joint(NamedTuple):
+    """A joint between bodies a and b at the start, in the own axes of each (m).
+
+    Its two ends as points of a and of b, straight across the gap that there is at each of them, the outward normal of
+    a's face, and the tangent along it, which is the normal turned by -90 degrees: towards +x where b lies on a. The
+    first end is the one farther back along the tangent.
+    """
+
+    ends_of_a: tuple[Point, Point]
+    ends_of_b: tuple[Point, Point]
+    normal: Point
+    tangent: Point
+
+
+def joint_between(a: PlacedBody, b: PlacedBody) -> Joint | None:
+    """Return the joint between the faces of two bodies that lie opposite each other, None where none do.
+
+    The faces are parallel but for `PARALLEL`, and overlap along each other. Of several such pairs that with the widest
+    gap is the joint.
+    """
+    found = [one for one in (_facing(a, b, *edge) for edge in edges_of(a.corners)) if one is not None]
+    return max(found, key=lambda one: one[0])[1] if found else None
+
+
+def _facing(a: PlacedBody, b: PlacedBody, begin: Point, end: Point, normal: Point) -> tuple[float, Joint] | None:
+    """Return the least gap (m) and the joint between a face of a and the face of b opposite it."""
+    opposite = _opposite(a, b, normal)
+    if opposite is None:
+        return None
+    tangent = (normal[1], -normal[0])
+    across, along = np.array(opposite) @ np.array(normal), np.array(opposite) @ np.array(tangent)
+    half = _dot(begin, normal)
+    first, last = max(float(along.min()), _dot(end, tangent)), min(float(along.max()), _dot(begin, tangent))
+    smallest = min(a.least_width, b.least_width)
+    order = np.argsort(along)
+    gaps = (np.interp((first, last), along[order], across[order]) - half).tolist()
+    if min(gaps) < -max(TOLERANCE, LEAST_SHARE * smallest) or last - first < LEAST_SHARE * smallest:
+        return None
+    ends = [(half * normal[0] + s * tangent[0], half * normal[1] + s * tangent[1]) for s in (first, last)]
+    places = [(x + gap * normal[0], y + gap * normal[1]) for (x, y), gap in zip(ends, gaps, strict=True)]
+    of_b = [_local(b, *_placed(a, *point)) for point in places]
+    return min(gaps), Joint((ends[0], ends[1]), (of_b[0], of_b[1]), normal, tangent)
+
+
+def _opposite(a: PlacedBody, b: PlacedBody, normal: Point) -> tuple[Point, Point] | None:
+    """Return the ends of the face of b that is parallel to one of a with this normal and faces it, in the axes of a."""
+    edges = edges_of([_local(a, *_placed(b, *corner)) for corner in b.corners])
+    begin, end, of_b = min(edges, key=lambda edge: _dot(edge[2], normal))
+    return (begin, end) if abs(of_b[0] * normal[1] - of_b[1] * normal[0]) <= PARALLEL else None
+
+
+def _dot(one: Point, other: Point) -> float:
+    return one[0] * other[0] + one[1] * other[1]
+
+
+def _placed(body: PlacedBody, x: float, y: float) -> Point:
+    """Return where a point of a body is (m), given in its own axes."""
+    cosine, sine = math.cos(body.angle), math.sin(body.angle)
+    return body.x + cosine * x - sine * y, body.y + sine * x + cosine * y
+
+
+def _local(body: PlacedBody, x: float, y: float) -> Point:
+    """Return a point (m) in the own axes of a body."""
+    cosine, sine = math.cos(body.angle), math.sin(body.angle)
+    return cosine * (x - body.x) + sine * (y - body.y), cosine * (y - body.y) - sine * (x - body.x)

@@ -10,21 +10,17 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from blocksim.scenario.keys import options, si_unit
+from blocksim.scenario.models.base import HELD, SYSTEMS
 from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
-from blocksim.scenario.models.drive import OWN_DRIVES
-from blocksim.scenario.models.events import Event, NewVelocity
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
-from blocksim.scenario.models.history import HISTORIES
-from blocksim.scenario.models.loads import LOADS, Load
-from blocksim.scenario.models.motions import MOTIONS
-from blocksim.scenario.models.probe import PROBES, Probe
+from blocksim.scenario.models.loads import HISTORIES, LOADS, Load
+from blocksim.scenario.models.motion import OWN_DRIVES
+from blocksim.scenario.models.record import MOTIONS
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.start import Start
-from blocksim.scenario.models.stepping import SCHEMES, Output, Time
+from blocksim.scenario.models.stepping import PROBES, SCHEMES, Event, NewVelocity, Output, Probe, Start, Time
 from blocksim.scenario.models.study import Experiment, Sweep
+from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS, Structure
-from blocksim.scenario.systems import HELD, SYSTEMS
 
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"

@@ -1,4 +1,4 @@
-"""Prescribed motion of the supports over time: displacement along one direction as a piecewise cubic polynomial."""
+"""Prescribed motion of supports and bodies over time, as piecewise cubics, and its peaks."""
 
 import math
 from typing import NamedTuple
@@ -6,12 +6,67 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.accelerations import pulse_samples, record_samples
-from blocksim.scenario.models.motion import FromTable, Harmonic
-from blocksim.scenario.models.pulse import Pulse
+from blocksim.scenario.models.motion import FromTable, Harmonic, Pulse, Ramp, Rotation
+from blocksim.scenario.models.record import Baseline, Record
 from blocksim.scenario.models.scenario import Scenario
 
 Floats = NDArray[np.float64]
+
+PIECES_PER_CYCLE = 1000
+"""Their displacement is off by less than (2 pi/1000)^4/384 = 4e-12 of A/w², their acceleration by 3.3e-6 A."""
+MOST_PIECES = 200_000
+
+
+def pulse_samples(pulse: Pulse) -> tuple[Floats, Floats, Floats]:
+    """Return times (s), displacement (m) and velocity (m/s) of a pulse from its start to its end.
+
+    They are exact, integrated from rest: with A and w for a sine v = A/w (1 - cos wt), u = A/w (t - sin wt/w); for a
+    cosine v = A/w sin wt, u = A/w² (1 - cos wt); for a rectangle v = A t, u = A t²/2. Cubic pieces through them are
+    exact for a rectangle.
+    """
+    count = 1 if pulse.shape == "rectangular" else min(MOST_PIECES, math.ceil(PIECES_PER_CYCLE * pulse.resolved_cycles))
+    t = np.linspace(0.0, pulse.resolved_duration, 1 + count)
+    w, a = pulse.angular_frequency, pulse.amplitude
+    if pulse.shape == "rectangular":
+        return pulse.start + t, 0.5 * a * t * t, a * t
+    half = np.sin(0.5 * w * t)
+    versine = 2.0 * half * half  # 1 - cos wt, without its cancellation
+    if pulse.shape == "cosine":
+        return pulse.start + t, a / w**2 * versine, a / w * np.sin(w * t)
+    return pulse.start + t, a / w * (t - np.sin(w * t) / w), a / w * versine
+
+
+def record_samples(record: Record) -> tuple[Floats, Floats]:
+    """Return times (s) and accelerations (m/s²) of a record, corrected and scaled; straight lines join them."""
+    times = np.array(record.table.times)
+    values = correct_baseline(times, record.factor * np.array(record.table.values), record.baseline)
+    peak = float(np.abs(values).max())
+    scale = record.scale if record.pga is None else record.pga / peak if peak > 0.0 else 0.0
+    return record.start + times, scale * values
+
+
+def correct_baseline(times: Floats, acceleration: Floats, baseline: Baseline) -> Floats:
+    """Return accelerations (m/s², (n,)) at these times (s) with their baseline corrected.
+
+    `rest` subtracts c0 + c1 t, t from the first sample to T: the velocity V and the displacement U that the record
+    leaves vanish with c0 = (6 U - 2 V T)/T², c1 = (6 V T - 12 U)/T³. `parabolic` subtracts c0 + c1 t + c2 t², chosen so
+    that the sum of the squared velocities of all samples is least: G. V. Berg and G. W. Housner, Integrated velocity
+    and displacement of strong earthquake ground motion, Bull. Seism. Soc. Am. 51 (1961) 175-189.
+    """
+    if baseline == "none":
+        return acceleration
+    t = times - times[0]
+    step, end = np.diff(t), float(t[-1])
+    velocity = np.concatenate([[0.0], np.cumsum(0.5 * step * (acceleration[:-1] + acceleration[1:]))])
+    if baseline == "rest":
+        advances = step * (velocity[:-1] + step * (2.0 * acceleration[:-1] + acceleration[1:]) / 6.0)
+        left, moved = float(velocity[-1]) * end, float(advances.sum())
+        return np.asarray(acceleration - ((6.0 * moved - 2.0 * left) + (6.0 * left - 12.0 * moved) * t / end) / end**2)
+    s = t / end
+    terms = np.stack([s, s**2 / 2.0, s**3 / 3.0], axis=1)
+    parts, *_ = np.linalg.lstsq(terms, velocity / end, rcond=None)
+    return np.asarray(acceleration - (parts[0] + s * (parts[1] + s * parts[2])))
+
 
 BEYOND = 1.01
 """Extent of the pieces, in ends of the scenario: the last step may end a little later."""
@@ -62,12 +117,12 @@ def motion_pieces(scenario: Scenario) -> MotionPieces:
                 pieces = _integrated(times, values)
             else:
                 displacement = values - values[0]
-                pieces = through(times, displacement, spline_slopes(times, displacement))
+                pieces = hermite_pieces(times, displacement, spline_slopes(times, displacement))
         case Pulse():
-            pieces = through(*pulse_samples(motion))
+            pieces = hermite_pieces(*pulse_samples(motion))
         case _:
             pieces = _integrated(*record_samples(motion))
-    return from_zero_to(end, pieces)
+    return extend_pieces(end, pieces)
 
 
 def displacement_and_velocity(pieces: MotionPieces, times: Floats) -> tuple[Floats, Floats]:
@@ -94,7 +149,7 @@ def _harmonic(motion: Harmonic, end: float) -> MotionPieces:
     speed = 2.0 * math.pi * motion.frequency
     sine, cosine = np.sin(speed * since + motion.phase), np.cos(speed * since + motion.phase)
     velocity = motion.amplitude * (rate / motion.resolved_ramp * sine + rise * speed * cosine)
-    return through(times, motion.amplitude * rise * sine, velocity)
+    return hermite_pieces(times, motion.amplitude * rise * sine, velocity)
 
 
 def _ramp(share: Floats) -> tuple[Floats, Floats]:
@@ -114,7 +169,7 @@ def _integrated(times: Floats, acceleration: Floats) -> MotionPieces:
     return MotionPieces(times, np.column_stack(columns), float(velocity[-1]))
 
 
-def through(times: Floats, displacement: Floats, velocity: Floats) -> MotionPieces:
+def hermite_pieces(times: Floats, displacement: Floats, velocity: Floats) -> MotionPieces:
     """Return the cubic pieces with these displacements (m) and velocities (m/s) at the joints (Hermite)."""
     step = np.diff(times)
     secant = np.diff(displacement) / step
@@ -145,7 +200,7 @@ def spline_slopes(x: Floats, y: Floats) -> Floats:
     return slopes
 
 
-def from_zero_to(end: float, pieces: MotionPieces) -> MotionPieces:
+def extend_pieces(end: float, pieces: MotionPieces) -> MotionPieces:
     """Add rest before the first piece, and after the last one its final velocity until `end` (s)."""
     times, coefficients, velocity = pieces
     if times[0] > 0.0:
@@ -156,3 +211,152 @@ def from_zero_to(end: float, pieces: MotionPieces) -> MotionPieces:
         times = np.append(times, end)
         coefficients = np.concatenate([coefficients, [[displacement, velocity, 0.0, 0.0]]])
     return MotionPieces(times, coefficients, velocity)
+
+
+class Peak(NamedTuple):
+    """The largest absolute value of a quantity, SI, and when it occurs (s)."""
+
+    value: float
+    time: float
+
+
+class MotionPeaks(NamedTuple):
+    """Peaks of acceleration (m/s²), velocity (m/s) and displacement (m) until an end, and the velocity (m/s) there."""
+
+    acceleration: Peak
+    velocity: Peak
+    displacement: Peak
+    final_velocity: float
+
+
+def acceleration_ends(pieces: MotionPieces) -> tuple[Floats, Floats]:
+    """Return times (s) and accelerations (m/s²) at both ends of every piece, (2 k,): linear between, with jumps."""
+    _, _, c2, c3 = pieces.coefficients.T
+    first = 2.0 * c2
+    last = first + 6.0 * c3 * np.diff(pieces.times)
+    times = np.stack([pieces.times[:-1], pieces.times[1:]], axis=1)
+    return times.ravel(), np.stack([first, last], axis=1).ravel()
+
+
+def motion_peaks(pieces: MotionPieces, end: float) -> MotionPeaks:
+    """Return the peaks from 0 to `end` (s), which lies within the pieces; the supports move."""
+    times, accelerations = acceleration_ends(pieces)
+    within = times <= end
+    moments = _moments(pieces, end)
+    displacement, velocity = displacement_and_velocity(pieces, moments)
+    return MotionPeaks(
+        _largest(accelerations[within], times[within]),
+        _largest(velocity, moments),
+        _largest(displacement, moments),
+        float(displacement_and_velocity(pieces, np.array([end]))[1][0]),
+    )
+
+
+def shortest_cycle(scenario: Scenario) -> float:
+    """Return the shortest cycle (s) of harmonic motions and pulses, of supports or bodies; infinite without any."""
+    motions = (scenario.motion, *(body.motion for body in scenario.bodies))
+    return min((motion.cycle for motion in motions if isinstance(motion, Harmonic | Pulse)), default=math.inf)
+
+
+def shortest_period(scenario: Scenario) -> float:
+    """Return the shortest period (s) of what moves as prescribed; infinite where nothing does.
+
+    That is the shortest cycle, or 2 pi times the peak velocity of the supports over their peak acceleration: with a
+    harmonic motion the same, with a steep ramp or a table the time in which it does what matters.
+    """
+    shortest = shortest_cycle(scenario)
+    if scenario.motion is None:
+        return shortest
+    peaks = motion_peaks(motion_pieces(scenario), scenario.time.end)
+    if not peaks.acceleration.value > 0.0:
+        return shortest
+    return min(shortest, 2.0 * math.pi * peaks.velocity.value / peaks.acceleration.value)
+
+
+def _largest(values: Floats, times: Floats) -> Peak:
+    place = int(np.argmax(np.abs(values)))
+    return Peak(abs(float(values[place])), float(times[place]))
+
+
+def _moments(pieces: MotionPieces, end: float) -> Floats:
+    """Return all times (s) at which velocity or displacement may be largest: joints, and where their rates vanish."""
+    _, c1, c2, c3 = pieces.coefficients.T
+    length = np.diff(pieces.times)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(c2 * c2 - 3.0 * c1 * c3)
+        inner = [-c2 / (3.0 * c3), (-c2 + root) / (3.0 * c3), (-c2 - root) / (3.0 * c3), -0.5 * c1 / c2]
+    inside = [pieces.times[:-1] + np.clip(np.nan_to_num(one, posinf=0.0, neginf=0.0), 0.0, length) for one in inner]
+    moments = np.concatenate([pieces.times, *inside, [end]])
+    return np.unique(moments[moments <= end])
+
+
+PIECES_OF_A_RAMP = 200
+"""Of a smooth one, which is of fifth order: they are off by less than 1e-9 of the way."""
+STILL = MotionPieces(np.zeros(2), np.zeros((1, 4)), 0.0)
+
+
+class Drive(NamedTuple):
+    """Motion of one body: pieces as in blocksim.scenario.motion, of its shift (m) and its turn (rad)."""
+
+    body: int  # its place among all bodies
+    along: tuple[float, float]  # unit vector of the shift
+    shift: MotionPieces
+    about: tuple[float, float]  # m: the point about which it turns, which is shifted with it
+    turn: MotionPieces
+
+    @property
+    def rest_time(self) -> float:
+        """Time (s) from when on the body rests, infinite where it never does."""
+        return max(_end(self.shift), _end(self.turn))
+
+
+def drives_of(scenario: Scenario) -> tuple[Drive, ...]:
+    """Return the motions of all driven bodies, in the order of the bodies."""
+    first, end = sum(structure.size for structure in scenario.structures), BEYOND * scenario.time.end
+    drives = []
+    for number, body in enumerate(scenario.bodies, start=first):
+        motion, centre = body.motion, (body.x, body.y)
+        if isinstance(motion, Rotation):
+            turn = _course(motion, motion.angle, end)
+            drives.append(Drive(number, (1.0, 0.0), STILL, motion.about or centre, turn))
+        elif motion is not None:
+            alone = scenario.model_copy(update={"motion": motion})  # as if it were that of the supports
+            shift = _course(motion, motion.distance, end) if isinstance(motion, Ramp) else motion_pieces(alone)
+            drives.append(Drive(number, motion_direction(alone), shift, centre, STILL))
+    return tuple(drives)
+
+
+def _course(motion: Ramp | Rotation, way: float, end: float) -> MotionPieces:
+    """Return the pieces of a way (m or rad) from the start of a motion on, until `end` (s) at least."""
+    count = PIECES_OF_A_RAMP if motion.course == "smooth" else 1
+    share = np.linspace(0.0, 1.0, count + 1)
+    times = motion.start + motion.resolved_duration * share
+    if count == 1:
+        pieces = MotionPieces(times, np.array([[0.0, way / motion.resolved_duration, 0.0, 0.0]]), 0.0)
+    else:
+        values = way * share**3 * (10.0 - 15.0 * share + 6.0 * share * share)
+        rates = way / motion.resolved_duration * 30.0 * (share * (1.0 - share)) ** 2
+        pieces = hermite_pieces(times, values, rates)
+    pieces = extend_pieces(end, pieces)
+    last = pieces.coefficients[-1]
+    if not last[1:].any():  # constant: exactly at the end of the way
+        last[0] = way
+    return pieces
+
+
+def _end(pieces: MotionPieces) -> float:
+    is_moving = np.asarray(pieces.coefficients[:, 1:].any(axis=1))
+    if not is_moving.any():
+        return 0.0
+    last = int(np.flatnonzero(is_moving)[-1])
+    return np.inf if last == is_moving.size - 1 else float(pieces.times[last + 1])
+
+
+def greatest_rate(pieces: MotionPieces) -> float:
+    """Return the greatest speed (m/s, or rad/s) of a motion."""
+    _, c1, c2, c3 = pieces.coefficients.T
+    length = np.diff(pieces.times)[: len(c1)]
+    with np.errstate(divide="ignore", invalid="ignore"):  # straight and parabolic pieces are fastest at an end
+        middle = np.nan_to_num(-c2 / (3.0 * c3), posinf=0.0, neginf=0.0)
+    rates = [np.abs(c1 + s * (2.0 * c2 + 3.0 * s * c3)) for s in (0.0 * length, np.clip(middle, 0.0, length), length)]
+    return float(max(np.max(rate, initial=0.0) for rate in rates))

@@ -8,9 +8,8 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.outlines import Corners, middle_of
-from blocksim.scenario.placement import PlacedBody
-from blocksim.scenario.segments import TOLERANCE, PlacedSegment
+from blocksim.scenario.geometry import Corners, middle_of
+from blocksim.scenario.placement import TOLERANCE, PlacedBody, PlacedSegment
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

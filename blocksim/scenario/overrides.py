@@ -1,14 +1,225 @@
-"""Setting single values of a scenario by their dotted key, as --set and sweeps do."""
+"""Dotted keys: reading, writing and following them, and setting single values by them as --set and sweeps do."""
 
+import functools
+import re
 import tomllib
-from collections.abc import Mapping, Sequence
+import types
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated, Any, Union, get_args, get_origin
 
-from blocksim.scenario.keys import MISSING, KeyPath, field_at, follow, format_key, parse_key, read_key, skip_blank
+from pydantic.fields import FieldInfo
+
+from blocksim.scenario.models.base import HELD, SYSTEMS, Table
 from blocksim.scenario.models.contact import GROUND, Friction
-from blocksim.scenario.quantities import shown
+from blocksim.scenario.models.scenario import Scenario
+from blocksim.scenario.models.stepping import SCHEMES, Time
 from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario.units import Kind, Quantity, toml
+
+KeyPath = tuple[str | int, ...]
+"""Path in a scenario, such as ("structures", 0, "overlap")."""
+
+NAMED: dict[str | int, int] = {
+    "materials": 2,
+    "blocks": 2,
+    "structures": 2,
+    "bodies": 2,
+    "walls": 2,
+    "events": 2,
+    "loads": 2,
+    "pairs": 3,
+    "probes": 2,
+}
+"""Tables of named or numbered entries: how many parts of a path lead to one entry."""
+
+TAGS = ("kind", "scheme")
+"""Keys whose word selects one of several tables."""
+
+MISSING = object()
+"""What `follow` returns where there is nothing."""
+
+MAX_PARTS = 64
+"""Of a dotted key; the time of tomllib grows with their square."""
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_BASIC = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"')
+_LITERAL = re.compile(r"'[^'\n]*'")
+_BLANK = re.compile(r"[ \t]*")
+
+
+def read_key(text: str, start: int = 0) -> tuple[tuple[str, ...], int]:
+    """Read a TOML key, dotted and quoted or not, from `start`: its parts, and where it ends.
+
+    Raises ValueError, also for more than MAX_PARTS parts.
+    """
+    parts: list[str] = []
+    while len(parts) < MAX_PARTS:
+        start = skip_blank(text, start)
+        found = next((m for p in (_BASIC, _LITERAL, _BARE) if (m := p.match(text, start))), None)
+        if found is None:
+            raise ValueError("not a key")
+        part = found[0]
+        literal = part[1:-1] if part[0] == "'" else part
+        parts.append(str(tomllib.loads(f"v = {part}")["v"]) if part[0] == '"' else literal)
+        after = skip_blank(text, found.end())
+        if not text.startswith(".", after):
+            return tuple(parts), found.end()
+        start = after + 1
+    raise ValueError("too many parts")
+
+
+def skip_blank(text: str, start: int) -> int:
+    """Return the index of the first character from `start` that is neither space nor tab."""
+    found = _BLANK.match(text, start)
+    return start if found is None else found.end()
+
+
+@functools.lru_cache(maxsize=1024)
+def parse_key(text: str) -> tuple[str, ...]:
+    """Read a whole text as one dotted key; raises ValueError."""
+    parts, end = read_key(text)
+    if skip_blank(text, end) != len(text):
+        raise ValueError("not a key")
+    return parts
+
+
+def format_key(path: Sequence[str | int]) -> str:
+    """Write a path as a dotted key, with quotes where TOML wants them."""
+    return ".".join(part if _BARE.fullmatch(part) else _quoted(part) for part in map(str, path))
+
+
+def _quoted(part: str) -> str:
+    escaped = part.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
+
+
+def follow(data: object, path: Sequence[str | int]) -> object:
+    """Return the value at a path of nested mappings and sequences, or MISSING."""
+    for part in path:
+        if isinstance(data, Mapping):
+            data = data.get(part, MISSING)
+        elif isinstance(data, list | tuple) and isinstance(part, int) and 0 <= part < len(data):
+            data = data[part]
+        else:
+            return MISSING
+    return data
+
+
+def table_at(path: Sequence[str | int], data: object) -> type[Table] | None:
+    """Return the model of the table at a path; `data` has the kinds of structures and motion."""
+    annotation: object = Scenario
+    for depth, part in enumerate(path):
+        table = _table(annotation, follow(data, path[:depth]))
+        entries = [(get_origin(option), get_args(option)) for option in options(annotation)]
+        inner = [arguments[1] for origin, arguments in entries if origin is dict]
+        inner += [arguments[0] for origin, arguments in entries if origin is tuple and isinstance(part, int)]
+        field = None if table is None else _fields(table).get(part)
+        annotation = inner[0] if inner else None if field is None else field.annotation
+    return _table(annotation, follow(data, path))
+
+
+def field_at(path: Sequence[str | int], data: object) -> FieldInfo | None:
+    """Return the model field at a path, or None where the models know no such key."""
+    table = table_at(path[:-1], data) if path else None
+    return None if table is None else _fields(table).get(path[-1])
+
+
+def field_of(key: str, scenario: Scenario) -> FieldInfo | None:
+    """Return the field that a dotted key leads to in a scenario, None where it leads to none."""
+    data = scenario.model_dump(by_alias=True, exclude={"sweep"})
+    path: KeyPath = ()
+    for part in parse_key(key):
+        entries = follow(data, path)
+        place: str | int = part
+        if isinstance(entries, list | tuple):  # an entry of a list is meant by its number, or by its name
+            named = (i for i, one in enumerate(entries) if isinstance(one, Mapping) and one.get("name") == part)
+            place = int(part) if part.isdecimal() else next(named, part)
+        path = (*path, place)
+    return field_at(path, data)
+
+
+def is_known(path: Sequence[str | int], data: object) -> bool:
+    """Return True if the models have a place for this path (what has a name or number must be in `data`)."""
+    named = 2 if path[0] in SYSTEMS else NAMED.get(path[0], 0)
+    if named and follow(data, path[:named]) is MISSING:
+        return False
+    if len(path) <= named:
+        return True
+    return field_at(path, data) is not None or (
+        isinstance(path[-1], int) and follow(data, path) is not MISSING and field_at(path[:-1], data) is not None
+    )
+
+
+def keys_of(table: type[Table]) -> tuple[str, ...]:
+    """Return the keys that a table may have, as written in the file."""
+    return tuple(str(key) for key in _fields(table))
+
+
+def _fields(table: type[Table]) -> dict[str | int, FieldInfo]:
+    """Return the fields of a table by their keys; of a scenario those of the tables of all systems too."""
+    systems: dict[str | int, FieldInfo] = {
+        name: FieldInfo(annotation=tuple[entry, ...], default=(), description=entry.__doc__)  # type: ignore[valid-type]
+        for name, entry in (SYSTEMS.items() if table is Scenario else ())
+    }
+    return {**_own_fields(table), **systems}
+
+
+@functools.cache
+def _own_fields(table: type[Table]) -> dict[str | int, FieldInfo]:
+    return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != HELD}
+
+
+def _table(annotation: object, node: object) -> type[Table] | None:
+    tables = [option for option in options(annotation) if isinstance(option, type) and issubclass(option, Table)]
+    if len(tables) > 1:
+        tables = [*SCHEMES.values()] if issubclass(tables[0], Time) else tables
+        for table in tables:
+            tag = _tag(table)  # the key whose word distinguishes the alternatives, here or by default
+            word = node.get(tag, MISSING) if isinstance(node, Mapping) else MISSING
+            if (table.model_fields[tag].default if word is MISSING else word) in kinds_of(table):
+                return table
+        return None
+    return tables[0] if tables else None
+
+
+def _tag(table: type[Table]) -> str:
+    return next(tag for tag in TAGS if tag in table.model_fields)
+
+
+def kinds_of(table: type[Table]) -> tuple[str, ...]:
+    """Return the words that distinguish this table from its alternatives."""
+    return get_args(table.model_fields[_tag(table)].annotation)
+
+
+def si_unit(info: FieldInfo) -> str:
+    """Return the SI unit of the values of a field, empty for plain numbers and words."""
+    kinds = (mark.kind if isinstance(mark, Quantity) else mark for mark in marks_of(info))
+    return next((kind.unit for kind in kinds if isinstance(kind, Kind)), "")
+
+
+def marks_of(info: FieldInfo) -> Iterator[Any]:
+    """Yield what describes the values of a field: annotations of its type, and of the alternatives in it."""
+    yield from info.metadata
+    inner = [*get_args(info.annotation)]
+    while inner:
+        part = inner.pop(0)
+        yield part
+        inner[:0] = get_args(part)
+
+
+def options(annotation: Any) -> Iterator[Any]:
+    """Yield the alternatives of a type expression, without metadata."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        yield from options(get_args(annotation)[0])
+    elif origin in (Union, types.UnionType):
+        for option in get_args(annotation):
+            yield from options(option)
+    else:
+        yield annotation
+
 
 Data = Mapping[str, object]
 
@@ -44,14 +255,14 @@ class TooDeepError(ValueError):
     """Tables or lists are nested deeper than any scenario needs."""
 
 
-def frozen(value: object, depth: int = 0) -> object:
+def freeze(value: object, depth: int = 0) -> object:
     """Copy nested data with tuples for lists; raises TooDeepError."""
     if depth > MAX_DEPTH:
         raise TooDeepError(f"nested more than {MAX_DEPTH} levels deep")
     if isinstance(value, Mapping):
-        return {key: frozen(entry, depth + 1) for key, entry in value.items()}
+        return {key: freeze(entry, depth + 1) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return tuple(frozen(entry, depth + 1) for entry in value)
+        return tuple(freeze(entry, depth + 1) for entry in value)
     return value
 
 
@@ -94,13 +305,13 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
     try:
         parts = parse_key(key) if isinstance(key, str) else tuple(key)
     except ValueError:
-        raise UnfitOverrideError(f"{shown(key)} is not a dotted key") from None
+        raise UnfitOverrideError(f"{toml(key)} is not a dotted key") from None
     if parts[0] == "pairs" and len(parts) >= 3 and follow(data, parts[:3]) is MISSING:
         turned = (parts[0], parts[2], parts[1])  # pairs.B.A is the pair that the data may have as pairs.A.B
         parts = parts if follow(data, turned) is MISSING else (*turned, *parts[3:])
     path: list[str | int] = []
     start = _with_list_to_change(_with_own_friction(data, parts), parts)
-    result = _put(start, parts, frozen(value), path)
+    result = _put(start, parts, freeze(value), path)
     assert isinstance(result, Mapping)  # noqa: S101 - data is a mapping, so is its copy
     return result, tuple(path)
 
@@ -136,16 +347,16 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
         done.append(index)
         return (*node[:index], _put(node[index], parts[1:], value, done), *node[index + 1 :])
     if not isinstance(node, Mapping):
-        raise UnfitOverrideError(f"{format_key(done)} is {shown(node)}, not a table")
+        raise UnfitOverrideError(f"{format_key(done)} is {toml(node)}, not a table")
     part = str(parts[0])
     child = node.get(part, MISSING)
     if child is MISSING and tuple(done) in _NAMED and len(parts) > 1:
         hint = did_you_mean_or_list(part, node)
-        raise UnfitOverrideError(f"{done[0]} has no {shown(part)}, {hint}")
+        raise UnfitOverrideError(f"{done[0]} has no {toml(part)}, {hint}")
     if child is MISSING and not done and len(parts) > 1:
         field = field_at((part,), {})
         if field is not None and isinstance(field.default, tuple):
-            raise UnfitOverrideError(f"this scenario has no [[{part}]], so no {shown(str(parts[1]))} among them")
+            raise UnfitOverrideError(f"this scenario has no [[{part}]], so no {toml(str(parts[1]))} among them")
     done.append(part)
     child = _opened(tuple(done), child) if len(parts) > 1 else child
     synonym = SYNONYMS.get(part)  # another way to write what is going to be set
@@ -161,8 +372,8 @@ def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]
         return named[0]
     names = [entry["name"] for entry in entries if isinstance(entry, Mapping) and "name" in entry]
     if names and not str(part).isdecimal():
-        raise UnfitOverrideError(f"{format_key(done)} has no {shown(part)}, {did_you_mean_or_list(str(part), names)}")
-    message = f"{format_key(done)} is a list of {len(entries)}, numbered from 0; {shown(part)} does not exist"
+        raise UnfitOverrideError(f"{format_key(done)} has no {toml(part)}, {did_you_mean_or_list(str(part), names)}")
+    message = f"{format_key(done)} is a list of {len(entries)}, numbered from 0; {toml(part)} does not exist"
     raise UnfitOverrideError(message)
 
 

@@ -1,25 +1,83 @@
-"""A scenario written out, complete and exact, and its hash."""
+"""What a scenario resolves to: parameters of pairs of materials, all values written out, and their hash."""
 
 import functools
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 from pydantic import BaseModel
 
-from blocksim.scenario.keys import si_unit
-from blocksim.scenario.models.contact import Friction, PairFriction
+from blocksim.scenario.models.base import HELD
+from blocksim.scenario.models.contact import GROUND, Friction, Pair, PairFriction
 from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.models.motion import FromTable, MotionTable
-from blocksim.scenario.models.motions import TABLED
+from blocksim.scenario.models.record import TABLED
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Time
 from blocksim.scenario.models.study import Sweep
-from blocksim.scenario.quantities import ANGLE
-from blocksim.scenario.systems import HELD
+from blocksim.scenario.overrides import format_key, si_unit
+from blocksim.scenario.units import ANGLE
+
+DEFAULT = "default"
+MATERIALS = "materials"
+
+
+@dataclass(frozen=True)
+class ResolvedPair:
+    """Contact parameters of two materials, SI; None where they follow from the materials, or from normal damping.
+
+    `normal_stiffness` is as given, not yet times contact.stiffness_scale. `rules` has for every field the key that
+    set it, "default" where none is given, "materials" where it follows from Young's moduli and Poisson's ratios.
+    """
+
+    friction: PairFriction
+    restitution: float
+    normal_stiffness: float | None
+    shear_stiffness_ratio: float | None
+    shear_damping_ratio: float | None
+    rules: Mapping[str, str]
+
+
+def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> ResolvedPair:
+    """Return the contact parameters of the materials `one` and `other`, of two blocks unless `ground`.
+
+    With `ground`, `one` is a block's material and `other` is "ground" or the material that a wall names; a wall
+    without a material is as the ground.
+    """
+    partners = [(one, other)]  # whose tables apply, in order of precedence
+    if ground and other != GROUND:
+        partners.append((one, GROUND))
+    elif ground and scenario.ground.material is not None:
+        partners.append((one, scenario.ground.material))
+    overrides: list[tuple[str, Pair]] = []
+    for names in partners:
+        for left, right in dict.fromkeys([names, names[::-1]]):
+            pair = scenario.pairs.get(left, {}).get(right)
+            if pair is not None:
+                overrides.append((format_key(("pairs", left, right)), pair))
+    side = "block_ground" if ground else "block_block"
+    contact = scenario.contact
+    general: dict[str, tuple[object, str]] = {}
+    for name, table, place in (
+        ("friction", scenario.friction, "friction"),
+        ("restitution", contact.restitution, "contact.restitution"),
+    ):
+        general[name] = getattr(table, side), f"{place}.{side}" if side in table.model_fields_set else DEFAULT
+    for name in ("normal_stiffness", "shear_stiffness_ratio", "shear_damping_ratio"):
+        otherwise = DEFAULT if name == "shear_damping_ratio" else MATERIALS
+        value = getattr(contact, name)
+        general[name] = value, otherwise if value is None else f"contact.{name}"
+    values: dict[str, Any] = {}
+    rules: dict[str, str] = {}
+    for quantity, usual in general.items():
+        special = ((getattr(pair, quantity), f"{key}.{quantity}") for key, pair in overrides)
+        values[quantity], rules[quantity] = next((found for found in special if found[0] is not None), usual)
+    return ResolvedPair(**values, rules=rules)
+
 
 MARK = "# Resolved by blocksim"  # of every version; what follows in the line is for people
 HEADER = f"{MARK}: all values as used, in SI units (m, kg, s, N, Pa), angles in rad.\n"

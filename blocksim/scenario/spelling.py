@@ -50,7 +50,7 @@ USUAL: Mapping[str, tuple[str, ...]] = {
 """Symbols and words of papers and other programs with the keys that mean the same; a table takes the first it has."""
 
 
-def listed(names: Sequence[object], most: int) -> str:
+def list_names(names: Sequence[object], most: int) -> str:
     """Return names separated by commas; of more than `most` the first, and how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(map(str, names[:most])) + more

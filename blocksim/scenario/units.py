@@ -1,13 +1,15 @@
-"""Unit expressions such as "kN/m^3": their value in SI, and their dimension.
+"""Units and quantities: expressions such as "kN/m^3", and numbers with a unit as SI floats."""
 
-Factors are exact fractions: "35 mm" is the float nearest to 0.035, not 35 times a rounded 0.001.
-"""
-
+import functools
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from fractions import Fraction
+from typing import Annotated, Any, Literal
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 Dimension = tuple[int, int, int, int]
 """Exponents of length, mass, time and angle; an angle counts, so that "1/s" is not a spin and "3" not an angle."""
@@ -160,3 +162,277 @@ def unit_factor(unit: str, target: str) -> float | None:
     except UnitError:
         return None
     return float(one.factor / other.factor) if one.dimension == other.dimension else None
+
+
+_NUMBER = r"[+-]?(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
+_DECIMAL_COMMA = re.compile(r"\s*([+-]?[0-9]+),([0-9]+)(?![0-9]*,)(.*)", re.DOTALL)
+_MAX_LENGTH_QUANTITIES = 80
+_MAX_SHOWN = 40
+LEAST, MOST = 1e-18, 1e30
+"""Bounds (SI) of positive numbers and of all numbers: products of many such numbers stay finite doubles."""
+
+
+def toml(value: object) -> str:
+    """Write a value as in a TOML file, shortened, for a message."""
+    match value:
+        case bool():
+            text = str(value).lower()
+        case str():
+            short = value if len(value) <= _MAX_SHOWN else value[:_MAX_SHOWN] + "…"
+            escaped = short.replace("\\", "\\\\").replace('"', '\\"')
+            text = f'"{"".join(c if c.isprintable() else repr(c)[1:-1] for c in escaped)}"'
+        case int() if abs(value) > 10**_MAX_SHOWN:
+            text = "a huge whole number"
+        case list() | tuple():
+            text = "a list"
+        case dict():
+            text = "a table"
+        case _:
+            text = str(value)[:_MAX_SHOWN]
+    return text
+
+
+def invalid(message: str, *key: str | int, at: Literal["key", "value"] = "value") -> PydanticCustomError:
+    """Build the error that carries a finished message through pydantic; `key` is the path of the key concerned."""
+    return PydanticCustomError("blocksim", "{message}", {"message": message, "key": key, "at": at})
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """Kind of quantity: its name with the article, its dimension, its SI unit, and an example for messages."""
+
+    name: str
+    dimension: Dimension
+    unit: str
+    example: str
+
+    def in_words(self, value: float) -> str:
+        """Write a bound for a message: 0 without a unit, angles in degrees."""
+        if value == 0 or not self.unit:
+            return f"{value:g}"
+        return f"{math.degrees(value):g} deg" if self.unit == "rad" else f"{value:g} {self.unit}"
+
+
+NUMBER = Kind("a plain number", (0, 0, 0, 0), "", "")
+LENGTH = Kind("a length", (1, 0, 0, 0), "m", "32 mm")
+AREA = Kind("an area", (2, 0, 0, 0), "m^2", "2 m^2")
+MASS = Kind("a mass", (0, 1, 0, 0), "kg", "2 kg")
+TIME = Kind("a time", (0, 0, 1, 0), "s", "2 s")
+ANGLE = Kind("an angle", (0, 0, 0, 1), "rad", "20 deg")
+SPEED = Kind("a speed", (1, 0, -1, 0), "m/s", "5 mm/s")
+FREQUENCY = Kind("a frequency", (0, 0, -1, 0), "Hz", "2 Hz")
+SPIN = Kind("a spin", (0, 0, -1, 1), "rad/s", "90 deg/s")
+ACCELERATION = Kind("an acceleration", (1, 0, -2, 0), "m/s^2", "9.81 m/s^2")
+PRESSURE = Kind("a pressure", (-1, 1, -2, 0), "Pa", "69 GPa")
+DENSITY = Kind("a density", (-3, 1, 0, 0), "kg/m^3", "2700 kg/m^3")
+UNIT_WEIGHT = Kind("a unit weight", (-2, 1, -2, 0), "N/m^3", "26.7 kN/m^3")
+STIFFNESS = Kind("a stiffness", (0, 1, -2, 0), "N/m", "1e6 N/m")
+FORCE = Kind("a force", (1, 1, -2, 0), "N", "2 kN")
+MOMENT = Kind("a moment", (2, 1, -2, 0), "N m", "5 N m")
+_KINDS = (NUMBER, LENGTH, AREA, MASS, TIME, ANGLE, SPEED, FREQUENCY, SPIN, ACCELERATION, PRESSURE, DENSITY)
+_NAMES = {kind.dimension: kind.name for kind in (*_KINDS, UNIT_WEIGHT, STIFFNESS, FORCE, MOMENT)}
+
+
+class _Annotation:
+    """What annotations of a float field have in common: they read the value of the file before pydantic does."""
+
+    def read(self, value: object) -> float:
+        """Turn the value of the file into an SI float; the pydantic error has what is allowed."""
+        raise NotImplementedError
+
+    def json_schema(self) -> dict[str, Any]:
+        """JSON Schema of the value in the file."""
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the value first, then let pydantic see a float."""
+        return core_schema.no_info_before_validator_function(
+            self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
+        )
+
+    def __get_pydantic_json_schema__(self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Describe what may stand in the file."""
+        return self.json_schema()
+
+
+@dataclass(frozen=True)
+class Quantity(_Annotation):
+    """Annotation of a float field: kind of quantity and allowed values (SI)."""
+
+    kind: Kind
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+
+    @property
+    def wanted(self) -> str:
+        """Return what is allowed: 'a length above 0 such as "32 mm"'."""
+        bounds = {"above": self.above, "of at least": self.at_least, "below": self.below, "at most": self.at_most}
+        given = [f"{word} {self.kind.in_words(bound)}" for word, bound in bounds.items() if bound is not None]
+        example = [f'such as "{self.kind.example}"'] if self.kind.example else []
+        return " ".join([self.kind.name, *[" and ".join(given)][: len(given)], *example])
+
+    def read(self, value: object) -> float:
+        """Turn the value of the file into an SI float; the pydantic error has what is allowed."""
+        number = self._text(value) if isinstance(value, str) else self._number(value)
+        if not math.isfinite(number):
+            raise invalid(f"{toml(value)} is not a finite number; {self.wanted} is needed")
+        too_small = (self.above is not None and number <= self.above) or (
+            self.at_least is not None and number < self.at_least
+        )
+        too_large = (self.below is not None and number >= self.below) or (
+            self.at_most is not None and number > self.at_most
+        )
+        if too_small or too_large:
+            raise invalid(f"{toml(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed")
+        if abs(number) > MOST:
+            raise invalid(f"{toml(value)} is too large to compute with; at most {MOST:g} (SI) is allowed")
+        if self.above == 0.0 and number < LEAST:
+            raise invalid(f"{toml(value)} is too small to compute with; at least {LEAST:g} (SI) is allowed")
+        return number
+
+    def _number(self, value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise invalid(f"{toml(value)} is not a number; {self.wanted} is needed")
+        try:
+            number = float(value)
+        except OverflowError:
+            return math.inf
+        if self.kind is ANGLE and number != 0 and math.isfinite(number):
+            raise invalid(f'{toml(value)} has no unit; write "{number:g} deg" (or "{number:g} rad")')
+        return number
+
+    def _text(self, text: str) -> float:
+        try:
+            number, dimension = parse_quantity(text, self.kind)
+        except ValueError as error:
+            raise invalid(f"{toml(text)} is not {self.kind.name}: {error}") from None
+        if dimension != self.kind.dimension:
+            name = _NAMES.get(dimension, f"not {self.kind.name}")
+            raise invalid(f"{toml(text)} is {name}; {self.wanted} is needed")
+        return number
+
+    def json_schema(self) -> dict[str, Any]:
+        """JSON Schema of the value in the file: a number in SI or a string with a unit."""
+        bounds = {
+            "exclusiveMinimum": self.above,
+            "minimum": self.at_least,
+            "exclusiveMaximum": self.below,
+            "maximum": self.at_most,
+        }
+        number: dict[str, Any] = {"type": "number"}
+        number |= {name: bound for name, bound in bounds.items() if bound is not None}
+        if self.kind is NUMBER:
+            return number
+        if self.kind is ANGLE:
+            number = {"const": 0}
+        return {"anyOf": [number, _text_schema(self.kind.example)]}
+
+
+@dataclass(frozen=True)
+class FrictionCoefficient(_Annotation):
+    """Annotation of a float field: a coefficient, or a friction angle ("21 deg") whose tangent it is."""
+
+    wanted = 'a number of at least 0 such as 0.31, or a friction angle below 90 deg such as "21 deg",'
+
+    def read(self, value: object) -> float:
+        """Turn a coefficient or a friction angle into a coefficient."""
+        if isinstance(value, str):
+            return math.tan(Quantity(ANGLE, at_least=0.0, below=math.pi / 2).read(value))
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise invalid(f"{toml(value)} is not a number; {self.wanted} is needed")
+        return Quantity(NUMBER, at_least=0.0).read(value)
+
+    def json_schema(self) -> dict[str, Any]:
+        """JSON Schema of the value in the file: a number or an angle with its unit."""
+        return {"anyOf": [{"type": "number", "minimum": 0}, _text_schema("21 deg")]}
+
+
+def _text_schema(example: str) -> dict[str, Any]:
+    return {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-zµμ°]", "examples": [example]}
+
+
+@functools.lru_cache(maxsize=1024)
+def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
+    """Read "number unit" into an SI float and its dimension; raises ValueError with the reason.
+
+    `wanted` decides which unit is suggested for a misspelt one, and that g is the standard gravity, not a gram, where
+    an acceleration is meant.
+    """
+    found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH_QUANTITIES else None
+    comma = _DECIMAL_COMMA.fullmatch(text) if len(text) <= _MAX_LENGTH_QUANTITIES else None
+    if comma:
+        raise ValueError(f'write a decimal point: "{comma[1]}.{comma[2]}{comma[3]}"')
+    if wanted is NUMBER and (found is None or found[2] is None):
+        raise ValueError("write a number without quotes")
+    if found is None:
+        raise ValueError(f'write a number and a unit, such as "{wanted.example}"')
+    number, unit = found.groups()
+    if unit is None:
+        raise ValueError(f'the unit is missing, write it as in "{wanted.example}"')
+    try:
+        worth = parse_unit("g0" if wanted is ACCELERATION and unit == "g" else unit)
+    except UnitError as error:
+        if not error.unknown:
+            raise ValueError(f"{toml(unit)[1:-1]!r} is not a unit") from None
+        similar = similar_unit(error.unknown, unit, wanted.dimension)
+        hint = f"did you mean {similar!r}?" if similar else f'write it as in "{wanted.example}"'
+        raise ValueError(f"unknown unit {error.unknown!r}, {hint}") from None
+    rough = float(number)
+    if rough == 0 or math.isinf(rough):  # before "1e999999999" becomes a whole number of a billion digits
+        return rough, worth.dimension
+    try:
+        return float(Fraction(number) * worth.factor), worth.dimension  # the float nearest to the exact product
+    except OverflowError:
+        return math.copysign(math.inf, rough), worth.dimension
+
+
+def unit_in(text: str) -> str:
+    """Return the unit in a text such as "9.5 mm"; empty if it is not a number with a known unit."""
+    found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH_QUANTITIES else None
+    if found is None or found[2] is None:
+        return ""
+    try:
+        parse_unit(found[2])
+    except UnitError:
+        return ""
+    return found[2].strip()
+
+
+Number = Annotated[float, Quantity(NUMBER)]
+PositiveNumber = Annotated[float, Quantity(NUMBER, above=0.0)]
+NonNegativeNumber = Annotated[float, Quantity(NUMBER, at_least=0.0)]
+Share = Annotated[float, Quantity(NUMBER, at_least=0.0, at_most=1.0)]
+Ratio = Annotated[float, Quantity(NUMBER, above=0.0, at_most=1.0)]
+Safety = Annotated[float, Quantity(NUMBER, above=0.0, at_most=0.1)]
+PoissonRatio = Annotated[float, Quantity(NUMBER, above=-1.0, below=0.5)]
+Friction = Annotated[float, FrictionCoefficient()]
+Length = Annotated[float, Quantity(LENGTH)]
+PositiveLength = Annotated[float, Quantity(LENGTH, above=0.0)]
+NonNegativeLength = Annotated[float, Quantity(LENGTH, at_least=0.0)]
+Time = Annotated[float, Quantity(TIME)]
+PositiveTime = Annotated[float, Quantity(TIME, above=0.0)]
+NonNegativeTime = Annotated[float, Quantity(TIME, at_least=0.0)]
+Angle = Annotated[float, Quantity(ANGLE)]
+HalfTurn = Annotated[float, Quantity(ANGLE, at_least=0.0, at_most=math.pi)]
+Embrace = Annotated[float, Quantity(ANGLE, above=0.0, below=2.0 * math.pi)]
+SlopeAngle = Annotated[float, Quantity(ANGLE, above=0.0, below=math.pi)]
+TiltAngle = Annotated[float, Quantity(ANGLE, above=-math.pi / 2, below=math.pi / 2)]
+Speed = Annotated[float, Quantity(SPEED)]
+NonNegativeSpeed = Annotated[float, Quantity(SPEED, at_least=0.0)]
+PositiveSpeed = Annotated[float, Quantity(SPEED, above=0.0)]
+PositiveFrequency = Annotated[float, Quantity(FREQUENCY, above=0.0)]
+Spin = Annotated[float, Quantity(SPIN)]
+PositiveSpin = Annotated[float, Quantity(SPIN, above=0.0)]
+NonNegativeAcceleration = Annotated[float, Quantity(ACCELERATION, at_least=0.0)]
+FrictionAngle = Annotated[float, Quantity(ANGLE, at_least=0.0, below=math.pi / 2)]
+Cohesion = Annotated[float, Quantity(PRESSURE, at_least=0.0)]
+Pressure = Annotated[float, Quantity(PRESSURE, above=0.0)]
+AnyPressure = Annotated[float, Quantity(replace(PRESSURE, example="10 kPa"))]
+Force = Annotated[float, Quantity(FORCE)]
+Moment = Annotated[float, Quantity(MOMENT)]
+Density = Annotated[float, Quantity(DENSITY, above=0.0)]
+UnitWeight = Annotated[float, Quantity(UNIT_WEIGHT, above=0.0)]
+Stiffness = Annotated[float, Quantity(STIFFNESS, above=0.0)]

@@ -4,14 +4,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from blocksim.simulation.ensemble import run_ensemble, run_in_batches
+    from blocksim.simulation.ensemble import MemberEnd, MemberFailure, run_ensemble, run_in_batches
     from blocksim.simulation.frames import Frames
-    from blocksim.simulation.keeping import renew_copies
     from blocksim.simulation.loop import Progress, Watcher
-    from blocksim.simulation.member_end import MemberEnd, MemberFailure
-    from blocksim.simulation.result import Result, read_result
-    from blocksim.simulation.running import simulate, simulate_into
-    from blocksim.simulation.summary import Summary
+    from blocksim.simulation.result import Result, Summary, read_result, renew_copies
+    from blocksim.simulation.run import simulate, simulate_into
 
 __all__ = [
     "Frames",

@@ -1,12 +1,11 @@
-"""Many runs of scenes of one shape, advanced together in compiled code: the engine of large sweeps.
-
-No process is started and nothing is recorded on the way; only where everything ended and what moved first comes back,
-with the same bits as from a run of its own.
-"""
+"""Many runs of scenes of one shape, advanced together in compiled code: the engine of large sweeps."""
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,28 +14,151 @@ from blocksim.errors import BlocksimError
 from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED
 from blocksim.kernels.common.compiler import compiling
 from blocksim.kernels.common.frame_times import next_frame
-from blocksim.kernels.common.watch import Watched
-from blocksim.scenario import Scenario
+from blocksim.kernels.common.members import Watched
+from blocksim.kernels.common.systems import Coupled
+from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.events import NEVER, Timeline
+from blocksim.simulation.frames import COLUMNS, Columns, Frames, as_frame, final_values
 from blocksim.simulation.ledger import (
+    EnergyLedger,
+    InPlay,
     adds_up,
     energy_ledger,
     ledger_of,
     next_energy_check,
     start_energy,
 )
-from blocksim.simulation.loop import last_step_of
-from blocksim.simulation.member_end import Closing, Ended, MemberEnd, MemberFailure, in_play_of
-from blocksim.simulation.movement import Watch
-from blocksim.simulation.moving_support import MovingSupport
-from blocksim.simulation.recorder import POSITION, steps_per_frame
-from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measured_row, scheme_of
-from blocksim.simulation.settling import begun
+from blocksim.simulation.loop import Outcome, diagnose, last_step_of, outcome_of
+from blocksim.simulation.observables import OBSERVABLES, Value, Watch, observe
+from blocksim.simulation.probes import MovingSupport
+from blocksim.simulation.recorder import POSITION, Rows, frames_from_rows, steps_per_frame
+from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measured_row, scheme_of
+from blocksim.simulation.settling import initial_scene
 from blocksim.simulation.team import ALONE
-from blocksim.world.scenes import Refusal, Stack, member, stack_of_one
-from blocksim.world.systems.blocks import motion_of
+from blocksim.world.build import Refusal, Stack, member, stack_of_one
+from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+Placed = tuple[PlacedBody, ...]
+
+
+@dataclass(frozen=True)
+class MemberEnd:
+    """Where one member ended and how."""
+
+    outcome: Outcome
+    ledger: EnergyLedger
+    seconds: float  # simulated
+    columns: Columns  # the final table, as `final.csv` has it
+    placed: Placed = field(repr=False)
+    time_step: float  # s
+    rows: Rows = field(repr=False)  # one: the last
+    observables: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
+
+    @cached_property
+    def frames(self) -> Frames:
+        """One: the last."""
+        return frames_from_rows((blocks_placed(self.placed),), self.time_step, self.rows)
+
+    @property
+    def final(self) -> "pd.DataFrame":
+        """The final table for people who know pandas."""
+        return as_frame(self.columns)
+
+
+@dataclass(frozen=True)
+class MemberFailure:
+    """A member that could not be built, or for whose contacts there was no room."""
+
+    error: BlocksimError
+
+    @property
+    def outcome(self) -> Outcome:
+        """The same words and code as where it had been run by itself."""
+        return Outcome("failed", str(self.error), self.error.exit_code)
+
+
+EnsembleEnd = MemberEnd | MemberFailure
+
+
+def in_play_of(scenes: AnyScene | Coupled, members: Sequence[int]) -> list[InPlay]:
+    """Return what decides the energy in play, of some members of a stack."""
+    further = mass_of_systems(member(scenes, 0)) if isinstance(scenes, Coupled) else 0.0  # in a stack of one
+    mass = scenes.world.bodies.view(np.ndarray)["mass"]
+    masses = [float(np.sum(mass[m])) + further for m in members]  # one by one: the order matters
+    book = scenes.world.ledger[:, 0]
+    moved = book["largest_kinetic"] + book["travel_work"]
+    return [*map(InPlay, masses, moved[list(members)].tolist())]
+
+
+class Closing:
+    """The last states of a stack of scenes."""
+
+    def __init__(
+        self,
+        scenes: AnyScene,
+        placed: list[Placed],
+        measured: NDArray[np.float64],
+        watch: Watch,
+        turned: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Take what is measured (m, e + 2) in the scenes as they are now, as the scheme's `measured`.
+
+        `watch` has seen them on the way; `turned` (m, 1) is their largest rotation (rad), where it was followed.
+        """
+        world, blocks = scenes.world, len(placed[0])
+        self.names = ledger_names(scenes)
+        self.scenes, self.placed = scenes, placed
+        self.measured = measured
+        self.motion = motion_of(world.bodies[:, :blocks])  # (m, 6, b)
+        self.steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
+        self.time_steps: list[float] = world.controls["step"][:, 0].tolist()
+        self.in_play = in_play_of(scenes, range(len(placed)))
+        self.columns = final_values(self.motion, _shapes(placed), _outlines(placed)).tolist()
+        support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
+        ends = watch.ends(self.motion, support, [self._seconds(m) for m in range(len(placed))], turned)
+        self.observables = observe(ends, [one.name for one in OBSERVABLES.values() if one.in_rows])
+
+    def _seconds(self, m: int) -> float:
+        return float(self.steps[m, 0]) * self.time_steps[m]
+
+    def end(self, m: int, start: float, code: int) -> MemberEnd:
+        """Return the end of one member: energy (J) at the start, status code that it came to."""
+        ledger = ledger_of(self.names, self.measured[m], start, self.in_play[m])
+        names = [body.name for body in self.placed[m]]
+        some = slice(m, m + 1)
+        outcome = outcome_of(code, ledger)
+        if not outcome.is_finished:
+            outcome = diagnose(outcome, code, member(self.scenes, m), self.placed[m])
+        return MemberEnd(
+            outcome=outcome,
+            ledger=ledger,
+            seconds=self._seconds(m),
+            columns=dict(zip(COLUMNS, (names, *self.columns[m]), strict=True)),
+            placed=self.placed[m],
+            time_step=self.time_steps[m],
+            rows=Rows(self.steps[m], (self.motion[some],), self.measured[some], self.names),
+            observables=self.observables[m],
+        )
+
+
+def _outlines(placed: list[Placed]) -> NDArray[np.float64] | None:
+    """Return the corners (m, b, k, 2) of blocks; None where all are rectangles."""
+    outlines = outlines_of([one for member in placed for one in member])
+    return None if outlines is None else outlines.reshape(len(placed), -1, *outlines.shape[1:])
+
+
+def _shapes(placed: list[Placed]) -> NDArray[np.float64]:
+    """Return sides and angles (m, 3, b) as placed."""
+    bodies = ((one.size_x, one.size_y, one.angle) for member in placed for one in member)
+    values = np.array([*bodies]).reshape(len(placed), -1, 3)
+    return values.swapaxes(1, 2)
+
 
 BATCH = 256  # members in memory at the same time
 MOST_BODIES = 16_384  # of all members of a batch
@@ -64,7 +186,7 @@ def run_ensemble(scenarios: Sequence[Scenario], *, threads: int | None = None, p
 
 def run_in_batches(
     scenarios: Iterable[Scenario], *, threads: int | None = None, most: int = BATCH, peaks: bool = False
-) -> Iterator[list[Ended]]:
+) -> Iterator[list[EnsembleEnd]]:
     """Run scenarios as `run_ensemble` does, at most `most` at a time; yield where those of a batch ended, in order.
 
     Scenarios are taken from where they come from as they are needed, and nothing of a batch is kept. One that cannot be
@@ -79,7 +201,7 @@ def run_in_batches(
     return _run_all(scenarios, count, most, peaks=peaks)
 
 
-def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: bool) -> Iterator[list[Ended]]:
+def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: bool) -> Iterator[list[EnsembleEnd]]:
     with ThreadPoolExecutor(threads) as pool:
         for batch in _batches(scenarios, most):
             for kernels in dict.fromkeys(map(kernels_of, batch)):
@@ -101,8 +223,10 @@ def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario
         yield batch
 
 
-def _run_batch(scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads: int, *, peaks: bool) -> list[Ended]:
-    ends: dict[int, Ended] = {}
+def _run_batch(
+    scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads: int, *, peaks: bool
+) -> list[EnsembleEnd]:
+    ends: dict[int, EnsembleEnd] = {}
     for one in build_stacks(scenarios):
         if isinstance(one, Refusal):
             ends[one.number] = MemberFailure(one.error)
@@ -122,7 +246,7 @@ def _settled(scenario: Scenario, stack: Stack) -> Stack:
     """Return a stack as its runs begin; one that settles first has one scene. Raises SettleError."""
     if not settles(scenario):
         return stack
-    scene, _ = begun(member(stack.scenes, 0), scenario, stack.placed[0], ALONE)
+    scene, _ = initial_scene(member(stack.scenes, 0), scenario, stack.placed[0], ALONE)
     return stack._replace(scenes=stack_of_one(scene))
 
 
@@ -253,7 +377,7 @@ class Ensemble:
         """Return the energy (J) of a member at the start."""
         return float(self.starts[m, : len(self.scheme.ledger)].sum())
 
-    def ends(self) -> list[Ended]:
+    def ends(self) -> list[EnsembleEnd]:
         """Return where the members ended, in order."""
         self._see_ends()
         measured = self._measured(np.arange(len(self.codes)))
@@ -277,7 +401,7 @@ class Ensemble:
         self._advance_members(members, nowhere, rows, nowhere.copy())
         return rows
 
-    def _run_alone(self, m: int, start: float) -> Ended:
+    def _run_alone(self, m: int, start: float) -> EnsembleEnd:
         """Go on with a member whose pair list is full."""
         scene, placed = member(self.scenes, m), [self.placed[m]]
         try:

@@ -13,9 +13,9 @@ import numpy as np
 from blocksim.kernels.common.arrays import AT_REST, DRIVEN, REACHED, REMOVED, SUPPORT, Record, World, zeros
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.events import in_order, wall_names
-from blocksim.scenario.models.events import Event
-from blocksim.simulation.happened import Happened, in_words
+from blocksim.scenario.models.stepping import Event
 from blocksim.simulation.ledger import start_energy
+from blocksim.simulation.result import EventRecord, describe_event
 from blocksim.simulation.schemes import AnyScene, scheme_of
 from blocksim.simulation.team import Team
 
@@ -37,7 +37,7 @@ class Timeline:
         self.names = {body.name: number for number, body in enumerate(placed)}
         self.walls = wall_names(scenario)
         self.loads = [load.name for load in scenario.loads]
-        self.happened: tuple[Happened, ...] = ()
+        self.happened: tuple[EventRecord, ...] = ()
         order = in_order(self.events)
         timed = ((self.events[number].at, number) for number in order)
         self.timed = [(max(1, round(at / step)), number) for at, number in timed if at is not None]
@@ -83,7 +83,9 @@ class Timeline:
         clock.checks_at_rest = 0
         scene.world.ledger[0].events += energy
         steps = int(clock.steps)
-        told = Happened(event=number, step=steps, time_s=steps * self.step, what=in_words(event), energy_J=energy)
+        told = EventRecord(
+            event=number, step=steps, time_s=steps * self.step, what=describe_event(event), energy_J=energy
+        )
         self.happened = (*self.happened, told)
         return scene, status
 
@@ -91,11 +93,11 @@ class Timeline:
         """Return the scene with what an event does in its arrays."""
         world = scene.world
         for name in event.remove:
-            world = removed(world, self._number(world, name))
+            world = remove_body(world, self._number(world, name))
         for name in event.fix:
-            world = fixed(world, self.names[name])
+            world = fix_body(world, self.names[name])
         for name in event.free:
-            world = freed(world, self.names[name], self.placed[self.names[name]])
+            world = free_body(world, self.names[name], self.placed[self.names[name]])
         for name in event.unload:
             end_load(world, self.loads.index(name))
         if event.velocity is not None:
@@ -112,7 +114,7 @@ class Timeline:
         return int(world.bodies.size) - 1 - len(self.walls) + self.walls.index(name)
 
 
-def removed(world: World, number: int) -> World:
+def remove_body(world: World, number: int) -> World:
     """Return a world without a body: it stays where it is, touches nothing, has no mass and never moves."""
     body = world.bodies[number]
     world = _without(world, number)
@@ -123,7 +125,7 @@ def removed(world: World, number: int) -> World:
     return world
 
 
-def fixed(world: World, number: int) -> World:
+def fix_body(world: World, number: int) -> World:
     """Return a world with a body that moves with the support from now on; what is not there or fixed is left."""
     body = world.bodies[number]
     if body.is_moved in (SUPPORT, REMOVED):
@@ -141,7 +143,7 @@ def fixed(world: World, number: int) -> World:
     return world._replace(moved=extended)
 
 
-def freed(world: World, number: int, placed: PlacedBody) -> World:
+def free_body(world: World, number: int, placed: PlacedBody) -> World:
     """Return a world with a body that is free from now on, as fast as it is; what is not there or free is left."""
     body = world.bodies[number]
     if body.is_moved not in (SUPPORT, DRIVEN):

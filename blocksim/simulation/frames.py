@@ -1,25 +1,105 @@
-"""What a run leaves behind over time: positions, velocities and energies at the output times.
+"""What a run leaves behind over time: contacts and states at the output times, and the final table."""
 
-A tidy pandas table and an xarray data set are made from frames on request; pandas and xarray are imported then.
-"""
-
+import csv
+import io
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.extras import loaded
-from blocksim.simulation.contacts import Contacts
-from blocksim.world.systems.blocks import BLOCKS
+from blocksim.errors import InvalidInputError
+from blocksim.extras import load_module
+from blocksim.scenario.input_files import MEGABYTE, read_limited
+from blocksim.world.systems.blocks import BLOCKS, boxes_around
 from blocksim.world.systems.system import Elements, Present, Track
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-EXTRA = "xarray"
+
 Floats = NDArray[np.float64]
+Rows = NDArray[Any]  # (c,) CONTACT_ROW
+
+BODIES = ("body_a", "body_b")
+SUPPORT = -1  # body number of the ground, of its pieces and of walls; blocks count from 0 as in frames
+UNITS = {
+    "x": "m",  # contact point
+    "y": "m",
+    "normal_x": "1",
+    "normal_y": "1",
+    "overlap": "m",  # negative: a gap
+    "normal_force": "N",
+    "shear_force": "N",
+}
+CONTACT_ROW = np.dtype([*((name, np.int32) for name in BODIES), *((name, np.float64) for name in UNITS)])
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """The contacts of n frames, one frame after the other."""
+
+    ends: NDArray[np.int64]  # (n,) number of contacts in all frames up to and with this one
+    rows: Rows  # (c,) CONTACT_ROW
+
+    def at(self, frame: int) -> Rows:
+        """Return the contacts of one frame, (k,) CONTACT_ROW."""
+        return self.rows[self.ends[frame - 1] if frame > 0 else 0 : self.ends[frame]]
+
+    def tables(self) -> list[Rows]:
+        """Return the contacts of all frames, one table each."""
+        return [self.at(frame) for frame in range(len(self))]
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Contacts":
+        """Return those of some frames."""
+        return join_contacts([self.at(frame) for frame in np.flatnonzero(which).tolist()])
+
+    @property
+    def frame(self) -> NDArray[np.intp]:
+        """Number of the frame of every contact, (c,)."""
+        return np.repeat(np.arange(len(self.ends)), np.diff(self.ends, prepend=0))
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.ends)
+
+
+def join_contacts(tables: Sequence[Rows]) -> Contacts:
+    """Return the contacts of frames from one table each."""
+    ends = np.cumsum([len(table) for table in tables], dtype=np.int64)
+    return Contacts(ends, np.concatenate([empty_rows(0), *tables]))
+
+
+def empty_rows(count: int) -> Rows:
+    """Return a table of so many contacts, all zero."""
+    return np.zeros(count, dtype=CONTACT_ROW)
+
+
+def forces_on_a(rows: Rows) -> Floats:
+    """Return the force (N) of every contact on its body a along x and y, (k, 2)."""
+    normal, shear = rows["normal_force"], rows["shear_force"]
+    nx, ny = rows["normal_x"], rows["normal_y"]
+    return np.stack([nx * normal - ny * shear, ny * normal + nx * shear], axis=-1)
+
+
+def force_on_supports(contacts: Contacts, up: tuple[float, float] = (0.0, 1.0), fixed: Sequence[bool] = ()) -> Floats:
+    """Return the force (N) along the unit vector `up` with which supports hold all free blocks at every frame, (n,).
+
+    Supports are ground and walls, and blocks that are `fixed`. Blocks at rest are held by what they weigh.
+    """
+    rows = contacts.rows
+    held = np.append(np.asarray(fixed, dtype=np.bool_), [False] * (1 + int(rows["body_a"].max(initial=0))))
+    holds_a = (rows["body_b"] == SUPPORT) | held[rows["body_b"]]
+    sign = holds_a.astype(float) - held[rows["body_a"]]
+    total = np.cumsum(sign * (forces_on_a(rows) @ np.array(up)))
+    return np.diff(np.concatenate([[0.0], total])[contacts.ends], prepend=0.0)
+
+
+EXTRA = "xarray"
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,7 +175,7 @@ def data_set(frames: Frames, name: str) -> "xr.Dataset":
     Variables of another system begin with its name, and have a dimension of their own. Raises UnavailableError without
     the extra `xarray`.
     """
-    xarray = loaded("xarray", "to_xarray", EXTRA)
+    xarray = load_module("xarray", "to_xarray", EXTRA)
     variables: dict[str, Any] = {}
     coordinates: dict[str, Any] = {"time": ("time", frames.time, {"units": "s"})}
     for track in frames.tracks:
@@ -108,3 +188,121 @@ def data_set(frames: Frames, name: str) -> "xr.Dataset":
     energies = {f"energy_{key}": (("time",), values, {"units": "J"}) for key, values in frames.energy.items()}
     found: xr.Dataset = xarray.Dataset({**variables, **energies}, coords=coordinates, attrs={"scenario": name})
     return found
+
+
+Columns = dict[str, list[Any]]  # by the names in COLUMNS, a value a block: its name, then numbers
+
+COLUMNS = (
+    "block",
+    "x_mm",
+    "y_mm",
+    "rotation_deg",
+    "left_mm",
+    "right_mm",
+    "bottom_mm",
+    "top_mm",
+    "vx_mm_s",
+    "vy_mm_s",
+    "spin_deg_s",
+)
+MILLI = 1e3
+MOST_BYTES = 400 * MEGABYTE  # of final.csv; a million blocks take half of it
+
+
+def final_columns(frames: Frames) -> Columns:
+    """Return the table of the last frame: a value a block, columns as in `COLUMNS`.
+
+    x, y is the centre; rotation the angle turned since the start, counter-clockwise positive, not wrapped; left, right,
+    bottom and top are the extents of the turned block.
+    """
+    motion = np.stack([one[-1] for one in (frames.x, frames.y, frames.angle, frames.vx, frames.vy, frames.spin)])
+    shapes = np.stack([frames.size_x, frames.size_y, frames.start_angle])
+    values = final_values(motion, shapes, frames.outlines)
+    return dict(zip(COLUMNS, (list(frames.names), *values.tolist()), strict=True))
+
+
+def final_values(motion: Floats, shapes: Floats, outlines: Floats | None = None) -> Floats:
+    """Return the numbers (..., 10, b) of the tables of states, columns as in `COLUMNS`.
+
+    `motion` (..., 6, b) holds x, y, angle and their rates, `shapes` (..., 3, b) sides along the body's own axes and the
+    angle at the start, all SI. `outlines` (..., b, k, 2) are corners along these axes, where any is no rectangle.
+    """
+    x, y, angle, vx, vy, spin = (motion[..., k, :] for k in range(6))
+    size_x, size_y, start_angle = (shapes[..., k, :] for k in range(3))
+    # of one state at a time: what is computed together may decide on the last digit
+    cos, sin = (
+        np.reshape([turn(one) for one in angle.reshape(-1, max(x.shape[-1], 1))], x.shape) for turn in (np.cos, np.sin)
+    )
+    if outlines is None:
+        cos, sin = np.abs(cos), np.abs(sin)
+        half_width = 0.5 * (cos * size_x + sin * size_y)
+        half_height = 0.5 * (sin * size_x + cos * size_y)
+        extents = [x - half_width, x + half_width, y - half_height, y + half_height]
+    else:
+        low, high = boxes_around(outlines, x, y, angle)
+        extents = [low[..., 0], high[..., 0], low[..., 1], high[..., 1]]
+    values = (
+        MILLI * x,
+        MILLI * y,
+        np.degrees(angle - start_angle),
+        *(MILLI * one for one in extents),
+        MILLI * vx,
+        MILLI * vy,
+        np.degrees(spin),
+    )
+    return np.stack(values, axis=-2)
+
+
+def as_frame(columns: Columns) -> "pd.DataFrame":
+    """Return the same table for people who know pandas."""
+    import pandas as pd
+
+    return pd.DataFrame(columns)
+
+
+def final_table(frames: Frames) -> "pd.DataFrame":
+    """Return the table of the last frame for people who know pandas."""
+    return as_frame(final_columns(frames))
+
+
+def rows_of(columns: Columns) -> list[dict[str, Any]]:
+    """Return the same table as a list of rows."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def csv_text(columns: Columns) -> str:
+    """Return the text of a file that gives all numbers back to the last bit; NaN is an empty cell."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    rows = zip(*columns.values(), strict=True)
+    writer.writerows([name, *("" if value != value else value for value in values)] for name, *values in rows)  # noqa: PLR0124 - NaN alone is not itself, and other cells are words
+    return text.getvalue()
+
+
+def read_table(path: Path) -> Columns:
+    """Return a final table from its file. Raises InputMissingError or InvalidInputError."""
+    try:
+        text = read_limited(path, MOST_BYTES).decode()
+        return _columns_of(line for line in csv.reader(io.StringIO(text, newline="")) if line)
+    except (ValueError, csv.Error) as error:
+        message = f"{path}: not a final table: {error}"
+        raise InvalidInputError(message) from error
+
+
+def _columns_of(lines: Iterator[list[str]]) -> Columns:
+    """Return the columns in the lines of a file, which are not kept. Raises ValueError."""
+    if tuple(next(lines, ())) != COLUMNS:
+        raise ValueError(f"the columns must be {','.join(COLUMNS)}")
+    columns: Columns = {name: [] for name in COLUMNS}
+    for number, cells in enumerate(lines, start=1):
+        if len(cells) != len(COLUMNS):
+            raise ValueError(f"row {number} has {len(cells)} cells, not {len(COLUMNS)}")
+        for column, value in zip(columns.values(), (cells[0], *map(_number, cells[1:])), strict=True):
+            column.append(value)
+    return columns
+
+
+def _number(text: str) -> float:
+    """Return the number of a cell to the last bit; an empty cell is one that is not finite."""
+    return float(text) if text else math.nan

@@ -1,13 +1,10 @@
-"""Probes of a run under way: samples at fixed steps, between compiled calls, which never change the motion.
-
-Forces are those of `blocksim.simulation.contacts`: with springs at the time of the sample, with rigid contacts the
-impulses of the last substep over its length. Where the support moves, places and velocities relative to it are given
-beside those in the frame in which it was at rest at the start.
-"""
+"""Probes: time histories of forces, points, joints and energies, sampled between compiled calls."""
 
 import math
 import sys
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,15 +12,189 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody, Scenario, place_segments
-from blocksim.scenario.models.probe import STEP, EnergyProbe, ForceProbe, JointProbe, PointProbe
-from blocksim.scenario.probes import GROUND, SUPPORTS, WALL, WALLS, Joint, joint_between, probe_names
-from blocksim.simulation.contacts import empty_rows, forces_on_a
-from blocksim.simulation.moving_support import AT_REST, MovingSupport
-from blocksim.simulation.probe_series import Column, ProbeSeries, columns_of, series_of
+from blocksim.scenario.events import GROUND, SUPPORTS, WALL, WALLS, Joint, joint_between, probe_names
+from blocksim.scenario.models.stepping import STEP, EnergyProbe, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.motion import motion_direction, motion_pieces
+from blocksim.simulation.frames import empty_rows, forces_on_a
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from blocksim.simulation.schemes import AnyScene
     from blocksim.world.systems.system import System, Touching
+
+
+class MovingSupport:
+    """Motion of the support."""
+
+    def __init__(self, scenario: Scenario | None) -> None:
+        """Work out the pieces of its motion once; without a scenario, or without a motion, it rests."""
+        self.times: list[float] = []
+        self.coefficients: list[list[float]] = []
+        self.direction = (1.0, 0.0)
+        if scenario is not None and scenario.motion is not None:
+            pieces = motion_pieces(scenario)
+            self.direction = motion_direction(scenario)
+            self.times, self.coefficients = pieces.times.tolist(), pieces.coefficients.tolist()
+
+    @property
+    def moves(self) -> bool:
+        """Whether it does not rest all the time."""
+        return bool(self.coefficients)
+
+    def at(self, time: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return displacement (m) and velocity (m/s) along x and y at a time (s)."""
+        if not self.coefficients:
+            return (0.0, 0.0), (0.0, 0.0)
+        piece = min(max(bisect_right(self.times, time) - 1, 0), len(self.coefficients) - 1)
+        s = time - self.times[piece]
+        c0, c1, c2, c3 = self.coefficients[piece]
+        moved, speed = c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * s * c3)
+        (x, y) = self.direction
+        return (moved * x, moved * y), (speed * x, speed * y)
+
+    def way(self, time: float) -> tuple[float, float]:
+        """Return how far (m) it has come along x and y since the start, at a time (s)."""
+        (x, y), _ = self.at(time)
+        (x0, y0), _ = self.at(0.0)
+        return x - x0, y - y0
+
+
+AT_REST = MovingSupport(None)
+
+
+Floats = NDArray[np.float64]
+
+FORCE, POINT, JOINT, ENERGY = "force", "point", "joint", "energy"
+TABLE_UNITS = {"m": ("_mm", 1e3), "m/s": ("_mm_s", 1e3), "rad": ("_deg", math.degrees(1.0)), "N": ("_N", 1.0),
+           "J": ("_J", 1.0), "1": ("", 1.0)}  # fmt: skip
+"""Ending of the name and factor of a column in tables for people, by its SI unit."""
+ROWS_AT_ONCE = 50_000
+CHUNK_ROWS = 1024  # of a column in run.h5
+DIGITS = 20  # characters of a number in CSV
+
+
+@dataclass(frozen=True)
+class Column:
+    """A quantity that a probe records."""
+
+    name: str
+    unit: str  # SI
+    meaning: str
+
+
+COLUMNS: Mapping[str, tuple[Column, ...]] = {
+    FORCE: (
+        Column("fx", "N", "force along x"),
+        Column("fy", "N", "force along y"),
+        Column("x", "m", "point of application, weighted by normal forces"),
+        Column("y", "m", "point of application"),
+        Column("mobilised", "1", "shear forces over normal forces times static friction"),
+        Column("contacts", "1", "number of contacts"),
+    ),
+    POINT: (
+        Column("x", "m", "place along x"),
+        Column("y", "m", "place along y"),
+        Column("dx", "m", "displacement from the start"),
+        Column("dy", "m", "displacement from the start"),
+        Column("relative_dx", "m", "displacement from the start relative to the support"),
+        Column("relative_dy", "m", "displacement from the start relative to the support"),
+        Column("vx", "m/s", "velocity"),
+        Column("vy", "m/s", "velocity"),
+        Column("relative_vx", "m/s", "velocity relative to the support"),
+        Column("relative_vy", "m/s", "velocity relative to the support"),
+        Column("rotation", "rad", "angle turned since the start"),
+    ),
+    JOINT: (
+        Column("opening", "m", "gap in the middle of the joint"),
+        Column("opening_first", "m", "gap at its first end"),
+        Column("opening_last", "m", "gap at its last end"),
+        Column("slip", "m", "displacement of the second body along the joint, towards +x where it lies on the first"),
+        Column("rotation", "rad", "angle that the second body has turned relative to the first"),
+    ),
+}
+
+
+def columns_of(kind: str, ledger: Sequence[str]) -> tuple[Column, ...]:
+    """Return the columns of a kind of probe; `ledger` names the energies of a run."""
+    if kind == ENERGY:
+        return tuple(Column(name, "J", name.replace("_", " ")) for name in ledger)
+    return COLUMNS[kind]
+
+
+@dataclass(frozen=True, repr=False)
+class ProbeSeries:
+    """The n samples of one probe in SI."""
+
+    name: str
+    kind: str
+    step: NDArray[np.int64]  # (n,) step numbers
+    time: Floats  # (n,) s
+    columns: dict[str, Floats] = field(repr=False)  # (n,) each
+    units: dict[str, str]  # SI, by column
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.step)
+
+    def __getitem__(self, column: str) -> Floats:
+        """Return a column. Raises KeyError for one that this kind of probe does not have."""
+        return self.columns[column]
+
+    def __repr__(self) -> str:
+        """Return a line: name, kind, samples, columns."""
+        return f"<Probe {self.name}: {self.kind}, {len(self)} samples of {', '.join(self.columns)}>"
+
+    def written(self) -> dict[str, Floats]:
+        """Return the columns as tables for people have them, in mm, degrees, N and J, by names with their units."""
+        return {
+            f"{name}{TABLE_UNITS[self.units[name]][0]}": TABLE_UNITS[self.units[name]][1] * values
+            for name, values in self.columns.items()
+        }
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return a pandas table, one row per sample: time_s, then the columns in mm, degrees, N and J."""
+        import pandas as pd
+
+        return pd.DataFrame({"time_s": self.time, **self.written()})
+
+    def csv_lines(self) -> Iterator[str]:
+        """Yield the CSV in parts: step, time_s and the columns; numbers read back exactly, nan where there is none."""
+        columns = self.written()
+        yield ",".join(["step", "time_s", *columns]) + "\n"
+        for first in range(0, len(self), ROWS_AT_ONCE):
+            part = slice(first, first + ROWS_AT_ONCE)
+            lists = [values[part].tolist() for values in (self.step, self.time, *columns.values())]
+            rows = zip(*lists, strict=True)
+            yield "".join(",".join(map(repr, row)) + "\n" for row in rows)
+
+
+def bytes_of_series(scenario: Scenario, steps: int, step: float, energies: int) -> int:
+    """Return the bytes that the probes of a run of so many steps (s) take in its folder, with so many energies."""
+    total = 0.0
+    for probe in scenario.probes:
+        every = step if probe.every == STEP else float(probe.every or scenario.output.every)
+        columns = energies if probe.kind == ENERGY else len(COLUMNS[probe.kind])
+        rows = steps * step / max(every, step) + 1
+        total += (2 + columns) * (8 * CHUNK_ROWS * math.ceil(rows / CHUNK_ROWS) + DIGITS * rows)
+    return int(total)
+
+
+def series_of(
+    name: str, kind: str, columns: Sequence[Column], rows: Sequence[tuple[int, Sequence[float]]], time_step: float
+) -> ProbeSeries:
+    """Return samples from rows of step and values; `time_step` in s."""
+    steps = np.array([step for step, _ in rows], dtype=np.int64)
+    values = np.array([row for _, row in rows], dtype=np.float64).reshape(len(rows), len(columns))
+    return ProbeSeries(
+        name,
+        kind,
+        steps,
+        np.multiply(steps, time_step, dtype=np.float64),
+        {one.name: np.ascontiguousarray(values[:, place]) for place, one in enumerate(columns)},
+        {one.name: one.unit for one in columns},
+    )
+
 
 Values = Sequence[float]
 Sampler = Callable[["Moment"], Values]

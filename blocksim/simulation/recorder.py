@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody
-from blocksim.simulation.contacts import Contacts, joined
-from blocksim.simulation.contacts import Rows as ContactRows
-from blocksim.simulation.frames import Frames
-from blocksim.simulation.movement import Watch
-from blocksim.simulation.moving_support import AT_REST, MovingSupport
-from blocksim.simulation.probes import NO_PROBES, Probes
+from blocksim.simulation.frames import Contacts, Frames, join_contacts
+from blocksim.simulation.frames import Rows as ContactRows
+from blocksim.simulation.observables import Watch
+from blocksim.simulation.probes import AT_REST, NO_PROBES, MovingSupport, Probes
 from blocksim.world.systems.blocks import BLOCKS, blocks_placed
 from blocksim.world.systems.system import Floats, Present, Track
 
@@ -171,7 +169,7 @@ class Recorder:
     def frames(self) -> Frames:
         """Return all frames that are held: those so far, or, with a sink, the last one."""
         steps, states, measured, tables = zip(*self.held, strict=True)
-        contacts = joined(tables) if self.with_contacts else None
+        contacts = join_contacts(tables) if self.with_contacts else None
         values = tuple(np.stack(one) for one in zip(*states, strict=True))
         rows = Rows(np.array(steps, dtype=np.int64), values, np.stack(measured), self.ledger, contacts)
         return frames_from_rows(self.systems, self.time_step, rows)

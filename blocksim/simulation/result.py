@@ -1,24 +1,145 @@
-"""A finished, failed or interrupted run as an object, and back from its folder."""
+"""A finished, failed or interrupted run: run.json with rest state and events, the object, and how a folder keeps it."""
 
+import json
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, load_stored, place_bodies
+from blocksim.scenario.input_files import MEGABYTE, read_limited
+from blocksim.scenario.models.stepping import Event, NewVelocity
 from blocksim.simulation import folder as files
-from blocksim.simulation.frames import Frames, data_set, tidy_table
-from blocksim.simulation.probe_series import ProbeSeries
-from blocksim.simulation.stores.hdf5_probes import read_probes
-from blocksim.simulation.stores.hdf5_reader import read_frames
-from blocksim.simulation.summary import Summary, read_summary
-from blocksim.simulation.table import Columns, as_frame, read_table
+from blocksim.simulation.atomic import sha256_of, write_text
+from blocksim.simulation.folder import PROBE, keep_scenario, probe_tables, read_tables
+from blocksim.simulation.frames import Columns, Frames, as_frame, csv_text, data_set, read_table, tidy_table
+from blocksim.simulation.ledger import EnergyLedger
+from blocksim.simulation.observables import Movement
+from blocksim.simulation.probes import ProbeSeries
+from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+
+NOT_AT_REST = "does not come to rest before time zero"
+
+
+class RestState(BaseModel, frozen=True):
+    """How a scene came to rest, or how far it got."""
+
+    steps: int
+    largest_displacement_mm: float
+    displaced_block: str
+    held: tuple[str, ...] = ()
+    at_rest: bool = True  # False where it was released all the same (`start.release`)
+
+
+LISTED = 6
+"""Names of bodies that a line has; of more it has the number."""
+
+
+class EventRecord(BaseModel, frozen=True):
+    """One event that has happened."""
+
+    event: int  # its number in the scenario, from 0
+    step: int
+    time_s: float  # of that step
+    what: str  # in words
+    energy_J: float  # noqa: N815 - taken from what the scene holds; negative where the event has brought some in
+
+
+def describe_event(event: Event) -> str:
+    """Return what an event does."""
+    return "; ".join(_parts(event))
+
+
+def _parts(event: Event) -> Iterator[str]:
+    for names, done in ((event.remove, "removed"), (event.fix, "fixed"), (event.free, "freed")):
+        if names:
+            yield f"{_listed(names)} {done}"
+    if event.unload:
+        yield f"{'load' if len(event.unload) == 1 else 'loads'} {', '.join(event.unload)} ended"
+    if event.velocity is not None:
+        yield f"{event.velocity.body} gets {_values(event.velocity)}"
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names) if len(names) <= LISTED else f"{len(names)} bodies"
+
+
+def _values(new: NewVelocity) -> str:
+    values = (("vx", new.vx, "m/s"), ("vy", new.vy, "m/s"), ("spin", new.spin, "rad/s"))
+    return ", ".join(f"{name} {value:g} {unit}" for name, value, unit in values if value is not None)
+
+
+MOST_BYTES = MEGABYTE
+"""Of run.json; a run writes two thousand."""
+
+
+class Summary(BaseModel, frozen=True):
+    """The entries of run.json; seconds are of wall time, unless they say that they are simulated."""
+
+    name: str
+    status: Literal["finished", "failed", "interrupted"]
+    reason: str
+    exit_code: int
+    run: str
+    scenario_hash: str
+    final_state_sha256: str
+    steps: int
+    time_step_s: float
+    simulated_time_s: float
+    ended_at: str
+    compile_seconds: float
+    solver_seconds: float
+    total_seconds: float
+    threads: int = 1
+    resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
+    last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
+    energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    settled: RestState | None = None  # how it came to rest before time zero, where it did
+    events: tuple[EventRecord, ...] = ()  # in the order in which they have happened
+    movement: Movement | None = None  # None in runs of earlier versions and without blocks
+    warnings: tuple[str, ...]
+    environment: dict[str, str]
+    sha256: dict[str, str] = {}
+
+    def to_json(self) -> str:
+        """Return the text of run.json; numbers that are not finite become null."""
+        return self.model_dump_json(indent=2) + "\n"
+
+
+def read_summary(path: Path) -> Summary:
+    """Return what a run.json holds. Raises InputMissingError or InvalidInputError."""
+    try:
+        return Summary.model_validate_json(read_limited(path, MOST_BYTES))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        message = f"{path}: not the summary of a run: {place + ': ' if place else ''}{first['msg']}"
+        raise InvalidInputError(message) from None
+
+
+def changed_files(folder: Path, summary: Summary) -> tuple[str, ...]:
+    """Return the files of a run that do not have the checksums that run.json has for them."""
+    return tuple(
+        name
+        for name, digest in summary.sha256.items()
+        if not (folder / Path(name).name).is_file() or sha256_of(folder / Path(name).name) != digest
+    )
+
+
+def changed_results(folder: Path, summary: Summary) -> tuple[str, ...]:
+    """Return which of frames and final table are not as the run has written them; the other files may be renewed."""
+    return tuple(name for name in changed_files(folder, summary) if name in {files.FRAMES, files.FINAL})
+
 
 MOST_ROWS = 20  # of the table that a notebook shows
 
@@ -122,3 +243,51 @@ def read_final(folder: Path, scenario: Scenario) -> Columns:
         message = f"{path}: its blocks are not those of {files.SCENARIO}"
         raise InvalidInputError(message)
     return columns
+
+
+COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION, *files.BODY_MOTIONS)
+
+
+def _with_checksums(summary: Summary, folder: Path) -> Summary:
+    tables = [name for name in summary.sha256 if name.startswith(PROBE)]
+    kept = [name for name in (*COPIES, files.FINAL, files.SOILS, files.FRAMES, *tables) if (folder / name).is_file()]
+    return summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
+
+
+def keep_result(result: Result, summary: Summary, folder: Path) -> Result:
+    """Keep the tables and the summary of a run that has ended in its folder, beside its frames. Raises OutputError."""
+    write_text(folder / files.FINAL, csv_text(result.columns))
+    for name, table in result.endings.items():
+        write_text(folder / f"{name}.csv", csv_text(table))
+    tables = _keep_probes(result.scenario, folder)
+    summary = _with_checksums(summary.model_copy(update={"sha256": dict.fromkeys(tables, "")}), folder)
+    write_text(folder / files.SUMMARY, summary.to_json())
+    if result.status == "finished":
+        write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
+        files.clear_remains(folder, files.CHECKPOINTS)
+    return Result(result.name, result.columns, summary, result.scenario, folder)
+
+
+def _keep_probes(scenario: Scenario, folder: Path) -> list[str]:
+    """Write a CSV for each probe, from what the run file has of it; return their names. Raises OutputError."""
+    tables = probe_tables(scenario)
+    for name, series in zip(tables, read_probes(folder / files.FRAMES, scenario).values(), strict=True):
+        write_text(folder / name, "".join(series.csv_lines()))
+    return tables
+
+
+def renew_copies(scenario: Scenario, folder: Path) -> None:
+    """Bring the resolved scenario and the experiment table in a finished run's folder up to date.
+
+    Neither decides the motion, so both may have changed since the run: another table, or another description.
+    """
+    tables = read_tables(scenario)
+    old = tuple(_bytes_of(folder / name) for name in COPIES)
+    keep_scenario(scenario, tables, folder)
+    if old != tuple(_bytes_of(folder / name) for name in COPIES):
+        summary = _with_checksums(read_summary(folder / files.SUMMARY), folder)
+        write_text(folder / files.SUMMARY, summary.to_json())
+
+
+def _bytes_of(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None

@@ -35,11 +35,11 @@ from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
 from blocksim.scenario.overlap import Outlines, Rectangles, penetration
 from blocksim.scenario.placement import smallest_width
+from blocksim.simulation.result import NOT_AT_REST, RestState
 from blocksim.simulation.schemes import AnyScene, scheme_of
 from blocksim.simulation.schemes.scheme import corner_ways, outlines_of
-from blocksim.simulation.settled import NOT_AT_REST, Settled
 from blocksim.simulation.team import Team
-from blocksim.world.scenes import arrays_of
+from blocksim.world.build import arrays_of
 
 PARTS = 50  # in which gravity and loads grow
 BALANCE = 1e-8  # of gravity (and of the strongest load): accelerations at rest
@@ -70,9 +70,9 @@ class SettleError(BlocksimError):
     exit_code = ExitCode.NUMERICAL_FAILURE
 
 
-def begun(
+def initial_scene(
     scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop = str
-) -> tuple[AnyScene, Settled | None]:
+) -> tuple[AnyScene, RestState | None]:
     """Return a scene at time zero as its run begins, and how it settled, where it did.
 
     Raises SettleError where that was asked for and fails; otherwise the scene begins as it was placed. Raises
@@ -93,7 +93,7 @@ def begun(
 
 def settle(
     scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop = str
-) -> tuple[AnyScene, Settled]:
+) -> tuple[AnyScene, RestState]:
     """Bring a scene at time zero to rest; return it, still at time zero, and how.
 
     Raises SettleError, and StoppedEarlyError where `stop` says why.
@@ -241,11 +241,11 @@ class _Settlement:
         ledger["largest_kinetic"][0] = 0.5 * float(np.sum(energies))
         self.scheme.begin(self.scene)
 
-    def settled(self) -> Settled:
+    def settled(self) -> RestState:
         """Return how it came to rest."""
         ways = self._ways()
         far = int(np.argmax(ways))
-        return Settled(
+        return RestState(
             steps=self.steps,
             largest_displacement_mm=MILLI * float(ways[far]),
             displaced_block=self.placed[far].name,

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 from pydantic import BaseModel, Field, ValidationError
 
 from blocksim.errors import ExitCode, InvalidInputError
-from blocksim.scenario.bounded_read import MEGABYTE, read_limited
-from blocksim.simulation.result_files import grows_from, heads
+from blocksim.scenario.input_files import MEGABYTE, read_limited
+from blocksim.simulation.folder import grows_from, heads
 from blocksim.study.sweep_folder import MANIFESTS, ORIGINS, SHARD, FolderKind, write_answer
-from blocksim.view.layout import Paper
+from blocksim.view.style import Paper
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,25 +4,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, overload
 
 from blocksim.analysis.compare import Comparison, compare_final
+from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import load_table
 from blocksim.analysis.judgement import Judgement, Settings, judge
-from blocksim.analysis.members import Members
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
 from blocksim.scenario import load_scenario, load_stored
 from blocksim.simulation import Result
 from blocksim.simulation import folder as files
-from blocksim.simulation.result import read_final
-from blocksim.simulation.summary import read_summary
+from blocksim.simulation.result import read_final, read_summary
+from blocksim.study.manifest import SweepResult, is_sweep, read_sweep
 from blocksim.study.rows import FINISHED, TABLE
 from blocksim.study.stored_run import find_run, how_it_ended
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.sweep_table import SweepResult, is_sweep, read_sweep
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from blocksim.simulation.table import Columns
+    from blocksim.simulation.frames import Columns
 
 ExperimentTablePath = Annotated[
     Path | str | None,

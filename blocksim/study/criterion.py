@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import quantities as q
+from blocksim.scenario import units as q
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.simulation.movement import MOVES_ON, OBSERVABLES, Observable
-from blocksim.simulation.settled import NOT_AT_REST
+from blocksim.simulation.observables import MOVES_ON, OBSERVABLES, Observable
+from blocksim.simulation.result import NOT_AT_REST
 from blocksim.study.rows import FINISHED
 
 STANDS = "--stands"

@@ -15,28 +15,27 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, Field, InstanceOf
 
-from blocksim.analysis.intervals import interval
+from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit, inflation_of
 from blocksim.errors import ExitCode, InvalidInputError
-from blocksim.extras import loaded
+from blocksim.extras import load_module
 from blocksim.scenario import Document, Source, document_of
 from blocksim.silence import silent
 from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.movement import MOVES_ON
+from blocksim.simulation.observables import MOVES_ON
 from blocksim.study.answer import Answer, Table, folder_kind
 from blocksim.study.criterion import falls_before_zero
 from blocksim.study.executors import Execution
 from blocksim.study.fragility_plan import COLLAPSE, FragilityPlan, read_fragility
+from blocksim.study.manifest import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, SweepTable, Timings
 from blocksim.study.plan import Values
-from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, Timings
 from blocksim.study.rows import FINISHED, Head, Row, check_experiment
 from blocksim.study.runs import Replay, folder_for
 from blocksim.study.study import Study
 from blocksim.study.sweep import TIMINGS, SweepRun, refuse_loss
 from blocksim.study.sweep_folder import SHARD, FolderKind, prepare
-from blocksim.study.sweep_table import SweepTable
-from blocksim.view import fragility as view
-from blocksim.view.layout import Paper
+from blocksim.view import studies as view
+from blocksim.view.style import Paper
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -302,7 +301,7 @@ def run_fragility(
     on_row: OnRow = silent,
 ) -> FragilityAnswer:
     """Run what is planned; see `fragility`."""
-    loaded("scipy.special", PURPOSE)
+    load_module("scipy.special", PURPOSE)
     refuse_loss(shard, overwrite=overwrite)
     run, setting = execution.ready()
     base = plan.document.build()

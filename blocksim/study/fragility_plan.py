@@ -18,25 +18,28 @@ from functools import cached_property
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document, Sweep, scenario_hash
-from blocksim.scenario.keys import format_key, parse_key
-from blocksim.scenario.models.variation import Uniform, Variation
+from blocksim.scenario.models.study import Uniform, Variation
+from blocksim.scenario.overrides import format_key, parse_key
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.study.criterion import Criterion, read_criterion
-from blocksim.study.design import Together, levels_of
-from blocksim.study.limit_plan import takes_whole
+from blocksim.study.limit_plan import takes_whole, typed_levels
 from blocksim.study.plan import (
     MOST_CASES,
     Cases,
+    Places,
+    Together,
     Values,
     Variations,
     cases_of,
+    draw_values,
+    generator,
+    levels_of,
+    open_interval,
     refuse_wrong_draws,
     table_digests,
     varied,
 )
 from blocksim.study.rows import Head, heads_of, si_number
-from blocksim.study.sampling import Places, drawn, generator, open_interval
-from blocksim.study.typed_levels import typed_levels
 
 INTENSITY, SCATTER, STRIPES, FAILS = "--intensity", "--scatter", "--stripes", "--fails"
 COLLAPSE = "outcome = fell"
@@ -131,7 +134,7 @@ class FragilityPlan:
         is_whole = takes_whole(self.document, key) and not isinstance(values, tuple)
         if is_whole and isinstance(values, Uniform):
             values = replace(values, low=values.low - 0.5, high=values.high + 0.5)  # so that its ends are as likely
-        by_level = [drawn(values, self._places(key, number)) for number in self.levels]
+        by_level = [draw_values(values, self._places(key, number)) for number in self.levels]
         together = [value for member in zip(*by_level, strict=True) for value in member]
         return tuple(round(si_number(value)) for value in together) if is_whole else tuple(together)
 

@@ -20,7 +20,7 @@ from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario, Source, document_of
 from blocksim.scenario.motion import settles
 from blocksim.silence import silent
-from blocksim.simulation.movement import PEAK, Manner
+from blocksim.simulation.observables import PEAK, Manner
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import build
 from blocksim.study import criterion
@@ -41,12 +41,16 @@ from blocksim.study.limit_margin import (
 from blocksim.study.limit_plan import (
     SCANNED,
     TOLERANCE,
+    Change,
     CurvePlan,
     LimitPlan,
+    Number,
+    changes_in,
+    next_near,
+    next_values,
     read_curve,
     read_limit,
 )
-from blocksim.study.limit_search import Change, Number, changes_in, next_near, next_values
 from blocksim.study.plan import Values
 from blocksim.study.rows import FINISHED, Head, Row
 from blocksim.study.runs import Replay, Runs, folder_for, runs_of

@@ -13,19 +13,18 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_validator
 
 from blocksim.errors import ExitCode, InvalidInputError, Problem
-from blocksim.scenario.csv_table import raise_problems, read_table
-from blocksim.simulation.movement import PEAK, Manner, table_columns
+from blocksim.scenario.input_files import raise_problems, read_table
+from blocksim.simulation.observables import PEAK, Manner, table_columns
 from blocksim.study.answer import Answer, Table, folder_kind
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
-from blocksim.study.limit_plan import NAMES, LimitPlan
-from blocksim.study.limit_search import Change, Number
+from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
 from blocksim.study.rows import Head, Row, as_cell
 from blocksim.study.stored_run import stored_run
 from blocksim.study.sweep_folder import FolderKind, case_folder
-from blocksim.view import limit_curve, mechanism
-from blocksim.view.layout import Paper
+from blocksim.view import mechanism, studies
 from blocksim.view.run_data import support_of
+from blocksim.view.style import Paper
 
 UNIT = r"(?: \[[^\[\]]*\])?"
 STEP = "time.step"
@@ -504,7 +503,7 @@ class CurveAnswer(Answer, frozen=True):
     def draw(self, path: Path, title: str, paper: Paper) -> None:
         """Draw limits over the other key, with a table of published or measured ones beside them."""
         points = [
-            (point.over, [limit_curve.Bracket(one.low, one.high, one.below.value, one.above.value)
+            (point.over, [studies.Bracket(one.low, one.high, one.below.value, one.above.value)
                           for one in point.search.changes])
             for point in self.points
         ]  # fmt: skip
@@ -517,8 +516,8 @@ class CurveAnswer(Answer, frozen=True):
             f"{key} ({unit})" if unit else key for key, unit in ((self.over, self.over_unit), (self.key, self.unit))
         ]
         published = () if self.beside is None else read_published(self.beside, self.over_unit, self.unit)
-        curve = limit_curve.LimitCurve(axes[0], axes[1], points, tuple(notes), published)
-        limit_curve.draw_limit_curve(curve, path, title, paper)
+        curve = studies.LimitCurve(axes[0], axes[1], points, tuple(notes), published)
+        studies.draw_limit_curve(curve, path, title, paper)
 
 
 def place_of(number: float, unit: str) -> str:
@@ -526,7 +525,7 @@ def place_of(number: float, unit: str) -> str:
     return re.sub(r"[^A-Za-z0-9.+-]+", "-", f"{number:.6g} {unit}".rstrip())
 
 
-def read_published(path: Path, over_unit: str, unit: str) -> tuple[limit_curve.Series, ...]:
+def read_published(path: Path, over_unit: str, unit: str) -> tuple[studies.Series, ...]:
     """Return the series of a table in the order of their first rows: value of the other key, limit, and name.
 
     Its columns are `over`, `limit` and `series`, the first two with the units of the search in brackets where there
@@ -549,4 +548,4 @@ def read_published(path: Path, over_unit: str, unit: str) -> tuple[limit_curve.S
         problems.append(Problem(str(path), "the table has no rows"))
     if problems:
         raise_problems(problems)
-    return tuple(limit_curve.Series(name, tuple(points)) for name, points in series.items())
+    return tuple(studies.Series(name, tuple(points)) for name, points in series.items())

@@ -6,7 +6,7 @@ stiffness k. In a wall the part that topples turns as a whole, as the load leave
 standing side of a bracket is the shift. A structure that has moved, or rocked back, has turned otherwise too. Of that
 only a bound is known, if everything rests on one corner of the softest contact; and none where supports move: what
 impacts of a rocking block leave depends on the springs too, and a pulse that begins at its peak while springs carry
-none of it makes it slip too far, with the root of 1/stiffness (simulation/onset.py).
+none of it makes it slip too far, with the root of 1/stiffness (simulation/run.py).
 
 **Stiff contacts.** All that is linear in 1/k where it is small, and so is what it takes away from a limit:
 L(k) = L - a/k. Of two stiffnesses, one r times the other, L = (r L(r k) - L(k))/(r - 1). With the law of Hertz a
@@ -34,14 +34,13 @@ from pydantic import BaseModel
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
-from blocksim.scenario.models.pulse import Pulse
+from blocksim.scenario.models.motion import Pulse
 from blocksim.scenario.models.stepping import SPRINGS
 from blocksim.scenario.motion import settles
 from blocksim.scenario.placement import smallest_width
-from blocksim.simulation.movement import FURTHER, MOVED_SHARE, Manner
+from blocksim.simulation.observables import FURTHER, MOVED_SHARE, Manner
 from blocksim.study.criterion import Verdict
-from blocksim.study.limit_plan import NAMES, LimitPlan
-from blocksim.study.limit_search import Change
+from blocksim.study.limit_plan import NAMES, Change, LimitPlan
 from blocksim.study.rows import Row
 from blocksim.world.interactions import contact_classes, interactions_of
 

@@ -1,30 +1,516 @@
-"""Pictures of sweeps and studies, and which picture a place has: of a run, a sweep, a study or a table."""
+"""What `plot` draws: runs, sweeps, studies and tables of sensitivities, read back from where they lie."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blocksim.analysis.experiment import load_table
-from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.options import takes
-from blocksim.scenario import Scenario, load_stored
+from blocksim.analysis.compare import limits, prediction_half_width
+from blocksim.analysis.evidence import Members
+from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.errors import InputMissingError, InvalidInputError, Problem
+from blocksim.options import Option, takes
+from blocksim.scenario import Scenario, load_scenario, load_stored
+from blocksim.scenario import units as q
+from blocksim.scenario.input_files import Cell, raise_problems, read_open_table
+from blocksim.scenario.models.study import Normal, Uniform
+from blocksim.scenario.overrides import field_of, si_unit
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.study.index_pictures import TORNADO, anything_goes, draw_indices
-from blocksim.study.run_pictures import PlotOptions, draw_motion_of, draw_probes_of, draw_run
-from blocksim.study.stored_run import Place, folder_of
+from blocksim.scenario.units import TIME, Quantity
+from blocksim.silence import silent
+from blocksim.simulation import folder as files
+from blocksim.simulation.folder import refuse_foreign
+from blocksim.simulation.stores.hdf5 import read_probes
+from blocksim.study.compare import ExperimentTablePath
+from blocksim.study.manifest import is_sweep, read_sweep
+from blocksim.study.rows import FINISHED, NUMBERS, TABLE, Head, Ranges, blocks_in, quarter_turns
+from blocksim.study.stored_run import Place, find_run, folder_of, stored_run
 from blocksim.study.study import draw_study, study_in
-from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import PLAN
-from blocksim.study.sweep_table import is_sweep
-from blocksim.view.kinds import MOTION, PROBE, STRIP, SWEEP_KINDS, kind_for
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.animation import Look, Pace, draw_animation, writer_of
+from blocksim.view.history import draw_probes, draw_support_motion
+from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
 from blocksim.view.levels import Panel, draw_levels
-from blocksim.view.style import picture_suffix
+from blocksim.view.page_size import PageOptions
+from blocksim.view.paint import COLOURS, paint_named
+from blocksim.view.run_data import support_of
+from blocksim.view.studies import Bars, draw_tornado
+from blocksim.view.style import OWN, Paper, picture_suffix
+from blocksim.view.sweeps.data import Input, Measured, SweepData, Typed
+from blocksim.view.time_panels import Choice
 
 if TYPE_CHECKING:
-    from blocksim.study.convergence import Convergence, RefinementStudy
+    import pandas as pd
+
+    from blocksim.study.converge import Convergence, RefinementStudy
+
+
+Floats = NDArray[np.float64]
+LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
+
+
+def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
+    """Return what a sweep's folder holds, beside the scenario's experiment or another table.
+
+    Raises InputMissingError or InvalidInputError: where files are missing or damaged, no case has finished, or the
+    table measures what the sweep does not have.
+    """
+    table = read_sweep(folder).table
+    scenario = load_stored(folder / PLAN)
+    blocks = blocks_in(map(str, table.columns))
+    finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
+    if not blocks or not finished.any():
+        message = f"{folder}: no case of this sweep has finished; nothing to draw"
+        raise InvalidInputError(message)
+    members = Members(table, str(folder / TABLE))
+    x_mm, rotation_deg = (
+        np.stack([members.values(block, quantity) for block in blocks], axis=1) for quantity in ("x", "rotation")
+    )
+    if max(np.nanmax(np.abs(one), initial=0.0) for one in (x_mm, rotation_deg)) > LARGEST:
+        raise InvalidInputError(f"{members.source}: a block has moved too far to be drawn")
+    is_cut = finished & ~np.isfinite(x_mm + rotation_deg).all(axis=1)
+    if is_cut.any():  # it has neither ended nor failed
+        case = table["case"].iloc[int(np.argmax(is_cut))]
+        raise InvalidInputError(f"{members.source}: case {case} has finished, but its row lacks positions of blocks")
+    path = experiment or (None if scenario.experiment is None else scenario.experiment.table)
+    return SweepData(
+        title=scenario.description or scenario.name,
+        mode="" if scenario.sweep is None else scenario.sweep.mode,
+        inputs=_inputs(scenario, table),
+        blocks=blocks,
+        x_mm=x_mm,
+        rotation_deg=rotation_deg,
+        finished=finished,
+        inside=None if path is None else Ranges.read(path).inside(table).to_numpy(dtype=bool) & finished,
+        measured=Measured() if path is None else measured_of(load_table(path), blocks),
+        manners=tuple(table["outcome"].fillna("").astype(str)) if "outcome" in table.columns else (),
+    )
+
+
+def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measured:
+    """Return repeats and prediction intervals of x (mm), and the measured class where all rotations are measured."""
+    means = {row.block: row.mean for row in table.summaries() if row.quantity == "rotation"}
+    turned = quarter_turns([means[block] for block in blocks if block in means])
+    rows = [row for row in table.summaries() if row.quantity == "x" and row.block in blocks]
+    return Measured(
+        x_mm={row.block: table.values(row.block, "x").to_numpy(dtype=float) for row in rows},
+        limits_mm={row.block: limits("x", row.mean, row.minimum, row.maximum) for row in rows},
+        prediction_mm={
+            row.block: (row.mean - half, row.mean + half)
+            for row in rows
+            if (half := prediction_half_width(row.s, row.n)) > 0.0
+        },
+        outcome=turned if len(turned) == len(blocks) else None,
+    )
+
+
+def _inputs(scenario: Scenario, table: "pd.DataFrame") -> tuple[Input, ...]:
+    """Return the keys that take more than one value, or the first where none does."""
+    vary = {} if scenario.sweep is None else scenario.sweep.vary
+    heads = [head for name in table.columns if (head := Head.read(str(name))).key in vary]
+    missing = [key for key in vary if key not in {head.key for head in heads}]
+    if missing or not heads:
+        message = f"{TABLE} has no column {missing[0]}" if missing else f"{PLAN} varies no key"
+        raise InvalidInputError(f"{message}; table and plan do not belong together")
+    inputs = [_input(scenario, head, table[str(head)]) for head in heads]
+    varied = [one for one in inputs if one.count > 1]
+    return tuple(varied or inputs[:1])
+
+
+def _input(scenario: Scenario, head: Head, column: "pd.Series") -> Input:
+    key = head.key
+    numbers = column.to_list() if column.dtype.kind in NUMBERS else [*map(_number, column)]
+    known = np.array([number for number in numbers if number is not None], dtype=np.float64)
+    values = known * head.si(1.0)
+    if not (np.abs(values) <= LARGEST).all():
+        raise InvalidInputError(f"{TABLE}: the column {key} holds values that are not numbers or too large")
+    if len(values) == len(numbers):
+        typed = Typed(head.unit, head.si(1.0)) if head.unit else None
+        vary = scenario.sweep.vary[key] if scenario.sweep is not None else ()
+        is_even = isinstance(vary, Normal) or (isinstance(vary, Uniform) and vary.scale == "linear")
+        return Input(key, unit_of(scenario, key) or head.si_unit, values, is_even=is_even, typed=typed)
+    words = [q.toml(value).strip('"') for value in column]
+    levels = tuple(dict.fromkeys(words))
+    return Input(key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)
+
+
+def _number(value: object) -> float | None:
+    """Return a value in SI, None for a word; in the table of a sweep it stands as it was given."""
+    try:
+        return float(str(value))
+    except ValueError:
+        pass
+    try:
+        return q.parse_quantity(str(value), q.NUMBER)[0]
+    except ValueError:
+        return None
+
+
+def unit_of(scenario: Scenario, key: str) -> str:
+    """Return the SI unit of a key's values, empty for plain numbers."""
+    field = field_of(key, scenario)
+    return "" if field is None else si_unit(field)
+
+
+TORNADO = "tornado"
+LARGEST_FILE = 10_000_000  # bytes
+HEAD = ("output", "unit", "key")
+UNITLESS = ("share", "")
+
+
+@dataclass(frozen=True)
+class IndexColumns:
+    """The columns of a method that a picture shows, what the bars mean, and what their dark parts do."""
+
+    value: str
+    half_width: str
+    part: str
+    labels: tuple[str, str]
+    has_unit: bool
+
+
+METHODS = (
+    IndexColumns(
+        "ST", "± ST", "S1", ("total share of the variance, 95 % interval", "share of the key alone"), has_unit=False
+    ),
+    IndexColumns("mu*", "±", "", ("mean change over a key's range, 95 % interval", ""), has_unit=True),
+)
+
+
+def anything_goes(_: Path) -> None:
+    """Accept any place for a picture."""
+
+
+def draw_indices(
+    table: Path,
+    path: Path | None = None,
+    kind: str | None = None,
+    paper: Paper = OWN,
+    *,
+    ready: Callable[[Path], None] = anything_goes,
+) -> Path:
+    """Draw the table of a sensitivity study; return the picture's path (default: that of the table, as PNG).
+
+    `ready` is asked as in `draw_sweep`.
+    Raises what `read_indices` raises, InvalidInputError for an unknown picture format or another kind, OutputError.
+    """
+    if kind not in {None, TORNADO}:
+        message = f"{table}: a table of indices is drawn as {TORNADO!r}, not as {kind!r}"
+        raise InvalidInputError(message)
+    panels, labels = read_indices(table)
+    path = path or Path(f"{table.stem}.png")
+    ready(path)
+    draw_tornado(panels, labels, path, title="Which inputs matter", paper=paper)
+    return path
+
+
+def read_indices(path: Path) -> tuple[list[Bars], tuple[str, str]]:
+    """Return the bars of every result and what they mean.
+
+    Raises InputMissingError or InvalidInputError, with every mistake located.
+    """
+    heads, table = read_open_table(path, LARGEST_FILE)
+    names = [head.text for head in heads]
+    shown = next((one for one in METHODS if {*HEAD, one.value, one.half_width} <= set(names)), None)
+    if shown is None:
+        message = "not the table of `blocksim sensitivity --out`: no columns output, unit, key and ST or mu*"
+        raise_problems([table.header.problem(message)])
+    rows = [{name: _read(cell, table.problems) for name, cell in row.items()} for row in table.rows]
+    if table.problems:
+        raise_problems(table.problems)
+    if not rows:
+        message = f"{path}: no result varies; nothing to draw"
+        raise InvalidInputError(message)
+    panels = []
+    for output in dict.fromkeys(str(row["output"]) for row in rows):
+        own = [row for row in rows if row["output"] == output]
+        columns = {name: np.array([row[name] for row in own], dtype=np.float64) for name in own[0] if name not in HEAD}
+        unit = str(own[0]["unit"])
+        bracket = f" ({unit})" if shown.has_unit and unit not in UNITLESS else ""
+        keys = tuple(str(row["key"]) for row in own)
+        value, half_width = columns[shown.value], columns[shown.half_width]
+        panels.append(Bars(f"{output}{bracket}", keys, value, half_width, columns.get(shown.part)))
+    return panels, shown.labels
+
+
+def _read(cell: Cell, problems: list[Problem]) -> str | float:
+    """Return the text of a name or the number of an index; 0 after noting a problem."""
+    if cell.column in HEAD:
+        return cell.text
+    try:
+        return cell.number() if cell.text not in {"", "nan"} else float("nan")
+    except ValueError as error:
+        problems.append(cell.problem(str(error)))
+        return 0.0
+
+
+LOOKS = {  # options of the pictures of runs, by field: their flag, and what they do
+    "times": ("--at", "selects frames of a run's strip, final picture or profile"),
+    "frames": ("--frames", "sets the number of panels of a run's strip"),
+    "panels": ("--panels", "selects the panels of a run's history"),
+    "blocks": ("--block", "selects the blocks of a run's history"),
+    "relative": ("--relative", "plots a run's history relative to the ground"),
+    "probes": ("--probe", "selects the probes of a run"),
+    "forces": ("--forces", "shows contacts of a run"),
+    "colour": ("--colour", "colours the blocks of a run"),
+}
+MEANT = {  # the kinds that have them
+    STRIP: ("times", "frames", "forces", "colour"),
+    FINAL: ("times", "forces", "colour"),
+    PROFILE: ("times", "forces", "colour"),
+    HISTORY: ("panels", "blocks", "relative", "forces", "colour"),
+    PROBE: ("probes",),
+}
+MOST_SHOWN = 40  # letters of a value in a message
+
+
+def _names(text: str) -> tuple[str, ...]:
+    """Return names separated by commas. Raises ValueError for an empty list."""
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise ValueError("give one name or several, separated by commas")
+    return names
+
+
+def _moments(text: str) -> tuple[float, ...]:
+    """Return times in s, separated by commas, with or without their unit. Raises ValueError."""
+    return tuple(map(_seconds, text.split(",")))
+
+
+def _seconds(text: str) -> float:
+    with suppress(ValueError):
+        return float(text)
+    with suppress(ValueError):
+        return Quantity(TIME, above=0.0).read(text)
+    example = "give seconds, separated by commas, such as 0,0.1,0.355 or '20 ms'"
+    raise ValueError(f"{text.strip()[:MOST_SHOWN]!r} is not a time; {example}")
+
+
+def _colour(text: str) -> str:
+    """Return a way to colour blocks. Raises ValueError for an unknown one."""
+    if text not in COLOURS:
+        raise ValueError(f"{text[:MOST_SHOWN]!r} is unknown; choose {', '.join(COLOURS)}")
+    return text
+
+
+Colour = Annotated[
+    str,
+    Option(
+        "Colour blocks by block, material, speed or turn; soil by displacement (default), speed, plastic or pressure.",
+        flags=("--colour", "--color"),
+        metavar="BY",
+        read=_colour,
+        complete="colours",
+    ),
+]
+Forces = Annotated[bool, Option("Draw contact forces, if the run has stored them.")]
+Replace = Annotated[bool, Option("Replace a file that blocksim did not write.")]
+
+
+MEANT = {
+    STRIP: ("--at", "--frames", "--forces", "--colour"),
+    FINAL: ("--at", "--forces", "--colour"),
+    PROFILE: ("--at", "--forces", "--colour"),
+    HISTORY: ("--panels", "--block", "--relative", "--forces", "--colour"),
+    PROBE: ("--probe",),
+}
+"""Options of each kind of picture of a run; that of the motion has none."""
+
+
+@dataclass(frozen=True)
+class PlotOptions(PageOptions):
+    """What is drawn of a run, a sweep, a study or a table, how, and where."""
+
+    out: Annotated[
+        Path | str | None,
+        Option("Picture to write: .png, .svg or .pdf.", metavar="FILE"),
+    ] = None
+    _: KW_ONLY
+    times: Annotated[
+        Sequence[float] | None,
+        Option(
+            "Times of the panels in s, as printed above them (default: by motion); of a final picture, one.",
+            flags=("--at", "--times"),
+            metavar="T,T,...",
+            read=_moments,
+        ),
+    ] = None
+    kind: Annotated[
+        str | None,
+        Option(
+            "Of a run: strip (default), final, history, profile (the surface of soil), motion (of the supports) or "
+            "probe. Of a sweep: lines, map (two inputs), matrix (every two inputs) or histogram; tornado for "
+            "sensitivities (default: what suits).",
+            metavar="KIND",
+            complete="kinds",
+        ),
+    ] = None
+    frames: Annotated[int | None, Option("Panels of a strip (default: 6 to 8).", metavar="N", least=2, most=60)] = None
+    panels: Annotated[
+        Sequence[str] | None,
+        Option(
+            "Panels of a history: x, y, dx, dy, rotation, vx, vy, speed, spin, energy, contacts, force, ground; "
+            "displacement is dx,dy and velocity vx,vy.",
+            metavar="P,P,...",
+            read=_names,
+        ),
+    ] = None
+    blocks: Annotated[
+        Sequence[str] | None,
+        Option("Blocks of a history, by name.", flags=("--block",), metavar="N,N,...", read=_names),
+    ] = None
+    probes: Annotated[
+        Sequence[str] | None,
+        Option("Probes to draw, by name (default: all).", flags=("--probe",), metavar="N,N,...", read=_names),
+    ] = None
+    relative: Annotated[bool, Option("Plot a history relative to the moving ground.")] = False
+    colour: Colour = "block"
+    experiment: ExperimentTablePath = None
+    forces: Forces = False
+    overwrite: Replace = False
+
+    def refuse(self, kind: str | None, what: str) -> None:
+        """Raise InvalidInputError for an option that was given and means nothing for a kind of picture."""
+        for name, (flag, meaning) in LOOKS.items():
+            if name not in MEANT.get(kind or "", ()) and getattr(self, name) != getattr(PlotOptions, name):
+                raise InvalidInputError(f"{flag} {meaning}, but {what}")
+
+    def picture(self, default: str) -> Path:
+        """Return the path of the picture. Raises OutputExistsError, OutputError where it may not go there."""
+        path = Path(self.out or default)
+        self.ready(path)
+        return path
+
+    def ready(self, path: Path) -> None:
+        """Raise OutputExistsError, OutputError where a picture may not be written."""
+        refuse_foreign(path, overwrite=self.overwrite)
+
+    @property
+    def table(self) -> Path | None:
+        """The experiment table."""
+        return None if self.experiment is None else Path(self.experiment)
+
+
+def draw_run(run: Path, options: PlotOptions, kind: str) -> tuple[Path, str]:
+    """Draw a run; return the picture's path (default: NAME.png or NAME_KIND.png) and a remark on an unfinished run.
+
+    Raises InvalidInputError for an unknown kind or format and options that mean nothing for it, what `stored_run`
+    and `PlotOptions.picture` raise, OutputError.
+    """
+    draw = run_kind(kind)
+    options.refuse(kind, f"this picture is of kind {kind}")
+    stored = stored_run(run)
+    scenario = stored.scenario
+    table = options.table or (scenario.experiment.table if scenario.experiment is not None else None)
+    measured = None if table is None else load_table(table)
+    picture = options.picture(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
+    chosen: dict[str, Any] = {"times": options.times}
+    if kind == HISTORY:
+        names = tuple(options.panels or ()), tuple(options.blocks or ())
+        chosen = {"choice": Choice(*names, options.relative)}
+    elif kind == STRIP:
+        chosen["count"] = options.frames
+    draw(
+        stored.frames,
+        picture,
+        title=scenario.name,
+        measured=measured,
+        support=support_of(scenario, stored.events),
+        forces=options.forces,
+        paint=paint_named(options.colour, stored.frames, scenario),
+        paper=options.paper,
+        **chosen,
+    )
+    return picture, stored.remark
+
+
+def draw_probes_of(place: Path, options: PlotOptions) -> tuple[Path, str]:
+    """Draw the probes of a run, all or those that are named; return as `draw_run`.
+
+    Raises what `stored_run`, reading the probes and `draw_probes` raise.
+    """
+    stored = stored_run(place)
+    picture = options.picture(f"{stored.scenario.name}_{PROBE}.png")
+    probes = read_probes(stored.folder / files.FRAMES, stored.scenario)
+    draw_probes(probes, picture, f"{stored.scenario.name}: probes", tuple(options.probes or ()), options.paper)
+    return picture, stored.remark
+
+
+def draw_motion_of(place: Path, options: PlotOptions) -> Path:
+    """Draw how the supports of a run or of a scenario file move, which need not have been run; return the picture.
+
+    Raises what loading the scenario and `draw_support_motion` raise.
+    """
+    if place.is_file():
+        scenario = load_scenario(place)
+    else:
+        scenario = load_stored(find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
+    picture = options.picture(f"{scenario.name}_{MOTION}.png")
+    support = support_of(scenario)
+    draw_support_motion(support, scenario.time.end, picture, f"{scenario.name}: motion", options.paper)
+    return picture
+
+
+@dataclass(frozen=True)
+class AnimateOptions:
+    """How fast, how large and in what colours a run is shown, and where the film goes."""
+
+    out: Annotated[Path | str | None, Option("Animation to write: .gif or .mp4.", metavar="FILE")] = None
+    _: KW_ONLY
+    speed: Annotated[
+        float,
+        Option("Simulated seconds per second of the animation.", metavar="FACTOR", least=1e-6, most=1e6),
+    ] = 0.25
+    fps: Annotated[float, Option("Frames per second; 50 in a GIF.", metavar="N", least=0.1, most=240.0)] = 30.0
+    trails: Annotated[
+        bool | None,
+        Option("Paths of the centres (default: up to 30 blocks).", flags=("--trails/--no-trails",)),
+    ] = None
+    forces: Forces = False
+    colour: Colour = "block"
+    width: Annotated[int, Option("Width in pixels.", metavar="PX", least=200, most=4000)] = 800
+    overwrite: Replace = False
+    on_picture: Callable[[int, int], None] = silent
+
+
+class Film(NamedTuple):
+    """An animation that was written."""
+
+    path: Path
+    is_replaced: bool  # an older one
+    pictures: int
+    beyond: str  # which blocks leave the view
+    remark: str  # on an unfinished run
+
+
+def draw_film(place: Path, options: AnimateOptions) -> Film:
+    """Write a run as an animation; see `animate`."""
+    if options.out is not None:
+        writer_of(Path(options.out))
+    stored = stored_run(place)
+    scenario = stored.scenario
+    path = Path(options.out or f"{scenario.name}.gif")
+    refuse_foreign(path, overwrite=options.overwrite)
+    is_replaced = path.exists()
+    paint = paint_named(options.colour, stored.frames, scenario)
+    look = Look(options.width, options.trails, scenario.name, options.forces, paint)
+    support, pace = support_of(scenario, stored.events), Pace(options.speed, options.fps)
+    count, beyond = draw_animation(stored.frames, path, pace, look, support, options.on_picture)
+    return Film(path, is_replaced, count, beyond, stored.remark)
+
+
+@takes(AnimateOptions)
+def animate(place: Place, options: AnimateOptions) -> Path:
+    """Write a run as an animation, GIF or MP4, and return its path (default: NAME.gif in the current folder).
+
+    Raises as `plot` does, and UnavailableError where nothing can write MP4.
+    """
+    return draw_film(folder_of(place), options).path
+
 
 FEWEST_LEVELS = 2  # to show a distance
 

@@ -1,26 +1,313 @@
-"""What a sweep varies, the scenario of each of its cases, and what they will cost."""
+"""What a sweep varies: values that are given or drawn, the scenario of each case, what all will cost."""
 
-from collections.abc import Iterable, Iterator, Mapping
+import functools
+import hashlib
+import math
+import re
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
+from pathlib import Path
 from statistics import fmean
+from typing import Any, TypeVar, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blocksim.errors import BlocksimError, InvalidInputError, ScenarioError
+from blocksim.errors import BlocksimError, InvalidInputError, Problem, ScenarioError
+from blocksim.extras import load_module
 from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
-from blocksim.scenario.check import mistakes_of_value
-from blocksim.scenario.findings import Finding
-from blocksim.scenario.keys import parse_key
-from blocksim.scenario.models.motions import TABLED
-from blocksim.scenario.models.variation import Normal, Variation, written
-from blocksim.scenario.overrides import Override, frozen, with_value
-from blocksim.scenario.quantities import shown
+from blocksim.scenario import units as q
+from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fault
+from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_open_table
+from blocksim.scenario.mistakes import Mistake
+from blocksim.scenario.models.record import TABLED
+from blocksim.scenario.models.study import Normal, Uniform, Variation, round_digits, toml_number
+from blocksim.scenario.overrides import Override, format_key, freeze, parse_key, parse_value, with_value
+from blocksim.scenario.units import toml
 from blocksim.simulation.provenance import run_hash
-from blocksim.study.design import Design, MadeOnDemand, Settings, read_columns, refuse_wrong_values
 from blocksim.study.rows import Head, check_experiment, heads_of
-from blocksim.study.sampling import design_of, remarks
+
+T_co = TypeVar("T_co", covariant=True)
+Settings = dict[str, object]
+"""Dotted key and value of everything that one case sets."""
+LARGEST_FILE = 20_000_000  # bytes
+MOST_TRIED = 50
+"""Different values of a column that are tried by themselves, beside its least and its greatest number."""
+HEAD = re.compile(r"(?P<key>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
+WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
+
+
+class MadeOnDemand(Sequence[T_co]):
+    """A sequence that keeps none of its entries: each is made when it is asked for."""
+
+    @abstractmethod
+    def row(self, number: int) -> T_co:
+        """Return an entry, 0 <= number < len."""
+
+    @overload
+    def __getitem__(self, number: int) -> T_co: ...
+    @overload
+    def __getitem__(self, number: slice) -> Sequence[T_co]: ...
+    def __getitem__(self, number: int | slice) -> T_co | Sequence[T_co]:
+        if isinstance(number, slice):
+            return [self.row(index) for index in range(len(self))[number]]
+        return self.row(range(len(self))[number])
+
+
+@dataclass(frozen=True)
+class Design(MadeOnDemand[Settings]):
+    """The settings of cases, made from one column of values a key."""
+
+    columns: Mapping[str, Sequence[object]]
+
+
+class Together(Design):
+    """The k-th case has the k-th value of every key; all columns are equally long."""
+
+    def __len__(self) -> int:
+        """Return the length of any column."""
+        return len(next(iter(self.columns.values())))
+
+    def row(self, number: int) -> Settings:
+        """Return the values of one row."""
+        return {key: column[number] for key, column in self.columns.items()}
+
+
+class Combinations(Design):
+    """Every value of every key with all values of the others; the last key changes fastest."""
+
+    def __len__(self) -> int:
+        """Return the product of the lengths."""
+        return math.prod(len(column) for column in self.columns.values())
+
+    def row(self, number: int) -> Settings:
+        """Return one combination, from the digits of its number."""
+        settings: Settings = {}
+        for key, column in reversed(list(self.columns.items())):
+            number, place = divmod(number, len(column))
+            settings[key] = column[place]
+        return {key: settings[key] for key in self.columns}
+
+
+def levels_of(values: Variation) -> tuple[object, ...]:
+    """Return the values of a list; a distribution, which no mode without samples accepts, has none to list."""
+    return values if isinstance(values, tuple) else ()
+
+
+def grid(sweep: Sweep) -> Design:
+    """Return all combinations; the last key changes fastest."""
+    return Combinations({key: levels_of(values) for key, values in sweep.vary.items()})
+
+
+def listed(sweep: Sweep) -> Design:
+    """Return one case for every place in the lists, which are equally long."""
+    return Together({key: levels_of(values) for key, values in sweep.vary.items()})
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: the key that it varies, its head, and cell and value of every row."""
+
+    key: str
+    head: Cell
+    cells: Sequence[Cell]
+    values: Sequence[object]
+
+
+def table(sweep: Sweep) -> Design:
+    """Return one case a row. Raises InputMissingError or InvalidInputError with the lines of all mistakes."""
+    return Together({column.key: column.values for column in read_columns(sweep.table or Path())})
+
+
+def read_columns(path: Path) -> list[Column]:
+    """Read the columns of a table. Raises InputMissingError or InvalidInputError with the lines of all mistakes."""
+    heads, rows = read_open_table(path, LARGEST_FILE)
+    problems = list(rows.problems)
+    if not rows.rows and not problems:
+        problems.append(rows.header.problem("no row follows the header; every row is one case"))
+    if len(heads) > MAX_VARIED:
+        problems.append(rows.header.problem(f"{len(heads)} columns are too many; at most {MAX_VARIED} can be varied"))
+    columns = [_column(head, [row[head.text] for row in rows.rows], problems) for head in heads]
+    keys = [column.key for column in columns]
+    problems += [c.head.problem("key given twice") for i, c in enumerate(columns) if c.key in keys[:i]]
+    if problems:
+        raise_problems(problems)
+    return columns
+
+
+def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Column:
+    found = HEAD.fullmatch(head.text)
+    key, unit = (head.text, None) if found is None else (found["key"], found["unit"])
+    complaint = variation_fault(key)
+    if unit is not None and not complaint:
+        try:
+            q.parse_quantity(f"1 {unit}", q.LENGTH)
+        except ValueError as error:
+            complaint = str(error)
+    if complaint:
+        problems.append(head.problem(complaint))
+        return Column(key, head, cells, ())
+    values = []
+    for cell in cells:
+        try:
+            values.append(_value(cell, unit))
+        except ValueError as error:
+            problems.append(cell.problem(str(error)))
+    return Column(key, head, cells, values)
+
+
+def _value(cell: Cell, unit: str | None) -> object:
+    """Return a cell as a scenario takes it; raises ValueError with a message for the user."""
+    if not cell.text:
+        message = "this cell is empty"
+        raise ValueError(message)
+    if unit is not None:
+        cell.number()
+        return f"{cell.text} {unit}"
+    if WHOLE.fullmatch(cell.text):
+        return int(cell.text)
+    return cell.number() if NUMBER.fullmatch(cell.text) else _word(cell.text)
+
+
+@functools.lru_cache(maxsize=1024)
+def _word(text: str) -> object:
+    value = parse_value(text)
+    if isinstance(value, list | dict):
+        message = f"a cell holds one value, not a {'list' if isinstance(value, list) else 'table'}"
+        raise ValueError(message)  # noqa: TRY004 - a mistake of the user's, reported with its cell
+    return value
+
+
+def refuse_wrong_values(document: Document, columns: Iterable[Column]) -> None:
+    """Try the values of each column by themselves; raises InvalidInputError with the cells of all wrong ones.
+
+    Tried are the first different values, and the ends of all numbers.
+    """
+    problems: list[Problem] = []
+    for column in columns:
+        places = {value: index for index, value in reversed(list(enumerate(column.values)))}
+        numbers = [(cell.number(), index) for index, cell in enumerate(column.cells) if NUMBER.fullmatch(cell.text)]
+        ends = [min(numbers)[1], max(numbers)[1]] if numbers else []
+        findings = [
+            (index, finding)
+            for index in dict.fromkeys((*sorted(places.values())[:MOST_TRIED], *ends))
+            for finding in mistakes_of_value(document.data, document.folder, column.key, column.values[index])
+        ]
+        of_key = next((column.head.problem(one.message) for _, one in findings if one.at == "key"), None)
+        problems += [of_key] if of_key else [column.cells[index].problem(one.message) for index, one in findings]
+    if problems:
+        raise_problems(list(dict.fromkeys(problems)))
+
+
+Places = NDArray[np.float64]
+"""Numbers u with 0 < u < 1, shape (samples,)."""
+LEAST = 2.0**-54
+"""Places stay this far away from 0, and one rounding from 1: the normal distribution is infinite there."""
+WORD_BYTES = 4
+DIMENSIONS = 128
+"""Dimensions that are scrambled, however few are used: so those in use do not depend on how many they are."""
+BITS = 30
+CHUNK = 4096
+"""Points made at a time; a power of two."""
+
+
+def draw_values(values: Variation, places: Places) -> Sequence[object]:
+    """Return the value at each place: numbers in SI, angles as texts in rad, levels as they were written."""
+    if isinstance(values, tuple):  # equally likely levels
+        return [values[index] for index in np.minimum(places * len(values), len(values) - 1).astype(int).tolist()]
+    low, high = values.low, values.high
+    numbers = (min(max(round_digits(number), low), high) for number in QUANTILES[type(values)](values, places).tolist())
+    return [toml_number(number, angle=values.angle) for number in numbers]
+
+
+def uniform_quantile(values: Uniform, places: Places) -> Places:
+    """Invert the uniform distribution of the values, or of their logarithms."""
+    if values.scale == "log":
+        return np.asarray(values.low * np.exp(places * np.log(values.high / values.low)))
+    return values.low + places * (values.high - values.low)
+
+
+def normal_quantile(values: Normal, places: Places) -> Places:
+    """Invert the normal distribution, cut at its bounds (scipy.stats.truncnorm)."""
+    stats = load_module("scipy.stats", "sampled sweeps")
+    low, high = ((bound - values.mean) / values.sd for bound in (values.low, values.high))
+    if np.isinf(low) and np.isinf(high):
+        return np.asarray(stats.norm.ppf(places, values.mean, values.sd))
+    return np.asarray(stats.truncnorm.ppf(places, low, high, values.mean, values.sd))
+
+
+QUANTILES: dict[type, Callable[[Any, Places], Places]] = {
+    Uniform: uniform_quantile,
+    Normal: normal_quantile,
+}
+
+
+def generator(seed: int, text: str) -> np.random.Generator:
+    """Return the stream of a seed and a text; streams of different texts are independent of one another."""
+    digest = hashlib.sha256(text.encode()).digest()
+    words = [int.from_bytes(digest[i : i + WORD_BYTES], "little") for i in range(0, len(digest), WORD_BYTES)]
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *words])))
+
+
+def open_interval(places: Places) -> Places:
+    """Move places at 0 and 1 inside by less than anybody can see."""
+    return np.clip(places, LEAST, 1.0 - 2.0 * LEAST)
+
+
+def _streams(sweep: Sweep) -> list[np.random.Generator]:
+    """Return the stream of every key, however its quotes are set."""
+    return [generator(sweep.seed, format_key(parse_key(key))) for key in sweep.vary]
+
+
+def lhs(sweep: Sweep) -> Places:
+    """Return a place in each of equally likely intervals, in random order, for every key."""
+    hypercube = load_module("scipy.stats.qmc", "sampled sweeps").LatinHypercube
+    return np.stack([hypercube(1, seed=stream).random(sweep.samples)[:, 0] for stream in _streams(sweep)])
+
+
+def normal(sweep: Sweep) -> Places:
+    """Return independent places."""
+    return np.stack([stream.random(sweep.samples) for stream in _streams(sweep)])
+
+
+def sobol(sweep: Sweep) -> Places:
+    """Return the first points of the sequence, in the middles of the finest cells of the net."""
+    sequence = load_module("scipy.stats.qmc", "sampled sweeps").Sobol(
+        DIMENSIONS, scramble=True, bits=BITS, seed=generator(sweep.seed, "sobol")
+    )
+    size = min(CHUNK, 1 << (sweep.samples - 1).bit_length())
+    chunks = [sequence.random(size)[:, : len(sweep.vary)].copy() for _ in range(0, sweep.samples, size)]
+    return np.asarray(np.concatenate(chunks)[: sweep.samples].T + 0.5 ** (BITS + 1))
+
+
+GIVEN: dict[str, Callable[[Sweep], Design]] = {"grid": grid, "list": listed, "table": table}
+DRAWN: dict[str, Callable[[Sweep], Places]] = {"lhs": lhs, "sobol": sobol, "normal": normal}
+"""Modes of sweeps; those that draw give places of the unit cube, shape (keys, samples)."""
+
+
+def design_of(sweep: Sweep) -> Design:
+    """Return the settings of all cases, the same for the same sweep on every machine.
+
+    Raises what reading a table raises, UnavailableError where a sampled mode has no scipy.
+    """
+    if sweep.mode in GIVEN:
+        return GIVEN[sweep.mode](sweep)
+    places = open_interval(DRAWN[sweep.mode](sweep))
+    return Together(
+        {key: draw_values(values, column) for (key, values), column in zip(sweep.vary.items(), places, strict=True)}
+    )
+
+
+def remarks(sweep: Sweep) -> list[str]:
+    """Return what whoever chose this sweep may want to know."""
+    if sweep.mode == "sobol" and sweep.samples & (sweep.samples - 1):
+        below = 1 << (sweep.samples.bit_length() - 1)
+        return [f"{sweep.samples} Sobol points are not balanced; {below} or {2 * below} are"]
+    return []
+
 
 MOST_CASES = 1_000_000
 TABLE = "table"  # last part of keys that name a file
@@ -89,8 +376,8 @@ def with_sweep(
     table = dict(present) if isinstance(present, Mapping) and not vary else {}
     overrides = list(document.overrides)
     for key, values in (vary or {}).items():
-        table[key] = frozen(values) if isinstance(values, Mapping) else tuple(map(_plain, values))
-        text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={shown(table[key])}"
+        table[key] = freeze(values) if isinstance(values, Mapping) else tuple(map(_plain, values))
+        text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={toml(table[key])}"
         label = f"--vary {text}" if isinstance(vary, Variations) else "vary"
         overrides.append(Override(label, text, ("sweep", key)))
     own = {"mode": mode, "samples": samples, "seed": seed}
@@ -156,10 +443,10 @@ def refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None
             continue
         drawn = [float(str(value).removesuffix(" rad")) for value in design.columns[key]]
         for end in (min(drawn), max(drawn)):
-            mistakes = mistakes_of_value(document.data, document.folder, key, written(end, angle=values.angle))
+            mistakes = mistakes_of_value(document.data, document.folder, key, toml_number(end, angle=values.angle))
             for message in dict.fromkeys(one.message for one in mistakes):  # one number may set two keys
                 text = f"drawn: {message}; cut the distribution with from and to"
-                findings.append(Finding(("sweep", key), text))
+                findings.append(Mistake(("sweep", key), text))
     if findings:
         raise ScenarioError([document.problem(finding) for finding in findings])
 

@@ -10,23 +10,30 @@ from blocksim.analysis.experiment import load_table
 from blocksim.analysis.judgement import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import Scenario, load_stored
-from blocksim.scenario.bounded_read import MEGABYTE
+from blocksim.scenario.input_files import MEGABYTE
 from blocksim.simulation import folder as files
-from blocksim.simulation.own_files import refuse_foreign
+from blocksim.simulation.folder import refuse_foreign
 from blocksim.study.compare import compare_sweep
+from blocksim.study.manifest import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, lines_in
+from blocksim.study.pictures import read_sweep_data
 from blocksim.study.rows import FINISHED, TABLE
 from blocksim.study.stored_run import Place, choice, find_run, folder_of
 from blocksim.study.study import study_in, study_page
-from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.sweep_folder import PLAN, case_folder
-from blocksim.study.sweep_table import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, lines_in
 from blocksim.view.report.page import write_report
 from blocksim.view.report.pictures import pictures_of
 from blocksim.view.report.player import MOST_BYTES
-from blocksim.view.report.runs import PartialRun, Subject, read_stored, run_subject
-from blocksim.view.report.shared import shared_path, shared_text
-from blocksim.view.report.studies import study_subject
-from blocksim.view.report.sweeps import CaseTable, sweep_subject
+from blocksim.view.report.subjects import (
+    CaseTable,
+    PartialRun,
+    Subject,
+    read_stored,
+    run_subject,
+    shared_path,
+    shared_text,
+    study_subject,
+    sweep_subject,
+)
 
 MEMBERS = 50  # of a sweep in one page
 MOST_TABLE_BYTES = 200 * MEGABYTE  # of sweep.csv

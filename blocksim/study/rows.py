@@ -17,15 +17,15 @@ from blocksim.analysis.compare import compare_final, limits
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Scenario, Sweep, place_bodies
-from blocksim.scenario import quantities as q
+from blocksim.scenario import units as q
 from blocksim.scenario.units import parse_unit
-from blocksim.simulation.table import COLUMNS, Columns
+from blocksim.simulation.frames import COLUMNS, Columns
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from blocksim.simulation.outcome import Outcome
-    from blocksim.simulation.summary import Summary
+    from blocksim.simulation.loop import Outcome
+    from blocksim.simulation.result import Summary
 
 Row = dict[str, object]
 FINISHED = "finished"

@@ -11,9 +11,9 @@ from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.silence import silent
 from blocksim.simulation import Result, Watcher, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
-from blocksim.simulation.checkpoint_policy import DEFAULTS, CheckpointPolicy
-from blocksim.simulation.running import SILENT, Listener
-from blocksim.simulation.summary import changed_results, read_summary
+from blocksim.simulation.checkpoint import DEFAULTS, CheckpointPolicy
+from blocksim.simulation.result import changed_results, read_summary
+from blocksim.simulation.run import NO_CALLBACKS, RunCallbacks
 from blocksim.study.rows import check_experiment
 from blocksim.study.stored_run import find_run
 
@@ -40,7 +40,7 @@ class RunOptions:
     precautions: CheckpointPolicy = DEFAULTS
     threads: Threads = 1
     on_progress: Watcher = silent
-    listener: Listener = SILENT
+    listener: RunCallbacks = NO_CALLBACKS
 
 
 @takes(RunOptions)

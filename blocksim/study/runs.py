@@ -14,7 +14,7 @@ from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
-from blocksim.study.progress import MANIFEST, PATTERN, Entry, Manifest, read_entries, values_hash
+from blocksim.study.manifest import MANIFEST, PATTERN, Entry, Manifest, read_entries, values_hash
 from blocksim.study.rows import Row, check_experiment, invalid_row
 from blocksim.study.sweep_folder import FolderKind, prepare
 

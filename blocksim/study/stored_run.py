@@ -12,12 +12,11 @@ from typing import Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored
-from blocksim.scenario.spelling import listed
+from blocksim.scenario.spelling import list_names
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.happened import Happened
-from blocksim.simulation.stores.hdf5_reader import read_frames
-from blocksim.simulation.summary import read_summary
+from blocksim.simulation.result import EventRecord, read_summary
+from blocksim.simulation.stores.hdf5 import read_frames
 from blocksim.study.rows import FINISHED, TABLE
 
 MOST_FOLDERS = 5  # named in a message
@@ -90,7 +89,7 @@ def _run_in(place: Path, needed: Sequence[str]) -> Path:
     below = sorted({path.parents[1] for path in place.glob(f"*/*/{files.DONE}")})
     for found, what in ((begun, "but an unfinished run"), (sweeps, "but a sweep"), (below, "but runs of scenarios")):
         if found:
-            message = f"{place}: no finished run in this folder, {what}: {listed(found, MOST_FOLDERS)}"
+            message = f"{place}: no finished run in this folder, {what}: {list_names(found, MOST_FOLDERS)}"
             raise InputMissingError(message)
     raise InputMissingError(f"{place}: no finished run in this folder; blocksim run SCENARIO makes one")
 
@@ -105,7 +104,7 @@ class StoredRun:
     choice: str = ""
 
     @cached_property
-    def events(self) -> tuple[Happened, ...]:
+    def events(self) -> tuple[EventRecord, ...]:
         """The events that have happened; none where run.json is missing or damaged."""
         with suppress(BlocksimError):
             return read_summary(self.folder / files.SUMMARY).events

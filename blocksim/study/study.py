@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import load_stored
 from blocksim.study.answer import Answer
-from blocksim.view.layout import OWN, Paper
-from blocksim.view.report.studies import StudyPage
-from blocksim.view.style import picture_suffix
+from blocksim.view.report.subjects import StudyPage
+from blocksim.view.style import OWN, Paper, picture_suffix
 
 if TYPE_CHECKING:
     from blocksim.study.runs import Replay

@@ -23,13 +23,22 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernel_set, kernels_of
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import stop_requests
-from blocksim.study.design import Settings, levels_of
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task, chosen_executor, executor_named
-from blocksim.study.plan import Cases, Values, cases_of, table_digests, with_sweep
-from blocksim.study.progress import MANIFEST, WHOLE, CaseIndex, Entry, Manifest, Shard, Timings, values_hash
+from blocksim.study.manifest import (
+    MANIFEST,
+    WHOLE,
+    CaseIndex,
+    Entry,
+    Manifest,
+    Shard,
+    SweepResult,
+    SweepTable,
+    Timings,
+    values_hash,
+)
+from blocksim.study.plan import Cases, Settings, Values, cases_of, levels_of, table_digests, with_sweep
 from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, check_experiment, invalid_row
 from blocksim.study.sweep_folder import CASES, prepare, read_plan
-from blocksim.study.sweep_table import SweepResult, SweepTable
 from blocksim.study.vary import variations_option
 
 TIMINGS = "timings.csv"

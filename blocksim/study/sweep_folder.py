@@ -16,13 +16,12 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.scenario.bounded_read import MEGABYTE, open_regular, read_head, read_limited
+from blocksim.scenario.input_files import MEGABYTE, open_regular, read_head, read_limited
 from blocksim.simulation.atomic import replacing, sync_file, write_text
-from blocksim.simulation.folder import brief_lock, make_folder, remove_run, takes_lock
-from blocksim.simulation.provenance import environment
-from blocksim.simulation.result_files import (
+from blocksim.simulation.folder import (
     Kind,
     TableRecord,
+    brief_lock,
     columns_added,
     grows_from,
     has_keys,
@@ -32,10 +31,14 @@ from blocksim.simulation.result_files import (
     is_resolved,
     is_written,
     keep_scenario,
+    make_folder,
     origin_of,
     read_tables,
     refuse_foreign_copies,
+    remove_run,
+    takes_lock,
 )
+from blocksim.simulation.provenance import environment
 
 MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each
 log = logging.getLogger(__name__)

@@ -16,16 +16,15 @@ import numpy as np
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_stored, scenario_hash
-from blocksim.scenario.bounded_read import read_limited
+from blocksim.scenario.input_files import read_limited
 from blocksim.silence import silent
 from blocksim.simulation import Result, Watcher, read_result, simulate
 from blocksim.simulation import folder as files
-from blocksim.simulation.frames import Floats
-from blocksim.simulation.probe_series import ProbeSeries
+from blocksim.simulation.checkpoint import STARTS_ANEW
+from blocksim.simulation.frames import Floats, csv_text
+from blocksim.simulation.probes import ProbeSeries
 from blocksim.simulation.provenance import ROOM_PREFIX, environment
-from blocksim.simulation.resumption import STARTS_ANEW
-from blocksim.simulation.summary import MOST_BYTES, Summary, changed_files, read_summary
-from blocksim.simulation.table import csv_text
+from blocksim.simulation.result import MOST_BYTES, Summary, changed_files, read_summary
 from blocksim.study.stored_run import find_run
 
 INTERRUPTED = "interrupted"

@@ -16,16 +16,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.movement import PEAK
+from blocksim.simulation.observables import PEAK
 from blocksim.study.executors.ensemble import rows_of
+from blocksim.study.manifest import NO_TABLE, OUTCOME, PATTERN, CaseIndex, lines_in, read_entries
 from blocksim.study.plan import Case, Cases
-from blocksim.study.progress import PATTERN, CaseIndex, read_entries
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row, varied_cells
 from blocksim.study.runs import Replay
 from blocksim.study.study import Study, study_in
 from blocksim.study.sweep import cases_in, measured_ranges
 from blocksim.study.sweep_folder import CASES, SWEEP, FolderKind, case_folder, read_origin, read_plan
-from blocksim.study.sweep_table import NO_TABLE, OUTCOME, lines_in
 from blocksim.study.verify_run import (
     EntryDifference,
     Origin,

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.scenario.outlines import area_of, centroid
+from blocksim.scenario.geometry import area_of, centroid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

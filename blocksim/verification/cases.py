@@ -2,20 +2,14 @@
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
-from blocksim.verification import (
-    collapse,
-    convergence,
-    dominoes,
-    energy,
-    flight,
-    impacts,
-    resting,
-    rocking,
-    seats,
-    sliding,
-    symmetry,
-    toppling,
-)
+from blocksim.verification import collapse, energy, impacts, resting, toppling
+from blocksim.verification import collapse as convergence
+from blocksim.verification import collapse as symmetry
+from blocksim.verification import impacts as flight
+from blocksim.verification import impacts as seats
+from blocksim.verification import resting as sliding
+from blocksim.verification import toppling as dominoes
+from blocksim.verification import toppling as rocking
 from blocksim.verification.case import Case, Setting
 from blocksim.verification.soil import SOIL_CASES
 
@@ -195,19 +189,19 @@ def refuse_springs(setting: Setting) -> None:
         raise SettingError(f"{wrong} needs springs; contacts of --scheme {setting.scheme} are rigid")
 
 
-def chosen(ids: list[str], scheme: str = SPRINGS) -> tuple[Case, ...]:
+def choose_cases(ids: list[str], scheme: str = SPRINGS) -> tuple[Case, ...]:
     """Return the cases of some ids (upper or lower case), in the order of the table; without ids all of the scheme."""
     wanted = {name.upper() for name in ids}
     unknown = sorted(wanted - {case.id for case in CASES})
     if unknown:
         raise UnknownCaseError(f"{', '.join(unknown)}: no such case; choose {CASES[0].id} to {CASES[-1].id}")
-    foreign = [reason for reason in left_out(scheme) if reason.split()[0] in wanted]
+    foreign = [reason for reason in excluded_cases(scheme) if reason.split()[0] in wanted]
     if foreign:
         raise SettingError(f"not for --scheme {scheme}: {'; '.join(foreign)}")
     return tuple(case for case in CASES if scheme not in case.not_for and (not wanted or case.id in wanted))
 
 
-def chosen_of_soil(ids: list[str]) -> tuple[Case, ...]:
+def choose_soil_cases(ids: list[str]) -> tuple[Case, ...]:
     """Return the cases of soil of some ids (upper or lower case), in the order of the table; without ids all."""
     wanted = {name.upper() for name in ids}
     unknown = sorted(wanted - {case.id for case in SOIL_CASES})
@@ -217,6 +211,6 @@ def chosen_of_soil(ids: list[str]) -> tuple[Case, ...]:
     return tuple(case for case in SOIL_CASES if not wanted or case.id in wanted)
 
 
-def left_out(scheme: str) -> tuple[str, ...]:
+def excluded_cases(scheme: str) -> tuple[str, ...]:
     """Return the cases that do not apply to a scheme, each with the reason."""
     return tuple(f"{case.id} ({case.not_for[scheme]})" for case in CASES if scheme in case.not_for)

@@ -1,17 +1,25 @@
-"""V24 the three blocks before their first impact, V22 their rest positions without restitution."""
+"""The three blocks: V22 and V24 places, V19 and V21 symmetry, V20 convergence."""
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.verification.case import Row, Setting, absolute
+from blocksim.verification import closed_forms as forms
+from blocksim.verification.case import Row, Setting, absolute, at_least
+from blocksim.verification.resting import CONTACT_RADIUS, resting_overlap
+from blocksim.verification.scene import HEIGHT, Throw, Thrower
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from numpy.typing import NDArray
+
+    from blocksim.kernels.common.arrays import World
     from blocksim.verification.scene import Simulation
+
 
 SIZES = {"width": 0.032, "height": 0.05, "length": 0.025}  # m, upright = "length"
 STEP_X = 0.022  # m, offset of each block against the one below: an overlap of 10 mm
@@ -69,3 +77,114 @@ def at_rest(setting: Setting) -> Iterator[Row]:
         allowed = HERTZ_TOLERANCE if setting.hertzian else tolerance
         yield absolute(f"block {block}, x", "mm", x, 1e3 * bodies[block - 1].x, allowed)
         yield absolute(f"block {block}, angle", "°", angle, np.degrees(bodies[block - 1].angle), 0.5)
+
+
+BEFORE, AFTER = 0.2, 0.45  # s: just before the first impact; all impacts are over
+MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])  # x, y, angle, vx, vy, spin
+RELABELLED = (2, 1, 0)
+SHIFT = 1.0  # m
+CORNER = 0.03  # m, from the centre of a block
+PLINTH: dict[str, object] = {"x": 0.0, "y": 0.05, "width": 1.0, "height": 0.1, "fixed": True}
+LANDING = 0.3  # s
+SAME, REORDERED = 1e-9, 1e-6  # m, before impacts
+SOLVED = {"velocity_tolerance": 1e-12}  # m/s: round-off may decide on one sweep more or less of rigid contacts
+
+
+def symmetries(setting: Setting) -> Iterator[Row]:
+    """Let the three blocks collapse in a mirror, under other numbers, and one metre aside.
+
+    Rigid contacts are gone through one after the other, in an order that goes by the numbers of blocks, once a position
+    pass. So overlaps depend on the numbers by a share of themselves (1e-9 m at a step h of 1e-5 s), and with them the
+    step in which a point of a face lifts off, after 0.1 s. One step sooner changes a velocity by less than g h, and a
+    place by less than g h 0.1 s until the first impact, which is 1e-5 m; a tenth of that is allowed.
+    """
+    usual = states(setting, staircase())
+    mirrored = [state * MIRROR for state in states(setting, staircase(side=-1.0))]
+    relabelled = [state[np.argsort(RELABELLED)] for state in states(setting, staircase(RELABELLED))]
+    back = np.array([SHIFT, 0.0, 0.0, 0.0, 0.0, 0.0])
+    moved = [state - back for state in states(setting, staircase(shift=SHIFT))]
+    for name, other in (("mirrored", mirrored), ("relabelled", relabelled), ("moved 1 m", moved)):
+        before, after = (distance(one, two) for one, two in zip(usual, other, strict=True))
+        allowed = SAME if setting.has_springs or other is not relabelled else REORDERED
+        yield absolute(f"{name}, before impacts", "m", 0.0, before, allowed)
+        yield absolute(f"{name}, at the end", "mm", 0.0, 1e3 * after, 0.05)
+
+
+def states(setting: Setting, bodies: Sequence[dict[str, object]]) -> list[NDArray[np.float64]]:
+    """Return the state just before the first impact and that after the last one."""
+    collapse = setting.start(bodies, time={} if setting.has_springs else SOLVED)
+    return [collapse.to_time(time).state() for time in (BEFORE, AFTER)]
+
+
+def distance(one: NDArray[np.float64], two: NDArray[np.float64]) -> float:
+    """Return how far (m) centres or corners of two states are apart at most."""
+    apart = np.abs(one - two)
+    return float(max(apart[:, :2].max(), CORNER * apart[:, 2].max()))
+
+
+def fixed_block(setting: Setting) -> Iterator[Row]:
+    """Let a block tumble over the ground and over a fixed block, at one step: the same motion."""
+    plinth = tumbling(setting, [PLINTH], 0.1)
+    ground = tumbling(setting, [], 0.0, step=plinth.step)
+    apart = 0.0
+    for time in np.linspace(0.0, LANDING, 31)[1:]:
+        one, two = (scene.to_time(float(time)).state()[:1] for scene in (ground, plinth))
+        apart = max(apart, distance(one, two - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])))
+    yield absolute("motions apart", "µm", 0.0, 1e6 * apart, 1.0)
+
+
+def tumbling(setting: Setting, others: Sequence[dict[str, object]], level: float, step: float = 0.0) -> Simulation:
+    """Drop a tilted block that slides and turns onto a level (m); `step` (s) is the scene's own where zero."""
+    body = {"y": level + HEIGHT, "angle": 0.4, "velocity": [0.3, -0.5]}
+    time = {"step": step} if step else {}
+    return setting.start([body, *others], friction=0.38, ground_friction=0.38, time=time)
+
+
+ORDER = 1.8
+REFINEMENTS = (1, 2, 4)
+COARSEST = 0.1  # frequency times step
+PERIODS, SAMPLES = 3, 24  # of the oscillation
+PHASES = 32  # of a step, at which an impact begins
+SAFETIES = (0.1, 0.05, 0.025)
+RESTITUTION = 0.5
+RUN_OUT_BOUND = 1.0  # mm
+SOFT = 0.01  # stiffness scale of the run-out
+
+
+def convergence(setting: Setting) -> Iterator[Row]:
+    """Order in dt of an oscillation and of the restitution; change of the run-out when the spacing is halved."""
+    coarse, middle, fine = (oscillation(setting, refinement) for refinement in REFINEMENTS)
+    yield at_least("oscillation, order in dt", "", ORDER, np.log2(rms(coarse - middle) / rms(middle - fine)))
+    errors = [rms(restitution_errors(setting, safety)) for safety in SAFETIES]
+    order = np.log2(errors[0] / errors[-1]) / np.log2(SAFETIES[0] / SAFETIES[-1])
+    yield at_least("restitution, order in dt", "", ORDER, order)
+    one, half = (collapse(setting, 0.2, spacing, SOFT).to_time(LONGEST).bodies.x for spacing in (1e-3, 5e-4))
+    yield absolute("run-out, spacing halved", "mm", 0.0, 1e3 * float(np.abs(one - half).max()), RUN_OUT_BOUND)
+
+
+def rms(values: NDArray[np.float64]) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def oscillation(setting: Setting, refinement: int) -> NDArray[np.float64]:
+    """Return heights (m) at fixed times of an undamped block that starts half of its overlap too high: no lift-off."""
+    overlap = resting_overlap(setting)
+    frequency = sqrt((1.5 if setting.hertzian else 1.0) * forms.GRAVITY / overlap)  # slope of d^1.5: 1.5 force/overlap
+    step = COARSEST / frequency / refinement
+
+    def press(world: World) -> None:
+        world.bodies[0].y -= 0.5 * overlap
+
+    contact = {"contact_radius": CONTACT_RADIUS} if setting.hertzian else {}
+    time = {"step": step, "force_step": True}
+    scene = setting.start([{"y": HEIGHT / 2}], press, restitution=1.0, contact=contact, time=time)
+    every = refinement * round(2.0 * np.pi / COARSEST * PERIODS / SAMPLES)
+    return np.array([scene.to_step(every * k).bodies[0].y for k in range(1, SAMPLES + 1)])
+
+
+def restitution_errors(setting: Setting, safety: float) -> NDArray[np.float64]:
+    """Return the errors of the restitution of flat impacts that begin at different phases of a step."""
+    thrower = Thrower(setting, RESTITUTION, time={"safety": safety})
+    throws = [thrower.throw(Throw(phase=(k + 0.5) / PHASES)).vy for k in range(PHASES)]
+    return np.array(throws) - RESTITUTION

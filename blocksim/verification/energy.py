@@ -13,8 +13,7 @@ from blocksim.kernels.common.arrays import AT_REST, REACHED
 from blocksim.scenario import Document, load_scenario, place_bodies
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.case import Row, Setting, absolute, at_least
-from blocksim.verification.scene import Simulation
-from blocksim.verification.throws import GOLDEN, Throw, Thrower, kinetic_energy
+from blocksim.verification.scene import GOLDEN, Simulation, Throw, Thrower, kinetic_energy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -65,7 +65,7 @@ FINDINGS = (
 )  # fmt: skip
 
 
-def measured(finding: Finding) -> dict[str, Any]:
+def measure_finding(finding: Finding) -> dict[str, Any]:
     """Run a finding; return its centres in mm, how far each lies beyond the measured range, and what is inside."""
     result = run(load_scenario(SCENARIOS / f"{finding.scenario}.toml", finding.settings))
     rows = {(row.block, row.quantity): row for row in compare_run(result).rows}
@@ -109,7 +109,7 @@ def main(arguments: Sequence[str]) -> None:
         rows = []
         for finding in FINDINGS:
             print(finding.command, file=sys.stderr, flush=True)  # noqa: T201
-            rows.append(measured(finding))
+            rows.append(measure_finding(finding))
         store.write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     text = page.read_text(encoding="utf-8")
     page.write_text(with_table(text, json.loads(store.read_text(encoding="utf-8"))), encoding="utf-8")

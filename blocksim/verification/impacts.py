@@ -1,8 +1,8 @@
-"""V4 restitution of flat and corner impacts, V5 and V6 one corner on the ground, V16 two free blocks that collide."""
+"""V1 flight, V3 bounces, V4 to V6 and V16 impacts, V25 flat landings on several blocks."""
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import pairwise, product
 from math import atan2, cos, radians, sin
 from typing import TYPE_CHECKING
 
@@ -10,14 +10,74 @@ import numpy as np
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, farthest, relative
-from blocksim.verification.flight import SPACINGS
-from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, Simulation
-from blocksim.verification.throws import GOLDEN, POLL, Throw, Thrower
+from blocksim.verification.scene import GOLDEN, HEIGHT, POLL, WIDTH, PaperBlock, Simulation, Throw, Thrower
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
+
+    from blocksim.verification.scene import Simulation
+
+
+SPACINGS = (5e-4, 1e-3, 2e-3, 4e-3)  # m, of boundary particles
+DROP, RESTITUTION = 0.1, 0.5  # m, -
+FALL_POLL = 5e-5  # s
+LARGEST = 10.0  # m, m/s: the numbers of the flight are smaller
+BOUNCE_TOLERANCES = (0.01, 0.02, 0.04)
+LONGEST = 0.6  # s; all bounces are over by then
+
+
+def free_flight(setting: Setting) -> Iterator[Row]:
+    """Compare a flight with a parabola and its spin with a constant, to round-off times steps."""
+    flight = setting.start([{"y": 2.0, "velocity": [1.5, 2.5], "spin": 30.0, "angle": 0.4}]).to_time(0.2)
+    t, body = flight.time, flight.bodies[0]
+    round_off = LARGEST * flight.steps * float(np.finfo(float).eps)
+    aside, above = body.x - 1.5 * t, body.y - (2.0 + 2.5 * t - forms.fall_distance(t))
+    yield absolute("off the parabola", "m", 0.0, max(abs(aside), abs(above)), round_off)
+    yield absolute("off the speed", "m/s", 0.0, max(abs(body.vx - 1.5), abs(body.vy - 2.5 + 9.81 * t)), round_off)
+    yield absolute("off the angle", "rad", 0.0, abs(body.angle - 0.4 - 30.0 * t), round_off)
+    yield absolute("change of spin", "rad/s", 0.0, abs(body.spin - 30.0), round_off)
+
+
+def bounces(setting: Setting) -> Iterator[Row]:
+    """Drop a block flat; apexes and flight time at four particle spacings, the farthest off counts."""
+    found = [observe_bounces(drop_flat(setting, spacing), 3) for spacing in setting.distinct(SPACINGS)]
+    for impact, tolerance in enumerate(BOUNCE_TOLERANCES, start=1):
+        expected = forms.apex_height(DROP, RESTITUTION, impact)
+        apex = farthest(expected, [apexes[impact - 1] for _, apexes in found])
+        yield relative(f"apex {impact}", "mm", 1e3 * expected, 1e3 * apex, tolerance)
+    expected = forms.flight_time(DROP, RESTITUTION, 1)
+    flight = farthest(expected, [times[1] - times[0] for times, _ in found])
+    yield relative("first flight", "s", expected, flight, BOUNCE_TOLERANCES[0])
+
+
+def drop_flat(setting: Setting, spacing: float) -> Simulation:
+    """Drop a block flat from 0.1 m."""
+    body = {"y": HEIGHT / 2 + DROP}
+    return setting.start([body], restitution=RESTITUTION, contact={"particle_spacing": spacing})
+
+
+def observe_bounces(fall: Simulation, impacts: int) -> tuple[list[float], list[float]]:
+    """Return the times (s) of so many impacts and one more, and the apexes (m) between them; NaN where there is none.
+
+    The time of an impact is that of the steepest change of speed, half a poll either way.
+    """
+    times: list[float] = []
+    apexes = [0.0]
+    falling = True
+    poll = max(FALL_POLL, fall.step)
+    while len(times) <= impacts and fall.time < LONGEST:
+        fall.to_time(fall.time + poll)
+        body = fall.bodies[0]
+        if falling and body.vy > 0.0:
+            times.append(fall.time - poll / 2)
+            apexes.append(0.0)
+        falling = body.vy < 0.0
+        apexes[-1] = max(apexes[-1], float(body.y) - HEIGHT / 2)
+    missing = impacts + 1 - len(times)
+    return times + [np.nan] * missing, [*apexes[1:-1], *([np.nan] * missing)]
+
 
 ASKED = tuple(tenth / 10 for tenth in range(11))
 SPEEDS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # m/s
@@ -153,3 +213,52 @@ def frozen_arms(step: float, mass: float) -> float:
     J = m' u (1 + e) at most, m' a quarter of both masses; both are of 1 m/s here.
     """
     return step * 0.25 * mass * 2.0
+
+
+FAR = 0.05  # m, where the outermost seats end, beyond the block
+OVERHANG = 1e-4  # m, that lies on the second seat, or beyond both ends of one
+SEATS = {
+    "one seat": (-FAR, FAR),
+    "overhanging": (OVERHANG - 0.5 * WIDTH, 0.5 * WIDTH - OVERHANG),
+    "joint in the middle": (-FAR, 0.0, FAR),
+    "joint 6 mm off": (-FAR, 6e-3, FAR),
+    "0.1 mm on the second": (-FAR, 0.5 * WIDTH - OVERHANG, FAR),
+    "three seats": (-FAR, -4e-3, 3e-3, FAR),
+}  # m: ends of the seats from the centre of the block
+LOOSE = (-WIDTH, 0.0, WIDTH)  # m, as wide as the block
+SEAT_RESTITUTIONS = (0.0, 0.2, 0.5, 0.8, 1.0)
+GAP_STEPS = 100.37  # of flight, so that a contact begins within a step
+LANDING_POLL, MOST_STEPS = 10, 4000
+
+
+def seats(setting: Setting) -> Iterator[Row]:
+    """Drop a block on seats of several lengths for five restitutions; the farthest off counts."""
+    for name, ends in SEATS.items():
+        landings = [(asked, land(setting, ends, asked)) for asked in SEAT_RESTITUTIONS]
+        rebounds = [vy - asked for asked, (vy, _) in landings]
+        yield absolute(f"{name}, e off by", "", 0.0, farthest(0.0, rebounds), 0.01)
+        yield absolute(f"{name}, spin", "rad/s", 0.0, farthest(0.0, [spin for _, (_, spin) in landings]), 0.05)
+    if setting.law == "linear":
+        vy, spin = land(setting, LOOSE, 1.0, fixed=False)
+        yield absolute("two loose blocks, elastic, speed", "m/s", 0.5, vy, 0.01)
+        yield absolute("two loose blocks, elastic, spin", "rad/s", 0.0, spin, 0.05)
+
+
+def land(setting: Setting, ends: Sequence[float], restitution: float, *, fixed: bool = True) -> tuple[float, float]:
+    """Return the speed (m/s) and spin (rad/s) with which a block leaves that has come down flat at 1 m/s."""
+    under = [
+        {"x": 0.5 * (left + right), "width": right - left, "y": 0.5 * HEIGHT, "fixed": fixed}
+        for left, right in pairwise(ends)
+    ]
+
+    def start(height: float) -> Simulation:
+        block = {"y": 1.5 * HEIGHT + height, "velocity": [0.0, -1.0]}
+        return setting.start([*under, block], restitution=restitution, gravity=0.0)
+
+    scene = start(GAP_STEPS * start(0.5 * HEIGHT).step)
+    body = scene.world.bodies[len(under)]
+    for steps in range(LANDING_POLL, MOST_STEPS, LANDING_POLL):
+        scene.to_step(steps)
+        if body.pairs_before == 0 and body.vy >= 0.0:
+            break
+    return float(body.vy), float(body.spin)

@@ -15,10 +15,19 @@ from typing import Any
 from blocksim.scenario.key_table import with_part
 from blocksim.scenario.models.stepping import IMPULSES
 from blocksim.simulation.atomic import write_text
-from blocksim.verification.case import Case, Row, Setting, Verdict
-from blocksim.verification.cases import CASES, chosen, left_out
+from blocksim.verification.case import (
+    Case,
+    Row,
+    Setting,
+    Verdict,
+    error_text,
+    expected_text,
+    number,
+    run_case,
+    tolerance_text,
+)
+from blocksim.verification.cases import CASES, choose_cases, excluded_cases
 from blocksim.verification.soil import SOIL_CASES
-from blocksim.verification.verify import error_text, expected_text, number, run_case, tolerance_text
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"
@@ -43,7 +52,7 @@ Stored = dict[str, dict[str, list[dict[str, Any]]]]  # head of the column, case 
 
 def cases_of(head: str) -> tuple[Case, ...]:
     """Return the cases of a column."""
-    return SOIL_CASES if head == SOIL else chosen([], SETTINGS[head].scheme)
+    return SOIL_CASES if head == SOIL else choose_cases([], SETTINGS[head].scheme)
 
 
 def _measured(head: str) -> Iterator[tuple[str, list[dict[str, Any]]]]:
@@ -88,8 +97,8 @@ def soil_table(stored: Stored) -> str:
 def _rigid_table(stored: Stored) -> Iterator[str]:
     scheme = SETTINGS[RIGID].scheme
     yield from [f"Rigid contacts, `blocksim verify --scheme {scheme}`:", ""]
-    yield markdown(RIGID_HEADS, [cells for case in chosen([], scheme) for cells in _cells(stored, RIGID, case)])
-    yield from ["", f"Left out: {'; '.join(left_out(scheme))}."]
+    yield markdown(RIGID_HEADS, [cells for case in choose_cases([], scheme) for cells in _cells(stored, RIGID, case)])
+    yield from ["", f"Left out: {'; '.join(excluded_cases(scheme))}."]
 
 
 def _cells(stored: Stored, head: str, case: Case) -> Iterator[list[str]]:

@@ -1,10 +1,27 @@
-"""V10 the chart of sliding and toppling on a slope, V17 the leaning ladder."""
+"""V11 the time of free rocking and V12 the loss of spin when the block comes down on its other corner.
+
+V10 the chart of sliding and toppling on a slope, V17 the leaning ladder.
+
+V18: a row of dominoes falls as fast as the collective model of J. M. J. van Leeuwen says.
+
+Dominoes of height h and thickness d stand with free gaps s. They turn about their lower front edges, which do not slip;
+faces are frictionless and collisions lose everything: a domino that has struck the next continues leaning on it. So all
+fallen dominoes and the foremost one move with one degree of freedom, the foremost one's angle. Between two collisions
+their energy is kept. In a collision the velocities are projected, in the metric of the kinetic energy, on those that
+the new contact allows; impulses between leaning dominoes are what makes the projection. (Am. J. Phys. 78 (2010)
+721-727.)
+
+Lengths of the model in units of h, time in units of sqrt(h/g); angles from the vertical.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, degrees, radians, sin
+from math import asin, cos, degrees, hypot, radians, sin, sqrt
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, count, relative
@@ -12,6 +29,63 @@ from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from blocksim.verification.scene import Simulation
+
+
+SLENDER, TALL = 0.010, 0.040  # m
+NO_SLIP = 5.0  # friction coefficient
+LONGEST = 0.2  # s
+SETTLED = 1e-3  # s after the impact
+
+
+def start_rocking(setting: Setting, restitution: float) -> Simulation:
+    """Let go of a slender block that stands on its right corner, turned by half the angle of balance."""
+    tilt = forms.toppling_slope(SLENDER, TALL) / 2
+    # the corner stays at x = SLENDER/2, y = 0; turned clockwise
+    body = {
+        "x": SLENDER / 2 - cos(tilt) * SLENDER / 2 + sin(tilt) * TALL / 2,
+        "y": sin(tilt) * SLENDER / 2 + cos(tilt) * TALL / 2,
+        "angle": -tilt,
+        "width": SLENDER,
+        "height": TALL,
+    }
+    return setting.start([body], restitution=restitution, ground_friction=NO_SLIP)
+
+
+def quarter_period(setting: Setting) -> Iterator[Row]:
+    """Time the way from release to standing upright."""
+    time, _ = until_upright(start_rocking(setting, 0.2))
+    expected = forms.rocking_quarter_time(SLENDER, TALL, forms.toppling_slope(SLENDER, TALL) / 2)
+    yield relative("time to upright", "s", expected, time, 0.005)
+
+
+def until_upright(scene: Simulation) -> tuple[float, float]:
+    """Continue until the angle changes its sign; return time (s) and spin (rad/s) there, by interpolation."""
+    block, steps = scene.bodies[0], scene.steps
+    angle = float(block.angle)
+    while block.angle < 0.0 and scene.time < LONGEST:
+        angle, steps = float(block.angle), scene.steps
+        scene.to_step(steps + 10)
+    share = angle / (angle - float(block.angle))
+    return (steps + share * (scene.steps - steps)) * scene.step, float(block.spin)
+
+
+def housner(setting: Setting) -> Iterator[Row]:
+    """Compare the spin about the new corner with that before the impact, both reckoned to the upright position.
+
+    The impact takes a while; until it is over the block has turned a little, and the spin at the upright position
+    follows from the energy about the corner, w^2 + (3/2) g (cos(alpha) - cos(alpha - |angle|)) / R.
+    """
+    scene = start_rocking(setting, 0.0)
+    time, _ = until_upright(scene)
+    block = scene.to_time(time + SETTLED).bodies[0]
+    half, alpha = hypot(SLENDER, TALL) / 2, forms.toppling_slope(SLENDER, TALL)
+    lifted = 1.5 * 9.81 / half * (cos(alpha - abs(block.angle)) - cos(alpha))
+    before = (1.5 * 9.81 / half * (cos(alpha - alpha / 2) - cos(alpha))) ** 0.5  # let go at half of alpha
+    after = (block.spin**2 + lifted) ** 0.5
+    yield relative("spin ratio", "", forms.housner_ratio(SLENDER, TALL), after / before, 0.05)
+
 
 ROUGH = 2.0  # friction coefficient at which no slope of this chart lets a block slide before it topples
 BRACKET = radians(1.0)  # either way of the expected limit
@@ -127,3 +201,123 @@ def limit(outcome: Callable[[float], bool], low: float, high: float, halvings: i
         middle = 0.5 * (low + high)
         low, high = (low, middle) if outcome(middle) else (middle, high)
     return 0.5 * (low + high)
+
+
+Floats = NDArray[np.float64]
+STEPS = 400  # of the foremost domino's angle between two collisions of the model
+DOMINO_TALL, THICK = 0.048, 0.0075  # m
+COUNT = 24
+GAPS = (0.2, 0.3, 0.5, 0.7)  # of the height
+FIRST, LAST = 10, 20
+PUSH = 6.5  # spin of the first domino in units of sqrt(g/h): near that of the stationary wave for every gap
+GRAVITY = 9.81  # m/s2
+SOFT = 0.01  # stiffness scale of the quick size
+POLL = 2e-4  # s
+LONGEST_WAVE = 2.0  # s
+
+
+@dataclass(frozen=True)
+class Dominoes:
+    """A row of dominoes, in units of their height."""
+
+    thickness: float
+    gap: float
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the lower edge, per mass."""
+        return (1.0 + self.thickness**2) / 3.0
+
+    @property
+    def strike(self) -> float:
+        """Angle (rad) at which a domino strikes the next, still upright one."""
+        return asin(self.gap)
+
+    def height(self, angles: Floats) -> float:
+        """Return the sum of the heights of all centres."""
+        return float(0.5 * np.sum(np.cos(angles) + self.thickness * np.sin(angles)))
+
+    def leaning(self, foremost: float, count: int) -> tuple[Floats, Floats]:
+        """Return angles of `count` dominoes that lean on one another, foremost first, and d angle/d foremost.
+
+        The upper front edge of one touches the back of the next: sin(a - b) = (s + d) cos b - d, a behind b.
+        """
+        angles, rates = [foremost], [1.0]
+        pitch = self.gap + self.thickness
+        for _ in range(count - 1):
+            front = angles[-1]
+            reach = pitch * cos(front) - self.thickness
+            slope = 1.0 - pitch * sin(front) / sqrt(1.0 - reach**2)
+            angles.append(front + asin(reach))
+            rates.append(slope * rates[-1])
+        return np.array(angles), np.array(rates)
+
+
+def collision_times(dominoes: Dominoes, count: int, spin: float) -> Floats:
+    """Return the times at which domino 1, 2, ... `count` strikes the next; domino 1 starts upright with `spin`."""
+    time, times = 0.0, []
+    for fallen in range(1, count + 1):
+        taken, spin = _turn(dominoes, fallen, spin)
+        time += taken
+        times.append(time)
+        spin = _strike(dominoes, fallen, spin)
+    return np.array(times)
+
+
+def _turn(dominoes: Dominoes, fallen: int, spin: float) -> tuple[float, float]:
+    """Let the foremost of `fallen` dominoes turn from upright to the next one; return the time taken and its spin."""
+    nodes = dominoes.strike * np.linspace(0.0, 1.0, STEPS + 1)
+    states = [dominoes.leaning(float(angle), fallen) for angle in nodes]
+    masses = np.array([0.5 * dominoes.inertia * float(rates @ rates) for _, rates in states])
+    heights = np.array([dominoes.height(angles) for angles, _ in states])
+    squares = (masses[0] * spin**2 + heights[0] - heights) / masses
+    if squares.min() <= 0.0:
+        message = f"the row stops at domino {fallen}"
+        raise ValueError(message)
+    slowness = 1.0 / np.sqrt(squares)
+    return float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(nodes))), float(np.sqrt(squares[-1]))
+
+
+def _strike(dominoes: Dominoes, fallen: int, spin: float) -> float:
+    """Return the spin of the domino that is struck by the foremost of `fallen` ones turning with `spin`."""
+    _, before = dominoes.leaning(dominoes.strike, fallen)
+    _, after = dominoes.leaning(0.0, fallen + 1)
+    return spin * float(before @ after[1:]) / float(after @ after)
+
+
+def wave_speed(dominoes: Dominoes, first: int, last: int, spin: float) -> float:
+    """Return the speed of the wave between two collisions, in units of sqrt(g h)."""
+    times = collision_times(dominoes, last, spin)
+    return (last - first) * (dominoes.gap + dominoes.thickness) / float(times[last - 1] - times[first - 1])
+
+
+def dominoes(setting: Setting) -> Iterator[Row]:
+    """Push the first of 24 dominoes; time the wave from the collision of domino 10 to that of domino 20."""
+    for gap in GAPS[:2] if setting.quick else GAPS:
+        model = wave_speed(Dominoes(THICK / DOMINO_TALL, gap), FIRST, LAST, PUSH) * sqrt(GRAVITY * DOMINO_TALL)
+        times = strike_times(row(setting, gap))
+        speed = (LAST - FIRST) * (gap * DOMINO_TALL + THICK) / (times[LAST - 1] - times[FIRST - 1])
+        yield relative(f"gap {gap:g} h, speed", "m/s", model, speed, 0.05)
+
+
+def row(setting: Setting, gap: float) -> Simulation:
+    """Start the row; the first domino turns about its lower front edge."""
+    spin = -PUSH * sqrt(GRAVITY / DOMINO_TALL)  # clockwise
+    pitch = gap * DOMINO_TALL + THICK
+    bodies: list[dict[str, object]] = [
+        {"x": i * pitch, "y": DOMINO_TALL / 2, "width": THICK, "height": DOMINO_TALL} for i in range(COUNT)
+    ]
+    bodies[0] |= {"spin": spin, "velocity": [-spin * DOMINO_TALL / 2, -spin * -THICK / 2]}
+    contact = {"stiffness_scale": SOFT if setting.quick else 1.0}
+    return setting.start(bodies, restitution=0.0, friction=0.0, ground_friction=NO_SLIP, contact=contact)
+
+
+def strike_times(scene: Simulation) -> list[float]:
+    """Return when each domino strikes the next: when that one starts to turn. NaN where it does not."""
+    moving = 1e-2 * sqrt(GRAVITY / DOMINO_TALL)  # rad/s
+    times = [np.nan] * (COUNT - 1)
+    while scene.time < LONGEST_WAVE and np.isnan(times[LAST - 1]):
+        scene.to_time(scene.time + POLL)
+        for i in np.flatnonzero(scene.bodies.spin[1:] < -moving):
+            times[i] = scene.time if np.isnan(times[i]) else times[i]
+    return times

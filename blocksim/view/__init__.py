@@ -1,6 +1,6 @@
 """Pictures, animations, reports. Importing this room is cheap: matplotlib is loaded when the first picture is drawn."""
 
-from blocksim.view.measured import MeasuredTable
+from blocksim.view.final import MeasuredTable
 from blocksim.view.run_data import FramesLike
 from blocksim.view.strip import draw_strip
 

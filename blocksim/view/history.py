@@ -1,8 +1,8 @@
-"""Histories of a run: motions of the blocks, energies, contacts, forces and the ground's motion over time."""
+"""Pictures over time: histories of a run, its probes, and the motion of its supports."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Protocol
@@ -10,10 +10,19 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.contacts import Contacts
+from blocksim.scenario.motion import Peak, acceleration_ends, displacement_and_velocity, motion_peaks
+from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario.units import STANDARD_GRAVITY
+from blocksim.simulation import probes
+from blocksim.simulation.frames import Contacts
+from blocksim.simulation.probes import JOINT, POINT, ProbeSeries
 from blocksim.view import style
-from blocksim.view.forces import contacts_of
-from blocksim.view.history_panels import (
+from blocksim.view.arrows import contacts_of
+from blocksim.view.final import MeasuredTable
+from blocksim.view.paint import Paint, by_block
+from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support, drawable_frames
+from blocksim.view.style import OWN, Paper, plain_numbers, write_heading, write_text
+from blocksim.view.time_panels import (
     BESIDE,
     CONTACTS,
     ENERGY,
@@ -21,31 +30,33 @@ from blocksim.view.history_panels import (
     GROUND,
     MOTIONS,
     USUAL,
+    WIDTH,
     Choice,
     Entries,
     HistoryFrames,
     Motion,
     Seen,
+    TimePanel,
     blocks_named,
     draw_contacts,
     draw_energies,
     draw_force,
     draw_ground,
+    draw_time_panels,
     drawn_energies,
     farthest_blocks,
     limits_of,
     panels_named,
+    stacked,
     support_force,
+    time_panels_png,
+    unit_for,
 )
-from blocksim.view.layout import OWN, Paper, plain_numbers, write_heading, write_text
-from blocksim.view.measured import MeasuredTable
-from blocksim.view.paint import Paint, by_block
-from blocksim.view.run_data import Floats, Indices, Support, drawable_frames
-from blocksim.view.time_panels import WIDTH, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 LEFT, RIGHT, HEAD, FOOT = 0.80, 1.60, 0.36, 0.62  # inches; the legends stand on the right
 PANEL, GAP = 1.25, 0.14  # inches
@@ -295,3 +306,172 @@ def _legend(drawing: _Drawing, names: Sequence[str], *, is_measured: bool) -> st
     elif shown < all_blocks:
         texts.append(f"{shown} of {all_blocks} blocks.")
     return " ".join(texts) or " "
+
+
+MOST_PANELS = 12
+_LETTERS_PROBES = 24  # of a line beside a panel
+PERCENT = 98.0  # of the samples of a force that are not those of an impact
+MOST_USUAL, CUT = 3.0, 1.5  # times what they hardly exceed: forces beyond are cut, there
+
+
+def draw_probes(
+    probes: Mapping[str, ProbeSeries],
+    path: Path,
+    title: str | None = None,
+    names: Sequence[str] = (),
+    paper: Paper = OWN,
+) -> None:
+    """Draw probes, all or those of these names.
+
+    Raises InvalidInputError for a run without probes, unknown names, too many panels, an unknown picture format or too
+    small a page, and OutputError when the file cannot be written.
+    """
+    unknown = next((name for name in names if name not in probes), None)
+    if unknown is not None:
+        message = f"--probe {unknown}: no such probe in this run, {did_you_mean_or_list(unknown, probes)}"
+        raise InvalidInputError(message)
+    panels = [panel for name in names or probes for panel in panels_of(probes[name])]
+    if not panels:
+        message = "this run has no samples of probes; [[probes]] in the scenario records them"
+        raise InvalidInputError(message)
+    if len(panels) > MOST_PANELS:
+        message = f"{len(panels)} panels are too many for one picture, at most {MOST_PANELS}; choose with --probe"
+        raise InvalidInputError(message)
+    draw_time_panels(panels, path, title, paper=paper)
+
+
+def probe_picture(probe: ProbeSeries) -> bytes:
+    """Return the picture (PNG) of one probe, for a report."""
+    return time_panels_png(panels_of(probe))
+
+
+def panels_of(probe: ProbeSeries) -> list[TimePanel]:
+    """Return the panels of a probe; none of one without samples."""
+    return _PANELS[probe.kind](probe) if len(probe) else []
+
+
+def _panel(probe: ProbeSeries, quantity: str, unit: str, factor: float, columns: Mapping[str, Floats]) -> TimePanel:
+    lines = {name: (probe.time, factor * values) for name, values in columns.items()}
+    several = "" if len(lines) > 1 else f"\n{next(iter(lines))}"
+    return TimePanel(
+        f"{quantity} ({unit})" if unit else quantity, lines, f"probe {probe.name}"[:_LETTERS_PROBES] + several
+    )
+
+
+def _largest(columns: Mapping[str, Floats]) -> float:
+    return max((float(np.nanmax(np.abs(values), initial=0.0)) for values in columns.values()), default=0.0)
+
+
+def _some(probe: ProbeSeries, *names: str) -> dict[str, Floats]:
+    return {name.replace("_", " "): probe[name] for name in names}
+
+
+def _force(probe: ProbeSeries) -> list[TimePanel]:
+    forces = _some(probe, "fx", "fy")
+    largest = _largest(forces)
+    usual = max(float(np.percentile(np.abs(values), PERCENT)) for values in forces.values())  # hardly exceeded
+    is_cut = usual > 0.0 and largest > MOST_USUAL * usual
+    factor, unit = unit_for(usual if is_cut else largest, "N")
+    panel = _panel(probe, "force", unit, factor, forces)
+    if is_cut:
+        low, high = (
+            sign * min(max(float((sign * one).max()) for one in forces.values()), CUT * usual) for sign in (-1, 1)
+        )
+        room = 0.08 * (high - low)
+        note = f"{panel.note}\nlargest: {factor * largest:.3g} {unit}"
+        panel = replace(panel, note=note, limits=(factor * (low - room), factor * (high + room)))
+    panels = [panel]
+    if np.isfinite(probe["mobilised"]).any():
+        panels.append(_panel(probe, "share of friction", "", 1.0, {"mobilised": probe["mobilised"]}))
+    return panels
+
+
+def _point(probe: ProbeSeries) -> list[TimePanel]:
+    moves = not np.array_equal(probe["dx"], probe["relative_dx"]) or not np.array_equal(
+        probe["dy"], probe["relative_dy"]
+    )
+    relative = "relative_" if moves else ""
+    places, velocities = (_some(probe, f"{relative}{one}x", f"{relative}{one}y") for one in "dv")
+    rotation = {"rotation": np.degrees(probe["rotation"])}
+    return [
+        _panel(probe, "displacement", "mm", MILLIMETRES, places),
+        _panel(probe, "velocity", "mm/s", MILLIMETRES, velocities),
+        _panel(probe, "rotation", "°", 1.0, rotation),
+    ]
+
+
+def _joint(probe: ProbeSeries) -> list[TimePanel]:
+    return [_panel(probe, "joint", "mm", MILLIMETRES, _some(probe, "opening_first", "opening_last", "slip"))]
+
+
+def _energy(probe: ProbeSeries) -> list[TimePanel]:
+    energies = drawn_energies(probe.columns, np.arange(len(probe)))
+    factor, unit = unit_for(_largest(energies), "J")
+    return [_panel(probe, "energy", unit, factor, energies)] if energies else []
+
+
+_PANELS: dict[str, Callable[[ProbeSeries], list[TimePanel]]] = {
+    probes.FORCE: _force,
+    POINT: _point,
+    JOINT: _joint,
+    probes.ENERGY: _energy,
+}
+
+
+BETWEEN = 4
+"""Points of velocity and displacement a piece of the motion."""
+ROUND_OFF = 1e-9
+
+
+def draw_support_motion(support: Support, end: float, path: Path, title: str | None = None, paper: Paper = OWN) -> None:
+    """Draw the motion of the supports along its direction from 0 to `end` (s).
+
+    Raises InvalidInputError for supports that rest, an unknown picture format or too small a page, and OutputError when
+    the file cannot be written.
+    """
+    pieces = support.motion
+    if pieces is None:
+        message = "the supports of this scenario do not move: it has no table [motion]"
+        raise InvalidInputError(message)
+    peaks = motion_peaks(pieces, end)
+    ends, acceleration = acceleration_ends(pieces)
+    ends, acceleration = _until(ends, acceleration, end)
+    count = len(pieces.times) - 1
+    times = np.interp(np.linspace(0.0, count, BETWEEN * count + 1), np.arange(count + 1), pieces.times)
+    times = np.append(times[times < end], end)
+    displacement, velocity = displacement_and_velocity(pieces, times)
+    in_g = peaks.acceleration.value / STANDARD_GRAVITY
+    panels = [
+        _panel_motion("acceleration (m/s²)", 1.0, (ends, acceleration), peaks.acceleration, "PGA", f"= {in_g:.4g} g\n"),
+        _panel_motion("velocity (mm/s)", MILLIMETRES, (times, velocity), peaks.velocity, "PGV"),
+        _panel_motion("displacement (mm)", MILLIMETRES, (times, displacement), peaks.displacement, "PGD"),
+    ]
+    final = _left(peaks.final_velocity, peaks.velocity), _left(float(displacement[-1]), peaks.displacement)
+    left = f"At the end: {final[0]:.4g} mm/s, {final[1]:.4g} mm.".replace("-", "−")
+    note = f"Ground, walls and fixed bodies, {support.way}. {left}"
+    draw_time_panels(panels, path, title, note, paper)
+
+
+def _panel_motion(
+    label: str, factor: float, line: tuple[Floats, Floats], peak: Peak, name: str, more: str = ""
+) -> TimePanel:
+    times, values = line
+    near = int(np.argmin(np.abs(times - peak.time) - 1e-9 * np.abs(values)))
+    unit = label.partition("(")[2].rstrip(")")
+    note = f"{name} {factor * peak.value:.4g} {unit}\n{more}at {peak.time:.4g} s"
+    sign = -1.0 if values[near] < 0.0 else 1.0
+    return TimePanel(label, {name: (times, factor * values)}, note, [(peak.time, sign * factor * peak.value)])
+
+
+def _left(value: float, peak: Peak) -> float:
+    """Return a value in mm or mm/s, zero where it is round-off beside the peak."""
+    return MILLIMETRES * value if abs(value) > ROUND_OFF * peak.value else 0.0
+
+
+def _until(times: Floats, values: Floats, end: float) -> tuple[Floats, Floats]:
+    """Cut a line of straight pieces at `end` (s)."""
+    kept = times < end
+    last = int(np.count_nonzero(kept))
+    share = (end - times[last - 1]) / max(times[last] - times[last - 1], 1e-300)
+    value = values[last - 1] + share * (values[last] - values[last - 1])
+    return np.append(times[:last], end), np.append(values[:last], value)

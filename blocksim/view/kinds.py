@@ -11,13 +11,11 @@ from blocksim.scenario.spelling import nearest
 from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
-from blocksim.view.layout import OWN, Paper
-from blocksim.view.profile import draw_profile
-from blocksim.view.strip import draw_strip
+from blocksim.view.strip import draw_profile, draw_strip
+from blocksim.view.style import OWN, Paper
 from blocksim.view.sweeps import lines, outcome_map
 from blocksim.view.sweeps.data import SweepData
-from blocksim.view.sweeps.histogram import drawn_histogram
-from blocksim.view.sweeps.matrix import drawn_matrix
+from blocksim.view.sweeps.scatter import drawn_histogram, drawn_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -5,8 +5,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Annotated
 
 from blocksim.options import Option
-from blocksim.view.layout import MILLIMETRES_PER_INCH, Paper
-from blocksim.view.style import DOTS_PER_INCH
+from blocksim.view.style import DOTS_PER_INCH, MILLIMETRES_PER_INCH, Paper
 
 SIZE = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*[x×]\s*([0-9]+(?:\.[0-9]*)?)\s*(mm|cm|in|px)?")
 INCHES = {"mm": 1.0 / MILLIMETRES_PER_INCH, "cm": 10.0 / MILLIMETRES_PER_INCH, "in": 1.0}

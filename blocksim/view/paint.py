@@ -12,8 +12,8 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.view import style
-from blocksim.view.layout import write_legend
 from blocksim.view.run_data import Floats, FramesLike, Support, drawable_frames, others_of
+from blocksim.view.style import write_legend
 from blocksim.world.systems.system import Shade
 
 if TYPE_CHECKING:

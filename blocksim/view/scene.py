@@ -1,20 +1,296 @@
-"""One moment of a run as a drawing: support, numbered blocks, measured positions. Millimetres."""
+"""One moment of a run as a drawing: canvas and axis, ground and walls, blocks with their names. Millimetres."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blocksim.scenario import PlacedSegment
+from blocksim.scenario.placement import TOLERANCE
 from blocksim.view import style
-from blocksim.view.ground import draw_shift, draw_start, draw_support
 from blocksim.view.paint import Paint
-from blocksim.view.panel import Canvas
-from blocksim.view.run_data import Floats, FramesLike, Support, corners_of, others_of, outlines_of, shortest_sides
-from blocksim.view.window import MILLIMETRES
+from blocksim.view.run_data import (
+    MILLIMETRES,
+    Extent,
+    Floats,
+    FramesLike,
+    Support,
+    corners_of,
+    others_of,
+    outlines_of,
+    parts_within,
+    shortest_sides,
+    turned,
+)
 from blocksim.world.systems.blocks import are_removed, placed_points
 from blocksim.world.systems.system import Track
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.transforms import Transform
+
+
+GROUND_THICKNESS = 5.0  # points, below the lowest ground
+RULER_EDGE = 10.0  # points; no number is nearer to the edge of a panel
+TICK_SPACING = 36.0  # points along the ruler
+TICK_LENGTH = 2.5  # points
+RULER_HEIGHT = 14.0  # points, with the numbers
+TICK_ROOM = 0.4  # inches along the axis for one number
+ROW_HEIGHT = 9.0  # points, of one row of measured ranges
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """Canvas of one moment: axes in the picture's millimetres, all on one scale."""
+
+    axes: "Axes"
+    extent: Extent
+    points_per_mm: float
+
+    @cached_property
+    def scene(self) -> "Transform":
+        """From the scene's millimetres to the paper."""
+        from matplotlib.transforms import Affine2D
+
+        return Affine2D().rotate(self.extent.tilt) + self.axes.transData
+
+    @property
+    def floor(self) -> float:
+        """Where the drawn ground ends (mm, scene)."""
+        return self.extent.base - GROUND_THICKNESS / self.points_per_mm
+
+    def box(self) -> tuple[Floats, Floats]:
+        """Return lower left and upper right (mm, scene) of all that can be seen, and a little more."""
+        sides, ends = (self.extent.left, self.extent.right), (self.extent.lowest, self.extent.top)
+        corners = turned(np.array([[x, y] for x in sides for y in ends]), -self.extent.tilt)
+        more = 0.1 * (self.extent.width + self.extent.height)
+        low, high = corners.min(axis=0) - more, corners.max(axis=0) + more
+        return np.array([low[0], self.floor]), high
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page with one panel as wide as the page allows, in inches; `points_per_mm` is the panel's scale."""
+
+    width: float
+    height: float
+    panel_height: float
+    side: float
+    foot: float
+    points_per_mm: float
+    extent: Extent
+
+    @property
+    def panel_width(self) -> float:
+        """Width of the panel."""
+        return self.width - 2.0 * self.side
+
+    @property
+    def place(self) -> tuple[float, float, float, float]:
+        """Return left, bottom, width, height of the panel as parts of the page."""
+        across, up = self.width, self.height
+        return self.side / across, self.foot / up, self.panel_width / across, self.panel_height / up
+
+
+def page_for(extent: Extent, width: float, tallest: float, margins: tuple[float, float, float]) -> Page:
+    """Return a page of this width for an extent, which is widened where the panel would be higher than `tallest`.
+
+    `margins` are those at the sides, above and below the panel. All in inches.
+    """
+    side, head, foot = margins
+    across = width - 2.0 * side
+    missing = max(extent.height * across / tallest - extent.width, 0.0)
+    extent = replace(extent, left=extent.left - 0.5 * missing, right=extent.right + 0.5 * missing)
+    scale = across / extent.width  # inches per mm
+    below = max((extent.lowest - extent.bottom) * scale, room_below(extent, 0) / style.POINTS_PER_INCH)
+    panel_height = (extent.top - extent.lowest) * scale + below
+    height = head + panel_height + foot
+    return Page(width, height, panel_height, side, foot, scale * style.POINTS_PER_INCH, extent)
+
+
+def depth_of(rows: int) -> float:
+    """Return how far rows of measured ranges reach below the lowest ground (points)."""
+    return GROUND_THICKNESS + (rows + 0.4) * ROW_HEIGHT
+
+
+def room_below(extent: Extent, rows: int) -> float:
+    """Return how far the picture continues below the lowest ground (points)."""
+    depth = depth_of(rows)
+    return (depth + RULER_HEIGHT) / float(np.cos(extent.tilt)) if extent.tilt else depth
+
+
+def finish_panel(canvas: Canvas, size: tuple[float, float], *, labelled: bool) -> None:
+    """Fix the scale of a panel of this size (inches) and leave only its x axis; tilted ground has its own ruler."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes, extent = canvas.axes, canvas.extent
+    axes.set_xlim(extent.left, extent.right)
+    axes.set_ylim(extent.top - size[1] * style.POINTS_PER_INCH / canvas.points_per_mm, extent.top)
+    axes.spines[["left", "right", "top"]].set_visible(False)
+    axes.yaxis.set_visible(False)
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=max(2, int(size[0] / TICK_ROOM)), steps=[1, 2, 5, 10]))
+    axes.tick_params(axis="x", length=2.5, pad=1.5)
+    axes.xaxis.set_visible(not extent.tilt)
+    axes.spines["bottom"].set_visible(not extent.tilt)
+    if labelled:
+        axes.set_xlabel("x (mm)", labelpad=1.0)
+
+
+def draw_ruler(canvas: Canvas, depth: float) -> None:
+    """Draw numbers of x (mm) along tilted ground, `depth` (points) below its lowest part."""
+    from matplotlib.ticker import MaxNLocator
+
+    y = canvas.extent.base - depth / canvas.points_per_mm
+    low, high = canvas.extent.span(y)
+    edge = RULER_EDGE / canvas.points_per_mm
+    room = (high - low) * canvas.points_per_mm
+    locator = MaxNLocator(nbins=max(2, int(room / TICK_SPACING)), steps=[1, 2, 5, 10])
+    tick = TICK_LENGTH / canvas.points_per_mm
+    canvas.axes.plot([low, high], [y, y], color=style.FAINT_INK, linewidth=style.LINE_WIDTH, transform=canvas.scene)
+    ticks = [float(x) for x in locator.tick_values(low, high) if low + edge <= x <= high - edge]
+    for x in ticks:
+        colour, width = style.FAINT_INK, style.LINE_WIDTH
+        canvas.axes.plot([x, x], [y - tick, y], color=colour, linewidth=width, transform=canvas.scene)
+        _write_number(canvas, x, y - 1.6 * tick, " mm" if x == ticks[-1] else "")
+
+
+def _write_number(canvas: Canvas, x: float, y: float, unit: str) -> None:
+    """Write a number, with its unit if any, below (x, y), along the ground."""
+    canvas.axes.text(
+        x,
+        y,
+        f"{x:g}{unit}".replace("-", "−"),
+        rotation=float(np.degrees(canvas.extent.tilt)),
+        rotation_mode="anchor",
+        ha="center",
+        va="top",
+        transform=canvas.scene,
+    )
+
+
+WALL_THICKNESS = 4.0  # points; less than the ground, which covers the feet of walls
+WALLS, GROUND, START, SHIFT = 0.5, 0.6, 0.7, 3.0  # order of drawing; blocks are at 1, lines at 2
+START_LINE: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": style.LINE_WIDTH, "linestyles": [(0, (3, 2))]}
+LEAST_SHIFT = 0.7  # points; what moved less is at the start's place to the eye
+ARROW_LENGTH = 3.0  # points; a displacement along the ground gets an arrow from here on
+MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a mitre would be a needle
+
+
+def draw_support(canvas: Canvas, support: Support, offset: Floats) -> None:
+    """Draw ground and walls, displaced by `offset` (mm) along x and y."""
+    from matplotlib.collections import LineCollection
+
+    low, high = canvas.box()
+    deep = [ground_line(support, canvas)[[-1, 0]] * [1.0, 0.0] + [0.0, low[1] - canvas.extent.height]]
+    solid = np.concatenate([ground_line(support, canvas) + offset, *deep])
+    for outline in wall_outlines(support.walls, WALL_THICKNESS / canvas.points_per_mm):
+        _fill(canvas, outline + offset, zorder=WALLS)
+    _fill(canvas, solid, zorder=GROUND)
+    lines = [parts_within(line + offset, low, high) for line in _faces(support, canvas)]
+    canvas.axes.add_collection(
+        LineCollection(
+            list(np.concatenate(lines)), colors=style.INK, linewidths=style.LINE_WIDTH, transform=canvas.scene
+        )
+    )
+
+
+def draw_start(canvas: Canvas, support: Support, offset: Floats, outlines: Floats) -> None:
+    """Draw dashed where ground, walls and fixed bodies (outlines in mm, (f, 4, 2)) were before they moved.
+
+    Pieces that have moved along themselves, such as level ground on a shaking table, look the same and are left out.
+    """
+    from matplotlib.collections import LineCollection
+
+    least = LEAST_SHIFT / canvas.points_per_mm
+    if float(np.hypot(*offset)) < least:
+        return
+    low, high = canvas.box()
+    parts = np.concatenate([parts_within(line, low, high) for line in _faces(support, canvas)])
+    ways = parts[:, 1] - parts[:, 0]
+    apart = np.abs(ways[:, 0] * offset[1] - ways[:, 1] * offset[0]) > least * np.hypot(*ways.T)
+    closed = [np.concatenate([outline, outline[:1]]) - offset for outline in outlines]
+    lines = LineCollection([*parts[apart], *closed], **START_LINE, zorder=START, transform=canvas.scene)
+    canvas.axes.add_collection(lines)
+
+
+def draw_shift(canvas: Canvas, support: Support, offset: Floats, x: float) -> None:
+    """Draw an arrow within the ground from x (mm) to the x at which this place of the ground is now."""
+    if abs(float(offset[0])) * canvas.points_per_mm < ARROW_LENGTH:
+        return
+    surface = MILLIMETRES * float(support.height(np.array([x / MILLIMETRES]))[0]) + offset[1]
+    y = surface - 0.5 * GROUND_THICKNESS / canvas.points_per_mm
+    canvas.axes.annotate(
+        "",
+        xy=(x + offset[0], y),
+        xytext=(x, y),
+        xycoords=canvas.scene,
+        textcoords=canvas.scene,
+        arrowprops={"arrowstyle": "->", "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 5.0, "color": style.INK},
+        zorder=SHIFT,
+    )
+
+
+def ground_line(support: Support, canvas: Canvas) -> Floats:
+    """Return the ground at rest (mm), with level ends beyond all that can be seen, (k, 2)."""
+    low, high = canvas.box()
+    line = MILLIMETRES * support.line(0.0)
+    shown = np.abs(np.concatenate([low, high, line[0], line[-1]])).max() + canvas.extent.width
+    line[0, 0] -= 2.0 * shown
+    line[-1, 0] += 2.0 * shown
+    return line
+
+
+def wall_outlines(walls: tuple[PlacedSegment, ...], thickness: float) -> list[Floats]:
+    """Return the outline (mm, (4, 2)) of each wall, `thickness` (mm) on the right of its face, mitred at joints."""
+    faces = MILLIMETRES * np.array([[[wall.x0, wall.y0], [wall.x1, wall.y1]] for wall in walls]).reshape(-1, 2, 2)
+    ways = np.diff(faces, axis=1)[:, 0]
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    outlines = []
+    for wall, face, way in zip(walls, faces, ways, strict=True):
+        before = [other for other, (_, end) in zip(ways, faces, strict=True) if _is_one(end, face[0])]
+        after = [other for other, (start, _) in zip(ways, faces, strict=True) if _is_one(start, face[1])]
+        first = face[0] + thickness * _depth(way, before, -way * wall.extends_start)
+        last = face[1] + thickness * _depth(way, after, way * wall.extends_end)
+        outlines.append(np.stack([face[0], face[1], last, first]))
+    return outlines
+
+
+def _depth(way: Floats, others: list[Floats], beyond: Floats) -> Floats:
+    """Return the way to a wall's back at one end, for a thickness of 1: the mitre, or square and `beyond` the end."""
+    right = _right(way)
+    if others and float(right @ _right(others[0])) > MOST_ALIGNED:
+        other = _right(others[0])
+        return np.asarray((right + other) / (1.0 + right @ other))
+    return right + beyond
+
+
+def _is_one(point: Floats, other: Floats) -> bool:
+    return bool(np.hypot(*(point - other)) <= MILLIMETRES * TOLERANCE)
+
+
+def _right(way: Floats) -> Floats:
+    return np.array([way[1], -way[0]])
+
+
+def _faces(support: Support, canvas: Canvas) -> list[Floats]:
+    """Return the lines (mm) of ground and walls at rest, (k, 2) each."""
+    walls = [MILLIMETRES * np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) for wall in support.walls]
+    return [ground_line(support, canvas), *walls]
+
+
+def _fill(canvas: Canvas, outline: Floats, zorder: float) -> None:
+    """Fill the part of an outline (mm, scene) that can be seen."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+    from matplotlib.transforms import Bbox
+
+    seen = Path(np.concatenate([outline, outline[:1]]), closed=True).clip_to_bbox(Bbox(np.stack(canvas.box())))
+    patch = PathPatch(seen, facecolor=style.GROUND_COLOUR, linewidth=0.0, zorder=zorder, transform=canvas.scene)
+    canvas.axes.add_artist(patch)
+
 
 Flags = NDArray[np.bool_]
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height

@@ -1,11 +1,21 @@
-"""What a scenario places where, and the records of all bodies at time zero.
+"""The corners of all bodies of a scene, each shape once, where any block is a polygon and no rectangle.
+
+Contact of a corner with a face lasts as long as no other face is nearer. At the distance e from the end of a face and
+so deep behind it, all others of a convex body are at least `clear` e minus the depth away: along the face the least
+distance to the others is a concave function, zero at both ends, and `clear` is its value in the middle over half of the
+length. Near an end only the face beside it can be nearer, as those beyond are `far` from all of the face.
+
+Boundary particles of all bodies for the contact models `particles` and `kernel`.
+
+What a scenario places where, and the records of all bodies at time zero.
 
 Blocks come first, then pieces of ground and walls, the half-plane last. The prescribed motion of the supports is a
 cubic polynomial of displacement for every stretch of time.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -15,22 +25,239 @@ from numpy.typing import NDArray
 from blocksim.kernels.common.arrays import (
     ALL,
     BODY,
+    CORNER,
     DRIVEN,
     MOTION_PIECE,
     MOVED,
     OUTLINE,
+    PARTICLE,
+    SLOTS,
     SUPPORT,
     Record,
     Records,
     zeros,
 )
+from blocksim.kernels.explicit.models.particles import PER_PARTICLE
+from blocksim.kernels.explicit.outlines import WIDEST_CONE
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
 from blocksim.scenario.motion import motion_pieces
 from blocksim.scenario.placement import length_beside, smallest_width
-from blocksim.world.applied import Applied, applied_loads
-from blocksim.world.drives import DriveRecords, drive_records, piece_records
+from blocksim.world.forcing import DriveRecords, LoadArrays, drive_records, load_arrays, piece_records
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
-from blocksim.world.shapes import HalfSides, Shapes, shapes_of
+
+NO_FACE = (0.0, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # nothing is beyond it, or looks against it
+FIELDS = ("x", "y", "nx", "ny", "distance", "half", "middle", "clear", "far", "sharp", "cone")
+Corners = tuple[tuple[float, float], ...]  # m, counter-clockwise about the centroid
+HalfSides = tuple[float, float]  # m
+
+
+class Shapes(NamedTuple):
+    """The shapes of a scene, and where each of its bodies has its corners."""
+
+    table: Records  # (q,) CORNER
+    firsts: tuple[int, ...]  # (n + 1,) of blocks, pieces of ground and the half-plane
+    sizes: tuple[int, ...]  # (n + 1,) numbers of corners
+    inner: Mapping[Corners, float]  # m: from the centroid of a block to the nearest face
+
+
+def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[HalfSides]) -> Shapes | None:
+    """Return the corners of all bodies, of rectangles too; None where all blocks are rectangles.
+
+    `slabs` (m) are the half sides of the pieces of ground. The half-plane, the last of all bodies, is a rectangle that
+    is infinitely wide and has its upper face in its centre. After the corners of a block come as many others as a block
+    may have here, so that four blocks are gone through together.
+    """
+    if not any(body.outline for body in placed):
+        return None
+    places: dict[Corners, int] = {}
+    rows: list[tuple[float, ...]] = []
+    blocks = [body.corners for body in placed]
+    most = max(len(corners) for corners in blocks)
+    ground = [_rectangle(*half_sides) for half_sides in (*slabs, (math.inf, 0.0))]
+    for corners in blocks:
+        if corners not in places:
+            places[corners] = len(rows)
+            rows += [*corner_rows(corners), *[NO_FACE] * (most - len(corners))]
+    firsts = [places[corners] for corners in blocks]
+    for corners in ground:
+        firsts.append(len(rows))
+        rows += _ground_rows(corners)
+    table = zeros(len(rows), CORNER)
+    for name, column in zip(FIELDS, zip(*rows, strict=True), strict=True):
+        table[name] = column
+    sizes = tuple(len(corners) for corners in (*blocks, *ground))
+    inner = {corners: float(table["distance"][place : place + len(corners)].min()) for corners, place in places.items()}
+    return Shapes(table, tuple(firsts), sizes, inner)
+
+
+def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
+    """Return the fields of CORNER, in the order of FIELDS, of the corners of one shape."""
+    rows: list[tuple[float, ...]] = []
+    cone = cone_of(corners)
+    for (x, y), (next_x, next_y) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        length = math.hypot(next_x - x, next_y - y)
+        nx, ny = (next_y - y) / length, (x - next_x) / length
+        half = 0.5 * length
+        rows.append((x, y, nx, ny, nx * x + ny * y, half, half - (ny * x - nx * y), cone))
+    return [
+        (
+            *row[:-1],
+            _clearance(number, rows),
+            _distance_of_others(number, rows),
+            _is_sharp(row, rows[number - 1], rows[(number + 1) % len(rows)]),
+            cone,
+        )
+        for number, row in enumerate(rows)
+    ]
+
+
+def _is_sharp(face: Sequence[float], *beside: Sequence[float]) -> bool:
+    """Return True if a face beside one meets it at less than a right angle."""
+    return any(face[2] * other[2] + face[3] * other[3] < 0.0 for other in beside)
+
+
+def _clearance(number: int, rows: Sequence[tuple[float, ...]]) -> float:
+    """Return how far all other faces are from the middle of one, over half of its length."""
+    x, y, nx, ny, _, half, *_ = rows[number]
+    x, y = x - half * ny, y + half * nx
+    return min(row[4] - row[2] * x - row[3] * y for k, row in enumerate(rows) if k != number) / half
+
+
+def _distance_of_others(number: int, rows: Sequence[tuple[float, ...]]) -> float:
+    """Return the distance (m) of a face from all others but those beside it: the lesser one of its two ends."""
+    before, after = (number - 1) % len(rows), (number + 1) % len(rows)
+    others = [row for k, row in enumerate(rows) if k not in {before, number, after}]
+    ends = [rows[number][:2], rows[after][:2]]
+    return min((row[4] - row[2] * x - row[3] * y for row in others for x, y in ends), default=math.inf)
+
+
+def _rectangle(half_x: float, half_y: float) -> Corners:
+    """Return the corners of a rectangle from the lower left one."""
+    return ((-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y))
+
+
+def _ground_rows(corners: Corners) -> list[tuple[float, ...]]:
+    """Return the fields of CORNER of a piece of ground or the half-plane, of which no face is beside another."""
+    half_x, half_y = corners[2]
+    faces = ((0.0, -1.0, half_y, half_x), (1.0, 0.0, half_x, half_y), (0.0, 1.0, half_y, half_x))
+    sides = (*faces, (-1.0, 0.0, half_x, half_y))
+    return [(*corner, *side, 0.0, 1.0, 0.0, 0.0, WIDEST_CONE) for corner, side in zip(corners, sides, strict=True)]
+
+
+def cone_of(corners: Corners) -> float:
+    """Return the sine of the angle up to which a face of a shape is parallel to one of another body.
+
+    At most half of the least angle by which the outline turns at a corner: a body that rolls over it from one face to
+    the next is on neither of them half way. And at most half of the sharpest corner: beyond that the sides of one
+    corner would be parallel.
+    """
+    edges = [math.atan2(y - last_y, x - last_x) for (last_x, last_y), (x, y) in pairwise((*corners, corners[0]))]
+    turns = [(after - before) % (2.0 * math.pi) for before, after in zip((edges[-1], *edges), edges, strict=False)]
+    return min(WIDEST_CONE, math.sin(0.5 * min(turns)), math.sin(0.5 * (math.pi - max(turns))))
+
+
+CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+NORMALS = ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))
+
+
+def place_particles(bodies: Records, model: str, spacing: float) -> Records | None:
+    """Give every body its boundary particles: fills its row and range fields and returns the particles of all.
+
+    `spacing` (m) is the largest distance of neighbours; bodies of equal sides share their particles. The surface model
+    has none: None.
+    """
+    if model == "surface":
+        return None
+    rows = kernel_rows if model == "kernel" else disc_rows
+    known: dict[tuple[float, ...], tuple[int, Records]] = {}
+    total = 0
+    for body in bodies[:-1]:
+        inset = 0.0 if model == "kernel" else 0.5 * spacing
+        body.row_x = division(2.0 * (body.half_x - inset), spacing) if body.faces == ALL else 1
+        body.row_y = division(2.0 * (body.half_y - inset), spacing) if body.faces == ALL else 1
+        key = (body.half_x, body.half_y, body.faces, body.corners)
+        if key not in known:
+            known[key] = (total, rows(body, inset) if body.faces == ALL else free_ends(body, model))
+            total += known[key][1].size
+        body.first_particle, body.particle_count = known[key][0], known[key][1].size
+    particles = zeros(total, PARTICLE)
+    for first, part in known.values():
+        particles[first : first + part.size] = part
+    return particles
+
+
+def kernel_rows(body: Record, inset: float) -> Records:
+    """Return four rows on the true edge, counter-clockwise from the lower left corner, both ends of each included.
+
+    Tributary lengths are half an interval at the ends, so that those of a face sum to its length.
+    """
+    parts = []
+    for start, normal, count in _rows(body):
+        row = zeros(count + 1, PARTICLE)
+        _line(row, body, inset, start, np.arange(count + 1) / count)
+        row.nx, row.ny = row.mx, row.my = normal
+        row[0].mx, row[0].my = NORMALS[start - 1]
+        row[-1].mx, row[-1].my = NORMALS[(start + 1) % 4]
+        row["share"] = 1.0 / count
+        row["share"][[0, -1]] = 0.5 / count
+        row["length"] = row["share"] * 2.0 * (body.half_x if normal[0] == 0.0 else body.half_y)
+        parts.append(row)
+    return np.concatenate(parts).view(np.recarray)
+
+
+def disc_rows(body: Record, inset: float) -> Records:
+    """Return the centres of discs, inset from the edge, counter-clockwise from the lower left one, corners once.
+
+    A corner stands for half an interval of each of its two faces.
+    """
+    parts = []
+    counts = [count for _, _, count in _rows(body)]
+    sides = [2.0 * (side - inset) for side in (body.half_x, body.half_y)] * 2
+    for k, (start, normal, count) in enumerate(_rows(body)):
+        row = zeros(count, PARTICLE)
+        _line(row, body, inset, start, np.arange(count) / count)
+        row.nx, row.ny = row.mx, row.my = normal
+        row["share"] = 1.0 / count
+        row["share"][0] = 0.5 / count + 0.5 / counts[k - 1]
+        row["length"] = sides[k] / count
+        row["length"][0] = 0.5 * (sides[k] / count + sides[k - 1] / counts[k - 1])
+        parts.append(row)
+    return np.concatenate(parts).view(np.recarray)
+
+
+def free_ends(body: Record, model: str) -> Records:
+    """Return the particles of a piece of ground: its free ends, which blocks can land on; discs see its line only."""
+    ends = [k for k in (2, 3) if body.corners >> k & 1] if model == "kernel" else []
+    row = zeros(len(ends), PARTICLE)
+    for particle, k in zip(row, ends, strict=True):
+        particle.x, particle.y = CORNERS[k][0] * body.half_x, body.half_y
+        particle.ny = particle.my = 1.0
+        particle.share = 0.5
+    return row
+
+
+def slots_of_a_pair(bodies: Records, model: str) -> int:
+    """Return how many contact slots the pair of the two largest bodies needs."""
+    most = int(bodies["particle_count"].max())
+    return {"surface": SLOTS, "kernel": 2 * most, "particles": PER_PARTICLE * most}[model]
+
+
+def division(side: float, spacing: float) -> int:
+    """Return the number of equal intervals, none longer than `spacing`, that a side (both m) is divided into."""
+    # a quotient that round-off lifted just over an integer must not add a particle
+    return max(1, math.ceil(side / spacing * (1.0 - 1e-12)))
+
+
+def _rows(body: Record) -> list[tuple[int, tuple[float, float], int]]:
+    """Return start corner, normal and number of intervals of every row."""
+    return [(k, NORMALS[k], int(body.row_x if k % 2 == 0 else body.row_y)) for k in range(4)]
+
+
+def _line(row: Records, body: Record, inset: float, start: int, share: NDArray[np.float64]) -> None:
+    begin, end = np.array(CORNERS[start]), np.array(CORNERS[(start + 1) % 4])
+    places = (begin + (end - begin) * share[:, None]) * (body.half_x - inset, body.half_y - inset)
+    row["x"], row["y"] = places[:, 0], places[:, 1]
+
 
 # A piece of ground is a slab of which only the upper face counts; its thickness is a share of the smallest side of all
 # blocks: more than any overlap, less than a ledge that is worth modelling.
@@ -50,7 +277,7 @@ class Outline(NamedTuple):
     interactions: Interactions
     motion: Records  # (m,) MOTION_PIECE, of driven bodies and then of the support
     drives: DriveRecords
-    applied: Applied
+    applied: LoadArrays
     shapes: Shapes | None
 
     @property
@@ -77,7 +304,7 @@ def outline_of(scenario: Scenario) -> Outline:
         both = zeros(drives.paths.size + motion.size, MOTION_PIECE)
         both[: drives.paths.size], both[drives.paths.size :] = drives.paths, motion
         motion = both
-    applied = applied_loads(scenario, placed)
+    applied = load_arrays(scenario, placed)
     segments = place_segments(scenario)
     shapes = shapes_of(placed, _slab_half_sides(scenario, placed, segments))
     return Outline(scenario, placed, segments, classes, interactions, motion, drives, applied, shapes)
@@ -107,7 +334,7 @@ def body_records(outlines: Outlines) -> Records:
     return bodies
 
 
-def with_freed(bodies: Records, outlines: Outlines) -> Records:
+def free_masses(bodies: Records, outlines: Outlines) -> Records:
     """Return the same records with the masses of bodies that events free, by which steps are chosen."""
     places = [(m, i) for m, one in enumerate(outlines) for i, body in enumerate(one.placed) if body.freed]
     if not places:

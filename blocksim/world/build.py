@@ -1,11 +1,24 @@
-"""Build the flat arrays of a scene from a scenario."""
+"""From a scenario to the arrays of its scene at time zero.
+
+Blocks are placed, step and skin chosen, bodies divided for the broad phase, the size checked, the arrays assembled.
+`build_stacks` does that for many scenarios at once, field by field over all members, as most of what building costs
+does not depend on their number. So all arrays have the members along their first axis, and `build_one` takes the only
+member of a stack.
+
+Build the flat arrays of a scene from a scenario.
+
+Build scenes of the explicit scheme that have further systems beside blocks and supports.
+"""
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from blocksim.errors import BlocksimError
 from blocksim.kernels.common.arrays import (
     ACTION,
     CLOCK,
@@ -13,30 +26,284 @@ from blocksim.kernels.common.arrays import (
     CONTACTS,
     CONTROLS,
     GROUP,
+    HALF,
     LEDGER,
     OPERATOR,
     PAIR,
     PARTICLE_CONTACT,
     POINT,
     SHARE,
+    SLOTS,
     TEAM_WORDS,
     Records,
     World,
     zeros,
 )
+from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
 from blocksim.kernels.explicit.broad_phase import TRAVELLED
 from blocksim.kernels.explicit.laws import LAW_CODES
 from blocksim.kernels.explicit.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
-from blocksim.scenario import Scenario
+from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import motion_direction
-from blocksim.world.applied import stacked
-from blocksim.world.bodies import Outline, all_moved_records
-from blocksim.world.bounds import Bounds
+from blocksim.world.bodies import (
+    Outline,
+    Outlines,
+    all_moved_records,
+    body_records,
+    free_masses,
+    outline_of,
+    place_particles,
+    slots_of_a_pair,
+)
+from blocksim.world.forcing import stack_loads
 from blocksim.world.interactions import interaction_tables
 from blocksim.world.memory import Size, refuse_if_too_large, scene_size
-from blocksim.world.scenes import Construction, Parts, Stride, build_one, joined
-from blocksim.world.step import MOST_STEPS, choose_approach, choose_skin, choose_step
+from blocksim.world.step import MOST_STEPS, Bounds, bounds_of, choose_approach, choose_skin, choose_step
+from blocksim.world.systems import acts_of
+from blocksim.world.systems.system import Present
+
+MOST_BYTES = 1 << 26  # of a stack of more than one scene
+MOST_LARGE = 64  # bodies that are checked one by one, outside the grid of the broad phase
+LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
+SURFACE = "surface"  # the model without particles
+Floats = NDArray[np.float64]
+
+
+class Stride(NamedTuple):
+    """Values chosen for one scene."""
+
+    step: float  # s
+    skin: float  # m
+    approach: float = 0.0  # m, up to which bodies are always listed
+
+
+class Parts(NamedTuple):
+    """What m scenes of one shape consist of, whatever the scheme."""
+
+    outlines: Outlines
+    bodies: Records  # (m, n + 1) BODY
+    cell_radius: Floats  # (m,) m
+    particles: Records | None  # (m, q) PARTICLE
+    slots: int  # of a pair
+
+    @property
+    def is_large(self) -> NDArray[np.bool_]:
+        """Which bodies (m, n) stay out of the grid; equally many in each scene."""
+        is_large: NDArray[np.bool_] = self.bodies["radius"][:, :-1] > self.cell_radius[:, np.newaxis]
+        return is_large
+
+    def chosen(self, numbers: Sequence[int]) -> "Parts":
+        """Return the parts of some of the scenes."""
+        if len(numbers) == len(self.outlines):
+            return self
+        return Parts(
+            [self.outlines[k] for k in numbers],
+            take_members(self.bodies, numbers),
+            self.cell_radius[list(numbers)],
+            None if self.particles is None else take_members(self.particles, numbers),
+            self.slots,
+        )
+
+
+@dataclass(frozen=True)
+class Construction:
+    """Parts of building scenes that depend on the scheme."""
+
+    choose: Callable[[Outline, Bounds], Stride]  # raises BlocksimError
+    model: Callable[[Outline], str]  # of contacts, as the scheme's arrays have it
+    size: Callable[[Parts], Size]  # of one of these scenes
+    assemble: Callable[[Parts, Sequence[Stride]], Any]
+
+
+class Built(NamedTuple):
+    """One scene at time zero, and its blocks as they were placed."""
+
+    placed: tuple[PlacedBody, ...]
+    scene: Any  # of the scheme's type
+
+
+class Stack(NamedTuple):
+    """Scenes that were built together."""
+
+    numbers: list[int]  # which of the scenarios they are of
+    placed: list[tuple[PlacedBody, ...]]
+    scenes: Any  # of the scheme's type
+
+    def numbered(self, numbers: Sequence[int]) -> "Stack":
+        """Return the same for scenarios with other numbers."""
+        return self._replace(numbers=[numbers[i] for i in self.numbers])
+
+
+class Refusal(NamedTuple):
+    """A scenario that cannot be built."""
+
+    number: int
+    error: BlocksimError
+
+    def numbered(self, numbers: Sequence[int]) -> "Refusal":
+        """Return the same for scenarios with other numbers."""
+        return self._replace(number=numbers[self.number])
+
+
+def build_one(scenario: Scenario, construction: Construction) -> Built:
+    """Build the scene of one scenario. Raises what refuses its step, its skin or its size."""
+    stack = only_stack(build_stacks([scenario], construction))
+    return Built(stack.placed[0], member(stack.scenes, 0))
+
+
+def build_stacks(scenarios: Sequence[Scenario], construction: Construction) -> Iterator[Stack | Refusal]:
+    """Build scenarios of one scheme; those of one shape come in as few stacks as memory allows.
+
+    A scenario whose step, skin or size is refused does not stop the others.
+    """
+    outlines = [outline_of(scenario) for scenario in scenarios]
+    for numbers in group_equal([outline.shape for outline in outlines]):
+        yield from _group(numbers, [outlines[i] for i in numbers], construction)
+
+
+def _group(numbers: Sequence[int], outlines: Outlines, construction: Construction) -> Iterator[Stack | Refusal]:
+    """Build scenes of one outline."""
+    good, strides, refusals = list[int](), list[Stride](), list[Refusal]()
+    with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
+        bodies = body_records(outlines)
+        all_bounds = bounds_of(free_masses(bodies, outlines), len(outlines[0].placed), [one.shapes for one in outlines])
+        for k, (outline, bounds) in enumerate(zip(outlines, all_bounds, strict=True)):
+            try:
+                strides.append(construction.choose(outline, bounds))
+                good.append(k)
+            except BlocksimError as error:
+                refusals.append(Refusal(numbers[k], error))
+    yield from refusals
+    if good:
+        model = construction.model(outlines[0])
+        for same, parts in _divided([outlines[k] for k in good], take_members(bodies, good), model):
+            yield from _stacks([numbers[good[k]] for k in same], parts, [strides[k] for k in same], construction)
+
+
+def _stacks(
+    numbers: list[int], parts: Parts, strides: list[Stride], construction: Construction
+) -> Iterator[Stack | Refusal]:
+    """Build scenes of one shape, as many at a time as have room."""
+    size = construction.size(parts)
+    count = max(1, MOST_BYTES // size.bytes)
+    for first in range(0, len(numbers), count):
+        places = range(first, min(first + count, len(numbers)))
+        names = [numbers[k] for k in places]
+        try:
+            refuse_if_too_large(size)
+        except BlocksimError as error:
+            yield from (Refusal(number, error) for number in names)
+        else:
+            chosen = parts.chosen(places)
+            placed = [outline.placed for outline in chosen.outlines]
+            yield Stack(names, placed, construction.assemble(chosen, [strides[k] for k in places]))
+
+
+def _divided(outlines: Outlines, bodies: Records, model: str) -> Iterator[tuple[list[int], Parts]]:
+    """Yield the parts of scenes of one outline, all those of one shape together, and which they are.
+
+    What decides the shape by now: how many bodies are large, how many move with the support, how many particles there
+    are, and how many slots a pair has: of corners those of its two bodies, at most.
+    """
+    particles: list[Records | None] = [None] * len(outlines)
+    if model == SURFACE:
+        sizes = [None if one.shapes is None else one.shapes.sizes for one in outlines]
+        slots = [SLOTS if one is None else 2 * max(HALF, *one) for one in sizes]
+    else:
+        spacings = [outline.scenario.contact.particle_spacing for outline in outlines]
+        particles = [place_particles(one, model, spacing) for one, spacing in zip(bodies, spacings, strict=True)]
+        slots = [slots_of_a_pair(one, model) for one in bodies]
+    parts = Parts(outlines, bodies, cell_radius(bodies), None, SLOTS)
+    counts = zip(
+        np.count_nonzero(parts.is_large, axis=1),
+        np.count_nonzero(bodies["is_moved"], axis=1),
+        slots,
+        (None if one is None else one.size for one in particles),
+        strict=True,
+    )
+    for same in group_equal(list(counts)):
+        one = parts.chosen(same)._replace(slots=slots[same[0]])
+        some_particles = [found for k in same if (found := particles[k]) is not None]
+        yield same, one._replace(particles=join_records(some_particles)) if some_particles else one
+
+
+def cell_radius(bodies: Records) -> Floats:
+    """Return the half diagonal (m) of the largest of the bodies (..., n + 1) in the grid.
+
+    In it are all but a few pieces of ground and planks.
+    """
+    radii = np.sort(bodies["radius"][..., :-1], axis=-1)
+    if radii.shape[-1] == 0:  # nothing but the half-plane: the grid holds nothing
+        return np.ones(radii.shape[:-1])
+    few = min(MOST_LARGE, radii.shape[-1] // 8)
+    count = np.count_nonzero(radii <= LARGE_RATIO * radii[..., :1], axis=-1)
+    smaller = np.take_along_axis(radii, np.asarray(count)[..., np.newaxis] - 1, axis=-1)[..., 0]
+    radius: Floats = np.maximum(radii[..., -1 - few], smaller)
+    return radius
+
+
+def group_equal(keys: Sequence[Hashable]) -> list[list[int]]:
+    """Return the places of equal keys, in the order in which each comes first."""
+    places: dict[Hashable, list[int]] = {}
+    for place, key in enumerate(keys):
+        places.setdefault(key, []).append(place)
+    return list(places.values())
+
+
+def join_records(records: Sequence[Records]) -> Records:
+    """Return records (k,) of m scenes as one array (m, k)."""
+    whole = zeros((len(records), records[0].size), records[0].dtype)
+    plain = whole.view(np.ndarray)
+    for m, one in enumerate(records):
+        plain[m] = one
+    return whole
+
+
+def take_members(records: Records, numbers: Sequence[int]) -> Records:
+    """Return the records of some of the scenes (m, ...), from a cache line on; all of them as they are."""
+    if len(numbers) == len(records):
+        return records
+    chosen = zeros((len(numbers), *records.shape[1:]), records.dtype)
+    chosen[...] = records[list(numbers)]
+    return chosen
+
+
+def only_stack(stacks: Iterable[Stack | Refusal]) -> Stack:
+    """Return the one stack that was built. Raises what refused it."""
+    (one,) = stacks
+    if isinstance(one, Refusal):
+        raise one.error
+    return one
+
+
+def member(scenes: Any, m: int) -> Any:
+    """Return one scene of a stack; it shares the memory."""
+    return _each(scenes, lambda array: array[m])
+
+
+def stack_of_one(scene: Any) -> Any:
+    """Return a scene as a stack; it shares the memory."""
+    return _each(scene, lambda array: array[np.newaxis])
+
+
+def arrays_of(scene: Any) -> list[NDArray[Any]]:
+    """Return all arrays of a scene, or of a stack of scenes."""
+    if isinstance(scene, np.ndarray):
+        return [scene]
+    return [] if scene is None else [array for part in scene for array in arrays_of(part)]
+
+
+def _each(scene: Any, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Any:
+    if isinstance(scene, np.ndarray):
+        return change(scene)
+    return None if scene is None else with_parts(scene, [_each(part, change) for part in scene])
+
+
+def with_parts(scene: Any, parts: list[Any]) -> Any:
+    """Return a named tuple, or a plain one, of the same type with other parts."""
+    return type(scene)(*parts) if hasattr(scene, "_fields") else tuple(parts)
+
 
 CHECK_INTERVAL = 1e-4  # s of simulated time between checks of rest, overlap and finiteness
 CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long, at most for
@@ -77,7 +344,7 @@ def _assemble(parts: Parts, strides: Sequence[Stride]) -> World:
     reach = np.maximum(controls["skin"], TRAVELLED * controls["skin"] + controls["approach"])
     controls["cell_width"] = 2.0 * controls["cell_radius"] + reach
     lists = empty_lists(first_capacity(bodies), parts.slots, before)
-    return assembled(parts, controls, points=_points(members, parts.slots), before=before, **lists)
+    return assemble_world(parts, controls, points=_points(members, parts.slots), before=before, **lists)
 
 
 def _model(outline: Outline) -> str:
@@ -87,25 +354,25 @@ def _model(outline: Outline) -> str:
 EXPLICIT = Construction(_choose, _model, _size, _assemble)
 
 
-def assembled(parts: Parts, controls: Records, **arrays: Any) -> World:
+def assemble_world(parts: Parts, controls: Records, **arrays: Any) -> World:
     """Return stacked worlds at time zero from their parts and the scheme's own arrays."""
     members, count = parts.bodies.shape
     bodies = parts.bodies
     bodies["half_x"][:, -1] = math.inf  # the half-plane has one face without ends
-    loads, load_pieces = stacked([outline.applied for outline in parts.outlines])
+    loads, load_pieces = stack_loads([outline.applied for outline in parts.outlines])
     tables = [one.shapes.table for one in parts.outlines if one.shapes is not None]  # none where all are rectangles
     world = World(
         bodies=bodies,
         **arrays,
         particles=parts.particles,
-        corners=joined(tables) if tables else None,
+        corners=join_records(tables) if tables else None,
         **_grid(parts),
         interactions=interaction_tables([outline.interactions for outline in parts.outlines]),
         ledger=zeros((members, count // GROUP + 1), LEDGER),
         action=zeros((members, 1), ACTION),
         matrices=numbers((members, 8, 3, 3), np.float64),
         moved=all_moved_records(bodies, parts.outlines),
-        motion=joined([outline.motion for outline in parts.outlines]),
+        motion=join_records([outline.motion for outline in parts.outlines]),
         controls=controls,
         clock=zeros((members, 1), CLOCK),
         shares=zeros((members, 1), SHARE),
@@ -128,7 +395,7 @@ def without_lists(parts: Parts, controls: Records) -> World:
     members = len(parts.outlines)
     before = zeros((members, 1), CONTACT)
     lists = empty_lists(1, 1, before)
-    return assembled(parts, controls, points=_points(members, 1), before=before, **lists)
+    return assemble_world(parts, controls, points=_points(members, 1), before=before, **lists)
 
 
 def numbers(shape: tuple[int, ...], kind: type[np.generic]) -> Any:
@@ -237,3 +504,14 @@ def _controls(scenario: Scenario, stride: Stride) -> dict[str, float]:
         "check_every": every,
         "rest_checks": rest_checks,
     }
+
+
+def couple(scenario: Scenario, world: Any, others: tuple[Present, ...]) -> Coupled:
+    """Return a world with further systems at time zero. Raises InvalidInputError for a pair that is not modelled."""
+    systems = tuple(present.system for present in others)
+    acts = tuple(Act(*one) for one in acts_of(systems))
+    arrays = tuple(system.build(scenario) for system in systems if system.build is not None)
+    stages = tuple(system.stages() for system in systems if system.stages is not None)
+    energies = tuple(tuple(f"{system.name}_{name}" for name in system.energies) for system in systems)
+    plan(arrays, Plan(stages, acts, energies))
+    return Coupled(world, arrays)

@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 
 from blocksim.kernels.common.arrays import World
 from blocksim.scenario import GROUND, PlacedBody, Scenario, place_bodies
-from blocksim.scenario.motion import motion_pieces
-from blocksim.scenario.motion_peaks import motion_peaks
-from blocksim.scenario.outlines import edges_of
+from blocksim.scenario.geometry import edges_of
+from blocksim.scenario.motion import motion_peaks, motion_pieces
 from blocksim.scenario.placement import has_outlines
-from blocksim.world.bodies import Outline, outline_of, with_freed
-from blocksim.world.bounds import Bounds, bounds_of
-from blocksim.world.build import build_world
-from blocksim.world.coupled import couple
+from blocksim.world.bodies import Outline, division, free_masses, outline_of
+from blocksim.world.build import build_world, couple, stack_of_one
 from blocksim.world.interactions import ContactClass, contact_classes, pair_of
 from blocksim.world.memory import (
     PROCESS_BYTES,
@@ -27,11 +24,9 @@ from blocksim.world.memory import (
     scene_size,
 )
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
-from blocksim.world.particles import division
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
-from blocksim.world.scenes import stack_of_one
-from blocksim.world.step import safety_of, step_of_contacts
+from blocksim.world.step import Bounds, bounds_of, safety_of, step_of_contacts
 from blocksim.world.systems import largest_step, others_of, warnings_of
 
 # measured on one core: a step costs about this for every body with its contacts
@@ -128,7 +123,7 @@ def describe(scenario: Scenario) -> Description:
     steps = max(1, round(scenario.time.end / step))
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 1
     outline = outline_of(scenario)
-    (bounds,) = bounds_of(with_freed(stack_of_one(world.bodies), [outline]), len(placed), [outline.shapes])
+    (bounds,) = bounds_of(free_masses(stack_of_one(world.bodies), [outline]), len(placed), [outline.shapes])
     particles = _particles(scenario, placed)
     touching = 0 if world.particles is None else particles // PARTICLES_OF_A_CONTACT
     contacts = recorded_contacts(len(placed), touching) if scenario.output.contacts else 0

@@ -30,14 +30,22 @@ from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.models.stepping import Nonsmooth as Stepping
 from blocksim.scenario.placement import smallest_width
 from blocksim.world.bodies import Outline
-from blocksim.world.bounds import Bounds
-from blocksim.world.build import GROWTH, empty_controls, first_capacity, numbers, without_lists
-from blocksim.world.loads import box_of, loads_at_rest
+from blocksim.world.build import (
+    GROWTH,
+    SURFACE,
+    Construction,
+    Parts,
+    Stride,
+    build_one,
+    empty_controls,
+    first_capacity,
+    numbers,
+    without_lists,
+)
 from blocksim.world.memory import Size, refuse_if_too_large, rigid_size
 from blocksim.world.rigid_step import FEW, choose_rigid_step
-from blocksim.world.sag import DAMPING, soft_contact
-from blocksim.world.scenes import SURFACE, Construction, Parts, Stride, build_one
-from blocksim.world.step import choose_skin
+from blocksim.world.sag import DAMPING, box_of, loads_at_rest, soft_contact
+from blocksim.world.step import Bounds, choose_skin
 
 MOST_REACH = 1.5  # of a body, in skins
 WEAK_RESTITUTION = 0.5  # up to which the impacts of a substep happen all at once

@@ -1,4 +1,21 @@
-"""The time step of the non-smooth scheme: by how far a block moves while its contacts stay as they were found.
+"""Joints of bodies as they are placed, found from their corners: where blocks touch one another and their supports.
+
+Outlines are convex, so that two bodies touch along one interval or at one point. The ends of an interval are corners
+of one of the two that lie on an edge of the other, whatever the shape: rectangles, outlines, drawn polygons,
+voussoirs, pieces of ground and walls, and the half-plane.
+
+How far the thrust of blocks at rest moves aside where rigid contacts give way like springs.
+
+A contact point at rest is a spring of w^2 / A, A = J M^-1 J^T and w = 2 pi f / h (sag.py); friction holds along the
+joint. So the displacements of a small scene at rest follow from one linear system with three unknowns per free block,
+and are proportional to h^2. Points in tension open: the worst are taken out, until none is left.
+
+Blocks that sink along the load path stay as strong as they were. What harms is displacement across it: the load above
+comes down elsewhere in the joints below. Its measure is how far a joint moves across its force, over its width, times
+that force over the greatest of the structure, and half of it in columns and walls. Limits of `ground.tilt` are too low
+by some 5 to 10 times this measure, in proportion to h^2.
+
+The time step of the non-smooth scheme: by how far a block moves while its contacts stay as they were found.
 
 Contacts are found once a step, and what a block turns and moves meanwhile is the error of a step, first order in its
 length. So the automatic step is the usual one unless the fastest point could move farther than a tenth of the smallest
@@ -7,7 +24,7 @@ time; walls do not fall that fast. A manual step is therefore refused only where
 start, or in one substep at that bound.
 
 Contacts give way at rest as if they were springs, in proportion to the step squared. The step of few blocks is so short
-that this leaves their strength as it is: see thrust.py for arches and leaning columns, sag.py for heavy blocks on
+that this leaves their strength as it is: see rigid_step.py for arches and leaning columns, sag.py for heavy blocks on
 light ones.
 
 A block that meets something in a substep h stays there until it ends, and has not yet moved with its new velocity: it
@@ -22,16 +39,364 @@ multiply errors a hundredfold: their steps are cut at impacts, see blocksim.kern
 """
 
 import math
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
-from blocksim.scenario import Scenario
-from blocksim.scenario.motion_peaks import shortest_cycle, shortest_period
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.kernels.common.arrays import LOAD_FIELD, LOAD_FORCE
+from blocksim.scenario import PlacedBody, PlacedSegment, Scenario
+from blocksim.scenario.geometry import box_of
+from blocksim.scenario.motion import shortest_cycle, shortest_period
+from blocksim.scenario.placement import smallest_width
 from blocksim.world.bodies import Outline
-from blocksim.world.bounds import Bounds, given_speed, greatest_speed, impact_speed, support_speed
-from blocksim.world.sag import CRUSHED_SHARE, UNLIKE, WARNING_SHARE, scene_sag, soft_contact
-from blocksim.world.step import MOST_STEPS, StepError, UncountableStepsError
-from blocksim.world.thrust import COURSED, thrust_shift
+from blocksim.world.sag import CRUSHED_SHARE, TOUCHING, UNLIKE, WARNING_SHARE, scene_sag, soft_contact
+from blocksim.world.step import (
+    MOST_STEPS,
+    Bounds,
+    StepError,
+    UncountableStepsError,
+    given_speed,
+    greatest_speed,
+    impact_speed,
+    support_speed,
+)
+
+Point = tuple[float, float]
+
+
+class Joint(NamedTuple):
+    """Where two bodies touch; pieces of ground and walls are numbered after the blocks, the half-plane comes last."""
+
+    one: int
+    other: int
+    normal: Point  # from one to the other
+    points: tuple[Point, ...]  # m: one, or the two ends
+
+    @property
+    def width(self) -> float:
+        """Length in m, zero of a point."""
+        return math.dist(self.points[0], self.points[-1])
+
+
+class _Side(NamedTuple):
+    """What a body shows to others: faces from corner to corner, with the solid on the left."""
+
+    body: int
+    faces: Sequence[tuple[Point, Point]]
+    corners: Sequence[Point]
+
+
+class _Hit(NamedTuple):
+    """A corner of one body on a face of another."""
+
+    point: Point
+    owner: int  # of the face
+    normal: Point  # out of the owner
+    is_inside: bool  # not at an end of the face
+
+
+def joints_of(
+    placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment], free: Collection[int], near: float, *, level: bool
+) -> list[Joint]:
+    """Return the joints of free blocks with each other and with supports; faces up to `near` (m) apart touch.
+
+    `level` says whether the half-plane y < 0 is one of the supports.
+    """
+    blocks = [_side_of(i, body) for i, body in enumerate(placed)]
+    low, high = box_of([corner for side in blocks if side.body in free for corner in side.corners])
+    (left, bottom), (right, top) = (low[0] - near, low[1] - near), (high[0] + near, high[1] + near)
+    sides = [*blocks, *(_side_of_piece(len(placed) + k, one) for k, one in enumerate(segments))]
+    if level:
+        sides.append(_Side(len(sides), [((right, 0.0), (left, 0.0))], []))
+    within = [
+        side
+        for side in sides
+        for (x0, y0), (x1, y1) in [box_of([corner for face in side.faces for corner in face])]
+        if x0 <= right and x1 >= left and y0 <= top and y1 >= bottom
+    ]
+    hits = defaultdict(list)
+    for pair, hit in _hits(within, free, near):
+        hits[pair].append(hit)
+    found = (_joint(pair, some, near) for pair, some in hits.items())
+    return [joint for joint in found if joint is not None]
+
+
+def _side_of(number: int, body: PlacedBody) -> _Side:
+    c, s = math.cos(body.angle), math.sin(body.angle)
+    corners = [(body.x + c * x - s * y, body.y + s * x + c * y) for x, y in body.corners]
+    return _Side(number, list(zip(corners, [*corners[1:], corners[0]], strict=True)), corners)
+
+
+def _side_of_piece(number: int, one: PlacedSegment) -> _Side:
+    """Return the face of a piece, which has its solid on the right, and those of its ends that are edges."""
+    start, end = (one.x0, one.y0), (one.x1, one.y1)
+    return _Side(number, [(end, start)], [*([start] if one.touches_start else []), *([end] if one.touches_end else [])])
+
+
+def _hits(sides: Sequence[_Side], free: Collection[int], near: float) -> Iterator[tuple[tuple[int, int], _Hit]]:
+    """Yield all corners on faces of other bodies, where one of the two is free."""
+    corners = np.array([corner for side in sides for corner in side.corners])
+    owners = np.array([side.body for side in sides for _ in side.corners])
+    faces = np.array([face for side in sides for face in side.faces])
+    bodies = np.array([side.body for side in sides for _ in side.faces])
+    way = faces[:, 1] - faces[:, 0]
+    length = np.hypot(way[:, 0], way[:, 1])
+    way /= length[:, None]
+    x, y = (corners[:, None, axis] - faces[None, :, 0, axis] for axis in (0, 1))
+    along = way[:, 0] * x + way[:, 1] * y
+    away = np.abs(way[:, 0] * y - way[:, 1] * x)
+    touches = (away <= near) & (np.abs(along - 0.5 * length) <= 0.5 * length + near) & (owners[:, None] != bodies)
+    for corner, face in np.argwhere(touches).tolist():
+        i, j = int(owners[corner]), int(bodies[face])
+        if i in free or j in free:
+            x0, y0 = corners[corner].tolist()
+            dx, dy = way[face].tolist()
+            is_inside = near < along[corner, face] < length[face] - near
+            yield (min(i, j), max(i, j)), _Hit((x0, y0), j, (dy, -dx), bool(is_inside))
+
+
+def _joint(pair: tuple[int, int], hits: Sequence[_Hit], near: float) -> Joint | None:
+    """Return the joint of two bodies; None where only corners touch."""
+    first = hits[0].point
+    one = max((hit.point for hit in hits), key=lambda point: math.dist(point, first))
+    other = max((hit.point for hit in hits), key=lambda point: math.dist(point, one))
+    width = math.dist(one, other)
+    if width > 2.0 * near:
+        across = (other[1] - one[1]) / width, (one[0] - other[0]) / width
+        best = max(hits, key=lambda hit: abs(_dot(hit.normal, across)))
+        way = math.copysign(1.0, _dot(best.normal, across)) * (1.0 if best.owner == pair[0] else -1.0)
+        return Joint(*pair, (way * across[0], way * across[1]), (one, other))
+    inside = next((hit for hit in hits if hit.is_inside), None)
+    if inside is None:
+        return None
+    way = 1.0 if inside.owner == pair[0] else -1.0
+    return Joint(*pair, (way * inside.normal[0], way * inside.normal[1]), (inside.point,))
+
+
+def _dot(a: Point, b: Point) -> float:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+HOLD = 100.0  # stiffness along a joint over that across it: rigid, and as accurate
+PASSES = 20
+ROUND_OFF = 1e-9  # of the greatest pressure: tension that is none
+WORST = 0.5  # of the greatest tension: points with more open in the same pass
+SLACK = 1e-12  # of its stiffness: what holds a block that joints do not
+LOOSE = 1e6  # over the overlap of one point that carries everything: only mechanisms move farther
+FALLS = 50.0  # over displacements with all points closed: only mechanisms move farther
+FEW_UPRIGHT = 3  # rectangles along the axes, of which a stack cannot lean far
+COURSED = 0.5  # calibrated: limits of columns and walls are off by half as much as those of arches, or less
+PARALLEL = 1e-3  # sine of the angle between normals of one direction
+Floats = NDArray[np.float64]
+
+
+class _Frame(NamedTuple):
+    """Contact points of all joints as springs between blocks, for w = 1/s."""
+
+    joints: Sequence[Joint]
+    blocks: Sequence[int]  # n
+    joint: NDArray[np.int64]  # (p,) that a point is of
+    arms: Floats  # (p, 2, 2) m: from the centroids of both bodies to the point
+    places: NDArray[np.int64]  # (p, 2): of both bodies among the blocks; n for supports
+    normals: Floats  # (p, 2)
+    across: Floats  # (p, 3 n + 3): opening for displacements of the blocks, and of supports
+    along: Floats  # (p, 3 n + 3): slip
+    stiffness: Floats  # (p,) N/m
+
+    @property
+    def is_coursed(self) -> bool:
+        """Whether normals are parallel or at right angles, as in columns and walls."""
+        x, y = self.normals[0]
+        sines, cosines = self.normals[:, 0] * y - self.normals[:, 1] * x, self.normals @ self.normals[0]
+        return bool((np.abs(sines * cosines) < PARALLEL).all())
+
+
+class _Rest(NamedTuple):
+    """Displacements of blocks (m, m, rad; supports last), and what points carry (N)."""
+
+    moved: Floats  # (n + 1, 3)
+    pressed: Floats  # (p,)
+    sheared: Floats  # (p,)
+
+
+def thrust_shift(outline: Outline) -> float:
+    """Return the measure times w^2 (1/s2); zero where blocks carry vertical forces alone, and for walls that fall."""
+    scenario, placed = outline.scenario, outline.placed
+    free = {i for i, body in enumerate(placed) if not body.fixed or body.freed}
+    if not free or _is_simple(outline, len(free)):
+        return 0.0
+    near = TOUCHING * smallest_width(placed)
+    joints = joints_of(placed, outline.segments, free, near, level=scenario.ground.profile is None)
+    joints, blocks = _carried(joints, free)
+    if not joints:
+        return 0.0
+    frame = _frame(placed, joints, blocks)
+    rest = _at_rest(frame, _forces(outline, blocks))
+    return 0.0 if rest is None else _greatest_shift(frame, rest) * (COURSED if frame.is_coursed else 1.0)
+
+
+def _is_simple(outline: Outline, free: int) -> bool:
+    """Return True for rectangles along the axes that are few, or that carry vertical forces alone."""
+    scenario = outline.scenario
+    if scenario.ground.profile is not None or any(body.angle or body.is_polygon for body in outline.placed):
+        return False
+    return free <= FEW_UPRIGHT or (scenario.ground.tilt == 0.0 and not scenario.loads)
+
+
+def _carried(joints: Sequence[Joint], free: set[int]) -> tuple[list[Joint], list[int]]:
+    """Return the joints of blocks that stand on supports, by way of others or not, and these blocks."""
+    held: set[int] = set()
+    grows = True
+    while grows:
+        more = {
+            i
+            for joint in joints
+            for i, other in ((joint.one, joint.other), (joint.other, joint.one))
+            if i in free and i not in held and (other not in free or other in held)
+        }
+        held |= more
+        grows = bool(more)
+    return [joint for joint in joints if joint.one in held or joint.other in held], sorted(held)
+
+
+def _frame(placed: Sequence[PlacedBody], joints: Sequence[Joint], blocks: Sequence[int]) -> _Frame:
+    place, count = {body: k for k, body in enumerate(blocks)}, len(blocks)
+    points = np.array([point for joint in joints for point in joint.points])
+    joint = np.repeat(np.arange(len(joints)), [len(one.points) for one in joints])
+    normals = np.array([one.normal for one in joints])[joint]
+    places = np.array([[place.get(one.one, count), place.get(one.other, count)] for one in joints])[joint]
+    bodies = [placed[i] for i in blocks]
+    centres = np.array([*((body.x, body.y) for body in bodies), (0.0, 0.0)])
+    masses = np.array([*((1.0 / body.mass, 1.0 / body.inertia) for body in bodies), (0.0, 0.0)])
+    arms = points[:, None] - centres[places]
+    rows: list[Floats] = []
+    compliance = np.zeros(len(points))
+    for ways in (normals, np.column_stack([-normals[:, 1], normals[:, 0]])):
+        row = np.zeros((len(points), count + 1, 3))
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            lever = arms[:, side, 0] * ways[:, 1] - arms[:, side, 1] * ways[:, 0]
+            row[np.arange(len(points)), places[:, side]] = sign * np.column_stack([ways, lever])
+            if not rows:
+                inverse = masses[places[:, side]]
+                compliance += inverse[:, 0] + lever**2 * inverse[:, 1]
+        rows.append(row.reshape(len(points), -1))
+    return _Frame(joints, blocks, joint, arms, places, normals, rows[0], rows[1], 1.0 / compliance)
+
+
+def _forces(outline: Outline, blocks: Sequence[int]) -> Floats:
+    """Return forces (N) and moments (N m) on blocks (n + 1, 3): weight, and loads as they are at the start.
+
+    Water is left out.
+    """
+    tilt, gravity = outline.scenario.ground.tilt, outline.scenario.gravity
+    forces = np.zeros((len(blocks) + 1, 3))
+    masses = np.array([outline.placed[i].mass for i in blocks])
+    pull = np.array([-gravity * math.sin(tilt), -gravity * math.cos(tilt)])
+    place = {body: k for k, body in enumerate(blocks)}
+    for load in outline.applied.loads:
+        value = float(outline.applied.pieces["value"][load.first_piece])
+        if load.kind == LOAD_FIELD:
+            pull += value * np.array([load.fx, load.fy])
+        elif load.kind == LOAD_FORCE and load.body in place:
+            forces[place[load.body]] += value * _push(load, outline.placed[load.body])
+    forces[:-1, :2] += masses[:, None] * pull
+    return forces
+
+
+def _push(load: np.record, body: PlacedBody) -> Floats:
+    """Return the force (N) and the moment (N m) of a load of value one, of which the point turns with the body."""
+    c, s = math.cos(body.angle), math.sin(body.angle)
+    x, y = c * load.x - s * load.y, s * load.x + c * load.y
+    fx, fy = (c * load.fx - s * load.fy, s * load.fx + c * load.fy) if load.turns else (load.fx, load.fy)
+    return np.array([fx, fy, x * fy - y * fx + load.torque])
+
+
+def _at_rest(frame: _Frame, forces: Floats) -> _Rest | None:
+    """Return the equilibrium without tension; of what falls that of closed joints, or none where it is a wall."""
+    closed = np.ones(frame.stiffness.size, bool)
+    matrix = _stiffness(frame, closed)
+    matrix[np.diag_indices_from(matrix)] *= 1.0 + SLACK
+    first = moved = _moved(matrix, forces)
+    if not np.abs(first).max() < LOOSE * float(np.abs(forces[:, :2]).sum() / frame.stiffness.min()):
+        return None
+    for _ in range(PASSES):
+        pressed = -frame.stiffness * (frame.across @ moved)
+        least = ROUND_OFF * pressed.max()
+        opens = closed & (pressed < -least) & (pressed <= WORST * pressed[closed].min())
+        shuts = ~closed & (pressed > least)
+        if not (opens | shuts).any():
+            break
+        closed ^= opens | shuts
+        matrix += _stiffness(frame, shuts) - _stiffness(frame, opens)
+        moved = _moved(matrix, forces)
+        if not np.abs(moved).max() < FALLS * np.abs(first).max():
+            if frame.is_coursed:
+                return None
+            closed[:], moved = True, first
+            break
+    pressed = np.maximum(0.0, -frame.stiffness * (frame.across @ moved)) * closed
+    return _Rest(moved.reshape(-1, 3), pressed, -HOLD * frame.stiffness * (frame.along @ moved) * (pressed > 0.0))
+
+
+def _stiffness(frame: _Frame, chosen: NDArray[np.bool_]) -> Floats:
+    """Return the stiffness (3 n, 3 n) of some of the points."""
+    across, along = frame.across[chosen, :-3], frame.along[chosen, :-3]
+    stiffness = frame.stiffness[chosen, None]
+    matrix: Floats = across.T @ (stiffness * across) + along.T @ (HOLD * stiffness * along)
+    return matrix
+
+
+def _moved(matrix: Floats, forces: Floats) -> Floats:
+    """Return the displacements (3 n + 3,), those of supports last."""
+    return np.append(np.linalg.solve(matrix, forces[:-1].ravel()), [0.0, 0.0, 0.0])
+
+
+def _greatest_shift(frame: _Frame, rest: _Rest) -> float:
+    """Return the measure: across the force, over the width, times the share in the greatest force."""
+    turned = np.column_stack([-frame.normals[:, 1], frame.normals[:, 0]])
+    point_forces = rest.pressed[:, None] * frame.normals + rest.sheared[:, None] * turned
+    count = len(frame.joints)
+    forces = np.column_stack([np.bincount(frame.joint, point_forces[:, axis], count) for axis in (0, 1)])
+    moves = rest.moved[frame.places]  # of both bodies at every point
+    x = (moves[:, :, 0] - moves[:, :, 2] * frame.arms[:, :, 1]).mean(axis=1)
+    y = (moves[:, :, 1] + moves[:, :, 2] * frame.arms[:, :, 0]).mean(axis=1)
+    aside = rest.pressed * (x * forces[frame.joint, 1] - y * forces[frame.joint, 0])
+    total = np.bincount(frame.joint, rest.pressed, count)
+    widths = np.array([joint.width for joint in frame.joints])
+    most = _greatest_forces(frame, np.hypot(forces[:, 0], forces[:, 1]))
+    carries = (total > 0.0) & (widths > 0.0) & (most > 0.0)
+    shift = np.abs(np.bincount(frame.joint, aside, count)[carries]) / (total * widths * most)[carries]
+    return float(shift.max(initial=0.0))
+
+
+def _greatest_forces(frame: _Frame, forces: Floats) -> Floats:
+    """Return the greatest force (N) in the structure of each joint.
+
+    Structures are free blocks that touch. Joints with supports count in columns and walls; those below heavy abutments
+    carry more than the arch between them, and count only where there are no others.
+    """
+    structure = {body: body for body in frame.blocks}
+
+    def first(body: int) -> int:
+        while structure[body] != body:
+            body = structure[body]
+        return body
+
+    inner = [joint.one in structure and joint.other in structure for joint in frame.joints]
+    for joint, is_inner in zip(frame.joints, inner, strict=True):
+        if is_inner:
+            structure[first(joint.one)] = first(joint.other)
+    labels = [first(joint.one if joint.one in structure else joint.other) for joint in frame.joints]
+    most = np.zeros(len(frame.joints))
+    for label in set(labels):
+        own = np.array([one == label for one in labels])
+        chosen = own & (frame.is_coursed | np.array(inner))
+        most[own] = forces[chosen if chosen.any() else own].max()
+    return most
+
 
 USUAL_STEP = 1e-3  # s
 SHARE = 0.1  # of the smallest side
@@ -39,7 +404,7 @@ FEW = 13  # free blocks: fewer take shorter steps
 NATURAL = 0.02  # of sqrt(L/g): the step of so many
 CROWD = 100  # free blocks, from which on sagging does not shorten a step
 CALM = 0.9  # of the overlap or sag that is warned of
-SHIFT = 2e-5  # of the width of a joint, calibrated: limits are too low by some 0.02 %, see thrust.py
+SHIFT = 2e-5  # of the width of a joint, calibrated: limits are too low by some 0.02 %, see rigid_step.py
 PERIOD_SHARE = 0.05  # of the shortest period of a prescribed motion: its velocity changes by a third in a step
 MILLI, PERCENT = 1e3, 1e2
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from blocksim.analysis.bits import differences
-from blocksim.simulation.contacts import SUPPORT, UNITS, empty_rows, joined
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.frames import SUPPORT, UNITS, Frames, empty_rows, join_contacts
 
 COUNT, BLOCKS = 5, 3
 
@@ -105,7 +104,7 @@ def with_contacts(counts: Sequence[int] = (0, 2, 3, 1, 0)) -> Frames:
         table["body_b"] = SUPPORT
         for column, name in enumerate(UNITS):
             table[name] = np.linspace(1.0, 2.0, len(table)) + number + 10 * column
-    return replace(frames(), contacts=joined(tables))
+    return replace(frames(), contacts=join_contacts(tables))
 
 
 @pytest.mark.parametrize(("name", "told"), [("normal_force", "normal_force_N"), ("body_a", "body_a"), ("x", "x_m")])

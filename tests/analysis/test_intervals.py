@@ -5,7 +5,7 @@ from math import comb
 import pytest
 from scipy import stats
 
-from blocksim.analysis.intervals import interval, lower_bound, quantile
+from blocksim.analysis.compare import interval, lower_bound, quantile
 
 
 def at_least(count: int, total: int, p: float) -> float:

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import binom, norm
 
-from blocksim.analysis.intervals import interval
+from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit, inflation_of
 
 X = np.array([0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.5, 1.9])

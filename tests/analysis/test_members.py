@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from blocksim.analysis.members import Failure, Members
+from blocksim.analysis.evidence import Failure, Members
 from blocksim.errors import InvalidInputError
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.analysis.properties import load_properties
+from blocksim.analysis.experiment import load_properties
 from blocksim.errors import InvalidInputError
 from tests.analysis.broken import Mistake, rendered, written
 

@@ -5,22 +5,31 @@ import json
 
 import pytest
 
-from blocksim.bench.machine import Machine, this_machine
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeated, report, single
-from blocksim.bench.measurements import MEASUREMENTS, UnknownMeasurementError, chosen
+from blocksim.bench.measurement import (
+    Findings,
+    Machine,
+    Measurement,
+    Number,
+    Setting,
+    repeat,
+    report,
+    single,
+    this_machine,
+)
+from blocksim.bench.measurements import MEASUREMENTS, UnknownMeasurementError, choose
 from blocksim.errors import ExitCode
 
 
 def test_a_number_is_the_median_of_its_samples_with_their_spread() -> None:
     values = itertools.cycle((3.0, 9.0, 4.0))
-    one = repeated("a step", "ns", lambda: next(values), 3)
+    one = repeat("a step", "ns", lambda: next(values), 3)
     assert (one.median, one.smallest, one.largest, one.is_repeated) == (4.0, 3.0, 9.0, True)
     assert not single("memory", "bytes", 7).is_repeated
 
 
 def test_chosen_keeps_the_order_of_the_registry() -> None:
-    assert chosen([]) == MEASUREMENTS
-    assert [one.name for one in chosen(["start-up", "walls", "walls"])] == ["walls", "start-up"]
+    assert choose([]) == MEASUREMENTS
+    assert [one.name for one in choose(["start-up", "walls", "walls"])] == ["walls", "start-up"]
 
 
 @pytest.mark.parametrize(
@@ -32,7 +41,7 @@ def test_chosen_keeps_the_order_of_the_registry() -> None:
 )
 def test_unknown_names_are_wrong_usage(name: str, told: str) -> None:
     with pytest.raises(UnknownMeasurementError) as caught:
-        chosen(["three-blocks", name])
+        choose(["three-blocks", name])
     assert f"NAME '{name}': no such measurement{told}" in str(caught.value)
     assert caught.value.exit_code == ExitCode.USAGE
 

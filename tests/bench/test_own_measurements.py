@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.bench import ensemble, soils, startup, three_blocks, walls
+from blocksim.bench import soils, startup, three_blocks, walls
 from blocksim.bench.measurement import Setting, single
-from blocksim.bench.measurements import chosen
+from blocksim.bench.measurements import choose
 from blocksim.bench.startup import StartError
-from blocksim.bench.three_blocks import CLOSE, Level, settled
+from blocksim.bench.three_blocks import CLOSE, Level, converged_levels
 
 QUICK = Setting(quick=True, repeats=2)
 
@@ -22,7 +22,7 @@ def level(scale: float, x: float) -> Level:
 
 def test_levels_count_as_converged_from_where_all_finer_ones_agree() -> None:
     levels = [level(1e-4, 0.9 * CLOSE), level(1e-3, 2.0 * CLOSE), level(1e-2, -0.9 * CLOSE), level(1.0, 0.0)]
-    assert [one.setting["scale"] for one in settled(levels, levels[-1])] == [1.0, 1e-2]
+    assert [one.setting["scale"] for one in converged_levels(levels, levels[-1])] == [1.0, 1e-2]
     told = levels[1].detail(levels[-1])
     assert (levels[1].text, told["scale"], told["steps"], told["cpu_ms"]) == ("scale 0.001", 1e-3, 10, 2000.0)
     assert told["off_mm"] == pytest.approx(0.4)
@@ -57,13 +57,13 @@ def test_rigid_blocks_tell_times_alone_and_among_many_and_a_setting_that_finer_o
 
 
 def test_ensemble_tells_its_rates_by_both_schemes_and_its_members_differ() -> None:
-    found = ensemble.ENSEMBLE.measure(QUICK)
+    found = three_blocks.ENSEMBLE.measure(QUICK)
     names = ["a second and core", "a second, 1 thread", "a second, 2 threads"]
     schemes = ("explicit", "nonsmooth")
     assert [one.quantity for one in found.numbers] == [f"{scheme}: {name}" for scheme in schemes for name in names]
     assert all(len(one.samples) == 2 and one.median > 1.0 for one in found.numbers)
-    for setting in ensemble.SETTINGS:
-        members = ensemble.scattered(5, setting)
+    for setting in three_blocks.SETTINGS:
+        members = three_blocks.scatter_friction(5, setting)
         assert len({scenario.friction.model_dump_json() for scenario in members}) == 5
         assert {scenario.time.scheme for scenario in members} == {setting.scheme}
 
@@ -107,7 +107,7 @@ def test_growth_is_the_exponent_of_the_time_of_a_whole_step() -> None:
 def test_threads_tell_by_how_much_they_are_faster_and_leave_small_walls_alone(
     name: str, small: int, large: int
 ) -> None:
-    (measurement,) = chosen([name])
+    (measurement,) = choose([name])
     found = measurement.measure(QUICK)
     told = [f"{count} blocks, {what}" for count in (small, large) for what in ("2 threads", "speed-up")]
     assert [one.quantity for one in found.numbers] == told

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import three_blocks
-from blocksim.bench.timing import Rerun, RunFailedError
+from blocksim.bench.scenes import Rerun, RunFailedError, three_blocks
 
 SOFT = {"stiffness_scale": 1e-4}
 

@@ -14,8 +14,7 @@ from typer.testing import CliRunner
 from blocksim.cli.app import app
 from blocksim.simulation.frames import Frames
 from blocksim.view.report.page import write_report
-from blocksim.view.report.runs import read_stored, run_subject
-from blocksim.view.report.studies import StudyPage, study_subject
+from blocksim.view.report.subjects import StudyPage, read_stored, run_subject, study_subject
 from tests.browser.conftest import PLAYER, Open, Opened
 from tests.view.made_up import polygons
 from tests.view.report.folders import write_experiment, write_run, write_sweep

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from blocksim.cli.process import loading
+from blocksim.cli.process import pause_collector
 
 
 @pytest.fixture(autouse=True)
@@ -18,7 +18,7 @@ def collector() -> Iterator[None]:
 
 
 def failing_load() -> None:
-    with loading():
+    with pause_collector():
         assert not gc.isenabled()
         raise ImportError
 
@@ -33,6 +33,6 @@ def test_collector_is_afterwards_as_it_was(*, is_on: bool) -> None:
 
 def test_what_was_loaded_is_out_of_its_sight() -> None:
     before = gc.get_freeze_count()
-    with loading():
+    with pause_collector():
         loaded: list[list[int]] = [[] for _ in range(1000)]
     assert gc.get_freeze_count() > before + len(loaded)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from blocksim.cli.failures import tell_internal_error, told
+from blocksim.cli.commands import errors_as_messages, report_internal_error
 from blocksim.errors import ExitCode, InputMissingError, OutputError
 from tests.cli.conftest import Command
 
@@ -15,7 +15,7 @@ LONG = "x" * 300
 
 def exit_code_of(error: BaseException) -> int:
     def fail() -> None:
-        with told():
+        with errors_as_messages():
             raise error
 
     with pytest.raises(typer.Exit) as caught:
@@ -51,7 +51,7 @@ def test_shortage_that_a_library_wraps_is_reported(capsys: pytest.CaptureFixture
 
 
 def test_error_that_is_no_shortage_stays_what_it_is() -> None:
-    with pytest.raises(ZeroDivisionError), told():
+    with pytest.raises(ZeroDivisionError), errors_as_messages():
         raise ZeroDivisionError
 
 
@@ -70,7 +70,7 @@ def test_internal_error_is_one_line_and_a_file(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    tell_internal_error(ValueError("two\nlines"))
+    report_internal_error(ValueError("two\nlines"))
     line = capsys.readouterr().err
     assert line.startswith("internal error: ValueError: two lines; please report it with the file ")
     assert line.count("\n") == 1
@@ -81,7 +81,7 @@ def test_internal_error_on_a_full_disk_is_still_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "nowhere"))
-    tell_internal_error(ValueError("x"))
+    report_internal_error(ValueError("x"))
     assert "internal error: ValueError: x" in capsys.readouterr().err
 
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from blocksim.cli.app import app
 from blocksim.scenario import load_scenario
-from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5 import read_frames
 from tests.cli.conftest import PATIENCE, SCENARIOS, SOFT, Command, Process, committed, wait_for, wait_for_frames
 from tests.sizes import in_all
 
@@ -152,7 +152,7 @@ def test_stopped_run_continues_to_the_same_bits(
 
 def test_second_signal_stops_while_a_checkpoint_is_being_written(process: Process, tmp_path: Path) -> None:
     slow = (
-        "import blocksim.simulation.checkpoint_policy as w, time\n"
+        "import blocksim.simulation.checkpoint as w, time\n"
         "w.write_checkpoint = lambda *_: (open('writing', 'w').close(), time.sleep(600))"
     )
     running = process(*LONG, "--out", "out", before=slow)

@@ -33,7 +33,7 @@ sys.meta_path.insert(0, Finder)
 """
 
 
-@pytest.mark.parametrize("module", ["typer", "numba", "blocksim.simulation.running"])
+@pytest.mark.parametrize("module", ["typer", "numba", "blocksim.simulation.run"])
 def test_ctrl_c_during_an_import_prints_no_traceback(process: Process, module: str) -> None:
     running = process(*LONGER, before=WHILE_IMPORTED.format(module=module))
     out, err = running.communicate(timeout=PATIENCE)
@@ -86,7 +86,7 @@ def test_ctrl_c_during_the_last_moments_keeps_the_exit_code_of_the_command(proce
 
 def test_three_times_ctrl_c_prints_no_traceback(process: Process, tmp_path: Path) -> None:
     slow = (
-        "import blocksim.simulation.running as p, time\n"
+        "import blocksim.simulation.run as p, time\n"
         "close = p.FrameFile.__exit__\n"
         "p.FrameFile.__exit__ = lambda *a: (open('closing', 'w').close(), time.sleep(600), close(*a))"  # as a slow disk
     )

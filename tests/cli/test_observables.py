@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from blocksim.scenario import load_stored
-from blocksim.simulation.movement import OBSERVABLES, Observable
+from blocksim.simulation.observables import OBSERVABLES, Observable
 from blocksim.study.executors.ensemble import run_case
 from tests.cli.conftest import SOFT, Command
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.cli.output import note, number, print_json, table_lines
-from blocksim.cli.prepare import tell_compilation
+from blocksim.cli.prepare import announce_compilation
 from blocksim.simulation import compilation
 
 
@@ -54,6 +54,6 @@ def test_compiled_solver_that_cannot_be_kept_is_reported(
     monkeypatch.setattr(compilation, "is_compiled", lambda _: False)
     monkeypatch.setattr(compilation, "compile_kernels", lambda _: 30.0)
     monkeypatch.setattr("blocksim.kernels.common.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
-    tell_compilation("surface", quiet=False)
+    announce_compilation("surface", quiet=False)
     told = capsys.readouterr().err.splitlines()
     assert told[-1].startswith("/disk/blocksim/0123: the compiled solver cannot be stored there; free some space")

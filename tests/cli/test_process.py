@@ -11,7 +11,7 @@ import h5py
 import pytest
 
 from blocksim.scenario import load_scenario
-from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5 import read_frames
 from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for, wait_for_frames
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from blocksim.cli import progress
-from blocksim.cli.progress import counting, reporting
+from blocksim.cli.progress import case_progress, count_progress
 from blocksim.study.rows import Head
 from tests.cli.conftest import Command
 
@@ -21,7 +21,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> StringIO:
 
 
 def test_terminal_has_a_bar_for_the_cases_of_a_sweep(terminal: StringIO, capsys: pytest.CaptureFixture[str]) -> None:
-    with reporting([Head("gravity")], quiet=False) as on_row:
+    with case_progress([Head("gravity")], quiet=False) as on_row:
         on_row(3, 8, {"status": "finished", "gravity": 9.81})
     assert "3 of 8 cases" in terminal.getvalue()
     assert capsys.readouterr().err == ""
@@ -32,14 +32,14 @@ def test_elsewhere_there_are_lines_now_and_then(
 ) -> None:
     now = iter([0.0, 1.0, 3.0, 4.0, 6.0])
     monkeypatch.setattr("blocksim.cli.progress.time.monotonic", lambda: next(now))
-    with counting("pictures", quiet=False) as show:
+    with count_progress("pictures", quiet=False) as show:
         for done in range(1, 5):
             show(done, 4)
     assert capsys.readouterr().err == "2 of 4 pictures\n4 of 4 pictures\n"
 
 
 def test_quiet_shows_nothing(terminal: StringIO, capsys: pytest.CaptureFixture[str]) -> None:
-    with counting("pictures", quiet=True) as show, reporting([], quiet=True) as on_row:
+    with count_progress("pictures", quiet=True) as show, case_progress([], quiet=True) as on_row:
         show(1, 2)
         on_row(1, 2, {"status": "finished"})
     assert (terminal.getvalue(), capsys.readouterr().err) == ("", "")

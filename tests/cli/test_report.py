@@ -12,7 +12,7 @@ import h5py
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.simulation.movement import table_columns
+from blocksim.simulation.observables import table_columns
 from blocksim.study.sweep import sweep
 from tests.cli.conftest import SOFT, Command
 from tests.view.report.folders import SCENARIOS, write_experiment, write_run, write_sweep

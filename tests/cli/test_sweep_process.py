@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.study.progress import read_entries
+from blocksim.study.manifest import read_entries
 from tests.cli.conftest import PATIENCE, Process, Running, wait_for
 from tests.sizes import in_all
 

@@ -16,7 +16,7 @@ from blocksim.cli.app import app
 from blocksim.simulation.atomic import sha256_of
 from blocksim.study.fragility import fragility
 from blocksim.study.limit import limit, limit_curve
-from blocksim.study.progress import read_entries
+from blocksim.study.manifest import read_entries
 from tests.cli.conftest import SCENARIOS, Command
 from tests.cli.test_limit import on_soft_springs
 from tests.golden import Golden

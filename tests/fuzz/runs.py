@@ -11,7 +11,7 @@ import numpy as np
 
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.simulation.recorder import Frame
-from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5 import read_frames
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 
 if TYPE_CHECKING:

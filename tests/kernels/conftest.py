@@ -17,9 +17,9 @@ import pytest
 from hypothesis import settings
 
 from blocksim.kernels.common.arrays import ALL, BODY, zeros
-from blocksim.kernels.common.geometry import place_corners
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.common.jit import config
+from blocksim.kernels.common.shapes import place_corners
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.simulation.team import Team
 from blocksim.verification.scene import scenario_of

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from blocksim.scenario.accelerations import corrected
-from blocksim.scenario.motion import MotionPieces, motion_pieces
+from blocksim.scenario.motion import MotionPieces, correct_baseline, motion_pieces
 from tests.scenario.test_motion import assert_smooth, at, scenario
 
 A, F = 4.0, 2.0
@@ -83,13 +82,13 @@ def test_with_the_baseline_rest_the_supports_end_at_rest_where_they_began(tmp_pa
     displacement, velocity = at(pieces, 2.25, 3.0)
     assert np.abs(displacement).max() < 1e-13
     assert np.abs(velocity).max() < 1e-13
-    removed = rows[:, 1] - corrected(rows[:, 0], rows[:, 1], "rest")
+    removed = rows[:, 1] - correct_baseline(rows[:, 0], rows[:, 1], "rest")
     assert np.abs(np.diff(removed, 2)).max() < 1e-12  # a straight line
 
 
 def test_the_parabolic_baseline_makes_the_velocities_least(rows: np.ndarray) -> None:
     t, before = rows.T
-    after = corrected(t, before, "parabolic")
+    after = correct_baseline(t, before, "parabolic")
     removed = before - after
     assert np.abs(np.diff(removed, 3)).max() < 1e-12  # a parabola
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario.bounded_read import read_limited, refuse_large
+from blocksim.scenario.input_files import read_limited, refuse_large
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ import pytest
 from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_hash, scenario_to_toml
 from blocksim.scenario.document import Document
-from blocksim.scenario.drawings import DrawingError, read_drawing, simplified
 from blocksim.scenario.models.stepping import Explicit
+from blocksim.scenario.structures.polygons import DrawingError, read_drawing, simplify
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
 WEDGE = [[1, 0], [1.5, 0.0], [2, 0], [1, 1], [1, 0]]
@@ -180,9 +180,9 @@ def test_damaged_dxf_files_are_refused(tmp_path: Path, content: bytes) -> None:
 
 def test_only_points_within_straight_edges_are_left_out() -> None:
     square = [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]
-    assert simplified(square) == [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+    assert simplify(square) == [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
     polygon = [(math.cos(0.4 * k), math.sin(0.4 * k)) for k in range(15)]
-    assert simplified(polygon) == polygon
+    assert simplify(polygon) == polygon
 
 
 def test_blocks_of_rounded_coordinates_fit_once_they_are_shrunk(tmp_path: Path) -> None:

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario.keys import MISSING, field_at, follow, format_key, is_known, parse_key, table_at
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.scenario.models.motion import FromTable
-from blocksim.scenario.structures.stack import Stack
+from blocksim.scenario.overrides import MISSING, field_at, follow, format_key, is_known, parse_key, table_at
+from blocksim.scenario.structures.masonry import Stack
 
 DATA = {
     "blocks": {"brick": {"width": 1}},

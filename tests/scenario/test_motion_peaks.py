@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from blocksim.scenario.motion import MotionPieces, motion_pieces
-from blocksim.scenario.motion_peaks import motion_peaks
+from blocksim.scenario.motion import MotionPieces, motion_peaks, motion_pieces
 from tests.scenario.test_motion import END, scenario
 
 

@@ -6,11 +6,10 @@ from typing import Any
 import pytest
 
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
-from blocksim.scenario.load_places import face_of, strip_before
+from blocksim.scenario.events import joint_between
 from blocksim.scenario.models.loads import Face
-from blocksim.scenario.overrides import frozen
-from blocksim.scenario.probes import joint_between
-from blocksim.scenario.start import impossible_starts
+from blocksim.scenario.overrides import freeze
+from blocksim.scenario.start import face_of, impossible_starts, strip_before
 from tests.scenario.conftest import data_of
 
 OAK = {"depth": 0.1, "material": "oak"}
@@ -23,7 +22,7 @@ HIGH = 0.1 * math.sqrt(3.0) / 2.0
 
 
 def scenario(bodies: list[dict[str, Any]], **tables: object) -> Scenario:
-    return Scenario.model_validate(frozen(data_of(blocks=BLOCKS, bodies=bodies, **tables)))
+    return Scenario.model_validate(freeze(data_of(blocks=BLOCKS, bodies=bodies, **tables)))
 
 
 def told(bodies: list[dict[str, Any]], **tables: object) -> list[tuple[object, str]]:

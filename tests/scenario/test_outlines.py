@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario.outlines import (
+from blocksim.scenario.geometry import (
     Corner,
     area_of,
     box_of,
-    centred,
+    centre_outline,
     centroid,
     faults,
     is_upright,
@@ -45,13 +45,13 @@ def test_moments_are_those_of_the_triangles_from_the_first_corner(
     own = [a / 36.0 * sum(np.sum((t[i] - t[i - 1]) ** 2) for i in range(3)) for a, t in zip(areas, fan, strict=True)]
     polar = sum(own) + float(areas @ np.sum((middles - centre) ** 2, axis=1))
     assert centroid(points.tolist()) == pytest.approx(centre, abs=1e-9 * wide + 1e-12)
-    assert section_of(centred(points.tolist())) == pytest.approx((areas.sum(), polar), rel=1e-8)
+    assert section_of(centre_outline(points.tolist())) == pytest.approx((areas.sum(), polar), rel=1e-8)
 
 
 @given(ANGLES, st.floats(0.1, 10.0))
 def test_the_sense_of_the_corners_does_not_matter(angles: list[int], wide: float) -> None:
     points = on_ellipse(angles, wide)
-    one, other = centred(points), centred([points[0], *points[:0:-1]])
+    one, other = centre_outline(points), centre_outline([points[0], *points[:0:-1]])
     assert one[0] == pytest.approx(other[0], abs=1e-12)
     assert np.ravel(one) == pytest.approx(np.ravel(other), abs=1e-12)
     assert centroid(one) == pytest.approx((0.0, 0.0), abs=1e-14)
@@ -60,7 +60,9 @@ def test_the_sense_of_the_corners_does_not_matter(angles: list[int], wide: float
 def test_an_outline_far_from_its_origin_keeps_its_digits() -> None:
     near = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.25), (0.0, 0.25)]
     far = [(x + 500_000.0, y + 5_500_000.0) for x, y in near]
-    assert centred(far) == centred(near) == ((-0.25, -0.125), (0.25, -0.125), (0.25, 0.125), (-0.25, 0.125))
+    assert (
+        centre_outline(far) == centre_outline(near) == ((-0.25, -0.125), (0.25, -0.125), (0.25, 0.125), (-0.25, 0.125))
+    )
 
 
 @pytest.mark.parametrize("sides", [3, 4, 6, 7, 16])
@@ -112,7 +114,7 @@ def test_upright_rectangles_have_no_round_off_of_their_own(
     tall = wide * slender
     points = [(0.0, 0.0), (wide, 0.0), (wide, tall), (0.0, tall)]
     points = [*points[first:], *points[:first]][:: -1 if clockwise else 1]
-    assert is_upright(centred(points))
-    assert {(2.0 * abs(x), 2.0 * abs(y)) for x, y in centred(points)} == {(wide, tall)}
-    assert not is_upright(centred([(0.0, 0.0), (wide, 1e-9 * wide), (wide, tall), (0.0, tall)]))
-    assert not is_upright(centred([(0.0, 0.0), (wide, 0.0), (wide, tall)]))
+    assert is_upright(centre_outline(points))
+    assert {(2.0 * abs(x), 2.0 * abs(y)) for x, y in centre_outline(points)} == {(wide, tall)}
+    assert not is_upright(centre_outline([(0.0, 0.0), (wide, 1e-9 * wide), (wide, tall), (0.0, tall)]))
+    assert not is_upright(centre_outline([(0.0, 0.0), (wide, 0.0), (wide, tall)]))

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario.outlines import Corner, centred
+from blocksim.scenario.geometry import Corner, centre_outline
 from blocksim.scenario.overlap import Outlines, Rectangles, crossings, near_pairs, overlapping_pairs, penetration
-from blocksim.scenario.placement import PlacedBody
-from blocksim.scenario.segments import PlacedSegment
+from blocksim.scenario.placement import PlacedBody, PlacedSegment
 
 
 def body(x: float, y: float, angle: float = 0.0, size_x: float = 0.04, size_y: float = 0.02) -> PlacedBody:
@@ -23,7 +22,7 @@ def corners(b: PlacedBody) -> list[tuple[float, float]]:
 
 
 def polygon(x: float, y: float, points: list[Corner], angle: float = 0.0) -> PlacedBody:
-    outline = centred(points)
+    outline = centre_outline(points)
     sizes = [max(values) - min(values) for values in zip(*outline, strict=True)]
     return body(x, y, angle, *sizes)._replace(outline=outline)
 

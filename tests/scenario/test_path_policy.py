@@ -7,7 +7,7 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Document, load_scenario, scenario_from_mapping
-from blocksim.scenario.path_policy import reaching
+from blocksim.scenario.input_files import file_access
 from tests.scenario.conftest import data_of
 
 TABLE = "block,quantity,unit,replicate,value\n1,x,mm,1,16\n"
@@ -99,7 +99,7 @@ def test_cases_of_a_sweep_name_no_file_outside(naming: Callable[[str], Path]) ->
 
 def test_a_document_keeps_what_was_allowed_when_it_was_read(naming: Callable[[str], Path]) -> None:
     scenario = naming("../theirs/measured.csv")
-    with reaching(anywhere=True):
+    with file_access(anywhere=True):
         allowed = Document.read(scenario)
     assert allowed.build().experiment is not None
     with pytest.raises(ScenarioError, match="leads outside"):

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
-from blocksim.scenario.overrides import frozen
+from blocksim.scenario.overrides import freeze
 from blocksim.scenario.placement import LENGTH_WITHOUT_BLOCKS, PlacedBody, length_beside, smallest_width
 from tests.scenario.conftest import MATERIAL, data_of
 
@@ -88,7 +88,7 @@ def test_a_scenario_is_placed_once_and_its_bodies_go_with_it() -> None:
 def placed_outline(outline: list[list[float]], **tables: object) -> PlacedBody:
     blocks = {"wedge": {"outline": outline, "depth": 0.5, "material": "aluminium"}, "brick": BRICK}
     data = data_of(materials={"aluminium": MATERIAL}, blocks=blocks, **tables)
-    return place_bodies(Scenario.model_validate(frozen(data)))[0]
+    return place_bodies(Scenario.model_validate(freeze(data)))[0]
 
 
 def test_a_block_with_an_outline_is_placed_by_its_centroid() -> None:

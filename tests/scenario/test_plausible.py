@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.scenario.plausible import implausible_values
+from blocksim.scenario.check import implausible_values
 from tests.soils import column, scene
 
 THREE_BLOCKS = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from blocksim.scenario import polygons
+from blocksim.scenario import geometry
 
-SQUARE = polygons.corners_of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
-ELL = polygons.corners_of([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)])
-SLOPE = polygons.corners_of([(0.0, 0.0), (2.0, 0.0), (0.0, 1.0)])
+SQUARE = geometry.corners_of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+ELL = geometry.corners_of([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)])
+SLOPE = geometry.corners_of([(0.0, 0.0), (2.0, 0.0), (0.0, 1.0)])
 
 
-def moved(x: float, y: float) -> polygons.Floats:
+def moved(x: float, y: float) -> geometry.Floats:
     return np.asarray(SQUARE + np.array([x, y]))
 
 
 def test_corners_run_counter_clockwise_however_they_are_given() -> None:
-    assert polygons.signed_area(polygons.corners_of([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])) == 1.0
-    assert polygons.signed_area(ELL) == 3.0
+    assert geometry.signed_area(geometry.corners_of([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])) == 1.0
+    assert geometry.signed_area(ELL) == 3.0
 
 
 @pytest.mark.parametrize(
@@ -31,31 +31,31 @@ def test_corners_run_counter_clockwise_however_they_are_given() -> None:
         (np.array([[0.5, -1.0], [0.6, -1.0], [0.6, 2.0], [0.5, 2.0]]), True),  # across, no corner inside
     ],
 )
-def test_polygons_overlap_where_they_have_more_than_edges_in_common(other: polygons.Floats, meets: bool) -> None:
-    assert polygons.overlap(SQUARE, other) is meets
-    assert polygons.overlap(other, SQUARE) is meets
+def test_polygons_overlap_where_they_have_more_than_edges_in_common(other: geometry.Floats, meets: bool) -> None:
+    assert geometry.overlap(SQUARE, other) is meets
+    assert geometry.overlap(other, SQUARE) is meets
 
 
 def test_the_notch_of_an_ell_is_free() -> None:
-    assert not polygons.overlap(ELL, moved(1.0, 1.0))
-    assert polygons.overlap(ELL, moved(0.9, 1.0))
+    assert not geometry.overlap(ELL, moved(1.0, 1.0))
+    assert geometry.overlap(ELL, moved(0.9, 1.0))
 
 
 def test_a_lattice_fills_a_square_and_keeps_its_discs_inside_a_slope() -> None:
-    places = polygons.filled(SQUARE, 0.1)
+    places = geometry.fill_lattice(SQUARE, 0.1)
     assert len(places) == 100
     assert places[0] == pytest.approx([0.05, 0.05])
-    sloping = polygons.filled(SLOPE, 0.05)
-    assert polygons.edge_distance(sloping, SLOPE).min() >= 0.499 * 0.05
+    sloping = geometry.fill_lattice(SLOPE, 0.05)
+    assert geometry.edge_distance(sloping, SLOPE).min() >= 0.499 * 0.05
     assert len(sloping) * 0.05**2 == pytest.approx(1.0, abs=0.05)
 
 
 def test_the_weight_above_counts_what_is_there_only() -> None:
     points = np.array([[0.5, 0.5], [1.5, 0.25], [0.5, 2.5]])
-    assert polygons.height_above(ELL, points) == pytest.approx([1.5, 0.75, 0.0])
+    assert geometry.height_above(ELL, points) == pytest.approx([1.5, 0.75, 0.0])
 
 
 def test_edges_that_cross_are_found() -> None:
     bow = np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
-    assert list(polygons.self_crossings(bow)) == [(0, 2)]
-    assert list(polygons.self_crossings(ELL)) == []
+    assert list(geometry.self_crossings(bow)) == [(0, 2)]
+    assert list(geometry.self_crossings(ELL)) == []

@@ -6,7 +6,7 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import PlacedBody, place_bodies, scenario_from_mapping
-from blocksim.scenario.probes import joint_between
+from blocksim.scenario.events import joint_between
 from tests.scenario.conftest import data_of
 
 

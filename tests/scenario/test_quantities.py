@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
-from blocksim.scenario import quantities as q
-from blocksim.scenario.quantities import LENGTH, STIFFNESS, TIME, UNIT_WEIGHT, Kind, Quantity, parse_quantity, shown
+from blocksim.scenario import units as q
+from blocksim.scenario.units import LENGTH, STIFFNESS, TIME, UNIT_WEIGHT, Kind, Quantity, parse_quantity, toml
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_bounds(annotation: Any, inside: object, outside: object) -> None:
     ],
 )
 def test_values_are_shown_as_in_toml_and_short(value: object, text: str) -> None:
-    assert shown(value) == text
+    assert toml(value) == text
 
 
 @pytest.mark.parametrize("kind", [LENGTH, TIME, UNIT_WEIGHT, STIFFNESS])

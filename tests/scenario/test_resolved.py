@@ -19,7 +19,7 @@ from blocksim.scenario import (
     scenario_hash,
     scenario_to_toml,
 )
-from blocksim.scenario.overrides import frozen
+from blocksim.scenario.overrides import freeze
 from blocksim.scenario.resolved import deciding_values
 
 REPOSITORY = Path(__file__).parents[2]
@@ -318,11 +318,11 @@ HEXAGON = {"sides": 6, "radius": 1, "depth": 1, "material": "m"}
 def test_the_hash_changes_with_every_key_of_an_outline(
     data: dict[str, Any], block: dict[str, Any], change: dict[str, Any]
 ) -> None:
-    one, other = (Scenario.model_validate(frozen({**data, "blocks": {"b": b}})) for b in (block, {**block, **change}))
+    one, other = (Scenario.model_validate(freeze({**data, "blocks": {"b": b}})) for b in (block, {**block, **change}))
     assert scenario_hash(one) != scenario_hash(other)
     for scenario in (one, other):
         text = scenario_to_toml(scenario)
-        assert Scenario.model_validate(frozen(tomllib.loads(text))) == scenario
+        assert Scenario.model_validate(freeze(tomllib.loads(text))) == scenario
         assert "upright" not in text
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.scenario import PlacedSegment, Scenario, place_segments, scenario_from_mapping, surface_height
-from blocksim.scenario.segments import ENDLESS
+from blocksim.scenario.placement import ENDLESS
 from tests.scenario.conftest import data_of
 
 Point = tuple[float, float]

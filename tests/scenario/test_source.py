@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.scenario.keys import KeyPath
-from blocksim.scenario.source import Span, locate
+from blocksim.scenario.document import Span, locate
+from blocksim.scenario.overrides import KeyPath
 
 TEXT = '''\
 # comment with [brackets] and = signs

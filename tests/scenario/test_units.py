@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from blocksim.scenario import quantities as q
+from blocksim.scenario import units as q
 from blocksim.scenario.units import Dimension, Unit, UnitError, parse_unit
 
 

@@ -10,10 +10,9 @@ from blocksim.kernels.common.arrays import REACHED, Floats, World
 from blocksim.scenario.models.stepping import Time
 from blocksim.simulation.schemes.scheme import Scheme
 from blocksim.world.bodies import Outline
-from blocksim.world.bounds import Bounds
-from blocksim.world.build import empty_controls, without_lists
+from blocksim.world.build import Construction, Parts, Stride, empty_controls, without_lists
 from blocksim.world.memory import scene_size
-from blocksim.world.scenes import Construction, Parts, Stride
+from blocksim.world.step import Bounds
 
 STEP = 1e-3  # s
 

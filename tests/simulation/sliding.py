@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation import read_result, simulate_into
-from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.checkpoint import CheckpointPolicy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -13,7 +13,7 @@ import pytest
 
 from blocksim.errors import OutputError
 from blocksim.simulation import atomic
-from blocksim.study.progress import Manifest
+from blocksim.study.manifest import Manifest
 
 
 def test_text_is_written_in_utf8_with_plain_line_ends(tmp_path: Path) -> None:

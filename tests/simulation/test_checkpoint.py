@@ -16,12 +16,12 @@ from blocksim.simulation.checkpoint import (
     Position,
     origin_of,
     read_checkpoint,
-    restored,
+    restore_scene,
     write_checkpoint,
 )
 from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.team import ALONE
-from blocksim.world.scenes import arrays_of
+from blocksim.world.build import arrays_of
 from tests.simulation.sliding import MODELS, sliding
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def test_scene_comes_back_to_the_last_bit_in_arrays_of_the_same_types(tmp_path: 
     path = tmp_path / "checkpoint.0"
     write_checkpoint(path, scene, AT, origin_of(scenario))
     stored = read_checkpoint(path)
-    back = restored(stored, build_scene(scenario))
+    back = restore_scene(stored, build_scene(scenario))
     assert stored.position == AT
     assert type(back) is type(scene)
     for one, other in zip(arrays_of(back), arrays_of(scene), strict=True):
@@ -104,7 +104,7 @@ def test_shapes_that_no_array_has_are_refused(written: Path, shape: str) -> None
     old = f",{json.dumps(read_checkpoint(written).head.arrays[0].shape)}]".encode()
     stored = read_checkpoint(forged(written, old, f",{shape}]".encode()))
     with pytest.raises(InvalidInputError, match="does not fit this scene"):
-        restored(stored, build_scene(sliding({})))
+        restore_scene(stored, build_scene(sliding({})))
 
 
 def test_checkpoint_larger_than_the_memory_is_not_read(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,7 +116,7 @@ def test_checkpoint_larger_than_the_memory_is_not_read(written: Path, monkeypatc
 @pytest.mark.parametrize("name", ["particles-linear", "nonsmooth"])
 def test_arrays_of_another_scene_are_refused(written: Path, name: str) -> None:
     with pytest.raises(InvalidInputError, match="do not fit this scene"):
-        restored(read_checkpoint(written), build_scene(sliding(MODELS[name])))
+        restore_scene(read_checkpoint(written), build_scene(sliding(MODELS[name])))
 
 
 def test_write_that_fails_leaves_the_older_one(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:

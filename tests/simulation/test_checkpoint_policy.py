@@ -6,8 +6,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from blocksim.simulation.checkpoint import Position, origin_of, read_checkpoint
-from blocksim.simulation.checkpoint_policy import NEVER, CheckpointPolicy, CheckpointWriter, Past
+from blocksim.simulation.checkpoint import (
+    NEVER,
+    CheckpointPolicy,
+    CheckpointWriter,
+    Past,
+    Position,
+    origin_of,
+    read_checkpoint,
+)
 from blocksim.simulation.schemes import build_scene
 from tests.simulation.sliding import sliding
 

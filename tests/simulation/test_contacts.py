@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation import Result, simulate, simulate_into
-from blocksim.simulation.contacts import SUPPORT, Contacts, borne, forces_on_a
-from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.frames import SUPPORT, Contacts, force_on_supports, forces_on_a
+from blocksim.simulation.stores.hdf5 import read_frames
 from tests.simulation.conftest import Shipped
 
 EVERY_STEP = 1e-9  # s; no step is shorter
@@ -114,7 +114,7 @@ def test_ground_holds_what_blocks_at_rest_weigh(soft: Shipped, name: str, scheme
     fixed = [body.fixed for body in place_bodies(result.scenario)]
     weight = sum(body.mass for body in free) * result.scenario.gravity
     tilt = result.scenario.ground.tilt
-    held = borne(contacts, (float(np.sin(tilt)), float(np.cos(tilt))), fixed)
+    held = force_on_supports(contacts, (float(np.sin(tilt)), float(np.cos(tilt))), fixed)
     assert held[-1] == pytest.approx(weight, rel=1e-6)
 
 
@@ -125,7 +125,7 @@ def test_there_are_as_many_as_are_counted_and_they_keep_within_the_cone(soft: Sh
     np.testing.assert_array_equal(counts, result.frames.contact_count)
     rows = contacts.rows
     assert (rows["normal_force"] >= 0.0).all()
-    # N: springs of 950 kN/m push along a face of 32 mm or more that shrinks by slip, see kernels/explicit/tributary.py
+    # N: springs of 950 kN/m push along a face of 32 mm or more that shrinks by slip, see kernels/explicit/bearing.py
     push = 0.5 * 9.5e5 * rows["overlap"] ** 2 / 0.032 if scheme == "explicit" else 0.0
     assert (np.abs(rows["shear_force"]) <= 0.38 * rows["normal_force"] * (1.0 + 1e-9) + push).all()
     np.testing.assert_allclose(np.hypot(rows["normal_x"], rows["normal_y"]), 1.0, rtol=1e-9)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.scenario.drives import drives_of
+from blocksim.scenario.motion import drives_of
 from blocksim.simulation import run_ensemble, simulate, simulate_into
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, Simulation

@@ -10,13 +10,12 @@ from blocksim.bench.scenes import pushed_wall
 from blocksim.errors import ExitCode
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import ensemble, simulate
-from blocksim.simulation.ensemble import Ensemble, run_ensemble, run_in_batches
-from blocksim.simulation.member_end import Ended, MemberEnd, MemberFailure
+from blocksim.simulation.ensemble import Ensemble, EnsembleEnd, MemberEnd, MemberFailure, run_ensemble, run_in_batches
 from blocksim.simulation.schemes import build_stacks
-from blocksim.world import build, memory, scenes
+from blocksim.world import build, memory
+from blocksim.world.build import Stack
 from blocksim.world.memory import SceneTooLargeError, scene_size
 from blocksim.world.rigid_step import StepTooLongError
-from blocksim.world.scenes import Stack
 from blocksim.world.step import SkinTooSmallError, StepTooLargeError
 
 if TYPE_CHECKING:
@@ -122,7 +121,7 @@ def test_a_member_whose_pair_list_is_full_gets_more_room(monkeypatch: pytest.Mon
     calls: list[int] = []
     alone = Ensemble._run_alone
 
-    def counted(self: Ensemble, m: int, start: float) -> Ended:
+    def counted(self: Ensemble, m: int, start: float) -> EnsembleEnd:
         calls.append(m)
         return alone(self, m, start)
 
@@ -195,7 +194,7 @@ def test_a_stack_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatc
     whole = [end.columns for end in run_ensemble(scenarios)]
     one = next(iter(build_stacks(scenarios[:1])))
     assert isinstance(one, Stack)
-    monkeypatch.setattr(scenes, "MOST_BYTES", 2 * scene_size(4, 16, 8).bytes)
+    monkeypatch.setattr(build, "MOST_BYTES", 2 * scene_size(4, 16, 8).bytes)
     assert [len(stack.placed) for stack in build_stacks(scenarios) if isinstance(stack, Stack)] == [2, 2, 1]
     assert [end.columns for end in run_ensemble(scenarios)] == whole
 

@@ -24,7 +24,7 @@ from blocksim.simulation.folder import (
     newest_finished,
     prepare_folder,
 )
-from blocksim.simulation.table import COLUMNS, csv_text
+from blocksim.simulation.frames import COLUMNS, csv_text
 from tests.simulation.conftest import SCENARIOS, Shipped
 from tests.simulation.sliding import MODELS, interrupted_at, sliding
 

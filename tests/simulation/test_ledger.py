@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from blocksim.simulation import run_ensemble, simulate, simulate_into
-from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.ledger import BODY_STEPS, FIRST_CHECK, EnergyLedger, next_energy_check
 
 if TYPE_CHECKING:

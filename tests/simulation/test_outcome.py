@@ -11,10 +11,10 @@ import pytest
 from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.scenario import place_bodies
-from blocksim.simulation import run_ensemble, running, simulate, simulate_into
-from blocksim.simulation.checkpoint import read_checkpoint
-from blocksim.simulation.checkpoint_policy import CheckpointPolicy
-from blocksim.simulation.outcome import BY_CODE, RESIDUAL, diagnosed, interrupted
+from blocksim.simulation import run as running
+from blocksim.simulation import run_ensemble, simulate, simulate_into
+from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
+from blocksim.simulation.loop import BY_CODE, RESIDUAL, diagnose, interrupted
 from blocksim.simulation.schemes import build, build_scene
 from tests.simulation.sliding import sliding
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.scenario import Scenario
-    from blocksim.world.scenes import Built
+    from blocksim.world.build import Built
     from tests.simulation.conftest import Shipped
 
 TIMES_THE_LIMIT = 50.0
@@ -79,20 +79,20 @@ def test_block_that_is_not_finite_is_named() -> None:
     scenario = sliding({})
     scene, placed = build_scene(scenario), place_bodies(scenario)
     scene.world.bodies[1].vy = np.nan
-    assert diagnosed(BY_CODE[NOT_FINITE], NOT_FINITE, scene, placed).reason.endswith("(block above, step 0)")
+    assert diagnose(BY_CODE[NOT_FINITE], NOT_FINITE, scene, placed).reason.endswith("(block above, step 0)")
 
 
 def test_lost_energy_names_the_fastest_block() -> None:
     scenario = sliding({})
     scene, placed = build_scene(scenario), place_bodies(scenario)
-    reason = diagnosed(RESIDUAL, REACHED, scene, placed).reason
+    reason = diagnose(RESIDUAL, REACHED, scene, placed).reason
     assert reason.endswith("(the fastest is block above with 1 m/s, step 0)")
 
 
 def test_runs_that_did_not_fail_keep_their_words() -> None:
     scenario = sliding({})
     for outcome in (BY_CODE[REACHED], interrupted("stopped by SIGTERM")):
-        assert diagnosed(outcome, OVERLAP_LIMIT, build_scene(scenario), place_bodies(scenario)) == outcome
+        assert diagnose(outcome, OVERLAP_LIMIT, build_scene(scenario), place_bodies(scenario)) == outcome
 
 
 def test_member_of_an_ensemble_says_the_same_as_a_run_of_its_own() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from blocksim.errors import OutputError, OutputExistsError
-from blocksim.simulation.own_files import refuse_foreign
-from blocksim.view.animation_files import write_gif, write_mp4
+from blocksim.simulation.folder import refuse_foreign
+from blocksim.view.animation import write_gif, write_mp4
 from blocksim.view.style import save_figure, styled_figure
 
 PNG = b"\x89PNG\r\n\x1a\n"

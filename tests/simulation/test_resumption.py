@@ -14,13 +14,11 @@ import pytest
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import simulate_into
-from blocksim.simulation.checkpoint import read_checkpoint
-from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.checkpoint import CheckpointPolicy, find_resumption, read_checkpoint
 from blocksim.simulation.provenance import code_hashes
-from blocksim.simulation.resumption import find_resumption
 from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.team import Team
-from blocksim.world.scenes import arrays_of
+from blocksim.world.build import arrays_of
 from tests.simulation.sliding import MODELS, assert_same, interrupted_at, sliding
 from tests.sizes import in_all
 
@@ -37,7 +35,7 @@ def two_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     def team(_: AnyScene, threads: int, _elements: int) -> Team:
         return Team(threads)
 
-    monkeypatch.setattr("blocksim.simulation.running.team_for", team)
+    monkeypatch.setattr("blocksim.simulation.run.team_for", team)
 
 
 def points(whole: Result, seed: str, count: int) -> list[int]:

@@ -19,8 +19,7 @@ from blocksim.errors import InputMissingError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, load_scenario, placement
 from blocksim.simulation import Progress, Result, read_result, simulate, simulate_into
 from blocksim.simulation.compilation import compile_kernels
-from blocksim.simulation.disk_room import bytes_needed
-from blocksim.simulation.running import Listener
+from blocksim.simulation.run import RunCallbacks, bytes_needed
 from blocksim.simulation.schemes import build_scene
 from blocksim.world.step import StepTooLargeError
 from tests.simulation.sliding import sliding
@@ -198,7 +197,7 @@ def test_too_small_a_disk_is_reported_with_both_sizes(tmp_path: Path, monkeypatc
         asked.append(place)
         return SimpleNamespace(free=1_000_000)
 
-    monkeypatch.setattr("blocksim.simulation.disk_room.shutil.disk_usage", usage)
+    monkeypatch.setattr("blocksim.simulation.run.shutil.disk_usage", usage)
     scenario = sliding({}, end=0.05, every=1e-7)
     with pytest.raises(OutputError, match=r"the results may take 2 MB, but only 1 MB are free there"):
         simulate_into(scenario, tmp_path / "not" / "yet")
@@ -223,7 +222,7 @@ def test_blocks_are_placed_once_from_loading_to_the_result(tmp_path: Path, monke
 
 def test_a_run_that_cannot_be_built_is_refused_before_it_compiles(soft: Shipped, tmp_path: Path) -> None:
     started: list[str] = []
-    listener = Listener(on_start=started.append)
+    listener = RunCallbacks(on_start=started.append)
     with pytest.raises(StepTooLargeError):
         simulate_into(soft(time__step=1.0, time__end=2.0), tmp_path / "run", listener=listener)
     assert started == []
@@ -238,5 +237,5 @@ def test_stopping_while_the_solver_is_compiled_leaves_no_folder(soft: Shipped, t
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate_into(soft(time__end=1e-4), tmp_path / "results" / "run", listener=Listener(on_start=stop))
+        simulate_into(soft(time__end=1e-4), tmp_path / "results" / "run", listener=RunCallbacks(on_start=stop))
     assert list(tmp_path.iterdir()) == []

@@ -11,10 +11,10 @@ import pytest
 from blocksim.errors import ExitCode, ScenarioError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import simulate, simulate_into
-from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
 from blocksim.simulation.schemes import build, scheme_of
-from blocksim.simulation.settling import SettleError, begun, settle
+from blocksim.simulation.settling import SettleError, initial_scene, settle
 from blocksim.simulation.team import ALONE
 from blocksim.study.criterion import DEFAULT, Verdict, read_criterion
 
@@ -200,7 +200,7 @@ def test_the_inertial_force_of_a_support_that_jerks_at_time_zero_is_carried_up_t
 ) -> None:
     scenario = jerked(scheme, share)
     built = build(scenario)
-    scene, settled = begun(built.scene, scenario, built.placed, ALONE)
+    scene, settled = initial_scene(built.scene, scenario, built.placed, ALONE)
     assert settled is not None
     scene, _ = ALONE.advance(scene, 0)
     weight = 2 * 160.0 * G

@@ -8,7 +8,7 @@ import pytest
 
 import blocksim
 from blocksim.scenario import Scenario
-from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.checkpoint import CheckpointPolicy
 from tests.soils import DEPTH, FAR, LEFT, MATERIALS, UNIT_WEIGHT, Soil, column, right, scene
 
 SPACING = 0.005

@@ -9,7 +9,7 @@ import pytest
 import blocksim
 from blocksim.errors import InvalidInputError
 from blocksim.simulation import Result
-from blocksim.simulation.stores.vtkhdf import write_vtkhdf
+from blocksim.simulation.stores.exports import write_vtkhdf
 from blocksim.study.run import open_run
 from blocksim.view.kinds import run_kind
 from blocksim.view.paint import paint_named

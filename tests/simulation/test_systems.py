@@ -14,25 +14,22 @@ import blocksim
 from blocksim.analysis.bits import differences
 from blocksim.errors import ExitCode, InvalidInputError, ScenarioError
 from blocksim.scenario import Scenario, json_schema, load_scenario, scenario_from_mapping, scenario_to_toml
-from blocksim.scenario.systems import SYSTEMS
+from blocksim.scenario.models.base import SYSTEMS
 from blocksim.simulation import run_ensemble
-from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.compilation import SMALLEST_SCENE
 from blocksim.simulation.frames import data_set, tidy_table
-from blocksim.simulation.outcome import BY_CODE, diagnosed
+from blocksim.simulation.loop import BY_CODE, diagnose
 from blocksim.simulation.schemes import build
-from blocksim.simulation.stores.csv_tables import write_frames_csv
-from blocksim.simulation.stores.vtkhdf import write_vtkhdf
+from blocksim.simulation.stores.exports import write_frames_csv, write_vtkhdf
 from blocksim.simulation.team import ALONE, team_for
 from blocksim.view import style
 from blocksim.view.animation import Animation, Look
-from blocksim.view.report import elements
-from blocksim.view.report.elements import element_bytes
-from blocksim.view.report.player import pack_frames
-from blocksim.view.report.runs import read_stored, run_subject
-from blocksim.view.run_data import Support, drawable_frames
+from blocksim.view.report import player
+from blocksim.view.report.player import element_bytes, pack_frames
+from blocksim.view.report.subjects import read_stored, run_subject
+from blocksim.view.run_data import Support, drawable_frames, extent_of
 from blocksim.view.strip import draw_strip
-from blocksim.view.window import extent_of
 from blocksim.world.describe import describe
 from blocksim.world.memory import chunk_rows
 from blocksim.world.systems import INTERACTIONS
@@ -224,7 +221,7 @@ def test_a_number_that_is_not_finite_ends_the_run_and_names_the_system() -> None
     one = build(scene())
     one.scene.systems[0].points.y[1] = np.nan
     after, code = ALONE.advance(one.scene, 100_000)
-    told = diagnosed(BY_CODE[code], code, after, one.placed)
+    told = diagnose(BY_CODE[code], code, after, one.placed)
     assert told.exit_code == ExitCode.NUMERICAL_FAILURE
     assert "(masses, step " in told.reason
 
@@ -271,7 +268,7 @@ def test_the_player_gets_all_corners_of_elements_that_grow(monkeypatch: pytest.M
         corners = discs(track, chosen, np.full(len(track.names), RADIUS))
         return corners * (1.0 + np.asarray(chosen)[:, None, None, None])
 
-    monkeypatch.setattr(elements, "outlines_of", growing)
+    monkeypatch.setattr(player, "outlines_of", growing)
     (packed,) = pack_frames(frames).data["systems"]
     assert packed["shape"] is None
     wanted = 1e3 * growing(frames.others[0], np.arange(len(frames)))

@@ -10,7 +10,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.simulation import Frames, Result
-from blocksim.simulation.table import COLUMNS, as_frame, csv_text, final_table, read_table
+from blocksim.simulation.frames import COLUMNS, as_frame, csv_text, final_table, read_table
 
 
 def frames_of(angle: float, start_angle: float) -> Frames:

@@ -9,8 +9,7 @@ import blocksim
 from blocksim.errors import InvalidInputError, ScenarioError
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation import Result
-from blocksim.simulation.stores.drawn import write_geojson
-from blocksim.simulation.stores.vtkhdf import write_vtkhdf
+from blocksim.simulation.stores.exports import write_geojson, write_vtkhdf
 from tests.soils import LEFT, column, data_of
 
 ALONE = {"blocks": {}, "bodies": [], "output": {"every": 0.02}}

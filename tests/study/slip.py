@@ -14,7 +14,7 @@ from blocksim.study.rows import Row
 from blocksim.study.runs import Replay, runs_of
 from blocksim.study.study import Study
 from blocksim.study.sweep_folder import FolderKind
-from blocksim.view.layout import Paper
+from blocksim.view.style import Paper
 from tests.study.test_limit import SQUAT, block_on_a_slope
 
 

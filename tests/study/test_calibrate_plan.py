@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blocksim.scenario import Sweep
-from blocksim.scenario.models.variation import Normal, Uniform
+from blocksim.scenario.models.study import Normal, Uniform
 from blocksim.study.calibrate_plan import Prior, Scatter, about, prior_of
 from blocksim.study.rows import si_number
 

@@ -10,8 +10,7 @@ import pytest
 from scipy.stats import binomtest
 
 from blocksim.errors import InvalidInputError, OutputExistsError
-from blocksim.study.calibrate_plan import Prior
-from blocksim.study.calibrate_search import FIRST, Score, Trial, hits_of, miss_of, opened, score_of, search
+from blocksim.study.calibrate_plan import FIRST, Prior, Score, Trial, hits_of, miss_of, open_journal, score_of, search
 from blocksim.study.executors.ensemble import Member
 from blocksim.study.rows import Range
 
@@ -91,7 +90,7 @@ def hill(values: Mapping[str, object]) -> Score:
 def made(
     journal: Path, trials: int, seed: int = 3, evaluate: Callable[[Mapping[str, object]], Score] = hill
 ) -> list[Trial]:
-    with opened(journal, PLAN) as study:
+    with open_journal(journal, PLAN) as study:
         return list(search(PRIORS, evaluate, study, trials=trials, seed=seed))
 
 
@@ -162,7 +161,7 @@ def test_journal_of_another_plan_is_refused_and_kept(tmp_path: Path) -> None:
     before = journal.read_bytes()
     with (
         pytest.raises(OutputExistsError, match=r"another calibration \(scenario differ"),
-        opened(journal, {**PLAN, "scenario": "two"}),
+        open_journal(journal, {**PLAN, "scenario": "two"}),
     ):
         pass
     assert journal.read_bytes() == before
@@ -171,7 +170,7 @@ def test_journal_of_another_plan_is_refused_and_kept(tmp_path: Path) -> None:
 def test_two_at_once_are_refused(tmp_path: Path) -> None:
     @contextmanager
     def second() -> Iterator[None]:
-        with opened(tmp_path / "journal", PLAN):
+        with open_journal(tmp_path / "journal", PLAN):
             yield
 
     with second(), pytest.raises(OutputExistsError, match="another calibration is running here"), second():
@@ -182,6 +181,6 @@ def test_two_at_once_are_refused(tmp_path: Path) -> None:
 def test_file_that_is_no_journal_is_refused_and_kept(tmp_path: Path, content: bytes) -> None:
     journal = tmp_path / "journal"
     journal.write_bytes(content)
-    with pytest.raises(InvalidInputError, match="not the journal of a calibration"), opened(journal, PLAN):
+    with pytest.raises(InvalidInputError, match="not the journal of a calibration"), open_journal(journal, PLAN):
         pass
     assert journal.read_bytes() == content

@@ -11,9 +11,9 @@ from blocksim.analysis.judgement import Judgement, Settings
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document
 from blocksim.study.compare import compare, compare_sweep
+from blocksim.study.manifest import SweepResult
 from blocksim.study.run import run
 from blocksim.study.sweep import sweep
-from blocksim.study.sweep_table import SweepResult
 from tests.study.conftest import SCENARIOS
 
 PAPER = SCENARIOS / "experiments" / "three_blocks.csv"

@@ -10,10 +10,19 @@ import pytest
 
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
-from blocksim.scenario.soil_places import soil_tables
+from blocksim.scenario.start import soil_tables
 from blocksim.study import converge as converging
-from blocksim.study.converge import REFINEMENTS, converge, refinements_of
-from blocksim.study.convergence import ConvergenceVerdict, Coordinates, Refinement, RefinementStudy, judge, with_setting
+from blocksim.study.converge import (
+    REFINEMENTS,
+    ConvergenceVerdict,
+    Coordinates,
+    Refinement,
+    RefinementStudy,
+    converge,
+    judge,
+    refinements_of,
+    with_setting,
+)
 from blocksim.study.executors import Batch, Setting, Task
 from blocksim.study.executors import ensemble as folders
 from blocksim.study.executors.processes import DEAD

@@ -6,10 +6,8 @@ import pytest
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import Document
-from blocksim.study import design as mode
-from blocksim.study.design import Combinations, Together
-from blocksim.study.plan import with_sweep
-from blocksim.study.sampling import design_of
+from blocksim.study import plan as mode
+from blocksim.study.plan import Combinations, Together, design_of, with_sweep
 from tests.golden import Golden
 from tests.study.plans import cases, plan_of
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document, scenario_hash
-from blocksim.study.fitted_file import toml_value, with_fitted
+from blocksim.study.calibrate import toml_value, with_fitted
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 KINETIC, RESTITUTION = "friction.block_block.kinetic", "contact.restitution"

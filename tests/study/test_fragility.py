@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from blocksim.analysis.intervals import interval
+from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
 from blocksim.study.fragility import FragilityAnswer, fragility
 from blocksim.study.fragility_plan import read_fragility
-from blocksim.study.progress import Shard
+from blocksim.study.manifest import Shard
 from tests.sizes import in_all
 
 MU = "friction.block_ground"

@@ -18,7 +18,7 @@ from blocksim.study.criterion import Verdict
 from blocksim.study.executors.processes import pool_of
 from blocksim.study.limit import limit as searched
 from blocksim.study.limit_plan import read_limit, variants
-from blocksim.study.progress import MANIFEST, Manifest
+from blocksim.study.manifest import MANIFEST, Manifest
 
 limit = partial(searched, keep_runs=False)
 FRICTION = 0.38

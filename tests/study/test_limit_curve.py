@@ -12,7 +12,7 @@ from blocksim.study.limit import limit_curve
 from blocksim.study.limit_answer import CurveAnswer
 from blocksim.study.pictures import plot
 from blocksim.study.reporting import report
-from blocksim.view.limit_curve import Bracket, LimitCurve, Series, joined
+from blocksim.view.studies import Bracket, LimitCurve, Series, joined
 from tests.study.test_limit import TILT, block_on_a_slope
 
 SIZE = (0.05, 0.1)  # m: topples at atan 0.5
@@ -60,7 +60,7 @@ def test_a_table_of_others_is_drawn_beside_it(
     found: CurveAnswer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[LimitCurve] = []
-    monkeypatch.setattr("blocksim.view.limit_curve.draw_limit_curve", lambda curve, *_: drawn.append(curve))
+    monkeypatch.setattr("blocksim.view.studies.draw_limit_curve", lambda curve, *_: drawn.append(curve))
     table = tmp_path / "published.csv"
     table.write_text('# from a book\nover,limit [deg],series\n0.3,16.7,"a, b"\n0.5,26.6,c\n0.4,21.8,"a, b"\n')
     plot(found, experiment=table)

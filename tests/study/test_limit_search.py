@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.study.limit_search import Change, Span, changes_in, next_near, next_values
+from blocksim.study.limit_plan import Change, Span, changes_in, next_near, next_values
 
 
 def searched(span: Span, answer: Callable[[float], str], tolerance: float) -> dict[float, str]:

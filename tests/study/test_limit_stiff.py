@@ -16,7 +16,7 @@ from blocksim.study.limit import find_limit
 from blocksim.study.limit_answer import LimitAnswer
 from blocksim.study.limit_margin import Level, Levels, ratio_of
 from blocksim.study.limit_plan import read_limit
-from blocksim.study.progress import MANIFEST
+from blocksim.study.manifest import MANIFEST
 from tests.study.test_limit import block_on_a_slope
 
 STIFF = 26.5  # deg: limit of stiff contacts

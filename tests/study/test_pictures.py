@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.study.index_pictures import read_indices
+from blocksim.study.pictures import read_indices
 
 SOBOL = "output,unit,key,S1,± S1,ST,± ST\nx of block 2,mm,a,0.1,0.2,0.7,0.3\nx of block 2,mm,b,0.2,nan,0.4,\n"
 MORRIS = "output,unit,key,mu*,±,mu,sigma\nx of block 2,mm,a,5,1,-5,0\nmeasured outcome,share,a,0.5,0.1,0.5,0\n"

@@ -10,8 +10,7 @@ from blocksim.errors import InvalidInputError, ScenarioError
 from blocksim.scenario import Document, scenario_to_toml
 from blocksim.simulation.provenance import run_hash
 from blocksim.study import plan
-from blocksim.study.plan import Values, Variations, with_sweep
-from blocksim.study.sampling import design_of
+from blocksim.study.plan import Values, Variations, design_of, with_sweep
 from tests.golden import Golden
 from tests.study.plans import SCALE, cases, plan_of
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import OutputExistsError
-from blocksim.study.progress import CaseIndex, Entry, Manifest, read_entries, values_hash
+from blocksim.study.manifest import CaseIndex, Entry, Manifest, read_entries, values_hash
 
 ROW: dict[str, object] = {"status": "finished", "reason": 'at "rest",\n', "seconds": 0.1, "1.x_mm": 1.0 / 3.0}
 ENTRIES = [Entry(number, f"{number:012x}", "00ff", {**ROW, "1.y_mm": 0.1 * number}) for number in range(4)]

@@ -9,10 +9,10 @@ import pytest
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.scenario import Document
+from blocksim.study.pictures import read_sweep_data
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.rows import Head, Ranges, heads_of
 from blocksim.study.sweep import sweep
-from blocksim.study.sweep_data import read_sweep_data
 from blocksim.study.verify_study import verify_sweep
 from tests.study.conftest import SCENARIOS
 from tests.study.plans import OVERLAP, TILT, cases, plan_of

@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 from blocksim import extras
 from blocksim.errors import UnavailableError
 from blocksim.scenario import Document, Sweep
-from blocksim.scenario.models.variation import Normal, Uniform
-from blocksim.study.sampling import design_of, drawn, open_interval, remarks
+from blocksim.scenario.models.study import Normal, Uniform
+from blocksim.study.plan import design_of, draw_values, open_interval, remarks
 from tests.study.plans import OVERLAP, RATIO, SCALE, TILT, sweep_of
 
 MIDDLES = (np.arange(10_000) + 0.5) / 10_000
 
 
 def numbers(values: Normal | Uniform) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    return np.array(drawn(values, MIDDLES), dtype=float)
+    return np.array(draw_values(values, MIDDLES), dtype=float)
 
 
 def test_normal_values_have_mean_and_standard_deviation() -> None:
@@ -62,12 +62,12 @@ def test_values_on_a_logarithmic_scale_fill_every_decade_evenly(nominal: Documen
 
 
 def test_angles_keep_their_unit_and_numbers_twelve_digits() -> None:
-    assert drawn(Uniform(0.0, 1.0, angle=True), np.array([1 / 3])) == ["0.333333333333 rad"]
-    assert drawn(Normal(1.0, 0.1), np.array([0.5])) == [1.0]
+    assert draw_values(Uniform(0.0, 1.0, angle=True), np.array([1 / 3])) == ["0.333333333333 rad"]
+    assert draw_values(Normal(1.0, 0.1), np.array([0.5])) == [1.0]
 
 
 def test_places_at_the_very_ends_give_finite_values() -> None:
-    low, high = drawn(Normal(0.0, 1.0), open_interval(np.array([0.0, 1.0])))
+    low, high = draw_values(Normal(0.0, 1.0), open_interval(np.array([0.0, 1.0])))
     assert -9.0 < float(str(low)) < -8.0
     assert 8.0 < float(str(high)) < 9.0
 

@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 
-from blocksim.extras import loaded
-from blocksim.scenario.models.variation import Normal, Uniform, Variation
-from blocksim.study.sensitivity import Indices, Output, indices_of, settings_at
-from blocksim.study.sensitivity_methods import METHODS, Floats, unit_cube
+from blocksim.extras import load_module
+from blocksim.scenario.models.study import Normal, Uniform, Variation
+from blocksim.study.sensitivity import METHODS, Floats, Indices, Output, indices_of, settings_at, unit_cube
 
 Function = Callable[..., Floats]
 G_WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0])
@@ -122,7 +121,7 @@ def test_blocks_may_be_left_out(method: str) -> None:
 
 def test_morris_trajectories_lie_farther_apart_than_random_ones_and_are_quick() -> None:
     chosen = METHODS["morris"].points(6, 64, 0).reshape(64, 7, 6)
-    random = np.asarray(loaded("SALib.sample.morris", "a test").sample(unit_cube(6), 64, seed=0)).reshape(64, 7, 6)
+    random = np.asarray(load_module("SALib.sample.morris", "a test").sample(unit_cube(6), 64, seed=0)).reshape(64, 7, 6)
 
     def spread(trajectories: Floats) -> float:
         centres = trajectories.mean(axis=1)

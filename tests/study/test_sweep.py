@@ -18,18 +18,17 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
-from blocksim.simulation.movement import table_columns
-from blocksim.simulation.result_files import is_resolved
+from blocksim.simulation.folder import is_resolved
+from blocksim.simulation.observables import table_columns
 from blocksim.study.executors.ensemble import run_case
 from blocksim.study.fragility import fragility
 from blocksim.study.fragility_plan import read_fragility
 from blocksim.study.limit import limit, limit_curve
+from blocksim.study.manifest import Manifest, Shard, read_sweep
 from blocksim.study.plan import Values, with_sweep
-from blocksim.study.progress import Manifest, Shard
 from blocksim.study.run import run
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_folder import SWEEP, note_table, prepare
-from blocksim.study.sweep_table import read_sweep
 from tests.golden import Golden
 from tests.study.conftest import SCENARIOS
 from tests.study.test_fragility import FRICTION, MU, SLOPE, TILTS

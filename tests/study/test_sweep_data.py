@@ -7,10 +7,9 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document, Scenario
-from blocksim.study.pictures import draw_sweep
+from blocksim.study.pictures import draw_sweep, read_sweep_data, unit_of
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.sweep import sweep
-from blocksim.study.sweep_data import read_sweep_data, unit_of
 from blocksim.study.sweep_folder import prepare
 from blocksim.view.sweeps.data import SweepData, value_axis
 from tests.study.conftest import SCENARIOS

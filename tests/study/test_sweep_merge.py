@@ -6,9 +6,8 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document
-from blocksim.study.progress import Shard
+from blocksim.study.manifest import Shard, read_sweep
 from blocksim.study.sweep import merge, sweep
-from blocksim.study.sweep_table import read_sweep
 
 VARY = {"friction.block_block.kinetic": [0.1 + 0.02 * k for k in range(10)]}
 
@@ -41,7 +40,7 @@ def test_what_is_no_sweep_is_reported(tmp_path: Path) -> None:
 def test_case_that_was_retried_elsewhere_counts_as_finished(quick: Document, tmp_path: Path) -> None:
     sweep(quick, VARY, out=tmp_path)
     lines = (tmp_path / "manifest.jsonl").read_text().splitlines(keepends=True)
-    from blocksim.study.progress import Entry  # noqa: PLC0415
+    from blocksim.study.manifest import Entry  # noqa: PLC0415
 
     entry = Entry.from_line(lines[3].encode())
     assert entry is not None

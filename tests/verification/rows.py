@@ -9,7 +9,7 @@ import pytest
 from blocksim.verification.case import Row, Verdict
 
 if TYPE_CHECKING:
-    from blocksim.verification.verify import Outcome
+    from blocksim.verification.case import Outcome
 
 SHARE = 0.2  # of its tolerance by which a measured number may differ from the kept one
 ORDER_SHARE = 0.1  # of its bound, for a number with a lower bound only

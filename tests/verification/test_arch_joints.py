@@ -16,7 +16,7 @@ import pytest
 from scipy.optimize import linprog
 
 from blocksim.scenario import Document, load_scenario
-from blocksim.scenario.outlines import area_of, centroid
+from blocksim.scenario.geometry import area_of, centroid
 from blocksim.simulation import simulate
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit import limit

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from blocksim.scenario import load_scenario
-from blocksim.scenario.outlines import centred
+from blocksim.scenario.geometry import centre_outline
 from blocksim.simulation import simulate
 from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.settling import SettleError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.scenario import Scenario
-    from blocksim.scenario.outlines import Corners
+    from blocksim.scenario.geometry import Corners
 
 RADIUS = 10.0  # m, mean
 STEP = 2.5e-4  # s: contacts give way by 1.5 mm at four times as long a step, and friction holds an arch by less
@@ -49,7 +49,7 @@ def abutment(angle: float, thickness: float) -> list[tuple[float, float]]:
 
 def block(corners: list[tuple[float, float]], *, fixed: bool = False) -> Block:
     """Return a block with corners at some places, above all ground."""
-    outline: Corners = centred(corners)
+    outline: Corners = centre_outline(corners)
     first = min(outline, key=lambda one: math.hypot(one[0] - outline[0][0], one[1] - outline[0][1]))
     x, y = corners[0][0] - first[0], corners[0][1] - first[1]
     return Block(x, y + 2.0 * RADIUS, fixed=fixed, outline=outline)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.verification.case import Case, Row, Setting, Verdict, at_least
-from blocksim.verification.cases import CASES, chosen
+from blocksim.verification.case import Case, Outcome, Row, Setting, Verdict, at_least, run_case
+from blocksim.verification.cases import CASES, choose_cases
 from blocksim.verification.reference import (
     BEGIN,
     END,
@@ -19,7 +19,6 @@ from blocksim.verification.reference import (
     table,
     with_table,
 )
-from blocksim.verification.verify import Outcome, run_case
 from tests.verification.rows import allowed, missed, same_kind
 
 ROOT = Path(__file__).parents[2]
@@ -36,7 +35,7 @@ HEADS = [
 
 
 def outcome(case_id: str, law: str, *, quick: bool) -> Outcome:
-    (case,) = chosen([case_id])
+    (case,) = choose_cases([case_id])
     return run_case(case, Setting(law=law, quick=quick))
 
 

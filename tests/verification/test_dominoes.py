@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from blocksim.verification import dominoes
-from blocksim.verification.dominoes import Dominoes, collision_times, wave_speed
+from blocksim.verification import toppling
+from blocksim.verification.toppling import Dominoes, collision_times, wave_speed
 
 ROW = Dominoes(thickness=7.5 / 48.0, gap=0.3)
 UNIT = sqrt(9.81 * 0.048)  # m/s
@@ -47,14 +47,14 @@ def test_the_first_domino_falls_as_integrated() -> None:
 def test_a_plastic_strike_on_an_upright_domino_leaves_both_half_of_the_spin() -> None:
     # edge and face meet at one height and continue together, so both get the same spin; the impulse is horizontal and
     # has the same arm about both feet, so the sum of the spins is kept
-    assert dominoes._strike(ROW, 1, 3.0) == pytest.approx(1.5)
+    assert toppling._strike(ROW, 1, 3.0) == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("fallen", [2, 5, 9])
 def test_a_strike_loses_energy_and_no_other_spin_would_be_nearer_to_the_old_ones(fallen: int) -> None:
     before = np.append(0.0, ROW.leaning(ROW.strike, fallen)[1])  # the struck domino first, at rest
     rates = ROW.leaning(0.0, fallen + 1)[1]
-    spin = dominoes._strike(ROW, fallen, 1.0)
+    spin = toppling._strike(ROW, fallen, 1.0)
     left = [float(np.sum((before - other * rates) ** 2)) for other in (0.99 * spin, spin, 1.01 * spin)]
     assert left[1] < min(left[0], left[2])
     assert spin**2 * float(rates @ rates) < float(before @ before)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.verification.findings import BEGIN, FINDINGS, STORE, Finding, measured, with_table
+from blocksim.verification.findings import BEGIN, FINDINGS, STORE, Finding, measure_finding, with_table
 
 PAGE = Path(__file__).parents[2] / "results" / "README.md"
 KEPT = {row["command"]: row for row in json.loads(PAGE.with_name(STORE).read_text(encoding="utf-8"))}
@@ -18,7 +18,7 @@ def test_table_of_the_page_is_that_of_the_kept_findings() -> None:
 
 
 def check(finding: Finding) -> None:
-    now, kept = measured(finding), KEPT[finding.command]
+    now, kept = measure_finding(finding), KEPT[finding.command]
     assert now["x_mm"] == pytest.approx(kept["x_mm"], abs=0.02), "run: make findings"
     assert now["inside"] == kept["inside"]
 

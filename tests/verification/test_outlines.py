@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from blocksim.scenario import place_bodies
-from blocksim.verification.case import Case, Setting
-from blocksim.verification.cases import chosen
-from blocksim.verification.verify import run_case
+from blocksim.verification.case import Case, Setting, run_case
+from blocksim.verification.cases import choose_cases
 from blocksim.world import bodies
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ LONG = {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23"}  # seconds
 SETTING = Setting(scheme="nonsmooth")
 CASES = [
     pytest.param(case, id=case.id, marks=[pytest.mark.long] if case.id in LONG else [])
-    for case in chosen([], SETTING.scheme)
+    for case in choose_cases([], SETTING.scheme)
 ]
 
 
@@ -42,7 +41,7 @@ def test_rectangles_given_as_outlines_have_the_same_answers(case: Case, monkeypa
 def test_rectangles_given_as_outlines_have_the_same_answers_with_springs(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (case,) = chosen([name], "explicit")
+    (case,) = choose_cases([name], "explicit")
     setting = Setting(quick=True)
     plain = run_case(case, setting)
     monkeypatch.setattr(bodies, "place_bodies", as_outlines)

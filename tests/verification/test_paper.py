@@ -9,9 +9,10 @@ import pytest
 from blocksim.analysis.experiment import load_table
 from blocksim.errors import BlocksimError
 from blocksim.scenario import load_scenario
-from blocksim.simulation.running import simulate
-from blocksim.verification.paper import laws, tables
-from blocksim.verification.paper.write import COLLAPSES, write_paper
+from blocksim.simulation.run import simulate
+from blocksim.verification import paper as laws
+from blocksim.verification import paper as tables
+from blocksim.verification.paper import COLLAPSES, write_paper
 
 SCENARIOS = Path(laws.__file__).parents[3] / "scenarios"
 RESULTS = SCENARIOS.parent / "results"

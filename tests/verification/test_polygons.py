@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 
-from blocksim.scenario.outlines import Corners, centred, regular, section_of
+from blocksim.scenario.geometry import Corners, centre_outline, regular, section_of
 from blocksim.verification.scene import Scene, Simulation
 
 G = 9.81
@@ -20,7 +20,7 @@ BETA = math.radians(20.0)  # half the angle of the wedge
 
 def table(corners: Corners, **values: object) -> dict[str, object]:
     """Return the table of a body with these corners (m)."""
-    outline = centred(corners)
+    outline = centre_outline(corners)
     place = {axis: corner - own for axis, corner, own in zip("xy", corners[0], outline[0], strict=True)}
     return {**place, "outline": [list(corner) for corner in outline], **values}
 

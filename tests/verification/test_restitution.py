@@ -8,10 +8,8 @@ import pytest
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Setting
-from blocksim.verification.flight import SPACINGS, dropped
-from blocksim.verification.impacts import COLLISION_STEPS, LANDINGS, collision
-from blocksim.verification.scene import HEIGHT, WIDTH
-from blocksim.verification.throws import GOLDEN, Throw, Thrower, kinetic_energy
+from blocksim.verification.impacts import COLLISION_STEPS, LANDINGS, SPACINGS, collision, drop_flat
+from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, Throw, Thrower, kinetic_energy
 
 TILT = radians(30.0)
 BOTH = ["linear", pytest.param("hertz-mindlin", marks=pytest.mark.long)]
@@ -39,7 +37,7 @@ def test_particle_spacing_changes_no_bit_of_an_impact(landing: str) -> None:
 
 
 def test_particle_spacing_changes_no_bit_of_a_bounce() -> None:
-    falls = [dropped(Setting(), spacing).to_time(0.15) for spacing in SPACINGS]
+    falls = [drop_flat(Setting(), spacing).to_time(0.15) for spacing in SPACINGS]
     assert len({fall.bodies.tobytes() for fall in falls}) == 1
     assert falls[0].bodies[0].vy > 0.0
 

@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 
 from blocksim.verification import energy
-from blocksim.verification.case import Case, Row, Setting
-from blocksim.verification.cases import CASES, SettingError, chosen, left_out
+from blocksim.verification.case import Case, Row, Setting, run_case
+from blocksim.verification.cases import CASES, SettingError, choose_cases, excluded_cases
 from blocksim.verification.reference import RIGID, STORE, read_store, stored_rows
-from blocksim.verification.scene import HEIGHT, Scene
-from blocksim.verification.throws import Throw, Thrower
-from blocksim.verification.verify import run_case
+from blocksim.verification.scene import HEIGHT, Scene, Throw, Thrower
 from blocksim.world import nonsmooth
 from tests.verification.rocking import rocking_peaks
 from tests.verification.rows import allowed, missed, same_kind
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 SETTING = Setting(scheme="nonsmooth")
-APPLY = chosen([], SETTING.scheme)
+APPLY = choose_cases([], SETTING.scheme)
 SLOW = {"V18", "V23"}  # seconds; ledgers of tests/kernels/nonsmooth and tests/simulation are there always
 
 
@@ -90,10 +88,10 @@ def test_rocking_peaks_of_blocks_that_hop_are_those_of_exact_impact_times(width:
 
 def test_what_is_about_springs_is_left_out_and_says_why() -> None:
     assert [case.id for case in CASES if case not in APPLY] == ["V2", "V20", "V25"]
-    assert all(len(reason) > 20 for reason in left_out(SETTING.scheme))
-    assert left_out("explicit") == ()
+    assert all(len(reason) > 20 for reason in excluded_cases(SETTING.scheme))
+    assert excluded_cases("explicit") == ()
     with pytest.raises(SettingError, match=r"V20 \(.*springs"):
-        chosen(["V1", "v20"], SETTING.scheme)
+        choose_cases(["V1", "v20"], SETTING.scheme)
 
 
 def test_settings_of_rigid_contacts_do_not_reach_scenes_of_springs() -> None:
@@ -118,7 +116,7 @@ class Wrong(Setting):
 
 
 def rows_missed(wrong: Wrong, case_id: str) -> list[Row]:
-    (case,) = chosen([case_id], wrong.scheme)
+    (case,) = choose_cases([case_id], wrong.scheme)
     return missed(run_case(case, wrong))
 
 

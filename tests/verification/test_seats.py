@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from blocksim.verification.case import Setting, Verdict
-from blocksim.verification.seats import OVERHANG, SEATS, land, seats
+from blocksim.verification.impacts import OVERHANG, SEATS, land, seats
 
 
 def test_block_leaves_several_seats_with_the_requested_restitution_and_without_spin() -> None:

@@ -1,4 +1,4 @@
-"""The linear recurrence of the dashpots: what world/stable_step.py claims about it, and that the kernels follow it.
+"""The linear recurrence of the dashpots: what world/step.py claims about it, and that the kernels follow it.
 
 One mode of motion x of unit mass, p pairs that act on it with a spring of stiffness w^2 each, accelerated by a constant
 g. The dashpots of a pair stand for a share 1/q of the mass, c = 2 z w/q^(1/2); where all pairs of a body act alike,
@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import REACHED
-from blocksim.world.restitution import damping_ratio
+from blocksim.world.interactions import damping_ratio
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import World

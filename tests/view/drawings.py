@@ -10,21 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.analysis import load_table
-from blocksim.scenario.models.history import Stretch
-from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure
+from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, Stretch
 from blocksim.scenario.motion import MotionPieces
 from blocksim.view import style
-from blocksim.view.acting import Acting
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
-from blocksim.view.history_panels import Choice
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import by_speed, by_turn
-from blocksim.view.run_data import Support
+from blocksim.view.run_data import Acting, Support
 from blocksim.view.strip import draw_strip
+from blocksim.view.studies import Bars, draw_tornado
 from blocksim.view.sweeps.lines import Series, drawn_series
-from blocksim.view.tornado import Bars, draw_tornado
+from blocksim.view.time_panels import Choice
 from tests.bench.peers.work_precision import Curve, draw_work_precision
 from tests.bench.peers.work_precision import Panel as Work
 from tests.view.made_up import HOSTILE, pressed, stacked, toppling
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from blocksim.simulation.frames import Frames
-    from blocksim.view.layout import Paper
+    from blocksim.view.style import Paper
     from blocksim.view.sweeps.data import SweepData
 
     Drawing = Callable[[Path, Paper], None]

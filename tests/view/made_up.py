@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
-from blocksim.simulation.contacts import SUPPORT, Contacts, empty_rows
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.frames import SUPPORT, Contacts, Frames, empty_rows
 
 HOSTILE = (
     "<script>alert(1)</script>",

@@ -14,8 +14,7 @@ from blocksim.errors import InvalidInputError, OutputError, UnavailableError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.frames import Frames
-from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, draw_animation, timed
-from blocksim.view.animation_files import ticks
+from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, draw_animation, ticks, timed
 from blocksim.view.paint import PAINTS
 from blocksim.view.run_data import Support
 from blocksim.view.style import BLOCK_COLOURS

@@ -11,7 +11,7 @@ import matplotlib as mpl
 import pytest
 
 from blocksim.errors import InvalidInputError, OutputError
-from blocksim.view.layout import OWN, Paper
+from blocksim.view.style import OWN, Paper
 from tests.view.described import described
 from tests.view.drawings import DRAWINGS
 from tests.view.made_up import overlapping

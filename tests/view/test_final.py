@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from blocksim.simulation.table import final_columns
+from blocksim.simulation.frames import final_columns
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
-from blocksim.view.history_panels import Choice
 from blocksim.view.paint import by_turn
+from blocksim.view.time_panels import Choice
 from tests.view.drawings import TABLE
 from tests.view.made_up import boxes_of, stacked, toppling
 from tests.view.test_loads import support

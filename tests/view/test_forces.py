@@ -9,9 +9,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.contacts import Contacts, empty_rows
+from blocksim.simulation.frames import Contacts, empty_rows
 from blocksim.view.animation import Look, Pace, draw_animation
-from blocksim.view.forces import FORCES, ForceScale, arrows, force_scale, rounded
+from blocksim.view.arrows import FORCES, ForceScale, arrows, force_scale, rounded
 from blocksim.view.kinds import RUN_KINDS
 from tests.view.made_up import pressed, toppling
 

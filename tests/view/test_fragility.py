@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.view.fragility import Band, Fragility, axis_of, draw_fragility, places
-from blocksim.view.layout import Paper
+from blocksim.view.studies import Band, Fragility, axis_of, draw_fragility, places
+from blocksim.view.style import Paper
 
 X = np.array([0.2, 0.4, 0.6])
 

@@ -7,17 +7,18 @@ from matplotlib.patches import PathPatch
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedSegment
-from blocksim.view.ground import (
+from blocksim.view.run_data import Extent, Support, turned
+from blocksim.view.scene import (
+    GROUND_THICKNESS,
     WALL_THICKNESS,
+    Canvas,
+    draw_ruler,
     draw_shift,
     draw_start,
     draw_support,
     wall_outlines,
 )
-from blocksim.view.panel import GROUND_THICKNESS, Canvas, draw_ruler
-from blocksim.view.run_data import Support
 from blocksim.view.style import styled_figure
-from blocksim.view.window import Extent, turned
 
 Floats = NDArray[np.float64]
 

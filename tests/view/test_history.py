@@ -8,12 +8,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.contacts import borne
+from blocksim.simulation.frames import force_on_supports
 from blocksim.view import style
 from blocksim.view.history import draw_history, line_looks
-from blocksim.view.history_panels import ENERGY_LOOKS, LEAST_SPAN, Choice, drawn_energies, unit_for
 from blocksim.view.paint import by_speed
 from blocksim.view.run_data import Support
+from blocksim.view.time_panels import ENERGY_LOOKS, LEAST_SPAN, Choice, drawn_energies, unit_for
 from tests.golden import Golden
 from tests.view.drawings import MOVING
 from tests.view.made_up import overlapping, pressed, toppling
@@ -33,7 +33,7 @@ def test_lines_are_what_was_recorded_in_millimetres_and_degrees(caught: list[Fig
     assert labels == ["x (mm)", "y (mm)", "rotation (°)", "energy (mJ)", "contacts", "support force (N)"]
     assert frames.contacts is not None
     held, weight = lines_of(caught[0], 5)
-    np.testing.assert_allclose(held, borne(frames.contacts))
+    np.testing.assert_allclose(held, force_on_supports(frames.contacts))
     np.testing.assert_allclose(weight, 12.0)
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.view.layout import Paper
 from blocksim.view.levels import MOST_BLOCKS, chosen_blocks, draw_levels, limits_of, refuse_small_page
+from blocksim.view.style import Paper
 from tests.view.drawings import panel
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from blocksim.view.limit_curve import Bracket, LimitCurve, Series, draw_limit_curve
+from blocksim.view.studies import Bracket, LimitCurve, Series, draw_limit_curve
 from tests.view.made_up import overlapping
 
 if TYPE_CHECKING:

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation.happened import Happened
-from blocksim.view.loads import FORCE, PRESSURE, SPEED, Arrows, Outside, outside, with_room
-from blocksim.view.run_data import Support, support_of
-from blocksim.view.window import extent_of
+from blocksim.simulation.result import EventRecord
+from blocksim.view.arrows import FORCE, PRESSURE, SPEED, Arrows, Outside, outside, with_room
+from blocksim.view.run_data import Support, extent_of, support_of
 from tests.view.made_up import blocks_at
 
 if TYPE_CHECKING:
@@ -26,13 +25,13 @@ STRONGER = {"kind": "force", "name": "pull", "body": "1", "magnitude": 12.0, "po
 
 
 def acting(
-    loads: Sequence[Mapping[str, object]], frames: Frames, happened: Sequence[Happened] = (), **tables: Any
+    loads: Sequence[Mapping[str, object]], frames: Frames, happened: Sequence[EventRecord] = (), **tables: Any
 ) -> Outside:
     """Return what acts in all frames of one block."""
     return outside(frames, np.arange(len(frames.time)), support(loads, happened, **tables))
 
 
-def support(loads: Sequence[Mapping[str, object]], happened: Sequence[Happened] = (), **tables: Any) -> Support:
+def support(loads: Sequence[Mapping[str, object]], happened: Sequence[EventRecord] = (), **tables: Any) -> Support:
     """Return the support of a scene with one block and these loads."""
     block = {"width": WIDTH, "height": HEIGHT, "length": 0.1, "material": "oak"}
     scene = {
@@ -71,7 +70,7 @@ def test_loads_follow_their_histories_and_are_gone_when_an_event_ends_them_or_th
     frames, events = block([0.0] * 6), [{"when": "rest", "unload": ["push"]}]
     (rising,) = only(acting([ramp], frames), FORCE)
     assert rising.way[:, 0, 0] == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0, 1.0])
-    ended = Happened(event=0, step=3, time_s=3.0, what="", energy_J=0.0)
+    ended = EventRecord(event=0, step=3, time_s=3.0, what="", energy_J=0.0)
     (cut,) = only(acting([ramp], frames, [ended], events=events), FORCE)
     assert cut.way[:, 0, 0] == pytest.approx([0.0, 0.5, 1.0, 0.0, 0.0, 0.0])
     frames.vx[2:] = np.nan

@@ -12,12 +12,10 @@ from matplotlib.lines import Line2D
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.study.run import run
-from blocksim.view.joints import joints
-from blocksim.view.layout import Paper
-from blocksim.view.mechanism import SLIDES, Side, draw_mechanisms
+from blocksim.view.mechanism import SLIDES, Side, draw_mechanisms, joints
 from blocksim.view.run_data import support_of
 from blocksim.view.scene import corners
-from blocksim.view.style import BLOCK_COLOURS, INK, MEASURED_COLOUR
+from blocksim.view.style import BLOCK_COLOURS, INK, MEASURED_COLOUR, Paper
 from tests.study.test_limit import SLENDER, SQUAT, block_on_a_slope
 from tests.view.made_up import boxes_of
 

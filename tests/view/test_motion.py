@@ -7,7 +7,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.motion import motion_pieces
-from blocksim.view.motion import draw_support_motion
+from blocksim.view.history import draw_support_motion
 from blocksim.view.run_data import Support
 from blocksim.view.time_panels import MOST_POINTS, thinned
 from tests.scenario.test_motion import END, scenario

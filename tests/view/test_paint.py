@@ -9,7 +9,7 @@ import pytest
 from blocksim.scenario import load_scenario
 from blocksim.view import paint, style
 from blocksim.view.paint import PAINTS, by_block, by_material, by_speed, by_turn
-from blocksim.view.sweeps.cells import CLASS_COLOURS
+from blocksim.view.sweeps.outcome_map import CLASS_COLOURS
 from tests.view.made_up import toppling
 
 SCENARIOS = Path(paint.__file__).parents[2] / "scenarios"

@@ -19,7 +19,7 @@ from blocksim.view.history import draw_history
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.run_data import Support
 from blocksim.view.strip import draw_strip
-from blocksim.view.tornado import Bars, draw_tornado
+from blocksim.view.studies import Bars, draw_tornado
 from tests.view.made_up import pressed, toppling
 from tests.view.sweeps.made_up import grid, made_up
 

@@ -9,7 +9,7 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.happened import Happened
+from blocksim.simulation.result import EventRecord
 from blocksim.view.run_data import Support, drawable_frames, moments_at, moments_by_motion, path_travelled, support_of
 from tests.view.made_up import blocks_at
 
@@ -120,7 +120,7 @@ def test_walls_go_at_the_time_of_an_event_and_at_rest_when_a_run_came_to_it() ->
     walls = [{"from": [x, 2], "to": [x, 3]} for x in (2, 3)]
     events = [{"when": "rest", "remove": ["wall 1"]}, {"at": 0.9, "remove": ["wall 2"]}]
     scenario = scenario_from_mapping({**SCENE, "walls": walls, "events": events})
-    happened = Happened(event=0, step=15, time_s=1.5, what="", energy_J=0.0)
+    happened = EventRecord(event=0, step=15, time_s=1.5, what="", energy_J=0.0)
     times = (0.8, 1.0, 1.4, 1.5)
     assert [len(support_of(scenario).at(time).walls) for time in times] == [2, 1, 1, 1]
     assert [len(support_of(scenario, [happened]).at(time).walls) for time in times] == [2, 1, 1, 0]

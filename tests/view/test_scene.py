@@ -9,15 +9,13 @@ from matplotlib.colors import to_rgba
 from matplotlib.path import Path as MatplotlibPath
 from numpy.typing import NDArray
 
+from blocksim.scenario.geometry import holds, least_width, regular
 from blocksim.scenario.motion import MotionPieces
-from blocksim.scenario.outlines import holds, least_width, regular
 from blocksim.simulation.frames import Frames
 from blocksim.view.paint import by_block
-from blocksim.view.panel import Canvas
-from blocksim.view.run_data import Support
-from blocksim.view.scene import Scene, corners, draw_scene, readable_scale, upper_sides
+from blocksim.view.run_data import Support, extent_of
+from blocksim.view.scene import Canvas, Scene, corners, draw_scene, readable_scale, upper_sides
 from blocksim.view.style import GROUND_COLOUR, block_colour, styled_figure
-from blocksim.view.window import extent_of
 from tests.view.made_up import blocks_at, polygons
 
 FRAMES = blocks_at([0.1, 0.2], [0.025, 0.016], [0.0, -np.pi / 2])

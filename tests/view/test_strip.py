@@ -7,11 +7,11 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from blocksim.view import measured, strip
-from blocksim.view.layout import OWN
-from blocksim.view.measured import measured_ranges, widened
-from blocksim.view.strip_layout import Lines, arrangement, plan
-from blocksim.view.window import Extent
+from blocksim.view import final, strip
+from blocksim.view.final import measured_ranges, widened
+from blocksim.view.run_data import Extent
+from blocksim.view.strip import Lines, arrangement, plan
+from blocksim.view.style import OWN
 
 
 class Table:
@@ -75,7 +75,7 @@ def test_a_scene_is_widened_to_hold_what_was_measured_and_a_tower_s_caption() ->
     assert wide.left < -50.0
     assert wide.right > 400.0
     tower = widened(Extent(0.0, 30.0, 0.0, 1000.0), [])
-    assert tower.width == pytest.approx(measured.NARROWEST * 1000.0)
+    assert tower.width == pytest.approx(final.NARROWEST * 1000.0)
 
 
 def test_importing_the_room_does_not_load_matplotlib() -> None:

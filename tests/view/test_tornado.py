@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.view.tornado import Bars, draw_tornado, limits_of, order_of
+from blocksim.view.studies import Bars, draw_tornado, span_of_bars, order_of
 from tests.view.drawings import KEYS
 
 
@@ -19,7 +19,7 @@ def test_keys_come_in_the_order_of_their_size() -> None:
 
 
 def test_intervals_that_are_hardly_known_do_not_hide_the_bars() -> None:
-    low, high = limits_of(Bars("x", KEYS, np.array([0.2, 0.7, 0.1]), np.array([0.1, 1e5, 0.0])))
+    low, high = span_of_bars(Bars("x", KEYS, np.array([0.2, 0.7, 0.1]), np.array([0.1, 1e5, 0.0])))
     assert -0.1 < low < 0.7 < high < 1.2
-    low, high = limits_of(Bars("x", KEYS, np.array([0.2, 0.7, 0.1]), np.array([0.1, 0.2, 0.0])))
+    low, high = span_of_bars(Bars("x", KEYS, np.array([0.2, 0.7, 0.1]), np.array([0.1, 0.2, 0.0])))
     assert (low, high) == pytest.approx((-0.014, 0.914))

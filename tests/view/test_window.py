@@ -6,9 +6,8 @@ import pytest
 from blocksim.scenario import PlacedSegment
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.frames import Frames
-from blocksim.view.run_data import Support
+from blocksim.view.run_data import Extent, Support, extent_of, parts_within, turned
 from blocksim.view.scene import corners
-from blocksim.view.window import Extent, extent_of, parts_within, turned
 from tests.view.made_up import blocks_at
 
 

@@ -25,20 +25,19 @@ from blocksim.kernels.common.arrays import BODY as BODY_RECORD
 from blocksim.kernels.explicit.energy import tallied
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world import memory
-from blocksim.world.bounds import bounds_of
 from blocksim.world.build import (
     GROWTH,
+    LARGE_RATIO,
+    MOST_LARGE,
     build_world,
+    cell_radius,
     empty_lists,
     with_more_room,
     with_threads,
 )
-from blocksim.world.interactions import contact_classes, interactions_of
+from blocksim.world.interactions import contact_classes, damping_ratio, interactions_of
 from blocksim.world.memory import SceneTooLargeError
-from blocksim.world.restitution import damping_ratio
-from blocksim.world.scenes import LARGE_RATIO, MOST_LARGE, cell_radius
-from blocksim.world.stable_step import Load
-from blocksim.world.step import StepTooLargeError, admissible_step
+from blocksim.world.step import Load, StepTooLargeError, admissible_step, bounds_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

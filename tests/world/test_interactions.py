@@ -12,11 +12,11 @@ from blocksim.world.interactions import (
     ContactClass,
     Interaction,
     contact_classes,
+    damping_ratio,
     interaction,
     interaction_tables,
     interactions_of,
 )
-from blocksim.world.restitution import damping_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

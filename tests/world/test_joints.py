@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from blocksim.scenario import place_bodies, place_segments, scenario_from_mapping
-from blocksim.world.joints import Joint, joints_of
+from blocksim.world.rigid_step import Joint, joints_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

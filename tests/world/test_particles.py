@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.verification.scene import scenario_of
+from blocksim.world.bodies import division, slots_of_a_pair
 from blocksim.world.build import build_world
-from blocksim.world.particles import division, slots_of_a_pair
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from blocksim.world.restitution import SMALLEST_RESTITUTION, damping_ratio, restitution_of
+from blocksim.world.interactions import SMALLEST_RESTITUTION, damping_ratio, restitution_of
 
 
 def integrated(ratio: float) -> float:

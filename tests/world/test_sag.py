@@ -8,12 +8,11 @@ import pytest
 
 from blocksim.bench.scenes import three_blocks
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
-from blocksim.simulation.running import simulate
+from blocksim.simulation.run import simulate
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, Scene, Simulation
 from blocksim.world.describe import describe
-from blocksim.world.loads import loads_at_rest
-from blocksim.world.sag import point_stiffness, scene_sag
+from blocksim.world.sag import loads_at_rest, point_stiffness, scene_sag
 
 
 def stack(count: int, **time: Any) -> Scene:

@@ -11,12 +11,11 @@ import pytest
 from blocksim.kernels.common.arrays import ALL, OUTLINE
 from blocksim.kernels.explicit.outlines import MOST_CORNERS, UPPER, WIDEST_CONE
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.scenario.outlines import MOST, centred, least_width, regular
-from blocksim.world.bodies import body_records, outline_of
-from blocksim.world.bounds import bounds_of
+from blocksim.scenario.geometry import MOST, centre_outline, least_width, regular
+from blocksim.world.bodies import body_records, cone_of, corner_rows, outline_of
+from blocksim.world.build import Stack, build_stacks, member
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
-from blocksim.world.scenes import Stack, build_stacks, member
-from blocksim.world.shapes import cone_of, corner_rows
+from blocksim.world.step import bounds_of
 
 TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]
 
@@ -74,7 +73,7 @@ def test_slots_have_room_for_the_corners_of_any_block() -> None:
 
 @pytest.mark.parametrize("outline", [TRIANGLE, regular(16, 0.1), [[0, 0], [1, 0], [1.01, 0.02], [0.5, 0.3], [0, 0.1]]])
 def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float]]) -> None:
-    rows = np.array(corner_rows(centred([(x, y) for x, y in outline])))
+    rows = np.array(corner_rows(centre_outline([(x, y) for x, y in outline])))
     for k, (x, y, nx, ny, distance, half, middle, clear, far, *_) in enumerate(rows):
         assert nx * y - ny * x == pytest.approx(middle - half)
         others = np.delete(rows, k, axis=0)

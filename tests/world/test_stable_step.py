@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.world.stable_step import ContactBody, ContactStiffness, frequency_squared, stable_step
+from blocksim.world.step import ContactBody, ContactStiffness, frequency_squared, stable_step
 
 sizes = st.floats(1e-3, 1.0)
 densities = st.floats(100.0, 2e4)

@@ -11,10 +11,16 @@ import pytest
 from blocksim.kernels.common.arrays import AT_REST, REACHED
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, tangent_stiffness
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
-from blocksim.world.bounds import bounds_of
 from blocksim.world.build import build_world
-from blocksim.world.stable_step import Load, steepest
-from blocksim.world.step import MOST_STEPS, StepTooLargeError, UncountableStepsError, expected_load
+from blocksim.world.step import (
+    MOST_STEPS,
+    Load,
+    StepTooLargeError,
+    UncountableStepsError,
+    bounds_of,
+    expected_load,
+    steepest,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

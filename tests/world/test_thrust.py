@@ -15,8 +15,7 @@ from blocksim.simulation.settling import SettleError, settle
 from blocksim.simulation.team import ALONE
 from blocksim.world.bodies import outline_of
 from blocksim.world.nonsmooth import build_nonsmooth
-from blocksim.world.rigid_step import USUAL_STEP
-from blocksim.world.thrust import thrust_shift
+from blocksim.world.rigid_step import USUAL_STEP, thrust_shift
 from tests.verification.test_arch_joints import limit_analysis
 from tests.verification.test_arches import RADIUS
 

@@ -124,7 +124,7 @@ CORNER = on_own_lines(
         "middle "  # m: of that face along (-ny, nx), from the foot of the centroid
         "half "  # m: half of its length
         "x y "  # m: place about the centroid, in the body frame; counter-clockwise
-        "clear "  # -: other faces are at least so many times as far as its nearer end; see world/shapes.py
+        "clear "  # -: other faces are at least so many times as far as its nearer end; see world/bodies.py
         "far "  # m: the distance of that face from all but itself and the two beside it
         "sharp "  # -: one where a face beside this one meets it at less than a right angle, else zero
         "cone"  # -: of the shape: sine of the angle up to which a face is parallel to one of another body

@@ -3,8 +3,8 @@
 import math
 
 from blocksim.kernels.common.arrays import Record, Records, World
-from blocksim.kernels.common.geometry import place_corners, turn
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.shapes import place_corners, turn
 
 
 @kernel

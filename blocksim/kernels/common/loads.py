@@ -11,8 +11,8 @@ import math
 from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import GROUP, LOAD_FORCE, LOAD_TILT, LOAD_WATER, Record, Records, World
-from blocksim.kernels.common.geometry import turn
 from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common.shapes import turn
 
 
 class Pose(NamedTuple):

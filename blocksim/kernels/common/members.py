@@ -1,6 +1,14 @@
-"""One world out of many copies of a scene."""
+"""Members of ensembles: one world out of many copies of a scene, and what is seen of it while it advances.
 
-from blocksim.kernels.common.arrays import Records, World
+Members record no frames. Compiled code keeps the first step at which a block has moved and the places then; which
+block was first is decided by blocksim.simulation.movement, as for a run with frames.
+"""
+
+import math
+from typing import NamedTuple
+
+from blocksim.kernels.common.arrays import Floats, Integers, Records, World
+from blocksim.kernels.common.frame_times import next_frame
 from blocksim.kernels.common.jit import kernel, rare_kernel
 
 
@@ -45,3 +53,59 @@ def member(worlds: World, m: int) -> World:
         worlds.loads[m],
         worlds.load_pieces[m],
     )
+
+
+class Watched(NamedTuple):
+    """What is watched of m members with b blocks each."""
+
+    frames: Floats  # (m,) steps between two frames, zero where peaks are not followed
+    periods: Floats  # (m,) the same, zero where it is not watched what moves first
+    steps: Integers  # (m,) output: the first frame in which a block had moved, zero before
+    places: Floats  # (m, 3, b) output: x, y (m), angle (rad) then
+    start: Floats  # (m, 3, b) x, y (m), angle (rad)
+    reach: Floats  # (m, b) m, half a diagonal
+    thresholds: Floats  # (m, b) m, infinite for fixed blocks
+    peaks: Floats  # (m,) output: rad, the largest rotation of a block that can move
+
+
+step_of_next = rare_kernel(next_frame)
+
+
+@rare_kernel
+def frame_to_watch(watched: Watched, m: int, done: int) -> int:
+    """Return the next step with a frame of a member that is of interest, zero where there is none.
+
+    Every stop costs: without peaks there is none after the first move.
+    """
+    if watched.frames[m] > 0.0:
+        return step_of_next(done, watched.frames[m])
+    is_watched = watched.periods[m] > 0.0 and watched.steps[m] == 0
+    return step_of_next(done, watched.periods[m]) if is_watched else 0
+
+
+@rare_kernel
+def has_moved(bodies: Records, watched: Watched, m: int) -> bool:
+    """Return True if some block of a member is farther than its threshold from where it began, or not finite."""
+    for i in range(watched.thresholds.shape[1]):
+        body = bodies[i]
+        way = math.sqrt((body.x - watched.start[m, 0, i]) ** 2 + (body.y - watched.start[m, 1, i]) ** 2)
+        turned = abs(body.angle - watched.start[m, 2, i]) * watched.reach[m, i]
+        threshold = watched.thresholds[m, i]
+        if not (way <= threshold and turned <= threshold):
+            return True
+    return False
+
+
+@rare_kernel
+def watch(bodies: Records, watched: Watched, m: int, step: int) -> None:
+    """Examine a frame of a member: how far blocks are turned, and what has moved if nothing had before."""
+    for i in range(watched.thresholds.shape[1]):
+        turn = abs(bodies[i].angle - watched.start[m, 2, i])
+        if turn > watched.peaks[m] and watched.thresholds[m, i] < math.inf:
+            watched.peaks[m] = turn
+    if watched.periods[m] > 0.0 and watched.steps[m] == 0 and has_moved(bodies, watched, m):
+        watched.steps[m] = step
+        for i in range(watched.thresholds.shape[1]):
+            watched.places[m, 0, i] = bodies[i].x
+            watched.places[m, 1, i] = bodies[i].y
+            watched.places[m, 2, i] = bodies[i].angle

@@ -1,26 +1,229 @@
-"""Stiffness of the corner contacts of one pair, as tributary.py has it: measured where dashpots are due."""
+"""Stiffness by tributary length: what share of a corner contact's stiffness the corner of a face contact has.
 
-from blocksim.kernels.common.arrays import Record, Records, World
+Two blocks that stand on one another touch along an interval, and its two ends are their contact points. A face that
+lies on its whole length has the stiffness of two corner contacts, 2 K. So the ends of an interval of length L have K
+L/F each, F the length of the face: then neither the sum of the stiffnesses below a block nor their centre depends on
+where the joints between the blocks below are, and a block that lands flat on several of them leaves without spin. F is
+the face of the free body; where both are free, the longer one. (With the shorter one a whole block on a half block and
+another whole one would lean towards the half block.) The ground, its pieces and walls are one plane, cut by no joints:
+their contacts have K.
+
+A block that stands on one corner has K. In between the share goes from L/F to 1 while the block tilts, by the cubic
+step q^2 (3 - 2 q) of the sine of the angle between the two faces, q from 0 at FLAT to 1 at CONE_TOLERANCE, from where
+on corners have one face to touch only. So no force jumps as one end leaves the ground, as a corner passes a joint, or
+as a corner slides off the end of a face.
+
+The stored energy share * U(depth) is a state function. Its force is not along the normal alone: where the share changes
+by sliding and tilting there is U d(share)/d(slip) along the tangent, against a, and a couple U d(share)/d(angle). Both
+are tiny, of the order of depth over length of the normal force, and without them an elastic contact that begins flat
+and ends tilted would gain or lose energy.
+
+It is measured where dashpots are due.
+"""
+
+from typing import NamedTuple
+
+from blocksim.kernels.common.arrays import ALL, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.damping import OPERATOR_LIFE, renew_dashpots
-from blocksim.kernels.explicit.models.duplicate_corners import PARALLEL
-from blocksim.kernels.explicit.tributary import (
-    APART,
-    ENDS,
-    LEAST,
-    PLANE,
-    WHOLE,
-    Bearing,
-    Interval,
-    are_blocks,
-    bearing_of_facing,
-    bearing_of_interval,
-    facing_of,
-    flat_of,
-    interval_of,
-    is_flat,
-    stiffness_between,
-)
+from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, PARALLEL
+from blocksim.kernels.explicit.outlines import cone_of, corner_of, into_world, side_along
+
+FLAT = 0.01  # sine of the angle between two faces up to which they are parallel
+FLAT_SHARE = FLAT / CONE_TOLERANCE  # the same of the cone, where that of polygons is narrower
+LEAST = 1e-6  # share of a corner that is about to pass the end of a face
+
+
+class Bearing(NamedTuple):
+    """Share of a contact in the stiffness of a corner contact, and how it changes by moving body a."""
+
+    share: float
+    slide: float  # 1/m, by slip of a ahead of b
+    turn: float  # 1/rad, by turning a
+
+
+class Interval(NamedTuple):
+    """Where two faces lie opposite each other, along the tangent (-ny, nx) from the centre of b."""
+
+    left: float  # m
+    right: float  # m
+    slide: float  # change of its length with the slip of a ahead of b
+    per_length: float  # 1/m, one over the length of the face that the share refers to
+    cosine: float  # of the tilt, by which the other face is seen shorter
+
+
+WHOLE = Bearing(1.0, 0.0, 0.0)
+PLANE, ENDS, APART = range(3)  # on the ground, a piece of it, or a wall; of faces that are parallel; neither
+
+
+@kernel
+def are_blocks(a: Record, b: Record) -> bool:
+    """Return True if neither of two bodies is a piece of ground, so that intervals count; see also the ground."""
+    return a.faces >= ALL and b.faces >= ALL
+
+
+@kernel
+def tilt_of(a: Record, b: Record) -> tuple[float, float]:
+    """Return the sine of the angle between the most nearly parallel faces, and its change with the angle of a."""
+    c = a.cos * b.cos + a.sin * b.sin
+    s = a.sin * b.cos - a.cos * b.sin
+    if abs(s) < abs(c):
+        return abs(s), c if s > 0.0 else -c
+    return abs(c), -s if c > 0.0 else s
+
+
+@kernel
+def bearing_of(part: float, slide: float, a: Record, b: Record) -> Bearing:
+    """Return the share of a corner whose interval is `part` of a face and changes with the slip by `slide` (1/m)."""
+    sine, rate = tilt_of(a, b)
+    return bearing_at(sine, rate, part, slide, FLAT, CONE_TOLERANCE)
+
+
+@kernel
+def bearing_at(sine: float, rate: float, part: float, slide: float, flat: float, cone: float) -> Bearing:
+    """Return the same at a tilt and its change with the angle of a, whose effect lasts from `flat` to `cone`."""
+    if sine <= flat:
+        return Bearing(part, slide, 0.0)
+    if sine >= cone:
+        return WHOLE
+    q = (sine - flat) / (cone - flat)
+    up = q * q * (3.0 - 2.0 * q)
+    steepness = 6.0 * q * (1.0 - q) / (cone - flat)
+    return Bearing(part + (1.0 - part) * up, slide * (1.0 - up), (1.0 - part) * steepness * rate)
+
+
+@kernel
+def is_flat(a: Record, b: Record) -> bool:
+    """Return True if two faces of a and b are parallel."""
+    return tilt_of(a, b)[0] <= FLAT
+
+
+@kernel
+def face_across(body: Record, nx: float, ny: float, side: float) -> tuple[float, float, float]:
+    """Return the middle of a face from the centre of its body and half of it, along the tangent, and its half length.
+
+    The face is the one whose outward normal is nearest to `side` = +-1 times (nx, ny).
+    """
+    along_x = nx * body.cos + ny * body.sin
+    along_y = ny * body.cos - nx * body.sin
+    if abs(along_x) > abs(along_y):
+        out = side if along_x > 0.0 else -side
+        return -out * body.half_x * along_y, body.half_y * abs(along_x), body.half_y
+    out = side if along_y > 0.0 else -side
+    return out * body.half_y * along_x, body.half_x * abs(along_y), body.half_x
+
+
+@kernel
+def face_per_length(a: Record, b: Record, half_a: float, half_b: float) -> float:
+    """Return one over the length (1/m) of the face that shares refer to: the free body's, of two free ones the longer.
+
+    `half_a` and `half_b` (m) are half of the faces that touch. A body that is only held until time zero counts as free:
+    it comes to rest on the springs that it has afterwards.
+    """
+    if a.is_moved != 0:
+        return 0.5 / half_b
+    if b.is_moved != 0:
+        return 0.5 / half_a
+    return 0.5 / max(half_a, half_b)
+
+
+@rare_kernel
+def interval_of(a: Record, b: Record, nx: float, ny: float) -> Interval:
+    """Return the interval of the two faces of a and b that look at each other along the normal (nx, ny), b to a."""
+    middle_a, reach_a, half_a = face_across(a, nx, ny, -1.0)
+    middle_b, reach_b, half_b = face_across(b, nx, ny, 1.0)
+    middle_a += nx * (a.y - b.y) - ny * (a.x - b.x)
+    cosine = reach_a / half_a * (reach_b / half_b)
+    return overlap_of(middle_a, reach_a, middle_b, reach_b, face_per_length(a, b, half_a, half_b), cosine)
+
+
+@kernel
+def overlap_of(
+    middle_a: float, reach_a: float, middle_b: float, reach_b: float, per_length: float, cosine: float
+) -> Interval:
+    """Return the interval of two faces with these middles, from the centre of b, and half lengths along the tangent."""
+    is_right_of_a = middle_a + reach_a < middle_b + reach_b
+    is_left_of_a = middle_a - reach_a > middle_b - reach_b
+    slide = (1.0 if is_right_of_a else 0.0) - (1.0 if is_left_of_a else 0.0)
+    right = min(middle_a + reach_a, middle_b + reach_b)
+    left = max(middle_a - reach_a, middle_b - reach_b)
+    return Interval(left, right, slide, per_length, cosine)
+
+
+@rare_kernel
+def bearing_of_faces(a: Record, b: Record, nx: float, ny: float) -> Bearing:
+    """Return the share of a corner that touches a face along the normal (nx, ny), whether or not the other end does."""
+    return bearing_of_interval(interval_of(a, b, nx, ny), a, b)
+
+
+@rare_kernel
+def bearing_of_interval(found: Interval, a: Record, b: Record) -> Bearing:
+    """Return the share of a corner at an end of an interval, whether or not there is a contact at the other end."""
+    part = (found.right - found.left) * found.per_length / found.cosine
+    if part > 1.0 or part < LEAST:
+        return bearing_of(min(max(part, LEAST), 1.0), 0.0, a, b)
+    return bearing_of(part, found.slide * found.per_length / found.cosine, a, b)
+
+
+@kernel
+def stiffness_between(pair: Record, x: float, y: float, nx: float, ny: float) -> float:
+    """Return the stiffness of the two ends of an interval, given the vector (m) from one to the other and their normal.
+
+    Where sliding does not change it, the interval is all of a face.
+    """
+    return abs(pair.slide * (y * nx - x * ny)) if pair.slide != 0.0 else pair.stiffness
+
+
+class Facing(NamedTuple):
+    """How the faces of two bodies look at each other along a normal, where there are polygons."""
+
+    interval: Interval
+    sine: float  # of the angle between them
+    rate: float  # its change with the angle of a
+    cone: float  # sine from which on they are not parallel
+
+
+@kernel
+def seen_along(body: Record, side: Record, nx: float, ny: float) -> tuple[float, float, float, float]:
+    """Return the normal of a face in world axes, its middle (m) along the tangent and its cosine to (nx, ny)."""
+    mx, my = into_world(body, side.nx, side.ny)
+    x, y = into_world(body, side.x - side.half * side.ny, side.y + side.half * side.nx)
+    return mx, my, nx * y - ny * x, abs(mx * nx + my * ny)
+
+
+@rare_kernel
+def facing_of(a: Record, b: Record, nx: float, ny: float, table: Records) -> Facing:
+    """Return how the faces of a and b look at each other along the normal (nx, ny), b to a."""
+    one = corner_of(a, table, side_along(a, table, -nx, -ny))
+    two = corner_of(b, table, side_along(b, table, nx, ny))
+    ax, ay, middle_a, cos_a = seen_along(a, one, nx, ny)
+    bx, by, middle_b, cos_b = seen_along(b, two, nx, ny)
+    middle_a += nx * (a.y - b.y) - ny * (a.x - b.x)
+    per_length = face_per_length(a, b, one.half, two.half)
+    interval = overlap_of(middle_a, one.half * cos_a, middle_b, two.half * cos_b, per_length, cos_a * cos_b)
+    sine = ax * by - ay * bx  # of the angle from the face of b to that of a
+    cosine = -ax * bx - ay * by
+    rate = cosine if sine > 0.0 else -cosine
+    return Facing(interval, abs(sine) if cosine > 0.0 else 1.0, rate, cone_of(a, b, table))
+
+
+@rare_kernel
+def bearing_of_facing(facing: Facing) -> Bearing:
+    """Return the share of a corner at an end of the interval of two faces, as bearing_of_interval."""
+    found = facing.interval
+    flat = flat_of(facing)
+    part = found.per_length * (found.right - found.left) / found.cosine
+    if part > 1.0 or part < LEAST:
+        return bearing_at(facing.sine, facing.rate, min(max(part, LEAST), 1.0), 0.0, flat, facing.cone)
+    slide = found.slide * found.per_length / found.cosine
+    return bearing_at(facing.sine, facing.rate, part, slide, flat, facing.cone)
+
+
+@kernel
+def flat_of(facing: Facing) -> float:
+    """Return the sine up to which two faces are parallel."""
+    return min(FLAT, FLAT_SHARE * facing.cone)
+
 
 MOST_CHANGE = 0.01  # of its stiffness, that a pair of polygons may miss until it is measured again
 

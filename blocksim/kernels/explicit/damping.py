@@ -17,13 +17,162 @@ The rate in the dashpot belongs to the middle of the kick, as the overlap does. 
 of the step before and corrected for the change of this pair's own forces, f = spring + dashpot:
 d = C (u + dt/2 A (f_before - f_spring - d)). That is second-order accurate, unbiased at rest, and for a single pair as
 stable as an implicit dashpot.
+
+Dashpots of a pair that touches in more than two points, in the three relative coordinates of two rigid bodies.
+
+Any number of points of one pair moves with three coordinates only: the relative velocity of the two bodies at a place
+(here the centre of body a) and their relative spin, V. With one row g_i of G a point, its rate is g_i V; with W the 3x3
+inverse mass of V the points see A = G W G^T of one another. The damping matrix above,
+C = 2 z k^(1/2) B^(-1/2) k^(1/2) with B = k^(1/2) A k^(1/2), is then
+
+    C = k G D G^T k,   D = 2 z L S^(-3/2) L^T,   S = L^T (G^T k G) L,   W = L L^T,
+
+because (X X^T)^(-1/2) = X (X^T X)^(-3/2) X^T for X = k^(1/2) G L. On V it acts as 2 z W^(-1/2) S^(1/2) W^(-1/2) with
+the symmetric root of W. Where S is singular (all normals parallel: a face) the power is taken over its range. First
+steps of contacts enter as w^(1/2) C w^(1/2). The forces are d = P y with P = w^(1/2) k G and
+
+    (I + dt/2 D Q W Q^T) y = D (P^T u + dt/2 Q W G^T (f_before - f_spring)),   Q = P^T G,
+
+the correction for the pair's own forces as above.
+
+Small dense matrices of one pair of bodies: roots, products and linear solve, without allocation.
 """
 
 import math
 
-from blocksim.kernels.common.arrays import AHEAD, BACK, NORMAL, Record
+from blocksim.kernels.common.arrays import AHEAD, BACK, NORMAL, Floats, Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.matrices import RANK_TOLERANCE, inverse_root_2
+
+# eigenvalues below this share of the largest count as zero: tangents of points on one face are parallel, so that
+# their matrix has rank one up to the difference of two overlaps
+RANK_TOLERANCE = 1e-4
+SWEEPS = 6  # quadratic convergence: five bring any 3 x 3 matrix to round-off
+ROUND_OFF = 1e-15
+
+
+@rare_kernel
+def inverse_root(eigenvalue: float, largest: float) -> float:
+    """Return eigenvalue^(-1/2), or zero outside the range of the matrix (pseudo-inverse)."""
+    return 1.0 / math.sqrt(eigenvalue) if eigenvalue > RANK_TOLERANCE * largest else 0.0
+
+
+@rare_kernel
+def inverse_root_2(a: float, b: float, d: float) -> tuple[float, float, float]:
+    """Return the inverse square root of the symmetric positive matrix [[a, b], [b, d]], over its range only."""
+    middle = 0.5 * (a + d)
+    half = 0.5 * (a - d)
+    radius = math.sqrt(half * half + b * b)
+    high = inverse_root(middle + radius, middle + radius)
+    low = inverse_root(max(middle - radius, 0.0), middle + radius)
+    # f(A) = mean I + slope (A - middle I) for any function f of a 2 x 2 matrix with eigenvalues middle +- radius
+    mean = 0.5 * (high + low)
+    slope = 0.5 * (high - low) / radius if radius > 0.0 else 0.0
+    return mean + slope * half, slope * b, mean - slope * half
+
+
+@rare_kernel
+def rotate_pair(matrix: Floats, vectors: Floats, n: int, p: int, q: int) -> None:
+    """Zero matrix[p, q] by one Jacobi rotation and turn the eigenvectors with it."""
+    theta = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
+    t = (1.0 if theta >= 0.0 else -1.0) / (abs(theta) + math.sqrt(theta * theta + 1.0))
+    c = 1.0 / math.sqrt(t * t + 1.0)
+    s = t * c
+    for k in range(n):
+        kp = matrix[k, p]
+        kq = matrix[k, q]
+        matrix[k, p] = c * kp - s * kq
+        matrix[k, q] = s * kp + c * kq
+    for k in range(n):
+        pk = matrix[p, k]
+        qk = matrix[q, k]
+        matrix[p, k] = c * pk - s * qk
+        matrix[q, k] = s * pk + c * qk
+        vp = vectors[k, p]
+        vq = vectors[k, q]
+        vectors[k, p] = c * vp - s * vq
+        vectors[k, q] = s * vp + c * vq
+
+
+@rare_kernel
+def sweep_pairs(matrix: Floats, vectors: Floats, n: int) -> None:
+    """Rotate every pair of axes once, where it is not diagonal to round-off."""
+    for p in range(n - 1):
+        for q in range(p + 1, n):
+            if abs(matrix[p, q]) > ROUND_OFF * math.sqrt(abs(matrix[p, p] * matrix[q, q])):
+                rotate_pair(matrix, vectors, n, p, q)
+
+
+@rare_kernel
+def inverse_three_halves(matrix: Floats, vectors: Floats, out: Floats) -> None:
+    """Write the power -3/2 of a symmetric positive 3 x 3 matrix into `out`, over its range only; destroys `matrix`.
+
+    Cyclic Jacobi rotations.
+    """
+    for i in range(SIZE):
+        for j in range(SIZE):
+            vectors[i, j] = 1.0 if i == j else 0.0
+    for _ in range(SWEEPS):
+        sweep_pairs(matrix, vectors, SIZE)
+    largest = max(matrix[0, 0], matrix[1, 1], matrix[2, 2])
+    for i in range(SIZE):
+        for j in range(SIZE):
+            total = 0.0
+            for k in range(SIZE):
+                root = inverse_root(max(matrix[k, k], 0.0), largest)
+                total += vectors[i, k] * vectors[j, k] * root * root * root
+            out[i, j] = total
+
+
+@rare_kernel
+def cholesky(matrix: Floats, out: Floats) -> None:
+    """Write the lower triangle L of a symmetric positive 3 x 3 matrix L L^T into `out`, zeros above it."""
+    for i in range(SIZE):
+        for j in range(SIZE):
+            total = matrix[i, j]
+            for k in range(min(i, j)):
+                total -= out[i, k] * out[j, k]
+            if i == j:
+                out[i, i] = math.sqrt(max(total, 0.0))
+            else:
+                out[i, j] = total / out[j, j] if i > j else 0.0
+
+
+@rare_kernel
+def multiply(left: Floats, right: Floats, out: Floats) -> None:
+    """Write the product of two 3 x 3 matrices into `out`, another one."""
+    for i in range(SIZE):
+        for j in range(SIZE):
+            out[i, j] = left[i, 0] * right[0, j] + left[i, 1] * right[1, j] + left[i, 2] * right[2, j]
+
+
+@rare_kernel
+def multiply_transposed(left: Floats, right: Floats, out: Floats) -> None:
+    """Write left^T right, 3 x 3, into `out`, another matrix."""
+    for i in range(SIZE):
+        for j in range(SIZE):
+            out[i, j] = left[0, i] * right[0, j] + left[1, i] * right[1, j] + left[2, i] * right[2, j]
+
+
+@rare_kernel
+def solve_in_place(matrix: Floats, right: Floats, n: int) -> None:
+    """Solve matrix x = right; x replaces `right`, `matrix` is destroyed.
+
+    Elimination without pivoting: used for I + (damping)(inverse mass), whose leading minors are positive as both
+    factors are symmetric and positive.
+    """
+    for k in range(n):
+        pivot = 1.0 / matrix[k, k]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] * pivot
+            for j in range(k + 1, n):
+                matrix[i, j] -= factor * matrix[k, j]
+            right[i] -= factor * right[k]
+    for k in range(n - 1, -1, -1):
+        total = right[k]
+        for j in range(k + 1, n):
+            total -= matrix[k, j] * right[j]
+        right[k] = total / matrix[k, k]
+
 
 BOTH = 3  # pattern of two points with a dashpot
 OPERATOR_LIFE = 32  # steps
@@ -175,3 +324,112 @@ def keep_dashpots(pair: Record, direction: int, pattern: int, left: int) -> None
     else:
         pair.shear_left = left
         pair.sticking = pattern
+
+
+# indices into the work matrices
+MOBILITY, STIFFNESS, GAIN, ROOT, FACTOR, PRODUCT, VECTORS, ROWS = range(8)
+CHANGE, FREE, ROW = range(3)  # rows of the last one
+SIZE = 3
+
+
+@rare_kernel
+def fill_mobility(a: Record, b: Record, out: Floats) -> None:
+    """Write the inverse mass W of the relative motion at the centre of a: (1/kg, 1/(kg m), 1/(kg m2) by blocks)."""
+    dx = a.x - b.x
+    dy = a.y - b.y
+    translation = a.inverse_mass + b.inverse_mass
+    turning = b.inverse_inertia
+    out[0, 0] = translation + turning * dy * dy
+    out[1, 1] = translation + turning * dx * dx
+    out[0, 1] = out[1, 0] = -turning * dx * dy
+    out[0, 2] = out[2, 0] = -turning * dy
+    out[1, 2] = out[2, 1] = turning * dx
+    out[2, 2] = turning + a.inverse_inertia
+
+
+@rare_kernel
+def fill_row(point: Record, direction: int, row: Floats) -> None:
+    """Write how the closing rate or the slip rate of a point follows from the relative motion (-, -, m)."""
+    if direction == NORMAL:
+        row[0] = -point.nx
+        row[1] = -point.ny
+        row[2] = -point.normal_arm_a
+    else:
+        row[0] = -point.ny
+        row[1] = point.nx
+        row[2] = point.shear_arm_a
+
+
+@rare_kernel
+def gather(points: Records, count: int, direction: int, work: Floats) -> None:
+    """Sum over the points: G^T k G, Q = G^T w^(1/2) k G, P^T u and G^T (f_before - f_spring)."""
+    vectors = work[ROWS]
+    for i in range(SIZE):
+        vectors[CHANGE, i] = vectors[FREE, i] = 0.0
+        for j in range(SIZE):
+            work[STIFFNESS, i, j] = work[PRODUCT, i, j] = 0.0
+    for n in range(count):
+        point = points[n]
+        fill_row(point, direction, vectors[ROW])
+        weighted = math.sqrt(point.weight) * point.stiffness
+        for i in range(SIZE):
+            vectors[CHANGE, i] += vectors[ROW, i] * (point.before - point.force)
+            vectors[FREE, i] += vectors[ROW, i] * weighted * point.rate
+            for j in range(SIZE):
+                outer = vectors[ROW, i] * vectors[ROW, j]
+                work[STIFFNESS, i, j] += point.stiffness * outer
+                work[PRODUCT, i, j] += weighted * outer
+
+
+@rare_kernel
+def fill_gain(ratio: float, work: Floats) -> None:
+    """Write D = 2 z L S^(-3/2) L^T; uses all matrices but the product and the vectors."""
+    cholesky(work[MOBILITY], work[ROOT])
+    multiply(work[STIFFNESS], work[ROOT], work[GAIN])
+    multiply_transposed(work[ROOT], work[GAIN], work[FACTOR])
+    inverse_three_halves(work[FACTOR], work[VECTORS], work[GAIN])
+    multiply(work[ROOT], work[GAIN], work[FACTOR])
+    for i in range(SIZE):
+        for j in range(SIZE):
+            total = 0.0
+            for k in range(SIZE):
+                total += work[FACTOR, i, k] * work[ROOT, j, k]
+            work[GAIN, i, j] = 2.0 * ratio * total
+
+
+@rare_kernel
+def solve_forces(step: float, work: Floats) -> None:
+    """Leave y in the row CHANGE of the vectors: (I + dt/2 D Q W Q^T) y = D (P^T u + dt/2 Q W G^T (f_before - f))."""
+    vectors = work[ROWS]
+    half = 0.5 * step
+    multiply(work[PRODUCT], work[MOBILITY], work[FACTOR])  # Q W; Q is symmetric
+    for i in range(SIZE):
+        for j in range(SIZE):
+            vectors[FREE, i] += half * work[FACTOR, i, j] * vectors[CHANGE, j]
+    multiply(work[FACTOR], work[PRODUCT], work[STIFFNESS])
+    multiply(work[GAIN], work[STIFFNESS], work[FACTOR])
+    for i in range(SIZE):
+        vectors[CHANGE, i] = 0.0
+        for j in range(SIZE):
+            vectors[CHANGE, i] += work[GAIN, i, j] * vectors[FREE, j]
+            work[FACTOR, i, j] = half * work[FACTOR, i, j] + (1.0 if i == j else 0.0)
+    solve_in_place(work[FACTOR], vectors[CHANGE], SIZE)
+
+
+@rare_kernel
+def add_coupled_dashpots(points: Records, count: int, direction: int, ratio: float, step: float, work: Floats) -> None:
+    """Add the dashpot forces (N) to `force` of every point, which holds the spring force; `work` holds the mobility.
+
+    Points without stiffness (they slide) have no dashpot.
+    """
+    gather(points, count, direction, work)
+    fill_gain(ratio, work)
+    solve_forces(step, work)
+    vectors = work[ROWS]
+    for n in range(count):
+        point = points[n]
+        fill_row(point, direction, vectors[ROW])
+        total = 0.0
+        for i in range(SIZE):
+            total += vectors[ROW, i] * vectors[CHANGE, i]
+        point.force += math.sqrt(point.weight) * point.stiffness * total

@@ -4,14 +4,14 @@ A contact pushes a corner out through the nearest face that it can touch. Beyond
 than the particles of a boundary reach, that would be the wrong way or none at all, and a block would come out on the
 other side. So a run ends at the first overlap beyond a limit, that of the thinner of the two. While a pair touches, the
 overlaps of its contacts are checked; where it does not, or particles may have lost one another, the overlap of the
-shapes. No step takes a block far into another (world/step.py, verlet_list.py), so none is behind before it is
+shapes. No step takes a block far into another (world/step.py, broad_phase.py), so none is behind before it is
 found.
 """
 
 from blocksim.kernels.common.arrays import ALL, Record, Records, World
 from blocksim.kernels.common.energy import smallest_side
-from blocksim.kernels.common.geometry import ground_gap, separation
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.shapes import ground_gap, separation
 from blocksim.kernels.explicit.models import KERNEL, SURFACE
 from blocksim.kernels.explicit.outlines import deepest_overlap
 

@@ -4,8 +4,8 @@ from blocksim.kernels.common.arrays import Floats, Records, World
 from blocksim.kernels.common.energy import potential_energy
 from blocksim.kernels.common.integrate import kinetic_energy
 from blocksim.kernels.common.jit import entry_kernel, rare_kernel
+from blocksim.kernels.explicit.history import shear_stiffness_before, stiffness_before
 from blocksim.kernels.explicit.laws import stored_energy
-from blocksim.kernels.explicit.memory import shear_stiffness_before, stiffness_before
 
 LEDGER_ROW = (
     "kinetic",

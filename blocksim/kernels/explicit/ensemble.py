@@ -2,8 +2,7 @@
 
 from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED, Floats, Integers, World
 from blocksim.kernels.common.jit import entry_kernel, rare_kernel
-from blocksim.kernels.common.members import member
-from blocksim.kernels.common.watch import Watched, frame_to_watch, watch
+from blocksim.kernels.common.members import Watched, frame_to_watch, member, watch
 from blocksim.kernels.explicit.energy import measure
 from blocksim.kernels.explicit.step import advance_single
 

@@ -1,4 +1,6 @@
-"""Contact history when contacts begin, end, or pass from one corner to another.
+"""What the record of a contact says about the step before: stiffness then, and forces that were not spring forces.
+
+Contact history when contacts begin, end, or pass from one corner to another.
 
 A contact record keeps what a contact remembers from step to step. A contact ends when its corner leaves, or touches
 another face; what its springs hold is then lost and tallied. Where two corners pass one another (blocks that become
@@ -10,9 +12,36 @@ from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit.broad_phase import idle_candidates
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point, weigh_first_step
-from blocksim.kernels.explicit.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
+from blocksim.kernels.explicit.laws import elastic_force, tangent_stiffness
 from blocksim.kernels.explicit.models import SURFACE, place_ended, slot_normal
-from blocksim.kernels.explicit.models.duplicate_corners import PARALLEL
+from blocksim.kernels.explicit.models.surface import PARALLEL
+
+
+@kernel
+def stiffness_before(contact: Record, of_corners: float, values: Record, particles: Records | None) -> float:
+    """Return the stiffness that a contact had, in units of `normal_stiffness`; `of_corners` is that of its pair."""
+    if particles is None:
+        return of_corners
+    return values.normal_stiffness * contact.share
+
+
+@kernel
+def shear_stiffness_before(contact: Record, stiffness: float, values: Record, law: int) -> float:
+    """Return the stiffness (N/m) that the shear spring of a contact had; `stiffness` as above."""
+    return values.shear_ratio * tangent_stiffness(law, stiffness, contact.depth)
+
+
+@kernel
+def normal_loss(contact: Record, stiffness: float, law: int) -> float:
+    """Return the part (N) of the normal force that was dashpot, less what clipping took; `stiffness` as above."""
+    return contact.normal_force - elastic_force(law, stiffness, contact.depth)
+
+
+@kernel
+def shear_loss(contact: Record, stiffness: float) -> float:
+    """Return the part (N) of the shear force that was not that of the spring of this stiffness (N/m)."""
+    return contact.shear_force - stiffness * contact.spring
+
 
 TAKEN = 0xFFFFFFFF  # slot of an old contact that has found its successor; no corner or particle has this number
 

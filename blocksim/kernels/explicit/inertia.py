@@ -28,13 +28,12 @@ import math
 from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import ALL, HALF, SHEAR, Record, Records, World
-from blocksim.kernels.common.geometry import corner_offset, ground_gap
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.bearing import bearing_along
+from blocksim.kernels.common.shapes import corner_offset, ground_gap
+from blocksim.kernels.explicit.bearing import are_blocks, bearing_along
 from blocksim.kernels.explicit.models import SURFACE, slot_normal, slot_place
 from blocksim.kernels.explicit.outlines import corner_vector, gap_on, lowest_corner, number_of_corners, way_over
 from blocksim.kernels.explicit.separation import gap_along
-from blocksim.kernels.explicit.tributary import are_blocks
 
 LEAST_GYRATION = 0.1
 SHARE_PERIOD, MOST_PERIOD, SUM_PERIOD = 32, 128, 256  # steps

@@ -1,6 +1,6 @@
 """Faces and corners of the bodies of a scene with polygons, seen in world axes, and gaps between them.
 
-All bodies have their corners in one table (kernels/common/outlines.py), rectangles, pieces of ground and the half-plane
+All bodies have their corners in one table (kernels/common/shapes.py), rectangles, pieces of ground and the half-plane
 as well. Those of the last two count from the lower left one, so that their upper face has the number 2.
 """
 
@@ -11,11 +11,11 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import ALL, Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.outlines import corner_at, face_towards, hull_of, least_along
+from blocksim.kernels.common.shapes import corner_at, face_towards, hull_of, least_along
 
 MOST_CORNERS = 16  # of a block: slots from there on are corners of the second body of a pair
 UPPER = 2  # the face of the ground that counts
-WIDEST_CONE = 0.2  # as between rectangles; see models/duplicate_corners.py
+WIDEST_CONE = 0.2  # as between rectangles; see models/surface.py
 
 
 @kernel
@@ -51,7 +51,7 @@ def corner_of(body: Record, table: Records, number: int) -> Record:
 
 @kernel
 def cone_of(a: Record, b: Record, table: Records) -> float:
-    """Return the sine of the angle up to which faces of two bodies count as parallel; see world/shapes.py."""
+    """Return the sine of the angle up to which faces of two bodies count as parallel; see world/bodies.py."""
     cone: float = min(corner_of(a, table, 0).cone, corner_of(b, table, 0).cone)
     return cone
 

@@ -8,8 +8,8 @@ import math
 from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import HALF, NORMAL, SHEAR, Record
-from blocksim.kernels.common.geometry import corner_offset
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.shapes import corner_offset
 from blocksim.kernels.explicit.damping import (
     BOTH,
     OPERATOR_LIFE,
@@ -21,7 +21,7 @@ from blocksim.kernels.explicit.damping import (
 )
 from blocksim.kernels.explicit.inertia import Piece, inverse_mass_of, piece_of
 from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
-from blocksim.kernels.explicit.models.duplicate_corners import CONE_TOLERANCE, corner_signs
+from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, corner_signs
 
 
 class Motion(NamedTuple):

@@ -2,7 +2,7 @@
 
 A contact continues where the search of models/outlines.py would find it again: its corner lies behind the face, no
 other face is nearer that it can touch, and no other corner begins. Far from the ends of its face no other can be nearer
-(`clear`, world/shapes.py). Near an end that rule itself is asked, for this one corner. The same holds for a corner
+(`clear`, world/bodies.py). Near an end that rule itself is asked, for this one corner. The same holds for a corner
 without a contact: in front of a face that has no sharp end it is outside, elsewhere the rule decides.
 """
 
@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from blocksim.kernels.common.arrays import NO_FACE, Record, Records, World
-from blocksim.kernels.common.geometry import END_RATIO
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.shapes import END_RATIO
+from blocksim.kernels.explicit.bearing import bearing_of_facing, facing_of, flat_of
 from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
-from blocksim.kernels.explicit.models.outline_ends import HAND_OVER, has_inner
-from blocksim.kernels.explicit.models.outlines import DEEPEST, can_touch, corner_seen, face_met
+from blocksim.kernels.explicit.models.outlines import DEEPEST, HAND_OVER, can_touch, corner_seen, face_met, has_inner
 from blocksim.kernels.explicit.outlines import (
     MOST_CORNERS,
     UPPER,
@@ -32,7 +32,6 @@ from blocksim.kernels.explicit.outlines import (
 )
 from blocksim.kernels.explicit.persistent_contacts import Motion, PersistentContact, contact_at
 from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver, least_ratio, meets_along
-from blocksim.kernels.explicit.tributary import bearing_of_facing, facing_of, flat_of
 
 FRONT_BITS = 4  # of PAIR.fronts for each of the first candidates, enough for the faces of a block
 FRONT = (1 << FRONT_BITS) - 1
@@ -149,7 +148,7 @@ def goes_inwards(owner: Record, number: int, nx: float, ny: float, is_last: bool
 
     `is_last` says which end that is, `cone` is that of the other body. The two faces are parallel to within half the
     cone. Outlines turn at a corner by at least twice the angle of the cone, and at most by half a turn less that
-    (world/shapes.py), so that no face of the corner falls by more than the cone: it can touch this face. Towards the
+    (world/bodies.py), so that no face of the corner falls by more than the cone: it can touch this face. Towards the
     face beside, which turns away by as much, its own falls by more than the cone: that one it cannot touch.
     """
     level = corner_of(owner, table, number if is_last else number_before(owner, number))

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from blocksim.kernels.common.arrays import HALF, Record, World
-from blocksim.kernels.common.geometry import corner_offset
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.shapes import corner_offset
 
 
 @kernel

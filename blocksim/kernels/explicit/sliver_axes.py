@@ -2,6 +2,10 @@
 
 An axis is the normal of a face, its depth how far the deepest corner of the other body lies behind that face; see
 slivers.py. Of two faces within the cone of one another each has the other `across`.
+
+Numbers that know how they change as body a of a pair is moved, b held: exact gradients by the chain rule.
+
+So a potential is written down once, and its forces follow from it: see slivers.py.
 """
 
 import math
@@ -11,10 +15,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.jets import (
-    Jet,
-    absolute,
-)
+from blocksim.kernels.explicit.bearing import FLAT, FLAT_SHARE, are_blocks
 from blocksim.kernels.explicit.outlines import (
     cone_of,
     corner_of,
@@ -25,7 +26,73 @@ from blocksim.kernels.explicit.outlines import (
     side_along,
     side_normal,
 )
-from blocksim.kernels.explicit.tributary import FLAT, FLAT_SHARE, are_blocks
+
+
+class Jet(NamedTuple):
+    """A value with its derivatives by the place of body a, per m, and by its angle, per rad."""
+
+    value: float
+    x: float
+    y: float
+    turn: float
+
+
+CONSTANT_ONE = Jet(1.0, 0.0, 0.0, 0.0)
+
+
+@rare_kernel
+def plus(one: Jet, two: Jet, times: float) -> Jet:
+    """Return one + times two."""
+    return Jet(one.value + times * two.value, one.x + times * two.x, one.y + times * two.y, one.turn + times * two.turn)
+
+
+@rare_kernel
+def product(one: Jet, two: Jet) -> Jet:
+    """Return the product of two numbers."""
+    p, q = one.value, two.value
+    return Jet(p * q, p * two.x + q * one.x, p * two.y + q * one.y, p * two.turn + q * one.turn)
+
+
+@rare_kernel
+def quotient(one: Jet, two: Jet) -> Jet:
+    """Return one over two."""
+    q = one.value / two.value
+    over = 1.0 / two.value
+    return Jet(q, over * (one.x - q * two.x), over * (one.y - q * two.y), over * (one.turn - q * two.turn))
+
+
+@rare_kernel
+def mapped(one: Jet, value: float, slope: float) -> Jet:
+    """Return f(one), given f and its slope there."""
+    return Jet(value, slope * one.x, slope * one.y, slope * one.turn)
+
+
+@rare_kernel
+def powered(one: Jet, exponent: float) -> Jet:
+    """Return a number that is not negative to a power of more than one."""
+    slope = one.value ** (exponent - 1.0)
+    return mapped(one, one.value * slope, exponent * slope)
+
+
+@rare_kernel
+def stepped(one: Jet, low: float, high: float) -> Jet:
+    """Return the cubic step q^2 (3 - 2 q) from zero at `low` to one at `high`."""
+    q = min(max((one.value - low) / (high - low), 0.0), 1.0)
+    return mapped(one, q * q * (3.0 - 2.0 * q), 6.0 * q * (1.0 - q) / (high - low))
+
+
+@rare_kernel
+def absolute(one: Jet) -> Jet:
+    """Return the absolute value."""
+    return mapped(one, abs(one.value), math.copysign(1.0, one.value))
+
+
+@rare_kernel
+def cosine_of(sine: Jet) -> Jet:
+    """Return the cosine of an angle of less than a right one, given its sine."""
+    cosine = math.sqrt(1.0 - sine.value * sine.value)
+    return mapped(sine, cosine, -sine.value / cosine)
+
 
 SLIVER = 0.1  # overlap on the nearest axis over that on the next one, from where on a pair has its own potential
 # of the cone: such an overlap over the next one, from where on the second of two tilted ends counts less; at twice that
@@ -167,7 +234,7 @@ def meets_along(
     (m) from its middle. Let its face g there be parallel to that face f to within the sine s <= FLAT/2, G be the length
     of g, and L that of the interval which f and g have in common. Point P of g in its middle and foot Q of P on f are
     L/2 from all ends, and not farther apart than D = depth + s G, which no corner of g exceeds. All other faces are
-    c L/2 from P or Q, which is of the same body as they, c the least `clear` of f and g (world/shapes.py), and thus at
+    c L/2 from P or Q, which is of the same body as they, c the least `clear` of f and g (world/bodies.py), and thus at
     least c L/2 - D from the other one: less deep no other axis can be. The nearest one, f or g, is at most D deep, so
     there is no sliver where D <= SLIVER (c L/2 - D). Another SLIVER D is more than 1 - cos, up to s^2 of G, can change.
     """

@@ -3,7 +3,7 @@
 Contact laws are Newton's restitution and Coulomb's friction, both as impulses; nothing is as stiff as the blocks, so
 that steps are 0.1 to 1 ms long. A step of length dt is
 
-    neighbours is the list of pairs still good? else make it and its colours anew            neighbours.py, colours.py
+    neighbours is the list of pairs still good? else make it and its colours anew            neighbours.py
     manifolds  the contact manifold of every pair, kept for the whole step                  manifold.py
     substeps   each of length h: kick, warm start, position pass, drift, velocity pass      passes.py, motion.py
     finish     poses and velocities back to the bodies                                      motion.py

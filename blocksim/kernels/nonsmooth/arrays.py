@@ -27,7 +27,7 @@ CONSTRAINT = record_type(
     "shear_arm_a shear_arm_b "  # m: r x t, the same for both points, as they lie on one face
     "gap_one gap_two "  # m: when the step began; FAR where there is no such point
     "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
-    "bend shear_bend",  # m/s: gain of the velocities at the points in half a substep, as bodies turn; gap_curvature.py
+    "bend shear_bend",  # m/s: gain of the velocities at the points in half a substep, as bodies turn; faces.py
     indices="a b material",  # bodies; place in the table of interactions
     # of the manifold in the current step: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over:
     # NOT_STRUCK, STRUCK, STRUCK_AT_REST; FORGOTTEN of the last one when the next step has begun without them
@@ -68,7 +68,7 @@ IMPACT = on_own_lines(
     record_type(
         "vx vy spin "  # m/s, m/s, rad/s: when the round began
         "after_vx after_vy after_spin "  # m/s, m/s, rad/s: with all rebounds; then of the last solution that gains
-        "low_vx low_vy low_spin "  # m/s, m/s, rad/s: of the last solution that does not gain energy; see restraint.py
+        "low_vx low_vy low_spin "  # m/s, m/s, rad/s: of the last solution that does not gain energy; see impacts.py
         "share "  # -: of rebounds, that is tried; at last, of the way from the lower solution to the higher one
         "low high "  # -: shares of rebounds of both solutions; this and the following of roots
         "then now "  # J: kinetic energy of the cluster before the round, and after it or as last tried
@@ -86,7 +86,7 @@ ASIDE_LANES = (
     "target_one target_two "  # m/s: as GROUP has them, of the velocity pass before; -FAR if not hit
     "rise_one rise_two "  # m/s: that a rebound gets against gravity after all rounds; -FAR before it is hit
     "all_one all_two "  # m/s: targets of a round with all rebounds
-    "after_one after_two after_shear "  # N s: of the solutions of restraint.py, as in IMPACT
+    "after_one after_two after_shear "  # N s: of the solutions of impacts.py, as in IMPACT
     "low_one low_two low_shear "
     "held"  # N s: normal impulses of the substep before; FAR of what presses though they are forgotten
 )

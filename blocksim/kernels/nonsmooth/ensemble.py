@@ -2,9 +2,8 @@
 
 from blocksim.kernels.common.arrays import REACHED, Floats, Integers
 from blocksim.kernels.common.jit import entry_kernel, rare_kernel
+from blocksim.kernels.common.members import Watched, frame_to_watch, of_member, watch
 from blocksim.kernels.common.members import member as world_of
-from blocksim.kernels.common.members import of_member
-from blocksim.kernels.common.watch import Watched, frame_to_watch, watch
 from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
 from blocksim.kernels.nonsmooth.energy import measure_nonsmooth
 from blocksim.kernels.nonsmooth.step import advance_single

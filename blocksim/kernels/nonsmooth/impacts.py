@@ -17,28 +17,269 @@ lost (M. Smith et al., Reflections on simultaneous impact, ACM Trans. Graph. 31 
 restitution can create energy (T. R. Kane and D. A. Levinson, Dynamics (1985), section 5.8). Without rebounds a round
 creates none: with lambda_n t = 0 and friction against the slip that is left the change is at most
 -1/2 lambda A lambda. A cluster that gains has the round solved again with the share of its rebounds that leaves it the
-energy that it had: restraint.py.
+energy that it had.
+
+How much of its rebounds a cluster gets that would gain energy with all of them.
+
+A share x of the rebounds of a round, from 0 to 1, has a solution of its own: the round with all targets above zero
+times x. Velocities v(x) are straight lines in x with bends where a point begins or ends to slide or to press, and the
+energy K(x) is a parabola on each of them. Without rebounds no energy is gained, so that between 0 and 1 it is at some x
+what it was. A cluster gets v(x) there. With more restitution x falls in proportion, and v(x) is the same: what a
+cluster does grows with restitution until it would gain energy, and stays.
+
+For one point there is one such x: with y its velocity after the round along the normal, w that along the tangent and
+A = J M^-1 J^T, energy changes by dK = y d(lambda_n) + w d(lambda_t). Where it sticks, that is y d(lambda_n) >= 0. Where
+it slides, with sigma = +-1 the sense of w, it is (y - mu |w|) d(lambda_n), and this bracket grows with lambda_n at the
+rate A_nn - 2 sigma mu A_nt + mu^2 A_tt >= 0, as A is positive definite: K falls at first, if at all, and then grows.
+
+The search keeps a solution with too little and one with too much energy, and tries the x that would be right if no bend
+were in between; if there is none, it is. An end that stays where it is counts for half as much each time. What the two
+last solutions leave is made up between them, so that the energy is exact. Both keep all bounds of impulses and
+approaches, so what lies between them does too.
 """
+
+import math
 
 from blocksim.kernels.common.arrays import TEAM_SIZE, Integers, Record, Records
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import rare_kernel
-from blocksim.kernels.nonsmooth.arrays import Contacts
-from blocksim.kernels.nonsmooth.clusters import find_clusters, weigh
-from blocksim.kernels.nonsmooth.iterate import VELOCITY, agree, velocity_pass
-from blocksim.kernels.nonsmooth.loads import kick_again
-from blocksim.kernels.nonsmooth.restraint import (
-    aim_share,
-    begin_search,
-    judge,
-    keep_all,
-    keep_bodies,
-    keep_constraints,
-    settle_bodies,
-    settle_constraints,
+from blocksim.kernels.common.simd import WIDTH, load, store
+from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
+from blocksim.kernels.nonsmooth.clusters import (
+    ROUND_OFF,
+    count_work,
+    energy,
+    find_clusters,
+    has_gain,
+    of_constraint,
+    weigh,
 )
-from blocksim.kernels.nonsmooth.rounds import aim_rest, aim_round, bring_back, set_aside, tally_round
-from blocksim.kernels.nonsmooth.sweeps import part_of
+from blocksim.kernels.nonsmooth.motion import kick_again
+from blocksim.kernels.nonsmooth.rounds import aim_rest, aim_round, bring_back, clear, set_aside, tally_round
+from blocksim.kernels.nonsmooth.sweeps import VELOCITY, agree, part_of, velocity_pass
+
+NEITHER, LOW, HIGH = range(3)  # what the last solution of a cluster is kept as: that with too little or too much energy
+
+
+@rare_kernel
+def begin_search(contacts: Contacts) -> None:
+    """Let all clusters that have gained energy begin without rebounds; the others keep all of theirs."""
+    bodies = contacts.impacts
+    for body in bodies:
+        root = bodies[body.root]
+        body.is_open = 1 if has_gain(root) else 0
+        body.share = 0.0 if body.is_open else 1.0
+        body.side = NEITHER
+        body.low = 0.0
+        body.high = 1.0
+        body.stale = 1.0
+        body.most = body.now
+
+
+@rare_kernel
+def keep_all(contacts: Contacts, begin: int, end: int) -> None:
+    """Keep the targets of a round and the impulses with all rebounds."""
+    for m in range(begin, end):
+        aside = contacts.asides[m]
+        if aside.is_hit:
+            group = contacts.groups[m]
+            store(None, aside.all_one, load(None, group.target_one))
+            store(None, aside.all_two, load(None, group.target_two))
+            store(None, aside.after_one, load(None, group.normal_one))
+            store(None, aside.after_two, load(None, group.normal_two))
+            store(None, aside.after_shear, load(None, group.shear))
+
+
+@rare_kernel
+def aim_share(contacts: Contacts, begin: int, end: int) -> None:
+    """Begin a round again with the share of its rebounds that is to be tried; leave out clusters that are done."""
+    for m in range(begin, end):
+        aside = contacts.asides[m]
+        if aside.is_hit:
+            group = contacts.groups[m]
+            clear(group)
+            for lane in range(WIDTH):
+                body = of_constraint(contacts, group, min(lane, group.count - 1))
+                group.target_one[lane] = part_of_target(aside.all_one[lane], body)
+                group.target_two[lane] = part_of_target(aside.all_two[lane], body)
+
+
+@rare_kernel
+def part_of_target(target: float, body: Record) -> float:
+    """Return what a point has to reach (m/s) with the share of its rebound that is to be tried."""
+    if not body.is_open:
+        return -FAR
+    return body.share * target if target > 0.0 else target
+
+
+@rare_kernel
+def judge(contacts: Contacts, is_last: bool) -> bool:
+    """Decide as what the solutions just found are to be kept, and what is to be tried next; return whether anything is.
+
+    Clusters that are done have in `share` where they are between their two solutions.
+    """
+    bodies = contacts.impacts
+    weigh_again(contacts)
+    for i in range(bodies.size):
+        if bodies[i].root == i:
+            close_in(bodies[i])
+    find_between(contacts)
+    is_any = False
+    for i in range(bodies.size):
+        body = bodies[i]
+        if body.root == i and body.side != NEITHER:
+            try_next(body, is_last)
+            is_any = is_any or body.is_open == 1
+    for body in bodies:
+        body.share = bodies[body.root].share
+        body.is_open = bodies[body.root].is_open
+    return is_any
+
+
+@rare_kernel
+def weigh_again(contacts: Contacts) -> None:
+    """Sum up the energies of all clusters that are not done."""
+    states = contacts.states
+    bodies = contacts.impacts
+    for body in bodies:
+        if body.is_open:
+            body.now = 0.0
+    for i in range(bodies.size):
+        if bodies[i].is_open and states[i].inverse_mass > 0.0:
+            bodies[bodies[i].root].now += energy(contacts, states[i], states[i].vx, states[i].vy, states[i].spin)
+    count_work(contacts)
+
+
+@rare_kernel
+def close_in(root: Record) -> None:
+    """Let the solution just found replace the one on the same side of the energy that a cluster had."""
+    last = root.side
+    if not root.is_open:
+        root.side = NEITHER
+        return
+    root.side = LOW if root.share <= 0.0 or root.now <= root.then else HIGH
+    root.stale = 0.5 * root.stale if root.side == last else 1.0
+    if root.side == LOW:
+        root.low, root.least = root.share, root.now
+    else:
+        root.high, root.most = root.share, root.now
+
+
+@rare_kernel
+def find_between(contacts: Contacts) -> None:
+    """Sum up the energy of the difference between the two solutions of every cluster, and give its bodies the side."""
+    states = contacts.states
+    bodies = contacts.impacts
+    ux = contacts.stepping[0].support_vx
+    uy = contacts.stepping[0].support_vy
+    for body in bodies:
+        body.between = 0.0
+    for i in range(bodies.size):
+        body = bodies[i]
+        state = states[i]
+        root = bodies[body.root]
+        body.side = root.side
+        if body.side != NEITHER and state.inverse_mass > 0.0:
+            is_low = body.side == LOW
+            vx = state.vx - (body.after_vx if is_low else body.low_vx) + ux
+            vy = state.vy - (body.after_vy if is_low else body.low_vy) + uy
+            spin = state.spin - (body.after_spin if is_low else body.low_spin)
+            root.between += energy(contacts, state, vx, vy, spin)
+
+
+@rare_kernel
+def try_next(root: Record, is_last: bool) -> None:
+    """Set the share that a cluster tries next, or where it ends up between its two solutions."""
+    room = root.then - root.least
+    excess = root.most - root.then
+    if is_last or room <= 0.0 or abs(root.now - root.then) <= ROUND_OFF * root.then:
+        root.is_open = 0
+        root.share = share_of(room, room + excess, root.between)
+        return
+    if root.side == LOW:
+        excess *= root.stale
+    else:
+        room *= root.stale
+    root.share = root.low + (root.high - root.low) * share_of(room, room + excess, root.between)
+
+
+@rare_kernel
+def share_of(room: float, gain: float, between: float) -> float:
+    """Return s in [0, 1] with s (gain - between) + s^2 between = room, all energies (J).
+
+    From v_0 to v_1 = v_0 + d energy is a parabola of the share s of d: K(s) = K_0 + s (K_1 - K_0 - c) + s^2 c with the
+    energy c of d.
+    """
+    if room <= 0.0:
+        return 0.0
+    slope = gain - between
+    return min(1.0, 2.0 * room / (slope + math.sqrt(slope * slope + 4.0 * between * room)))
+
+
+@rare_kernel
+def keep_constraints(contacts: Contacts, begin: int, end: int) -> None:
+    """Keep the impulses just found, on the side that their cluster is on."""
+    for m in range(begin, end):
+        aside = contacts.asides[m]
+        if aside.is_hit:
+            group = contacts.groups[m]
+            for lane in range(WIDTH):
+                side = of_constraint(contacts, group, min(lane, group.count - 1)).side
+                if side == LOW:
+                    aside.low_one[lane] = group.normal_one[lane]
+                    aside.low_two[lane] = group.normal_two[lane]
+                    aside.low_shear[lane] = group.shear[lane]
+                elif side == HIGH:
+                    aside.after_one[lane] = group.normal_one[lane]
+                    aside.after_two[lane] = group.normal_two[lane]
+                    aside.after_shear[lane] = group.shear[lane]
+
+
+@rare_kernel
+def keep_bodies(contacts: Contacts, first: int, last: int) -> None:
+    """Keep the velocities just found, on the side that their cluster is on, and go back to the start of the round."""
+    for i in range(first, last):
+        body = contacts.impacts[i]
+        state = contacts.states[i]
+        if body.side == LOW:
+            body.low_vx, body.low_vy, body.low_spin = state.vx, state.vy, state.spin
+        elif body.side == HIGH:
+            body.after_vx, body.after_vy, body.after_spin = state.vx, state.vy, state.spin
+        if body.is_hit:
+            state.vx, state.vy, state.spin = body.vx, body.vy, body.spin
+
+
+@rare_kernel
+def settle_constraints(contacts: Contacts, begin: int, end: int) -> None:
+    """Give constraints the impulses that their cluster ends up with."""
+    for m in range(begin, end):
+        aside = contacts.asides[m]
+        if aside.is_hit:
+            group = contacts.groups[m]
+            for lane in range(WIDTH):
+                s = of_constraint(contacts, group, min(lane, group.count - 1)).share
+                group.normal_one[lane] = between(aside.low_one[lane], aside.after_one[lane], s)
+                group.normal_two[lane] = between(aside.low_two[lane], aside.after_two[lane], s)
+                group.shear[lane] = between(aside.low_shear[lane], aside.after_shear[lane], s)
+
+
+@rare_kernel
+def settle_bodies(contacts: Contacts, first: int, last: int) -> None:
+    """Give bodies the velocities that their cluster ends up with."""
+    for i in range(first, last):
+        body = contacts.impacts[i]
+        if body.is_hit:
+            state = contacts.states[i]
+            state.vx = between(body.low_vx, body.after_vx, body.share)
+            state.vy = between(body.low_vy, body.after_vy, body.share)
+            state.spin = between(body.low_spin, body.after_spin, body.share)
+
+
+@rare_kernel
+def between(x: float, y: float, share: float) -> float:
+    """Return what lies between x and y; exactly y where the share is one."""
+    return y if share >= 1.0 else x + share * (y - x)
+
 
 MOST_ROUNDS = 100  # what approaches then does not rebound
 MOST_TRIES = 30  # shares of rebounds; what energy is left then is made up between the last two

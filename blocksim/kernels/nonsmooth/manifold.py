@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.outlines import hull_of
+from blocksim.kernels.common.shapes import hull_of
 from blocksim.kernels.common.simd import (
     WIDTH,
     Lanes,
@@ -36,6 +36,7 @@ from blocksim.kernels.nonsmooth.faces import (
     Block,
     Points,
     at_start,
+    bend_of,
     block_ahead,
     block_of,
     clip,
@@ -44,12 +45,9 @@ from blocksim.kernels.nonsmooth.faces import (
     opposite_edge,
     points_of,
 )
-from blocksim.kernels.nonsmooth.gap_curvature import bend_of
 from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_level, points_on_piece
-from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners
-from blocksim.kernels.nonsmooth.sides import hulls_of_one
+from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners, hulls_of_one, points_of_two
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, presses
-from blocksim.kernels.nonsmooth.slivers import points_of_two
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by

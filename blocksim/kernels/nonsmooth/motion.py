@@ -1,9 +1,21 @@
-"""What happens to bodies one by one: kick and warm start, drift, poses."""
+"""What happens to bodies one by one: kick and warm start, drift, poses.
 
-from blocksim.kernels.common.arrays import Record, Records
-from blocksim.kernels.common.geometry import turn
-from blocksim.kernels.common.jit import kernel
-from blocksim.kernels.nonsmooth.arrays import Contacts
+Loads in the substeps: like gravity, but body by body. In scenes without loads nothing of this is called.
+
+A kick over a substep is that of the loads as they are when it begins, at the places then: halfway between the
+velocities before and after it. What the kick brings a body is its impulse times the mean of the velocities before and
+after the substep, contacts included; so their work adds up exactly, see energy.py.
+
+Prescribed motion: of the supports (the ground, its pieces, walls, fixed bodies) and of driven bodies.
+"""
+
+from blocksim.kernels.common.arrays import LOAD_FORCE, Record, Records, World
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.loads import acceleration_at, accelerations
+from blocksim.kernels.common.shapes import turn
+from blocksim.kernels.common.supports import displacement, follow_pieces, is_driven, piece_at, pose_at, put, way_over
+from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
+from blocksim.kernels.nonsmooth.parts import begin_of_part, end_of_part
 
 IN_FLIGHT = 1e-9  # of a kick: bodies whose velocity changes by no more beside it touch nothing
 
@@ -108,3 +120,167 @@ def place_all(
         state = contacts.states[i]
         if state.inverse_mass > 0.0:
             place(bodies[i], state, contacts.before[i], share, h, gravity)
+
+
+@rare_kernel
+def pull_of_loads(world: World, time: float) -> tuple[float, float]:
+    """Return the acceleration (m/s2) that loads give all free bodies at a time (s)."""
+    x = 0.0
+    y = 0.0
+    for load in world.loads:
+        if load.kind < LOAD_FORCE:
+            ax, ay = acceleration_at(world, load, time)
+            x += ax
+            y += ay
+    return x, y
+
+
+@rare_kernel
+def kick_by_loads(scene: Nonsmooth, number: int, first: int, last: int, share: float, last_share: float) -> None:
+    """Add the kick of loads to bodies that gravity has kicked in substep `number` of a step.
+
+    Bodies that were warm-started have that of the last substep once more, of which there was a share `last_share`.
+    """
+    h = scene.contacts.stepping[0].substep
+    time = scene.world.clock[0].steps * scene.world.controls[0].step + number * h
+    accelerations(scene.world, scene.contacts.states, scene.pushes, first, last, time)
+    new = share * h
+    old = last_share * h
+    for i in range(first, last):
+        state = scene.contacts.states[i]
+        one = scene.pushes[i]
+        if state.inverse_mass > 0.0:
+            state.vx += new * one.ax - old * one.last_ax
+            state.vy += new * one.ay - old * one.last_ay
+            state.spin += new * one.rate - old * one.last_rate
+
+
+@rare_kernel
+def kick_again(contacts: Contacts, pushes: Records, first: int, last: int, share: float) -> None:
+    """Add the kick of loads to bodies of clusters that were hit, whose substep begins after the last impact."""
+    kick = share * contacts.stepping[0].substep
+    for i in range(first, last):
+        if contacts.impacts[i].is_hit and contacts.states[i].inverse_mass > 0.0:
+            state = contacts.states[i]
+            state.vx += kick * pushes[i].ax
+            state.vy += kick * pushes[i].ay
+            state.spin += kick * pushes[i].rate
+
+
+@rare_kernel
+def tally_loads(scene: Nonsmooth, first: int, last: int, share: float) -> None:
+    """Tally what loads have brought the bodies from `first` to before `last` in a substep with that share of a kick."""
+    half = 0.5 * share * scene.contacts.stepping[0].substep
+    for i in range(first, last):
+        state = scene.contacts.states[i]
+        if state.inverse_mass > 0.0:
+            body = scene.world.bodies[i]
+            before = scene.contacts.before[i]
+            one = scene.pushes[i]
+            along = one.ax * (before.vx + state.vx) + one.ay * (before.vy + state.vy)
+            turning = one.rate * (before.spin + state.spin)
+            one.work += half * (body.mass * along + body.inertia * turning)
+
+
+@rare_kernel
+def show_velocities(scene: Nonsmooth, first: int, last: int, share: float) -> None:
+    """Bring the velocities of bodies in flight up to their places, at the end of a step; `share` is of the last kick.
+
+    As motion.place does with gravity alone.
+    """
+    h = scene.contacts.stepping[0].substep
+    controls = scene.world.controls[0]
+    for i in range(first, last):
+        state = scene.contacts.states[i]
+        if state.inverse_mass > 0.0:
+            body = scene.world.bodies[i]
+            before = scene.contacts.before[i]
+            one = scene.pushes[i]
+            kx = h * (controls.gravity_x + one.ax)
+            ky = h * (controls.gravity_y + one.ay)
+            off = abs(state.vx - before.vx - share * kx) + abs(state.vy - before.vy - share * ky)
+            flies = off <= IN_FLIGHT * (abs(kx) + abs(ky))
+            body.vx = state.vx + (0.5 * kx if flies else 0.0)
+            body.vy = state.vy + (0.5 * ky if flies else 0.0)
+            body.spin = state.spin + (0.5 * h * one.rate if flies else 0.0)
+
+
+@rare_kernel
+def displacement_at(world: World, time: float) -> float:
+    """Return the displacement (m) of the supports at a time (s) that is not before the current step."""
+    return displacement(world.motion[piece_at(world.motion, world.clock[0].motion_piece, time)], time)
+
+
+@rare_kernel
+def drive(scene: Nonsmooth, number: int) -> None:
+    """Give supports and driven bodies their velocity in substep `number`: displacement over time."""
+    world = scene.world
+    controls = world.controls[0]
+    stepping = scene.contacts.stepping[0]
+    h = stepping.substep
+    begin = begin_of_part(scene) + number * h
+    rate = (displacement_at(world, begin + h) - displacement_at(world, begin)) / h
+    stepping.support_vx = controls.motion_x * rate
+    stepping.support_vy = controls.motion_y * rate
+    for one in world.moved:
+        if is_driven(one):
+            drive_own(scene, one, begin)
+            continue
+        state = scene.contacts.states[one.body]
+        before = scene.contacts.before[one.body]
+        state.vx = before.vx = stepping.support_vx
+        state.vy = before.vy = stepping.support_vy
+
+
+@rare_kernel
+def drive_own(scene: Nonsmooth, one: Record, begin: float) -> None:
+    """Give a driven body its velocity in the substep that begins at a time (s)."""
+    h = scene.contacts.stepping[0].substep
+    state = scene.contacts.states[one.body]
+    before = scene.contacts.before[one.body]
+    way = way_over(scene.world, one, begin, h)
+    state.vx = before.vx = way.x / h
+    state.vy = before.vy = way.y / h
+    state.spin = before.spin = way.angle / h
+
+
+@rare_kernel
+def place_supports(scene: Nonsmooth) -> None:
+    """End a step of supports and driven bodies, which is not counted yet: where they have to be, never summed up."""
+    world = scene.world
+    controls = world.controls[0]
+    clock = world.clock[0]
+    now = end_of_part(scene)
+    clock.motion_piece = piece_at(world.motion, clock.motion_piece, now)
+    moved = displacement(world.motion[clock.motion_piece], now)
+    stepping = scene.contacts.stepping[0]
+    stepping.support_x = controls.motion_x * moved
+    stepping.support_y = controls.motion_y * moved
+    for one in world.moved:
+        if is_driven(one):
+            place_driven(scene, one, now)
+            continue
+        body = world.bodies[one.body]
+        state = scene.contacts.states[one.body]
+        body.x = one.x + stepping.support_x
+        body.y = one.y + stepping.support_y
+        body.vx = state.vx
+        body.vy = state.vy
+        state.dx = 0.0
+        state.dy = 0.0
+
+
+@rare_kernel
+def place_driven(scene: Nonsmooth, one: Record, time: float) -> None:
+    """End a step of one driven body, at a time (s)."""
+    world = scene.world
+    body = world.bodies[one.body]
+    state = scene.contacts.states[one.body]
+    follow_pieces(world, one, time)
+    put(body, pose_at(world, one, time))
+    body.vx = state.vx
+    body.vy = state.vy
+    body.spin = state.spin
+    state.dx = 0.0
+    state.dy = 0.0
+    state.turned = 0.0

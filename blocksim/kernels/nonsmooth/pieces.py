@@ -11,7 +11,7 @@ of the two pieces or are no edges.
 from typing import NamedTuple
 
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.outlines import AnyHull
+from blocksim.kernels.common.shapes import AnyHull
 from blocksim.kernels.nonsmooth.arrays import FAR
 from blocksim.kernels.nonsmooth.faces import (
     Block,

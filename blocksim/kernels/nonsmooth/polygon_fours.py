@@ -2,13 +2,12 @@
 
 from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.outlines import Hull, hull_of
+from blocksim.kernels.common.shapes import Hull, hull_of
 from blocksim.kernels.common.simd import WIDTH, fields_8, four, is_all, select, split
 from blocksim.kernels.nonsmooth.arrays import Contacts
 from blocksim.kernels.nonsmooth.faces import at_start
 from blocksim.kernels.nonsmooth.manifold import Place, blocks_at, collide, inverse_masses_at, write_four
-from blocksim.kernels.nonsmooth.polygons import Found, follow_corners, points_of_polygons
-from blocksim.kernels.nonsmooth.sides import Hulls
+from blocksim.kernels.nonsmooth.polygons import Found, Hulls, follow_corners, points_of_polygons
 from blocksim.kernels.nonsmooth.slip import Motion, presses
 
 

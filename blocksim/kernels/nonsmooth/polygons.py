@@ -1,33 +1,154 @@
-"""Where convex polygons touch or will: faces by separating axes, points by clipping, as of rectangles (manifold.py).
+"""Faces of convex polygons, of one body or of four at a time: which looks against a direction, and where it is.
+
+As in groups.py one source serves four pairs and a single one: `lane` is None for four. Of four bodies with different
+numbers of faces the table has faces after those of each that are never found (world/bodies.py).
+
+Where convex polygons touch or will: faces by separating axes, points by clipping, as of rectangles (manifold.py).
 
 Of all faces of both the reference is the one beyond which the other body reaches least. The face of the other body that
 looks most against it is clipped to its length: that gives at most two points. Each of them is a corner of one of the
 bodies, and impulses go with these corners from step to step: where a polygon rolls over a corner, what carried its one
 face at the right carries the next one at the left.
 
-Four pairs at a time, or a single one, by the same sums (sides.py). Where faces hardly face one another a pair is looked
-at alone: slivers.py.
+Four pairs at a time, or a single one, by the same sums. Where faces hardly face one another a pair is looked at alone.
+
+Polygons whose faces hardly face one another, or meet beside the reference face: one pair at a time.
+
+Where two faces face each other over a sliver only, the bodies meet at other faces, if these are nearly parallel: a
+block that slides over the flush joint of two others would else be stopped by the side of the second, as it sinks in by
+a little. And a face of b on which no point lies gives way to that of a.
 """
 
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import Record
-from blocksim.kernels.common.jit import kernel
-from blocksim.kernels.common.outlines import AnyHull, Hull, face_towards, next_corner
-from blocksim.kernels.common.simd import Lane, Lanes, Mask, greater, is_all, lesser, select
+from blocksim.kernels.common.arrays import Record, Records
+from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.shapes import AnyHull, Hull, face_towards, next_corner
+from blocksim.kernels.common.simd import Lane, Lanes, Mask, fields_0, fields_4, greater, is_all, lesser, select, split
 from blocksim.kernels.nonsmooth.arrays import FAR
-from blocksim.kernels.nonsmooth.faces import Block, Edge, Face, Points, clip, face_of, has_point, opposite_edge
-from blocksim.kernels.nonsmooth.faces import points_of as points_on
-from blocksim.kernels.nonsmooth.sides import (
-    Hulls,
-    Side,
-    least_along,
-    normal_at,
-    number_against,
-    side_at,
-    side_edge,
-    side_face,
+from blocksim.kernels.nonsmooth.faces import (
+    Block,
+    Edge,
+    Face,
+    Points,
+    clip,
+    face_of,
+    has_point,
+    in_frame,
+    opposite_edge,
 )
+from blocksim.kernels.nonsmooth.faces import points_of as points_on
+
+
+class Hulls(NamedTuple):
+    """The corners of four bodies, as of Hull; of a single one what is an integer here stands four times."""
+
+    table: Records
+    places: tuple[int, int, int, int]  # of the first corner in the table
+    size: int  # number of faces of that which has most
+    first: Lanes  # as `places`
+    count: Lanes  # number of faces
+    inner: Lanes  # m, from the centroid to the nearest face
+
+
+class Side(NamedTuple):
+    """A face in the frame of its body, fields as in CORNER."""
+
+    nx: Lanes
+    ny: Lanes
+    distance: Lanes
+    middle: Lanes
+    half: Lanes
+
+
+@kernel
+def hulls_of_one(hull: Hull) -> Hulls:
+    """Return the corners of a single body."""
+    first, size = hull.first, hull.size
+    places = (first, first, first, first)
+    return Hulls(hull.table, places, size, 1.0 * first, 1.0 * size, 1.0 * hull.inner)
+
+
+@kernel
+def normal_at(hulls: Hulls, k: int, lane: Lane) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Return normal, distance and middle (m) of face k of bodies."""
+    one, two, three, four = hulls.places
+    return fields_0(lane, hulls.table, (one + k, two + k, three + k, four + k))
+
+
+@kernel
+def side_at(table: Records, place: Lanes, lane: Lane) -> Side:
+    """Return the faces at places of the table."""
+    one, two, three, four = split(place)
+    places = (int(one), int(two), int(three), int(four))
+    nx, ny, distance, middle = fields_0(lane, table, places)
+    half, _, _, _ = fields_4(lane, table, places)
+    return Side(nx, ny, distance, middle, half)
+
+
+@kernel
+def number_against(hulls: Hulls, mx: Lanes, my: Lanes, lane: Lane) -> Lanes:
+    """Return the numbers of the faces that look most against unit vectors given in the frames of the bodies."""
+    nx, ny, _, _ = normal_at(hulls, 0, lane)
+    least = nx * mx + ny * my
+    number = 0.0 * least
+    for k in range(1, hulls.size):
+        nx, ny, _, _ = normal_at(hulls, k, lane)
+        cosine = nx * mx + ny * my
+        is_less = cosine < least
+        least = select(is_less, cosine, least)
+        number = select(is_less, 1.0 * k, number)
+    return number
+
+
+@kernel
+def least_along(side: Side, mx: Lanes, my: Lanes) -> Lanes:
+    """Return how far (m) a body reaches along a unit vector in its frame at least, given the face most against it.
+
+    One of the two ends of that face is the corner that reaches least.
+    """
+    along = side.nx * mx + side.ny * my
+    across = side.nx * my - side.ny * mx
+    return side.distance * along + side.middle * across - side.half * abs(across)
+
+
+@kernel
+def side_face(body: Block, side: Side) -> Face:
+    """Return a face as reference: of a rectangle what face_of returns, bit by bit."""
+    return Face(
+        body.cos * side.nx - body.sin * side.ny,
+        body.sin * side.nx + body.cos * side.ny,
+        body.x,
+        body.y,
+        side.distance,
+        -side.half - side.middle,
+        side.half - side.middle,
+    )
+
+
+@kernel
+def side_edge(face: Face, body: Block, side: Side) -> Edge:
+    """Return a face that looks towards a reference face: it begins at the left.
+
+    Of a rectangle that is what opposite_edge returns, bit by bit: from the centre to the middle of the face, and from
+    there to both ends.
+    """
+    x, y = in_frame(face, body.x, body.y)
+    # the body's own x axis in the frame of the reference face
+    c = body.cos * face.ny - body.sin * face.nx
+    s = body.cos * face.nx + body.sin * face.ny
+    # normal and direction of the body's face there
+    mx = side.nx * c - side.ny * s
+    my = side.nx * s + side.ny * c
+    tx = -side.ny * c - side.nx * s
+    ty = side.nx * c - side.ny * s
+    x = x + side.distance * mx + side.middle * tx
+    y = y + side.distance * my + side.middle * ty
+    ex = side.half * tx
+    ey = side.half * ty
+    are_all = abs(ex) >= 0.0
+    return Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
+
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller inner radius: two faces that face each other over less are passed by
@@ -323,3 +444,67 @@ def follow_corners(constraint: Record, one: int, two: int) -> None:
         constraint.shear *= (constraint.normal_one + constraint.normal_two) / total
     constraint.corner_one = one
     constraint.corner_two = two
+
+
+LEVEL = -0.99498743710662  # cosine: two faces within 0.1 rad of each other can meet as faces
+
+
+@kernel
+def points_of_two(a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float) -> Found:
+    """Return the contact manifold of two convex polygons within the margin (m)."""
+    found, best_b, best_a = points_of_polygons(a, hulls_a, b, hulls_b, margin, 0)
+    if found.is_odd:
+        return points_where_odd(best_b, best_a, a, hulls_a, b, hulls_b, margin)
+    return found
+
+
+@rare_kernel
+def points_where_odd(
+    best_b: Best, best_a: Best, a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float
+) -> Found:
+    """Return the same for polygons whose best faces face one another over a sliver, or have no point."""
+    if best_a.number < 0.0:
+        found = found_beside(True, best_b, a, hulls_a, b, hulls_b, margin)
+        if found.is_near:
+            return found
+        best_a = best_face(hulls_a, pose_of(b, a), hulls_b, 0)
+        if best_b.gap > best_a.gap:
+            return found
+    return found_beside(False, best_a, a, hulls_a, b, hulls_b, margin)
+
+
+@rare_kernel
+def found_beside(is_of_b: bool, best: Best, a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float) -> Found:
+    """Return the manifold on the best face of a body, or on the next best where it faces the other over a sliver."""
+    found = found_on(is_of_b, best, a, hulls_a, b, hulls_b, margin, 0)
+    least = EDGE * min(hulls_a.inner, hulls_b.inner)
+    if found.points.constraint.width < least:
+        body, hulls, other, others = (b, hulls_b, a, hulls_a) if is_of_b else (a, hulls_a, b, hulls_b)
+        next_best = next_above(-least, best.number, hulls, body, others, other)
+        if next_best.number >= 0.0 and can_meet(next_best, body, hulls, other, others):
+            return found_on(is_of_b, next_best, a, hulls_a, b, hulls_b, margin, 0)
+    return found
+
+
+@kernel
+def next_above(least: float, but: float, hulls: Hulls, body: Block, others: Hulls, other: Block) -> Best:
+    """Return the best face of a body but one of those with a gap above `least` (m)."""
+    pose = pose_of(other, body)
+    best = Best(least, -1.0, -1.0)
+    for k in range(hulls.size):
+        nx, ny, distance, _ = normal_at(hulls, k, 0)
+        gap, against = gap_beyond(nx * pose.x + ny * pose.y - distance, nx, ny, pose, others, 0)
+        if gap > best.gap and but != 1.0 * k:
+            best = Best(gap, 1.0 * k, against)
+    return best
+
+
+@kernel
+def can_meet(best: Best, body: Block, hulls: Hulls, other: Block, others: Hulls) -> bool:
+    """Return True if two faces are nearly parallel."""
+    pose = pose_of(other, body)
+    one = side_at(hulls.table, hulls.first + best.number, 0)
+    two = side_at(others.table, others.first + best.against, 0)
+    mx = pose.c * one.nx - pose.s * one.ny
+    my = pose.s * one.nx + pose.c * one.ny
+    return mx * two.nx + my * two.ny < LEVEL

@@ -5,7 +5,6 @@ import math
 from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import WIDTH, Lane, Lanes, Mask, fields_0, greater, lesser, load, select, store
-from blocksim.kernels.nonsmooth.aims import gaps, pulls
 from blocksim.kernels.nonsmooth.arrays import (
     AWAY,
     FAR,
@@ -18,7 +17,7 @@ from blocksim.kernels.nonsmooth.arrays import (
 )
 from blocksim.kernels.nonsmooth.clusters import of_constraint
 from blocksim.kernels.nonsmooth.groups import bodies_at, constraints_of, highest, total
-from blocksim.kernels.nonsmooth.passes import taken_by
+from blocksim.kernels.nonsmooth.passes import gaps, pulls, taken_by
 from blocksim.kernels.nonsmooth.slip import presses, slip_of
 
 UPRIGHT = 0.1  # cosine of the angle between a normal and gravity, from which on it presses at the start of a run

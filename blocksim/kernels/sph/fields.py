@@ -16,24 +16,209 @@ array([4877.3, 4817.4])
 array([4905., 9810.])
 >>> gradient(water, pressure, form="corrected")[:3, 1].round(1)  # of particles in the lowest row
 array([-9810., -9810., -9810.])
+
+Sums over neighbouring particles: interpolation (Eq 1) and gradients (Eq 2), plain, symmetric and corrected.
+
+V_b = m_b/rho_b is the area of particle b, W_ab = W(|r_a - r_b|, h), and grad_a W_ab = W' (r_a - r_b)/|r_a - r_b|.
+Neighbours are those of `cells.find_neighbours` with the support radius; the particle itself may be among them.
+
+Order of the error of a smooth field in h at a fixed h/dx, as tests/kernels/sph/test_convergence.py measures it:
+
+                                lattice, inside   disordered, inside   edges
+    interpolation  plain        2, then stalls     0                    0
+                   shepard      2 (at particles)   1                    1
+                   linear       2                  2                    2
+    gradient       plain        2, then stalls    -1                   -1
+                   symmetric    2, then stalls    -1                   -1
+                   difference   2, then stalls     0                    0
+                   corrected    2                  1                    1
+
+Inside, the error of order two is (h^2/4) M Laplacian A, M the integral of W q^2 (5/9 for Wendland C2), and the gradient
+of that. It stalls at a share of the field (of its slope) that depends on h/dx only: for Wendland C2 1 % (2.6 %) at
+h/dx = 1.3, and falling about as (h/dx)^-5 (-4).
 """
 
+import math
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blocksim.kernels.common.arrays import Floats
+from blocksim.kernels.common.arrays import Floats, Integers
+from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.sph.cells import Neighbours, find_neighbours
-from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
-from blocksim.kernels.sph.operators import (
-    GRADIENT_CODES,
-    INTERPOLATION_CODES,
-    Sources,
-    differentiate_particles,
-    interpolate_points,
-)
+from blocksim.kernels.sph.functions import KERNEL_CODES, kernel_slope, kernel_value, support_radius
+
+PLAIN = 0
+SHEPARD, LINEAR = 1, 2
+SYMMETRIC, DIFFERENCE, CORRECTED = 1, 2, 3
+INTERPOLATION_CODES = {"plain": PLAIN, "shepard": SHEPARD, "linear": LINEAR}
+GRADIENT_CODES = {"plain": PLAIN, "symmetric": SYMMETRIC, "difference": DIFFERENCE, "corrected": CORRECTED}
+
+# Eigenvalues below this share of their scale count as zero: of neighbours on a line one is zero up to round-off.
+RANK_TOLERANCE = 1e-8
+
+
+class Sources(NamedTuple):
+    """The particles that a sum runs over."""
+
+    positions: Floats  # m, (n, 2)
+    mass: Floats  # kg per metre of thickness, (n,)
+    density: Floats  # kg/m^3, (n,)
+    function: int  # code of the smoothing function
+    smoothing_length: float  # m
+
+
+@kernel
+def pseudo_inverse(a: float, b: float, d: float, least: float) -> tuple[float, float, float]:
+    """Invert the positive semidefinite matrix [[a, b], [b, d]] over its eigenvalues above `least`; zero elsewhere."""
+    middle = 0.5 * (a + d)
+    half = 0.5 * (a - d)
+    radius = math.sqrt(half * half + b * b)
+    if middle + radius <= least:
+        return 0.0, 0.0, 0.0
+    if middle - radius > least:
+        determinant = a * d - b * b
+        return d / determinant, -b / determinant, a / determinant
+    # one eigenvalue, middle + radius, is left; its projector is (I + (M - middle I)/radius)/2
+    scale = 0.5 / (middle + radius)
+    return scale * (1.0 + half / radius), scale * b / radius, scale * (1.0 - half / radius)
+
+
+@kernel
+def weight(sources: Sources, b: int, dx: float, dy: float) -> float:
+    """Return V_b W for a point that particle b is (dx, dy) (m) away from."""
+    r = math.sqrt(dx * dx + dy * dy)
+    return sources.mass[b] / sources.density[b] * kernel_value(sources.function, r, sources.smoothing_length)
+
+
+@kernel
+def radial_factor(sources: Sources, dx: float, dy: float) -> float:
+    """Return W'/r (1/m^4), so that grad_a W_ab = W'/r (r_a - r_b); zero where particles coincide."""
+    r = math.sqrt(dx * dx + dy * dy)
+    return kernel_slope(sources.function, r, sources.smoothing_length) / r if r > 0.0 else 0.0
+
+
+@rare_kernel
+def sum_at(sources: Sources, values: Floats, x: float, y: float, near: Integers) -> tuple[float, float, float, float]:
+    """Return sum V W, sum V W A (Eq 1) and sum V W (r_b - r)."""
+    weights, total, sum_x, sum_y = 0.0, 0.0, 0.0, 0.0
+    for b in near:
+        dx = sources.positions[b, 0] - x
+        dy = sources.positions[b, 1] - y
+        w = weight(sources, b, dx, dy)
+        weights += w
+        total += w * values[b]
+        sum_x += w * dx
+        sum_y += w * dy
+    return weights, total, sum_x, sum_y
+
+
+@rare_kernel
+def fit_line(
+    sources: Sources, values: Floats, x: float, y: float, near: Integers, mean_x: float, mean_y: float, mean: float
+) -> tuple[float, float]:
+    """Return the slopes (1/m) of the plane through the mean that fits the values best, with the weights V W.
+
+    A direction in which the neighbours do not spread has no slope.
+    """
+    weights, xx, xy, yy, x_a, y_a = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for b in near:
+        dx = sources.positions[b, 0] - x
+        dy = sources.positions[b, 1] - y
+        w = weight(sources, b, dx, dy)
+        weights += w
+        xx += w * (dx - mean_x) * (dx - mean_x)
+        xy += w * (dx - mean_x) * (dy - mean_y)
+        yy += w * (dy - mean_y) * (dy - mean_y)
+        x_a += w * (dx - mean_x) * (values[b] - mean)
+        y_a += w * (dy - mean_y) * (values[b] - mean)
+    least = RANK_TOLERANCE * weights * sources.smoothing_length * sources.smoothing_length
+    inverse_xx, inverse_xy, inverse_yy = pseudo_inverse(xx, xy, yy, least)
+    return inverse_xx * x_a + inverse_xy * y_a, inverse_xy * x_a + inverse_yy * y_a
+
+
+@rare_kernel
+def interpolate_at(form: int, sources: Sources, values: Floats, x: float, y: float, near: Integers) -> float:
+    """Return a field (any unit) at one point from its values at the particles nearby.
+
+    plain: sum V_b A_b W (Eq 1). shepard: the same over sum V_b W (Shepard 1968). linear: moving least squares, the
+    value here of the plane that fits the values around best with the weights V_b W. Without any particle nearby
+    the plain sum is zero and the others are nan.
+    """
+    weights, total, sum_x, sum_y = sum_at(sources, values, x, y, near)
+    if form == PLAIN:
+        return total
+    if weights <= 0.0:
+        return math.nan
+    mean = total / weights
+    if form == SHEPARD:
+        return mean
+    mean_x = sum_x / weights
+    mean_y = sum_y / weights
+    slope_x, slope_y = fit_line(sources, values, x, y, near, mean_x, mean_y, mean)
+    return mean - slope_x * mean_x - slope_y * mean_y
+
+
+@entry_kernel
+def interpolate_points(
+    form: int, sources: Sources, values: Floats, points: Floats, offsets: Integers, indices: Integers, out: Floats
+) -> None:
+    """Write the field at all points (m, 2) into `out` (m,)."""
+    for i in range(points.shape[0]):
+        near = indices[offsets[i] : offsets[i + 1]]
+        out[i] = interpolate_at(form, sources, values, points[i, 0], points[i, 1], near)
+
+
+@kernel
+def pair_factor(form: int, sources: Sources, values: Floats, a: int, b: int) -> float:
+    """Return what grad_a W_ab is multiplied with: V_b A_b, V_b (A_b - A_a) or the symmetric form of them."""
+    density = sources.density[b]
+    if form == PLAIN:
+        return sources.mass[b] / density * values[b]
+    if form == SYMMETRIC:
+        own = sources.density[a]
+        return own * sources.mass[b] * (values[a] / (own * own) + values[b] / (density * density))
+    return sources.mass[b] / density * (values[b] - values[a])
+
+
+@rare_kernel
+def gradient_at(form: int, sources: Sources, values: Floats, a: int, near: Integers) -> tuple[float, float]:
+    """Return the gradient (1/m) at particle a.
+
+    plain: sum V_b A_b grad W (Eq 2). symmetric: rho_a sum m_b (A_a/rho_a^2 + A_b/rho_b^2) grad W (Monaghan 1992);
+    times -m_a/rho_a it is a force with opposite partners. difference: sum V_b (A_b - A_a) grad W, zero for constants.
+    corrected: the latter times the inverse of B = sum V_b grad W (r_b - r_a)^T (Randles & Libersky 1996; Bonet & Lok
+    1999), exact for linear fields. B is symmetric and positive semidefinite; where all neighbours lie on a line the
+    gradient across it is zero, and without neighbours the whole of it.
+    """
+    sum_x, sum_y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0
+    for b in near:
+        dx = sources.positions[b, 0] - sources.positions[a, 0]
+        dy = sources.positions[b, 1] - sources.positions[a, 1]
+        radial = -radial_factor(sources, dx, dy)
+        factor = radial * pair_factor(form, sources, values, a, b)
+        sum_x += factor * dx
+        sum_y += factor * dy
+        spread = radial * sources.mass[b] / sources.density[b]
+        xx += spread * dx * dx
+        xy += spread * dx * dy
+        yy += spread * dy * dy
+    if form != CORRECTED:
+        return sum_x, sum_y
+    inverse_xx, inverse_xy, inverse_yy = pseudo_inverse(xx, xy, yy, RANK_TOLERANCE * (xx + yy))
+    return inverse_xx * sum_x + inverse_xy * sum_y, inverse_xy * sum_x + inverse_yy * sum_y
+
+
+@entry_kernel
+def differentiate_particles(
+    form: int, sources: Sources, values: Floats, offsets: Integers, indices: Integers, out: Floats
+) -> None:
+    """Write the gradient at all particles into `out` (n, 2)."""
+    for a in range(sources.positions.shape[0]):
+        out[a, 0], out[a, 1] = gradient_at(form, sources, values, a, indices[offsets[a] : offsets[a + 1]])
+
 
 KernelName = Literal["wendland-c2", "cubic-spline", "quintic-spline"]
 InterpolationForm = Literal["plain", "shepard", "linear"]

@@ -1,16 +1,29 @@
-"""Common base of all tables of a scenario, and field types that are not quantities."""
+"""Common base of all tables of a scenario, of those of further systems, and field types that are not quantities."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    create_model,
+)
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from blocksim.scenario.path_policy import OutOfReachError, table_in
-from blocksim.scenario.quantities import TIME, Quantity, invalid, shown
+from blocksim.scenario.input_files import OutOfReachError, table_in
 from blocksim.scenario.spelling import nearest
+from blocksim.scenario.units import TIME, Quantity, invalid, toml
+
+if TYPE_CHECKING:
+    from blocksim.scenario.models.scenario import Scenario
 
 
 class Table(BaseModel):
@@ -49,18 +62,18 @@ class OneOf(Checked):
     @property
     def wanted(self) -> str:
         """Return what is allowed."""
-        return " or ".join(shown(word) for word in self.available)
+        return " or ".join(toml(word) for word in self.available)
 
     def read(self, value: object) -> object:
         """Pass an available word; raises a pydantic error that lists the available words."""
         if type(value) in (str, int) and value in self.available:
             return value
         if isinstance(value, str) and value in self.planned:
-            raise invalid(f"{shown(value)} is not available yet; use {self.wanted}")
+            raise invalid(f"{toml(value)} is not available yet; use {self.wanted}")
         words = [word for word in self.available if isinstance(word, str)]
         similar = nearest(value, words, most=2) if isinstance(value, str) else None
-        hint = f"did you mean {shown(similar)}?" if similar else f"use {self.wanted}"
-        raise invalid(f"{shown(value)} is unknown, {hint}")
+        hint = f"did you mean {toml(similar)}?" if similar else f"use {self.wanted}"
+        raise invalid(f"{toml(value)} is unknown, {hint}")
 
 
 @dataclass(frozen=True)
@@ -75,7 +88,7 @@ class TimeOr(Checked):
         if isinstance(value, str) and not any(letter.isdigit() for letter in value):
             if value == self.word:
                 return value
-            raise invalid(f'{shown(value)} is not {self.what}; use "{self.word}" or {POSITIVE_TIME.wanted}')
+            raise invalid(f'{toml(value)} is not {self.what}; use "{self.word}" or {POSITIVE_TIME.wanted}')
         return POSITIVE_TIME.read(value)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -93,7 +106,7 @@ class Whole(Checked):
     def read(self, value: object) -> object:
         """Pass a whole number in the range; raises a pydantic error."""
         if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
-            raise invalid(f"{shown(value)} is not a whole number from {self.least} to {self.most}")
+            raise invalid(f"{toml(value)} is not a whole number from {self.least} to {self.most}")
         return value
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -119,7 +132,7 @@ def require_one(missing: str, **values: object) -> None:
 def table_path(value: object, folder: Path | str | None, example: str) -> Path:
     """Return the file that a key names, found from a folder, or unchecked without one; raises a pydantic error."""
     if not isinstance(value, str) or not value or "\0" in value:
-        raise invalid(f"{shown(value)} is not the path of a table, such as {shown(example)}")
+        raise invalid(f"{toml(value)} is not the path of a table, such as {toml(example)}")
     if folder is None:
         return Path(value)
     try:
@@ -130,13 +143,13 @@ def table_path(value: object, folder: Path | str | None, example: str) -> Path:
 
 def _identifier(value: object) -> object:
     if not isinstance(value, str):
-        raise invalid(f"{shown(value)} is not a string in quotes")
+        raise invalid(f"{toml(value)} is not a string in quotes")
     allowed = value.isascii() and all(c.isalnum() or c in "._-" for c in value)
     if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
-        message = f"{shown(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
+        message = f"{toml(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
         raise invalid(message)
     if value.endswith(".") or value.partition(".")[0].upper() in DEVICES:
-        raise invalid(f"{shown(value)} is not a name: some systems reserve it")
+        raise invalid(f"{toml(value)} is not a name: some systems reserve it")
     return value
 
 
@@ -150,3 +163,29 @@ Identifier = Annotated[
     Field(json_schema_extra={"pattern": rf"^(?!{_DEVICE}(\.|$))[A-Za-z0-9_]([A-Za-z0-9._-]{{0,98}}[A-Za-z0-9_-])?$"}),
 ]
 """A name that can be a folder or a table cell on every system."""
+
+
+HELD = "(systems)"
+"""Where a scenario keeps the tables of all systems; no key that a file could have."""
+
+
+class SystemTable(Table):
+    """One entry of the tables of a system; every system adds its own keys."""
+
+    declared_in: ClassVar[str]  # module:name of its blocksim.world.systems.system.System
+
+    def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:  # noqa: ARG002 - for those of systems
+        """Yield keys and what is wrong with them, although every value is valid by itself."""
+        yield from ()
+
+
+SYSTEMS: dict[str, type[SystemTable]] = {}
+"""Table of a scenario and its model."""
+
+
+def read_tables(held: Any, info: ValidationInfo) -> dict[str, tuple[SystemTable, ...]]:
+    """Return the validated tables of all systems; raises pydantic's error, with their places."""
+    several: Any = tuple  # of which type follows at run time
+    fields: dict[str, Any] = {name: (several[SYSTEMS[name], ...], ...) for name in held}
+    read = create_model("Systems", __base__=Table, **fields).model_validate(held, context=info.context)
+    return {name: getattr(read, name) for name in held}

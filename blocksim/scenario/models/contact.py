@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from blocksim.scenario import quantities as q
+from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf, Table
 
 Model = Literal["surface", "particles", "kernel"]
@@ -57,7 +57,7 @@ class PairFriction(Table):
             return value
         if isinstance(value, int | float | str) and not isinstance(value, bool):
             return {"static": value}
-        message = f"{q.shown(value)} is not a friction coefficient; write a number, an angle, or {{ static, kinetic }}"
+        message = f"{q.toml(value)} is not a friction coefficient; write a number, an angle, or {{ static, kinetic }}"
         raise q.invalid(message)
 
     @model_validator(mode="after")
@@ -96,7 +96,7 @@ class Restitution(Table):
             return {"block_block": value, "block_ground": value}
         if isinstance(value, Mapping | Restitution):
             return value
-        raise q.invalid(f"{q.shown(value)} is not a restitution; write a number or {{ block_block, block_ground }}")
+        raise q.invalid(f"{q.toml(value)} is not a restitution; write a number or {{ block_block, block_ground }}")
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:

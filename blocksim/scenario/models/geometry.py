@@ -16,10 +16,10 @@ from pydantic import (
 )
 from pydantic_core import PydanticKnownError
 
-from blocksim.scenario import outlines
-from blocksim.scenario import quantities as q
+from blocksim.scenario import geometry
+from blocksim.scenario import units as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole, require_one
-from blocksim.scenario.models.drive import AnyDrive
+from blocksim.scenario.models.motion import AnyDrive
 from blocksim.scenario.units import USUAL_GRAVITY
 
 Side = Literal["width", "height", "length"]
@@ -105,9 +105,9 @@ class Block(Table):
         default=None,
         description="corners [x, y] of a convex block, in either sense, in place of width, height and length; "
         "x and y of a body are those of its centroid",
-        json_schema_extra={"minItems": outlines.FEWEST, "maxItems": outlines.MOST},
+        json_schema_extra={"minItems": geometry.FEWEST, "maxItems": geometry.MOST},
     )
-    sides: Annotated[int, Whole(outlines.FEWEST, outlines.MOST)] | None = Field(
+    sides: Annotated[int, Whole(geometry.FEWEST, geometry.MOST)] | None = Field(
         default=None, description="number of sides of a regular block, the lowest level, in place of an outline"
     )
     radius: q.PositiveLength | None = Field(default=None, description="distance of its corners from its centre")
@@ -148,11 +148,11 @@ class Block(Table):
                 why = elsewhere if shape == "width" else f"has no meaning beside {shape}"
                 raise q.invalid(f"{key} {why}; keep one of them", key, at="key")
         if self.along == self.upright:
-            others = " or ".join(q.shown(side) for side in SIDES if side != self.upright)
-            raise q.invalid(f"{q.shown(self.upright)} already stands upright; {others} can lie along x", "along")
-        for number, message in outlines.faults(self.outline) if self.outline is not None else ():
+            others = " or ".join(q.toml(side) for side in SIDES if side != self.upright)
+            raise q.invalid(f"{q.toml(self.upright)} already stands upright; {others} can lie along x", "along")
+        for number, message in geometry.faults(self.outline) if self.outline is not None else ():
             raise q.invalid(message, "outline", *(() if number is None else (number,)))
-        for _, message in outlines.faults(self.polygon) if self.sides is not None and self.radius is not None else ():
+        for _, message in geometry.faults(self.polygon) if self.sides is not None and self.radius is not None else ():
             raise q.invalid(message, "radius")
         return self
 
@@ -177,11 +177,11 @@ class Block(Table):
         return self.width is not None or bool(self.polygon)
 
     @cached_property
-    def polygon(self) -> outlines.Corners:
+    def polygon(self) -> geometry.Corners:
         """Corners (m) counter-clockwise about the centroid; empty for a rectangular block."""
         if self.outline is not None:
-            return outlines.centred(self.outline)
-        return outlines.regular(self.sides, self.radius) if self.sides is not None and self.radius is not None else ()
+            return geometry.centre_outline(self.outline)
+        return geometry.regular(self.sides, self.radius) if self.sides is not None and self.radius is not None else ()
 
     @cached_property
     def size_x(self) -> float:
@@ -205,7 +205,7 @@ class Block(Table):
         return {"width": self.width, "height": self.height, "length": self.length}[name] or 0.0
 
     def _extent(self, axis: int) -> float:
-        low, high = outlines.box_of(self.polygon)
+        low, high = geometry.box_of(self.polygon)
         return high[axis] - low[axis]
 
 

@@ -8,6 +8,13 @@ A table of motion is CSV with the columns `time_s` and one of displacement or ac
     0.01,0.12
 
 Lines that begin with `#` are notes. Times increase and are not negative; the motion begins with the first of them.
+
+Acceleration pulses of the supports: sine, half-sine, rectangular, cosine.
+
+Prescribed motion of single bodies: as that of the supports, or once from start to end along a line or about a point.
+
+A driven body has friction and restitution at its faces as any other; forces do not move it, and [motion] does not
+either. Two bodies neither of which is free do not touch.
 """
 
 import hashlib
@@ -15,15 +22,14 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal, Self, TypeVar
+from typing import Annotated, Literal, Self, TypeVar, get_args
 
 from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema, model_validator
 
 from blocksim.errors import BlocksimError
-from blocksim.scenario import quantities as q
-from blocksim.scenario.bounded_read import read_limited
-from blocksim.scenario.csv_table import DIALECT, bare_rows
-from blocksim.scenario.models.base import Table, table_path
+from blocksim.scenario import units as q
+from blocksim.scenario.input_files import DIALECT, bare_rows, read_limited
+from blocksim.scenario.models.base import OneOf, Table, require_one, table_path
 from blocksim.scenario.units import STANDARD_GRAVITY
 
 PIECES_PER_CYCLE = 200
@@ -127,7 +133,7 @@ def read_motion_table(path: Path) -> MotionTable:
     line, names = lines[0] if lines else (1, [])
     others = [name for name in names if name != TIME]
     if len(names) != 2 or len(others) != 1 or others[0] not in COLUMNS:
-        found = q.shown(",".join(names))
+        found = q.toml(",".join(names))
         message = f"the columns are {found}; {TIME} and one of {', '.join(COLUMNS)} are needed"
         if ";" in found:
             message = f"{found}: columns are separated by semicolons; {DIALECT}"
@@ -138,7 +144,7 @@ def read_motion_table(path: Path) -> MotionTable:
     for line, cells in lines[1:]:
         if len(cells) != 2:
             hint = f"; {DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""
-            raise MotionTableError(f"line {line}: {q.shown(','.join(cells))}: a time and a value are needed{hint}")
+            raise MotionTableError(f"line {line}: {q.toml(','.join(cells))}: a time and a value are needed{hint}")
         numbers = dict(zip(names, (finite_number(line, cell, cell) for cell in cells), strict=True))
         time, before = numbers[TIME], times[-1] if times else -math.inf
         if time < 0.0 or time <= before:
@@ -159,7 +165,7 @@ def finite_number(line: int, text: str, digits: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise MotionTableError(f"line {line}: {q.shown(text)} is not a finite number")
+        raise MotionTableError(f"line {line}: {q.toml(text)} is not a finite number")
     return number
 
 
@@ -209,3 +215,153 @@ class FromTable(Table):
     start: q.NonNegativeTime = Field(
         default=0.0, description="time at which the table's time is zero; the supports rest before"
     )
+
+
+MOST_CYCLES = 1000.0
+Shape = Literal["sine", "half-sine", "rectangular", "cosine"]
+SINGLE = ("half-sine", "rectangular")
+"""Shapes of half a cycle, which do not repeat."""
+ABRUPT = ("rectangular", "cosine")
+"""Shapes that begin at their largest acceleration."""
+_SHAPES = OneOf(get_args(Shape))
+_Cycles = Annotated[float, q.Quantity(q.NUMBER, above=0.0, at_most=MOST_CYCLES)]
+Acceleration = Annotated[float, q.Quantity(q.ACCELERATION, above=0.0)]
+
+
+class Pulse(Table):
+    """Acceleration a(t) of the supports, which rest at t = `start` and before; a = 0 after the pulse.
+
+    With the amplitude A, w = 2 pi frequency, t from the start: sine A sin wt and cosine A cos wt over `cycles`,
+    half-sine A sin wt over half a cycle, rectangular A over half a cycle. The velocity that a half-sine (2 A/w), a
+    rectangle (A duration) or an incomplete cycle leaves stays; a full sine leaves no velocity but the displacement
+    2 pi A cycles/w^2, a full cosine neither.
+
+    A cosine or rectangle at time zero finds blocks that have settled into it, as with `start.settle`, as far as
+    friction carries its inertial force: see simulation/settling.py. One that begins later finds springs that carry
+    none of it; run.json warns where that makes a slip too large.
+    """
+
+    kind: Literal["pulse"] = Field(description="kind of motion")
+    shape: Annotated[Shape, _SHAPES] = Field(description="course of the acceleration")
+    amplitude: Acceleration = Field(description="largest acceleration; 0.5 g is written as such")
+    frequency: q.PositiveFrequency | None = Field(
+        default=None, description="cycles per second; give this or duration (a half-sine, a rectangle: half a cycle)"
+    )
+    duration: q.PositiveTime | None = Field(default=None, description="duration of the whole pulse")
+    cycles: _Cycles = Field(default=1.0, description="number of cycles of a sine or cosine, at most 1000")
+    direction: q.Angle = Field(default=0.0, description="direction of positive acceleration, counter-clockwise from +x")
+    start: q.NonNegativeTime = Field(default=0.0, description="start of the pulse; the supports rest before")
+
+    @property
+    def is_abrupt(self) -> bool:
+        """Return True for a pulse that begins at its largest acceleration."""
+        return self.shape in ABRUPT
+
+    @property
+    def resolved_cycles(self) -> float:
+        """Number of cycles, one half of a half-sine or a rectangle."""
+        return 0.5 if self.shape in SINGLE else self.cycles
+
+    @property
+    def resolved_duration(self) -> float:
+        """Duration (s) of the whole pulse."""
+        if self.duration is not None:
+            return self.duration
+        assert self.frequency is not None  # noqa: S101 - one of the two is there
+        return self.resolved_cycles / self.frequency
+
+    @property
+    def cycle(self) -> float:
+        """Time (s) of one cycle, whole or not."""
+        return self.resolved_duration / self.resolved_cycles
+
+    @property
+    def angular_frequency(self) -> float:
+        """Angular frequency w (rad/s)."""
+        return 2.0 * math.pi * self.resolved_cycles / self.resolved_duration
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if (self.frequency is None) == (self.duration is None):
+            found = "neither is" if self.frequency is None else "both are"
+            raise q.invalid(f"frequency or duration is needed; {found} given", "duration")
+        if self.shape in SINGLE and self.cycles != 1.0:
+            message = f'shape {q.toml(self.shape)} is a single half cycle; cycles belongs to "sine" and "cosine"'
+            raise q.invalid(message, "cycles")
+        return self
+
+
+Course = Literal["constant", "smooth"]
+COURSES: tuple[Course, ...] = ("constant", "smooth")
+MOST_BODY_TABLES = 16
+"""Different tables of motion of bodies, which are copied into the folder of a run."""
+STEEPEST = 15.0 / 8.0
+"""Greatest speed of a smooth course over its mean."""
+POSITIVE_SPIN = q.Quantity(q.SPIN, above=0.0)
+
+
+class Ramp(Table):
+    """Once over a distance: at constant speed, or smoothly, u = distance (10 s^3 - 15 s^4 + 6 s^5)."""
+
+    kind: Literal["ramp"] = Field(description="kind of motion")
+    distance: q.PositiveLength = Field(description="way from start to end")
+    direction: q.Angle = Field(default=0.0, description="direction of the motion, counter-clockwise from +x")
+    duration: q.PositiveTime | None = Field(default=None, description="time from start to end; give this or speed")
+    speed: q.PositiveSpeed | None = Field(default=None, description="greatest speed; give this or duration")
+    course: Annotated[Course, OneOf(COURSES)] = Field(
+        default="constant", description="constant (at once at full speed) or smooth (starts and ends without a jerk)"
+    )
+    start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the body rests before")
+
+    @model_validator(mode="after")
+    def _duration_or_speed(self) -> Self:
+        require_one("give duration or speed", duration=self.duration, speed=self.speed)
+        return self
+
+    @property
+    def resolved_duration(self) -> float:
+        """Time (s) from start to end."""
+        return _duration(self.duration, self.distance, self.speed, self.course)
+
+
+class Rotation(Table):
+    """Once by an angle about a point, at constant spin or smoothly as a ramp."""
+
+    kind: Literal["rotation"] = Field(description="kind of motion")
+    angle: q.Angle = Field(description="turn from start to end, counter-clockwise positive")
+    about: tuple[q.Length, q.Length] | None = Field(
+        default=None, description="[x, y] of the point that it turns about (default: the centre of the body)"
+    )
+    duration: q.PositiveTime | None = Field(default=None, description="time from start to end; give this or spin")
+    spin: Annotated[float, POSITIVE_SPIN] | None = Field(
+        default=None, description="greatest angular velocity; give this or duration"
+    )
+    course: Annotated[Course, OneOf(COURSES)] = Field(
+        default="constant", description="constant (at once at full spin) or smooth (starts and ends without a jerk)"
+    )
+    start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the body rests before")
+
+    @model_validator(mode="after")
+    def _duration_or_spin(self) -> Self:
+        require_one("give duration or spin", duration=self.duration, spin=self.spin)
+        if self.angle == 0.0:
+            raise q.invalid("a turn by 0 is none", "angle")
+        return self
+
+    @property
+    def resolved_duration(self) -> float:
+        """Time (s) from start to end."""
+        return _duration(self.duration, abs(self.angle), self.spin, self.course)
+
+
+def _duration(duration: float | None, way: float, speed: float | None, course: Course) -> float:
+    if duration is not None:
+        return duration
+    return way / (speed or math.nan) * (STEEPEST if course == "smooth" else 1.0)
+
+
+AnyDrive = Annotated[Harmonic | FromTable | Ramp | Rotation, Field(discriminator="kind")]
+"""Any prescribed motion of a body, distinguished by its `kind`."""
+OWN_DRIVES: dict[str, type[Table]] = {"ramp": Ramp, "rotation": Rotation}
+DRIVES: dict[str, type[Table]] = {"harmonic": Harmonic, "table": FromTable, **OWN_DRIVES}
+"""Class by kind, as written in a scenario."""

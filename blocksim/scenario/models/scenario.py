@@ -14,19 +14,15 @@ from pydantic import (
 )
 from pydantic.json_schema import SkipJsonSchema
 
-from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Identifier, OneOf, Table
+from blocksim.scenario import units as q
+from blocksim.scenario.models.base import HELD, SYSTEMS, Identifier, OneOf, SystemTable, Table, read_tables
 from blocksim.scenario.models.contact import Contact, Friction, Pair
-from blocksim.scenario.models.events import Event
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.loads import AnyLoad
-from blocksim.scenario.models.motions import AnyMotion
-from blocksim.scenario.models.probe import AnyProbe
-from blocksim.scenario.models.start import Start
-from blocksim.scenario.models.stepping import AnyTime, Explicit, Output
+from blocksim.scenario.models.record import AnyMotion
+from blocksim.scenario.models.stepping import AnyProbe, AnyTime, Event, Explicit, Output, Start
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
-from blocksim.scenario.systems import HELD, SYSTEMS, SystemTable, read_tables
 from blocksim.scenario.units import USUAL_GRAVITY
 
 SCHEMA_VERSION = 1

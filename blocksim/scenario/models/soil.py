@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
 import numpy as np
 from pydantic import Field, model_validator
 
-from blocksim.scenario import polygons
-from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import Identifier, OneOf
+from blocksim.scenario import geometry
+from blocksim.scenario import units as q
+from blocksim.scenario.models.base import SYSTEMS, Identifier, OneOf, SystemTable
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.scenario.systems import SYSTEMS, SystemTable
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,9 +64,9 @@ class SoilTable(SystemTable):
         for key in ("outline", "x", "y", "angle"):
             is_given = getattr(self, key) is not None
             if is_given and key not in wanted:
-                raise q.invalid(f"this key does not belong to kind {q.shown(self.kind)}", key, at="key")
+                raise q.invalid(f"this key does not belong to kind {q.toml(self.kind)}", key, at="key")
             if not is_given and key in wanted:
-                raise q.invalid(f"kind {q.shown(self.kind)} needs the key {key}", "kind", at="key")
+                raise q.invalid(f"kind {q.toml(self.kind)} needs the key {key}", "kind", at="key")
         for key in ("x", "y"):
             ends = getattr(self, key)
             if ends is not None and ends[1] <= ends[0]:
@@ -80,9 +79,9 @@ class SoilTable(SystemTable):
             raise q.invalid("an outline needs at least three corners [x, y]", "outline")
         if len(set(self.outline)) < len(self.outline):
             raise q.invalid("two corners are the same", "outline")
-        for one, other in polygons.self_crossings(np.array(self.outline)):
+        for one, other in geometry.self_crossings(np.array(self.outline)):
             raise q.invalid(f"edges {one + 1} and {other + 1} of the outline meet", "outline")
-        if abs(polygons.signed_area(np.array(self.outline))) <= polygons.ROUND_OFF**2:
+        if abs(geometry.signed_area(np.array(self.outline))) <= geometry.ROUND_OFF**2:
             raise q.invalid("the outline has no area", "outline")
         return self
 
@@ -90,10 +89,10 @@ class SoilTable(SystemTable):
     def corners(self) -> "NDArray[np.float64]":
         """Corners (m, (k, 2)), counter-clockwise."""
         if self.outline is not None:
-            return polygons.corners_of(self.outline)
+            return geometry.corners_of(self.outline)
         (x0, x1), (y0, y1) = self.x or (0.0, 0.0), self.y or (0.0, 0.0)
         left, right = self._heads
-        return polygons.corners_of([(x0, y0), (x1, y0), (x1 - right, y1), (x0 + left, y1)])
+        return geometry.corners_of([(x0, y0), (x1, y0), (x1 - right, y1), (x0 + left, y1)])
 
     @property
     def _heads(self) -> tuple[float, float]:
@@ -105,17 +104,17 @@ class SoilTable(SystemTable):
     def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
         """Find a material that is no soil, a spacing that does not suit, and what the outline meets."""
         from blocksim.scenario.placement import has_outlines  # noqa: PLC0415 - needs the scenario's own model
-        from blocksim.scenario.soil_places import meetings  # noqa: PLC0415 - the same
+        from blocksim.scenario.start import meetings  # noqa: PLC0415 - the same
 
         if self.material not in scenario.materials:
             hint = did_you_mean_or_list(self.material, scenario.materials)
-            yield "material", f"unknown material {q.shown(self.material)}, {hint}"
+            yield "material", f"unknown material {q.toml(self.material)}, {hint}"
         elif not scenario.materials[self.material].is_soil:
-            yield "material", f"{q.shown(self.material)} is no soil; give this material a friction_angle"
+            yield "material", f"{q.toml(self.material)} is no soil; give this material a friction_angle"
         if has_outlines(scenario):  # refused: they say nothing about spacing and place
             return
         sides = [side for block in scenario.blocks.values() if (side := min(block.size_x, block.size_y)) > 0.0]
-        across = polygons.count_across(self.corners, self.spacing)
+        across = geometry.count_across(self.corners, self.spacing)
         first = scenario.systems["soils"][0]
         unfit = []
         if isinstance(first, SoilTable) and self.spacing != first.spacing:

@@ -1,9 +1,10 @@
-"""Time stepping and recording."""
+"""What happens over time: stepping, recording, the start, events and probes."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, Literal, Self, get_args
 
 from pydantic import (
+    BeforeValidator,
     Discriminator,
     Field,
     SerializeAsAny,
@@ -11,10 +12,11 @@ from pydantic import (
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
+    model_validator,
 )
 
-from blocksim.scenario import quantities as q
-from blocksim.scenario.models.base import OneOf, Table, TimeOr, Whole
+from blocksim.scenario import units as q
+from blocksim.scenario.models.base import Identifier, OneOf, Table, TimeOr, Whole, by_kind, require_one
 from blocksim.scenario.spelling import nearest
 
 Scheme = Literal["explicit", "nonsmooth"]
@@ -131,3 +133,138 @@ class Output(Table):
 
     every: q.PositiveTime = Field(default=0.001, description="time between recorded frames")
     contacts: bool = Field(default=False, description="true to record all contacts and their forces in every frame")
+
+
+Release = Literal["at rest", "always"]
+
+
+class Start(Table):
+    """What happens before time zero: nothing, or the blocks settle under gravity and the loads of time zero.
+
+    They also do under a pulse that begins at its peak at time zero; see `blocksim.scenario.motion.settles`.
+    """
+
+    settle: bool = Field(
+        default=False, description="true to bring all to rest before time zero, with the contact forces that hold it"
+    )
+    hold: tuple[str, ...] = Field(
+        default=(), description="names of bodies that are kept still meanwhile and released at time zero"
+    )
+
+    release: Annotated[Release, OneOf(get_args(Release))] = Field(
+        default="at rest",
+        description='what is released at time zero: a scene "at rest" only, any other ends the run; or "always", which '
+        "records how it falls",
+    )
+
+    @model_validator(mode="after")
+    def _holds_while_it_settles(self) -> Self:
+        if self.hold and not self.settle:
+            raise q.invalid("nothing is held without settle = true", "hold")
+        if self.release != "at rest" and not self.settle:
+            raise q.invalid("all is released at once without settle = true", "release")
+        return self
+
+
+When = Literal["rest"]
+ACTIONS = ("remove", "fix", "free", "unload", "velocity")
+Names = tuple[str, ...]
+
+
+class NewVelocity(Table):
+    """Velocity that a body gets; what is not given stays as it is."""
+
+    body: str = Field(description="name of a free body")
+    vx: q.Speed | None = Field(default=None, description="velocity of the centre along x (default: as it is)")
+    vy: q.Speed | None = Field(default=None, description="velocity of the centre along y (default: as it is)")
+    spin: q.Spin | None = Field(default=None, description="angular velocity (default: as it is)")
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        if self.vx is None and self.vy is None and self.spin is None:
+            raise q.invalid("give vx, vy or spin")
+        return self
+
+
+class Event(Table):
+    """One event: when it happens, and all that happens then."""
+
+    at: q.PositiveTime | None = Field(default=None, description="time of the event; give this or when")
+    when: Annotated[When, OneOf(("rest",))] | None = Field(
+        default=None, description='"rest": once everything rests, instead of the end of the run; give this or at'
+    )
+    remove: Names = Field(default=(), description='names of bodies and walls ("wall 1" is the first) that go')
+    fix: Names = Field(default=(), description="names of bodies that are fixed from then on")
+    free: Names = Field(default=(), description="names of fixed or driven bodies that are free from then on")
+    unload: Names = Field(default=(), description="names of loads that end")
+    velocity: NewVelocity | None = Field(default=None, description="velocity that a body gets")
+
+    @model_validator(mode="after")
+    def _has_one_moment_and_an_effect(self) -> Self:
+        require_one('give a time, such as at = "0.2 s", or when = "rest"', at=self.at, when=self.when)
+        if not any(getattr(self, action) for action in ACTIONS):
+            raise q.invalid("nothing happens; give remove, fix, free, unload or velocity")
+        return self
+
+
+STEP = "step"
+Every = Annotated[float | Literal["step"], q.TIME, TimeOr(STEP, "a time between samples")]
+
+
+def _two(value: object) -> object:
+    if isinstance(value, list | tuple) and len(value) != 2:
+        raise q.invalid(f'{len(value)} bodies do not make a joint; two are needed, such as ["1", "2"]')
+    return value
+
+
+class Probe(Table):
+    """Something that is recorded over time; it never changes the motion."""
+
+    name: Identifier | None = Field(
+        default=None, description="name in files and pictures (default: kind and number, as in force1)"
+    )
+    every: Every | None = Field(
+        default=None, description='time between samples, or "step" for every step (default: every output time)'
+    )
+
+
+class ForceProbe(Probe):
+    """Force of contacts on something, its point of application, and the share of friction that it mobilises."""
+
+    kind: Literal["force"] = Field(description="kind of probe")
+    on: str = Field(
+        description='name of the body that it acts on; or "ground", "wall 1", "walls", or "supports": ground, walls '
+        "and fixed bodies (fx is the base shear, -fy the support force)"
+    )
+    by: str | None = Field(default=None, description="body or support that exerts it (default: all that touch)")
+
+
+class PointProbe(Probe):
+    """Motion of a material point of a body, in place and relative to the moving support."""
+
+    kind: Literal["point"] = Field(description="kind of probe")
+    body: str = Field(description="body that the point belongs to, by name")
+    at: tuple[q.Length, q.Length] = Field(
+        default=(0.0, 0.0), description="the point [x, y] in the body's own axes, from its centre"
+    )
+
+
+class JointProbe(Probe):
+    """Opening and slip of the joint between two faces that lie opposite each other at the start."""
+
+    kind: Literal["joint"] = Field(description="kind of probe")
+    bodies: Annotated[tuple[str, str], BeforeValidator(_two)] = Field(
+        description="two bodies by name; the joint turns with the first"
+    )
+
+
+class EnergyProbe(Probe):
+    """The energies of the ledger."""
+
+    kind: Literal["energy"] = Field(description="kind of probe")
+
+
+AnyProbe = Annotated[ForceProbe | PointProbe | JointProbe | EnergyProbe, Field(discriminator="kind")]
+"""Any probe, distinguished by its `kind`."""
+PROBES: dict[str, type[Probe]] = by_kind(AnyProbe)
+"""Class by kind, as written in a scenario."""

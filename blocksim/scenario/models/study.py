@@ -1,5 +1,6 @@
-"""Experiment and sweep of a scenario."""
+"""Experiment and sweep of a scenario, and the values of one varied key."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,246 @@ from pydantic import (
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, PydanticCustomError
 
-from blocksim.scenario import quantities as q
+from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf, Table, Whole, table_path
-from blocksim.scenario.models.variation import VALUES_SCHEMA, Variation, read_sampled, read_spread
 from blocksim.scenario.spelling import nearest
+from blocksim.scenario.units import Dimension, parse_unit
+
+MAX_VALUES = 100_000
+SIGNIFICANT = 12
+"""Digits that spaced and sampled values keep: mathematical libraries differ in the last ones."""
+FARTHEST = 8.0
+"""Largest distance from the mean, in standard deviations, at which a truncated normal distribution may begin."""
+
+NO_DIMENSION = q.NUMBER.dimension
+Scale = Literal["linear", "log"]
+
+
+@dataclass(frozen=True, slots=True)
+class Uniform:
+    """Evenly distributed from `low` to `high`, or their logarithms are; SI, radians where `angle`.
+
+    `unit` is the one that the file has, if any.
+    """
+
+    low: float
+    high: float
+    scale: Scale = "linear"
+    angle: bool = False
+    unit: str = ""
+
+    def as_table(self) -> dict[str, object]:
+        """Return the table of the file that says this."""
+        ends = {"from": _typed(self.low, self), "to": _typed(self.high, self)}
+        return ends if self.scale == "linear" else {**ends, "scale": self.scale}
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """Normally distributed, with nothing below `low` or above `high`; SI, radians where `angle`.
+
+    `unit` is the one that the file has, if any.
+    """
+
+    mean: float
+    sd: float
+    low: float = -math.inf
+    high: float = math.inf
+    angle: bool = False
+    unit: str = ""
+
+    def as_table(self) -> dict[str, object]:
+        """Return the table of the file that says this."""
+        ends = {"mean": self.mean, "sd": self.sd, "from": self.low, "to": self.high}
+        return {name: _typed(end, self) for name, end in ends.items() if math.isfinite(end)}
+
+
+Distribution = Uniform | Normal
+Variation = tuple[Any, ...] | Distribution
+
+
+def toml_number(number: float, *, angle: bool) -> object:
+    """Return a number as in a scenario: an angle as a string with its unit."""
+    return f"{number!r} rad" if angle else number
+
+
+def _typed(number: float, values: Distribution) -> object:
+    """Return a number with the unit of the file, if that gives the same number again."""
+    if values.unit:
+        text = f"{number / float(parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
+        if q.parse_quantity(text)[0] == number:
+            return text
+    return toml_number(number, angle=values.angle)
+
+
+def _unit(value: Mapping[str, Any], *names: str) -> str:
+    """Return the first unit that was typed at some keys."""
+    texts = (value[name] for name in names if isinstance(value.get(name), str))
+    return next((unit for text in texts if (unit := q.unit_in(text))), "")
+
+
+def round_digits(number: float) -> float:
+    """Return a number to the digits that are equal on every machine."""
+    return float(f"{number:.{SIGNIFICANT - 1}e}")
+
+
+def read_spread(value: object) -> tuple[Any, ...]:
+    """Return the values of a list or of { from, to, count }; raises a pydantic error for anything else."""
+    if not isinstance(value, Mapping):
+        return _levels(value, "{ from, to, count }")
+    is_whole = {"from", "to"} <= set(value) and "count" not in value and set(value) <= {"from", "to", "scale"}
+    if is_whole or "mean" in value or "sd" in value:
+        message = "a distribution needs one of the modes lhs, sobol and normal; "
+        raise q.invalid(message + "otherwise write a list or { from, to, count }")
+    _refuse_slips(value, ("from", "to", "count", "scale"), needed=("from", "to", "count"))
+    return _spread(value)
+
+
+def read_sampled(value: object) -> Variation:
+    """Return the levels of a list, or the distribution of a table; raises a pydantic error."""
+    if not isinstance(value, Mapping):
+        return _levels(value, "{ from, to } or { mean, sd }")
+    if "count" in value:
+        raise q.invalid('count belongs to the modes "grid" and "list"; here `samples` sets the number', "count")
+    if "mean" in value or "sd" in value:
+        return _normal(value)
+    _refuse_slips(value, ("from", "to", "scale", "mean", "sd"), needed=("from", "to"))
+    (low, high), angle = _numbers(value, "from", "to")
+    scale = _scale(value, low, high)
+    _refuse_empty(value, low, high)
+    return Uniform(low, high, scale, angle, _unit(value, "from", "to"))
+
+
+def _levels(value: object, tables: str) -> tuple[Any, ...]:
+    if not isinstance(value, list | tuple):
+        raise q.invalid(f"{q.toml(value)} is not a variation; write a list or {tables}, and the key in quotes")
+    if not value:
+        raise q.invalid("the list of values is empty")
+    return tuple(value)
+
+
+def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tuple[str, ...]) -> None:
+    """Refuse keys that a variation does not have, and report missing ones."""
+    if not set(value) & set(known):
+        message = (
+            f"{q.toml(value)} is not a variation; write a list or {{ {', '.join(needed)} }}, and the key in quotes"
+        )
+        raise q.invalid(message)
+    for key in value:
+        if key not in known:
+            meant = nearest(str(key), known, most=2)
+            hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
+            raise q.invalid(f"unknown key {q.toml(key)}, {hint}")
+    missing = [key for key in needed if key not in value]
+    if missing:
+        raise q.invalid(f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing")
+
+
+def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
+    """Return `count` evenly spaced values: both ends as written, between them SI numbers, angles as texts in rad.
+
+    Between ends that are written as whole numbers such values stay whole, for keys that take no others.
+    """
+    count = value["count"]
+    if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:
+        raise q.invalid(f"count {q.toml(count)} is not a whole number from 2 to {MAX_VALUES}")
+    (first, last), angle = _numbers(value, "from", "to")
+    scale = _scale(value, first, last)
+    if scale == "log":
+        inner = [round_digits(first * (last / first) ** (i / (count - 1))) for i in range(1, count - 1)]
+    else:
+        inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
+    if type(value["from"]) is type(value["to"]) is int:
+        return tuple(int(number) if number.is_integer() else number for number in (first, *inner, last))
+    ends = [  # as typed, with their unit
+        value[name] if isinstance(value[name], str) else toml_number(number, angle=angle)
+        for name, number in (("from", first), ("to", last))
+    ]
+    return (ends[0], *(toml_number(number, angle=angle) for number in inner), ends[1])
+
+
+def is_descending(value: Mapping[str, Any]) -> bool:
+    """Return True if `from` and `to` are of one kind and `from` is the greater; False for what cannot be read."""
+    try:
+        (first, last), _ = _numbers(value, "from", "to")
+    except PydanticCustomError:
+        return False
+    return first > last
+
+
+def _normal(value: Mapping[str, Any]) -> Normal:
+    _refuse_slips(value, ("mean", "sd", "from", "to"), needed=("mean", "sd"))
+    bounds = [name for name in ("from", "to") if name in value]
+    (mean, sd, *given), angle = _numbers(value, "mean", "sd", *bounds)
+    if sd <= 0.0:
+        raise q.invalid(f"the standard deviation {q.toml(value['sd'])} is not above 0", "sd")
+    ends = dict(zip(bounds, given, strict=True))
+    low, high = ends.get("from", -math.inf), ends.get("to", math.inf)
+    if len(bounds) == 2:
+        _refuse_empty(value, low, high)
+    if low > mean + FARTHEST * sd or high < mean - FARTHEST * sd:
+        message = f"the bounds exclude everything within {FARTHEST:g} standard deviations of the mean"
+        raise q.invalid(message, "from" if low > mean else "to")
+    return Normal(mean, sd, low, high, angle, _unit(value, "mean", "sd"))
+
+
+def _refuse_empty(value: Mapping[str, Any], low: float, high: float) -> None:
+    if low >= high:
+        raise q.invalid(f"from = {q.toml(value['from'])} is not below to = {q.toml(value['to'])}", "from")
+
+
+def _scale(value: Mapping[str, Any], low: float, high: float) -> Scale:
+    scale = value.get("scale", "linear")
+    OneOf(("linear", "log")).read(scale)
+    if scale == "log" and not (low > 0.0 and high > 0.0):
+        raise q.invalid('scale = "log" needs from and to above 0', "scale")
+    return "log" if scale == "log" else "linear"
+
+
+def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
+    """Return the SI numbers of keys of one kind, and whether they are angles."""
+    ends = [_end(value[name]) for name in names]
+    kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != NO_DIMENSION}
+    if len(kinds) > 1:
+        *others, last = (f"{name} {q.toml(value[name])}" for name in names)
+        raise q.invalid(f"{', '.join(others)} and {last} are not of one kind")
+    return [number for number, _ in ends], q.ANGLE.dimension in kinds
+
+
+def _end(value: object) -> tuple[float, Dimension]:
+    if not isinstance(value, str):
+        return q.Quantity(q.NUMBER).read(value), NO_DIMENSION
+    try:
+        return q.parse_quantity(value, q.LENGTH)
+    except ValueError as error:
+        raise q.invalid(f"{q.toml(value)}: {error}") from None
+
+
+_END: dict[str, Any] = {"type": ["number", "string"]}
+_SCALE: dict[str, Any] = {"enum": ["linear", "log"]}
+
+
+def _table_schema(properties: dict[str, Any], *required: str) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(required),
+        "additionalProperties": False,
+    }
+
+
+_COUNT: dict[str, Any] = {"type": "integer", "minimum": 2, "maximum": MAX_VALUES}
+VALUES_SCHEMA: dict[str, Any] = {
+    "anyOf": [
+        {"type": "array", "minItems": 1},
+        _table_schema({"from": _END, "to": _END, "count": _COUNT, "scale": _SCALE}, "from", "to"),
+        _table_schema({"mean": _END, "sd": _END, "from": _END, "to": _END}, "mean", "sd"),
+    ]
+}
+"""JSON Schema of all values of a varied key."""
+
 
 MAX_SAMPLES = 1_000_000
 MAX_SEED = 2**53
@@ -75,9 +310,7 @@ def _of_the_mode(value: object, info: ValidationInfo) -> object:
     modes = KEYS_OF[str(info.field_name)]
     mode = info.data.get("mode")
     if mode is not None and mode not in modes:
-        message = (
-            f"mode {q.shown(mode)} has no key {info.field_name}, which belongs to {', '.join(map(q.shown, modes))}"
-        )
+        message = f"mode {q.toml(mode)} has no key {info.field_name}, which belongs to {', '.join(map(q.toml, modes))}"
         raise q.invalid(message, at="key")
     return value
 

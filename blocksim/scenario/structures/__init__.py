@@ -5,19 +5,10 @@ from typing import Annotated
 from pydantic import Field
 
 from blocksim.scenario.models.base import by_kind
-from blocksim.scenario.structures.arch import Arch
-from blocksim.scenario.structures.base import MAX_BLOCKS, Pose, Structure, UnfitError
-from blocksim.scenario.structures.column import Column
-from blocksim.scenario.structures.dominoes import Dominoes
-from blocksim.scenario.structures.grid import Grid
+from blocksim.scenario.structures.base import MAX_BLOCKS, Pose, Shaped, Structure, UnfitError
+from blocksim.scenario.structures.cells import Arch, Column, Rubble, Voronoi
+from blocksim.scenario.structures.masonry import BlockWall, Dominoes, Grid, Pyramid, Stack, Staircase
 from blocksim.scenario.structures.polygons import Polygons
-from blocksim.scenario.structures.pyramid import Pyramid
-from blocksim.scenario.structures.rubble import Rubble
-from blocksim.scenario.structures.shaped import Shaped
-from blocksim.scenario.structures.stack import Stack
-from blocksim.scenario.structures.staircase import Staircase
-from blocksim.scenario.structures.voronoi import Voronoi
-from blocksim.scenario.structures.wall import BlockWall
 
 AnyStructure = Annotated[
     Staircase | Stack | BlockWall | Pyramid | Dominoes | Grid | Arch | Column | Voronoi | Rubble | Polygons,

@@ -1,14 +1,17 @@
-"""Common base of all kinds of structure."""
+"""Common base of all kinds of structure, and of those that shape their blocks."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from blocksim.scenario import quantities as q
+from blocksim.scenario import geometry
+from blocksim.scenario import units as q
+from blocksim.scenario.geometry import Corner, Corners
 from blocksim.scenario.models.base import Table, Whole
 from blocksim.scenario.models.geometry import Block
 
@@ -114,3 +117,73 @@ def draws(seed: int, *shape: int) -> Floats:
     numpy guarantees only the bit stream of PCG64 and its conversion to doubles, not distributions.
     """
     return np.random.Generator(np.random.PCG64(seed)).random(shape)
+
+
+class Cell(NamedTuple):
+    """One block where it is: its corners (m), counter-clockwise."""
+
+    corners: Sequence[Corner]
+    fixed: bool = False
+    block: str | None = None  # None: that of the structure
+    name: str | None = None  # None: its number
+
+
+class Shaped(Structure):
+    """A structure that shapes its blocks; its `block` has a depth and a material only.
+
+    `left` and `bottom` are those of the box around all blocks.
+    """
+
+    @property
+    @abstractmethod
+    def drawn(self) -> Sequence[Cell]:
+        """All blocks, wherever they are; raises UnfitError where keys do not make blocks."""
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """All blocks where they start; raises UnfitError."""
+        dx, dy = self.shift
+        cells = tuple(cell._replace(corners=[(x + dx, y + dy) for x, y in cell.corners]) for cell in self._as_drawn)
+        for number, cell in enumerate(cells, start=1):
+            for _, message in geometry.faults(cell.corners):
+                raise UnfitError("kind", f"block {number} of this structure: {message}")
+        return cells
+
+    @cached_property
+    def _as_drawn(self) -> Sequence[Cell]:
+        return self.drawn
+
+    @property
+    def shift(self) -> Corner:
+        """How far all blocks move (m) from where they are drawn."""
+        low, _ = geometry.box_of([corner for cell in self._as_drawn for corner in cell.corners])
+        return self.left - low[0], self.bottom - low[1]
+
+    @property
+    def size(self) -> int:
+        """Number of blocks; zero where keys do not make blocks."""
+        try:
+            return len(self.cells)
+        except UnfitError:
+            return 0
+
+    @property
+    def shapes(self) -> Sequence[Corners]:
+        """Corners (m) of every block about its centroid."""
+        return [geometry.centre_outline(cell.corners) for cell in self.cells]
+
+    def height(self, block: Block) -> float:  # noqa: ARG002 - blocks have the shape that this gives them
+        """Upper edge of the highest block."""
+        _, high = geometry.box_of([corner for cell in self.cells for corner in cell.corners])
+        return high[1] - self.bottom
+
+    def place(self, block: Block) -> Sequence[Pose]:
+        """Return the centroids of all blocks, none of them turned."""
+        if block.is_shaped:
+            raise UnfitError("block", "this structure shapes its blocks; give the block a depth and a material only")
+        return [Pose(*geometry.centroid(cell.corners)) for cell in self.cells]
+
+    def start(self, block: Block) -> Sequence[Pose]:
+        """Return the poses with the initial velocities; fixed blocks rest. Raises UnfitError."""
+        poses = super().start(block)
+        return [Pose(*pose[:3]) if cell.fixed else pose for pose, cell in zip(poses, self.cells, strict=True)]

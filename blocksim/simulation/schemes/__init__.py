@@ -12,9 +12,8 @@ from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import SCHEMES as TABLES
 from blocksim.scenario.motion import settles
 from blocksim.simulation.schemes.scheme import COUNTED, AnyScene, Scene, Scheme
-from blocksim.world import scenes
-from blocksim.world.coupled import couple
-from blocksim.world.scenes import Built, Refusal, Stack, alike, build_one, stack_of_one
+from blocksim.world import build as scenes
+from blocksim.world.build import Built, Refusal, Stack, build_one, couple, group_equal, stack_of_one
 from blocksim.world.systems import others_of
 
 
@@ -66,7 +65,7 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
     A scene with systems beside blocks and supports, one of a scheme without a way to advance members together, and one
     that settles before it begins, is a stack of its own.
     """
-    for places in alike([_together(scenario) for scenario in scenarios]):
+    for places in group_equal([_together(scenario) for scenario in scenarios]):
         some = [scenarios[i] for i in places]
         if _together(some[0]) is None:
             yield from (_alone(i, scenarios[i]) for i in places)

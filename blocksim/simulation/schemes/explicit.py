@@ -18,7 +18,7 @@ from blocksim.kernels.explicit.models import SURFACE as SURFACE_MODEL
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.kernels.explicit.step import advance, advance_coupled_alone, advance_coupled_in_team, advance_in_team
 from blocksim.scenario.overlap import penetration
-from blocksim.simulation.contacts import SUPPORT, UNITS, Rows, empty_rows
+from blocksim.simulation.frames import SUPPORT, UNITS, Rows, empty_rows
 from blocksim.simulation.schemes.scheme import BODIES_A_THREAD, Overlaps, Scheme, outlines_of, smallest_sides
 from blocksim.world.build import EXPLICIT as CONSTRUCTION
 from blocksim.world.build import with_more_room, with_threads

@@ -16,7 +16,7 @@ from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER, measure_nonsmoot
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.step import advance_nonsmooth, advance_nonsmooth_in_team
 from blocksim.scenario import PlacedBody, Scenario
-from blocksim.simulation.contacts import SUPPORT, Rows, empty_rows
+from blocksim.simulation.frames import SUPPORT, Rows, empty_rows
 from blocksim.simulation.schemes.scheme import (
     BODIES_A_THREAD,
     Overlaps,

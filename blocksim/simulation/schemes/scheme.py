@@ -16,8 +16,8 @@ from blocksim.kernels.common.systems import Coupled
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.overlap import Outlines, Rectangles
-from blocksim.simulation.contacts import Rows, empty_rows
-from blocksim.world.scenes import Construction
+from blocksim.simulation.frames import Rows, empty_rows
+from blocksim.world.build import Construction
 
 AnyScene = World | Nonsmooth
 """The arrays of a scene under way; `world` are those that all schemes share."""

@@ -22,8 +22,8 @@ from blocksim.scenario import PlacedBody
 from blocksim.simulation.atomic import PERMISSIONS, permissions_of, sync_file
 from blocksim.simulation.probes import NO_PROBES, Probes
 from blocksim.simulation.recorder import Frame
-from blocksim.simulation.stores import hdf5_layout as layout
-from blocksim.simulation.stores.hdf5_open import SIGNATURE, SUPERBLOCK, VERSION
+from blocksim.simulation.stores import hdf5 as layout
+from blocksim.simulation.stores.hdf5_files import SIGNATURE, SUPERBLOCK, VERSION
 from blocksim.world.memory import chunk_rows
 from blocksim.world.systems.blocks import blocks_placed
 from blocksim.world.systems.system import Present

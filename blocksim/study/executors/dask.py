@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
 
 from blocksim.errors import InvalidInputError, UnavailableError
-from blocksim.extras import CLUSTER, loaded
+from blocksim.extras import CLUSTER, load_module
 from blocksim.simulation.provenance import code_hash
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
 from blocksim.study.executors.ensemble import run_batch
@@ -42,7 +42,7 @@ def check(setting: Setting) -> None:
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
     """Give a client of a scheduler. Raises UnavailableError where there is no package, or no answer."""
-    distributed = loaded("distributed", "--scheduler", CLUSTER)  # here: a second that other executors do not pay
+    distributed = load_module("distributed", "--scheduler", CLUSTER)  # here: a second that other executors do not pay
     with silence():
         try:
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)

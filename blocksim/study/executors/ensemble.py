@@ -18,9 +18,9 @@ from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError,
 from blocksim.scenario import Document, Scenario
 from blocksim.simulation import MemberEnd, MemberFailure, Summary, run_in_batches
 from blocksim.simulation import folder as files
+from blocksim.simulation.frames import Columns, read_table
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
-from blocksim.simulation.summary import changed_results, read_summary
-from blocksim.simulation.table import Columns, read_table
+from blocksim.simulation.result import changed_results, read_summary
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
 from blocksim.study.run import run

@@ -9,9 +9,9 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.scenario.keys import KeyPath, format_key
+from blocksim.scenario.overrides import KeyPath, format_key
 from blocksim.simulation.atomic import write_bytes
-from blocksim.view.report.runs import Subject
+from blocksim.view.report.subjects import Subject
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -11,8 +11,8 @@ import numpy as np
 from blocksim.view import style
 from blocksim.view.history import HistoryLike, drawn_history
 from blocksim.view.kinds import SWEEP_KINDS
-from blocksim.view.layout import OWN
 from blocksim.view.run_data import Support
+from blocksim.view.style import OWN
 from blocksim.view.sweeps import outcome_map
 from blocksim.view.sweeps.data import SweepData, short_names
 from blocksim.view.sweeps.outcome_map import OutcomeMap

@@ -1,26 +1,208 @@
-"""Data of the player: frames as text that a page can carry, contact forces, and the surroundings of the blocks.
+"""Data of the player: frames, forces, loads, further systems and surroundings, as text that a page can carry."""
 
-Frames are thinned where there are too many, and rounded where they are large. Lengths in millimetres.
-"""
-
+import base64
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.happened import Happened
+from blocksim.simulation.result import EventRecord
 from blocksim.view import style
-from blocksim.view.forces import force_scale, pushing_up
-from blocksim.view.report.elements import element_bytes, pack_systems
-from blocksim.view.report.packing import EXACT_VALUES, SHORT_BYTES, listed, pack
-from blocksim.view.run_data import Floats, Indices, drawable_frames, shortest_sides, support_of
+from blocksim.view.arrows import SPEED, Arrows, Mark, Turns, force_scale, length_in, outside, pushing_up, with_room
+from blocksim.view.paint import ELEMENT_COLOURS, shade_scale
+from blocksim.view.run_data import (
+    MILLIMETRES,
+    Extent,
+    Floats,
+    Indices,
+    Support,
+    drawable_frames,
+    extent_of,
+    others_of,
+    outlines_of,
+    shortest_sides,
+    support_of,
+    turned,
+)
 from blocksim.view.scene import upper_sides
-from blocksim.view.window import MILLIMETRES, extent_of
 from blocksim.world.systems.blocks import are_removed, distinct
+from blocksim.world.systems.system import Track
+
+EXACT_VALUES = 200_000  # up to so many values are kept as 32-bit floats
+LEVELS = 65_535  # steps of a rounded value
+SHORT_BYTES = 2
+
+
+def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]:
+    """Return values as base64 text with the range they are rounded in, and the largest error of that.
+
+    Few values, or all with `exact`, become 32-bit floats; many become 16-bit steps between smallest and largest.
+    Values that are not finite stay what they are, or become 0 in steps.
+    """
+    if exact or values.size <= EXACT_VALUES:
+        floats = values.astype("<f4")
+        return {"type": "f4", "data": _text(floats)}, _largest(floats.astype(float) - values)
+    finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+    low, high = float(finite.min()), float(finite.max())
+    step = (high - low) / LEVELS or 1.0
+    steps = np.rint((finite - low) / step).astype("<u2")
+    return {"type": "u2", "low": low, "step": step, "data": _text(steps)}, _largest(low + step * steps - values)
+
+
+def listed(values: Floats) -> list[float]:
+    """Return a few values as plain numbers of seven digits."""
+    return [float(f"{value:.7g}") for value in values]
+
+
+def _largest(errors: Floats) -> float:
+    finite = np.abs(errors[np.isfinite(errors)])
+    return float(finite.max()) if finite.size else 0.0
+
+
+def _text(values: NDArray[Any]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
+
+
+STEPS = 24  # of the colours of elements: each is one path of the canvas
+SAME_SHAPE = 1e-6  # of its size, by which corners of an outline that only moves may be off
+
+
+def element_bytes(frames: Frames, drawable: Indices) -> int:
+    """Return about how many bytes the elements of all systems take in one frame."""
+    ends = drawable[[0, -1]]
+    tracks = others_of(frames)
+    return sum(SHORT_BYTES * (_numbers(track, ends) + len(track.system.shades)) * len(track.names) for track in tracks)
+
+
+def _numbers(track: Track, ends: Indices) -> int:
+    """Return how many numbers an element has in a frame, judged by two of them."""
+    outlines = np.concatenate([_outlines(track, frame) for frame in ends])
+    return 2 if _only_move(outlines.reshape(len(ends), -1, *outlines.shape[1:])) else 2 * outlines.shape[1]
+
+
+def _outlines(track: Track, frame: int) -> Floats:
+    """Return the outlines (mm) in one frame, (b, k, 2)."""
+    return np.asarray(MILLIMETRES * outlines_of(track, np.array([frame]))[0])
+
+
+def _only_move(outlines: Floats) -> bool:
+    """Return True if no element turns or changes its shape, (f, b, k, 2)."""
+    shapes = outlines - outlines.mean(axis=2, keepdims=True)
+    size = np.ptp(shapes[0], axis=(0, 1)).max(initial=0.0)
+    return bool(np.abs(shapes - shapes[:1]).max(initial=0.0) <= SAME_SHAPE * size)
+
+
+def pack_systems(frames: Frames, kept: Indices) -> list[dict[str, Any]]:
+    """Return every system with its name, colour, number of elements and corners, and places in the kept frames.
+
+    `x` and `y` are those of centres (f, b), with a `shape` of one outline for each element, or for all; without it
+    those of all corners (f, b, k). `shades` are what elements can be coloured by: labels, values (f, b), and the value
+    of the last of the `palette`.
+    """
+    return [
+        {
+            "name": track.system.name,
+            "colour": style.block_colour(number),
+            **_packed(track, kept),
+            "shades": [
+                {"label": shade.label, "high": shade_scale(shade, values).high, "values": pack(values)[0]}
+                for shade in track.system.shades
+                for values in [shade.of(track.some(kept))]
+            ],
+            "palette": palette() if track.system.shades else [],
+        }
+        for number, track in enumerate(others_of(frames), start=1)
+    ]
+
+
+def palette() -> list[str]:
+    """Return the colours of elements, in even steps from none to most."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return [to_hex(colour) for colour in colormaps[ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
+
+
+def _packed(track: Track, kept: Indices) -> dict[str, Any]:
+    first = _outlines(track, int(kept[0]))
+    sizes = {"count": first.shape[0], "corners": first.shape[1]}
+    places = np.empty((len(kept), *first.shape[:1], 2))
+    for number, frame in enumerate(kept):
+        outlines = _outlines(track, int(frame))
+        if not _only_move(np.stack([first, outlines])):
+            every = np.stack([_outlines(track, int(one)) for one in kept])
+            return {**sizes, "shape": None, **_axes(every)}
+        places[number] = outlines.mean(axis=1)
+    shapes = first - first.mean(axis=1, keepdims=True)
+    is_one = _only_move(np.stack([shapes, np.broadcast_to(shapes[:1], shapes.shape)]))
+    return {**sizes, "shape": pack(shapes[:1] if is_one else shapes, exact=True)[0], **_axes(places)}
+
+
+def _axes(places: Floats) -> dict[str, Any]:
+    return {axis: pack(places[..., number])[0] for number, axis in enumerate(("x", "y"))}
+
+
+MOST_ARROWS = 200_000  # in all frames of a run
+
+
+class PackedLoads(NamedTuple):
+    """What acts from outside, for the page: plain values for JSON, the extent that holds it too, notes."""
+
+    data: dict[str, Any]
+    extent: Extent
+    notes: list[str]
+
+
+def pack_loads(
+    frames: Frames, scenario: Scenario, kept: Indices, happened: Sequence[EventRecord]
+) -> PackedLoads | None:
+    """Return what acts from outside in some frames, with the extent that holds it; None where nothing does.
+
+    The support's displacement is told beside loads on all blocks, as level ground looks the same wherever it is.
+    """
+    support = support_of(scenario, happened)
+    acts, extent = outside(frames, kept, support), extent_of(frames, kept, support)
+    length = length_in(extent)
+    marks = [*map(list, acts.marks)]
+    for row, moved in zip(marks, support.displacement(frames.time[kept]) if support.motion else (), strict=False):
+        row.append(_mark_of_support(float(moved), support))
+    if acts.is_empty and not any(marks):
+        return None
+    notes = list(filter(None, [replace(acts, marks=()).explanation]))
+    arrows = acts.arrows
+    if sum(one.ends_there.size for one in arrows) > MOST_ARROWS:
+        arrows, notes = (), ["Loads on blocks are not drawn in this page: there are too many."]
+    data = {
+        "arrows": [_arrows(one, length) for one in arrows if one.way.any()],
+        "turns": None if acts.turns is None else _turns(acts.turns),
+        "marks": [[[mark.text, *mark.way] for mark in row] for row in marks],
+    }
+    return PackedLoads(data, with_room(extent, replace(acts, arrows=arrows), length), notes)
+
+
+def _mark_of_support(moved: float, support: Support) -> Mark:
+    """Return the displacement (m) of the support and its direction in the picture."""
+    text = f"support {MILLIMETRES * moved:+.2f} mm".replace("-", "−")
+    x, y = turned(np.sign(moved) * np.array(support.direction), support.tilt).tolist()
+    return Mark(text, (x, y))
+
+
+def _arrows(one: Arrows, length: float) -> dict[str, Any]:
+    lines = one.lines(length)
+    ends = {"x0": lines[..., 0, 0], "y0": lines[..., 0, 1], "x1": lines[..., 1, 0], "y1": lines[..., 1, 1]}
+    packed = {name: pack(values, exact=True)[0] for name, values in ends.items()}
+    return {"colour": "ink" if one.kind == SPEED else "load", "count": lines.shape[1], **packed}
+
+
+def _turns(turns: Turns) -> dict[str, Any]:
+    columns = {"x": turns.at[..., 0], "y": turns.at[..., 1], "sweep": turns.sweep}
+    packed = {name: pack(values, exact=True)[0] for name, values in columns.items()}
+    return {"radius": listed(turns.radius), **packed}
+
 
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
 CONTACT_BYTES = 16  # of a contact in a frame
@@ -62,7 +244,7 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
         "names": list(frames.names),
         "size_x": listed(MILLIMETRES * frames.size_x),
         "size_y": listed(MILLIMETRES * frames.size_y),
-        "outlines": _outlines(frames),
+        "outlines": _outlines_player(frames),
         "start_angle": listed(np.degrees(frames.start_angle)),
         "channels": {name: part for name, (part, _) in packed.items()},
         "systems": pack_systems(frames, kept),
@@ -102,7 +284,7 @@ def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | 
     }
 
 
-def _outlines(frames: Frames) -> dict[str, Any] | None:
+def _outlines_player(frames: Frames) -> dict[str, Any] | None:
     """Return corners, upper side and least width (mm) of every shape, and which of them each block has.
 
     None where all blocks are rectangles, whose sides tell the same.
@@ -119,7 +301,9 @@ def _outlines(frames: Frames) -> dict[str, Any] | None:
     }
 
 
-def scene_data(frames: Frames, scenario: Scenario, kept: Indices, happened: Sequence[Happened] = ()) -> dict[str, Any]:
+def scene_data(
+    frames: Frames, scenario: Scenario, kept: Indices, happened: Sequence[EventRecord] = ()
+) -> dict[str, Any]:
     """Return everything but the frames that the player needs, as plain values for JSON.
 
     `gone` and `walls_gone` say from which of the kept frames on a block or wall is not there any more, None for never.

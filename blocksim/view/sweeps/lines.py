@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.layout import OWN, Paper, write_heading
+from blocksim.view.style import OWN, Paper, write_heading
 from blocksim.view.sweeps.data import (
     MOST_COLUMNS,
     STAYS_MM,

@@ -1,6 +1,6 @@
 """The systems of scenes and how pairs of them act on one another; see blocksim/world/README.md.
 
-A system of the user's choice is one file, and one line in `blocksim.scenario.systems.SYSTEMS`;
+A system of the user's choice is one file, and one line in `blocksim.scenario.models.base.SYSTEMS`;
 every pair that can meet is one line in `INTERACTIONS`.
 """
 
@@ -10,10 +10,9 @@ from typing import Any
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
-from blocksim.scenario.systems import SYSTEMS
-from blocksim.world.systems.blocks import BLOCKS
+from blocksim.scenario.models.base import SYSTEMS
+from blocksim.world.systems.blocks import BLOCKS, SUPPORTS
 from blocksim.world.systems.soils import SOILS, soils_and
-from blocksim.world.systems.supports import SUPPORTS
 from blocksim.world.systems.system import Present, System
 
 IN_WORLD = (BLOCKS, SUPPORTS)

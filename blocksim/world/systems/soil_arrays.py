@@ -14,17 +14,17 @@ from blocksim.kernels.soil.step import finish, flow, start
 from blocksim.kernels.sph.wendland_c2 import SUPPORT
 from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.soil_places import soil_tables
+from blocksim.scenario.start import soil_tables
 from blocksim.world.interactions import contact_classes
-from blocksim.world.systems.soil_kinds import (
+from blocksim.world.systems.soil_materials import (
     DAMPING_RATIO,
     RAMP,
     SHEAR_RATIO,
     SMOOTHING,
+    damping_at_start,
     depth_of_scene,
     friction_with,
     lame_constants,
-    settling_of,
     wave_speed,
     yield_surface,
 )
@@ -109,7 +109,7 @@ def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
         record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
         record.slope, record.cohesion = yield_surface(material)
         record.impedance = material.density * wave_speed(material)
-        record.settling, record.settled = settling_of(scenario, table)
+        record.settling, record.settled = damping_at_start(scenario, table)
         record.is_corrected = table.gradient == "corrected"
     return records
 

@@ -176,7 +176,7 @@ class Track:
         return {one.column: one.factor * one.of(self) for one in self.system.outputs}
 
 
-def stored(name: str) -> Callable[[Track], Floats]:
+def quantity_as_stored(name: str) -> Callable[[Track], Floats]:
     """Return an output that is a quantity as it is stored."""
     return lambda track: track[name]
 

@@ -5,10 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from blocksim.analysis.evidence import Evidence, Findings, Members
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Measurement
-from blocksim.analysis.members import Members
 from blocksim.analysis.metrics import METRICS
-from blocksim.analysis.metrics.metric import Evidence, Findings
 
 Key = tuple[str, str]  # block and quantity
 

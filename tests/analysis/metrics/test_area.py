@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from blocksim.analysis.metrics.area import area_between, area_interval
+from blocksim.analysis.metrics import area_between, area_interval
 from tests.analysis.metrics.conftest import found_by
 
 X = ("a", "x")

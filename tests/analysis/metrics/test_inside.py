@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from blocksim.analysis.compare import prediction_half_width
-from blocksim.analysis.metrics.inside import repeat_passes, repeat_passes_all
+from blocksim.analysis.metrics import repeat_passes, repeat_passes_all
 from tests.analysis.metrics.conftest import found_by
 
 X, ANGLE = ("a", "x"), ("a", "rotation")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from blocksim.analysis.metrics.joint import Hotelling, hotelling
+from blocksim.analysis.metrics import Hotelling, hotelling
 from tests.analysis.metrics.conftest import found_by
 
 ONE, TWO, THREE = ("1", "x"), ("2", "x"), ("3", "x")

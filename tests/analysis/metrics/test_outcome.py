@@ -4,7 +4,7 @@ from math import nan
 
 import pytest
 
-from blocksim.analysis.metrics.outcome import outcome
+from blocksim.analysis.metrics import outcome
 from tests.analysis.metrics.conftest import found_by
 
 ONE, TWO = ("1", "rotation"), ("2", "rotation")

@@ -8,9 +8,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.bench.machine import this_machine
-from blocksim.bench.measurement import REPEATS, Outcome, Setting, report
-from blocksim.bench.measurements import chosen
+from blocksim.bench.measurement import REPEATS, Outcome, Setting, report, this_machine
+from blocksim.bench.measurements import choose
 from blocksim.errors import BlocksimError
 from tests.bench.peers.engine import Findings
 from tests.bench.peers.heap import HEAP
@@ -39,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         except ImportError as error:
             parser.error(f"the package {package} is missing ({error}): pip install 'blocksim[bench]'")
     try:
-        wanted = chosen(asked.names, PEERS)
+        wanted = choose(asked.names, PEERS)
     except BlocksimError as error:
         parser.error(str(error))
     outcomes = [one.run(Setting(asked.quick, max(1, asked.repeats))) for one in wanted]

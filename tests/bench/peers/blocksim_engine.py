@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.bench.timing import Rerun
+from blocksim.bench.scenes import Rerun
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.team import ALONE
 from tests.bench.peers.engine import Final, Scene, timed

@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from blocksim.bench.scenes import FRICTION
-from blocksim.scenario.outlines import edges_of
+from blocksim.scenario.geometry import edges_of
 from tests.bench.peers.engine import Stepper
 
 if TYPE_CHECKING:

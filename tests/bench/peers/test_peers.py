@@ -12,7 +12,7 @@ import pytest
 from blocksim.bench.measurement import Measurement, Setting, single
 from blocksim.bench.scenes import Stepping, three_blocks
 from blocksim.scenario import Scenario
-from blocksim.scenario.outlines import edges_of
+from blocksim.scenario.geometry import edges_of
 from tests.bench.peers import __main__ as script
 from tests.bench.peers import three_blocks as three_blocks_peers
 from tests.bench.peers import wall

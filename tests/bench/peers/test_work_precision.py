@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.view.layout import Paper
+from blocksim.view.style import Paper
 from tests.bench.peers.work_precision import (
     SMALLEST_SHARE,
     Curve,

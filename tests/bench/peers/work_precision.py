@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from blocksim.view import style
-from blocksim.view.layout import OWN, PanelPage, Paper, write_heading
 from blocksim.view.run_data import Floats
+from blocksim.view.style import OWN, PanelPage, Paper, write_heading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

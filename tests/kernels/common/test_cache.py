@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.kernels.common import cache, jit
+from blocksim.kernels.common import jit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,8 +27,8 @@ DAMAGE: dict[str, Callable[[bytes], bytes]] = {
 def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Keep what is compiled in a folder of this test's own."""
     monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path / "kernels")
-    cache._tell_damage.cache_clear()
-    cache._tell_others.cache_clear()
+    jit._tell_damage.cache_clear()
+    jit._tell_others.cache_clear()
     return tmp_path / "kernels"
 
 

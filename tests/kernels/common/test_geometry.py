@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import BODY, zeros
-from blocksim.kernels.common.geometry import (
+from blocksim.kernels.common.shapes import (
     END_RATIO,
     SMALL_TURN,
     corner_offset,

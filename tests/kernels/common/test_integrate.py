@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import BODY, CONTROLS, zeros
-from blocksim.kernels.common.geometry import place_corners
 from blocksim.kernels.common.integrate import (
     finish_step,
     kinetic_energy,
@@ -18,6 +17,7 @@ from blocksim.kernels.common.integrate import (
     start_all,
     start_step,
 )
+from blocksim.kernels.common.shapes import place_corners
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, Records, World

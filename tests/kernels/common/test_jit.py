@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.kernels.common import cache, jit, ownership
+from blocksim.kernels.common import jit
 from blocksim.kernels.common.arrays import PAIR, zeros
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_cache_folder_that_others_may_write_is_refused_with_a_line(
     chosen: Path, modes: tuple[int, int], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(ownership, "_is_group_of_one", lambda _: False)
+    monkeypatch.setattr(jit, "_is_group_of_one", lambda _: False)
     chosen.chmod(modes[0])
     chosen.parent.chmod(modes[1])
     with caplog.at_level(logging.WARNING, "blocksim"):
@@ -195,8 +195,8 @@ def test_cache_folder_that_only_this_user_may_write_serves(
 
 def test_compiled_code_of_another_user_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "source" / "module" / "code.nbc"
-    cache._write(file, b"code")
-    assert cache._read(file) == b"code"
+    jit._write(file, b"code")
+    assert jit._read(file) == b"code"
     fstat, other = os.fstat, os.getuid() + 1
 
     def of_another(number: int) -> os.stat_result:
@@ -204,7 +204,7 @@ def test_compiled_code_of_another_user_is_not_read(tmp_path: Path, monkeypatch: 
         return os.stat_result((*state[:4], other, *state[5:]))
 
     monkeypatch.setattr(os, "fstat", of_another)
-    assert cache._read(file) is None
+    assert jit._read(file) is None
 
 
 @pytest.mark.usefixtures("fresh_folder_choice", "compiler")

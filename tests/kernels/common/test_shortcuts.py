@@ -7,8 +7,8 @@ from numba import types
 from numba.core import funcdesc
 from numba.core.types import abstract, functions
 
+from blocksim.kernels.common.compiler import shortcuts
 from blocksim.kernels.common.jit import config, njit
-from blocksim.kernels.common.shortcuts import shortcuts
 
 
 def fail_in_shortcuts() -> None:

@@ -9,8 +9,7 @@ import pytest
 
 from blocksim.kernels.common.arrays import POINT, zeros
 from blocksim.kernels.explicit.contact import clip_tension, pair_forces
-from blocksim.kernels.explicit.persistent_forces import TOUCHING
-from blocksim.kernels.explicit.persistent_pairs import persistent_forces
+from blocksim.kernels.explicit.persistent_forces import TOUCHING, persistent_forces
 from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:

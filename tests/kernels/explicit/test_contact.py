@@ -19,10 +19,9 @@ from blocksim.kernels.explicit.contact import (
     shared_step,
     spare_lost_faces,
 )
-from blocksim.kernels.explicit.damping import BOTH, OPERATOR_LIFE
+from blocksim.kernels.explicit.damping import BOTH, OPERATOR_LIFE, RANK_TOLERANCE
 from blocksim.kernels.explicit.inertia import Piece
 from blocksim.kernels.explicit.kinematics import mutual_mass, resolve_point
-from blocksim.kernels.explicit.matrices import RANK_TOLERANCE
 from blocksim.kernels.explicit.models import KERNEL, PARTICLES, SURFACE
 from tests.kernels.conftest import dashpots_by_definition
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import NORMAL, POINT, SHEAR, zeros
-from blocksim.kernels.explicit.coupled import MOBILITY, SIZE, add_coupled_dashpots, fill_mobility, fill_row
+from blocksim.kernels.explicit.damping import MOBILITY, SIZE, add_coupled_dashpots, fill_mobility, fill_row
 from blocksim.kernels.explicit.kinematics import resolve_point
 from tests.kernels.conftest import dashpots_by_definition
 

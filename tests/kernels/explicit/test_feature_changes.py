@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from blocksim.kernels.explicit.bearing import FLAT
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.models.outlines import near_slots
 from blocksim.kernels.explicit.outlines import cone_of
 from blocksim.kernels.explicit.sliver_axes import nearest_axis
-from blocksim.kernels.explicit.tributary import FLAT
 from blocksim.verification.scene import Scene
 
 if TYPE_CHECKING:

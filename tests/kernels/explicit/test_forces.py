@@ -12,11 +12,9 @@ from blocksim.kernels.common.arrays import GROUP, LEDGER, zeros
 from blocksim.kernels.common.integrate import finish_step, start_all, start_step
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.forces import changed_forces, finish_group, forces_between, forces_within
 from blocksim.kernels.explicit.partition import add_from_before, add_kept, keep, partition
-from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING
-from blocksim.kernels.explicit.persistent_pairs import persistent_forces
-from blocksim.kernels.explicit.step import advance
+from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
+from blocksim.kernels.explicit.step import advance, changed_forces, finish_group, forces_between, forces_within
 from blocksim.world.build import with_threads
 from tests.kernels.crews import SCENES, advanced, assert_same_bits, bits
 

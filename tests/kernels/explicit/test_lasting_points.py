@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.explicit.lasting_points import SEARCH, lasting_points
+from blocksim.kernels.explicit.contact import SEARCH, lasting_points
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.explicit.slivers import points_of_sliver
 from blocksim.verification.scene import Scene

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.explicit.matrices import (
+from blocksim.kernels.explicit.damping import (
     RANK_TOLERANCE,
     cholesky,
     inverse_root,

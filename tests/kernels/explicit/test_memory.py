@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from blocksim.kernels.common.arrays import CONTACT, INTERACTION, PARTICLE, PARTICLE_CONTACT, zeros
+from blocksim.kernels.explicit.history import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
-from blocksim.kernels.explicit.memory import normal_loss, shear_loss, shear_stiffness_before, stiffness_before
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record

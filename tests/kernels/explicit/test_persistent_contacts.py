@@ -14,8 +14,7 @@ from blocksim.kernels.common.arrays import NORMAL, OPERATOR, SHEAR, zeros
 from blocksim.kernels.explicit.contact import fill_operator
 from blocksim.kernels.explicit.kinematics import resolve_point
 from blocksim.kernels.explicit.models import contact_points
-from blocksim.kernels.explicit.models.duplicate_corners import CONE_TOLERANCE, corner_signs
-from blocksim.kernels.explicit.models.surface import face_normal, opens
+from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, corner_signs, face_normal, opens
 from blocksim.kernels.explicit.persistent_contacts import (
     PersistentContact,
     admits,

@@ -17,8 +17,7 @@ from blocksim.kernels.explicit.damping import BOTH
 from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.kernels.explicit.partition import add_kept, keep
-from blocksim.kernels.explicit.persistent_forces import CHANGED, NOTHING, TOUCHING, UNTOUCHED
-from blocksim.kernels.explicit.persistent_pairs import persistent_forces
+from blocksim.kernels.explicit.persistent_forces import CHANGED, NOTHING, TOUCHING, UNTOUCHED, persistent_forces
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation

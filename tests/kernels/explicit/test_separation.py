@@ -10,12 +10,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from blocksim.kernels.common.geometry import separation
 from blocksim.kernels.common.integrate import renew_rotations
+from blocksim.kernels.common.shapes import separation
 from blocksim.kernels.explicit.broad_phase import idle_candidates
 from blocksim.kernels.explicit.models import contact_points
-from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED
-from blocksim.kernels.explicit.persistent_pairs import persistent_forces
+from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED, persistent_forces
 from blocksim.kernels.explicit.separation import begins_contact, choose_axis, gap_along
 from blocksim.verification.scene import HEIGHT, WIDTH
 from tests.kernels import rectangles

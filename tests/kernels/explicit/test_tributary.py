@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import SUPPORT
+from blocksim.kernels.explicit.bearing import FLAT, LEAST, bearing_of_faces, interval_of
 from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.models.duplicate_corners import CONE_TOLERANCE
-from blocksim.kernels.explicit.tributary import FLAT, LEAST, bearing_of_faces, interval_of
+from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE
 from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:

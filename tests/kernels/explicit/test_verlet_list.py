@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import MOTION_PIECE, World, zeros
-from blocksim.kernels.common.geometry import separation
-from blocksim.kernels.explicit.verlet_list import (
+from blocksim.kernels.common.shapes import separation
+from blocksim.kernels.explicit.broad_phase import (
     MOST_UNSEEN,
     MOST_UNSEEN_DRIVEN,
     PAIR_SHARE,

@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.scenario.outlines import centred, regular
+from blocksim.scenario.geometry import centre_outline, regular
 from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from blocksim.scenario.outlines import Corners
+    from blocksim.scenario.geometry import Corners
 
 RADIUS = 0.02
 HEXAGON = regular(6, RADIUS)
-TRIANGLE = centred([(0.0, 0.0), (0.04, 0.0), (0.012, 0.03)])  # its centroid is not over the middle of its base
+TRIANGLE = centre_outline([(0.0, 0.0), (0.04, 0.0), (0.012, 0.03)])  # its centroid is not over the middle of its base
 
 
 def rectangle(width: float = WIDTH, height: float = HEIGHT) -> Corners:
     """Return the outline of a rectangle."""
-    return centred([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
+    return centre_outline([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
 
 
 def turned(outline: Corners, angle: float) -> NDArray[np.float64]:
@@ -43,4 +43,4 @@ def random_outline(random: Any, size: float = RADIUS) -> Corners:
         steps = np.diff([*angles, angles[0] + 2.0 * pi])
         if steps.min() > 0.15 and steps.max() < 2.8:
             stretch = random.uniform(0.4, 1.0)
-            return centred([(size * cos(one), stretch * size * sin(one)) for one in angles.tolist()])
+            return centre_outline([(size * cos(one), stretch * size * sin(one)) for one in angles.tolist()])

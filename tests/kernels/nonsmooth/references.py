@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from blocksim.kernels.common.geometry import separation
+from blocksim.kernels.common.shapes import separation
 from blocksim.kernels.nonsmooth.arrays import FAR
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.nonsmooth.begin import load_states
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
-from blocksim.kernels.nonsmooth.step import find_manifolds
-from blocksim.kernels.nonsmooth.substep import substep
+from blocksim.kernels.nonsmooth.step import find_manifolds, substep
 from blocksim.scenario.models.stepping import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, Scene

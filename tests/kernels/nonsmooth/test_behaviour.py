@@ -12,14 +12,14 @@ from scipy.integrate import solve_ivp
 
 from blocksim.bench.scenes import pushed_wall, three_blocks
 from blocksim.kernels.common.arrays import AT_REST, REACHED, TEAM_SIZE
-from blocksim.kernels.common.watch import Watched
+from blocksim.kernels.common.members import Watched
+from blocksim.kernels.nonsmooth.cone import solve_two
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
-from blocksim.kernels.nonsmooth.solve import solve_two
 from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
+from blocksim.world.build import build_stacks, only_stack
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
-from blocksim.world.scenes import build_stacks, only
 from tests.kernels.nonsmooth.scenes import rigid
 
 if TYPE_CHECKING:
@@ -216,7 +216,7 @@ def test_same_bits_for_any_number_of_threads_and_calls(
 def test_members_of_an_ensemble_have_the_same_bits(begin: Callable[..., Any]) -> None:
     scenarios = [three_blocks({"restitution": e}) for e in (0.0, 0.1)]
     alone = [begin(scenario).to_step(400) for scenario in scenarios]
-    scenes = only(build_stacks([rigid(scenario) for scenario in scenarios], NONSMOOTH)).scenes
+    scenes = only_stack(build_stacks([rigid(scenario) for scenario in scenarios], NONSMOOTH)).scenes
     codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, len(NONSMOOTH_LEDGER) + 2))
     places, lengths = np.zeros((2, 3, 3)), np.zeros((2, 3))
     watched = Watched(

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, TOUCHING
-from blocksim.kernels.nonsmooth.colours import most_groups
 from blocksim.kernels.nonsmooth.groups import gather
-from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, rebuild
+from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, most_groups, rebuild
 from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, pairs_of, place, posed
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.nonsmooth.arrays import CONSTRAINT, FAR, STATE, STEPPING
-from blocksim.kernels.nonsmooth.gap_curvature import bend_of, bend_time, follow_curvature
+from blocksim.kernels.nonsmooth.faces import bend_of, bend_time, follow_curvature
 from blocksim.kernels.nonsmooth.manifold import Place, collide
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, slip_of
 from tests.kernels.nonsmooth.references import brought_near, corners, meeting, places_of, sides

@@ -10,7 +10,7 @@ import pytest
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
-from blocksim.kernels.nonsmooth.substep import substep
+from blocksim.kernels.nonsmooth.step import substep
 from tests.kernels.nonsmooth.scenes import (
     Block,
     after_substep,

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import TEAM_SIZE
-from blocksim.kernels.common.watch import Watched
+from blocksim.kernels.common.members import Watched
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
 from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team
-from blocksim.scenario.outlines import centred, regular, section_of
+from blocksim.scenario.geometry import centre_outline, regular, section_of
 from blocksim.verification.collapse import SIZES, staircase
 from blocksim.verification.scene import Scene, Simulation
+from blocksim.world.build import build_stacks, only_stack
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
-from blocksim.world.scenes import build_stacks, only
 from tests.kernels.nonsmooth.polygons import HEXAGON, RADIUS, TRIANGLE, depth_below, random_outline, turned
 from tests.kernels.nonsmooth.scenes import RIGID, Block, listed, place, posed, rigid
 
 if TYPE_CHECKING:
-    from blocksim.scenario.outlines import Corners
+    from blocksim.scenario.geometry import Corners
 
 G = 9.81
 RESTITUTIONS = (0.0, 0.5, 1.0)
@@ -222,7 +222,7 @@ def test_members_of_an_ensemble_of_polygons_have_the_same_bits() -> None:
 
     scenarios = [dropped(radius) for radius in (0.02, 0.03)]
     alone = [Simulation(build_nonsmooth(scenario)).to_step(100) for scenario in scenarios]
-    scenes = only(build_stacks(scenarios, NONSMOOTH)).scenes
+    scenes = only_stack(build_stacks(scenarios, NONSMOOTH)).scenes
     codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, len(NONSMOOTH_LEDGER) + 2))
     places, lengths = np.zeros((2, 1, 3)), np.zeros((2, 1))
     watched = Watched(
@@ -251,7 +251,7 @@ def wedge(mass_ratio: float, speed: float = 0.0) -> tuple[list[Block], float]:
     left = [(-x, y) for x, y in reversed(jaw)]
     blocks = []
     for corners, vx in ((shape, 0.0), (jaw, -speed), (left, speed)):
-        outline = centred(corners)
+        outline = centre_outline(corners)
         x, y = corners[0][0] - outline[0][0], corners[0][1] - outline[0][1]
         blocks.append(Block(x, y, vx=vx, outline=outline))
     return blocks, section_of(blocks[1].outline)[0] / section_of(blocks[0].outline)[0]

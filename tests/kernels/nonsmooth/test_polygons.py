@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-    from blocksim.scenario.outlines import Corners
+    from blocksim.scenario.geometry import Corners
 
 PAIRS = 25
 BRICK = rectangle(WIDTH, HEIGHT)

@@ -9,10 +9,8 @@ from blocksim.kernels.common.arrays import TEAM_SIZE, Floats, Integers
 from blocksim.kernels.common.jit import entry_kernel
 from blocksim.kernels.common.simd import fields_0, split
 from blocksim.kernels.soil.arrays import CLUSTER, GROUP, NEIGHBOURS, Soils
-from blocksim.kernels.soil.gradient import correction, raw_gradient
-from blocksim.kernels.soil.momentum import forces_on
 from blocksim.kernels.soil.neighbours import places_of
-from blocksim.kernels.soil.step import renew_lists, stress_group
+from blocksim.kernels.soil.step import correction, forces_on, raw_gradient, renew_lists, stress_group
 from blocksim.simulation.schemes import build_scene
 from tests.soils import column, scene
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.soil.shapes import from_body
+from blocksim.kernels.soil.contact import from_body
 from blocksim.simulation.schemes import build_scene
 from tests.soils import LEFT, column, scene
 

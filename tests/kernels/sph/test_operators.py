@@ -9,9 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.sph.fields import GradientForm, InterpolationForm, KernelName, Particles, gradient, interpolate
+from blocksim.kernels.sph.fields import (
+    GRADIENT_CODES,
+    INTERPOLATION_CODES,
+    GradientForm,
+    InterpolationForm,
+    KernelName,
+    Particles,
+    gradient,
+    interpolate,
+    pseudo_inverse,
+)
 from blocksim.kernels.sph.functions import KERNEL_CODES, kernel_slope, kernel_value
-from blocksim.kernels.sph.operators import GRADIENT_CODES, INTERPOLATION_CODES, pseudo_inverse
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,8 +8,7 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
-from blocksim.scenario.models.history import Stretch
-from blocksim.scenario.models.loads import Gravity, VaryingLoad
+from blocksim.scenario.models.loads import Gravity, Stretch, VaryingLoad
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody, Scenario, place_bodies, scenario_to_toml
-from blocksim.scenario.outlines import area_of, faults
+from blocksim.scenario.events import joint_between
+from blocksim.scenario.geometry import area_of, faults
 from blocksim.scenario.overlap import overlapping_pairs
-from blocksim.scenario.overrides import frozen
-from blocksim.scenario.probes import joint_between
+from blocksim.scenario.overrides import freeze
 from blocksim.scenario.start import impossible_starts
 from tests.scenario.conftest import BRICK, data_of
 
@@ -22,7 +22,7 @@ STONE = {"depth": 0.5, "material": "oak"}
 
 def scenario(**structure: Any) -> Scenario:
     structures = [{"block": "stone", **structure}]
-    return Scenario.model_validate(frozen(data_of(blocks={"stone": STONE}, structures=structures, bodies=[])))
+    return Scenario.model_validate(freeze(data_of(blocks={"stone": STONE}, structures=structures, bodies=[])))
 
 
 def built(**structure: Any) -> tuple[PlacedBody, ...]:
@@ -149,7 +149,7 @@ def test_blocks_with_and_without_a_shape_are_not_mixed_up() -> None:
         {"bodies": [{"block": "stone", "x": 0, "y": 1}]},
         {"structures": [{"kind": "stack", "block": "stone", "count": 2}], "bodies": []},
     ]
-    found = [[*impossible_starts(Scenario.model_validate(frozen(data_of(blocks=blocks, **one))))] for one in tables]
+    found = [[*impossible_starts(Scenario.model_validate(freeze(data_of(blocks=blocks, **one))))] for one in tables]
     assert [[finding.path for finding in one] for one in found] == [
         [("structures", 0, "block")],
         [("bodies", 0, "block")],
@@ -169,7 +169,7 @@ def test_blocks_with_and_without_a_shape_are_not_mixed_up() -> None:
 )
 def test_the_resolved_file_makes_the_same_blocks(structure: dict[str, Any]) -> None:
     first = scenario(**structure)
-    again = Scenario.model_validate(frozen(tomllib.loads(scenario_to_toml(first))))
+    again = Scenario.model_validate(freeze(tomllib.loads(scenario_to_toml(first))))
     assert again == first
     assert place_bodies(again) == place_bodies(first)
 

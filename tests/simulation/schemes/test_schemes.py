@@ -15,8 +15,8 @@ from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import SCHEMES, build_scene, build_stacks, measured_row, scheme_of
 from blocksim.simulation.team import ALONE, Team
 from blocksim.world import build
+from blocksim.world.build import Stack, arrays_of, member, only_stack
 from blocksim.world.nonsmooth import build_nonsmooth
-from blocksim.world.scenes import Stack, arrays_of, member, only
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -133,7 +133,7 @@ def test_ensemble_of_both_schemes_ends_as_single_runs_do() -> None:
 
 def test_members_of_a_stack_are_the_scenes_that_would_be_built_alone() -> None:
     scenarios = [collapse(step=step) for step in (1e-3, 5e-4, 2e-4)]
-    stack = only(build_stacks(scenarios))
+    stack = only_stack(build_stacks(scenarios))
     assert all(array.ctypes.data % 64 == 0 for array in arrays_of(stack.scenes) if array.size)
     for m, scenario in enumerate(scenarios):
         one, alone = member(stack.scenes, m), build_nonsmooth(scenario)

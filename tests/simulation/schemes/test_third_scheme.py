@@ -12,7 +12,7 @@ from blocksim.scenario import Scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.scenario.document import Document
 from blocksim.scenario.models.stepping import SCHEMES
 from blocksim.simulation import run_ensemble
-from blocksim.simulation.checkpoint_policy import CheckpointPolicy
+from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.compilation import SMALLEST_SCENE
 from tests.simulation.flight import STEP, FlightTime
 

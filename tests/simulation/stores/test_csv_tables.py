@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from blocksim.errors import OutputError
-from blocksim.simulation.contacts import SUPPORT, Contacts, empty_rows
-from blocksim.simulation.frames import Frames
-from blocksim.simulation.stores.csv_tables import CONTACT_COLUMNS, FRAME_COLUMNS, write_contacts_csv, write_frames_csv
+from blocksim.simulation.frames import SUPPORT, Contacts, Frames, empty_rows
+from blocksim.simulation.stores.exports import CONTACT_COLUMNS, FRAME_COLUMNS, write_contacts_csv, write_frames_csv
 from tests.view.made_up import HOSTILE, toppling
 
 

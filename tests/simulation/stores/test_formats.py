@@ -3,7 +3,7 @@
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.stores.formats import FORMATS, format_named
+from blocksim.simulation.stores.exports import FORMATS, format_named
 
 
 def test_formats_are_found_and_misspelt_ones_told() -> None:

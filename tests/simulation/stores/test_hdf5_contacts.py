@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from blocksim.scenario import place_bodies
-from blocksim.simulation.contacts import Rows, empty_rows
+from blocksim.simulation.frames import Rows, empty_rows
 from blocksim.simulation.recorder import MOTION, Frame
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5 import read_frames
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from tests.simulation.conftest import Shipped
 

@@ -14,7 +14,7 @@ from blocksim.scenario import place_bodies
 from blocksim.simulation import Result
 from blocksim.simulation.recorder import MOTION, Frame
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.stores.hdf5 import read_frames
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from tests.simulation.conftest import Shipped
 

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from blocksim.simulation.stores.hdf5_sink import SafeFile, Sink
+from blocksim.simulation.stores.hdf5_files import SafeFile, Sink
 
 ROWS = np.arange(50_000.0)
 

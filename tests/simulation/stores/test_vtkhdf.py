@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario import load_scenario
-from blocksim.scenario.outlines import regular
+from blocksim.scenario.geometry import regular
 from blocksim.simulation.frames import Frames
-from blocksim.simulation.stores import vtkhdf
-from blocksim.simulation.stores.vtkhdf import write_vtkhdf
+from blocksim.simulation.stores import exports
+from blocksim.simulation.stores.exports import write_vtkhdf
 from blocksim.view.scene import corners
-from blocksim.world.systems.supports import support_quads
+from blocksim.world.systems.blocks import support_quads
 from tests.view.made_up import HOSTILE, polygons, toppling
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -32,7 +32,7 @@ CELLS = 4  # three blocks and the ground
 @pytest.fixture(params=[1, 7, 1 << 16], ids=lambda size: f"batch {size}")
 def written(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Frames, Path]:
     """Give frames of three blocks and their file, written some blocks at once."""
-    monkeypatch.setattr(vtkhdf, "BATCH", request.param)
+    monkeypatch.setattr(exports, "BATCH", request.param)
     frames = toppling(3, steps=11)
     assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, LEVEL) == 11
     return frames, tmp_path / "run.vtkhdf"

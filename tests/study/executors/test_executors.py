@@ -10,8 +10,8 @@ from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
 from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, Setting, Task, executor_named, take
+from blocksim.study.manifest import Shard
 from blocksim.study.plan import Values
-from blocksim.study.progress import Shard
 from blocksim.study.sweep import SweepOptions, merge, sweep
 
 KINETIC = "friction.block_block.kinetic"

@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario, load_scenario, place_bodies
 from blocksim.simulation import folder as files
-from blocksim.simulation.contacts import SUPPORT, Rows, empty_rows
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.folder import keep_scenario, read_tables
+from blocksim.simulation.frames import SUPPORT, Frames, Rows, csv_text, empty_rows, final_columns
 from blocksim.simulation.ledger import EnergyLedger
 from blocksim.simulation.recorder import Frame
-from blocksim.simulation.result_files import keep_scenario, read_tables
-from blocksim.simulation.stores.hdf5_reader import read_frames
+from blocksim.simulation.result import Summary
+from blocksim.simulation.stores.hdf5 import read_frames
 from blocksim.simulation.stores.hdf5_writer import FrameFile
-from blocksim.simulation.summary import Summary
-from blocksim.simulation.table import csv_text, final_columns
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 LEDGER = ("kinetic", "potential", "friction")

@@ -11,10 +11,9 @@ from pathlib import Path
 import pytest
 
 from blocksim.simulation.ledger import EnergyLedger
-from blocksim.simulation.movement import Manner, Movement
+from blocksim.simulation.observables import Manner, Movement
 from blocksim.view.report.page import labels, page_text
-from blocksim.view.report.runs import Subject, read_stored, run_subject
-from blocksim.view.report.sweeps import CaseTable, sweep_subject
+from blocksim.view.report.subjects import CaseTable, Subject, read_stored, run_subject, sweep_subject
 from tests.view.report.folders import write_run
 
 HOSTILE = ("<script>alert(1)</script>", "</script><img src=x>", "<!--<script>", "\u202egnp", "{{ 7*7 }}", "x" * 3000)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.study.sweep_data import read_sweep_data
+from blocksim.study.pictures import read_sweep_data
 from blocksim.view.report.pictures import history_of, pictures_of
 from blocksim.view.run_data import Support
 from tests.view.made_up import toppling

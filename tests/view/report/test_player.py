@@ -9,8 +9,8 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
-from blocksim.scenario.outlines import regular
-from blocksim.simulation.happened import Happened
+from blocksim.scenario.geometry import regular
+from blocksim.simulation.result import EventRecord
 from blocksim.view.report.player import boundary_particles, pack_frames, scene_data
 from blocksim.world.build import build_world
 from tests.view.made_up import polygons, toppling
@@ -52,7 +52,7 @@ def test_page_knows_when_blocks_and_walls_are_gone(tmp_path: Path) -> None:
     frames = write_run(tmp_path / "run", "slope", count=5)
     scenario = load_scenario(SCENARIOS / "slope.toml", {"events": [{"when": "rest", "remove": ["wall 1"]}]})
     frames.vx[3:, 1] = np.nan
-    happened = Happened(event=0, step=10, time_s=float(frames.time[2]), what="", energy_J=0.0)
+    happened = EventRecord(event=0, step=10, time_s=float(frames.time[2]), what="", energy_J=0.0)
     kept = np.array([0, 2, 3, 4])
     data = scene_data(frames, scenario, kept, [happened])
     assert data["gone"] == [None, 2, *[None] * (len(frames.names) - 2)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from blocksim.view.sweeps.histogram import limits_of
+from blocksim.view.sweeps.scatter import limits_of
 
 
 def test_axis_leaves_out_the_rarest_run_outs_but_nothing_measured() -> None:

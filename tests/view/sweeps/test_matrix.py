@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from blocksim.view.sweeps.matrix import MOST_INPUTS, variables_of
+from blocksim.view.sweeps.scatter import MOST_INPUTS, variables_of
 from tests.view.sweeps.made_up import REPEATS, grid, made_up, samples
 
 

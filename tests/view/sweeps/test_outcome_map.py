@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blocksim.view.layout import OWN
-from blocksim.view.sweeps.cells import (
+from blocksim.view.style import OWN
+from blocksim.view.sweeps.data import Input, SweepData, percent
+from blocksim.view.sweeps.outcome_map import (
     CLASS_COLOURS,
     OTHER_COLOUR,
     classes_of,
     edges_of,
     manners_of,
+    map_of,
     on_grid,
     outline_of,
     run_out_scale,
 )
-from blocksim.view.sweeps.data import Input, SweepData, percent
-from blocksim.view.sweeps.outcome_map import map_of
 from tests.view.sweeps.made_up import grid, made_up
 
 

@@ -8,9 +8,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from blocksim.view.kinds import SWEEP_KINDS
-from blocksim.view.layout import Paper
+from blocksim.view.studies import Bars, draw_tornado
+from blocksim.view.style import Paper
 from blocksim.view.sweeps.data import Input, SweepData
-from blocksim.view.tornado import Bars, draw_tornado
 from tests.view.made_up import boxes_of, overlapping
 from tests.view.sweeps.made_up import grid, made_up
 

@@ -11,10 +11,9 @@ import pytest
 import blocksim
 from blocksim.simulation import Result
 from blocksim.simulation.frames import data_set, tidy_table
-from blocksim.simulation.stores.csv_tables import write_frames_csv
-from blocksim.simulation.stores.vtkhdf import write_vtkhdf
-from blocksim.view.history_panels import MOTIONS, Seen
+from blocksim.simulation.stores.exports import write_frames_csv, write_vtkhdf
 from blocksim.view.run_data import Support, drawable_frames
+from blocksim.view.time_panels import MOTIONS, Seen
 from blocksim.world.systems.blocks import placed_points
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"

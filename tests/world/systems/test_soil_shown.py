@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blocksim.world.systems.soil_shown import connected, ending, pressure, surface, touching
-from blocksim.world.systems.soils import SOILS
+from blocksim.world.systems.soils import SOILS, connected, ending, pressure, surface, touching
 from blocksim.world.systems.system import Present, Track
 from tests.soils import LEFT, Soil, column, right, scene
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from blocksim.scenario import load_scenario
-from blocksim.world.systems.supports import support_motion, support_quads
+from blocksim.world.systems.blocks import support_motion, support_quads
 from tests.view.made_up import toppling
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"

@@ -1,4 +1,7 @@
-"""The machine code of the functions and operators of lanes: one instruction for four numbers wherever there is one."""
+"""The types of four numbers in compiled code, and the machine code of what is done with them.
+
+Types are vector registers; functions and operators are one instruction for four numbers wherever there is one.
+"""
 
 import operator
 from collections.abc import Callable
@@ -8,7 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin
+from numba.extending import lower_builtin, models, register_model
 
 from blocksim.kernels.common.simd.functions import (
     WIDTH,
@@ -32,18 +35,45 @@ from blocksim.kernels.common.simd.functions import (
     write_fields_4,
     write_fields_8,
 )
-from blocksim.kernels.common.simd.types import (
-    ALIGNMENT,
-    BYTE,
-    DOUBLE,
-    INDEX,
-    LANES,
-    MASK,
-    SIZE,
-    VECTOR,
-    LanesType,
-    MaskType,
-)
+
+DOUBLE = ir.DoubleType()
+VECTOR = ir.VectorType(DOUBLE, WIDTH)
+BYTE = ir.IntType(8)
+INDEX = ir.IntType(32)
+SIZE = ir.IntType(64)
+ALIGNMENT = 8  # bytes that may be relied on
+
+
+class LanesType(types.Type):
+    """The type of four doubles in compiled code."""
+
+    def __init__(self) -> None:
+        """Name it."""
+        super().__init__(name="Lanes")
+
+
+class MaskType(types.Type):
+    """The type of four flags in compiled code."""
+
+    def __init__(self) -> None:
+        """Name it."""
+        super().__init__(name="Mask")
+
+
+LANES, MASK = LanesType(), MaskType()
+
+
+@register_model(LanesType)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, of: Any) -> None:
+        super().__init__(manager, of, VECTOR)
+
+
+@register_model(MaskType)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, of: Any) -> None:
+        super().__init__(manager, of, ir.VectorType(ir.IntType(1), WIDTH))
+
 
 LIKELY = (2000, 1)  # weights of a branch that is to stay one
 

@@ -7,7 +7,7 @@ A model is one file with
 
 one code here and one branch in each dispatcher below. The `surface` model has two: with polygons in a scene, all its
 corners lie in a table (`corners` below), which outlines.py reads. How many slots a pair needs is said in
-world/particles.py. Where an ended contact was is derived again for corners and kept in the slot for particles
+world/bodies.py. Where an ended contact was is derived again for corners and kept in the slot for particles
 (`place_ended`). All models share laws, friction, dashpots, history and the energy ledger.
 """
 

@@ -25,9 +25,9 @@ blocks touch both rows act, each with half of that.
 import math
 
 from blocksim.kernels.common.arrays import ALL, Integers, Record, World
-from blocksim.kernels.common.geometry import slab_depth, to_world
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.models.boundary import (
+from blocksim.kernels.common.shapes import slab_depth, to_world
+from blocksim.kernels.explicit.models.particles import (
     FACE,
     ROWS,
     first_within,

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.explicit.models.boundary import (
+from blocksim.kernels.explicit.models.particles import (
     ROWS,
     first_within,
     is_particle_near,

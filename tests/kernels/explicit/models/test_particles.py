@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.kernels.common.geometry import to_world
+from blocksim.kernels.common.shapes import to_world
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of

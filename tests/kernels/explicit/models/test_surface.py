@@ -11,11 +11,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from blocksim.kernels.common.arrays import CONTACT, CONTACTS, HALF, PAIR, POINT, SLOTS, zeros
-from blocksim.kernels.common.geometry import ground_gap, separation
+from blocksim.kernels.common.shapes import ground_gap, separation
 from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.models.duplicate_corners import CONE_TOLERANCE, corner_signs
 from blocksim.kernels.explicit.models.surface import (
+    CONE_TOLERANCE,
     block_points,
+    corner_signs,
     corners_near,
     corners_near_ground,
     face_below_corner,

@@ -1,0 +1,446 @@
+"""Metrics that compare an ensemble with repeats: outcome, inside, prediction, validation, area and joint test."""
+
+from collections import Counter
+from collections.abc import Sequence
+from math import hypot, isfinite, nan, sqrt
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blocksim.analysis.compare import (
+    CONFIDENCE,
+    data_uncertainty,
+    interval,
+    lower_bound,
+    prediction_half_width,
+    quantile,
+)
+from blocksim.analysis.evidence import (
+    BLOCK,
+    Column,
+    Evidence,
+    Findings,
+    Floats,
+    Form,
+    Interval,
+    Metric,
+    Pair,
+    Row,
+    complete_repeats,
+)
+from blocksim.extras import load_module
+
+QUARTER = 90.0  # deg
+ROTATION = "rotation"
+UNKNOWN = "?"
+FAILED = "did not finish"
+
+
+def outcome(rotations: Sequence[float]) -> str:
+    """Return the class of rotations (deg); halves between two quarter turns go to the even one."""
+    turns = (f"{QUARTER * round(angle / QUARTER):.0f}" if np.isfinite(angle) else UNKNOWN for angle in rotations)
+    return ", ".join(turns)
+
+
+def _find(evidence: Evidence) -> Findings:
+    measured = [pair for pair in evidence.pairs if pair.measured.quantity == ROTATION]
+    members = evidence.members
+    blocks = [pair.measured.block for pair in measured] or [
+        block for block in members.blocks if members.has(block, ROTATION)
+    ]
+    if not blocks:
+        return Findings((), ("not computed: the sweep has no rotations",))
+    rotations = np.column_stack([members.values(block, ROTATION) for block in blocks])
+    repeats, incomplete = complete_repeats(measured)
+    ends = zip(rotations.tolist(), members.finished, strict=True)
+    found = Counter(outcome(row) if has_ended else FAILED for row, has_ended in ends)
+    seen = Counter(map(outcome, repeats.tolist()))
+    order = sorted({*found, *seen}, key=lambda name: (-found[name], -seen[name], name))
+    messages = ["blocks: " + ", ".join(blocks)]
+    if incomplete:
+        messages.append(f"left out, as not all rotations were measured: replicate {incomplete}")
+    if seen:
+        messages.append("at least: one-sided 95 % limit of the measured share")
+    return Findings(tuple(_row(name, found, seen) for name in order), tuple(messages))
+
+
+def _row(name: str, found: Counter[str], seen: Counter[str]) -> Row:
+    count, total, repeats = found[name], found.total(), seen.total()
+    measured: Row = {"measured": seen[name], "repeats": repeats, "lower_bound": lower_bound(seen[name], repeats)}
+    return {
+        "outcome": name,
+        "members": count,
+        "of": total,
+        "share": count / total,
+        "interval": interval(count, total),
+        **(measured if seen[name] else dict.fromkeys(measured, None)),
+    }
+
+
+OUTCOME = Metric(
+    "outcome",
+    "final rotations, rounded to quarter turns (deg)",
+    (
+        Column("outcome", "outcome", Form.TEXT, "rotation of each block, rounded to 90 degrees"),
+        Column("members", "samples", Form.COUNT, "samples with this outcome"),
+        Column("of", "of", Form.COUNT, "all samples, failed ones included"),
+        Column("share", "share", Form.SHARE, "samples / of", 1),
+        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+        Column("measured", "measured", Form.COUNT, "repeats with this outcome"),
+        Column("repeats", "of", Form.COUNT, "all repeats"),
+        Column("lower_bound", "at least", Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) if all n agree", 1),
+    ),
+    _find,
+)
+
+
+ALL = "all"
+
+
+def repeat_passes(n: int) -> float:
+    """Return the probability that the next repeat lies within [minimum, maximum] of `n` repeats."""
+    return (n - 1) / (n + 1)
+
+
+def repeat_passes_all(counts: list[int]) -> Interval | float | None:
+    """Return the bounds of the probability that the next repeat passes all tests, with n repeats in each."""
+    if not counts:
+        return None
+    chances = [repeat_passes(n) for n in counts]
+    least = max(0.0, 1.0 - sum(1.0 - chance for chance in chances))
+    return chances[0] if len(chances) == 1 else (least, min(chances))
+
+
+def _find_inside(evidence: Evidence) -> Findings:
+    total = evidence.members.count
+    passes = [repeat_passes(pair.measured.n) if _has_range(pair) else None for pair in evidence.pairs]
+    rows: list[Row] = [
+        {
+            **pair.head,
+            "limits": pair.limits,
+            **_share(int(pair.inside.sum()), total),
+            "repeat_passes": chance,
+        }
+        for pair, chance in zip(evidence.pairs, passes, strict=True)
+    ]
+    ranged = [pair.measured.n for pair in evidence.pairs if _has_range(pair)]
+    everything: Row = {"block": ALL, "quantity": "", "unit": "", "limits": None}
+    share = _share(int(evidence.inside.sum()), total)
+    last: Row = {**everything, **share, "repeat_passes": repeat_passes_all(ranged)}
+    failed = total - int(evidence.members.finished.sum())
+    text = f"shares are of all {total} samples" + (f"; {failed} did not finish and count as outside" if failed else "")
+    return Findings((*rows, last), (text,))
+
+
+def _share(count: int, total: int) -> Row:
+    return {"inside": count, "of": total, "share": count / total, "interval": interval(count, total)}
+
+
+def _has_range(pair: Pair) -> bool:
+    """Return True if the limits are those of the repeats, and no tolerance about them."""
+    return pair.limits == (pair.measured.minimum, pair.measured.maximum)
+
+
+def _find_predicted(evidence: Evidence) -> Findings:
+    lengths = evidence.lengths
+    rows = tuple(_predicted(pair, evidence.members.count) for pair in lengths if pair.scatters)
+    without = [f"{pair.name}: repeats without scatter predict nothing" for pair in lengths if not pair.scatters]
+    return Findings(rows, tuple(without))
+
+
+def _predicted(pair: Pair, total: int) -> Row:
+    half = prediction_half_width(pair.measured.s, pair.measured.n)
+    ends = (pair.measured.mean - half, pair.measured.mean + half)
+    return {**pair.head, "prediction": ends, **_share(int(pair.between(ends).sum()), total)}
+
+
+SHARE = (
+    Column("share", "share", Form.SHARE, "inside / of", 1),
+    Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+)
+INSIDE = Metric(
+    "inside",
+    "samples inside the measured limits, by the rules for single runs",
+    (
+        *BLOCK,
+        Column("limits", "limits", Form.NUMBER, "limits of inside, as for a single run"),
+        Column("inside", "inside", Form.COUNT, "samples inside; failed ones count as outside"),
+        Column("of", "", Form.COUNT, "all samples, failed ones included"),
+        *SHARE,
+        Column("repeat_passes", "repeat", Form.SHARE, "probability that the next repeat is inside: (n-1)/(n+1)", 0),
+    ),
+    _find_inside,
+)
+PREDICTION = Metric(
+    "prediction",
+    "samples inside the 95 % prediction interval for the next test (mm)",
+    (
+        *BLOCK,
+        Column("prediction", "next test", Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
+        Column("inside", "inside", Form.COUNT, "samples in it; failed ones count as outside"),
+        Column("of", "of", Form.COUNT, "all samples, failed ones included"),
+        *SHARE,
+    ),
+    _find_predicted,
+)
+
+
+COVERAGE = 2.0  # factor k of the expanded uncertainty, about 95 %
+ENOUGH = 2  # values that a standard deviation needs
+
+
+def _find_validation(evidence: Evidence) -> Findings:
+    lengths = evidence.lengths
+    rows = tuple(_row_validation(pair, evidence.u_num) for pair in lengths)
+    messages = [f"u_num = {evidence.u_num:g} mm"] if rows else ["no length was measured"]
+    if any(pair.known.size < ENOUGH for pair in lengths):
+        messages.append("u_input needs two samples with a value")
+    if any(pair.measured.n < ENOUGH for pair in lengths):
+        messages.append("u_D needs two repeats")
+    return Findings(rows, tuple(messages))
+
+
+def _row_validation(pair: Pair, u_num: float) -> Row:
+    values, measured = pair.known, pair.measured
+    simulated = float(np.mean(values)) if values.size else nan
+    error = simulated - measured.mean
+    u_input = float(np.std(values, ddof=1)) if values.size >= ENOUGH else nan
+    u_data = data_uncertainty(measured.s, measured.n)
+    u_val = hypot(u_num, u_input, u_data)
+    return {
+        **pair.head,
+        "members": int(values.size),
+        "S": simulated,
+        "D": measured.mean,
+        "E": error,
+        "u_num": u_num,
+        "u_input": u_input,
+        "u_D": u_data,
+        "u_val": u_val,
+        "within": abs(error) <= COVERAGE * u_val if isfinite(u_val) and isfinite(error) else None,
+    }
+
+
+VALIDATION = Metric(
+    "validation",
+    "error and uncertainty after ASME V&V 20 (mm)",
+    (
+        *BLOCK,
+        Column("members", "", Form.COUNT, "samples with a value, used for S and u_input"),
+        Column("S", "S", Form.NUMBER, "mean of the samples"),
+        Column("D", "D", Form.NUMBER, "mean of the repeats"),
+        Column("E", "E", Form.NUMBER, "S - D"),
+        Column("u_num", "", Form.NUMBER, "standard uncertainty of the numerical solution (--u-num)"),
+        Column("u_input", "u_input", Form.NUMBER, "standard deviation of the samples"),
+        Column("u_D", "u_D", Form.NUMBER, "of D: sqrt(s^2/n + 0.5^2), reading included"),
+        Column("u_val", "u_val", Form.NUMBER, "sqrt(u_num^2 + u_input^2 + u_D^2)"),
+        Column("within", "|E|<=2u", Form.TEXT, "|E| <= 2 u_val: no error of the model is detected"),
+    ),
+    _find_validation,
+)
+
+
+Counts = NDArray[np.int64]
+RESAMPLES = 2000
+SEED = 0
+FEWEST = 4  # values of a sample that is worth resampling
+
+
+class Steps:
+    """Two samples on their common grid of values, for the area between their distributions as counts change."""
+
+    def __init__(self, one: Floats, other: Floats) -> None:
+        """Take samples of any length, at least one value each."""
+        grid, places = np.unique(np.concatenate([one, other]), return_inverse=True)
+        self.widths = np.diff(grid)
+        self.one, self.other = places[: one.size], places[one.size :]
+
+    def area(self, one: Counts, other: Counts) -> float:
+        """Return the area between two samples, given as the places of their values on the grid."""
+        gap = self._distribution(one) - self._distribution(other)
+        return float(np.sum(np.abs(gap) * self.widths))  # not by BLAS, whose threads hinder one another here
+
+    def _distribution(self, places: Counts) -> Floats:
+        """Return the share of values up to each place of the grid but the last."""
+        counts = np.bincount(places, minlength=self.widths.size + 1)
+        return np.cumsum(counts)[:-1] / places.size
+
+
+def area_between(one: Floats, other: Floats) -> float:
+    """Return the area between the distributions of two samples, in their unit."""
+    steps = Steps(one, other)
+    return steps.area(steps.one, steps.other)
+
+
+def area_interval(members: Floats, repeats: Floats, resamples: int = RESAMPLES, seed: int = SEED) -> Interval:
+    """Return the 95 % interval of the area, see above; NaN where a sample is too small for one."""
+    smaller = min(members.size, repeats.size)
+    if smaller < FEWEST:
+        return nan, nan
+    random = np.random.default_rng(seed)
+    steps = Steps(members, repeats)
+    areas = [steps.area(_resampled(steps.one, random), _resampled(steps.other, random)) for _ in range(resamples)]
+    area = steps.area(steps.one, steps.other)
+    widened = NormalDist().cdf(quantile(0.5 * (1.0 + CONFIDENCE), smaller - 1) * sqrt(smaller / (smaller - 1)))
+    half = max(float(np.quantile(areas, widened)) - area, 0.0)
+    return max(area - half, 0.0), area + half
+
+
+def _resampled(places: Counts, random: np.random.Generator) -> Counts:
+    return places[random.integers(0, places.size, places.size)]
+
+
+def _find_area(evidence: Evidence) -> Findings:
+    lengths = evidence.lengths
+    rows = tuple(_row_area(pair) for pair in lengths)
+    messages = [f"{pair.name}: no interval, {why}" for pair in lengths if (why := _complaint(pair))]
+    if len(messages) < len(lengths):
+        messages.append(f"bootstrap of {RESAMPLES} resamples, seed {SEED}")
+    return Findings(rows, tuple(messages))
+
+
+def _complaint(pair: Pair) -> str:
+    """Return why there is no interval, or nothing."""
+    if not pair.scatters:
+        return "as the repeats do not scatter"
+    few = min(pair.known.size, len(pair.repeats)) < FEWEST
+    return f"which needs {FEWEST} samples and {FEWEST} repeats" if few else ""
+
+
+def _row_area(pair: Pair) -> Row:
+    members, repeats = pair.known, np.array(list(pair.repeats.values()))
+    head: Row = {**pair.head, "members": int(members.size), "repeats": int(repeats.size)}
+    if not members.size:
+        return {**head, "area": None, "interval": None}
+    interval = None if _complaint(pair) else area_interval(members, repeats)
+    return {**head, "area": area_between(members, repeats), "interval": interval}
+
+
+AREA = Metric(
+    "area",
+    "area between the distributions of samples and repeats (mm)",
+    (
+        *BLOCK,
+        Column("members", "samples", Form.COUNT, "samples with a value"),
+        Column("repeats", "repeats", Form.COUNT, "repeats with a value"),
+        Column("area", "area", Form.NUMBER, "integral of |F_samples - F_repeats| dx: 0 where they are equal"),
+        Column("interval", "95 %", Form.NUMBER, "bootstrap interval of the area, both samples resampled"),
+    ),
+    _find_area,
+)
+
+
+SMALLEST_EIGENVALUE = 1e-9  # of the correlation matrix: below it, one position follows from the others
+
+
+class Hotelling(NamedTuple):
+    """T2, and the F distribution of its test: `F` has `dof_1`, `dof_2` degrees of freedom."""
+
+    T2: float
+    F: float
+    dof_1: float
+    dof_2: float
+    critical: float  # at the level 5 %
+    p_value: float
+
+
+def hotelling(repeats: Floats, members: Floats) -> Hotelling | None:
+    """Compare the means of repeats (n, p) and members (N, p), n > p; None where degrees of freedom do not suffice."""
+    n, p = repeats.shape
+    difference = repeats.mean(axis=0) - members.mean(axis=0)
+    of_repeats, of_members = _covariance_of_mean(repeats), _covariance_of_mean(members)
+    both = of_repeats + of_members
+    squared = float(difference @ np.linalg.solve(both, difference))
+    inverse = _spread(both, of_repeats) / (n - 1)
+    if len(members) > 1:
+        inverse += _spread(both, of_members) / (len(members) - 1)
+    degrees = (p + p * p) / inverse
+    rest = degrees - p + 1
+    if rest <= 0.0:
+        return None
+    scale = degrees * p / rest
+    special = load_module("scipy.special", "judging a sweep")
+    critical = scale * float(special.fdtri(p, rest, CONFIDENCE))
+    return Hotelling(squared, squared / scale, float(p), rest, critical, float(special.fdtrc(p, rest, squared / scale)))
+
+
+def _covariance_of_mean(sample: Floats) -> Floats:
+    """Return the sample covariance of p columns by the number of rows; zero for a single row."""
+    n, p = sample.shape
+    if n == 1:
+        return np.zeros((p, p))
+    covariance: Floats = np.cov(sample, rowvar=False).reshape(p, p) / n
+    return covariance
+
+
+def _spread(both: Floats, part: Floats) -> float:
+    """Return tr(M^2) + tr(M)^2 for M = part both^-1, which has the traces of both^-1 part."""
+    share = np.linalg.solve(both, part)
+    return float(np.trace(share @ share) + np.trace(share) ** 2)
+
+
+def _find_joint(evidence: Evidence) -> Findings:
+    lengths = evidence.lengths
+    chosen = [pair for pair in lengths if pair.scatters]
+    messages = [f"{pair.name}: repeats without scatter are left out" for pair in lengths if not pair.scatters]
+    if not chosen:
+        return Findings((), (*messages, "not computed: no measured position scatters"))
+    repeats, incomplete = complete_repeats(chosen)
+    members = np.column_stack([pair.values for pair in chosen])
+    members = members[np.isfinite(members).all(axis=1)]
+    if incomplete:
+        messages.append(f"left out, as not all positions were measured: replicate {incomplete}")
+    complaint = _complaint_joint(repeats, members)
+    found = None if complaint else hotelling(repeats, members)
+    if found is None:
+        return Findings((), (*messages, f"not computed: {complaint or 'too few samples for their scatter'}"))
+    return Findings((_row_joint(chosen, repeats, members, found),), tuple(messages))
+
+
+def _complaint_joint(repeats: Floats, members: Floats) -> str:
+    """Return why no test is possible, or nothing."""
+    n, p = repeats.shape
+    if n <= p:
+        return f"{n} complete repeats for {p} positions, at least {p + 1} are needed"
+    if not len(members):
+        return "no sample has all positions"
+    if not np.ptp(repeats, axis=0).all():
+        return "a position does not scatter in the complete repeats"
+    correlation = np.atleast_2d(np.corrcoef(repeats, rowvar=False))
+    if np.linalg.eigvalsh(correlation)[0] < SMALLEST_EIGENVALUE:
+        return "a position follows from the others (their covariance is singular)"
+    return ""
+
+
+def _row_joint(pairs: Sequence[Pair], repeats: Floats, members: Floats, found: Hotelling) -> Row:
+    return {
+        "positions": ", ".join(f"{pair.measured.block} {pair.measured.quantity}" for pair in pairs),
+        "repeats": len(repeats),
+        "members": len(members),
+        **found._asdict(),
+        "within": found.critical >= found.T2,
+    }
+
+
+JOINT = Metric(
+    "joint",
+    "do the means of all positions agree? Hotelling's T2, two samples",
+    (
+        Column("positions", "positions", Form.TEXT, "blocks and quantities taken together"),
+        Column("repeats", "n", Form.COUNT, "repeats in which all of them were measured"),
+        Column("members", "N", Form.COUNT, "samples that have all of them"),
+        Column("T2", "T2", Form.NUMBER, "squared distance of the means in units of their scatter"),
+        Column("critical", "5 %", Form.NUMBER, "T2 that is exceeded by chance in 5 % of experiments"),
+        Column("F", "", Form.NUMBER, "T2 scaled to follow the F distribution"),
+        Column("dof_1", "", Form.NUMBER, "its degrees of freedom: number of positions"),
+        Column("dof_2", "dof", Form.NUMBER, "its degrees of freedom: n - p for large ensembles", 1),
+        Column("p_value", "p", Form.NUMBER, "probability of such a T2 if the true means agree", 3),
+        Column("within", "agree", Form.TEXT, "T2 <= critical T2"),
+    ),
+    _find_joint,
+)
+
+
+METRICS: dict[str, Metric] = {metric.name: metric for metric in (INSIDE, OUTCOME, VALIDATION, PREDICTION, AREA, JOINT)}

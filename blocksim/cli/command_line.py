@@ -1,0 +1,212 @@
+"""Options of commands: those that several share, and how typer gets them from the options of the library."""
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NoReturn, Union, get_args, get_origin
+
+import typer
+
+from blocksim.cli import completion
+from blocksim.cli.output import answer, note, print_json
+from blocksim.errors import ExitCode
+from blocksim.options import Option, OptionField, has_options, option_field, option_fields
+
+
+class Executor(StrEnum):
+    """What runs the cases of a study."""
+
+    ENSEMBLE = "ensemble"
+    PROCESSES = "processes"
+    DASK = "dask"
+
+
+ExecutorName = Annotated[
+    Executor | None,
+    typer.Option(help="ensemble: in this process (default); processes: a case that crashes stops no other."),
+]
+Jobs = Annotated[int | None, Option("Threads or processes (default: one per core).", metavar="N", least=1)]
+Scheduler = Annotated[str | None, Option("Scheduler of a Dask cluster, such as tcp://host:8786.", metavar="ADDRESS")]
+ScenarioPath = Annotated[Path, Option("Scenario file (TOML).", metavar="SCENARIO", is_argument=True)]
+Settings = Annotated[
+    list[str] | None,
+    Option(
+        "Set a scenario key, e.g. contact.stiffness_scale=0.01. Repeatable.",
+        flags=("--set",),
+        metavar="KEY=VALUE",
+        complete="scenario_keys",
+    ),
+]
+Overwrite = Annotated[bool, Option("Run again and replace the existing results.")]
+Replace = Annotated[bool, Option("Replace a file that blocksim did not write.")]
+Json = Annotated[bool, Option("Print the answer as JSON, for programs.", flags=("--json",))]
+Quiet = Annotated[bool, Option("Print only the answer.", flags=("--quiet", "-q"))]
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a command has to say at its end: its answer, as lines and as data, and notes before and after it."""
+
+    lines: Iterable[str] = ()
+    data: object = None
+    notes: Iterable[str] = ()
+    before: Iterable[str] = ()
+    always: Iterable[str] = ()  # notes after the answer that --quiet does not silence
+    code: int = ExitCode.SUCCESS
+
+
+@dataclass(frozen=True)
+class Screen:
+    """Where a command prints, and how much."""
+
+    as_json: Json = False
+    quiet: Quiet = False
+
+    @property
+    def silent(self) -> bool:
+        """Whether there is nothing beside the answer."""
+        return self.quiet or self.as_json
+
+    def note(self, text: str) -> None:
+        """Print a line beside the answer, unless that is all that is wanted."""
+        if not self.silent:
+            note(text)
+
+    def print(self, report: Report) -> None:
+        """Print a report."""
+        for text in report.before:
+            self.note(text)
+        lines = [] if self.as_json else list(report.lines)
+        if self.as_json:
+            print_json(report.data)
+        elif lines:
+            answer("\n".join(lines))
+        for text in report.always:
+            note(text)
+        for text in report.notes:
+            self.note(text)
+
+    def show(self, report: Report) -> NoReturn:
+        """Print a report and leave with its exit code."""
+        self.print(report)
+        raise typer.Exit(report.code)
+
+
+@dataclass(frozen=True)
+class TextScreen(Screen):
+    """Where a command without JSON prints."""
+
+    as_json: bool = False
+
+
+def _allow_outside(context: typer.Context, asked: bool) -> None:
+    from blocksim.scenario.input_files import file_access
+
+    if asked:
+        context.with_resource(file_access(anywhere=True))
+
+
+ALLOW_OUTSIDE = typer.Option(
+    False,
+    "--allow-outside",
+    callback=_allow_outside,
+    expose_value=False,
+    help="Allow tables outside the scenario's folder and the current one.",
+)
+
+
+def as_typer_command(function: Callable[..., Report | None], *, reads_scenarios: bool = False) -> Callable[..., None]:
+    """Return a command as typer takes it: groups of options are single ones, and its report is shown.
+
+    A command that returns a report and has no parameter for the screen prints text, and has --quiet.
+    """
+    parameters: list[inspect.Parameter] = []
+    groups: dict[str, Any] = {}
+    own = inspect.signature(function, eval_str=True)
+    for parameter in own.parameters.values():
+        field = option_field(parameter.name, parameter.annotation, parameter.default)
+        if has_options(field.kind):
+            groups[field.name] = field.kind
+            parameters += _parameters(field.kind)
+        else:
+            parameters.append(_parameter(field, field.option) if field.option else parameter)
+    plain = own.return_annotation is Report and not any(issubclass(kind, Screen) for kind in groups.values())
+    parameters += _parameters(TextScreen) if plain else ()
+    if reads_scenarios:  # directly or with results
+        outside = inspect.Parameter("outside", inspect.Parameter.KEYWORD_ONLY, default=ALLOW_OUTSIDE, annotation=bool)
+        parameters.append(outside)
+
+    def call(**values: Any) -> None:
+        screen = _made(TextScreen, values) if plain else None
+        made = {name: _made(kind, values) for name, kind in groups.items()}
+        values.pop("outside", None)
+        report = function(**made, **values)
+        if report is not None:
+            (screen or next(one for one in made.values() if isinstance(one, Screen))).show(report)
+
+    call.__doc__ = function.__doc__
+    by_name = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in parameters]
+    call.__signature__ = inspect.Signature(by_name)  # type: ignore[attr-defined]
+    call.__annotations__ = {}
+    return call
+
+
+def _parameters(group: Any) -> Iterator[inspect.Parameter]:
+    """Yield the options of a group as typer takes them."""
+    for field in option_fields(group):
+        if field.option is not None:
+            yield _parameter(field, field.option)
+        elif has_options(field.kind):
+            yield from _parameters(field.kind)
+
+
+def _parameter(field: OptionField, option: Option) -> inspect.Parameter:
+    """Return an option as typer takes it."""
+    name, kind, default, _ = field
+    kinds = [one for one in get_args(kind) if one is not NoneType] if get_origin(kind) in {Union, UnionType} else [kind]
+    typed: Any = Path if Path in kinds else str if option.read else kinds[0]
+    typed = list[str] if option.is_repeatable else Literal[option.choices] if option.choices else typed
+    is_plain = isinstance(default, bool | int | float | str | Path) or default is inspect.Parameter.empty
+    default = (not default if option.is_negated else default) if is_plain else None
+    more: dict[str, Any] = {"help": option.help, "metavar": option.metavar, "show_default": option.show_default}
+    more |= {"min": option.least, "max": option.most}
+    more["autocompletion"] = getattr(completion, option.complete) if option.complete else None
+    if option.read and not option.is_repeatable:
+        more["parser"] = _parser(option.read)
+    flags = option.flags or (f"--{name.replace('_', '-')}",)
+    default = ... if default is inspect.Parameter.empty else default
+    info = typer.Argument(default, **more) if option.is_argument else typer.Option(default, *flags, **more)
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=info, annotation=typed)
+
+
+def _parser(read: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a reader for typer, which also asks it for defaults."""
+
+    def parse(text: Any) -> Any:
+        try:
+            return read(text) if isinstance(text, str) else text
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+
+    return parse
+
+
+def _made(group: Any, values: dict[str, Any]) -> Any:
+    """Take the values of a group out of those of all options. Raises BadParameter, and what reading them raises."""
+    given: dict[str, Any] = {}
+    for name, kind, default, option in option_fields(group):
+        if option is not None:
+            value = values.pop(name)
+            if option.is_repeatable and option.read:
+                value = option.read(value or [])
+            if value is not None or default is inspect.Parameter.empty:
+                given[name] = not value if option.is_negated else value
+        elif has_options(kind):
+            given[name] = _made(kind, values)
+    try:
+        return group(**given)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None

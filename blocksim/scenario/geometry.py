@@ -1,0 +1,405 @@
+"""Geometry of polygons: area, centroid, moments, what lies inside, crossings, overlap, Voronoi cells."""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+ROUND_OFF = 1e-9
+"""m; polygons that overlap by less touch."""
+DISC_SHARE = 0.5 * (1.0 - 1e-6)
+"""Radius of a particle in spacings, less what round-off may take."""
+
+
+def corners_of(points: Sequence[tuple[float, float]]) -> Floats:
+    """Return corners (m) as an array (k, 2), counter-clockwise."""
+    corners = np.array(points, dtype=np.float64).reshape(-1, 2)
+    return corners if signed_area(corners) >= 0.0 else corners[::-1]
+
+
+def signed_area(corners: Floats) -> float:
+    """Return the area (m2) of a polygon (k, 2), positive where it is counter-clockwise."""
+    x, y = corners.T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def edge_ends(corners: Floats) -> tuple[Floats, Floats]:
+    """Return where the edges of a polygon begin and end, (k, 2) each."""
+    return corners, np.roll(corners, -1, axis=0)
+
+
+def is_inside(points: Floats, corners: Floats) -> Flags:
+    """Return for points (n, 2) whether they lie in a polygon; on an edge either."""
+    found = np.zeros(len(points), dtype=bool)
+    x, y = points.T
+    for (x0, y0), (x1, y1) in zip(*edge_ends(corners), strict=True):
+        if y0 != y1:
+            crosses = (y0 > y) != (y1 > y)
+            found ^= crosses & (x < x0 + (y - y0) * (x1 - x0) / (y1 - y0))
+    return found
+
+
+def edge_distance(points: Floats, corners: Floats) -> Floats:
+    """Return the distances (m) of points (n, 2) from the nearest edge."""
+    nearest = np.full(len(points), np.inf)
+    for begin, end in zip(*edge_ends(corners), strict=True):
+        along, beyond = end - begin, points - begin
+        share = np.clip(beyond @ along / float(along @ along), 0.0, 1.0)
+        nearest = np.minimum(nearest, np.hypot(*(beyond - np.outer(share, along)).T))
+    return nearest
+
+
+def is_deep_inside(points: Floats, corners: Floats) -> Flags:
+    """Return for points (n, 2) whether they lie in a polygon and not on its edge."""
+    return is_inside(points, corners) & (edge_distance(points, corners) > ROUND_OFF)
+
+
+def cuts(begin: Floats, end: Floats, corners: Floats) -> bool:
+    """Return True if a straight line (m) has a part inside a polygon."""
+    along = end - begin
+    shares = [0.0, 1.0]
+    for e0, e1 in zip(*edge_ends(corners), strict=True):
+        edge, beyond = e1 - e0, e0 - begin
+        across = along[0] * edge[1] - along[1] * edge[0]
+        if across != 0.0:
+            shares.append(float((beyond[0] * edge[1] - beyond[1] * edge[0]) / across))
+    ordered = np.unique(np.clip(shares, 0.0, 1.0))
+    middles = 0.5 * (ordered[1:] + ordered[:-1])
+    return bool(is_deep_inside(begin + np.outer(middles, along), corners).any())
+
+
+def overlap(one: Floats, other: Floats) -> bool:
+    """Return True if two polygons have more than edges in common."""
+    lows, highs = [corners.min(axis=0) for corners in (one, other)], [corners.max(axis=0) for corners in (one, other)]
+    if np.any(np.maximum(*lows) >= np.minimum(*highs) - ROUND_OFF):
+        return False
+    for a, b in ((one, other), (other, one)):
+        if any(cuts(begin, end, b) for begin, end in zip(*edge_ends(a), strict=True)):
+            return True
+    heights = np.unique(one[:, 1])  # neither cuts the other: a point in one of them tells whether one is in the other
+    y = 0.5 * (heights[0] + heights[1])
+    low, high = crossings_below(one, np.array([y]), axis=1)[0][:2]
+    return bool(is_deep_inside(np.array([[0.5 * (low + high), y]]), other).any())
+
+
+def crossings_below(corners: Floats, places: Floats, axis: int) -> list[Floats]:
+    """Return where lines at these places (m) along an axis cross the edges of a polygon, sorted, for each place."""
+    other = 1 - axis
+    begins, ends = edge_ends(corners)
+    found = []
+    for place in places:
+        is_crossed = (begins[:, axis] > place) != (ends[:, axis] > place)
+        b, e = begins[is_crossed], ends[is_crossed]
+        share = (place - b[:, axis]) / (e[:, axis] - b[:, axis])
+        found.append(np.sort(b[:, other] + share * (e[:, other] - b[:, other])))
+    return found
+
+
+def height_above(corners: Floats, points: Floats) -> Floats:
+    """Return how much (m) of a polygon is straight above each of the points (n, 2)."""
+    columns, which = np.unique(points[:, 0], return_inverse=True)
+    levels = crossings_below(corners, columns, axis=0)
+    above = np.zeros(len(points))
+    for k, line in enumerate(levels):
+        mine = which == k
+        y = points[mine, 1]
+        for low, high in zip(line[::2], line[1::2], strict=True):
+            above[mine] += np.maximum(high - np.maximum(low, y), 0.0)
+    return above
+
+
+def self_crossings(corners: Floats) -> Iterator[tuple[int, int]]:
+    """Yield pairs of edges of a polygon that cross or touch although they are no neighbours."""
+
+    def side(p: Floats, q: Floats, r: Floats) -> float:
+        return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
+
+    edges = list(zip(*edge_ends(corners), strict=True))
+    for i, (a0, a1) in enumerate(edges):
+        for j, (b0, b1) in enumerate(edges[i + 2 :], start=i + 2):
+            low, high = (
+                np.maximum(np.minimum(a0, a1), np.minimum(b0, b1)),
+                np.minimum(np.maximum(a0, a1), np.maximum(b0, b1)),
+            )
+            crosses = side(a0, a1, b0) * side(a0, a1, b1) <= 0.0 and side(b0, b1, a0) * side(b0, b1, a1) <= 0.0
+            if (j + 1) % len(edges) != i and crosses and bool((low <= high).all()):
+                yield i, j
+
+
+def count_across(corners: Floats, spacing: float) -> tuple[int, int]:
+    """Return how many particles a lattice of this spacing (m) has along x and y of a polygon."""
+    columns, rows = np.floor((corners.max(axis=0) - corners.min(axis=0)) / spacing + 1e-6).astype(int)
+    return int(columns), int(rows)
+
+
+def fill_lattice(corners: Floats, spacing: float) -> Floats:
+    """Return the places (m, (n, 2)) of a square lattice whose discs of that diameter (m) lie in a polygon, by rows."""
+    columns, rows = count_across(corners, spacing)
+    x, y = corners.min(axis=0)[:, np.newaxis] + spacing * (np.arange(max(columns, rows)) + 0.5)
+    places = np.stack(np.meshgrid(x[:columns], y[:rows]), axis=-1).reshape(-1, 2)
+    kept = is_inside(places, corners) & (edge_distance(places, corners) >= DISC_SHARE * spacing)
+    return places[kept]
+
+
+Corner = tuple[float, float]
+Corners = tuple[Corner, ...]
+"""Corners (m) counter-clockwise."""
+
+FEWEST, MOST = 3, 16
+RECTANGLE = 4
+SHORTEST = 1e-3
+"""Least length of an edge, and least thickness, in shares of the diagonal of the bounding box: below, contact would
+have to tell corners apart that lie closer to one another than the accuracy of a step."""
+STRAIGHT = math.radians(0.1)
+"""Least turn of the outline at a corner."""
+LEAST = 1e-6  # m; a thousand times the distance at which things touch
+
+
+def area_of(corners: Sequence[Corner]) -> float:
+    """Return the area (m²), positive where corners run counter-clockwise."""
+    x0, y0 = corners[0]
+    local = [(x - x0, y - y0) for x, y in corners]  # no digits are lost far from the origin
+    return 0.5 * math.fsum(_cross(a, b) for a, b in _edges(local))
+
+
+def centre_outline(points: Sequence[Corner]) -> Corners:
+    """Return corners counter-clockwise about their centroid; the first point stays the first."""
+    x0, y0 = points[0]
+    local = [(x - x0, y - y0) for x, y in points]
+    if area_of(local) < 0.0:
+        local = [local[0], *local[:0:-1]]
+    if is_upright(tuple(local)):
+        cx, cy = middle_of(local)
+        return tuple((x - cx, y - cy) for x, y in local)
+    for _ in range(2):  # the second time removes the round-off of the first
+        cx, cy = centroid(local)
+        local = [(x - cx, y - cy) for x, y in local]
+    return tuple(local)
+
+
+def centroid(corners: Sequence[Corner]) -> Corner:
+    """Return the centroid (m) of a polygon that has an area."""
+    x0, y0 = corners[0]
+    local = [(x - x0, y - y0) for x, y in corners]
+    parts = [(_cross(a, b), a, b) for a, b in _edges(local)]
+    six = 3.0 * math.fsum(cross for cross, _, _ in parts)
+    x = math.fsum(cross * (a[0] + b[0]) for cross, a, b in parts) / six
+    y = math.fsum(cross * (a[1] + b[1]) for cross, a, b in parts) / six
+    return x0 + x, y0 + y
+
+
+@lru_cache(maxsize=256)
+def section_of(corners: Corners) -> tuple[float, float]:
+    """Return the area (m²) of corners about their centroid, and its polar second moment about it (m⁴).
+
+    The moment is the sum over triangles from the centroid: 1/12 Σ (a × b) (a·a + a·b + b·b).
+    """
+    polar = math.fsum(_cross(a, b) * (_dot(a, a) + _dot(a, b) + _dot(b, b)) for a, b in _edges(corners)) / 12.0
+    return area_of(corners), polar
+
+
+def box_of(corners: Sequence[Corner]) -> tuple[Corner, Corner]:
+    """Return the lower left and the upper right corner (m) of the bounding box."""
+    xs, ys = zip(*corners, strict=True)
+    return (min(xs), min(ys)), (max(xs), max(ys))
+
+
+@lru_cache(maxsize=256)
+def is_upright(corners: Corners) -> bool:
+    """Return True if the corners are those of a rectangle with sides along the axes.
+
+    It is treated as a rectangle wherever another order of rounding would give another last digit.
+    """
+    low, high = box_of(corners)
+    return len(corners) == RECTANGLE and set(corners) == set(itertools.product(*zip(low, high, strict=True)))
+
+
+def middle_of(corners: Sequence[Corner]) -> Corner:
+    """Return the middle (m) of the bounding box."""
+    (left, bottom), (right, top) = box_of(corners)
+    return 0.5 * (left + right), 0.5 * (bottom + top)
+
+
+@lru_cache(maxsize=256)
+def least_width(corners: Corners) -> float:
+    """Return the least distance (m) of two parallel lines with all corners between them; one is along an edge."""
+    reaches = []
+    for a, b in _edges(corners):
+        along, length = _minus(b, a), math.dist(a, b)
+        reaches.append(max(abs(_cross(along, _minus(corner, a))) for corner in corners) / length if length else 0.0)
+    return min(reaches)
+
+
+def holds(corners: Sequence[Corner], point: Corner, margin: float) -> bool:
+    """Return whether a point is inside, or outside by no more than a margin (all m)."""
+    return all(_cross(_minus(b, a), _minus(point, a)) >= -margin * math.dist(a, b) for a, b in _edges(corners))
+
+
+def edges_of(corners: Sequence[Corner]) -> Iterator[tuple[Corner, Corner, Corner]]:
+    """Yield the ends (m) of every edge, counter-clockwise, and its outward unit normal."""
+    for a, b in _edges(corners):
+        length = math.dist(a, b)
+        yield a, b, ((b[1] - a[1]) / length, (a[0] - b[0]) / length)
+
+
+def shrink_outline(points: Sequence[Corner], way: float) -> list[Corner]:
+    """Return a convex outline whose edges are all moved inwards by a way (m), in the order of the file.
+
+    A corner moves along (n + m) / (1 + n·m), n and m the inward normals of its edges: to where the moved edges meet.
+    """
+    sense = math.copysign(1.0, area_of(points))
+    ways = [(b[0] - a[0], b[1] - a[1], math.dist(a, b)) for a, b in _edges(points)]
+    normals = [(-sense * y / length, sense * x / length) for x, y, length in ways]
+    moved = []
+    for (x, y), n, m in zip(points, (normals[-1], *normals), normals, strict=False):
+        share = way / (1.0 + _dot(n, m))
+        moved.append((x + share * (n[0] + m[0]), y + share * (n[1] + m[1])))
+    return moved
+
+
+def regular(sides: int, radius: float) -> Corners:
+    """Return a regular polygon about its centroid, corners at a radius (m), its lowest side level."""
+    first = -0.5 * math.pi - math.pi / sides
+    angles = (first + 2.0 * math.pi * number / sides for number in range(sides))
+    return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
+
+
+def faults(points: Sequence[Corner]) -> Iterator[tuple[int | None, str]]:
+    """Yield what is wrong with an outline, worst first, and the number (from 0) of the corner, None for all of it."""
+    if not FEWEST <= len(points) <= MOST:
+        yield None, f"{len(points)} corners; an outline has {FEWEST} to {MOST} corners [x, y]"
+        return
+    low, high = box_of(points)
+    extent = math.dist(low, high)
+    if extent < LEAST:
+        yield None, f"all corners are within {1e6 * LEAST:g} µm"
+        return
+    local = [((x - points[0][0]) / extent, (y - points[0][1]) / extent) for x, y in points]
+    for number, corner in enumerate(local):
+        edge = math.dist(corner, local[number - 1])
+        if edge == 0.0 and number == 0:
+            yield len(local) - 1, "the first corner again; an outline closes by itself"
+        elif edge == 0.0:
+            yield number, "the same corner as the one before"
+        elif edge < SHORTEST:
+            yield number, f"this corner is only {1e3 * edge * extent:.3g} mm from the one before; leave one of them out"
+    sense = math.copysign(1.0, area_of(local))
+    ways = [_minus(b, a) for a, b in _edges(local)]
+    turns = [sense * math.atan2(_cross(a, b), _dot(a, b)) for a, b in zip((ways[-1], *ways), ways, strict=False)]
+    if min(turns) <= 0.0 or sum(turns) > 1.5 * 2.0 * math.pi:  # slow, and cannot happen to others
+        for edges in self_crossings(corners_of(local)):  # of the counter-clockwise outline, here in the file's order
+            first, second = sorted(one if sense > 0.0 else (len(local) - 2 - one) % len(local) for one in edges)
+            meets = f"the edge from corner {second + 1} meets that from corner {first + 1}"
+            yield second, f"{meets}: the outline crosses itself"
+    thickness = least_width(tuple(local))
+    if thickness < SHORTEST:
+        size = f"{1e3 * thickness * extent:.3g} mm thick and {1e3 * extent:.3g} mm long"
+        yield None, f"a sliver: {size}; at least {SHORTEST:g} of the length is needed"
+        return
+    for number, turn in enumerate(turns):
+        if turn <= -STRAIGHT:
+            yield number, "the outline is not convex at this corner; divide the block into convex ones"
+        elif turn < STRAIGHT:
+            yield number, f"the outline is nearly straight here ({180.0 - math.degrees(turn):.6g} deg); leave it out"
+
+
+def _edges(corners: Sequence[Corner]) -> Iterator[tuple[Corner, Corner]]:
+    return zip(corners, (*corners[1:], corners[0]), strict=True)
+
+
+def _minus(a: Corner, b: Corner) -> Corner:
+    return a[0] - b[0], a[1] - b[1]
+
+
+def _cross(a: Corner, b: Corner) -> float:
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _dot(a: Corner, b: Corner) -> float:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+NEAREST = 48
+"""Neighbours that are tried first; they decide nearly all cells."""
+
+
+def voronoi(points: Sequence[Corner], region: Sequence[Corner]) -> list[list[Corner]]:
+    """Return the cell (m) of each point, counter-clockwise; so are the corners of the convex region."""
+    places = np.array(points)
+    cells = []
+    for number in range(len(points)):
+        x, y = (float(one) for one in places[number])
+        cell = [(u - x, v - y) for u, v in region]
+        for dx, dy in _around(number, places):
+            reach = max(u * u + v * v for u, v in cell)
+            if dx * dx + dy * dy >= 4.0 * reach:
+                break
+            cell = _cut(cell, dx, dy)
+        cells.append([(x + u, y + v) for u, v in cell])
+    return cells
+
+
+def relax_points(points: Sequence[Corner], region: Sequence[Corner], times: int) -> list[Corner]:
+    """Return points moved to the centroids of their cells, so many times (Lloyd): cells become more alike."""
+    for _ in range(times):
+        points = [centroid(cell) for cell in voronoi(points, region)]
+    return [*points]
+
+
+def _around(number: int, places: Floats) -> Iterator[Corner]:
+    """Yield the other points as seen from one, the nearest first."""
+    ways = places - places[number]
+    distances = np.einsum("ij,ij->i", ways, ways)
+    distances[number] = math.inf
+    others = len(places) - 1
+    near = np.argpartition(distances, min(NEAREST, others))[: min(NEAREST, others)]
+    near = near[np.lexsort((near, distances[near]))]
+    yield from ways[near].tolist()
+    if others > NEAREST:
+        order = np.lexsort((np.arange(len(places)), distances))[NEAREST:-1]
+        yield from ways[order].tolist()
+
+
+def _cut(cell: Sequence[Corner], dx: float, dy: float) -> list[Corner]:
+    """Return the part of a polygon that is nearer to the origin than to a point."""
+    half = 0.5 * (dx * dx + dy * dy)
+    beyond = [dx * u + dy * v - half for u, v in cell]
+    kept: list[Corner] = []
+    for index, (corner, after) in enumerate(zip(cell, beyond, strict=True)):
+        before = beyond[index - 1]
+        if (before > 0.0) != (after > 0.0):
+            share = before / (before - after)
+            (x0, y0), (x1, y1) = cell[index - 1], corner
+            kept.append((x0 + share * (x1 - x0), y0 + share * (y1 - y0)))
+        if after <= 0.0:
+            kept.append(corner)
+    return kept
+
+
+def clean_cell(cell: Sequence[Corner], least: float) -> list[Corner]:
+    """Return a convex polygon without corners that are too near (m) to another, nearly straight, or too many.
+
+    What goes is a corner at a time, that whose triangle with its neighbours is smallest: what is left lies within.
+    """
+    corners = [*cell]
+    extent = max((math.dist(a, b) for a in corners for b in corners), default=0.0)
+    shortest = max(least, 2.0 * SHORTEST * extent)
+    while len(corners) > 3:
+        needless, losses = [], []
+        for number, here in enumerate(corners):
+            before, after = corners[number - 1], corners[(number + 1) % len(corners)]
+            one, other = (here[0] - before[0], here[1] - before[1]), (after[0] - here[0], after[1] - here[1])
+            turn = math.atan2(one[0] * other[1] - one[1] * other[0], one[0] * other[0] + one[1] * other[1])
+            is_short = min(math.dist(before, here), math.dist(here, after)) < shortest
+            needless += [number] if is_short or turn < 2.0 * STRAIGHT else []
+            wide, far = (after[0] - before[0], after[1] - before[1])
+            losses.append(one[0] * far - one[1] * wide)
+        if not needless and len(corners) <= MOST:
+            break
+        corners.pop(min(needless or range(len(corners)), key=losses.__getitem__))
+    return corners

@@ -1,0 +1,275 @@
+"""Structures that divide a whole into blocks: arches, columns, Voronoi cells, rubble."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from blocksim.scenario import geometry
+from blocksim.scenario import units as q
+from blocksim.scenario.geometry import Corner, clean_cell, relax_points, voronoi
+from blocksim.scenario.models.base import Whole, require_one
+from blocksim.scenario.models.geometry import Point
+from blocksim.scenario.structures.base import Cell, Floats, Seed, Shaped, UnfitError, draws
+
+MOST_VOUSSOIRS = 1000
+MOST_TURN = 0.9 * math.pi
+ABUTMENT = 2.0
+"""Width of an abutment in thicknesses of the arch; it is half as deep behind its joint."""
+
+
+class Arch(Shaped):
+    """Voussoirs between radial joints, from the left springing to the right one, then two fixed abutments.
+
+    Inner and outer faces are straight, with their ends on the circles of intrados and extrados. Abutments are
+    rectangles of twice the thickness whose faces are the springing joints.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": ["radius"]}, {"required": ["span"]}]})
+
+    kind: Literal["arch"] = Field(description="kind of structure")
+    radius: q.PositiveLength | None = Field(default=None, description="mean radius; give this or span")
+    span: q.PositiveLength | None = Field(
+        default=None, description="clear distance of the springings of the intrados; give this or radius"
+    )
+    thickness: q.PositiveLength = Field(description="thickness of the ring")
+    embrace: q.Embrace = Field(default=math.pi, description="angle between the springing joints")
+    count: Annotated[int, Whole(1, MOST_VOUSSOIRS)] = Field(description="number of voussoirs")
+    abutments: bool = Field(default=True, description="whether fixed blocks hold the springings")
+
+    @model_validator(mode="after")
+    def _one_size(self) -> Self:
+        missing = "the size is missing: give radius (of the middle of the ring) or span"
+        require_one(missing, radius=self.radius, span=self.span)
+        if self.mean_radius <= 0.5 * self.thickness:
+            message = f"a ring of {1e3 * self.thickness:g} mm needs a mean radius of more than half of that"
+            raise q.invalid(message, "thickness")
+        return self
+
+    @property
+    def mean_radius(self) -> float:
+        """Radius (m) of the middle of the ring."""
+        if self.radius is not None:
+            return self.radius
+        return 0.5 * (self.span or math.nan) / math.sin(0.5 * self.embrace) + 0.5 * self.thickness
+
+    @property
+    def drawn(self) -> Sequence[Cell]:
+        """Voussoirs about the centre of the circles; raises UnfitError for one that turns by half a circle or more."""
+        if self.embrace / self.count > MOST_TURN:
+            raise UnfitError("count", f"a voussoir of {math.degrees(self.embrace / self.count):.4g} deg is not convex")
+        inner, outer = self.mean_radius - 0.5 * self.thickness, self.mean_radius + 0.5 * self.thickness
+        joints = [0.5 * math.pi + self.embrace * (0.5 - number / self.count) for number in range(self.count + 1)]
+        ends = [(_at(inner, angle), _at(outer, angle)) for angle in joints]
+        ring = [Cell([one[0], other[0], other[1], one[1]]) for one, other in pairwise(ends)]
+        return [*ring, *([self._abutment(joints[0], 1.0), self._abutment(joints[-1], -1.0)] if self.abutments else [])]
+
+    def _abutment(self, angle: float, way: float) -> Cell:
+        """Return the fixed block behind a joint; `way` is 1 where it lies counter-clockwise of it."""
+        inner, outer = (self.mean_radius + 0.5 * sign * ABUTMENT * self.thickness for sign in (-1.0, 1.0))
+        back = way * self.thickness
+        dx, dy = -back * math.sin(angle), back * math.cos(angle)
+        (x0, y0), (x1, y1) = _at(inner, angle), _at(outer, angle)
+        return Cell([(x0, y0), (x1, y1), (x1 + dx, y1 + dy), (x0 + dx, y0 + dy)], fixed=True)
+
+
+def _at(radius: float, angle: float) -> Corner:
+    return radius * math.cos(angle), radius * math.sin(angle)
+
+
+MOST_DRUMS = 1000
+
+
+class Column(Shaped):
+    """Drums of equal height one above the other, their sides on straight lines from the lower to the upper width."""
+
+    kind: Literal["column"] = Field(description="kind of structure")
+    count: Annotated[int, Whole(1, MOST_DRUMS)] = Field(description="number of drums")
+    tall: q.PositiveLength = Field(alias="height", description="height of the column")
+    width: q.PositiveLength = Field(description="width at its foot")
+    top_width: q.PositiveLength | None = Field(default=None, description="width at its top (default: width)")
+
+    @property
+    def drawn(self) -> Sequence[Cell]:
+        """Drums from the ground up."""
+        top = self.width if self.top_width is None else self.top_width
+        levels = [number / self.count for number in range(self.count + 1)]
+        halves = [0.5 * (self.width + (top - self.width) * level) for level in levels]
+        ends = [
+            ((-half, self.tall * level), (half, self.tall * level)) for half, level in zip(halves, levels, strict=True)
+        ]
+        return [Cell([low[0], low[1], high[1], high[0]]) for low, high in pairwise(ends)]
+
+
+MOST_CELLS = 5000
+MOST_ROUNDS = 20
+TRIALS = 8
+"""Random points in the box for each cell; a thin region has fewer cells."""
+LEAST_EDGE, LEAST_WIDTH = 0.02, 0.1
+"""Shortest edge of a cell and its least width by default, in sides of a square of the mean area."""
+
+
+class Voronoi(Shaped):
+    """Cells of random points in a rectangle or a convex region.
+
+    Cells below the smallest width are rejected: their neighbours take their place. Edges shorter than a fiftieth of a
+    mean cell become corners, which leaves small openings between the cells and never an overlap.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["width", "height"]}, {"required": ["region"]}]}
+    )
+
+    kind: Literal["voronoi"] = Field(description="kind of structure")
+    count: Annotated[int, Whole(1, MOST_CELLS)] = Field(description="number of cells, before small ones are rejected")
+    width: q.PositiveLength | None = Field(default=None, description="width of a wall; give this and height, or region")
+    tall: q.PositiveLength | None = Field(default=None, alias="height", description="height of a wall")
+    region: tuple[Point, ...] | None = Field(
+        default=None,
+        description="corners [x, y] of a convex region, such as a slope",
+        json_schema_extra={"minItems": geometry.FEWEST, "maxItems": geometry.MOST},
+    )
+    seed: Seed = Field(default=1, description="seed of the random points")
+    relax: Annotated[int, Whole(0, 20)] = Field(
+        default=2, description="how often points move to the centroids of their cells, which makes cells more alike"
+    )
+    smallest: q.PositiveLength | None = Field(
+        default=None, description="least width of a cell (default: a tenth of the side of a square of the mean area)"
+    )
+
+    @model_validator(mode="after")
+    def _one_region(self) -> Self:
+        sides = (self.width, self.tall)
+        if self.region is None and None in sides:
+            raise q.invalid("the size is missing: give width and height of a wall, or region")
+        if self.region is not None and sides != (None, None):
+            raise q.invalid("region and the sides of a wall are both given; keep one of them", "region")
+        for number, message in geometry.faults(self.region) if self.region is not None else ():
+            raise q.invalid(message, "region", *(() if number is None else (number,)))
+        return self
+
+    @property
+    def whole(self) -> Sequence[Corner]:
+        """Corners (m) of what is divided, counter-clockwise."""
+        if self.region is not None:
+            x, y = geometry.centroid(self.region)
+            return [(x + u, y + v) for u, v in geometry.centre_outline(self.region)]
+        width, tall = self.width or 0.0, self.tall or 0.0
+        return [(0.0, 0.0), (width, 0.0), (width, tall), (0.0, tall)]
+
+    @property
+    def drawn(self) -> Sequence[Cell]:
+        """Cells from the lowest to the highest centroid; raises UnfitError where none is large enough."""
+        side = math.sqrt(geometry.area_of(self.whole) / self.count)
+        least = LEAST_WIDTH * side if self.smallest is None else self.smallest
+        points = relax_points(self._points(), self.whole, self.relax)
+        for _ in range(MOST_ROUNDS):
+            found = [clean_cell(cell, LEAST_EDGE * side) for cell in voronoi(points, self.whole)]
+            is_large = [_width(cell) >= least for cell in found]
+            if all(is_large):
+                return [Cell(cell) for cell in sorted(found, key=lambda cell: geometry.centroid(cell)[::-1])]
+            points = [point for point, stays in zip(points, is_large, strict=True) if stays]
+            if not points:
+                break
+        message = (
+            f"no division into cells of at least {1e3 * least:g} mm was found; give a smaller width, or fewer cells"
+        )
+        raise UnfitError("count" if self.smallest is None else "smallest", message)
+
+    def _points(self) -> list[Corner]:
+        """Return random points in the region, the same for a seed."""
+        (left, bottom), (right, top) = geometry.box_of(self.whole)
+        random = draws(self.seed, TRIALS * self.count, 2).tolist()
+        places = ((left + u * (right - left), bottom + v * (top - bottom)) for u, v in random)
+        found = [place for place in places if geometry.holds(self.whole, place, 0.0)]
+        return found[: self.count] or [geometry.centroid(self.whole)]
+
+
+def _width(cell: Sequence[Corner]) -> float:
+    """Return the least width (m), zero for an outline that no block may have."""
+    if len(cell) < geometry.FEWEST or next(geometry.faults(cell), None) is not None:
+        return 0.0
+    return geometry.least_width(tuple(cell))
+
+
+MOST_BLOCKS = 20_000
+MOST_SIDES = 10
+JITTER = 0.35
+"""Largest shift of a corner along its ellipse, in distances of corners."""
+FLATTEST = 0.6
+"""Shorter over longer axis of the flattest ellipse."""
+PER_BLOCK = 4
+"""Random numbers of a block beside those of its corners."""
+
+
+class Rubble(Shaped):
+    """Blocks of random shape and size in rows, each in a square as wide as the largest block.
+
+    Corners lie on an ellipse of random flatness and direction. Sizes, the longest axes of ellipses, follow a power law
+    between the smallest and the largest: the number of blocks above d goes with d^-exponent.
+    """
+
+    kind: Literal["rubble"] = Field(description="kind of structure")
+    count: Annotated[int, Whole(1, MOST_BLOCKS)] = Field(description="number of blocks")
+    columns: Annotated[int, Whole(1, MOST_BLOCKS)] = Field(description="number of blocks in a row")
+    smallest: q.PositiveLength = Field(description="size of the smallest block")
+    largest: q.PositiveLength = Field(description="size of the largest block")
+    exponent: q.NonNegativeNumber = Field(
+        default=2.0, description="of the power law of sizes; 0: even in the logarithm"
+    )
+    fewest_sides: Annotated[int, Whole(geometry.FEWEST, MOST_SIDES)] = Field(
+        default=4, description="least number of sides"
+    )
+    most_sides: Annotated[int, Whole(geometry.FEWEST, MOST_SIDES)] = Field(
+        default=8, description="most number of sides"
+    )
+    gap: q.NonNegativeLength = Field(default=0.0, description="least distance of neighbours")
+    seed: Seed = Field(default=1, description="seed of shapes and sizes")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.smallest > self.largest:
+            raise q.invalid(f"the smallest size is above the largest, {1e3 * self.largest:g} mm", "smallest")
+        if self.fewest_sides > self.most_sides:
+            raise q.invalid(f"the least number of sides is above the most, {self.most_sides}", "fewest_sides")
+        return self
+
+    @property
+    def drawn(self) -> Sequence[Cell]:
+        """Blocks row by row from below, each from left to right."""
+        pitch = self.largest + self.gap
+        random = draws(self.seed, self.count, PER_BLOCK + MOST_SIDES)
+        cells = []
+        for number, numbers in enumerate(random):
+            row, column = divmod(number, self.columns)
+            corners = self._corners(numbers)
+            x, y = geometry.middle_of(corners)
+            dx, dy = pitch * column - x, pitch * row - y
+            cells.append(Cell([(u + dx, v + dy) for u, v in corners]))
+        return cells
+
+    def _size(self, share: float) -> float:
+        """Return the size (m) above which a share of the blocks is."""
+        ratio = self.smallest / self.largest
+        if self.exponent == 0.0 or ratio == 1.0:
+            return float(self.largest * ratio**share)
+        try:
+            return float(self.largest * (1.0 + share * (ratio**-self.exponent - 1.0)) ** (-1.0 / self.exponent))
+        except OverflowError:  # so steep that all blocks are small
+            return self.smallest
+
+    def _corners(self, random: Floats) -> list[geometry.Corner]:
+        share, flat, turn, sides, *shifts = random.tolist()
+        count = self.fewest_sides + int(sides * (self.most_sides - self.fewest_sides + 1))
+        half = 0.5 * self._size(share)
+        flatness = FLATTEST + (1.0 - FLATTEST) * flat
+        angle = 2.0 * math.pi * turn
+        c, s = math.cos(angle), math.sin(angle)
+        corners = []
+        for number, shift in enumerate(shifts[:count]):
+            place = 2.0 * math.pi * (number + JITTER * (2.0 * shift - 1.0)) / count
+            u, v = half * math.cos(place), half * flatness * math.sin(place)
+            corners.append((c * u - s * v, s * u + c * v))
+        return corners

@@ -1,0 +1,256 @@
+"""Structures of equal blocks: stacks, staircases, walls, pyramids, dominoes and grids."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from blocksim.scenario import units as q
+from blocksim.scenario.models.base import OneOf
+from blocksim.scenario.models.geometry import Block
+from blocksim.scenario.structures.base import Count, Courses, Pose, Seed, Structure, UnfitError, draws, poses_at
+
+
+class Stack(Structure):
+    """Block i (from 0) has its left edge at left + i offset and its lower edge at bottom + i size_y."""
+
+    kind: Literal["stack"] = Field(description="kind of structure")
+    count: Count = Field(description="number of blocks")
+    offset: q.Length = Field(default=0.0, description="shift of each block relative to the one below")
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return self.count
+
+    def height(self, block: Block) -> float:
+        """All blocks on top of each other."""
+        return self.count * block.size_y
+
+    def place(self, block: Block) -> Sequence[Pose]:
+        """Return the poses from the ground up."""
+        first = self.left + block.size_x / 2
+        return [Pose(first + i * self.offset, self.bottom + (i + 0.5) * block.size_y) for i in range(self.count)]
+
+
+class Staircase(Structure):
+    """Block i (from 0) has its left edge at left + i (size_x - overlap) and its lower edge at bottom + i size_y."""
+
+    kind: Literal["staircase"] = Field(description="kind of structure")
+    count: Count = Field(description="number of blocks")
+    overlap: q.PositiveLength = Field(description="length over which a block lies on the one below")
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return self.count
+
+    def height(self, block: Block) -> float:
+        """All blocks on top of each other."""
+        return self.count * block.size_y
+
+    def place(self, block: Block) -> Sequence[Pose]:
+        """Return the poses from the ground up."""
+        if self.overlap > block.size_x:
+            raise UnfitError(
+                "overlap",
+                f"{self.overlap * 1e3:g} mm is more than the block's {block.size_x * 1e3:g} mm along x",
+            )
+        step = block.size_x - self.overlap
+        first = self.left + block.size_x / 2
+        return [Pose(first + i * step, self.bottom + (i + 0.5) * block.size_y) for i in range(self.count)]
+
+
+Bond = Literal["running", "stack"]
+BONDS: tuple[Bond, ...] = ("running", "stack")
+PLACE = 2  # numbers of the position of a hole
+
+
+def _hole(value: object) -> object:
+    if not isinstance(value, list | tuple) or len(value) != PLACE:
+        raise q.invalid(f"{q.toml(value)} is not a hole; write [row, column], counted from 1 at the lower left")
+    return value
+
+
+Hole = Annotated[tuple[Count, Count], BeforeValidator(_hole)]
+
+
+class BlockWall(Courses):
+    """Block j of course i (both from 0) begins at x = left + j (size_x + gap) and y = bottom + i size_y.
+
+    In running bond every second course is shifted to the right by half of that distance; all courses have whole blocks
+    and the same number of them, so that the ends are toothed. A missing block does not support the ones above,
+    which fall into the hole as far as their neighbours allow.
+    """
+
+    kind: Literal["wall"] = Field(description="kind of structure")
+    columns: Count = Field(description="number of blocks in a course")
+    bond: Annotated[Bond, OneOf(BONDS)] = Field(
+        default="running", description="running: every second course is shifted by half a block; stack: none is"
+    )
+    gap: q.NonNegativeLength = Field(default=0.0, description="gap between neighbours in a course")
+    holes: tuple[Hole, ...] = Field(
+        default=(), description="blocks to leave out, [row, column] from 1, the lowest and leftmost first"
+    )
+    missing: q.Share = Field(default=0.0, description="share of the other blocks to leave out at random")
+    offset: q.NonNegativeLength = Field(
+        default=0.0, description="largest random shift of a block along x, to either side; at most half of the gap"
+    )
+    seed: Seed = Field(default=0, description="random seed of shifts and blocks left out")
+
+    @model_validator(mode="after")
+    def _holes_are_inside_and_neighbours_apart(self) -> Self:
+        seen = set()
+        for number, (row, column) in enumerate(self.holes):
+            if row > self.rows or column > self.columns:
+                message = f"[{row}, {column}] is outside a wall of {self.rows} rows and {self.columns} columns"
+                raise q.invalid(message, "holes", number)
+            if (row, column) in seen:
+                raise q.invalid(f"[{row}, {column}] is left out twice", "holes", number)
+            seen.add((row, column))
+        if self.size == 0:
+            message = "this wall has no block left"
+            raise q.invalid(message, "holes" if len(self.holes) == self.rows * self.columns else "missing")
+        if self.offset > 0.5 * self.gap:
+            message = (
+                f"two neighbours shifted by {self.offset * 1e3:g} mm could overlap; "
+                f"at most half of the gap, {0.5e3 * self.gap:g} mm, is allowed"
+            )
+            raise q.invalid(message, "offset")
+        return self
+
+    @property
+    def size(self) -> int:
+        """Number of blocks that are not left out."""
+        others = self.rows * self.columns - len(self.holes)
+        return others - self._random_holes(others)
+
+    def _random_holes(self, others: int) -> int:
+        return round(self.missing * others)
+
+    def place(self, block: Block) -> Sequence[Pose]:
+        """Return the poses course by course, each from left to right."""
+        random = draws(self.seed, 2, self.rows, self.columns)
+        pitch = block.size_x + self.gap
+        row, column = np.indices((self.rows, self.columns))
+        shift = np.where(row % 2 == 1, 0.5 * pitch, 0.0) if self.bond == "running" else np.zeros(row.shape)
+        x = self.left + 0.5 * block.size_x + column * pitch + shift + self.offset * (2.0 * random[0] - 1.0)
+        y = self.bottom + (row.astype(np.float64) + 0.5) * block.size_y
+        kept = np.ones(row.shape, dtype=np.bool_)
+        for hole_row, hole_column in self.holes:
+            kept[hole_row - 1, hole_column - 1] = False
+        others = np.flatnonzero(kept)
+        lowest = np.argsort(random[1].ravel()[others], kind="stable")[: self._random_holes(others.size)]
+        kept.ravel()[others[lowest]] = False
+        return poses_at(x[kept], y[kept])
+
+
+class Pyramid(Courses):
+    """Course i (from 0) has rows - i blocks, each in the middle above two of the course below."""
+
+    kind: Literal["pyramid"] = Field(description="kind of structure")
+    gap: q.NonNegativeLength = Field(default=0.0, description="gap between neighbours in a course")
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return self.rows * (self.rows + 1) // 2
+
+    def place(self, block: Block) -> Sequence[Pose]:
+        """Return the poses course by course, each from left to right."""
+        row = np.repeat(np.arange(self.rows), np.arange(self.rows, 0, -1))
+        column = np.concatenate([np.arange(count) for count in range(self.rows, 0, -1)])
+        pitch = block.size_x + self.gap
+        x = self.left + 0.5 * block.size_x + (column + 0.5 * row) * pitch
+        y = self.bottom + (row.astype(np.float64) + 0.5) * block.size_y
+        return poses_at(x, y)
+
+
+class Dominoes(Structure):
+    """Block i (from 0) has its left edge at left + i (size_x + spacing).
+
+    A push turns the first domino about its lower edge on the side that it falls to, without slip: its centre moves
+    along x at the speed of the push and rises at push size_x / size_y, its spin is 2 push / size_y.
+    """
+
+    kind: Literal["dominoes"] = Field(description="kind of structure")
+    count: Count = Field(description="number of blocks")
+    spacing: q.PositiveLength = Field(description="clear distance between neighbours")
+    push: q.Speed = Field(
+        default=0.0,
+        description="speed along x of the centre of the first domino, which turns about its lower edge",
+    )
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return self.count
+
+    def height(self, block: Block) -> float:
+        """One block."""
+        return block.size_y
+
+    def place(self, block: Block) -> Sequence[Pose]:
+        """Return the poses from left to right."""
+        pitch, y = block.size_x + self.spacing, self.bottom + 0.5 * block.size_y
+        first = Pose(
+            self.left + 0.5 * block.size_x,
+            y,
+            vx=self.push,
+            vy=abs(self.push) * block.size_x / block.size_y,
+            spin=-2.0 * self.push / block.size_y,
+        )
+        return [first, *(Pose(first.x + i * pitch, y) for i in range(1, self.count))]
+
+
+class Grid(Courses):
+    """Place j of row i (both from 0) begins at x = left + j (size_x + gap_x) and y = bottom + i (size_y + gap_y).
+
+    Each block is shifted along x and along y and turned by random amounts of up to `offset` and `turn`, to either side.
+    """
+
+    kind: Literal["grid"] = Field(description="kind of structure")
+    columns: Count = Field(description="number of blocks in a row")
+    gap_x: q.NonNegativeLength = Field(description="gap between neighbours along x, before they are shifted and turned")
+    gap_y: q.NonNegativeLength = Field(description="gap between neighbours along y, before they are shifted and turned")
+    offset: q.NonNegativeLength = Field(
+        default=0.0, description="largest random shift of a block along x and along y, to either side"
+    )
+    turn: q.HalfTurn = Field(default=0.0, description="largest random angle of a block, to either side")
+    seed: Seed = Field(default=0, description="random seed of shifts and angles")
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return self.rows * self.columns
+
+    def height(self, block: Block) -> float:
+        """All rows, before blocks are shifted and turned."""
+        return self.rows * block.size_y + (self.rows - 1) * self.gap_y
+
+    def place(self, block: Block) -> Sequence[Pose]:
+        """Return the poses row by row, each from left to right."""
+        needs = {  # gaps in which two neighbours, shifted and turned towards each other, cannot overlap
+            "gap_x": (self.columns, self.gap_x, _growth(block.size_x, block.size_y, self.turn)),
+            "gap_y": (self.rows, self.gap_y, _growth(block.size_y, block.size_x, self.turn)),
+        }
+        for key, (count, gap, growth) in needs.items():
+            least = 2.0 * self.offset + growth
+            if count > 1 and gap < least:
+                message = (
+                    f"{gap * 1e3:g} mm is too small for such random shifts and angles; at least {least * 1e3:g} mm"
+                )
+                raise UnfitError(key, f"{message} is needed")
+        shift_x, shift_y, turn = 2.0 * draws(self.seed, 3, self.rows, self.columns) - 1.0
+        row, column = np.indices((self.rows, self.columns))
+        x = self.left + 0.5 * block.size_x + column * (block.size_x + self.gap_x) + self.offset * shift_x
+        y = self.bottom + 0.5 * block.size_y + row * (block.size_y + self.gap_y) + self.offset * shift_y
+        return poses_at(x, y, self.turn * turn)
+
+
+def _growth(side: float, other: float, turn: float) -> float:
+    """Return the largest growth (m) of a rectangle along a side when it is turned by up to `turn` (rad)."""
+    widest = min(turn, math.atan2(other, side))
+    return side * math.cos(widest) + other * math.sin(widest) - side

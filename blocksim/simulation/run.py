@@ -1,0 +1,370 @@
+"""Run one scenario: room on the disk, build the scene, step it, keep what it did."""
+
+import math
+import shutil
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from blocksim.errors import OutputError
+from blocksim.kernels.common.arrays import World
+from blocksim.scenario import PlacedBody, Scenario, scenario_hash
+from blocksim.scenario.models.motion import Pulse
+from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
+from blocksim.scenario.placement import smallest_width
+from blocksim.silence import silent
+from blocksim.simulation import folder as files
+from blocksim.simulation.checkpoint import (
+    DEFAULTS,
+    NEW,
+    NO_PAST,
+    CheckpointPolicy,
+    CheckpointWriter,
+    Past,
+    Resumption,
+    check_frames,
+    find_resumption,
+    kept_rows,
+    origin_of,
+    remarks_on,
+    restore_scene,
+    take_over_probes,
+)
+from blocksim.simulation.compilation import compile_kernels, compile_systems, kernels_of
+from blocksim.simulation.events import Timeline
+from blocksim.simulation.folder import CHECKPOINTS, folder_lock, keep_scenario, probe_tables, read_tables
+from blocksim.simulation.frames import final_columns
+from blocksim.simulation.ledger import RESIDUAL_PROMISE
+from blocksim.simulation.loop import LoopResult, RunControl, Watcher, last_step_of, run_loop
+from blocksim.simulation.observables import Movement
+from blocksim.simulation.probes import MovingSupport, bytes_of_series, probes_of
+from blocksim.simulation.provenance import environment, run_hash, state_hash
+from blocksim.simulation.recorder import Recorder
+from blocksim.simulation.result import RestState, Result, Summary, describe_event, keep_result
+from blocksim.simulation.schemes import AnyScene, build, ledger_names, scheme_of
+from blocksim.simulation.settling import initial_scene
+from blocksim.simulation.stopping import WallTime, stop_requests
+from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.team import Team, team_for
+from blocksim.world.build import Built, arrays_of
+from blocksim.world.free_memory import readable
+from blocksim.world.memory import is_shorter_than_step, output_count, recorded_contacts, run_bytes
+from blocksim.world.systems import others_of, warnings_of
+
+CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
+
+
+def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
+    """Raise OutputError where a run may leave more than there is room for on the disk of a folder (yet to be made)."""
+    needed = bytes_needed(scenario, scene)
+    place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    free = shutil.disk_usage(place).free
+    if needed > free:
+        raise OutputError(
+            f"{folder}: the results may take {readable(needed)}, but only {readable(free)} are free there; write "
+            "elsewhere with --out DIR, or store fewer frames (output.every, time.end)"
+        )
+
+
+def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
+    """Return the bytes that the frames of a run and its checkpoints take at most."""
+    steps = last_step_of(scenario.time.end, float(scene.world.controls[0].step))
+    frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
+    bodies, particles = scene.world.bodies.size - 1, scene.world.particles
+    contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
+    arrays = sum(array.nbytes for array in arrays_of(scene))
+    step = float(scene.world.controls[0].step)
+    series = bytes_of_series(scenario, steps, step, len(ledger_names(scene)))
+    return series + run_bytes(bodies, frames, contacts, others_of(scenario)) + CHECKPOINT_FILES * arrays
+
+
+GAINED = 0.5  # a/w
+PROMISE = 5e-3  # error of a slip
+SAMPLES = 20_000  # of twice the duration of a pulse
+
+
+def onset_warning(scenario: Scenario, placed: Sequence[PlacedBody], world: World, settled: RestState | None) -> str:
+    """Return a warning where springs make a slip under an abrupt pulse too large by more than the promise."""
+    pulse = scenario.motion
+    if not isinstance(pulse, Pulse) or not pulse.is_abrupt or not scenario.time.has_springs:
+        return ""
+    if (settled is not None and pulse.start == 0.0) or scenario.ground.tilt != 0.0:
+        return ""
+    worst, name = max(_errors(scenario, pulse, placed, world), default=(0.0, ""))
+    if worst <= PROMISE:
+        return ""
+    return (
+        f"the pulse begins at its peak: springs give way before block {name} slips, and its slip is some {worst:.1%} "
+        "too large (as 1/sqrt(contact.stiffness_scale)); begin the pulse at time zero, or raise the scale"
+    )
+
+
+def _errors(
+    scenario: Scenario, pulse: Pulse, placed: Sequence[PlacedBody], world: World
+) -> Iterator[tuple[float, str]]:
+    """Yield the relative error of the slip of every block that slips on the ground, and its name."""
+    ground = int(world.bodies[-1]["contact_class"])
+    for body, one in zip(world.bodies[:-1], placed, strict=True):
+        values = world.interactions[int(body["contact_class"]), ground]
+        stiffness = 2.0 * float(values["normal_stiffness"] * values["shear_ratio"])
+        limit = float(values["kinetic_friction"]) * scenario.gravity
+        if stiffness > 0.0 and limit < pulse.amplitude and not one.fixed:
+            gained = GAINED * pulse.amplitude * math.sqrt(one.mass / stiffness)
+            yield gained / mean_slip_rate(scenario, pulse, limit), one.name
+
+
+def mean_slip_rate(scenario: Scenario, pulse: Pulse, limit: float) -> float:
+    """Return the mean velocity (m/s) of the first slip of a rigid block whose friction gives it `limit` (m/s2)."""
+    times = pulse.start + np.linspace(0.0, 2.0 * pulse.resolved_duration, SAMPLES + 1)
+    _, velocity = displacement_and_velocity(motion_pieces(scenario), times)
+    most = limit * float(times[1] - times[0])
+    block = float(velocity[0])
+    slip: list[float] = []
+    for support in velocity[1:].tolist():
+        ahead = support - block
+        if abs(ahead) > most:
+            block += math.copysign(most, ahead)
+            slip.append(abs(support - block))
+        elif slip:
+            break
+        else:  # it sticks
+            block = support
+    return float(np.mean(slip)) if slip else math.inf
+
+
+@dataclass(frozen=True)
+class RunCallbacks:
+    """What is called before the first step of a run; nothing by default."""
+
+    on_remark: Callable[[str], None] = silent  # a line: a run already computed, or resumed and where
+    on_start: Callable[[str], None] = silent  # the set of kernels, which is compiled next
+
+
+NO_CALLBACKS = RunCallbacks()
+
+
+def simulate(
+    scenario: Scenario, *, threads: int = 1, on_progress: Watcher = silent, wall_time: float | None = None
+) -> Result:
+    """Run a scenario in memory, without writing anything. A signal or the limit of wall time (s) interrupts it.
+
+    The result does not depend on the number of threads; small scenes do not use them all.
+    """
+    limit, began = WallTime(wall_time), time.perf_counter()
+    built = build(scenario)
+    began += _compiled(scenario)
+    recorder = _recorder(scenario, built)
+    with _attended(built.scene, scenario, threads, limit, on_progress) as (team, control):
+        scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
+        watched = replace(control, timeline=_timeline(scenario, recorder))
+        ended = run_loop(scene, recorder, scenario.time.end, team=team, control=watched)
+    return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
+
+
+def simulate_into(
+    scenario: Scenario,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    resume: bool = False,
+    threads: int = 1,
+    precautions: CheckpointPolicy = DEFAULTS,
+    on_progress: Watcher = silent,
+    listener: RunCallbacks = NO_CALLBACKS,
+) -> Result:
+    """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
+
+    With `resume` it continues from the newest whole checkpoint there, to the same bits as without the interruption;
+    without any it starts again. Raises InvalidInputError for checkpoints of another scenario or version of the code,
+    OutputExistsError where the folder is not free, or another run is in progress in it, and OutputError where writing
+    fails. A signal (SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1) or the limit of wall time ends it with the status
+    `interrupted`, and what was computed until then is kept.
+    """
+    limit, began = WallTime(precautions.wall_time, precautions.time_over), time.perf_counter()
+    built = build(scenario)
+    refuse_full_disk(folder, scenario, built.scene)
+    tables = read_tables(scenario)
+    with folder_lock(folder):
+        resumption = find_resumption(folder, scenario) if resume else NEW
+        for remark in remarks_on(resumption, folder) if resume else ():
+            listener.on_remark(remark)
+        began += _compiled(scenario, listener)
+        with _attended(built.scene, scenario, threads, limit, on_progress) as (team, control):
+            settled = None if resumption.checkpoint is None else resumption.checkpoint.position.settled
+            if resumption.checkpoint is None:
+                scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
+                built = built._replace(scene=scene)
+            segment = RunSegment(scenario, folder, built, resumption, settled)
+            toml = segment.prepare(tables, overwrite=overwrite or resume)
+            ended = segment.run(toml, precautions, team, control)
+            result = _result(scenario, segment.recorder, ended, time.perf_counter() - began, settled)
+            return keep_result(result, segment.account(result.summary), folder)
+
+
+def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> float:
+    """Compile what a run needs and return the seconds it took, which are no part of the run. Raises OutputError."""
+    began = time.perf_counter()
+    kernels = kernels_of(scenario)
+    listener.on_start(kernels)
+    compile_kernels(kernels)
+    compile_systems(scenario)
+    return time.perf_counter() - began
+
+
+@contextmanager
+def _attended(
+    scene: AnyScene, scenario: Scenario, threads: int, limit: WallTime, on_progress: Watcher
+) -> Iterator[tuple[Team, RunControl]]:
+    """Give the threads of a run, and what stops it: a signal, or the limit of wall time."""
+    elements = sum(one.count for one in others_of(scenario))
+    with stop_requests() as requests, team_for(scene, threads, elements) as team:
+        yield team, RunControl(on_progress, lambda: requests.reason() or limit.reason())
+
+
+def _timeline(scenario: Scenario, recorder: Recorder) -> Timeline | None:
+    """Return the events of a run, None where it has none."""
+    return Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
+
+
+def _recorder(scenario: Scenario, built: Built) -> Recorder:
+    step, output = float(built.scene.world.controls[0].step), scenario.output
+    probes, others = probes_of(scenario, built.placed, step, ledger_names(built.scene)), others_of(scenario)
+    support = MovingSupport(scenario)
+    return Recorder(
+        built.placed, output.every, step, others=others, contacts=output.contacts, probes=probes, support=support
+    )
+
+
+class RunSegment:
+    """A run, or a part of one that was resumed, in its folder: its frames and checkpoints."""
+
+    def __init__(
+        self, scenario: Scenario, folder: Path, built: Built, resumption: Resumption, settled: RestState | None = None
+    ) -> None:
+        """Take the scene at time zero and go to the checkpoint, if there is one.
+
+        Nothing is written yet. Raises InvalidInputError where the checkpoint or the frames before it do not fit.
+        """
+        self.scenario, self.folder, self.resumption = scenario, folder, resumption
+        stored = resumption.checkpoint
+        self.scene = built.scene if stored is None else restore_scene(stored, built.scene)
+        self.recorder = _recorder(scenario, built)
+        self.step = self.recorder.time_step
+        self.past = replace(NO_PAST, settled=settled)
+        if stored is not None:
+            self.past = Past.of(stored.path, stored.position)
+            self.recorder.take_over(kept_rows(folder, self.recorder))
+            check_frames(stored, self.recorder)
+            take_over_probes(stored, scenario, self.recorder)
+
+    def prepare(self, tables: Mapping[str, bytes], *, overwrite: bool) -> str:
+        """Make the folder ready for this part; return the resolved scenario. Raises OutputExistsError, OutputError."""
+        if self.resumption.checkpoint is None:
+            files.prepare_folder(self.folder, overwrite=overwrite)
+        return keep_scenario(self.scenario, tables, self.folder)
+
+    def run(self, toml: str, precautions: CheckpointPolicy, team: Team, control: RunControl) -> LoopResult:
+        """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""
+        with FrameFile(
+            self.folder / files.FRAMES,
+            self.recorder.placed,
+            self.step,
+            toml,
+            ledger=ledger_names(self.scene),
+            kept=self.recorder.held,
+            others=self.recorder.systems[1:],
+            contacts=self.scenario.output.contacts,
+            probes=self.recorder.probes,
+        ) as sink:
+            self.recorder.pour_into(sink)
+            files.clear_remains(
+                self.folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(self.scenario))
+            )  # of the part before
+            self.writer = CheckpointWriter(
+                self.folder,
+                origin_of(self.scenario),
+                sink.sync,
+                precautions.periods(self.step),
+                precautions.checkpoint_seconds,
+                self.past,
+            )
+            control = replace(control, checkpoints=self.writer, timeline=_timeline(self.scenario, self.recorder))
+            since = self.resumption.checkpoint and self.resumption.checkpoint.position
+            return run_loop(self.scene, self.recorder, self.scenario.time.end, team=team, control=control, since=since)
+
+    def account(self, summary: Summary) -> Summary:
+        """Return the summary of this part as that of the whole run."""
+        last = None if summary.status == "finished" else self.writer.last_step
+        altered, warnings = self.recorder.altered, self.resumption.remarks
+        if altered:
+            more = f" and {len(altered) - 1} more" if len(altered) > 1 else ""
+            where = f"{self.folder / files.FRAMES}: the frame of step {altered[0]}{more}"
+            text = f"{where} differs from the recomputed one: it was changed after recording"
+            warnings = (*warnings, text)
+        return summary.model_copy(
+            update={
+                "total_seconds": self.past.seconds + summary.total_seconds,
+                "resumed_from": self.past.resumed_from,
+                "last_checkpoint": last,
+                "warnings": (*warnings, *summary.warnings),
+            }
+        )
+
+
+def _result(
+    scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float, settled: RestState | None
+) -> Result:
+    frames = recorder.frames()
+    summary = _summary(scenario, recorder, ended, seconds)
+    added = [text for text in [onset_warning(scenario, recorder.placed, ended.scene.world, settled)] if text]
+    summary = summary.model_copy(update={"settled": settled, "warnings": (*summary.warnings, *added)})
+    probes = recorder.probes.series()
+    return Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
+
+
+def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Summary:
+    world = ended.scene.world
+    step = float(world.controls[0].step)
+    steps, ground = int(world.clock[0].steps), world.bodies[-1]
+    return Summary(
+        name=scenario.name,
+        status=ended.outcome.status,
+        reason=ended.outcome.reason,
+        exit_code=ended.outcome.exit_code,
+        run=run_hash(scenario),
+        scenario_hash=scenario_hash(scenario),
+        final_state_sha256=state_hash(ended.scene),
+        steps=steps,
+        time_step_s=step,
+        simulated_time_s=steps * step,
+        ended_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        compile_seconds=compile_kernels(kernels_of(scenario, recorder.placed)),
+        solver_seconds=ended.solver_seconds,
+        total_seconds=seconds,
+        energy_J=ended.ledger,
+        threads=ended.threads,
+        events=ended.events,
+        movement=Movement.of(recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step),
+        warnings=tuple(_warnings(scenario, recorder.placed, ended)),
+        environment=environment(),
+    )
+
+
+def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResult) -> Iterator[str]:
+    residual, every = ended.ledger.relative_residual, scenario.output.every
+    if residual > RESIDUAL_PROMISE:
+        yield f"relative energy error {residual:.1e}, above {RESIDUAL_PROMISE:g}"
+    if is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
+        yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
+    yield from warnings_of(scenario)
+    for number in ended.pending if ended.outcome.is_finished else ():
+        yield f"events.{number} has not happened, as nothing came to rest: {describe_event(scenario.events[number])}"
+    if ended.outcome.is_finished and placed:
+        sunk = scheme_of(ended.scene).warning(ended.scene, ended.overlap, smallest_width(placed))
+        if sunk:
+            yield sunk

@@ -1,0 +1,415 @@
+"""The state of a sweep on the disk: manifest, shards and timings, and sweep.csv made from them."""
+
+import csv
+import hashlib
+import io
+import itertools
+import json
+import math
+import os
+import re
+import time
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
+from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
+from blocksim.simulation.atomic import PERMISSIONS, replacing, sync_file
+from blocksim.simulation.folder import brief_lock, takes_lock
+from blocksim.simulation.observables import table_columns
+from blocksim.study.plan import Cases
+from blocksim.study.rows import FINISHED, KEPT, TABLE, Ranges, Row, as_cell, blocks_in, varied_cells
+from blocksim.study.sweep_folder import SWEEP, FolderKind, note_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+SHARD_FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
+MANIFEST = "manifest.jsonl"
+PATTERN = "manifest*.jsonl"
+DIGITS = 12
+SUM = b',"sum":"'
+NEWLINE = b"\n"
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+LONGEST = 1 << 30
+"""Bytes of a line that are read at once; a row of a million blocks has 200 million."""
+MISSING, ENDED_WELL, ENDED_BADLY = range(3)
+TIMING_COLUMNS = ("case", "executor", "seconds", "host")
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Every `of`-th case, beginning with number `index`; both count from 0 as job arrays do."""
+
+    index: int = 0
+    of: int = 1
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Read "i/n". Raises InvalidInputError unless 0 <= i < n."""
+        match = SHARD_FORM.fullmatch(text.strip())
+        shard = None if match is None else cls(int(match[1]), int(match[2]))
+        if shard is None or shard.index >= shard.of:
+            message = f"--shard {text}: write I/N with I from 0 to N - 1, such as 0/8 for the first of eight"
+            raise InvalidInputError(message)
+        return shard
+
+    def __str__(self) -> str:
+        """Return "i/n"."""
+        return f"{self.index}/{self.of}"
+
+    @property
+    def slice(self) -> slice:
+        """The numbers of its cases, among those of all cases."""
+        return slice(self.index, None, self.of)
+
+    def numbers(self, count: int) -> range:
+        """Return the numbers of its cases where there are `count` in all."""
+        return range(count)[self.slice]
+
+    def file(self, name: str) -> str:
+        """Return the name of its own file: sweep.csv, or sweep-0-of-8.csv."""
+        path = PurePath(name)
+        return name if self.of == 1 else f"{path.stem}-{self.index}-of-{self.of}{path.suffix}"
+
+
+WHOLE = Shard()
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One case that has ended: its number, the name of its run, the hash of its values, its row."""
+
+    number: int
+    case: str
+    values: str
+    row: Row
+
+    def to_line(self) -> bytes:
+        """Return the line of the manifest; numbers that are not finite become null."""
+        row = {
+            name: None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in self.row.items()
+        }
+        data = {"number": self.number, "case": self.case, "values": self.values, "row": row}
+        head = json.dumps(data, separators=(",", ":")).encode()[:-1]
+        return b'%s%s%08x"}\n' % (head, SUM, zlib.crc32(head))
+
+    @classmethod
+    def from_line(cls, line: bytes) -> Self | None:
+        """Return the entry of a line, or None where the line is not whole, or not of a sweep."""
+        head, _, end = line.rpartition(SUM)
+        if end != b'%08x"}\n' % zlib.crc32(head):
+            return None
+        try:
+            data = json.loads(head + b"}")
+            number, case, values, row = data["number"], data["case"], data["values"], data["row"]
+        except (ValueError, KeyError, TypeError, RecursionError):  # a right sum below what no sweep writes
+            return None
+        is_hash = isinstance(values, str) and re.fullmatch("[0-9a-f]{1,15}", values) is not None
+        is_ours = type(number) is int and isinstance(case, str) and is_hash and isinstance(row, dict)
+        return cls(number, case, values, row) if is_ours else None
+
+
+def values_hash(settings: dict[str, object]) -> str:
+    """Return a hash of the varied values of a case, in the form in which they were given."""
+    return hashlib.sha256(json.dumps(settings, default=str).encode()).hexdigest()[:DIGITS]
+
+
+class Manifest:
+    """A manifest that this process, and no other, appends to."""
+
+    def __init__(self, path: Path, what: str = "sweep") -> None:
+        """Open the file and keep others out. Raises OutputExistsError where another process has it, and OutputError."""
+        self.path = path
+        with brief_lock(path.parent):  # who empties the folder sees the file locked, or not at all
+            try:
+                self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, PERMISSIONS)
+            except OSError as error:
+                message = f"{path}: cannot be written: {error.strerror}"
+                raise OutputError(message) from error
+            is_free = takes_lock(self._file)
+        if not is_free:
+            os.close(self._file)
+            message = f"{path.parent}: this {what} is already running; wait for it, or write elsewhere with --out DIR"
+            raise OutputExistsError(message)
+        self.size = os.fstat(self._file).st_size
+        if self.size and os.pread(self._file, 1, self.size - 1) != NEWLINE:
+            self._write(NEWLINE)  # a line torn by a kill must not take the next one with it
+
+    def append(self, entries: Iterable[Entry]) -> list[int]:
+        """Bring entries to the disk and return where each begins. Raises OutputError (disk full)."""
+        lines = [entry.to_line() for entry in entries]
+        starts = list(itertools.accumulate(map(len, lines), initial=self.size))[:-1]
+        self._write(b"".join(lines))
+        return starts
+
+    def _write(self, content: bytes) -> None:
+        try:
+            left = memoryview(content)
+            while left:
+                left = left[os.write(self._file, left) :]
+            os.fsync(self._file)
+        except OSError as error:
+            message = f"{self.path}: cannot be written: {error.strerror}"
+            raise OutputError(message) from error
+        self.size += len(content)
+
+    def close(self) -> None:
+        """Let others have the file."""
+        os.close(self._file)
+
+
+def read_entries(path: Path) -> Iterator[tuple[int, Entry]]:
+    """Yield where each whole line of a manifest begins, and its entry."""
+    start = 0
+    with open_regular(path) as file:
+        while line := file.readline(LONGEST):
+            entry = Entry.from_line(line)
+            if entry is not None:
+                yield start, entry
+            start += len(line)
+
+
+class CaseIndex:
+    """Where in the manifests the row of each of n cases is: some bytes a case, whatever its row holds."""
+
+    def __init__(self, folder: Path, count: int) -> None:
+        """Read all manifests of a folder; torn lines are passed over."""
+        self.folder = folder
+        self.state = np.zeros(count, dtype=np.int8)
+        self.starts = np.zeros(count, dtype=np.int64)  # bytes from the begin of the manifest
+        self.values = np.zeros(count, dtype=np.int64)  # hash of the varied values
+        self.sources = np.zeros(count, dtype=np.int16)  # number of the manifest in `paths`
+        self.paths: list[Path] = []
+        self.blocks: dict[tuple[str, ...], int] = {}  # blocks of a row: first case that has such a row
+        for path in sorted(folder.glob(PATTERN)):
+            for start, entry in read_entries(path):
+                self.note(path, start, entry)
+
+    def note(self, path: Path, start: int, entry: Entry) -> None:
+        """Remember where an entry is; one that ended well is not given up for another."""
+        number = entry.number
+        if not 0 <= number < len(self.state) or self.state[number] == ENDED_WELL:
+            return
+        if path not in self.paths:
+            self.paths.append(path)
+        self.state[number] = ENDED_WELL if entry.row.get("status") == FINISHED else ENDED_BADLY
+        self.starts[number], self.sources[number] = start, self.paths.index(path)
+        self.values[number] = int(entry.values, 16)
+        blocks = blocks_in(entry.row)
+        self.blocks[blocks] = min(number, self.blocks.get(blocks, number))
+
+    def forget_failed(self, shard: Shard) -> None:
+        """Have those cases of a shard run again that did not end well."""
+        state = self.state[shard.slice]
+        state[state == ENDED_BADLY] = MISSING
+
+    def holds(self, number: int, settings: dict[str, object]) -> bool:
+        """Return True if a case has a row, and that with these values: other code may have numbered the cases again."""
+        if self.state[number] != MISSING and self.values[number] != int(values_hash(settings), 16):
+            self.state[number] = MISSING
+        return bool(self.state[number] != MISSING)
+
+    def count(self, shard: Shard = WHOLE) -> int:
+        """Return how many cases of a shard have a row."""
+        return int(np.count_nonzero(self.state[shard.slice]))
+
+    def all_blocks(self) -> tuple[str, ...]:
+        """Return the blocks of all rows, in the order of the cases in which they first appear."""
+        first = sorted(self.blocks, key=self.blocks.__getitem__)
+        return tuple(dict.fromkeys(block for blocks in first for block in blocks))
+
+    @contextmanager
+    def reader(self) -> Iterator[Callable[[int], Entry | None]]:
+        """Give what reads the entry of a case that has a row; it gives None where the file has changed since."""
+        with ExitStack() as files:
+            opened = [files.enter_context(open_regular(path)) for path in self.paths]
+
+            def entry(number: int) -> Entry | None:
+                file = opened[int(self.sources[number])]
+                file.seek(int(self.starts[number]))
+                return Entry.from_line(file.readline())
+
+            yield entry
+
+
+class Timings:
+    """A table that grows by a line a case: its share (s) of the wall time of the batch that it was run in."""
+
+    def __init__(self, path: Path, executor: str) -> None:
+        """Begin, or continue with, a table."""
+        self.path, self.executor = path, executor
+
+    def append(self, cases: Iterable[str], seconds: float, host: str) -> None:
+        """Add the cases of a batch that took so long (s). Raises OutputError."""
+        names = list(cases)
+        try:
+            with self.path.open("a+b") as file:
+                size, text = file.seek(0, os.SEEK_END), io.StringIO()
+                if size:  # a last line that was torn by a kill must not take the next one with it
+                    file.seek(size - 1)
+                    text.write("" if file.read() == NEWLINE else "\n")
+                writer = csv.writer(text, lineterminator="\n")
+                writer.writerows([] if size else [TIMING_COLUMNS])
+                share = f"{seconds / max(len(names), 1):.6f}"
+                writer.writerows((name, self.executor, share, as_cell(host)) for name in names)
+                file.write(text.getvalue().encode())
+        except OSError as error:
+            message = f"{self.path}: cannot be written: {error.strerror}"
+            raise OutputError(message) from error
+
+
+TEXT_COLUMNS = {"case": str, "status": str, "reason": str, "first_mover": str}
+MOST_BYTES = 2000 * MEGABYTE
+"""Of sweep.csv: a million cases of a hundred blocks do not fit into most memories."""
+OUTCOME = ("status", "reason", "seconds")
+NEEDED = {"case", "status"}
+NO_TABLE, NO_COLUMNS = "not the table of a sweep", "no columns case and status"
+SOONEST = 2.0  # s between two tables while the sweep runs
+MOST_ROWS = 20  # that a notebook shows
+SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
+
+
+@dataclass
+class SweepTable:
+    """The table of a sweep, to be written whenever it is worth it."""
+
+    path: Path
+    cases: Cases
+    done: CaseIndex
+    ranges: Ranges | None
+    shard: Shard = WHOLE
+    kind: FolderKind = SWEEP
+    next_at: float = field(default_factory=lambda: time.monotonic() + SOONEST)
+
+    def write_now_and_then(self) -> None:
+        """Write the table unless it was written a short while ago; the more rows, the longer the while."""
+        if time.monotonic() >= self.next_at:
+            with suppress(OutputExistsError):  # somebody has changed it: the sweep goes on, and says so at its end
+                self.write()
+
+    def write(self) -> None:
+        """Write all rows so far, one after the other: none is kept. Raises as `note_table`."""
+        began = time.monotonic()
+        self.next_at = began + SOONEST
+        with replacing(self.path) as temporary:
+            with temporary.open("w", encoding="utf-8", newline="") as file:
+                csv.writer(file, lineterminator="\n").writerows(self._lines())
+            sync_file(temporary)
+            note_table(self.path, temporary, self.kind)
+        ended = time.monotonic()
+        self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
+
+    def _lines(self) -> Iterator[list[object]]:
+        verdict = [] if self.ranges is None else ["inside"]
+        ends = table_columns() + [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
+        yield ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *ends]
+        with self.done.reader() as entry_of:
+            for number in self.shard.numbers(len(self.cases)):
+                settings = self.cases.design[number]
+                entry = entry_of(number) if self.done.holds(number, settings) else None
+                if entry is None:
+                    continue
+                row = entry.row
+                if self.ranges is not None:  # judged here and not when the case ended: the measured table may be mended
+                    row = {**row, "inside": self.ranges.hold(row) if row.get("status") == FINISHED else None}
+                values = varied_cells(self.cases.heads, settings).values()
+                yield list(map(as_cell, [entry.case, *values, *map(row.get, (*OUTCOME, *verdict, *ends))]))
+
+
+@dataclass(frozen=True, repr=False)
+class SweepResult:
+    """The folder of a sweep and its table, one row per case."""
+
+    folder: Path
+    name: str = TABLE
+    planned: int | None = None  # how many rows there are to be; None where only the table is known
+
+    @cached_property
+    def table(self) -> "pd.DataFrame":
+        """The rows of the table (pandas 3 reads every bit). Raises InputMissingError or InvalidInputError."""
+        return _read(self.folder / self.name)
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the table, one row per case."""
+        return self.table
+
+    def __repr__(self) -> str:
+        """Return a line: folder, cases and what varies."""
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"<SweepResult {self.folder}: {len(self.table)} cases{failed}; varied: {', '.join(self.keys)}>"
+
+    def _repr_html_(self) -> str:
+        """Return the same line above the table, for notebooks."""
+        return f"<p>{escape(repr(self)[1:-1])}</p>{self.table.to_html(index=False, max_rows=MOST_ROWS)}"
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The columns of the dotted keys that vary, with the units of their numbers: "ground.tilt [deg]"."""
+        names = [str(name) for name in self.table.columns]
+        return tuple(names[names.index("case") + 1 : names.index("status")])
+
+    @property
+    def failed(self) -> int:
+        """How many cases did not finish."""
+        return int((self.table["status"] != FINISHED).sum())
+
+    @property
+    def left(self) -> int:
+        """How many cases were not run, where the first failure was to end the sweep."""
+        return 0 if self.planned is None else self.planned - len(self.table)
+
+    @property
+    def share_inside(self) -> float | None:
+        """Share of all cases that lie inside all measured ranges; None without an experiment."""
+        if "inside" not in self.table or self.table["inside"].isna().all():
+            return None
+        return float((self.table["inside"] == True).mean())  # noqa: E712 - the column has True, False and missing values
+
+    def share_inside_of(self, experiment: Path | str) -> float:
+        """Share of all cases that lie inside all ranges of another table. Raises what reading it raises."""
+        finished = self.table[self.table["status"] == FINISHED]
+        return float(Ranges.read(experiment).inside(finished).sum()) / len(self.table)
+
+
+def is_sweep(place: Path | str) -> bool:
+    """Return True if a place is the folder of a sweep."""
+    return (Path(place) / TABLE).is_file()
+
+
+def read_sweep(folder: Path | str) -> SweepResult:
+    """Return the sweep that a folder holds. Raises InputMissingError or InvalidInputError."""
+    result = SweepResult(Path(folder))
+    _ = result.table
+    return result
+
+
+def lines_in(path: Path, most_bytes: int = MOST_BYTES) -> list[list[str]]:
+    """Return the cells of all lines as the texts that stand there. Raises InputMissingError or InvalidInputError."""
+    try:
+        return list(csv.reader(io.StringIO(read_limited(path, most_bytes).decode(), newline="")))
+    except (ValueError, csv.Error) as error:
+        raise InvalidInputError(f"{path}: {NO_TABLE}: {error}") from error
+
+
+def _read(path: Path) -> "pd.DataFrame":
+    import pandas as pd
+
+    try:
+        refuse_large(path, MOST_BYTES)
+        table = pd.read_csv(path, dtype=TEXT_COLUMNS)
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(f"{path}: {NO_TABLE}: {str(error).strip()}") from error
+    if not set(table.columns) >= NEEDED or table.columns[0] != "case":
+        raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
+    return table

@@ -1,1 +1,0 @@
-"""The paper's figures, tables and equations with the results of the shipped scenarios."""

@@ -1,0 +1,464 @@
+"""Arrows of a picture: contact forces on a scale that is printed, loads, moments and velocities of driven bodies."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.models.loads import Force, Gravity, Horizontal, Moment, Pressure
+from blocksim.scenario.start import NORMALS
+from blocksim.simulation.frames import Contacts, Rows, forces_on_a
+from blocksim.view import style
+from blocksim.view.run_data import MILLIMETRES, Acting, Extent, Floats, FramesLike, Indices, Support, turned
+from blocksim.view.scene import Canvas
+from blocksim.world.systems.blocks import are_removed
+
+if TYPE_CHECKING:
+    from matplotlib.collections import Collection
+
+
+USUAL = 0.9  # share of all recorded forces that are no larger than the one the scale is made for
+USUAL_LENGTH = 0.6  # of the mean side of the blocks: length of the arrow of that force
+LONGEST = 2.0  # of that length; longer arrows are cut
+_HEAD = 4.0, 1.7  # points: length and half width of a head
+LEAST = 0.5  # points; shorter arrows are left out
+WIDTH, HALO = 1.1, 2.6  # points: of a shaft, and of the light line below it
+WHOLE = 24.0  # points: where the longest arrow is shorter, all of that is smaller in proportion
+FORCES, BELOW, VEIL = 3.6, 3.5, 3.4  # order of drawing: above everything else
+VEIL_ALPHA = 0.6  # of the white over many small blocks, whose colours would hide small arrows
+ROUND = (1.0, 2.0, 5.0, 10.0)
+MISSING = (
+    "this run has stored no contacts, so their forces cannot be shown; run it again with --set output.contacts=true"
+)
+
+
+class WithContacts(FramesLike, Protocol):
+    """Frames that may have contacts."""
+
+    @property
+    def contacts(self) -> Contacts | None:
+        """Contacts of all frames, where they were recorded."""
+        ...
+
+
+@dataclass(frozen=True)
+class ForceScale:
+    """Scale of arrows: `mm_per_newton` of the scene, and the length (mm) beyond which they are cut."""
+
+    mm_per_newton: float
+    longest: float
+
+    @property
+    def explanation(self) -> str:
+        """Explanation of the arrows for the reader."""
+        most = self.longest / self.mm_per_newton
+        return f"Arrows: contact forces, drawn on the upper block; {self.example} long, capped at {most:.3g} N."
+
+    @property
+    def example(self) -> str:
+        """Length of the arrow of a round force."""
+        force = rounded(0.5 * self.longest / self.mm_per_newton)
+        return f"{force:g} N is {force * self.mm_per_newton:.3g} mm"
+
+
+def contacts_of(frames: WithContacts) -> Contacts:
+    """Return the contacts of a run. Raises InvalidInputError, with advice, where none were stored."""
+    if frames.contacts is None:
+        raise InvalidInputError(MISSING)
+    return frames.contacts
+
+
+def force_scale(frames: WithContacts) -> ForceScale:
+    """Return the scale for all frames of a run. Raises InvalidInputError where no contacts were stored."""
+    force = np.hypot(*forces_on_a(contacts_of(frames).rows).T)
+    force = force[np.isfinite(force) & (force > 0.0)]
+    usual = float(np.quantile(force, USUAL)) if len(force) else 1.0
+    length = USUAL_LENGTH * MILLIMETRES * float(np.mean([frames.size_x.mean(), frames.size_y.mean()]))
+    return ForceScale(length / usual, LONGEST * length)
+
+
+def rounded(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20 ... that is not larger."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(part * power for part in ROUND if part * power <= value * (1.0 + 1e-9)))
+
+
+def pushing_up(rows: Rows, tilt: float) -> Floats:
+    """Return the forces (N, (k, 2)) of contacts on the body that they push up in the picture, turned by `tilt`."""
+    forces = forces_on_a(rows)
+    up = forces @ np.array([np.sin(tilt), np.cos(tilt)])
+    return np.asarray(forces * np.where(up < 0.0, -1.0, 1.0)[:, None])
+
+
+def arrows(rows: Rows, scale: ForceScale, tilt: float) -> Floats:
+    """Return start and end (mm, scene, (k, 2, 2)) of the arrow of every contact; those not finite are left out."""
+    starts = MILLIMETRES * np.stack([rows["x"], rows["y"]], axis=-1)
+    ways = scale.mm_per_newton * pushing_up(rows, tilt)
+    shown = np.isfinite(starts).all(axis=1) & np.isfinite(ways).all(axis=1)
+    starts, ways = starts[shown], ways[shown]
+    lengths = np.hypot(*ways.T)
+    ways *= np.minimum(1.0, scale.longest / np.maximum(lengths, 1e-12))[:, None]
+    return np.stack([starts, starts + ways], axis=1)
+
+
+def draw_forces(canvas: Canvas, frames: WithContacts, frame: int, scale: ForceScale) -> None:
+    """Draw the forces of all contacts of one frame."""
+    found = arrows(contacts_of(frames).at(frame), scale, canvas.extent.tilt)
+    size = min(1.0, scale.longest * canvas.points_per_mm / WHOLE)
+    if size < 1.0:
+        _draw_veil(canvas)
+    for part in arrow_parts(found, canvas, size):
+        canvas.axes.add_collection(part)
+
+
+def _draw_veil(canvas: Canvas) -> None:
+    """Make everything above the ground paler."""
+    from matplotlib.patches import Rectangle
+
+    extent = canvas.extent
+    place = (extent.left, extent.lowest), extent.width, extent.top - extent.lowest
+    canvas.axes.add_artist(Rectangle(*place, facecolor="#FFFFFF", alpha=VEIL_ALPHA, linewidth=0.0, zorder=VEIL))
+
+
+def arrow_parts(found: Floats, canvas: Canvas, size: float, colour: str = style.INK) -> "list[Collection]":
+    """Return shafts and heads of arrows, with a light line around them that keeps them apart from dark blocks.
+
+    `size` is that of heads and lines over their usual one.
+    """
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    ways = found[:, 1] - found[:, 0]
+    lengths = np.hypot(*ways.T)
+    found, ways, lengths = (one[lengths * canvas.points_per_mm >= LEAST] for one in (found, ways, lengths))
+    along = ways / lengths[:, None]
+    head = np.minimum(size * _HEAD[0] / canvas.points_per_mm, lengths)
+    necks = found[:, 1] - head[:, None] * along
+    across = np.stack([-along[:, 1], along[:, 0]], axis=-1) * (head * _HEAD[1] / _HEAD[0])[:, None]
+    heads = list(np.stack([found[:, 1], necks + across, necks - across], axis=1))
+    shafts = list(np.stack([found[:, 0], necks], axis=1))
+    at: dict[str, Any] = {"transform": canvas.scene}
+    return [
+        LineCollection(shafts, colors="#FFFFFF", linewidths=size * HALO, zorder=BELOW, **at),
+        PolyCollection(
+            heads, facecolors="#FFFFFF", edgecolors="#FFFFFF", linewidths=size * (HALO - WIDTH), zorder=BELOW, **at
+        ),
+        LineCollection(shafts, colors=colour, linewidths=size * WIDTH, zorder=FORCES, **at),
+        PolyCollection(heads, facecolors=colour, linewidths=0.0, zorder=FORCES, **at),
+    ]
+
+
+UNIFORM, DEEP = 5, 9  # arrows along a face under uniform pressure, and along one under water
+FORCE, PRESSURE, MOMENT, SPEED = "force", "pressure", "moment", "speed"
+UNITS = {FORCE: "N", PRESSURE: "Pa", MOMENT: "N m", SPEED: "m/s"}
+PREFIXES = ((1e6, "M"), (1e3, "k"))
+LENGTH = 0.13  # of the larger side of a panel: the longest arrow
+SWEEP = 1.5 * np.pi  # of the largest moment
+RADIUS = 0.32  # of the smaller side of its body
+MARGIN = 0.02  # of the larger side, beyond the ends of arrows
+
+
+@dataclass(frozen=True)
+class Arrows:
+    """Arrows of k places in f frames: where they touch a body (mm, scene), their way over the longest, (f, k, 2)."""
+
+    kind: str
+    at: Floats
+    way: Floats
+    ends_there: Floats  # (f, k) 1 where an arrow ends at its place, 0 where it begins
+
+    def lines(self, length: float) -> Floats:
+        """Return start and end (mm, scene) of all arrows, (f, k, 2, 2), where the longest has this length (mm)."""
+        ways = length * self.way
+        starts = self.at - self.ends_there[..., None] * ways
+        return np.stack([starts, starts + ways], axis=2)
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Round arrows of k moments in f frames: centres (mm, (f, k, 2)), radii (mm, (k,)), sweeps (rad, (f, k))."""
+
+    at: Floats
+    radius: Floats
+    sweep: Floats
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What holds for all of a frame: words, and a direction in the picture, (0, 0) for no arrow."""
+
+    text: str
+    way: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Outside:
+    """All that acts from outside in f frames; `largest` of each kind there is, in SI."""
+
+    arrows: tuple[Arrows, ...] = ()
+    turns: Turns | None = None
+    marks: tuple[tuple[Mark, ...], ...] = ()  # of each frame
+    largest: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to draw."""
+        return not self.arrows and self.turns is None and not any(self.marks)
+
+    @property
+    def sizes(self) -> str:
+        """The largest load of each kind that has arrows, in words; empty where there is none."""
+        straight = ", ".join(in_words(self.largest[kind], UNITS[kind]) for kind in (FORCE, PRESSURE) if self._has(kind))
+        parts = [f"the longest {straight}"] if straight else []
+        parts += [f"round {in_words(self.largest[MOMENT], UNITS[MOMENT])}"] if self._has(MOMENT) else []
+        return ", ".join(parts)
+
+    @property
+    def explanation(self) -> str:
+        """Explanation of all arrows for the reader; empty where there is none."""
+        texts = [f"Red arrows: loads, {self.sizes}."] if self.sizes else []
+        texts += ["Above the panels: loads on all blocks."] if any(self.marks) else []
+        if self._has(SPEED):
+            texts.append(f"Black arrows: velocity of driven bodies, the longest {self.largest[SPEED]:.3g} m/s.")
+        return " ".join(texts)
+
+    def _has(self, kind: str) -> bool:
+        return self.largest.get(kind, 0.0) > 0.0
+
+
+def outside(frames: FramesLike, chosen: Indices, support: Support) -> Outside:
+    """Return what acts from outside in the chosen frames."""
+    poses = _Poses.of(frames, chosen)
+    raw = [*_forces(poses, support.loads), *_pressures(poses, support), *_speeds(frames, chosen, support)]
+    sizes = [float(np.hypot(one.way[..., 0], one.way[..., 1]).max(initial=0.0)) for one in raw]
+    turns, moment = _moments(frames, poses, support.loads)
+    largest = {
+        kind: max(sizes[number] for number, one in enumerate(raw) if one.kind == kind)
+        for kind in {one.kind for one in raw}
+    }
+    scaled = [replace(one, way=one.way / (largest[one.kind] or 1.0)) for one in raw]
+    marks = _marks(frames.time[chosen], support)
+    return Outside(tuple(scaled), turns, marks, {**largest, MOMENT: moment})
+
+
+def in_words(value: float, unit: str) -> str:
+    """Return a positive value with its unit, in thousands or millions where it is large."""
+    factor, prefix = next(((size, name) for size, name in PREFIXES if value >= size), (1.0, ""))
+    return f"{value / factor:.3g} {prefix}{unit}"
+
+
+def length_in(extent: Extent) -> float:
+    """Return the length (mm) of the longest arrow in a panel."""
+    return LENGTH * max(extent.width, extent.height)
+
+
+def with_room(extent: Extent, found: Outside, length: float) -> Extent:
+    """Return an extent that also holds all arrows, but for what is below it."""
+    lines = [turned(one.lines(length), extent.tilt).reshape(-1, 2) for one in found.arrows if one.way.any()]
+    if not lines:
+        return extent
+    points = np.concatenate(lines)
+    margin = MARGIN * max(extent.width, extent.height)
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    return replace(
+        extent,
+        left=min(extent.left, float(low[0])),
+        right=max(extent.right, float(high[0])),
+        top=max(extent.top, float(high[1])),
+    )
+
+
+@dataclass(frozen=True)
+class _Poses:
+    """Times (s, (f,)) of frames, and of all bodies places (m, (f, b, 2)), angles, sides and whether they are there."""
+
+    time: Floats
+    places: Floats
+    angle: Floats
+    sides: Floats  # (b, 2)
+    is_there: Floats  # (f, b) 1 or 0
+
+    @classmethod
+    def of(cls, frames: FramesLike, chosen: Indices) -> "_Poses":
+        places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
+        vx = getattr(frames, "vx", None)
+        there = np.ones(places.shape[:2]) if vx is None else 1.0 - are_removed(vx[chosen])
+        sides = np.stack([frames.size_x, frames.size_y], axis=-1)
+        return cls(frames.time[chosen], places, frames.angle[chosen], sides, there)
+
+    def turned(self, body: int, vectors: Floats) -> Floats:
+        """Return vectors (k, 2) of a body's own axes in those of the scene, (f, k, 2)."""
+        cosine, sine = np.cos(self.angle[:, body])[:, None], np.sin(self.angle[:, body])[:, None]
+        x, y = vectors[:, 0], vectors[:, 1]
+        return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+    def arrows(self, kind: str, body: int, arms: Floats, ways: Floats) -> Arrows:
+        """Return arrows on a body at arms (m, (f, k, 2)) from its centre."""
+        ways = ways * self.is_there[:, body, None, None]
+        pushes = (ways * arms).sum(axis=-1) < 0.0
+        return Arrows(kind, MILLIMETRES * (self.places[:, body, None] + arms), ways, pushes.astype(float))
+
+
+def _forces(poses: _Poses, loads: Sequence[Acting]) -> Iterator[Arrows]:
+    for one in loads:
+        if isinstance(one.load, Force):
+            load = one.load
+            way = np.array([[np.cos(load.direction), np.sin(load.direction)]])
+            ways = poses.turned(one.body, way) if load.axes == "body" else way[None]
+            sizes = (load.magnitude * one.values(poses.time))[:, None, None]
+            yield poses.arrows(FORCE, one.body, poses.turned(one.body, np.array([load.point])), sizes * ways)
+
+
+def _pressures(poses: _Poses, support: Support) -> Iterator[Arrows]:
+    for one in support.loads:
+        if isinstance(one.load, Pressure):
+            normal, half = np.array(NORMALS[one.load.face]), 0.5 * poses.sides[one.body]
+            count = UNIFORM if one.load.water_level is None else DEEP
+            along = (np.arange(count) + 0.5) / count if one.load.water_level is None else np.linspace(0.0, 1.0, count)
+            points = half * (normal + np.outer(2.0 * along - 1.0, np.abs(normal[::-1])))
+            arms = poses.turned(one.body, points)
+            inwards = poses.turned(one.body, -normal[None])
+            yield poses.arrows(PRESSURE, one.body, arms, _pressure(poses, one, arms, support.tilt)[..., None] * inwards)
+
+
+def _pressure(poses: _Poses, one: Acting, arms: Floats, tilt: float) -> Floats:
+    """Return the pressures (Pa, (f, k)) at points of a face; water is deep below its level, against gravity."""
+    load, factor = one.load, one.values(poses.time)[:, None]
+    assert isinstance(load, Pressure)  # noqa: S101 - for the type checker
+    if load.water_level is None:
+        return np.broadcast_to(factor * (load.magnitude or 0.0), arms.shape[:2])
+    heights = (poses.places[:, one.body, None] + arms) @ np.array([np.sin(tilt), np.cos(tilt)])
+    return np.asarray(load.unit_weight * np.maximum(load.water_level * factor - heights, 0.0))
+
+
+def _speeds(frames: FramesLike, chosen: Indices, support: Support) -> Iterator[Arrows]:
+    """Yield the velocities of driven bodies, where frames know any."""
+    vx, vy = getattr(frames, "vx", None), getattr(frames, "vy", None)
+    driven = np.flatnonzero(support.driven)
+    if vx is None or vy is None or not len(driven):
+        return
+    pick = np.ix_(chosen, driven)
+    ways = np.nan_to_num(np.stack([vx[pick], vy[pick]], axis=-1))
+    places = np.stack([frames.x[pick], frames.y[pick]], axis=-1)
+    at = places + _to_edge(ways, frames.angle[pick], 0.5 * frames.size_x[driven], 0.5 * frames.size_y[driven])
+    yield Arrows(SPEED, MILLIMETRES * at, ways, np.zeros(at.shape[:2]))
+
+
+def _to_edge(ways: Floats, angle: Floats, half_x: Floats, half_y: Floats) -> Floats:
+    """Return what leads from the centre of a block to its edge in some directions; nothing where there is none."""
+    size = np.hypot(ways[..., 0], ways[..., 1])
+    direction = np.arctan2(ways[..., 1], ways[..., 0]) - angle
+    with np.errstate(divide="ignore"):
+        reach = np.minimum(half_x / np.abs(np.cos(direction)), half_y / np.abs(np.sin(direction)))
+    return np.asarray(ways * (reach / np.where(size > 0.0, size, np.inf))[..., None])
+
+
+def _moments(frames: FramesLike, poses: _Poses, loads: Sequence[Acting]) -> tuple[Turns | None, float]:
+    """Return round arrows, and the largest moment (N m)."""
+    found = [(one, one.load) for one in loads if isinstance(one.load, Moment)]
+    if not found:
+        return None, 0.0
+    bodies = [one.body for one, _ in found]
+    sizes = [load.magnitude * one.values(poses.time) * poses.is_there[:, one.body] for one, load in found]
+    moments = np.stack(sizes, axis=1)
+    largest = float(np.abs(moments).max(initial=0.0))
+    radius = MILLIMETRES * RADIUS * np.minimum(frames.size_x, frames.size_y)[bodies]
+    return Turns(MILLIMETRES * poses.places[:, bodies], radius, SWEEP * moments / (largest or 1.0)), largest
+
+
+def _marks(times: Floats, support: Support) -> tuple[tuple[Mark, ...], ...]:
+    """Return what loads on all bodies are in each frame: their sum, and gravity that turns."""
+    fields = [(one, one.load) for one in support.loads if isinstance(one.load, Horizontal)]
+    rows: list[list[Mark]] = [[] for _ in times]
+    if fields:
+        total = np.sum([load.magnitude * one.values(times) for one, load in fields], axis=0)
+        for row, value in zip(rows, total.tolist(), strict=True):
+            row.append(Mark(f"{abs(value):.3g} g", (float(np.sign(value)), 0.0)))
+    for one in support.loads:
+        if isinstance(one.load, Gravity):
+            for row, tilt in zip(rows, one.values(times).tolist(), strict=True):
+                off = tilt - support.tilt
+                text = f"tilt {np.degrees(tilt):.2f}°".replace("-", "−")
+                row.append(Mark(text, (-float(np.sin(off)), -float(np.cos(off)))))
+    return tuple(tuple(row) for row in rows)
+
+
+COLOUR = "#A50026"
+ARC_POINTS = 24
+_HEAD_LOAD_ARROWS = 4.0  # points, of round arrows
+LEAST_SWEEP = 0.02  # rad
+MARK, MARK_SIDE = 9.0, 12.0  # points: length of the arrow of a mark, and room for it
+MARK_LETTER = 5.0  # points
+MARK_GAP = 8.0  # points between two marks
+
+
+def draw_outside(canvas: Canvas, found: Outside, index: int, length: float) -> None:
+    """Draw the arrows of the frame with this index among the chosen ones; `length` is of the longest (mm)."""
+    for one in found.arrows:
+        lines = one.lines(length)[index]
+        seen = np.hypot(*(lines[:, 1] - lines[:, 0]).T) * canvas.points_per_mm >= LEAST
+        for part in arrow_parts(lines[seen], canvas, 1.0, style.INK if one.kind == SPEED else COLOUR):
+            canvas.axes.add_collection(part)
+    if found.turns is not None:
+        turns = found.turns
+        for centre, radius, sweep in zip(turns.at[index], turns.radius, turns.sweep[index], strict=True):
+            if abs(sweep) >= LEAST_SWEEP:
+                _draw_turn(canvas, arc(centre, float(radius), float(sweep)))
+
+
+def arc(centre: Floats, radius: float, sweep: float) -> Floats:
+    """Return points (mm) of a round arrow, which is open at the right, from its start to its tip."""
+    angle = (0.25 * np.pi if sweep > 0.0 else -0.25 * np.pi) + np.linspace(0.0, sweep, ARC_POINTS)
+    return np.asarray(centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+
+
+def _draw_turn(canvas: Canvas, points: Floats) -> None:
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    way = points[-1] - points[-2]
+    way /= np.hypot(*way)
+    head = min(
+        _HEAD_LOAD_ARROWS / canvas.points_per_mm, float(np.hypot(*(points[-1] - points[0]))) or _HEAD_LOAD_ARROWS
+    )
+    across = 0.5 * head * np.array([-way[1], way[0]])
+    tip = np.stack([points[-1] + 0.5 * head * way, points[-1] - 0.5 * head * way + across])
+    outline = np.stack([*tip, points[-1] - 0.5 * head * way - across])
+    at: dict[str, Any] = {"transform": canvas.scene, "zorder": FORCES}
+    canvas.axes.add_collection(LineCollection([points], colors="#FFFFFF", linewidths=2.5 * WIDTH, **at))
+    canvas.axes.add_collection(LineCollection([points], colors=COLOUR, linewidths=WIDTH, **at))
+    canvas.axes.add_collection(PolyCollection([outline], facecolors=COLOUR, linewidths=0.0, **at))
+
+
+def draw_marks(canvas: Canvas, marks: tuple[Mark, ...], offset: float = 0.0, *, up: float = 4.0) -> None:
+    """Write marks with their arrows on a line above a panel: from `offset` right of its left end on, `up` above it.
+
+    Both are in points.
+    """
+    for mark in marks:
+        _draw_mark(canvas, mark, offset, up)
+        offset += MARK_SIDE + MARK_LETTER * len(mark.text) + MARK_GAP
+
+
+def _draw_mark(canvas: Canvas, mark: Mark, offset: float, up: float) -> None:
+    scale = canvas.points_per_mm
+    left, middle = canvas.extent.left + offset / scale, canvas.extent.top + (up + 5.0) / scale
+    way = 0.5 * MARK / scale * np.array(mark.way)
+    centre = np.array([left + 0.5 * MARK / scale, middle])
+    if way.any():
+        canvas.axes.annotate(
+            "",
+            xy=tuple(centre + way),
+            xytext=tuple(centre - way),
+            annotation_clip=False,
+            arrowprops={
+                "arrowstyle": "-|>",
+                "shrinkA": 0.0,
+                "shrinkB": 0.0,
+                "mutation_scale": 6.0,
+                "linewidth": WIDTH,
+                "color": COLOUR,
+            },
+        )
+    place = left + MARK_SIDE / scale, canvas.extent.top + up / scale
+    canvas.axes.text(*place, mark.text, va="bottom", color=COLOUR)

@@ -1,0 +1,444 @@
+"""The parts of a report: runs, sweeps and studies, as far as their folders can be read."""
+
+import math
+import re
+from base64 import b64encode
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
+from blocksim.scenario import Scenario, load_stored
+from blocksim.scenario.document import MAX_BYTES
+from blocksim.scenario.input_files import read_limited, relative_path
+from blocksim.simulation import folder as files
+from blocksim.simulation.frames import Columns, Frames, read_table, rows_of
+from blocksim.simulation.observables import OBSERVABLES
+from blocksim.simulation.probes import ProbeSeries
+from blocksim.simulation.result import Summary, read_summary
+from blocksim.simulation.stores.hdf5 import read_frames, read_probes
+from blocksim.view.history import panels_of, probe_picture
+from blocksim.view.report.pictures import Repeats, history_of
+from blocksim.view.report.player import MOST_BYTES, frame_indices, pack_forces, pack_frames, pack_loads, scene_data
+from blocksim.view.run_data import support_of
+
+ROOT = r"(?:/|[A-Za-z]:[\\/])"
+ABSOLUTE = re.compile(rf"'(?P<quoted>{ROOT}[^']+)'|(?<![^\s=,(\"])(?P<bare>{ROOT}[^\s'\",:;()]+)")
+
+
+def shared_path(path: str) -> str:
+    """Return an absolute path as seen from the current folder, or its last name where it lies elsewhere."""
+    below = relative_path(path)
+    is_elsewhere = below == path and re.match(ROOT, path) is not None
+    return re.split(r"[\\/]", path.rstrip("\\/"))[-1] if is_elsewhere else below
+
+
+def shared_text(text: str) -> str:
+    """Return a text with all absolute paths in it as `shared_path` has them; those with spaces need quotes."""
+    return ABSOLUTE.sub(lambda found: f"'{shared_path(q)}'" if (q := found["quoted"]) else shared_path(found[0]), text)
+
+
+Part = TypeVar("Part")
+
+LEDGER = {  # name in run.json: name in the report
+    "kinetic": "kinetic",
+    "potential": "potential",
+    "stored_normal": "stored, normal",
+    "stored_shear": "stored, shear",
+    "dashpot": "lost in dashpots",
+    "friction": "lost in friction",
+    "broken": "lost as contacts broke",
+    "impacts": "lost in impacts",
+    "correction": "correction of positions",
+    "to_support": "given to the support",
+    "to_loads": "given to loads",
+    "events": "taken by events",
+    "start": "at the start",
+    "in_play": "in play",
+    "residual": "residual",
+}
+
+ALWAYS = ("kinetic", "potential", "residual")
+ROUND_OFF = 1e-12  # of the energy in play
+RATIOS = ("relative_residual",)  # in run.json beside energies
+
+DRAWN = ("x", "y", "rotation")  # measured quantities that have a curve
+NO_SUMMARY = "no summary: the run was killed, is still running, or its run.json cannot be read"
+NO_FORCES = "This run has stored no contacts, so their forces cannot be shown; --set output.contacts=true stores them."
+
+
+@dataclass(frozen=True)
+class PartialRun:
+    """The parts of a run that could be read, None for the others.
+
+    `problems` give the reasons, a line each; `damage` are those that are not missing files.
+    """
+
+    folder: Path
+    scenario: Scenario | None
+    scenario_text: str | None
+    summary: Summary | None
+    frames: Frames | None
+    final: Columns | None
+    problems: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
+    probes: Mapping[str, ProbeSeries] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The scenario's name; that of the folder where it is not known."""
+        if self.scenario is not None:
+            return self.scenario.name
+        return self.folder.name if self.summary is None else self.summary.name
+
+    @property
+    def status(self) -> str:
+        """`finished`, `failed` or `interrupted`; `unfinished` where the run left no summary."""
+        return "unfinished" if self.summary is None else self.summary.status
+
+
+class _Attempts:
+    """Reads one part after the other and records errors."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+        self.damage: list[str] = []
+
+    def at(self, read: Callable[[], Part]) -> Part | None:
+        """Return what `read` returns, None where it raises an error of the input."""
+        try:
+            return read()
+        except BlocksimError as error:
+            self.problems.append(str(error))
+            if not isinstance(error, InputMissingError):
+                self.damage.append(str(error))
+            return None
+
+
+def read_stored(folder: Path) -> PartialRun:
+    """Return what a run's folder holds. Raises InvalidInputError where nothing of it can be read."""
+    attempts = _Attempts()
+    scenario = attempts.at(lambda: load_stored(folder / files.SCENARIO))
+    summary = attempts.at(lambda: read_summary(folder / files.SUMMARY))
+    frames = None if scenario is None else attempts.at(lambda: read_frames(folder / files.FRAMES, scenario))
+    final = attempts.at(lambda: read_table(folder / files.FINAL))
+    try:
+        text = read_limited(folder / files.SCENARIO, MAX_BYTES).decode(errors="replace")
+    except BlocksimError:
+        text = None
+    if scenario is None and summary is None and final is None:
+        message = "\n".join([f"{folder}: nothing of this run can be read", *attempts.problems])
+        raise InvalidInputError(message)
+    probes = (
+        None
+        if scenario is None or frames is None
+        else attempts.at(lambda: read_probes(folder / files.FRAMES, scenario))
+    )
+    problems, damage = tuple(attempts.problems), tuple(attempts.damage)
+    return PartialRun(folder, scenario, text, summary, frames, final, problems, damage, probes or {})
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One part of a report: `page` is for the template, `data` for the scripts; `key` ties the two together."""
+
+    key: str
+    kind: str
+    name: str
+    page: Mapping[str, Any]
+    data: Mapping[str, Any] = field(repr=False)
+
+
+def run_subject(
+    key: str,
+    run: PartialRun,
+    comparison: Mapping[str, Any] | None = None,
+    remarks: tuple[str, ...] = (),
+    *,
+    most_bytes: int = MOST_BYTES,
+    parent: str | None = None,
+) -> Subject:
+    """Return a run for a report; `comparison` is what `Comparison.to_dict` gives, `remarks` are further problems.
+
+    `parent` is the key of the sweep that it is a member of.
+    """
+    data, notes, problems = _moving(run, most_bytes)
+    history = None
+    if data is not None and run.frames is not None and run.scenario is not None:
+        data["measured"] = _measured(data["names"], comparison)
+        repeats = None if comparison is None else Repeats(comparison["rows"])
+        if data["names"]:
+            support = support_of(run.scenario, () if run.summary is None else run.summary.events)
+            history, data["histories"] = history_of(run.frames, support, repeats)
+    page = {
+        "parent": parent,
+        "place": shared_path(str(run.folder)),
+        "status": run.status,
+        "reason": NO_SUMMARY if run.summary is None else shared_text(run.summary.reason),
+        "summary": _summary(run),
+        "problems": [shared_text(text) for text in (*run.problems, *problems, *remarks)],
+        "scenario": run.scenario_text,
+        "values": None if run.scenario is None else run.scenario.model_dump(by_alias=True, exclude={"sweep"}),
+        "description": None if run.scenario is None else run.scenario.description,
+        "notes": notes,
+        "final": [] if run.final is None else rows_of(run.final),
+        "comparison": comparison,
+        "ledger": _ledger(run),
+        "provenance": _provenance(run),
+        "probes": [] if parent is not None else [_probe(one) for one in run.probes.values() if len(one)],
+        "has_player": data is not None,
+        "history": history,
+        "names": data["names"] if data else [],
+        "has_particles": bool(data and data["scene"]["particles"]),
+        "has_forces": bool(data and data["forces"]),
+        "has_loads": bool(data and data["loads"]),
+        "has_shades": bool(data and any(system["shades"] for system in data["systems"])),
+        "has_measured": bool(data and data["measured"]),
+    }
+    return Subject(key, "run", run.name, page, {"kind": "run", "name": run.name, "frames": data})
+
+
+def _moving(run: PartialRun, most_bytes: int) -> tuple[dict[str, Any] | None, list[str], list[str]]:
+    """Return frames and scene for the player, notes on them, and problems with them."""
+    if run.frames is None or run.scenario is None:
+        return None, [], []
+    try:
+        packed = pack_frames(run.frames, most_bytes)
+    except InvalidInputError as error:
+        return None, [], [str(error)]
+    kept = frame_indices(run.frames, most_bytes)
+    happened = () if run.summary is None else run.summary.events
+    scene = scene_data(run.frames, run.scenario, kept, happened)
+    forces, loads = pack_forces(run.frames, kept, scene["tilt"]), pack_loads(run.frames, run.scenario, kept, happened)
+    if loads is not None:
+        scene["extent"] = [loads.extent.left, loads.extent.right, loads.extent.bottom, loads.extent.top]
+    notes = [*packed.notes, NO_FORCES if forces is None else forces["told"], *(loads.notes if loads else ())]
+    moving = {"scene": scene, "forces": forces, "loads": loads.data if loads else None}
+    return {**packed.data, **moving}, notes, []
+
+
+def _measured(names: Sequence[str], comparison: Mapping[str, Any] | None) -> list[dict[str, Any]]:
+    """Return mean and range of the repeats (mm or degrees) by the number of the block, for player and curves."""
+    rows = [] if comparison is None else comparison["rows"]
+    numbers = {name: number for number, name in enumerate(names)}
+    return [
+        {"block": numbers[row["block"]], **{key: row[key] for key in ("quantity", "minimum", "mean", "maximum")}}
+        for row in rows
+        if row["block"] in numbers and row["quantity"] in DRAWN and row["mean"] is not None
+    ]
+
+
+def _summary(run: PartialRun) -> list[tuple[str, str]]:
+    """Return names and values for people."""
+    tracks = () if run.frames is None else run.frames.tracks
+    blocks = [(track.system.name, str(len(track.names))) for track in tracks]
+    if run.summary is None:
+        last = [] if run.frames is None else [("recorded until", f"{run.frames.time[-1]:.4g} s")]
+        return [*blocks, *last]
+    summary, error = run.summary, run.summary.energy_J.relative_residual
+    return [
+        *blocks,
+        *(() if summary.movement is None else summary.movement.lines("{:.2f}".format)),
+        ("simulated time", f"{summary.simulated_time_s:.4g} s"),
+        ("steps", f"{summary.steps} of {summary.time_step_s:.3g} s"),
+        ("solver time", f"{summary.solver_seconds:.2f} s on {summary.threads} thread{'s' * (summary.threads > 1)}"),
+        ("relative energy error", "0" if error == 0.0 else f"{error:.1e}" if math.isfinite(error) else "unknown"),
+        *(("warning", shared_text(warning)) for warning in summary.warnings),
+    ]
+
+
+def _ledger(run: PartialRun) -> list[tuple[str, str]]:
+    if run.summary is None:
+        return []
+    values = run.summary.energy_J.model_dump()
+    # entries that a scheme does not have are zero
+    names = [*(name for name in values if name not in (*LEDGER, *RATIOS)), *LEDGER]  # of other systems first
+    least = ROUND_OFF * abs(values["in_play"])
+    shown = [name for name in names if name in ALWAYS or not abs(values[name]) <= least]
+    texts = {name: f"{values[name]:.6g}".replace("-", "−") if math.isfinite(values[name]) else "–" for name in shown}
+    return [(LEDGER.get(name, name.replace("_", " ")), text) for name, text in texts.items()]
+
+
+def _probe(probe: ProbeSeries) -> dict[str, str]:
+    """Return a line about a probe, and its picture (PNG, base64)."""
+    picture = b64encode(probe_picture(probe)).decode() if panels_of(probe) else ""
+    text = f"{probe.name}: {probe.kind}, {len(probe)} samples to {probe.time[-1]:.4g} s, in probe-{probe.name}.csv"
+    return {"text": text, "picture": picture}
+
+
+def _provenance(run: PartialRun) -> list[tuple[str, str]]:
+    if run.summary is None:
+        return []
+    summary = run.summary
+    hashes = [("run", summary.run), ("scenario", summary.scenario_hash), ("final state", summary.final_state_sha256)]
+    environment = [(name, shared_text(text)) for name, text in summary.environment.items()]  # the command names folders
+    return [("ended at", summary.ended_at), *hashes, *environment, *summary.sha256.items()]
+
+
+CASE, STATUS = "case", "status"  # what is varied stands between them
+OF_BLOCKS = (".x_mm", ".y_mm", ".rotation_deg", ".left_mm", ".right_mm")
+MOST_VALUES = 400_000  # of blocks in the page; a sweep of 10 000 cases shows 13 blocks
+
+
+@dataclass(frozen=True)
+class CaseTable:
+    """The rows of sweep.csv as texts, by column."""
+
+    folder: Path
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Columns of the keys that vary, as `SweepResult.keys` has them."""
+        return self.columns[self.columns.index(CASE) + 1 : self.columns.index(STATUS)]
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """Columns of what is known of a whole case: status, movement and whatever else is not of a block."""
+        known = {CASE, *self.varied}
+        return tuple(name for name in self.columns if name not in known and not name.endswith(OF_BLOCKS))
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """Names of the blocks."""
+        return tuple(name.removesuffix(".x_mm") for name in self.columns if name.endswith(".x_mm"))
+
+    def column(self, name: str) -> list[str]:
+        """Return one column; empty texts where there is none."""
+        if name not in self.columns:
+            return [""] * len(self.rows)
+        place = self.columns.index(name)
+        return [row[place] for row in self.rows]
+
+
+COLUMN_OF = {"x": "x_mm", "rotation": "rotation_deg"}
+"""Measured quantities whose final values are in the page."""
+
+
+def sweep_subject(
+    key: str,
+    table: CaseTable,
+    scenario: Scenario | None,
+    members: Mapping[str, str],
+    problems: Sequence[str] = (),
+    left_out: Sequence[str] = (),
+    *,
+    judged: Mapping[str, Any] | None = None,
+    pictures: Sequence[Mapping[str, Any]] = (),
+) -> Subject:
+    """Return a sweep for a report; `members` are the keys of the subjects of its cases.
+
+    `left_out` are cases with frames that are not in the page. `judged` is what `Judgement.to_dict` gives,
+    `pictures` what `pictures_of` does.
+    """
+    name = table.folder.name if scenario is None else scenario.name
+    shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
+    rows = [] if judged is None else judged["metrics"]["inside"]["rows"]
+    limits = {  # of inside, by the column of the table
+        f"{row['block']}.{COLUMN_OF[row['quantity']]}": list(row["limits"])
+        for row in rows
+        if row["quantity"] in COLUMN_OF and row["limits"]
+    }
+    page = {
+        "place": shared_path(str(table.folder)),
+        "description": None if scenario is None else scenario.description,
+        "summary": _summary_sweeps(table, len(members)),
+        "problems": [shared_text(text) for text in problems],
+        "hidden_blocks": len(table.blocks) - len(shown),
+        "has_members": bool(members),
+        "judged": judged,
+        "pictures": [(one["label"], one["source"]) for one in pictures],
+    }
+    data = {
+        "kind": "sweep",
+        "name": name,
+        "place": shared_path(str(table.folder)),
+        "columns": _columns(table, shown),
+        "left_out": list(left_out),
+        "measured": limits,
+        "members": dict(members),
+        "pictures": [one["data"] for one in pictures],
+    }
+    return Subject(key, "sweep", name, page, data)
+
+
+def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
+    """Return names, roles and values; a column whose values are all numbers has numbers, an empty cell is null."""
+    ends = [f"{block}{suffix}" for block in blocks for suffix in (".x_mm", ".rotation_deg")]
+    roles = {"varied": table.varied, "case": (CASE,), "outcome": table.results, "block": ends}
+    order = [CASE, *table.varied, *table.results, *ends]
+    role = {name: kind for kind, names in roles.items() for name in names}
+    labels = {one.name: {"label": one.label} for one in OBSERVABLES.values() if one.title}
+    return [
+        {
+            "name": name,
+            **labels.get(name, {}),
+            "role": role[name],
+            "values": _values(table.column(name), is_text=name == CASE),
+        }
+        for name in order
+        if name in table.columns
+    ]
+
+
+def _values(texts: Sequence[str], *, is_text: bool) -> list[Any]:
+    if is_text:
+        return list(texts)
+    numbers = [_number(text) for text in texts]
+    if all(number is not None or not text for number, text in zip(numbers, texts, strict=True)):
+        return numbers
+    return [text or None for text in texts]
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _summary_sweeps(table: CaseTable, members: int) -> list[tuple[str, str]]:
+    cases = len(table.rows)
+    finished = table.column("status").count("finished")
+    judged = [value for value in table.column("inside") if value]
+    inside = [] if not judged else [("inside all measured ranges", f"{judged.count('True')} of {len(judged)}")]
+    return [
+        ("cases", str(cases)),
+        ("finished", f"{finished} of {cases}"),
+        *inside,
+        ("varied", ", ".join(table.varied) or "nothing"),
+        ("runs in this page", str(members)),
+    ]
+
+
+@dataclass(frozen=True)
+class StudyPage:
+    """The parts of a study: pairs of what was found, and a table of texts with its title."""
+
+    name: str
+    description: str
+    summary: Sequence[tuple[str, str]]
+    title: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    picture: bytes | None = None  # PNG
+    problems: Sequence[str] = ()
+
+
+def study_subject(key: str, study: StudyPage, place: str) -> Subject:
+    """Return a study for a report."""
+    picture = None if study.picture is None else f"data:image/png;base64,{b64encode(study.picture).decode()}"
+    page = {
+        "place": shared_path(place),
+        "description": study.description,
+        "summary": list(study.summary),
+        "title": study.title,
+        "heads": list(study.heads),
+        "rows": [list(row) for row in study.rows],
+        "picture": picture,
+        "problems": [shared_text(text) for text in study.problems],
+    }
+    return Subject(key, "study", study.name, page, {"kind": "study", "name": study.name, "place": shared_path(place)})
