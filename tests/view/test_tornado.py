@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.view.studies import Bars, draw_tornado, span_of_bars, order_of
+from blocksim.view.studies import Bars, draw_tornado, order_of, span_of_bars
 from tests.view.drawings import KEYS
 
 
