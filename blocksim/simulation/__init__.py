@@ -33,14 +33,14 @@ _HOMES = {
     "MemberFailure": "ensemble",
     "Progress": "loop",
     "Result": "result",
-    "Summary": "summary",
+    "Summary": "result",
     "Watcher": "loop",
     "read_result": "result",
-    "renew_copies": "keeping",
+    "renew_copies": "result",
     "run_ensemble": "ensemble",
     "run_in_batches": "ensemble",
-    "simulate": "running",
-    "simulate_into": "running",
+    "simulate": "run",
+    "simulate_into": "run",
 }
 
 

@@ -311,16 +311,6 @@ Forces = Annotated[bool, Option("Draw contact forces, if the run has stored them
 Replace = Annotated[bool, Option("Replace a file that blocksim did not write.")]
 
 
-MEANT = {
-    STRIP: ("--at", "--frames", "--forces", "--colour"),
-    FINAL: ("--at", "--forces", "--colour"),
-    PROFILE: ("--at", "--forces", "--colour"),
-    HISTORY: ("--panels", "--block", "--relative", "--forces", "--colour"),
-    PROBE: ("--probe",),
-}
-"""Options of each kind of picture of a run; that of the motion has none."""
-
-
 @dataclass(frozen=True)
 class PlotOptions(PageOptions):
     """What is drawn of a run, a sweep, a study or a table, how, and where."""

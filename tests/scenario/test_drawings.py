@@ -145,7 +145,9 @@ def test_dxf_without_its_package_names_the_extra(tmp_path: Path, monkeypatch: py
 
 def test_settings_in_the_current_folder_do_not_reach_the_reader_of_dxf(tmp_path: Path) -> None:
     (tmp_path / "ezdxf.ini").write_text("[core]\nlog_unprocessed_tags = true\n")
-    code = "from blocksim.extras import loaded; print(loaded('ezdxf', 'reading').options.log_unprocessed_tags)"
+    code = (
+        "from blocksim.extras import load_module; print(load_module('ezdxf', 'reading').options.log_unprocessed_tags)"
+    )
     command = [sys.executable, "-c", code]
     assert subprocess.run(command, cwd=tmp_path, check=True, capture_output=True).stdout == b"False\n"
 

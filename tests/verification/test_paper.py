@@ -14,7 +14,7 @@ from blocksim.verification import paper as laws
 from blocksim.verification import paper as tables
 from blocksim.verification.paper import COLLAPSES, write_paper
 
-SCENARIOS = Path(laws.__file__).parents[3] / "scenarios"
+SCENARIOS = Path(laws.__file__).parents[2] / "scenarios"
 RESULTS = SCENARIOS.parent / "results"
 SOFT = {"contact.stiffness_scale": 0.001}
 

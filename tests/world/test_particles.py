@@ -31,7 +31,7 @@ def scenario(bodies: Sequence[Mapping[str, object]], model: str, spacing: float,
 def particles_of(world: World, body: int) -> Records:
     """Return the particles of one body."""
     record = world.bodies[body]
-    found: Records = world.particles[record.first_particle : record.first_particle + record.division]
+    found: Records = world.particles[record.first_particle : record.first_particle + record.particle_count]
     return found
 
 
@@ -81,9 +81,9 @@ def test_bodies_of_equal_sides_share_their_particles(model: str) -> None:
     alike, other, again = {"y": 0.5}, {"y": 0.5, "x": 0.1, "width": 0.02}, {"y": 0.5, "x": 0.2}
     world = build_world(scenario([alike, other, again], model, 1e-3))
     first, odd, last = world.bodies[:3]
-    assert (first.first_particle, first.division) == (last.first_particle, last.division)
-    assert odd.first_particle == first.division
-    assert world.particles.size == first.division + odd.division
+    assert (first.first_particle, first.particle_count) == (last.first_particle, last.particle_count)
+    assert odd.first_particle == first.particle_count
+    assert world.particles.size == first.particle_count + odd.particle_count
 
 
 @pytest.mark.parametrize("model", WITH_PARTICLES)
@@ -109,7 +109,7 @@ def test_surface_model_needs_no_particles() -> None:
 def test_pair_of_the_two_largest_bodies_has_a_slot_for_every_contact(model: str) -> None:
     small, large = {"y": 0.5}, {"y": 0.5, "x": 0.2, "width": 0.064}
     world = build_world(scenario([small, large, {**large, "x": 0.4}], model, 1e-3))
-    most = int(world.bodies[1].division)
+    most = int(world.bodies[1].particle_count)
     assert slots_of_a_pair(world.bodies, model) == (2 if model == "kernel" else 4) * most
     assert world.candidates.shape[1] == world.contacts.shape[1] == slots_of_a_pair(world.bodies, model)
     assert world.points.size == world.contacts.shape[1] + 1
@@ -118,11 +118,11 @@ def test_pair_of_the_two_largest_bodies_has_a_slot_for_every_contact(model: str)
 def test_slabs_of_ground_have_particles_at_their_free_ends_only() -> None:
     hill = {"profile": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.0]]}
     world = build_world(scenario([{"y": 0.5}], "kernel", 1e-3, ground=hill))
-    counts = world.bodies.division[1:-1].tolist()
+    counts = world.bodies.particle_count[1:-1].tolist()
     assert counts == [0, 1, 0, 0]
     peak, slab = particles_of(world, 2)[0], world.bodies[2]
     x = slab.x + slab.cos * peak.x - slab.sin * peak.y
     y = slab.y + slab.sin * peak.x + slab.cos * peak.y
     assert [x, y] == pytest.approx([0.1, 0.1], abs=1e-12)
     discs = build_world(scenario([{"y": 0.5}], "particles", 1e-3, ground=hill))
-    assert discs.bodies.division[1:-1].tolist() == [0, 0, 0, 0]
+    assert discs.bodies.particle_count[1:-1].tolist() == [0, 0, 0, 0]
