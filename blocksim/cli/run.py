@@ -7,7 +7,6 @@ from contextlib import nullcontext, suppress
 from dataclasses import replace
 from itertools import islice
 
-import click
 import typer
 
 from blocksim.cli.command_line import Report, Screen
@@ -30,7 +29,7 @@ FIRST_ROWS = 10
 INTERRUPTED = "interrupted"
 
 
-def run_command(source: ScenarioInput, options: RunOptions, screen: Screen) -> None:
+def run_command(context: typer.Context, source: ScenarioInput, options: RunOptions, screen: Screen) -> None:
     """Simulate a scenario and print the final positions.
 
     If the scenario names an experiment, the table has the measured ranges. A finished run is not repeated but shown.
@@ -55,8 +54,7 @@ def run_command(source: ScenarioInput, options: RunOptions, screen: Screen) -> N
         if not screen.silent:
             warn_of_values(ready)
         out = options.out or default_folder(ready)
-        context = click.get_current_context(silent=True)
-        if context is not None and context.obj is not None:  # imports and compiling are waited for too
+        if context.obj is not None:  # imports and compiling are waited for too
             over = time.monotonic() - context.obj
             options = replace(options, precautions=replace(options.precautions, time_over=over))
         result = run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))

@@ -80,7 +80,7 @@ def test_fixed_blocks_do_not_move() -> None:
 @pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
 def test_run_and_member_of_an_ensemble_move_alike(scheme: str) -> None:
     scenario = load_scenario(SCENARIOS / "three_blocks_nominal.toml", {**FALLING, "time.scheme": scheme})
-    run, (member,) = simulate(scenario), run_ensemble([scenario], threads=1)
+    run, (member,) = simulate(scenario), run_ensemble([scenario], threads=1, peaks=True)
     found = run.summary.movement
     assert found is not None
     assert found.first_mover == "3"  # it stands on nothing but its left corner
@@ -158,7 +158,7 @@ def test_a_block_moves_on_that_would_soon_have_left_its_place(
 def test_members_end_as_fast_as_the_same_runs_alone() -> None:
     changes = ({"time.end": 0.15}, {"time.end": 0.15, "friction.block_ground": 0.2})
     scenarios = [load_scenario(SCENARIOS / "three_blocks_nominal.toml", {**FALLING, **one}) for one in changes]
-    for scenario, member in zip(scenarios, run_ensemble(scenarios), strict=True):
+    for scenario, member in zip(scenarios, run_ensemble(scenarios, peaks=True), strict=True):
         alone = simulate(scenario).summary.movement
         assert alone is not None
         assert member.observables == alone.row
@@ -187,7 +187,7 @@ def on_a_table(scheme: str, **motion: object) -> Scenario:
 def test_what_rides_on_a_moving_table_has_not_moved(scheme: str) -> None:
     held, slides = on_a_table(scheme), on_a_table(scheme, friction=0.1)
     lifted = on_a_table(scheme, direction="90 deg", amplitude=0.03, frequency=1.0, ramp=0.2)
-    members = run_ensemble([held, slides, lifted])
+    members = run_ensemble([held, slides, lifted], peaks=True)
     for scenario, member, outcome in zip((held, slides, lifted), members, ("stands", "slid", "stands"), strict=True):
         run = simulate(scenario)
         found = run.summary.movement
@@ -227,6 +227,6 @@ def test_driven_blocks_are_not_the_ones_that_moved_farthest() -> None:
 def test_blocks_on_a_shaking_table_are_as_fast_as_they_move_on_it() -> None:
     shaking = load_scenario(SCENARIOS / "shaking_table.toml", {"time.end": 0.4, "contact.stiffness_scale": 0.001})
     movement = simulate(shaking).summary.movement
-    (member,) = run_ensemble([shaking])
+    (member,) = run_ensemble([shaking], peaks=True)
     assert movement is not None
     assert member.observables == movement.row

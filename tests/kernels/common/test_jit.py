@@ -241,7 +241,7 @@ def test_hash_sees_every_source_below_the_folder(copied_kernels: Path) -> None:
     folder = copied_kernels / "blocksim" / "kernels"
     assert jit.source_hash(folder) == jit.source_hash()
     seen = {jit.source_hash(folder)}
-    for path in (folder / "common" / "geometry.py", folder / "explicit" / "laws" / "linear.py"):
+    for path in (folder / "common" / "shapes.py", folder / "explicit" / "laws" / "linear.py"):
         path.write_text(path.read_text() + "# edited\n")
         seen.add(jit.source_hash(folder))
     (folder / "explicit" / "laws" / "linear.py").rename(folder / "explicit" / "laws" / "straight.py")
