@@ -59,12 +59,12 @@ def _run_smallest(name: str) -> None:
 
 
 def _run_soil() -> None:
-    from blocksim.simulation.schemes import build_scene, measured_row  # noqa: PLC0415
+    from blocksim.simulation.schemes import build_scene, measure_row  # noqa: PLC0415
     from blocksim.simulation.team import ALONE, Team  # noqa: PLC0415
     from tests.soils import column, scene  # noqa: PLC0415
 
     soil = scene(column(0.05, 0.05, 0.005), end=1e-4)
-    measured_row(ALONE.advance(build_scene(soil), 1)[0])
+    measure_row(ALONE.advance(build_scene(soil), 1)[0])
     with Team(2) as team:
         team.advance(build_scene(soil), 1)
 

@@ -108,7 +108,7 @@ class RunFailedError(BlocksimError):
     exit_code = ExitCode.NUMERICAL_FAILURE
 
 
-class Timed(NamedTuple):
+class TimedRun(NamedTuple):
     """The scene at the end, and the CPU seconds of this process that it took to get there."""
 
     scene: AnyScene
@@ -159,7 +159,7 @@ class Rerun:
         """Memory of all arrays of the scene."""
         return sum(array.nbytes for array in self._arrays)
 
-    def run(self, last_step: int) -> Timed:
+    def run(self, last_step: int) -> TimedRun:
         """Advance from the start to a step, or until all rests; more room for pairs is part of it.
 
         Raises RunFailedError: the time of a failed run is meaningless.
@@ -168,12 +168,12 @@ class Rerun:
         _refuse_failed(timed.outcome)
         return timed
 
-    def attempt(self, last_step: int) -> Timed:
+    def attempt(self, last_step: int) -> TimedRun:
         """Do the same, but return a failed run too."""
         self.restore()
         began = time.process_time()
         scene, status = ALONE.advance(self.scene, last_step)
-        return Timed(scene, time.process_time() - began, BY_CODE[status])
+        return TimedRun(scene, time.process_time() - began, BY_CODE[status])
 
     def restore(self) -> None:
         """Go back to the start."""

@@ -16,7 +16,7 @@ from blocksim.simulation.stores.exports import format_named
 from blocksim.study.compare import ExperimentTablePath
 from blocksim.study.pictures import AnimateOptions, PlotOptions, Replace, draw, draw_film
 from blocksim.study.reporting import MEMBERS, report_on
-from blocksim.study.stored_run import stored_run
+from blocksim.study.stored_run import load_stored_run
 
 MEGABYTE = 1e6
 OLDER = "replaces an older file, "
@@ -138,7 +138,7 @@ def export_command(
     Example: blocksim export scenarios/three_blocks.toml --format vtkhdf
     """
     form = format_named(kind)
-    stored = stored_run(run)
+    stored = load_stored_run(run)
     contacts = stored.frames.contacts
     file = out or Path(f"{stored.scenario.name}.{kind}")
     beside = file.with_name(f"{file.stem}_contacts{file.suffix}")

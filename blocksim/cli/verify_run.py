@@ -31,7 +31,7 @@ UNITS = {"_mm": " mm", "_deg": "°", "_mm_s": " mm/s", "_deg_s": "°/s", "_J": "
 
 
 @dataclass(frozen=True)
-class Verified:
+class VerificationReport:
     """Result for one place: for people, for programs, and the exit code."""
 
     lines: tuple[str, ...]
@@ -72,7 +72,7 @@ def verify_run_command(
     raise typer.Exit(max(one.code for one in verified))  # of several the most severe: 65, 66 before 1 before 0
 
 
-def _verified(place: Path, threads: int, sample: int, seed: int, *, silent: bool) -> Verified:
+def _verified(place: Path, threads: int, sample: int, seed: int, *, silent: bool) -> VerificationReport:
     """Verify one place; an error in it does not stop the others."""
     try:
         study = study_in(place)
@@ -87,7 +87,7 @@ def _verified(place: Path, threads: int, sample: int, seed: int, *, silent: bool
         note(str(error))
         kind = "missing" if isinstance(error, InputMissingError) else "damaged"
         data = {"agrees": False, "kind": kind, "folder": str(place), "error": str(error)}
-        return Verified((f"{place}: {kind}",), data, error.exit_code)
+        return VerificationReport((f"{place}: {kind}",), data, error.exit_code)
 
 
 def _run_again(place: Path, threads: int, *, silent: bool) -> RunVerdict:
@@ -107,7 +107,7 @@ def _repeat_study(folder: Path, study: Study, sample: int, seed: int, *, silent:
     return verify_study(folder, study, sample, seed)
 
 
-def _of_study(verdicts: tuple[SweepVerdict, ...]) -> Verified:
+def _of_study(verdicts: tuple[SweepVerdict, ...]) -> VerificationReport:
     """Report a study, of a curve of limits every search and then the curve."""
     found = [_of_sweep(one, "runs", "table and answer follow from the runs; ") for one in verdicts]
     agrees = all(one.agrees for one in verdicts)
@@ -116,10 +116,10 @@ def _of_study(verdicts: tuple[SweepVerdict, ...]) -> Verified:
         told["searches"] = [one.data for one in found[:-1]]
         if verdicts[-1].agrees:
             found[-1] = replace(found[-1], lines=(f"{verdicts[-1].folder}: table and answer follow from the searches",))
-    return Verified(tuple(line for one in found for line in one.lines), told, ExitCode(not agrees))
+    return VerificationReport(tuple(line for one in found for line in one.lines), told, ExitCode(not agrees))
 
 
-def _of_run(verdict: RunVerdict, *, told: bool) -> Verified:
+def _of_run(verdict: RunVerdict, *, told: bool) -> VerificationReport:
     count = verdict.frames.frames[0]
     if verdict.agrees:
         lines = [f"{verdict.folder}: bit-identical: final state, {count} frames, final.csv"]
@@ -127,7 +127,7 @@ def _of_run(verdict: RunVerdict, *, told: bool) -> Verified:
             note("\n".join(_told_origins(verdict.origins)))
     else:
         lines = [f"{verdict.folder}: differs", *(INDENT + line for line in _reasons(verdict))]
-    return Verified(tuple(lines), verdict.to_dict(), ExitCode(not verdict.agrees))
+    return VerificationReport(tuple(lines), verdict.to_dict(), ExitCode(not verdict.agrees))
 
 
 def _reasons(verdict: RunVerdict) -> Iterator[str]:
@@ -194,7 +194,7 @@ def _change(one: Origin) -> str:
     return f"{one.then[:LONGEST]} -> {one.now[:LONGEST]}"
 
 
-def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> Verified:
+def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> VerificationReport:
     count = f"{len(verdict.checked)} of {verdict.rows} {what}"
     if verdict.agrees:
         kept = f", bit-identical in {len(verdict.runs)} kept runs" if verdict.runs else ""
@@ -207,7 +207,7 @@ def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> Ver
         lines += [INDENT + line for line in _entries(verdict.entries)]
         runs = [_of_run(run, told=False) for run in verdict.runs if not run.agrees]
         lines += [INDENT + line for run in runs for line in run.lines]
-    return Verified(tuple(lines), verdict.to_dict(), ExitCode(not verdict.agrees))
+    return VerificationReport(tuple(lines), verdict.to_dict(), ExitCode(not verdict.agrees))
 
 
 def _cells(verdict: SweepVerdict) -> Iterator[str]:

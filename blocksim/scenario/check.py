@@ -20,7 +20,7 @@ from blocksim.scenario.models.study import OWN_KEYS, Mode, Normal, Sweep, Unifor
 from blocksim.scenario.overrides import SYNONYMS, Data, UnfitOverrideError, with_value
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.start import impossible_starts, soil_tables, unfit_soils
-from blocksim.scenario.structures import Shaped
+from blocksim.scenario.structures import PolygonStructure
 from blocksim.scenario.structures.polygons import Polygons
 from blocksim.scenario.units import toml
 
@@ -99,7 +99,7 @@ def unfit_choices(scenario: Scenario) -> Iterator[Mistake]:
             key = "outline" if block.outline is not None else "sides"
             yield Mistake(("blocks", name, key), why, at="key", relation=True)
     for number, structure in enumerate(scenario.structures):
-        if why and isinstance(structure, Shaped):
+        if why and isinstance(structure, PolygonStructure):
             yield Mistake(("structures", number, "kind"), why, relation=True)
     springs = next(name for name, one in SCHEMES.items() if one.has_springs)
     for key in () if scenario.time.has_springs else SPRING_CHOICES:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blocksim.scenario.geometry import Corners, box_of, is_upright, least_width, middle_of, section_of
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import KeyPath
-from blocksim.scenario.structures import Pose, Shaped, Structure
+from blocksim.scenario.structures import PolygonStructure, Pose, Structure
 from blocksim.scenario.structures.base import Cell
 
 LENGTH_WITHOUT_BLOCKS = 0.1  # m: can be seen beside soil
@@ -120,7 +120,7 @@ def place_bodies(scenario: Scenario) -> tuple[PlacedBody, ...]:
 
 def has_outlines(scenario: Scenario) -> bool:
     """Return True if any block is no rectangle, without placing them."""
-    shaped = any(isinstance(structure, Shaped) for structure in scenario.structures)
+    shaped = any(isinstance(structure, PolygonStructure) for structure in scenario.structures)
     return shaped or any(block.polygon for block in scenario.blocks.values())
 
 
@@ -162,7 +162,7 @@ def _forget(dead: weakref.ref[Scenario]) -> None:
 def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedBody]:
     """Return the bodies of a structure, called by their numbers from a first one on."""
     poses = structure.start(scenario.blocks[structure.block])
-    if isinstance(structure, Shaped):
+    if isinstance(structure, PolygonStructure):
         return [
             _shaped(scenario, structure.block, str(number), *one)
             for number, one in enumerate(zip(structure.cells, structure.shapes, poses, strict=True), start=first)

@@ -31,7 +31,7 @@ from blocksim.scenario.placement import (
 )
 from blocksim.scenario.resolved import body_table_contents
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.scenario.structures import MAX_BLOCKS, Polygons, Shaped, UnfitError
+from blocksim.scenario.structures import MAX_BLOCKS, Polygons, PolygonStructure, UnfitError
 from blocksim.scenario.units import toml
 
 MAX_LOADS = 1000
@@ -305,7 +305,7 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
         (("bodies", number, "block"), spec.block) for number, spec in enumerate(scenario.bodies)
     ]
     for number, structure in enumerate(scenario.structures):
-        if not isinstance(structure, Shaped):
+        if not isinstance(structure, PolygonStructure):
             needing.append((("structures", number, "block"), structure.block))
         for place, cell in enumerate(structure.drawn if isinstance(structure, Polygons) else ()):
             if cell.block is not None and cell.block not in scenario.blocks:

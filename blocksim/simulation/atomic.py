@@ -20,7 +20,7 @@ NO_SUCH_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM}  # file 
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def atomic_path(path: Path) -> Iterator[Path]:
     """Give a name beside a file, with its suffix, to write to; in the end the new file takes the place of the old one.
 
     It has the permissions of the old one, else those that the user's umask leaves. What a writer of the same file left
@@ -118,9 +118,9 @@ def sync_file(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def writing(path: Path) -> Iterator[BinaryIO]:
+def atomic_file(path: Path) -> Iterator[BinaryIO]:
     """Give a file that takes the place of `path` at the end, when it is on the disk. Raises what `replacing` raises."""
-    with replacing(path) as temporary, temporary.open("wb") as file:
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
         yield file
         file.flush()
         os.fsync(file.fileno())
@@ -128,7 +128,7 @@ def writing(path: Path) -> Iterator[BinaryIO]:
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a file through a temporary one beside it; raises OutputError and leaves nothing behind when that fails."""
-    with writing(path) as file:
+    with atomic_file(path) as file:
         file.write(content)
 
 

@@ -23,7 +23,7 @@ from blocksim.scenario import Scenario, load_stored
 from blocksim.scenario.resolved import deciding_values
 from blocksim.scenario.units import TIME, Quantity
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import writing
+from blocksim.simulation.atomic import atomic_file
 from blocksim.simulation.folder import CHECKPOINTS
 from blocksim.simulation.provenance import code_hashes, code_version, machine
 from blocksim.simulation.recorder import Recorder, Rows, rows_of_frames
@@ -107,7 +107,7 @@ def write_checkpoint(path: Path, scene: AnyScene, position: Position, origin: Or
     arrays = arrays_of(scene)
     types = tuple(ArrayType(str(array.dtype), array.shape) for array in arrays)
     head = CheckpointHead(format=FORMAT, position=position, origin=origin, arrays=types)
-    with writing(path) as file:
+    with atomic_file(path) as file:
         hashed = _Hashed(file)
         hashed.write(head.model_dump_json().encode() + b"\n")
         for array in arrays:
@@ -333,11 +333,11 @@ def remarks_on(found: Resumption, folder: Path) -> Iterator[str]:
         position = found.checkpoint.position
         yield f"resuming at step {position.step} ({position.frames} frames recorded): {folder}"
     if found is NEW:
-        for other in files.unfinished_beside(folder):
+        for other in files.unfinished_siblings(folder):
             yield f"nothing to resume in {folder}; an unfinished run of another scenario or code version is in {other}"
 
 
-def kept_rows(folder: Path, recorder: Recorder) -> Rows:
+def stored_frames(folder: Path, recorder: Recorder) -> Rows:
     """Return the frames at output times that an earlier part of a run has left. Raises what reading them raises.
 
     Frames after the checkpoint are among them, as the run would only repeat them; that of the moment at which it was

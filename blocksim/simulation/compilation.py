@@ -9,7 +9,7 @@ from blocksim.kernels.common import jit
 from blocksim.kernels.common.compiler import compiling
 from blocksim.scenario import PlacedBody, Scenario, scenario_from_mapping
 from blocksim.scenario.placement import has_outlines
-from blocksim.simulation.schemes import SCHEMES, build_scene, measured_row, scheme_named
+from blocksim.simulation.schemes import SCHEMES, build_scene, measure_row, scheme_named
 from blocksim.simulation.team import ALONE
 
 DEFAULT = "surface"  # the set without a mark of its own in the cache
@@ -59,7 +59,7 @@ def compile_systems(scenario: Scenario) -> None:
     """Compile what a scenario with systems beside blocks and supports needs as well, for these systems."""
     if scenario.systems:
         with compiling():
-            measured_row(ALONE.advance(build_scene(scenario), 0)[0])
+            measure_row(ALONE.advance(build_scene(scenario), 0)[0])
 
 
 def _compile(kernels: str) -> None:
@@ -69,7 +69,7 @@ def _compile(kernels: str) -> None:
         if kernels in (*scheme.kernel_sets, scheme.kernels(""))
     )
     scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **changes})), 0)
-    measured_row(scene)
+    measure_row(scene)
     if kernels != DEFAULT:
         jit.mark(kernels)
 

@@ -34,7 +34,7 @@ from blocksim.simulation.loop import Outcome, diagnose, last_step_of, outcome_of
 from blocksim.simulation.observables import OBSERVABLES, Value, Watch, observe
 from blocksim.simulation.probes import MovingSupport
 from blocksim.simulation.recorder import POSITION, Rows, frames_from_rows, steps_per_frame
-from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measured_row, scheme_of
+from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measure_row, scheme_of
 from blocksim.simulation.settling import initial_scene
 from blocksim.simulation.team import ALONE
 from blocksim.world.build import Refusal, Stack, member, stack_of_one
@@ -96,7 +96,7 @@ def in_play_of(scenes: AnyScene | Coupled, members: Sequence[int]) -> list[InPla
     return [*map(InPlay, masses, moved[list(members)].tolist())]
 
 
-class Closing:
+class FinalStates:
     """The last states of a stack of scenes."""
 
     def __init__(
@@ -381,7 +381,7 @@ class Ensemble:
         """Return where the members ended, in order."""
         self._see_ends()
         measured = self._measured(np.arange(len(self.codes)))
-        closing = Closing(self.scenes, self.placed, measured, self.watch, self._peaks())
+        closing = FinalStates(self.scenes, self.placed, measured, self.watch, self._peaks())
         return [
             self._run_alone(m, self._start(m)) if code == PAIRS_FULL else closing.end(m, self._start(m), code)
             for m, code in enumerate(self.codes.tolist())
@@ -411,7 +411,7 @@ class Ensemble:
             scene, code = self._finish(m, scene, start)
         except BlocksimError as error:
             return MemberFailure(error)
-        closing = Closing(stack_of_one(scene), placed, measured_row(scene)[np.newaxis], self.watch.only(m))
+        closing = FinalStates(stack_of_one(scene), placed, measure_row(scene)[np.newaxis], self.watch.only(m))
         return closing.end(0, start, code)
 
     def _finish(self, m: int, scene: AnyScene, start: float) -> tuple[AnyScene, int]:

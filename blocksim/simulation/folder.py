@@ -43,7 +43,7 @@ RESOLVED = MARK.encode()
 Kind = Callable[[bytes], bool]  # whether the first HEAD_BYTES of a file are of a kind
 
 
-def grows_from(start: bytes) -> Kind:
+def append_only_kind(start: bytes) -> Kind:
     """Return the kind of content that is appended to, and may have been torn in its first line by a kill."""
 
     def is_kind(head: bytes) -> bool:
@@ -53,7 +53,7 @@ def grows_from(start: bytes) -> Kind:
     return is_kind
 
 
-def heads(form: bytes) -> Kind:
+def prefix_kind(form: bytes) -> Kind:
     """Return the kind of a CSV file whose first line has this form (a regular expression)."""
     return lambda head: re.fullmatch(form, head.split(b"\n", 1)[0].rstrip(b"\r")) is not None
 
@@ -228,7 +228,7 @@ def keep_scenario(
     refuse_foreign_copies(tables, folder, plan)
     if _is_there(folder / plan) and not is_resolved(folder / plan):
         raise _foreign(folder / plan)
-    text = head + resolved_beside(scenario, tables, is_varied=plan != SCENARIO)
+    text = head + resolved_text(scenario, tables, is_varied=plan != SCENARIO)
     write_text(folder / plan, text)
     for name, content in tables.items():
         write_bytes(folder / name, content)
@@ -263,7 +263,7 @@ def _foreign(path: Path) -> OutputExistsError:
     )
 
 
-def resolved_beside(scenario: Scenario, tables: Mapping[str, bytes], *, is_varied: bool = False) -> str:
+def resolved_text(scenario: Scenario, tables: Mapping[str, bytes], *, is_varied: bool = False) -> str:
     """Return the resolved scenario (TOML) that refers to the copies beside it; the base of others is `is_varied`."""
     names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
     of_bodies = dict(zip(body_table_contents(scenario), BODY_MOTIONS, strict=False))
@@ -328,34 +328,6 @@ RESULTS = Path("results")
 DONE_BYTES = MEGABYTE  # of done.json
 PATIENCE = 30.0  # s that files of a study may take to change together; jobs of an array begin at the same time
 POLL = 0.01  # s
-
-__all__ = [
-    "BODY_MOTIONS",
-    "CHECKPOINTS",
-    "DONE",
-    "EXPERIMENT",
-    "FINAL",
-    "FRAMES",
-    "MOTION",
-    "OURS",
-    "RESULTS",
-    "SCENARIO",
-    "SOILS",
-    "SUMMARY",
-    "brief_lock",
-    "check_folder",
-    "clear_remains",
-    "default_folder",
-    "folder_lock",
-    "holds_run",
-    "is_finished",
-    "make_folder",
-    "newest_finished",
-    "prepare_folder",
-    "remove_run",
-    "takes_lock",
-    "unfinished_beside",
-]
 
 
 def default_folder(scenario: Scenario) -> Path:
@@ -555,7 +527,7 @@ def newest_finished(folder: Path) -> Path | None:
     return max(finished, key=lambda path: (path / DONE).stat().st_mtime_ns, default=None)
 
 
-def unfinished_beside(folder: Path) -> list[Path]:
+def unfinished_siblings(folder: Path) -> list[Path]:
     """Return the folders beside one in which checkpoints of runs that did not finish wait."""
     checkpoints = (path for name in CHECKPOINTS for path in folder.parent.glob(f"*/{name}"))
     return sorted({path.parent for path in checkpoints if path.parent != folder and not is_finished(path.parent)})

@@ -15,7 +15,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.scenario.input_files import MEGABYTE, read_limited
 from blocksim.world.systems.blocks import BLOCKS, boxes_around
-from blocksim.world.systems.system import Elements, Present, Track
+from blocksim.world.systems.system import Elements, SystemInScene, Track
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -133,7 +133,7 @@ class Frames:
         unknown = np.full(len(self.names), np.nan)
         shape = (self.size_x, self.size_y, unknown, *(unknown if one is None else one for one in self._inert))
         start = np.stack([unknown, unknown, self.start_angle, unknown, unknown, unknown])
-        blocks = Present(BLOCKS, Elements(self.names, np.stack(shape), start, self.outlines))
+        blocks = SystemInScene(BLOCKS, Elements(self.names, np.stack(shape), start, self.outlines))
         values = np.stack([getattr(self, one.name) for one in BLOCKS.quantities], axis=1)
         return (Track(blocks, values), *self.others)
 

@@ -81,9 +81,9 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
 
 def start_energy(scene: "AnyScene") -> float:
     """Return all energy (J) that a scene holds and has lost: constant, if the ledger is complete."""
-    from blocksim.simulation.schemes import ledger_names, measured_row  # noqa: PLC0415 - numba, not for readers
+    from blocksim.simulation.schemes import ledger_names, measure_row  # noqa: PLC0415 - numba, not for readers
 
-    return float(measured_row(scene)[: len(ledger_names(scene))].sum())
+    return float(measure_row(scene)[: len(ledger_names(scene))].sum())
 
 
 class InPlay(NamedTuple):
@@ -95,16 +95,12 @@ class InPlay(NamedTuple):
 
 def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start."""
-    from blocksim.simulation.schemes import (  # noqa: PLC0415 - numba, not for readers
-        ledger_names,
-        mass_of_systems,
-        measured_row,
-    )
+    from blocksim.simulation.schemes import ledger_names, mass_of_systems, measure_row  # noqa: PLC0415 - as above
 
     book = scene.world.ledger[0]
     mass = float(np.sum(scene.world.bodies.mass)) + mass_of_systems(scene)
     in_play = InPlay(mass, float(book.largest_kinetic + book.travel_work))
-    return ledger_of(ledger_names(scene), measured_row(scene), start, in_play)
+    return ledger_of(ledger_names(scene), measure_row(scene), start, in_play)
 
 
 def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_play: InPlay) -> EnergyLedger:

@@ -24,7 +24,7 @@ from blocksim.simulation.ledger import (
 )
 from blocksim.simulation.recorder import MOTION, Recorder
 from blocksim.simulation.result import EventRecord
-from blocksim.simulation.schemes import AnyScene, measured_row, scheme_of
+from blocksim.simulation.schemes import AnyScene, measure_row, scheme_of
 from blocksim.simulation.team import ALONE, Team
 
 GROUND = "the ground"
@@ -63,7 +63,7 @@ BY_CODE = {
 }
 
 
-def interrupted(why: str) -> Outcome:
+def interrupted_outcome(why: str) -> Outcome:
     """Return what a run comes to that is stopped, and can continue."""
     return Outcome("interrupted", why, ExitCode.STOPPED_EARLY)
 
@@ -324,9 +324,9 @@ class _Run:
         """Record where the run ended, and return its outcome."""
         self.recorder.sample(self.scene)  # wherever it ended
         ledger = energy_ledger(self.scene, self.start)
-        outcome = interrupted(why) if why else outcome_of(self.status, ledger)
+        outcome = interrupted_outcome(why) if why else outcome_of(self.status, ledger)
         outcome = diagnose(outcome, self.status, self.scene, self.recorder.placed)
-        overlap = float(measured_row(self.scene)[-1])
+        overlap = float(measure_row(self.scene)[-1])
         happened, pending = ((), []) if self.timeline is None else (self.timeline.happened, self.timeline.pending)
         threads = self.team.threads
         return LoopResult(self.scene, outcome, ledger, self.seconds, threads, overlap, happened, tuple(pending))

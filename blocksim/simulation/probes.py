@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from blocksim.simulation.schemes import AnyScene
-    from blocksim.world.systems.system import System, Touching
+    from blocksim.world.systems.system import BodyContacts, System
 
 
 class MovingSupport:
@@ -229,7 +229,7 @@ class Moment:
             friction = np.concatenate([friction, more.friction])
         return rows, forces_on_a(rows), friction
 
-    def _of_systems(self) -> "Iterator[Touching]":
+    def _of_systems(self) -> "Iterator[BodyContacts]":
         """Yield the contacts of further systems with bodies, their parts numbered."""
         first = self.bodies.size
         for (system, count), arrays in zip(self.parts, getattr(self.scene, "systems", ()), strict=True):
@@ -246,14 +246,14 @@ class Moment:
     @cached_property
     def energies(self) -> Values:
         """Energies (J) of the ledger."""
-        from blocksim.simulation.schemes import measured_row  # noqa: PLC0415 - numba, not for readers
+        from blocksim.simulation.schemes import measure_row  # noqa: PLC0415 - numba, not for readers
         from blocksim.simulation.schemes.scheme import COUNTED  # noqa: PLC0415
 
-        found: list[float] = measured_row(self.scene)[: -len(COUNTED)].tolist()
+        found: list[float] = measure_row(self.scene)[: -len(COUNTED)].tolist()
         return found
 
 
-def rows_of(touching: "Touching") -> Any:
+def rows_of(touching: "BodyContacts") -> Any:
     """Return contacts of a system as those of bodies a with parts b."""
     rows = empty_rows(len(touching.body))
     rows["body_a"], rows["body_b"] = touching.body, touching.part

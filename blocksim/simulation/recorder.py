@@ -14,7 +14,7 @@ from blocksim.simulation.frames import Rows as ContactRows
 from blocksim.simulation.observables import Watch
 from blocksim.simulation.probes import AT_REST, NO_PROBES, MovingSupport, Probes
 from blocksim.world.systems.blocks import BLOCKS, blocks_placed
-from blocksim.world.systems.system import Floats, Present, Track
+from blocksim.world.systems.system import Floats, SystemInScene, Track
 
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
@@ -64,7 +64,7 @@ class Recorder:
         step: float,
         sink: FrameSink | None = None,
         *,
-        others: Sequence[Present] = (),
+        others: Sequence[SystemInScene] = (),
         contacts: bool = False,
         probes: Probes = NO_PROBES,
         support: MovingSupport = AT_REST,
@@ -135,10 +135,10 @@ class Recorder:
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already: then look whether that is the same."""
-        from blocksim.simulation.schemes import ledger_names, measured_row, scheme_of  # noqa: PLC0415 - numba, not for readers
+        from blocksim.simulation.schemes import ledger_names, measure_row, scheme_of  # noqa: PLC0415 - numba, not for readers
 
         step = int(scene.world.clock[0].steps)
-        row = measured_row(scene)
+        row = measure_row(scene)
         states = self._states(scene)
         self.watch.see([0], states[0][None], [step * self.time_step])
         self.ledger = ledger_names(scene)
@@ -198,7 +198,7 @@ def rows_of_frames(frames: Frames) -> Rows:
     return Rows(frames.step, values, measured, tuple(frames.energy), frames.contacts)
 
 
-def frames_from_rows(systems: Sequence[Present], time_step: float, rows: Rows) -> Frames:
+def frames_from_rows(systems: Sequence[SystemInScene], time_step: float, rows: Rows) -> Frames:
     """Return frames of systems, blocks first, with these steps (s)."""
     columns = rows.measured.T
     blocks, *others = (Track(one, values) for one, values in zip(systems, rows.values, strict=True))

@@ -29,10 +29,10 @@ from blocksim.simulation.checkpoint import (
     Resumption,
     check_frames,
     find_resumption,
-    kept_rows,
     origin_of,
     remarks_on,
     restore_scene,
+    stored_frames,
     take_over_probes,
 )
 from blocksim.simulation.compilation import compile_kernels, compile_systems, kernels_of
@@ -258,7 +258,7 @@ class RunSegment:
         self.past = replace(NO_PAST, settled=settled)
         if stored is not None:
             self.past = Past.of(stored.path, stored.position)
-            self.recorder.take_over(kept_rows(folder, self.recorder))
+            self.recorder.take_over(stored_frames(folder, self.recorder))
             check_frames(stored, self.recorder)
             take_over_probes(stored, scenario, self.recorder)
 

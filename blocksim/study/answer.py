@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.scenario.input_files import MEGABYTE, read_limited
-from blocksim.simulation.folder import grows_from, heads
+from blocksim.simulation.folder import append_only_kind, prefix_kind
 from blocksim.study.sweep_folder import MANIFESTS, ORIGINS, SHARD, FolderKind, write_answer
 from blocksim.view.style import Paper
 
@@ -30,9 +30,9 @@ def folder_kind(name: str, what: str, command: str, tables: Mapping[str, str]) -
         plan=f"{name}.toml",
         head=f"# {name.capitalize()} ".encode(),
         results={
-            **{table: heads(form.encode()) for table, form in tables.items()},
+            **{table: prefix_kind(form.encode()) for table, form in tables.items()},
             rf"{name}\.json": ORIGINS,
-            rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
+            rf"timings{SHARD}\.csv": append_only_kind(b"case,executor,seconds,host\n"),
             **MANIFESTS,
         },
         leftover=re.compile(rf"\.({names}|{name}\.json|{name}\.toml)\..*"),

@@ -52,7 +52,7 @@ _COMMENT = re.compile(r"""([^#"']*?)(\s*)(?:#\s*(.*?)\s*)?""")
 """What stands behind a value: the end of its list or table, blanks, and a comment."""
 
 
-def with_fitted(
+def fitted_text(
     document: Document,
     values: Mapping[str, object],
     provenance: Mapping[str, str],
@@ -330,7 +330,7 @@ def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
     score = score_of(members, plan.ranges)
     fit = Fit(plan, best, score, options.trials, path, hits_of(members, plan.ranges), ties)
     note = f"one of {len(ties)} equally good, see [provenance]" if fit.is_one_of_many else NOTE
-    text = with_fitted(plan.document, best.values, _provenance(fit), path.parent, _head(fit), note)
+    text = fitted_text(plan.document, best.values, _provenance(fit), path.parent, _head(fit), note)
     if kept is None:
         write_text(path, text)
     elif kept.read_bytes() != text.encode():

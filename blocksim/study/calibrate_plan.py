@@ -28,7 +28,7 @@ from blocksim.simulation.atomic import sha256_of
 from blocksim.simulation.folder import takes_lock
 from blocksim.simulation.provenance import code_hash
 from blocksim.study.executors.ensemble import Member
-from blocksim.study.plan import Variations, design_of, varied
+from blocksim.study.plan import Variations, build_distributions, design_of
 from blocksim.study.rows import Range, are_inside, check_experiment, ranges_of, si_number, values_at
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ class Scatter:
             values = dict(fitted)
             for key, value in row.items():
                 name = names.get(parse_key(key), key)
-                values[name] = about(plan.vary[key], value, fitted[name]) if name in fitted else value
+                values[name] = centre_on_fit(plan.vary[key], value, fitted[name]) if name in fitted else value
             yield values
 
     def described(self) -> dict[str, str]:
@@ -136,7 +136,7 @@ class Scatter:
         return {} if self.plan is None else {key: in_words(values) for key, values in self.plan.vary.items()}
 
 
-def about(distribution: Variation, drawn: object, fitted: object) -> object:
+def centre_on_fit(distribution: Variation, drawn: object, fitted: object) -> object:
     """Return a drawn value moved so that the distribution lies about the fitted value.
 
     By the difference to its mean or middle, or by the ratio where its logarithm is evenly distributed.
@@ -218,9 +218,9 @@ def calibration_plan(
     if experiment is not None:
         load_table(experiment)  # so that its mistakes are reported of the option
         document = document.with_values({TABLE: user_value(TABLE, str(experiment.absolute()))})
-    fits = varied(document, fit, FIT, MODE)
+    fits = build_distributions(document, fit, FIT, MODE)
     if scatter is not None and scatter.tables:
-        scattered: Sweep | None = varied(document, scatter, SCATTER, MODE)
+        scattered: Sweep | None = build_distributions(document, scatter, SCATTER, MODE)
     else:
         own = document.build().sweep
         scattered = own if own is not None and own.is_sampled else None

@@ -15,7 +15,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.result import read_final, read_summary
 from blocksim.study.manifest import SweepResult, is_sweep, read_sweep
 from blocksim.study.rows import FINISHED, TABLE
-from blocksim.study.stored_run import find_run, how_it_ended
+from blocksim.study.stored_run import ending_text, find_run
 from blocksim.study.sweep_folder import PLAN
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
         now = (load_scenario(run) if Path(run).is_file() else was).experiment
         named = now.table if now else None
     if summary is not None and summary.status != FINISHED:
-        how = how_it_ended(summary.status, summary.reason)
+        how = ending_text(summary.status, summary.reason)
         raise InvalidInputError(f"{name}: {how}; only a finished run can be compared")
     table = experiment or named
     if table is None:

@@ -30,6 +30,7 @@ from blocksim.study.plan import (
     Together,
     Values,
     Variations,
+    build_distributions,
     cases_of,
     draw_values,
     generator,
@@ -37,7 +38,6 @@ from blocksim.study.plan import (
     open_interval,
     refuse_wrong_draws,
     table_digests,
-    varied,
 )
 from blocksim.study.rows import Head, heads_of, si_number
 
@@ -210,7 +210,9 @@ def _stripes(document: Document, given: Variations) -> dict[str, tuple[object, .
     """Return the values of each key by record."""
     if not given.tables:
         return {}
-    shared = {key: levels_of(values) for key, values in varied(document, given, STRIPES, "list").vary.items()}
+    shared = {
+        key: levels_of(values) for key, values in build_distributions(document, given, STRIPES, "list").vary.items()
+    }
     for key, values in shared.items():
         if len(set(map(str, values))) < len(values) or len(values) == 1:
             why = "one record does not scatter; set it with --set" if len(values) == 1 else "a record is given twice"
@@ -221,7 +223,7 @@ def _stripes(document: Document, given: Variations) -> dict[str, tuple[object, .
 
 def _scatter(document: Document, given: Variations, *, needed: bool) -> Sweep | None:
     if given.tables:
-        spread = varied(document.without_sweep(), given, SCATTER, "normal")
+        spread = build_distributions(document.without_sweep(), given, SCATTER, "normal")
         constant = next(
             (key for key, values in spread.vary.items() if len(set(map(str, levels_of(values)))) == 1), None
         )

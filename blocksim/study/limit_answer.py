@@ -20,7 +20,7 @@ from blocksim.study.criterion import Verdict
 from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
 from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
 from blocksim.study.rows import Head, Row, as_cell
-from blocksim.study.stored_run import stored_run
+from blocksim.study.stored_run import load_stored_run
 from blocksim.study.sweep_folder import FolderKind, case_folder
 from blocksim.view import mechanism, studies
 from blocksim.view.run_data import support_of
@@ -389,7 +389,7 @@ class LimitAnswer(Answer, frozen=True):
         place = None if side.case is None else case_folder(self.folder, side.case)
         if place is None:
             return None
-        run = stored_run(place)
+        run = load_stored_run(place)
         first = None if side.first_mover is None else str(side.first_mover)
         head = f"{side.verdict.value} at {self.key} = {self.value(side.value)}"
         came = side.outcome or ""

@@ -111,9 +111,9 @@ class Levels:
             return None
         before, last = self.levels[-2:]
         ratios = (self.ratio,) if self.is_at_rest else (self.ratio, math.sqrt(self.ratio))
-        low = min(extrapolated(before.high, last.low, ratio) for ratio in ratios)
-        high = max(extrapolated(before.low, last.high, ratio) for ratio in ratios)
-        middle = extrapolated(before.middle, last.middle, self.ratio)
+        low = min(extrapolate_limit(before.high, last.low, ratio) for ratio in ratios)
+        high = max(extrapolate_limit(before.low, last.high, ratio) for ratio in ratios)
+        middle = extrapolate_limit(before.middle, last.middle, self.ratio)
         unknown = (middle - before.middle) ** 2 / self.ratio / abs(middle) if middle else 0.0
         return low - unknown, high + unknown
 
@@ -124,13 +124,13 @@ class Levels:
         """
         last = self.levels[-1].middle
         if len(self.levels) > 1:
-            share = extrapolated(self.levels[-2].middle, last, self.ratio) / last - 1.0 if last else 0.0
+            share = extrapolate_limit(self.levels[-2].middle, last, self.ratio) / last - 1.0 if last else 0.0
         way = last * share * (1.0 - 1.0 / self.ratio)
         margin = max(AIM * abs(way), tolerance * abs(last))
         return last + way - margin, last + way + margin
 
 
-def extrapolated(softer: float, stiffer: float, ratio: float) -> float:
+def extrapolate_limit(softer: float, stiffer: float, ratio: float) -> float:
     """Return the value of stiff contacts from two that springs are off by, the second `ratio` times less."""
     return (ratio * stiffer - softer) / (ratio - 1.0)
 
@@ -199,7 +199,7 @@ class StandingSide:
             return max(self.give.share, 2.0 * math.radians(self.give.turn) / slender)
         if is_late or (scenario.motion is not None and scenario.contact.stiffness_scale < 1.0):
             return math.inf
-        sink = most_sink(scenario)
+        sink = largest_static_compression(scenario)
         width = min(min(body.size_x, body.size_y) for body in place_bodies(scenario))
         moved = self.plan.criterion.least_moved
         return max(2.0 * sink / (width * slender), sink / moved if moved else 0.0)
@@ -241,7 +241,7 @@ def slenderness(scenario: Scenario) -> float:
     return min(math.sin(2.0 * math.atan2(min(width, height), height)) for width, height in sizes)
 
 
-def most_sink(scenario: Scenario) -> float:
+def largest_static_compression(scenario: Scenario) -> float:
     """Return how far (m) the softest contact gives way under the weight of all free blocks, in shear if softer."""
     placed = place_bodies(scenario)
     weight = scenario.gravity * sum(body.mass for body in placed if not body.fixed)

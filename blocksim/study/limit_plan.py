@@ -34,7 +34,7 @@ from blocksim.scenario.placement import smallest_width
 from blocksim.scenario.units import parse_unit
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.study.criterion import Criterion, Verdict, read_criterion
-from blocksim.study.plan import Values, Variations, levels_of, varied
+from blocksim.study.plan import Values, Variations, build_distributions, levels_of
 from blocksim.study.rows import Head, Row, heads_of
 
 Kind = TypeVar("Kind")
@@ -242,7 +242,7 @@ def typed_levels(document: Document, given: Variations, option: str) -> tuple[He
     if isinstance(table, Mapping) and "count" not in table:
         message = f"{option} {text}: single values are needed, as in KEY=a,b,c or KEY=FROM:TO:COUNT"
         raise InvalidInputError(message)
-    sweep = varied(document, given, option, "grid")
+    sweep = build_distributions(document, given, option, "grid")
     (head,), (values,) = heads_of(sweep), sweep.vary.values()
     levels: dict[float, object] = {}
     for value in levels_of(values):
@@ -407,7 +407,7 @@ def read_limit(
     ends: dict[str, Any] = {name: table[name] for name in table if name != "count"}
     if is_descending(ends):
         ends |= {"from": ends["to"], "to": ends["from"]}
-    values = varied(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
+    values = build_distributions(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
     assert isinstance(values, Uniform)  # noqa: S101 - it has two ends
     unit = values.unit or ("rad" if values.angle else "")
     plan = LimitPlan(bare, key, unit, _span(bare, key, values, unit, ends, count), criterion, tolerance)

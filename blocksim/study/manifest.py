@@ -22,7 +22,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
-from blocksim.simulation.atomic import PERMISSIONS, replacing, sync_file
+from blocksim.simulation.atomic import PERMISSIONS, atomic_path, sync_file
 from blocksim.simulation.folder import brief_lock, takes_lock
 from blocksim.simulation.observables import table_columns
 from blocksim.study.plan import Cases
@@ -302,7 +302,7 @@ class SweepTable:
         """Write all rows so far, one after the other: none is kept. Raises as `note_table`."""
         began = time.monotonic()
         self.next_at = began + SOONEST
-        with replacing(self.path) as temporary:
+        with atomic_path(self.path) as temporary:
             with temporary.open("w", encoding="utf-8", newline="") as file:
                 csv.writer(file, lineterminator="\n").writerows(self._lines())
             sync_file(temporary)

@@ -28,7 +28,7 @@ from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study.compare import ExperimentTablePath
 from blocksim.study.manifest import is_sweep, read_sweep
 from blocksim.study.rows import FINISHED, NUMBERS, TABLE, Head, Ranges, blocks_in, quarter_turns
-from blocksim.study.stored_run import Place, find_run, folder_of, stored_run
+from blocksim.study.stored_run import Place, find_run, folder_of, load_stored_run
 from blocksim.study.study import draw_study, study_in
 from blocksim.study.sweep_folder import PLAN
 from blocksim.view.animation import Look, Pace, draw_animation, writer_of
@@ -40,7 +40,7 @@ from blocksim.view.paint import COLOURS, paint_named
 from blocksim.view.run_data import support_of
 from blocksim.view.studies import Bars, draw_tornado
 from blocksim.view.style import OWN, Paper, picture_suffix
-from blocksim.view.sweeps.data import Input, Measured, SweepData, Typed
+from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 from blocksim.view.time_panels import Choice
 
 if TYPE_CHECKING:
@@ -86,17 +86,17 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
         rotation_deg=rotation_deg,
         finished=finished,
         inside=None if path is None else Ranges.read(path).inside(table).to_numpy(dtype=bool) & finished,
-        measured=Measured() if path is None else measured_of(load_table(path), blocks),
+        measured=Measurements() if path is None else measured_of(load_table(path), blocks),
         manners=tuple(table["outcome"].fillna("").astype(str)) if "outcome" in table.columns else (),
     )
 
 
-def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measured:
+def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measurements:
     """Return repeats and prediction intervals of x (mm), and the measured class where all rotations are measured."""
     means = {row.block: row.mean for row in table.summaries() if row.quantity == "rotation"}
     turned = quarter_turns([means[block] for block in blocks if block in means])
     rows = [row for row in table.summaries() if row.quantity == "x" and row.block in blocks]
-    return Measured(
+    return Measurements(
         x_mm={row.block: table.values(row.block, "x").to_numpy(dtype=float) for row in rows},
         limits_mm={row.block: limits("x", row.mean, row.minimum, row.maximum) for row in rows},
         prediction_mm={
@@ -129,7 +129,7 @@ def _input(scenario: Scenario, head: Head, column: "pd.Series") -> Input:
     if not (np.abs(values) <= LARGEST).all():
         raise InvalidInputError(f"{TABLE}: the column {key} holds values that are not numbers or too large")
     if len(values) == len(numbers):
-        typed = Typed(head.unit, head.si(1.0)) if head.unit else None
+        typed = InputUnit(head.unit, head.si(1.0)) if head.unit else None
         vary = scenario.sweep.vary[key] if scenario.sweep is not None else ()
         is_even = isinstance(vary, Normal) or (isinstance(vary, Uniform) and vary.scale == "linear")
         return Input(key, unit_of(scenario, key) or head.si_unit, values, is_even=is_even, typed=typed)
@@ -181,7 +181,7 @@ METHODS = (
 )
 
 
-def anything_goes(_: Path) -> None:
+def accept_any_path(_: Path) -> None:
     """Accept any place for a picture."""
 
 
@@ -191,7 +191,7 @@ def draw_indices(
     kind: str | None = None,
     paper: Paper = OWN,
     *,
-    ready: Callable[[Path], None] = anything_goes,
+    ready: Callable[[Path], None] = accept_any_path,
 ) -> Path:
     """Draw the table of a sensitivity study; return the picture's path (default: that of the table, as PNG).
 
@@ -393,7 +393,7 @@ def draw_run(run: Path, options: PlotOptions, kind: str) -> tuple[Path, str]:
     """
     draw = run_kind(kind)
     options.refuse(kind, f"this picture is of kind {kind}")
-    stored = stored_run(run)
+    stored = load_stored_run(run)
     scenario = stored.scenario
     table = options.table or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None else load_table(table)
@@ -423,7 +423,7 @@ def draw_probes_of(place: Path, options: PlotOptions) -> tuple[Path, str]:
 
     Raises what `stored_run`, reading the probes and `draw_probes` raise.
     """
-    stored = stored_run(place)
+    stored = load_stored_run(place)
     picture = options.picture(f"{stored.scenario.name}_{PROBE}.png")
     probes = read_probes(stored.folder / files.FRAMES, stored.scenario)
     draw_probes(probes, picture, f"{stored.scenario.name}: probes", tuple(options.probes or ()), options.paper)
@@ -481,7 +481,7 @@ def draw_film(place: Path, options: AnimateOptions) -> Film:
     """Write a run as an animation; see `animate`."""
     if options.out is not None:
         writer_of(Path(options.out))
-    stored = stored_run(place)
+    stored = load_stored_run(place)
     scenario = stored.scenario
     path = Path(options.out or f"{scenario.name}.gif")
     refuse_foreign(path, overwrite=options.overwrite)
@@ -531,7 +531,7 @@ def draw_sweep(
     kind: str | None = None,
     paper: Paper = OWN,
     *,
-    ready: Callable[[Path], None] = anything_goes,
+    ready: Callable[[Path], None] = accept_any_path,
 ) -> Path:
     """Draw a sweep, by default as the kind that suits it; return the picture's path (default: NAME.png).
 

@@ -40,7 +40,7 @@ HEAD = re.compile(r"(?P<key>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
 
 
-class MadeOnDemand(Sequence[T_co]):
+class LazySequence(Sequence[T_co]):
     """A sequence that keeps none of its entries: each is made when it is asked for."""
 
     @abstractmethod
@@ -58,7 +58,7 @@ class MadeOnDemand(Sequence[T_co]):
 
 
 @dataclass(frozen=True)
-class Design(MadeOnDemand[Settings]):
+class Design(LazySequence[Settings]):
     """The settings of cases, made from one column of values a key."""
 
     columns: Mapping[str, Sequence[object]]
@@ -102,7 +102,7 @@ def grid(sweep: Sweep) -> Design:
     return Combinations({key: levels_of(values) for key, values in sweep.vary.items()})
 
 
-def listed(sweep: Sweep) -> Design:
+def list_design(sweep: Sweep) -> Design:
     """Return one case for every place in the lists, which are equally long."""
     return Together({key: levels_of(values) for key, values in sweep.vary.items()})
 
@@ -283,8 +283,8 @@ def sobol(sweep: Sweep) -> Places:
     return np.asarray(np.concatenate(chunks)[: sweep.samples].T + 0.5 ** (BITS + 1))
 
 
-GIVEN: dict[str, Callable[[Sweep], Design]] = {"grid": grid, "list": listed, "table": table}
-DRAWN: dict[str, Callable[[Sweep], Places]] = {"lhs": lhs, "sobol": sobol, "normal": normal}
+LISTED_MODES: dict[str, Callable[[Sweep], Design]] = {"grid": grid, "list": list_design, "table": table}
+SAMPLED_MODES: dict[str, Callable[[Sweep], Places]] = {"lhs": lhs, "sobol": sobol, "normal": normal}
 """Modes of sweeps; those that draw give places of the unit cube, shape (keys, samples)."""
 
 
@@ -293,9 +293,9 @@ def design_of(sweep: Sweep) -> Design:
 
     Raises what reading a table raises, UnavailableError where a sampled mode has no scipy.
     """
-    if sweep.mode in GIVEN:
-        return GIVEN[sweep.mode](sweep)
-    places = open_interval(DRAWN[sweep.mode](sweep))
+    if sweep.mode in LISTED_MODES:
+        return LISTED_MODES[sweep.mode](sweep)
+    places = open_interval(SAMPLED_MODES[sweep.mode](sweep))
     return Together(
         {key: draw_values(values, column) for (key, values), column in zip(sweep.vary.items(), places, strict=True)}
     )
@@ -333,7 +333,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Cases(MadeOnDemand[Case]):
+class Cases(LazySequence[Case]):
     """All cases of a sweep; each is made when it is asked for, and none is kept."""
 
     document: Document
@@ -494,7 +494,7 @@ class Variations(Mapping[str, Values]):
         return len(self.tables)
 
 
-def varied(document: Document, given: Variations, option: str, mode: str) -> Sweep:
+def build_distributions(document: Document, given: Variations, option: str, mode: str) -> Sweep:
     """Return the distributions, checked against the scenario.
 
     Raises ScenarioError that shows each mistake in the text given to `option`.

@@ -19,7 +19,7 @@ from blocksim.silence import silent
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.frames import Columns
 from blocksim.study.executors.ensemble import run_members
-from blocksim.study.plan import Values, Variations, draw_values, open_interval, varied
+from blocksim.study.plan import Values, Variations, build_distributions, draw_values, open_interval
 from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
 from blocksim.study.vary import SPREAD, variations_option
 
@@ -358,7 +358,7 @@ def _sampled_plan(document: Document, vary: Mapping[str, Values] | None) -> Swee
     """
     is_typed = isinstance(vary, Variations)
     if vary:
-        plan: Sweep | None = varied(document, Variations.of(vary), VARY if is_typed else "vary", MODE)
+        plan: Sweep | None = build_distributions(document, Variations.of(vary), VARY if is_typed else "vary", MODE)
     else:
         plan = document.build().sweep
     if plan is None or not plan.is_sampled:

@@ -22,7 +22,7 @@ from blocksim.study.rows import FINISHED, TABLE
 MOST_FOLDERS = 5  # named in a message
 
 
-class Kept(Protocol):
+class HasFolder(Protocol):
     """A result of a run, or of a study, that may lie in a folder."""
 
     @property
@@ -31,7 +31,7 @@ class Kept(Protocol):
         ...
 
 
-Place = Path | str | Kept
+Place = Path | str | HasFolder
 
 
 def folder_of(place: Place) -> Path:
@@ -123,11 +123,11 @@ class StoredRun:
             else:
                 if summary.status == FINISHED:
                     return self.choice
-                state = how_it_ended(summary.status, summary.reason)
+                state = ending_text(summary.status, summary.reason)
         return f"{self.folder}: {state}; its {len(self.frames)} frames end at {float(self.frames.time[-1]):.4g} s"
 
 
-def stored_run(place: Path | str) -> StoredRun:
+def load_stored_run(place: Path | str) -> StoredRun:
     """Return the run meant by a run folder, by `results/<name>` or by a scenario file; only its frames are needed.
 
     Raises InputMissingError, ScenarioError, or InvalidInputError for frames that cannot be read.
@@ -143,6 +143,6 @@ def choice(place: Path, folder: Path) -> str:
     return f"{place}: the newest of {count} runs is taken: {folder}" if count > 1 else ""
 
 
-def how_it_ended(status: str, reason: str) -> str:
+def ending_text(status: str, reason: str) -> str:
     """Return what a run that did not finish has come to, in words."""
     return f"this run {'was' if status == 'interrupted' else 'has'} {status} ({reason})"

@@ -17,15 +17,14 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_head, read_limited
-from blocksim.simulation.atomic import replacing, sync_file, write_text
+from blocksim.simulation.atomic import atomic_path, sync_file, write_text
 from blocksim.simulation.folder import (
     Kind,
     TableRecord,
+    append_only_kind,
     brief_lock,
     columns_added,
-    grows_from,
     has_keys,
-    heads,
     is_leftover,
     is_own,
     is_resolved,
@@ -33,6 +32,7 @@ from blocksim.simulation.folder import (
     keep_scenario,
     make_folder,
     origin_of,
+    prefix_kind,
     read_tables,
     refuse_foreign_copies,
     remove_run,
@@ -85,9 +85,9 @@ class FolderKind:
         return named is not None and is_leftover(path.name, (named[1],)) and path.is_file()
 
 
-MANIFESTS: Mapping[str, Kind] = {rf"manifest{SHARD}\.jsonl": grows_from(b'{"number":')}
+MANIFESTS: Mapping[str, Kind] = {rf"manifest{SHARD}\.jsonl": append_only_kind(b'{"number":')}
 ORIGINS = has_keys("began_at")
-OF_CASES = heads(rb"case,(?:.*,)?status,reason,seconds(?:,.*)?")
+OF_CASES = prefix_kind(rb"case,(?:.*,)?status,reason,seconds(?:,.*)?")
 SWEEP = FolderKind(
     what="a sweep",
     command="blocksim sweep FILE",
@@ -96,7 +96,7 @@ SWEEP = FolderKind(
     results={  # shards have files of their own
         rf"sweep{SHARD}\.csv": OF_CASES,
         **MANIFESTS,
-        rf"timings{SHARD}\.csv": grows_from(b"case,executor,seconds,host\n"),
+        rf"timings{SHARD}\.csv": append_only_kind(b"case,executor,seconds,host\n"),
         r"sweep\.json": ORIGINS,
     },
     leftover=re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*"),
@@ -246,7 +246,7 @@ def write_answer(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]],
     """Write the table of a study (heads first), and its answer into the summary. Raises OutputError."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
-    with replacing(path) as temporary:
+    with atomic_path(path) as temporary:
         temporary.write_bytes(text.getvalue().encode())
         sync_file(temporary)
         note_table(path, temporary, kind)

@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.kernels.common.arrays import REACHED
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation.ledger import energy_ledger, start_energy
-from blocksim.simulation.schemes import AnyScene, build_scene, measured_row, scheme_of
+from blocksim.simulation.schemes import AnyScene, build_scene, measure_row, scheme_of
 from blocksim.simulation.team import ALONE
 from blocksim.verification import closed_forms as forms
 from blocksim.world.build import arrays_of
@@ -110,7 +110,7 @@ class Simulation:
 
     def measured(self) -> NDArray[np.float64]:
         """Return the energies (J) of the scheme's ledger, the number of contacts and the largest overlap (m)."""
-        return measured_row(self.scene)
+        return measure_row(self.scene)
 
     @property
     def kinetic(self) -> float:

@@ -23,7 +23,7 @@ from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes import build_scene, ledger_names
 from blocksim.verification.case import Case, Row, Setting, absolute, at_least, count, relative
 from blocksim.verification.scene import Simulation
-from blocksim.world.systems.soils import connected
+from blocksim.world.systems.soils import connected_span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -461,7 +461,7 @@ def columns_of_rods(setting: Setting) -> Iterator[Row]:
         scene.to_time(1.0)
         ratio = TALL / place
         x, y = scene.points["x"], scene.points["y"]
-        front = connected(x, 2.0 * spacing)[1] + 0.5 * spacing
+        front = connected_span(x, 2.0 * spacing)[1] + 0.5 * spacing
         height = float(y[x < 2.0 * spacing].max()) + 0.5 * spacing
         left = 1.0 if ratio <= 0.65 else 1.0 / (1.42 * ratio ** (2.0 / 3.0))  # noqa: PLR2004 - of the source
         run_out = 3.25 * ratio**0.96 if ratio <= 1.5 else 3.80 * ratio**0.73  # noqa: PLR2004 - of the source

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError, OutputError, UnavailableError
-from blocksim.simulation.atomic import replacing, write_bytes
+from blocksim.simulation.atomic import atomic_path, write_bytes
 from blocksim.simulation.folder import NAME
 from blocksim.view import style
 from blocksim.view.arrows import (
@@ -166,7 +166,7 @@ def write_mp4(path: Path, pictures: Iterator[NDArray[np.uint8]], seconds: NDArra
     repeats = np.round(seconds * rate).astype(int)
     shown = zip(repeats, pictures, strict=True)
     repeated = (np.ascontiguousarray(picture) for repeat, picture in shown for _ in range(repeat))
-    with replacing(path) as temporary:
+    with atomic_path(path) as temporary:
         try:
             is_whole = encode(temporary, repeated, rate, int(repeats.sum()))
         except (OSError, RuntimeError):
@@ -365,7 +365,7 @@ class Animation:
         """Draw the fixed parts: title, axis, and the support unless it moves."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-        with style.styled_figure(*_even(self.page)) as figure, style.no_word_of_missing_letters():
+        with style.styled_figure(*_even(self.page)) as figure, style.silence_missing_glyphs():
             figure.set_dpi(DOTS_PER_INCH)
             self.canvas = Canvas(figure.add_axes(self.page.place), self.page.extent, self.page.points_per_mm)
             self._draw_still(figure, title)
@@ -402,7 +402,7 @@ class Animation:
         """Return the picture of one frame."""
         axes = self.canvas.axes
         there = set(axes.get_children())
-        with style.in_style(), style.no_word_of_missing_letters():
+        with style.in_style(), style.silence_missing_glyphs():
             self._draw(frame)
             moving = sorted((one for one in axes.get_children() if one not in there), key=lambda one: one.get_zorder())
             self.paper.restore_region(self.still)

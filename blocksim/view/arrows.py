@@ -11,7 +11,7 @@ from blocksim.scenario.models.loads import Force, Gravity, Horizontal, Moment, P
 from blocksim.scenario.start import NORMALS
 from blocksim.simulation.frames import Contacts, Rows, forces_on_a
 from blocksim.view import style
-from blocksim.view.run_data import MILLIMETRES, Acting, Extent, Floats, FramesLike, Indices, Support, turned
+from blocksim.view.run_data import MILLIMETRES, ActingLoad, Extent, Floats, FramesLike, Indices, Support, rotate_points
 from blocksim.view.scene import Canvas
 from blocksim.world.systems.blocks import are_removed
 
@@ -255,7 +255,7 @@ def length_in(extent: Extent) -> float:
 
 def with_room(extent: Extent, found: Outside, length: float) -> Extent:
     """Return an extent that also holds all arrows, but for what is below it."""
-    lines = [turned(one.lines(length), extent.tilt).reshape(-1, 2) for one in found.arrows if one.way.any()]
+    lines = [rotate_points(one.lines(length), extent.tilt).reshape(-1, 2) for one in found.arrows if one.way.any()]
     if not lines:
         return extent
     points = np.concatenate(lines)
@@ -300,7 +300,7 @@ class _Poses:
         return Arrows(kind, MILLIMETRES * (self.places[:, body, None] + arms), ways, pushes.astype(float))
 
 
-def _forces(poses: _Poses, loads: Sequence[Acting]) -> Iterator[Arrows]:
+def _forces(poses: _Poses, loads: Sequence[ActingLoad]) -> Iterator[Arrows]:
     for one in loads:
         if isinstance(one.load, Force):
             load = one.load
@@ -322,7 +322,7 @@ def _pressures(poses: _Poses, support: Support) -> Iterator[Arrows]:
             yield poses.arrows(PRESSURE, one.body, arms, _pressure(poses, one, arms, support.tilt)[..., None] * inwards)
 
 
-def _pressure(poses: _Poses, one: Acting, arms: Floats, tilt: float) -> Floats:
+def _pressure(poses: _Poses, one: ActingLoad, arms: Floats, tilt: float) -> Floats:
     """Return the pressures (Pa, (f, k)) at points of a face; water is deep below its level, against gravity."""
     load, factor = one.load, one.values(poses.time)[:, None]
     assert isinstance(load, Pressure)  # noqa: S101 - for the type checker
@@ -354,7 +354,7 @@ def _to_edge(ways: Floats, angle: Floats, half_x: Floats, half_y: Floats) -> Flo
     return np.asarray(ways * (reach / np.where(size > 0.0, size, np.inf))[..., None])
 
 
-def _moments(frames: FramesLike, poses: _Poses, loads: Sequence[Acting]) -> tuple[Turns | None, float]:
+def _moments(frames: FramesLike, poses: _Poses, loads: Sequence[ActingLoad]) -> tuple[Turns | None, float]:
     """Return round arrows, and the largest moment (N m)."""
     found = [(one, one.load) for one in loads if isinstance(one.load, Moment)]
     if not found:

@@ -29,7 +29,7 @@ from blocksim.view.run_data import (
     drawable_frames,
     extent_of,
     moments_at,
-    turned,
+    rotate_points,
 )
 from blocksim.view.scene import (
     TOP,
@@ -219,7 +219,7 @@ def _ranges(measured: MeasuredTable | None) -> dict[str, tuple[float, float, flo
 
 def _page_x(page: Page, places: Floats) -> Floats:
     """Return how far (points) places (mm, scene, (k, 2)) are from the panel's left end."""
-    return np.asarray((turned(places, page.extent.tilt)[:, 0] - page.extent.left) * page.points_per_mm)
+    return np.asarray((rotate_points(places, page.extent.tilt)[:, 0] - page.extent.left) * page.points_per_mm)
 
 
 def draw_label(axes: "Axes", label: Label, top: float) -> None:

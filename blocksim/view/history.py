@@ -33,9 +33,9 @@ from blocksim.view.time_panels import (
     WIDTH,
     Choice,
     Entries,
+    FramesInView,
     HistoryFrames,
     Motion,
-    Seen,
     TimePanel,
     blocks_named,
     draw_contacts,
@@ -111,7 +111,7 @@ class _Drawing:
 
     def motion(self, name: str) -> Motion:
         """Return one quantity of all blocks."""
-        return MOTIONS[name](Seen(self.frames, self.chosen, self.support, self.relative))
+        return MOTIONS[name](FramesInView(self.frames, self.chosen, self.support, self.relative))
 
 
 def draw_history(
@@ -129,12 +129,12 @@ def draw_history(
     """
     path = Path(path)
     style.picture_suffix(path)
-    with drawn_history(frames, title, measured, support, **asked) as (figure, _):
+    with draw_history_page(frames, title, measured, support, **asked) as (figure, _):
         style.save_figure(figure, path)
 
 
 @contextmanager
-def drawn_history(
+def draw_history_page(
     frames: HistoryLike,
     title: str | None = None,
     measured: MeasuredTable | None = None,

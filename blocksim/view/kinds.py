@@ -15,7 +15,7 @@ from blocksim.view.strip import draw_profile, draw_strip
 from blocksim.view.style import OWN, Paper
 from blocksim.view.sweeps import lines, outcome_map
 from blocksim.view.sweeps.data import SweepData
-from blocksim.view.sweeps.scatter import drawn_histogram, drawn_matrix
+from blocksim.view.sweeps.scatter import draw_histogram, draw_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -55,15 +55,15 @@ class Kind:
 
 @contextmanager
 def _map(sweep: SweepData, paper: Paper) -> "Iterator[Figure]":
-    with outcome_map.drawn(sweep, paper) as (figure, _):
+    with outcome_map.draw_map(sweep, paper) as (figure, _):
         yield figure
 
 
 SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
-    "lines": Kind(lines.refusal, lines.suits, lines.drawn),
+    "lines": Kind(lines.refusal, lines.suits, lines.draw_lines),
     "map": Kind(outcome_map.refusal, outcome_map.suits, _map),
-    "matrix": Kind(lambda _: "", lambda sweep: len(sweep.inputs) > 1, drawn_matrix),
-    "histogram": Kind(lambda _: "", lambda _: True, drawn_histogram),
+    "matrix": Kind(lambda _: "", lambda sweep: len(sweep.inputs) > 1, draw_matrix),
+    "histogram": Kind(lambda _: "", lambda _: True, draw_histogram),
 }
 
 

@@ -21,7 +21,7 @@ from blocksim.world.systems.system import Track
 _Floats = NDArray[np.float64]
 
 
-class Acting(NamedTuple):
+class ActingLoad(NamedTuple):
     """A load, the number of its body (-1: all free ones), its factor or tilt (rad) over time, and when (s) it ends."""
 
     load: AnyLoad
@@ -36,7 +36,7 @@ class Acting(NamedTuple):
         return np.where(times < self.end, values[piece] + rates[piece] * (times - starts[piece]), 0.0)
 
 
-def acting_loads(scenario: Scenario, event_times: Sequence[float]) -> tuple[Acting, ...]:
+def acting_loads(scenario: Scenario, event_times: Sequence[float]) -> tuple[ActingLoad, ...]:
     """Return the loads of a scenario whose events happen at these times (s)."""
     numbers = {body.name: number for number, body in enumerate(place_bodies(scenario))} if scenario.loads else {}
     tilt = scenario.ground.tilt
@@ -45,7 +45,7 @@ def acting_loads(scenario: Scenario, event_times: Sequence[float]) -> tuple[Acti
         stretches = load.stretches_from(tilt) if isinstance(load, Gravity) else load.stretches()
         ends = (at for event, at in zip(scenario.events, event_times, strict=True) if load.name in event.unload)
         body = numbers[load.body] if isinstance(load, OnBody) else -1
-        found.append(Acting(load, body, stretches, min(ends, default=math.inf)))
+        found.append(ActingLoad(load, body, stretches, min(ends, default=math.inf)))
     return tuple(found)
 
 
@@ -224,7 +224,7 @@ class Support:
     direction: tuple[float, float] = (1.0, 0.0)
     motion: MotionPieces | None = None
     weight: float = 0.0
-    loads: tuple[Acting, ...] = ()
+    loads: tuple[ActingLoad, ...] = ()
 
     @property
     def way(self) -> str:
@@ -370,7 +370,7 @@ def extent_of(
     reached = _reached(frames, chosen, support)
     if blocks is not None:
         reached = reached[:, blocks]
-    others = [turned(outlines_of(one, chosen), support.tilt).reshape(-1, 2) for one in others_of(frames)]
+    others = [rotate_points(outlines_of(one, chosen), support.tilt).reshape(-1, 2) for one in others_of(frames)]
     reached = np.concatenate([reached.reshape(-1, 2), *others])
     low, high = reached.min(axis=0), reached.max(axis=0)
     shifts = _extreme_offsets(frames, chosen, support)
@@ -412,7 +412,7 @@ def together(frames: FramesLike, chosen: Indices, support: Support | None = None
     return np.asarray(stays | np.array(support.fixed or (False,) * count, dtype=bool))
 
 
-def turned(points: Floats, angle: float) -> Floats:
+def rotate_points(points: Floats, angle: float) -> Floats:
     """Return points (..., 2) turned counter-clockwise about the origin by an angle (rad)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.asarray(points @ np.array([[cosine, sine], [-sine, cosine]]))
@@ -435,7 +435,7 @@ def _reached(frames: FramesLike, chosen: Indices, support: Support) -> Floats:
     centres = np.stack([x, frames.y[chosen]], axis=-1)
     offsets = support.offset(frames.time[chosen])[:, None]
     below = np.stack([x, support.height(x - offsets[..., 0]) + offsets[..., 1]], axis=-1)
-    centres, below = turned(centres, support.tilt), turned(below, support.tilt)
+    centres, below = rotate_points(centres, support.tilt), rotate_points(below, support.tilt)
     angle = frames.angle[chosen] + support.tilt
     if frames.outlines is not None:
         return np.concatenate([*boxes_around(frames.outlines, centres[..., 0], centres[..., 1], angle), below])
@@ -457,10 +457,10 @@ def _near(support: Support, shifts: Floats, low: Floats, high: Floats) -> Floats
     """Return the corners of the ground and the ends of the walls' parts (m, picture) that lie within a box."""
     found = [np.zeros((0, 2))]
     for shift in shifts:
-        corners = turned(support.corners() + shift, support.tilt)
+        corners = rotate_points(support.corners() + shift, support.tilt)
         found.append(corners[((low <= corners) & (corners <= high)).all(axis=1)])
         for wall in support.walls:
-            line = turned(np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) + shift, support.tilt)
+            line = rotate_points(np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) + shift, support.tilt)
             found.append(parts_within(line, low, high).reshape(-1, 2))
     return np.concatenate(found)
 
@@ -468,5 +468,5 @@ def _near(support: Support, shifts: Floats, low: Floats, high: Floats) -> Floats
 def _lowest_ground(support: Support, shifts: Floats, low: Floats, high: Floats) -> float:
     """Return the least height (m, scene) of the ground within a box of the picture."""
     line = support.line(ENDLESS)
-    parts = [parts_within(turned(line + shift, support.tilt), low, high).reshape(-1, 2) for shift in shifts]
-    return float(turned(np.concatenate(parts), -support.tilt)[:, 1].min())
+    parts = [parts_within(rotate_points(line + shift, support.tilt), low, high).reshape(-1, 2) for shift in shifts]
+    return float(rotate_points(np.concatenate(parts), -support.tilt)[:, 1].min())

@@ -22,8 +22,8 @@ from blocksim.view.run_data import (
     others_of,
     outlines_of,
     parts_within,
+    rotate_points,
     shortest_sides,
-    turned,
 )
 from blocksim.world.systems.blocks import are_removed, placed_points
 from blocksim.world.systems.system import Track
@@ -65,7 +65,7 @@ class Canvas:
     def box(self) -> tuple[Floats, Floats]:
         """Return lower left and upper right (mm, scene) of all that can be seen, and a little more."""
         sides, ends = (self.extent.left, self.extent.right), (self.extent.lowest, self.extent.top)
-        corners = turned(np.array([[x, y] for x in sides for y in ends]), -self.extent.tilt)
+        corners = rotate_points(np.array([[x, y] for x in sides for y in ends]), -self.extent.tilt)
         more = 0.1 * (self.extent.width + self.extent.height)
         low, high = corners.min(axis=0) - more, corners.max(axis=0) + more
         return np.array([low[0], self.floor]), high

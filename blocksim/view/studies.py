@@ -36,7 +36,9 @@ _NARROWEST, _LOWEST = 1.8, 1.0  # inches, of the panel on a page whose size was 
 
 
 @contextmanager
-def sheet(path: Path | str, title: str | None, notes: Sequence[str], paper: Paper, left: float) -> "Iterator[Axes]":
+def open_study_figure(
+    path: Path | str, title: str | None, notes: Sequence[str], paper: Paper, left: float
+) -> "Iterator[Axes]":
     """Give the panel, `left` inches from the edge; then write the picture as PNG, SVG or PDF.
 
     The same input gives the same bytes. Raises InvalidInputError for an unknown picture format or too small a page,
@@ -171,7 +173,7 @@ class LimitCurve:
     beside: tuple[Series, ...] = ()
 
 
-def joined(curve: LimitCurve) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+def join_brackets(curve: LimitCurve) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """Return the lines between middles of brackets: of neighbours with as many limits of the same kinds."""
     lines = []
     for (left, here), (right, there) in pairwise(curve.points):
@@ -186,8 +188,8 @@ def _middle(one: Bracket) -> float:
 
 def draw_limit_curve(curve: LimitCurve, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
     """Draw the picture and write it; raises as `sheet`."""
-    with sheet(path, title, curve.notes, paper, _LEFT_LIMIT_CURVE) as axes:
-        for start, end in joined(curve):
+    with open_study_figure(path, title, curve.notes, paper, _LEFT_LIMIT_CURVE) as axes:
+        for start, end in join_brackets(curve):
             axes.plot(*zip(start, end, strict=True), color=LINE_COLOUR, linewidth=1.0, zorder=2)
         _draw_others(axes, curve.beside)
         _draw_brackets(axes, [(x, one) for x, found in curve.points for one in found])
@@ -270,7 +272,7 @@ def places(x: Floats) -> Floats:
 
 def draw_fragility(found: Fragility, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
     """Draw the picture and write it; raises as `sheet`."""
-    with sheet(path, title, found.notes, paper, _LEFT_FRAGILITY) as axes:
+    with open_study_figure(path, title, found.notes, paper, _LEFT_FRAGILITY) as axes:
         band = found.band
         if band is not None:
             axes.fill_between(band.x, band.low, band.high, color=CURVE_COLOUR, alpha=0.18, linewidth=0.0)

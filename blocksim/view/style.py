@@ -128,13 +128,13 @@ def save_figure(figure: "Figure", path: Path) -> None:
 def figure_bytes(figure: "Figure", suffix: str) -> bytes:
     """Return the figure in the format of a suffix, one of those that are written."""
     buffer = BytesIO()
-    with no_word_of_missing_letters():
+    with silence_missing_glyphs():
         figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
     return buffer.getvalue()
 
 
 @contextmanager
-def no_word_of_missing_letters() -> Iterator[None]:
+def silence_missing_glyphs() -> Iterator[None]:
     """Draw letters that the font lacks as boxes and do not warn: the reader sees it."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
@@ -156,7 +156,7 @@ def width_of(text: str, size: float, *, bold: bool = False) -> float:
     from matplotlib.textpath import text_to_path
 
     font = FontProperties(family=FONT, size=size, weight="bold" if bold else "normal")
-    with no_word_of_missing_letters():
+    with silence_missing_glyphs():
         return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0])
 
 

@@ -240,7 +240,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Seen:
+class FramesInView:
     """Chosen frames as seen from where the ground was at the start, or from the moving ground."""
 
     frames: HistoryFrames
@@ -270,7 +270,7 @@ class Seen:
         return np.asarray(MILLIMETRES * (velocities - carried[:, axis, None] * bool(self.from_ground)))
 
 
-MOTIONS: dict[str, Callable[[Seen], Motion]] = {
+MOTIONS: dict[str, Callable[[FramesInView], Motion]] = {
     "x": lambda seen: Motion(f"x{seen.from_ground} (mm)", seen.place(0), "" if seen.from_ground else "x"),
     "y": lambda seen: Motion(f"y{seen.from_ground} (mm)", seen.place(1), "" if seen.from_ground else "y"),
     "dx": lambda seen: Motion(f"Δx{seen.from_ground} (mm)", seen.displacement(0)),
@@ -285,10 +285,10 @@ MOTIONS: dict[str, Callable[[Seen], Motion]] = {
 }
 
 
-def _shown(output: Output) -> Callable[[Seen], Motion]:
+def _shown(output: Output) -> Callable[[FramesInView], Motion]:
     """Return the panel of what blocks show beside their motion."""
 
-    def motion(seen: Seen) -> Motion:
+    def motion(seen: FramesInView) -> Motion:
         values = output.of(seen.frames.tracks[0].some(seen.chosen))
         factor, unit = unit_for(float(np.abs(values).max(initial=0.0)), output.unit)
         return Motion(f"{output.meaning} ({unit})", factor * values)

@@ -436,9 +436,9 @@ def _fill_slab(record: Record, segment: PlacedSegment, thickness: float) -> None
 STANDSTILL = zeros(1, MOTION_PIECE)
 
 
-def all_moved_records(bodies: Records, outlines: Outlines) -> Records:
+def stacked_driven_records(bodies: Records, outlines: Outlines) -> Records:
     """Return what moves with the supports of m scenes, then what is driven, (m, f)."""
-    supports, driven = moved_records(bodies), [outline.drives.driven for outline in outlines]
+    supports, driven = driven_records(bodies), [outline.drives.driven for outline in outlines]
     count = supports.shape[-1]
     records = zeros((len(outlines), count + driven[0].size), MOVED)
     records[:, :count] = supports
@@ -447,7 +447,7 @@ def all_moved_records(bodies: Records, outlines: Outlines) -> Records:
     return records
 
 
-def moved_records(bodies: Records) -> Records:
+def driven_records(bodies: Records) -> Records:
     """Return where all bodies (..., n + 1) that move with the support start; in every scene there are equally many."""
     is_moved = bodies["is_moved"] == SUPPORT
     numbers = np.nonzero(is_moved)[-1].reshape(*is_moved.shape[:-1], -1)

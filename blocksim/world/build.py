@@ -49,19 +49,19 @@ from blocksim.scenario.motion import motion_direction
 from blocksim.world.bodies import (
     Outline,
     Outlines,
-    all_moved_records,
     body_records,
     free_masses,
     outline_of,
     place_particles,
     slots_of_a_pair,
+    stacked_driven_records,
 )
 from blocksim.world.forcing import stack_loads
 from blocksim.world.interactions import interaction_tables
 from blocksim.world.memory import Size, refuse_if_too_large, scene_size
 from blocksim.world.step import MOST_STEPS, Bounds, bounds_of, choose_approach, choose_skin, choose_step
 from blocksim.world.systems import acts_of
-from blocksim.world.systems.system import Present
+from blocksim.world.systems.system import SystemInScene
 
 MOST_BYTES = 1 << 26  # of a stack of more than one scene
 MOST_LARGE = 64  # bodies that are checked one by one, outside the grid of the broad phase
@@ -371,7 +371,7 @@ def assemble_world(parts: Parts, controls: Records, **arrays: Any) -> World:
         ledger=zeros((members, count // GROUP + 1), LEDGER),
         action=zeros((members, 1), ACTION),
         matrices=numbers((members, 8, 3, 3), np.float64),
-        moved=all_moved_records(bodies, parts.outlines),
+        moved=stacked_driven_records(bodies, parts.outlines),
         motion=join_records([outline.motion for outline in parts.outlines]),
         controls=controls,
         clock=zeros((members, 1), CLOCK),
@@ -506,7 +506,7 @@ def _controls(scenario: Scenario, stride: Stride) -> dict[str, float]:
     }
 
 
-def couple(scenario: Scenario, world: Any, others: tuple[Present, ...]) -> Coupled:
+def couple(scenario: Scenario, world: Any, others: tuple[SystemInScene, ...]) -> Coupled:
     """Return a world with further systems at time zero. Raises InvalidInputError for a pair that is not modelled."""
     systems = tuple(present.system for present in others)
     acts = tuple(Act(*one) for one in acts_of(systems))

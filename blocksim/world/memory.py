@@ -13,7 +13,7 @@ from blocksim.kernels.common.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PA
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, CONSTRAINT, GROUP, IMPACT, KEPT, LISTED, PART, STATE, TALLY
 from blocksim.world.free_memory import available_bytes, readable
-from blocksim.world.systems.system import Present
+from blocksim.world.systems.system import SystemInScene
 
 LISTS = 2  # of candidate pairs: the present one and the one being built
 OPERATORS = 2  # of a pair: along the normal and along the tangent
@@ -87,7 +87,7 @@ def chunk_rows(elements: int) -> int:
     return min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(elements, 1)))
 
 
-def run_bytes(bodies: int, frames: int, contacts: int = 0, others: Sequence[Present] = ()) -> int:
+def run_bytes(bodies: int, frames: int, contacts: int = 0, others: Sequence[SystemInScene] = ()) -> int:
     """Return the bytes of run.h5 with so many frames, the room of the last chunk included, and contacts in each."""
     rows = chunk_rows(max([bodies, *(one.count for one in others)]))
     whole = -(-frames // rows) * rows

@@ -78,12 +78,12 @@ def velocity_tolerance(scenario: Scenario, blocks: int) -> float:
     time = stepping_of(scenario)
     if time.velocity_tolerance is not None:
         return time.velocity_tolerance
-    if blocks == 1 or (blocks < CROWD and is_anything_moved(scenario)):
+    if blocks == 1 or (blocks < CROWD and has_driven_parts(scenario)):
         return FINEST
     return FINE if blocks < CROWD else COARSE
 
 
-def is_anything_moved(scenario: Scenario) -> bool:
+def has_driven_parts(scenario: Scenario) -> bool:
     """Return True if the supports move, or any body as prescribed."""
     return scenario.motion is not None or any(body.motion is not None for body in scenario.bodies)
 
@@ -133,7 +133,7 @@ def has_impacts_in_rounds(
     return restitution > 0.0 and (free <= ALONE or has_row(placed()))
 
 
-def may_rebound_in_rounds(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> bool:
+def needs_repeated_impacts(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> bool:
     """Return the same of a scenario before it is built; where not all pairs meet it may be True in vain."""
     contact = scenario.contact
     pairs = [pair.restitution or 0.0 for row in scenario.pairs.values() for pair in row.values()]

@@ -239,7 +239,7 @@ def _crush(crushed: list[float], pair: tuple[int, int | None], overlap: float, b
     crushed[upper] = max(crushed[upper], below + own)
 
 
-def crushed_now(scene: Nonsmooth) -> float:
+def current_crush_depth(scene: Nonsmooth) -> float:
     """Return how far (m) a corner has sunk into light blocks that carry heavy ones, where contacts are at rest.
 
     The same as `Sag.crushed`, measured: also where blocks have come to lie on others.

@@ -126,7 +126,7 @@ def bounds_of(bodies: NDArray[np.record], blocks: int, shapes: Sequence[Shapes |
     columns_of_kinds = zip(*(all_blocks[name].tolist() for name in Kind._fields), strict=True)
     kinds = [frozenset(map(Kind, *one)) for one in columns_of_kinds]
     standing = [
-        one if shape is None else standing_of(bodies, shape)
+        one if shape is None else standing_kinds(bodies, shape)
         for one, bodies, shape in zip(kinds, all_blocks, shapes, strict=True)
     ]
     grounds = bodies["contact_class"][:, blocks:].tolist()
@@ -137,7 +137,7 @@ def bounds_of(bodies: NDArray[np.record], blocks: int, shapes: Sequence[Shapes |
     ]
 
 
-def standing_of(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[Kind]:
+def standing_kinds(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[Kind]:
     """Return the blocks of a scene as they stand, a polygon on each of its faces.
 
     In place of `half_x` is how far along the face a corner is from the foot of the centroid, at most, and in place of
@@ -239,7 +239,7 @@ class Load(NamedTuple):
     weight: float  # N, of all free bodies
 
 
-def steepest(law: str, stiffness: float, inverse_mass: float, load: Load) -> float:
+def max_tangent_stiffness(law: str, stiffness: float, inverse_mass: float, load: Load) -> float:
     """Return the greatest slope (N/m) of the normal force that a contact of two bodies is expected to reach.
 
     `stiffness` as in the interaction table; `inverse_mass` (1/kg) of both bodies together.
@@ -345,7 +345,7 @@ def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str
 
     def stiffness(i: int, j: int, inverse_mass: float) -> ContactStiffness:
         row = table[i][j]
-        normal = steepest(law, row.normal_stiffness, inverse_mass, load)
+        normal = max_tangent_stiffness(law, row.normal_stiffness, inverse_mass, load)
         return ContactStiffness(normal, normal * row.shear_ratio, max(row.normal_damping, row.shear_damping))
 
     grounded = [

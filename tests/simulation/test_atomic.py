@@ -60,7 +60,7 @@ def test_a_file_keeps_its_permissions_when_it_is_replaced(tmp_path: Path, mode: 
     path = tmp_path / "a.csv"
     path.write_text("old")
     path.chmod(mode)
-    with atomic.replacing(path) as temporary:
+    with atomic.atomic_path(path) as temporary:
         assert mode_of(temporary) | 0o200 == mode | 0o200  # what may not be read is at no time there to be read
         temporary.write_text("new")
     assert (path.read_text(), mode_of(path)) == ("new", mode)
@@ -113,7 +113,7 @@ def test_folder_that_cannot_be_brought_to_the_disk_is_no_failure(
 
 def test_a_file_takes_the_place_of_the_older_one_once_it_is_whole(tmp_path: Path) -> None:
     (tmp_path / "a.mp4").write_text("old")
-    with atomic.replacing(tmp_path / "a.mp4") as temporary:
+    with atomic.atomic_path(tmp_path / "a.mp4") as temporary:
         assert temporary.suffix == ".mp4"  # some programs choose the format by it
         temporary.write_text("new")
         assert (tmp_path / "a.mp4").read_text() == "old"
@@ -129,7 +129,7 @@ def test_a_file_that_is_not_finished_leaves_the_older_one(
     (tmp_path / "a.mp4").write_text("old")
 
     def begin() -> None:
-        with atomic.replacing(tmp_path / "a.mp4") as temporary:
+        with atomic.atomic_path(tmp_path / "a.mp4") as temporary:
             temporary.write_text("half")
             raise error
 

@@ -5,7 +5,7 @@ import pytest
 
 from blocksim.scenario import Sweep
 from blocksim.scenario.models.study import Normal, Uniform
-from blocksim.study.calibrate_plan import Prior, Scatter, about, prior_of
+from blocksim.study.calibrate_plan import Prior, Scatter, centre_on_fit, prior_of
 from blocksim.study.rows import si_number
 
 FRICTION = Prior("friction.block_block.kinetic", 0.17, 0.31)
@@ -100,7 +100,7 @@ def test_fitted_key_written_with_other_quotes_is_the_same_key() -> None:
 def test_scatter_is_moved_to_the_fitted_value(
     distribution: Normal | Uniform, drawn: object, fitted: object, expected: object
 ) -> None:
-    moved = about(distribution, drawn, fitted)
+    moved = centre_on_fit(distribution, drawn, fitted)
     if isinstance(expected, str):
         assert isinstance(moved, str)
         assert float(moved.removesuffix(" rad")) == pytest.approx(0.32)

@@ -12,7 +12,7 @@ from blocksim.study.limit import limit_curve
 from blocksim.study.limit_answer import CurveAnswer
 from blocksim.study.pictures import plot
 from blocksim.study.reporting import report
-from blocksim.view.studies import Bracket, LimitCurve, Series, joined
+from blocksim.view.studies import Bracket, LimitCurve, Series, join_brackets
 from tests.study.test_limit import TILT, block_on_a_slope
 
 SIZE = (0.05, 0.1)  # m: topples at atan 0.5
@@ -111,4 +111,4 @@ def test_what_is_no_list_of_numbers_is_refused_before_anything_is_written(
 def test_only_neighbours_with_the_same_changes_are_joined() -> None:
     one, two = Bracket(1.0, 3.0, "stands", "falls"), Bracket(4.0, 6.0, "falls", "stands")
     points = [(0.0, [one]), (1.0, [one]), (2.0, [one, two]), (3.0, []), (4.0, [two])]
-    assert joined(LimitCurve("", "", points)) == [((0.0, 2.0), (1.0, 2.0))]
+    assert join_brackets(LimitCurve("", "", points)) == [((0.0, 2.0), (1.0, 2.0))]

@@ -11,7 +11,7 @@ from blocksim.study.fragility import FragilityAnswer, fragility
 from blocksim.study.limit import limit
 from blocksim.study.pictures import plot
 from blocksim.study.reporting import report
-from blocksim.study.stored_run import stored_run
+from blocksim.study.stored_run import load_stored_run
 from tests.study.test_fragility import FRICTION, SLIDES, SLOPE, TILTS
 from tests.study.test_limit import SQUAT, TILT, block_on_a_slope
 
@@ -78,7 +78,7 @@ def test_a_limit_is_drawn_as_its_mechanism_beside_the_last_that_stands(
     assert found.plan is not None
     assert set(found.kept) == {change.low, change.high}
     for value, name in found.kept.items():
-        run = stored_run(Path("found/cases") / name)
+        run = load_stored_run(Path("found/cases") / name)
         release = "always" if value == change.high else "at rest"  # it falls before time zero
         kept = {"output.contacts": True, "start.release": release, "time.stop_at_rest": value != change.high}
         assert run.scenario == replace_values(found.plan.scenario_at(value), kept)

@@ -20,7 +20,7 @@ from blocksim.scenario.geometry import area_of, centroid
 from blocksim.simulation import simulate
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit import limit
-from blocksim.study.stored_run import stored_run
+from blocksim.study.stored_run import load_stored_run
 from blocksim.study.sweep_folder import CASES
 from blocksim.verification.arches import least_thickness
 from tests.simulation.conftest import SCENARIOS
@@ -152,7 +152,7 @@ def test_limit_on_springs_finds_the_least_thickness_and_what_stands_above_it(tmp
     (change,) = found.limits
     assert (change.below, change.above) == (Verdict.FALLS, Verdict.STANDS)
     assert 0.99 * least < change.low < change.high < 1.01 * least
-    stands = stored_run(found.folder / CASES / found.kept[change.high])
+    stands = load_stored_run(found.folder / CASES / found.kept[change.high])
     assert_same(joints_of(stands.frames, 27, 0.35), expected)
 
 

@@ -14,7 +14,7 @@ def caught(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     figures: list[Figure] = []
 
     def keep(figure: Figure, _: Path) -> None:
-        with style.no_word_of_missing_letters():
+        with style.silence_missing_glyphs():
             figure.draw_without_rendering()
         figures.append(figure)
 

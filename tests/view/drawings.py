@@ -18,10 +18,10 @@ from blocksim.view.history import draw_history
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import by_speed, by_turn
-from blocksim.view.run_data import Acting, Support
+from blocksim.view.run_data import ActingLoad, Support
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, draw_tornado
-from blocksim.view.sweeps.lines import Series, drawn_series
+from blocksim.view.sweeps.lines import Series, draw_series
 from blocksim.view.time_panels import Choice
 from tests.bench.peers.work_precision import Curve, draw_work_precision
 from tests.bench.peers.work_precision import Panel as Work
@@ -48,10 +48,10 @@ LEGEND = ("total", "alone")
 RISING = (Stretch(0.0, 0.0, 2.0), Stretch(0.5, 1.0, 0.0))
 LOADED = Support(
     loads=(
-        Acting(Force(kind="force", body="1", magnitude=-2e3, point=(0.016, 0.0)), 0, RISING, np.inf),
-        Acting(Moment(kind="moment", body="2", magnitude=0.5), 1, RISING, np.inf),
-        Acting(Pressure(kind="pressure", body="3", face="top", magnitude=5e6), 2, RISING, 0.5),
-        Acting(Horizontal(kind="horizontal", magnitude=0.25), -1, RISING, np.inf),
+        ActingLoad(Force(kind="force", body="1", magnitude=-2e3, point=(0.016, 0.0)), 0, RISING, np.inf),
+        ActingLoad(Moment(kind="moment", body="2", magnitude=0.5), 1, RISING, np.inf),
+        ActingLoad(Pressure(kind="pressure", body="3", face="top", magnitude=5e6), 2, RISING, 0.5),
+        ActingLoad(Horizontal(kind="horizontal", magnitude=0.25), -1, RISING, np.inf),
     ),
     motion=PIECES,
 )
@@ -114,7 +114,7 @@ def of_sweep(kind: str, sweep: SweepData) -> Drawing:
 
 def of_series(*values: Any, **more: Any) -> Drawing:
     def draw(path: Path, paper: Paper) -> None:
-        with drawn_series(*values, paper=paper, **more) as figure:
+        with draw_series(*values, paper=paper, **more) as figure:
             style.save_figure(figure, path)
 
     return draw

@@ -7,7 +7,7 @@ from matplotlib.patches import PathPatch
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedSegment
-from blocksim.view.run_data import Extent, Support, turned
+from blocksim.view.run_data import Extent, Support, rotate_points
 from blocksim.view.scene import (
     GROUND_THICKNESS,
     WALL_THICKNESS,
@@ -156,9 +156,9 @@ def test_tilted_ground_is_turned_in_the_picture_and_numbered_along_itself(tilt: 
     draw_support(drawn, Support(tilt=tilt), NOWHERE)
     turn = drawn.scene - drawn.axes.transData
     for point in ([0.0, 0.0], [70.0, -3.0]):
-        assert turn.transform(point) == pytest.approx(turned(np.array(point), tilt))
+        assert turn.transform(point) == pytest.approx(rotate_points(np.array(point), tilt))
     assert drawn.axes.patches[0].get_transform().transform([70.0, 0.0]) == pytest.approx(
-        drawn.axes.transData.transform(turned(np.array([70.0, 0.0]), tilt))
+        drawn.axes.transData.transform(rotate_points(np.array([70.0, 0.0]), tilt))
     )
     draw_ruler(drawn, depth=10.0)
     numbers = [(text.get_text(), text.get_position()[0]) for text in drawn.axes.texts]

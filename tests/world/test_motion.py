@@ -10,7 +10,7 @@ import pytest
 
 from blocksim.kernels.common.supports import acceleration, displacement, piece_at
 from blocksim.verification.scene import scenario_of
-from blocksim.world.bodies import motion_records, moved_records
+from blocksim.world.bodies import driven_records, motion_records
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def test_pieces_join_without_jump_of_place_or_velocity() -> None:
 def test_all_that_moves_with_the_support_is_listed_where_it_starts() -> None:
     bodies = [{"y": 0.5, "fixed": True}, {"x": 0.2, "y": 0.5}, {"x": 0.4, "y": 0.7, "fixed": True}]
     world = build_world(scenario_of(bodies, motion=SHAKING, time={"end": 2.0}))
-    for moved in (world.moved, moved_records(world.bodies)):
+    for moved in (world.moved, driven_records(world.bodies)):
         assert moved.body.tolist() == [0, 2, 3]
         assert moved.x.tolist() == [0.0, 0.4, 0.0]
         assert moved.y.tolist() == [0.5, 0.7, 0.0]

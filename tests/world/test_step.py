@@ -19,7 +19,7 @@ from blocksim.world.step import (
     UncountableStepsError,
     bounds_of,
     expected_load,
-    steepest,
+    max_tangent_stiffness,
 )
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def test_no_contact_becomes_stiffer_than_the_step_expects(body: Mapping[str, obj
     world, block = scene.world, scene.bodies[0]
     stiffness = float(world.interactions[1, 0].normal_stiffness)
     load = load_of(body, contact={"law": "hertz-mindlin"})
-    expected = steepest("hertz-mindlin", stiffness, float(block.inverse_mass), load)
+    expected = max_tangent_stiffness("hertz-mindlin", stiffness, float(block.inverse_mass), load)
     deepest = 0.0
     while scene.time < 0.25:
         scene.to_step(scene.steps + 5)
@@ -92,15 +92,15 @@ def test_no_contact_becomes_stiffer_than_the_step_expects(body: Mapping[str, obj
 def test_contact_under_the_weight_of_everything_is_not_stiffer_than_expected() -> None:
     load = Load(0.0, 100.0)
     stiffness = 1e9
-    slope = steepest("hertz-mindlin", stiffness, 10.0, load)
+    slope = max_tangent_stiffness("hertz-mindlin", stiffness, 10.0, load)
     depth = (slope / (1.5 * stiffness)) ** 2
     assert stiffness * depth**1.5 == pytest.approx(100.0)
 
 
 def test_linear_contacts_and_fixed_pairs_do_not_stiffen() -> None:
     load = Load(10.0, 1e3)
-    assert steepest("linear", 7.0, 10.0, load) == 7.0
-    assert steepest("hertz-mindlin", 7.0, 0.0, load) == 7.0
+    assert max_tangent_stiffness("linear", 7.0, 10.0, load) == 7.0
+    assert max_tangent_stiffness("hertz-mindlin", 7.0, 0.0, load) == 7.0
 
 
 @pytest.mark.parametrize("change", [{"velocity": [0.0, -20.0]}, {"y": 5.0}, {"spin": 500.0}])

@@ -40,7 +40,7 @@ class Table(BaseModel):
 POSITIVE_TIME = Quantity(TIME, above=0.0)
 
 
-class Checked:
+class FieldReader:
     """What annotations of a field have in common: they read the value of the file before pydantic does."""
 
     def read(self, value: object) -> object:
@@ -53,7 +53,7 @@ class Checked:
 
 
 @dataclass(frozen=True)
-class OneOf(Checked):
+class OneOf(FieldReader):
     """Annotation of a literal field: the words that are available, and those that are planned."""
 
     available: tuple[str | int, ...]
@@ -77,7 +77,7 @@ class OneOf(Checked):
 
 
 @dataclass(frozen=True)
-class TimeOr(Checked):
+class TimeOr(FieldReader):
     """Annotation of a time above 0 (s) or one word; `what` it is stands in messages."""
 
     word: str
@@ -97,7 +97,7 @@ class TimeOr(Checked):
 
 
 @dataclass(frozen=True)
-class Whole(Checked):
+class Whole(FieldReader):
     """Annotation of a whole number in a range."""
 
     least: int

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from blocksim.scenario.models.base import by_kind
-from blocksim.scenario.structures.base import MAX_BLOCKS, Pose, Shaped, Structure, UnfitError
+from blocksim.scenario.structures.base import MAX_BLOCKS, PolygonStructure, Pose, Structure, UnfitError
 from blocksim.scenario.structures.cells import Arch, Column, Rubble, Voronoi
 from blocksim.scenario.structures.masonry import BlockWall, Dominoes, Grid, Pyramid, Stack, Staircase
 from blocksim.scenario.structures.polygons import Polygons
@@ -28,11 +28,11 @@ __all__ = [
     "Column",
     "Dominoes",
     "Grid",
+    "PolygonStructure",
     "Polygons",
     "Pose",
     "Pyramid",
     "Rubble",
-    "Shaped",
     "Stack",
     "Staircase",
     "Structure",

@@ -128,7 +128,7 @@ class Cell(NamedTuple):
     name: str | None = None  # None: its number
 
 
-class Shaped(Structure):
+class PolygonStructure(Structure):
     """A structure that shapes its blocks; its `block` has a depth and a material only.
 
     `left` and `bottom` are those of the box around all blocks.

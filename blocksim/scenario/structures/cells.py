@@ -12,7 +12,7 @@ from blocksim.scenario import units as q
 from blocksim.scenario.geometry import Corner, clean_cell, relax_points, voronoi
 from blocksim.scenario.models.base import Whole, require_one
 from blocksim.scenario.models.geometry import Point
-from blocksim.scenario.structures.base import Cell, Floats, Seed, Shaped, UnfitError, draws
+from blocksim.scenario.structures.base import Cell, Floats, PolygonStructure, Seed, UnfitError, draws
 
 MOST_VOUSSOIRS = 1000
 MOST_TURN = 0.9 * math.pi
@@ -20,7 +20,7 @@ ABUTMENT = 2.0
 """Width of an abutment in thicknesses of the arch; it is half as deep behind its joint."""
 
 
-class Arch(Shaped):
+class Arch(PolygonStructure):
     """Voussoirs between radial joints, from the left springing to the right one, then two fixed abutments.
 
     Inner and outer faces are straight, with their ends on the circles of intrados and extrados. Abutments are
@@ -82,7 +82,7 @@ def _at(radius: float, angle: float) -> Corner:
 MOST_DRUMS = 1000
 
 
-class Column(Shaped):
+class Column(PolygonStructure):
     """Drums of equal height one above the other, their sides on straight lines from the lower to the upper width."""
 
     kind: Literal["column"] = Field(description="kind of structure")
@@ -111,7 +111,7 @@ LEAST_EDGE, LEAST_WIDTH = 0.02, 0.1
 """Shortest edge of a cell and its least width by default, in sides of a square of the mean area."""
 
 
-class Voronoi(Shaped):
+class Voronoi(PolygonStructure):
     """Cells of random points in a rectangle or a convex region.
 
     Cells below the smallest width are rejected: their neighbours take their place. Edges shorter than a fiftieth of a
@@ -204,7 +204,7 @@ PER_BLOCK = 4
 """Random numbers of a block beside those of its corners."""
 
 
-class Rubble(Shaped):
+class Rubble(PolygonStructure):
     """Blocks of random shape and size in rows, each in a square as wide as the largest block.
 
     Corners lie on an ellipse of random flatness and direction. Sizes, the longest axes of ellipses, follow a power law

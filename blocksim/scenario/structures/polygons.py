@@ -20,7 +20,7 @@ from blocksim.scenario.geometry import Corner
 from blocksim.scenario.input_files import MEGABYTE, read_limited
 from blocksim.scenario.models.base import Identifier, Table, table_path
 from blocksim.scenario.models.geometry import Point
-from blocksim.scenario.structures.base import Cell, Shaped
+from blocksim.scenario.structures.base import Cell, PolygonStructure
 from blocksim.scenario.units import toml
 
 MOST_BYTES = 20 * MEGABYTE
@@ -190,7 +190,7 @@ class DrawnBlock(Table):
         return self
 
 
-class Polygons(Shaped):
+class Polygons(PolygonStructure):
     """Blocks in `cells`, or in a GeoJSON or DXF file, of which results keep the blocks and not the file.
 
     A polygon of GeoJSON may have the properties block, fixed and name; the layer of a DXF polyline other than 0 is the

@@ -96,7 +96,7 @@ def ledger_names(scene: AnyScene | Coupled) -> tuple[str, ...]:
     return (*names, *(name for energies in plan_of(scene.systems).energies for name in energies))
 
 
-def measured_row(scene: AnyScene | Coupled) -> NDArray[np.float64]:
+def measure_row(scene: AnyScene | Coupled) -> NDArray[np.float64]:
     """Return energies (J) as `ledger_names` has them, number of contacts and largest overlap (m)."""
     scheme = scheme_of(scene)
     row = np.zeros(len(scheme.measured))

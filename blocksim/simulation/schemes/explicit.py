@@ -134,7 +134,7 @@ def _reach(world: World) -> float:
     return float(controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size)
 
 
-def lost_particles(scene: Any, found: Overlaps) -> str:
+def particle_depth_warning(scene: Any, found: Overlaps) -> str:
     """Return what limits the deepest overlap where that is how far particles reach; nothing where it is not."""
     model, reach = scene.world.controls[0].model, _reach(scene.world)
     if model == SURFACE_MODEL or found.limit[np.nanargmax(found.depth / found.limit)] != reach:
@@ -177,7 +177,7 @@ WORLDS = Scheme(
     measure=measure,
     contacts=lambda scene, blocks: explicit_contacts(scene.world, blocks),
     overlaps=overlaps_of_springs,
-    lost_contact=lost_particles,
+    lost_contact=particle_depth_warning,
 )
 COUPLED = replace(
     WORLDS,

@@ -26,8 +26,8 @@ from blocksim.simulation.schemes.scheme import (
     smallest_sides,
 )
 from blocksim.world.nonsmooth import NONSMOOTH as CONSTRUCTION
-from blocksim.world.nonsmooth import may_rebound_in_rounds, threads_of, with_more_constraints, with_more_threads
-from blocksim.world.sag import crushed_now, overlap_warning
+from blocksim.world.nonsmooth import needs_repeated_impacts, threads_of, with_more_constraints, with_more_threads
+from blocksim.world.sag import current_crush_depth, overlap_warning
 
 Floats = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ def overlaps_of_constraints(scene: Nonsmooth) -> Overlaps:
 
 
 def _variant(kernels: str, scenario: Scenario, placed: Sequence[PlacedBody] | None) -> str:
-    return IN_ROUNDS[kernels] if may_rebound_in_rounds(scenario, placed) else kernels
+    return IN_ROUNDS[kernels] if needs_repeated_impacts(scenario, placed) else kernels
 
 
 RATES = ("vx", "vy", "spin")
@@ -165,5 +165,5 @@ NONSMOOTH = Scheme(
     measure=measure_nonsmooth,
     contacts=nonsmooth_contacts,
     overlaps=overlaps_of_constraints,
-    warning=lambda scene, overlap, side: overlap_warning(overlap, crushed_now(scene), side),
+    warning=lambda scene, overlap, side: overlap_warning(overlap, current_crush_depth(scene), side),
 )

@@ -16,7 +16,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.structures.polygons import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
-from blocksim.simulation.atomic import replacing, write_text
+from blocksim.simulation.atomic import atomic_path, write_text
 from blocksim.simulation.folder import DXF_PROPERTY, GEOJSON_MARK
 from blocksim.simulation.frames import BODIES, UNITS, Contacts, Frames
 from blocksim.simulation.probes import TABLE_UNITS
@@ -62,7 +62,7 @@ def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
 
 
 def _write(path: Path, columns: Sequence[str], rows: Iterable[Row]) -> None:
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)
@@ -141,7 +141,7 @@ def write_dxf(path: Path, frames: Frames, scenario: Scenario) -> int:
         line = space.add_lwpolyline(one.corners.tolist(), close=True, dxfattribs=layer)
         name = CONTROLS.sub("_", one.body.name)[:MOST_LETTERS]
         line.set_xdata(DXF_APPLICATION, [(DXF_TEXT, name), (DXF_INTEGER, int(one.body.fixed))])
-    with replacing(path) as temporary:
+    with atomic_path(path) as temporary:
         document.saveas(temporary)
     return len(blocks)
 
@@ -184,7 +184,7 @@ def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
     """
     chosen = _finite(frames)
     tracks = (*frames.tracks, supports_track(scenario, frames.tracks[0], frames.time))
-    with replacing(path) as temporary, SafeFile(temporary) as safe:
+    with atomic_path(path) as temporary, SafeFile(temporary) as safe:
         _write_grid(safe.file.create_group("VTKHDF"), tracks, frames.time[chosen], chosen, safe.check)
         names = [name.encode() for name in frames.names]
         safe.file.create_dataset("blocksim/block_names", data=names, dtype=h5py.string_dtype())

@@ -19,11 +19,11 @@ from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Cont
 from blocksim.simulation.probes import CHUNK_ROWS, ProbeSeries
 from blocksim.simulation.recorder import Frame, Rows, frames_from_rows
 from blocksim.simulation.stores import hdf5_files as safety
-from blocksim.simulation.stores.hdf5_files import DAMAGE, is_left_open, opened
+from blocksim.simulation.stores.hdf5_files import DAMAGE, is_left_open, open_hdf5
 from blocksim.world.systems import others_of
 from blocksim.world.systems.blocks import BLOCKS as _BLOCKS
 from blocksim.world.systems.blocks import blocks_placed
-from blocksim.world.systems.system import Present, System
+from blocksim.world.systems.system import System, SystemInScene
 
 PARTICLES = "particles"
 BLOCKS = f"{PARTICLES}/{_BLOCKS.name}"
@@ -86,7 +86,7 @@ def measured_units(ledger: Iterable[str]) -> dict[str, str]:
 
 
 def sets_of_frames(
-    systems: Sequence[Present], ledger: Iterable[str], time_step: float, chunk: int, *, contacts: bool
+    systems: Sequence[SystemInScene], ledger: Iterable[str], time_step: float, chunk: int, *, contacts: bool
 ) -> Iterator[DataSet]:
     """Yield the data sets of frames with steps of `time_step` (s), in chunks of so many rows.
 
@@ -119,7 +119,7 @@ def sets_of_probe(probe: ProbeSeries) -> Iterator[DataSet]:
         yield DataSet(f"{place}/{name}", unit, partial(_column, name))
 
 
-def constants_of(present: Present) -> Iterator[tuple[str, str, Values]]:
+def constants_of(present: SystemInScene) -> Iterator[tuple[str, str, Values]]:
     """Yield what is written once of a system: place, unit, values."""
     place = f"{PARTICLES}/{present.system.name}"
     for one, values in zip(present.system.constants, present.elements.constants, strict=True):
@@ -160,7 +160,7 @@ def read_probes(path: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
     names = probe_names(scenario)
     if not names:
         return {}
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         try:
             return {name: _samples(path, file, name) for name in names}
         except DAMAGE as error:
@@ -205,7 +205,7 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
     return read_systems(path, (blocks_placed(place_bodies(scenario)), *others_of(scenario)))
 
 
-def read_systems(path: Path, systems: Sequence[Present]) -> Frames:
+def read_systems(path: Path, systems: Sequence[SystemInScene]) -> Frames:
     """Return the committed frames of a run file of these systems, blocks first. Raises as `read_frames`."""
     for pause in PAUSES:
         try:
@@ -217,8 +217,8 @@ def read_systems(path: Path, systems: Sequence[Present]) -> Frames:
     return _frames(path, systems)
 
 
-def _frames(path: Path, systems: Sequence[Present]) -> Frames:
-    with opened(path) as file:
+def _frames(path: Path, systems: Sequence[SystemInScene]) -> Frames:
+    with open_hdf5(path) as file:
         try:
             time_step, rows = _read(path, file, systems)
         except DAMAGE as error:
@@ -227,7 +227,7 @@ def _frames(path: Path, systems: Sequence[Present]) -> Frames:
     return frames_from_rows(systems, time_step, rows)
 
 
-def _read(path: Path, file: Any, systems: Sequence[Present]) -> tuple[float, Rows]:
+def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, Rows]:
     """Return step (s) and rows of all committed frames, after looking at what would be read."""
     count = int(safety.data_set(file, COMMITTED, 0)[()])
     ledger = tuple(name for name in safety.group(file, OBSERVABLES) if name not in COUNTED_UNITS)

@@ -34,13 +34,13 @@ class UnsafeError(ValueError):
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Any]:
+def open_hdf5(path: Path) -> Iterator[Any]:
     """Give the file to read from. Raises as `check_regular`; InvalidInputError for no HDF5 file, or one cut off."""
     check_regular(path)  # again by name below: HDF5 opens most files by itself
     try:
         with path.open("rb", buffering=0) as raw:
             head = _head_as_closed(path, raw)
-            with h5py.File(path if head is None else AsClosed(raw, head), "r") as file:
+            with h5py.File(path if head is None else ClosedFileView(raw, head), "r") as file:
                 yield file
     except DAMAGE as error:
         message = f"{path}: not a readable HDF5 file: {short_cause(error)}"
@@ -79,7 +79,7 @@ def _head_as_closed(path: Path, raw: io.FileIO) -> bytes | None:
     return closed + lookup3(closed).to_bytes(4, "little")
 
 
-class AsClosed(io.RawIOBase):
+class ClosedFileView(io.RawIOBase):
     """A file with another beginning."""
 
     def __init__(self, raw: io.FileIO, head: bytes) -> None:

@@ -26,7 +26,7 @@ from blocksim.simulation.stores import hdf5 as layout
 from blocksim.simulation.stores.hdf5_files import SIGNATURE, SUPERBLOCK, VERSION
 from blocksim.world.memory import chunk_rows
 from blocksim.world.systems.blocks import blocks_placed
-from blocksim.world.systems.system import Present
+from blocksim.world.systems.system import SystemInScene
 
 FLUSH_SECONDS = 0.25
 APART = 10.0  # times what the last flush took: a tenth of a run at most
@@ -55,7 +55,7 @@ class FrameFile:
         *,
         ledger: Sequence[str],
         kept: Iterable[Frame] = (),
-        others: Sequence[Present] = (),
+        others: Sequence[SystemInScene] = (),
         contacts: bool = False,
         probes: Probes = NO_PROBES,
     ) -> None:

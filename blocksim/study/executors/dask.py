@@ -29,18 +29,18 @@ COUNT_EVERY = 2.0  # s between two examines how many workers there are
 
 def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
     """Run batches on the workers of `setting.scheduler`; on leaving, what is under way is called off."""
-    with connected(setting.scheduler or "") as client:
+    with dask_client(setting.scheduler or "") as client:
         yield from Submission(client, tasks, setting).batches()
 
 
 def check(setting: Setting) -> None:
     """Check that the scheduler answers, before anything is written. Raises what `connected` raises."""
-    with connected(setting.scheduler or ""):
+    with dask_client(setting.scheduler or ""):
         pass
 
 
 @contextmanager
-def connected(address: str) -> Iterator[Any]:
+def dask_client(address: str) -> Iterator[Any]:
     """Give a client of a scheduler. Raises UnavailableError where there is no package, or no answer."""
     distributed = load_module("distributed", "--scheduler", CLUSTER)  # here: a second that other executors do not pay
     with silence():

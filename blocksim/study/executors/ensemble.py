@@ -39,7 +39,7 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
     batch = take(tasks, size.count, setting.is_stopped)
     while batch and not setting.is_stopped():
         began = time.monotonic()
-        running = Running(batch, setting)
+        running = BatchInProgress(batch, setting)
         following = take(tasks, size.count, setting.is_stopped)
         if not running.wait(setting):
             return
@@ -48,7 +48,7 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
         batch = following
 
 
-class Running:
+class BatchInProgress:
     """A batch that is under way."""
 
     def __init__(self, tasks: tuple[Task, ...], setting: Setting) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
-from blocksim.view.history import HistoryLike, drawn_history
+from blocksim.view.history import HistoryLike, draw_history_page
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.run_data import Support
 from blocksim.view.style import OWN
@@ -50,7 +50,7 @@ def embedded(figure: "Figure") -> str:
 
 def history_of(frames: HistoryLike, support: Support, measured: Repeats | None) -> tuple[str, list[dict[str, Any]]]:
     """Return the histories of a run, and of each panel its name, place and the ends of its axes."""
-    with drawn_history(frames, None, measured, support) as (figure, panels):
+    with draw_history_page(frames, None, measured, support) as (figure, panels):
         places = [
             {"name": name, "place": _place(axes), "time": axes.get_xlim(), "values": axes.get_ylim()}
             for name, axes in panels.items()
@@ -67,7 +67,7 @@ def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
     names = dict(zip((one.key for one in sweep.inputs), short_names([one.key for one in sweep.inputs]), strict=True))
     maps = []
     for x, y in [*pairs][:MOST_MAPS]:
-        with outcome_map.drawn(sweep, OWN, (x, y), by_manner=any(sweep.manners)) as (figure, found):
+        with outcome_map.draw_map(sweep, OWN, (x, y), by_manner=any(sweep.manners)) as (figure, found):
             label = f"map of {names[y.key]} over {names[x.key]}"
             maps.append({"label": label, "source": embedded(figure), "data": _cases(found)})
     others = []

@@ -24,9 +24,9 @@ from blocksim.view.run_data import (
     extent_of,
     others_of,
     outlines_of,
+    rotate_points,
     shortest_sides,
     support_of,
-    turned,
 )
 from blocksim.view.scene import upper_sides
 from blocksim.world.systems.blocks import are_removed, distinct
@@ -187,7 +187,7 @@ def pack_loads(
 def _mark_of_support(moved: float, support: Support) -> Mark:
     """Return the displacement (m) of the support and its direction in the picture."""
     text = f"support {MILLIMETRES * moved:+.2f} mm".replace("-", "−")
-    x, y = turned(np.sign(moved) * np.array(support.direction), support.tilt).tolist()
+    x, y = rotate_points(np.sign(moved) * np.array(support.direction), support.tilt).tolist()
     return Mark(text, (x, y))
 
 
@@ -214,7 +214,7 @@ ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
-class Packed:
+class PackedFrames:
     """Frames for the page: `data` is plain values for JSON; the errors are the largest of rounding, by channel."""
 
     data: dict[str, Any]
@@ -233,7 +233,7 @@ class Packed:
         ]
 
 
-def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
+def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> PackedFrames:
     """Return the drawable frames in mm and degrees. Raises InvalidInputError when there is none."""
     kept = frame_indices(frames, most_bytes)
     lengths = {name: MILLIMETRES * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
@@ -249,7 +249,7 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> Packed:
         "channels": {name: part for name, (part, _) in packed.items()},
         "systems": pack_systems(frames, kept),
     }
-    return Packed(data, len(kept), len(frames), {name: error for name, (_, error) in packed.items()})
+    return PackedFrames(data, len(kept), len(frames), {name: error for name, (_, error) in packed.items()})
 
 
 def frame_indices(frames: Frames, most_bytes: int = MOST_BYTES) -> Indices:

@@ -20,7 +20,7 @@ PREFIXED = ("m", "s", "Pa")
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
-class Typed(NamedTuple):
+class InputUnit(NamedTuple):
     """The unit in which the user has typed values of a key, and what one of it is in SI."""
 
     unit: str
@@ -36,7 +36,7 @@ class Input:
     values: Floats  # (n,)
     levels: tuple[str, ...] = ()
     is_even: bool = False  # drawn from a range without regard to decades
-    typed: Typed | None = None  # the unit that the user has typed, if any
+    typed: InputUnit | None = None  # the unit that the user has typed, if any
 
     @property
     def is_number(self) -> bool:
@@ -57,7 +57,7 @@ class Input:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Measurements:
     """Measurements of the blocks: repeats of x, limits of inside and prediction (mm), and the class."""
 
     x_mm: Mapping[str, Floats] = field(default_factory=dict)  # by block, (repeats,)
@@ -83,7 +83,7 @@ class SweepData:
     rotation_deg: Floats  # (n, b)
     finished: Flags  # (n,)
     inside: Flags | None = None  # (n,) in all measured ranges; None without an experiment
-    measured: Measured = field(default_factory=Measured)
+    measured: Measurements = field(default_factory=Measurements)
     manners: tuple[str, ...] = ()  # (n,) how each case ended, such as `fell`; none where nobody judged it
 
     @property
@@ -158,7 +158,9 @@ def most_moving(spread: Floats) -> list[int]:
     return sorted((moving or candidates)[:MOST_ROWS])
 
 
-def value_axis(values: Floats, key: str, unit: str, *, is_even: bool = False, typed: Typed | None = None) -> ValueAxis:
+def value_axis(
+    values: Floats, key: str, unit: str, *, is_even: bool = False, typed: InputUnit | None = None
+) -> ValueAxis:
     """Return the axis for values of a key: over decades (not if spaced evenly), around their middle, or plain."""
     low, high = float(values.min()), float(values.max())
     factor, shown = scale_of(max(abs(low), abs(high)), unit, typed)
@@ -177,7 +179,7 @@ def value_axis(values: Floats, key: str, unit: str, *, is_even: bool = False, ty
     return ValueAxis(f"{key}{_bracketed(shown)}", 0.0, factor, is_log=False)
 
 
-def scale_of(size: float, unit: str, typed: Typed | None = None) -> tuple[float, str]:
+def scale_of(size: float, unit: str, typed: InputUnit | None = None) -> tuple[float, str]:
     """Return factor and unit for values in SI: as typed, else as values of this size are best read."""
     if typed is not None:
         return 1.0 / typed.worth, typed.unit

@@ -16,8 +16,8 @@ from blocksim.view.sweeps.data import (
     Flags,
     Floats,
     Input,
+    InputUnit,
     SweepData,
-    Typed,
     ValueAxis,
     most_moving,
     value_axis,
@@ -68,13 +68,13 @@ def suits(sweep: SweepData) -> bool:
     return other is None or other.count <= MOST_COLUMNS
 
 
-def drawn(sweep: SweepData, paper: Paper = OWN) -> "AbstractContextManager[Figure]":
+def draw_lines(sweep: SweepData, paper: Paper = OWN) -> "AbstractContextManager[Figure]":
     """Give the drawn lines."""
     axis, _ = _axis_and_other(sweep)
     ranges = {block: ends for block in sweep.blocks if (ends := sweep.measured.range_of(block)) is not None}
     key = axis.key, axis.unit
     series = list(series_of(sweep))
-    return drawn_series(series, sweep.blocks, key, sweep.title, ranges, typed=axis.typed, paper=paper)
+    return draw_series(series, sweep.blocks, key, sweep.title, ranges, typed=axis.typed, paper=paper)
 
 
 def series_of(sweep: SweepData) -> Iterator[Series]:
@@ -99,14 +99,14 @@ def _axis_and_other(sweep: SweepData) -> tuple[Input, Input | None]:
 
 
 @contextmanager
-def drawn_series(
+def draw_series(
     series: Sequence[Series],
     blocks: Sequence[str],
     key: tuple[str, str],
     title: str | None = None,
     measured: Mapping[str, tuple[float, float]] | None = None,
     *,
-    typed: Typed | None = None,
+    typed: InputUnit | None = None,
     paper: Paper = OWN,
 ) -> "Iterator[Figure]":
     """Give final x drawn over a key, that is given with its SI unit.

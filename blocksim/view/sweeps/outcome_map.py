@@ -268,7 +268,7 @@ def refusal(sweep: SweepData) -> str:
 
 
 @contextmanager
-def drawn(
+def draw_map(
     sweep: SweepData, paper: Paper = OWN, axes: tuple[Input, Input] | None = None, *, by_manner: bool = False
 ) -> "Iterator[tuple[Figure, OutcomeMap]]":
     """Give the drawn map. Samples over more than two inputs are seen along all others.

@@ -64,7 +64,7 @@ def variables_of(sweep: SweepData) -> list[Variable]:
 
 
 @contextmanager
-def drawn_matrix(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
+def draw_matrix(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
     """Give the lower half of the matrix, with histograms on its diagonal."""
     variables = variables_of(sweep)
     count, legend = len(variables), _entries(sweep)
@@ -281,7 +281,7 @@ _INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 
 
 @contextmanager
-def drawn_histogram(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
+def draw_histogram(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
     """Give a panel for each block that moves."""
     blocks = sweep.moving[-_MOST_BLOCKS_HISTOGRAM:]
     legend = _entries_histogram(sweep)

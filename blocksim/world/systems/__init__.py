@@ -13,7 +13,7 @@ from blocksim.scenario import Scenario
 from blocksim.scenario.models.base import SYSTEMS
 from blocksim.world.systems.blocks import BLOCKS, SUPPORTS
 from blocksim.world.systems.soils import SOILS, soils_and
-from blocksim.world.systems.system import Present, System
+from blocksim.world.systems.system import System, SystemInScene
 
 IN_WORLD = (BLOCKS, SUPPORTS)
 """Systems of every scene, whose arrays are the world, and whose steps, bounds and energies are the scheme's own."""
@@ -50,9 +50,9 @@ def systems_of(scenario: Scenario) -> tuple[System, ...]:
     return tuple(system_named(name) for name in SYSTEMS if scenario.systems.get(name))
 
 
-def others_of(scenario: Scenario) -> tuple[Present, ...]:
+def others_of(scenario: Scenario) -> tuple[SystemInScene, ...]:
     """Return the systems of a scenario beside blocks and supports, in the order in which they are registered."""
-    return tuple(Present(system, system.elements(scenario)) for system in systems_of(scenario))
+    return tuple(SystemInScene(system, system.elements(scenario)) for system in systems_of(scenario))
 
 
 def largest_step(scenario: Scenario) -> float:

@@ -18,9 +18,9 @@ from blocksim.world.systems.system import (
     Floats,
     Indices,
     Output,
-    Present,
     Quantity,
     System,
+    SystemInScene,
     Track,
     quantity_as_stored,
 )
@@ -184,9 +184,9 @@ BLOCKS = System(
 )
 
 
-def blocks_placed(placed: Sequence[PlacedBody]) -> Present:
+def blocks_placed(placed: Sequence[PlacedBody]) -> SystemInScene:
     """Return the blocks of a scene that were placed so."""
-    return Present(BLOCKS, elements_of(placed))
+    return SystemInScene(BLOCKS, elements_of(placed))
 
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks
@@ -226,7 +226,7 @@ def supports_track(scenario: Scenario, blocks: Track, times: Floats) -> Track:
     elements = _pieces(scenario, blocks)
     motion = np.concatenate(support_motion(scenario, times), axis=1)
     values = np.repeat(motion[:, :, None], len(elements.names), axis=2)
-    return Track(Present(SUPPORTS, elements), values)
+    return Track(SystemInScene(SUPPORTS, elements), values)
 
 
 def support_quads(scenario: Scenario, blocks: Track) -> Floats:

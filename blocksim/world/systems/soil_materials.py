@@ -125,7 +125,7 @@ def weak_thrusts(scenario: Scenario) -> Iterator[str]:
     """Yield a warning for each soil beside blocks that may yield, whose thrust on them is known to be too small."""
     for soil in soil_tables(scenario):
         rows = geometry.count_across(soil.corners, soil.spacing)[1]
-        share = lacking(soil.gradient, rows)
+        share = thrust_deficit(soil.gradient, rows)
         if share > TOLERATED and is_base_rough(scenario, soil) and is_beside_a_block(scenario, soil):
             key = overrides.format_key(("soils", soil.name, "spacing" if soil.gradient == "corrected" else "gradient"))
             cure = f"{fewest_rows()} rows" if soil.gradient == "corrected" else '"corrected"'
@@ -135,7 +135,7 @@ def weak_thrusts(scenario: Scenario) -> Iterator[str]:
             )
 
 
-def lacking(gradient: str, rows: int) -> float:
+def thrust_deficit(gradient: str, rows: int) -> float:
     """Return which share of the active thrust soil on a rough base lacks with so many rows of particles."""
     per_row, less = LACK[gradient]
     return per_row / rows - less

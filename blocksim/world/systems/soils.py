@@ -14,6 +14,7 @@ from blocksim.scenario.models.stepping import Explicit
 from blocksim.scenario.start import soil_tables
 from blocksim.world.systems.soil_materials import SMOOTHING, depth_of_scene, geostatic_stress, wave_speed, weak_thrusts
 from blocksim.world.systems.system import (
+    BodyContacts,
     Cost,
     Elements,
     Floats,
@@ -23,7 +24,6 @@ from blocksim.world.systems.system import (
     Shade,
     System,
     Table,
-    Touching,
     Track,
     discs,
     quantity_as_stored,
@@ -36,7 +36,7 @@ BACK = 2.0  # spacings from the end in which the height at the back is taken
 SMOOTHED = 2  # times that pressure is averaged over neighbouring cells of one spacing
 
 
-def touching(soils: Any, world: Any) -> Touching:
+def body_contacts(soils: Any, world: Any) -> BodyContacts:
     """Return the contacts of soils with bodies."""
     touches = soils.touches[: int(soils.controls["touch_count"][0])]
     touches = touches[touches["normal_force"] > 0.0].view(np.ndarray)
@@ -48,7 +48,7 @@ def touching(soils: Any, world: Any) -> Touching:
     apart = float(soils.controls["radius"][0]) - touches["depth"]
     centre = np.stack([soils.points["x"][particle], soils.points["y"][particle]], axis=-1)
     friction = soils.interactions["static_friction"][kind, world.bodies["contact_class"][body]]
-    return Touching(
+    return BodyContacts(
         body.astype(np.intp), kind.astype(np.intp), centre - apart[:, None] * normal, -normal, push, -rub, friction
     )
 
@@ -64,7 +64,7 @@ def parts_of(track: Track) -> dict[str, Indices]:
     return {str(name): np.flatnonzero(owners == name) for name in dict.fromkeys(owners.tolist())}
 
 
-def connected(x: Floats, gap: float) -> tuple[float, float]:
+def connected_span(x: Floats, gap: float) -> tuple[float, float]:
     """Return the ends (m) of the part around the median that no gap (m) interrupts."""
     ordered = np.sort(x)
     breaks = np.flatnonzero(np.diff(ordered) > gap)
@@ -74,7 +74,7 @@ def connected(x: Floats, gap: float) -> tuple[float, float]:
     return float(ordered[first]), float(ordered[last])
 
 
-def ending(scenario: Scenario, track: Track) -> Table:
+def final_table(scenario: Scenario, track: Track) -> Table:
     """Return the table of the last frame: a row for each soil.
 
     left and right end the part without a gap of 2 spacings, first and last particle wherever they are. The back is the
@@ -92,7 +92,7 @@ def _ending_of(track: Track, own: Indices, scenario: Scenario) -> tuple[Any, ...
     spacing = float(track["spacing"][own[0]])
     half = 0.5 * spacing
     x, y, vx, vy = (track[name][-1, own] for name in ("x", "y", "vx", "vy"))
-    left, right = connected(x, GAP * spacing)
+    left, right = connected_span(x, GAP * spacing)
     is_left = _is_left_back(track, own, scenario, (left, right))
     near = x <= left + BACK * spacing if is_left else x >= right - BACK * spacing
     near &= (x >= left) & (x <= right)
@@ -322,9 +322,9 @@ SOILS = System(
     cost=COST,
     dearer=_dearer,
     parts=part_names,
-    touching=touching,
+    touching=body_contacts,
     shades=SHADES,
-    ending=ending,
+    ending=final_table,
     profile=surface,
     warnings=weak_thrusts,
 )

@@ -56,7 +56,7 @@ class Elements:
     outlines: Floats | None = None  # (b, k, 2) m, own axes, counter-clockwise, the last corner repeated; of polygons
 
 
-class Touching(NamedTuple):
+class BodyContacts(NamedTuple):
     """Where k elements of a system press against bodies of the world; the normal points from them to the body."""
 
     body: Indices  # (k,) blocks first, then supports
@@ -107,7 +107,7 @@ class System:
     cost: Cost = field(default_factory=Cost)  # of every element, where it is not part of the blocks'
     dearer: Callable[[Scenario], float] = lambda _: 1.0  # time of a step of the elements of a scene over that, at most
     parts: Callable[[Scenario], tuple[str, ...]] | None = None  # names of its tables, which probes of force may name
-    touching: Callable[[Any, Any], Touching] | None = None  # of its arrays and the world
+    touching: Callable[[Any, Any], BodyContacts] | None = None  # of its arrays and the world
     shades: tuple[Shade, ...] = ()  # the first one is the default
     ending: Callable[[Scenario, "Track"], Table] | None = None  # of the last frame, one row a part
     profile: Callable[["Track", int], list[Floats]] | None = None  # lines (m, (k, 2)) of its surface in a frame
@@ -115,7 +115,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class Present:
+class SystemInScene:
     """A system in one scene."""
 
     system: System
@@ -136,7 +136,7 @@ class Present:
 class Track:
     """What n frames hold of one system; `track["x"]` is (n, b) for a quantity and (b,) for a constant."""
 
-    present: Present
+    present: SystemInScene
     values: Floats  # (n, q, b)
 
     @property
@@ -189,6 +189,6 @@ def discs(track: Track, chosen: Indices, radius: Floats, corners: int = 8) -> Fl
     return np.asarray(centres[:, :, None] + around)
 
 
-def values_of(presents: Sequence[Present], states: Sequence[Sequence[Floats]]) -> list[Floats]:
+def values_of(presents: Sequence[SystemInScene], states: Sequence[Sequence[Floats]]) -> list[Floats]:
     """Return the values (n, q, b) of every system, given its states in each of n frames."""
     return [np.stack([frame[k] for frame in states]) for k in range(len(presents))]

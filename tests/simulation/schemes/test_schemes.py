@@ -12,7 +12,7 @@ from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario.models import stepping
 from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
 from blocksim.simulation.provenance import run_hash
-from blocksim.simulation.schemes import SCHEMES, build_scene, build_stacks, measured_row, scheme_of
+from blocksim.simulation.schemes import SCHEMES, build_scene, build_stacks, measure_row, scheme_of
 from blocksim.simulation.team import ALONE, Team
 from blocksim.world import build
 from blocksim.world.build import Stack, arrays_of, member, only_stack
@@ -43,7 +43,7 @@ def same_bits(one: Nonsmooth, other: Nonsmooth) -> bool:
         np.array_equal(one.contacts.constraints[name][:count], other.contacts.constraints[name][:count])
         for name in rows
     )
-    return all([*bodies, *impulses, np.array_equal(measured_row(one), measured_row(other))])
+    return all([*bodies, *impulses, np.array_equal(measure_row(one), measure_row(other))])
 
 
 def test_every_scheme_of_the_file_can_be_run() -> None:
@@ -51,7 +51,7 @@ def test_every_scheme_of_the_file_can_be_run() -> None:
     for name, scheme in SCHEMES.items():
         scene = build_scene(three_blocks(time={"scheme": name}))
         assert scheme_of(scene) is scheme
-        assert len(measured_row(ALONE.advance(scene, 0)[0])) == len(scheme.measured)
+        assert len(measure_row(ALONE.advance(scene, 0)[0])) == len(scheme.measured)
 
 
 def test_schemes_are_different_runs() -> None:

@@ -11,7 +11,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.simulation.recorder import MOTION, Frame
 from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.stores.hdf5_files import SUPERBLOCK, is_left_open, lookup3, opened
+from blocksim.simulation.stores.hdf5_files import SUPERBLOCK, is_left_open, lookup3, open_hdf5
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 
 FRAMES = 300
@@ -76,5 +76,5 @@ def test_a_damaged_superblock_is_not_made_whole(killed: Path) -> None:
     content = bytearray(killed.read_bytes())
     content[36] ^= 1  # the address of the root group
     killed.write_bytes(content)
-    with pytest.raises(InvalidInputError, match="its superblock is damaged"), opened(killed):
+    with pytest.raises(InvalidInputError, match="its superblock is damaged"), open_hdf5(killed):
         pass

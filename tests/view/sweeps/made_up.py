@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.view.sweeps.data import Input, Measured, SweepData
+from blocksim.view.sweeps.data import Input, Measurements, SweepData
 
 Floats = NDArray[np.float64]
 REPEATS = np.array([71.69, 76.57, 72.70, 73.22, 73.73, 78.53])
@@ -21,12 +21,12 @@ def made_up(inputs: tuple[Input, ...], mode: str = "grid", failed: int = 0, *, m
         finished[:, None], np.column_stack([np.zeros(count), np.where(x[:, 1] > 65.0, -90.0, 0.0)]), np.nan
     )
     inside = (x[:, 1] >= REPEATS.min()) & (x[:, 1] <= REPEATS.max())
-    known = Measured(
+    known = Measurements(
         {"1": np.full(6, 16.0), "2": REPEATS}, {"1": (15.5, 16.5), "2": (71.69, 78.53)}, {"2": (67.2, 81.6)}, (0, -90)
     )
     return SweepData(
         "made up", mode, inputs, ("1", "2"), x, turns, finished, inside if measured else None,
-        known if measured else Measured(),
+        known if measured else Measurements(),
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blocksim.view.sweeps.data import Input, SweepData, Typed, outcome_label, short_names, value_axis
+from blocksim.view.sweeps.data import Input, InputUnit, SweepData, outcome_label, short_names, value_axis
 from tests.view.sweeps.made_up import made_up
 
 
@@ -74,13 +74,13 @@ def test_axis_shows_values_so_that_they_can_be_read(
 @pytest.mark.parametrize(
     ("values", "typed", "label", "shown"),
     [
-        ([0.09, 0.1, 0.12], Typed("cm", 0.01), "key (cm)", [9.0, 10.0, 12.0]),
-        ([0.1, 3.1], Typed("mm", 0.001), "key (mm)", [100.0, 3100.0]),  # over decades
-        ([0.9995, 1.0, 1.0005], Typed("cm", 0.01), "key − 100 cm (cm)", [-0.05, 0.0, 0.05]),
-        ([0.0099995, 0.01, 0.0100005], Typed("mm", 0.001), "key − 10 mm (nm)", [-500.0, 0.0, 500.0]),
+        ([0.09, 0.1, 0.12], InputUnit("cm", 0.01), "key (cm)", [9.0, 10.0, 12.0]),
+        ([0.1, 3.1], InputUnit("mm", 0.001), "key (mm)", [100.0, 3100.0]),  # over decades
+        ([0.9995, 1.0, 1.0005], InputUnit("cm", 0.01), "key − 100 cm (cm)", [-0.05, 0.0, 0.05]),
+        ([0.0099995, 0.01, 0.0100005], InputUnit("mm", 0.001), "key − 10 mm (nm)", [-500.0, 0.0, 500.0]),
     ],
 )
-def test_axis_keeps_the_typed_unit(values: list[float], typed: Typed, label: str, shown: list[float]) -> None:
+def test_axis_keeps_the_typed_unit(values: list[float], typed: InputUnit, label: str, shown: list[float]) -> None:
     axis = value_axis(np.array(values), "key", "m", typed=typed)
     assert axis.label == label
     assert axis.shown(np.array(values)).tolist() == pytest.approx(shown)

@@ -13,7 +13,7 @@ from blocksim.simulation import Result
 from blocksim.simulation.frames import data_set, tidy_table
 from blocksim.simulation.stores.exports import write_frames_csv, write_vtkhdf
 from blocksim.view.run_data import Support, drawable_frames
-from blocksim.view.time_panels import MOTIONS, Seen
+from blocksim.view.time_panels import MOTIONS, FramesInView
 from blocksim.world.systems.blocks import placed_points
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -40,7 +40,7 @@ def test_kinetic_energies_of_blocks_add_up_to_that_of_the_ledger(fallen: Result,
     np.testing.assert_array_equal(cells[:, :blocks], table)
     found = data_set(frames, "three")["kinetic_energy"]
     assert (found.attrs["units"], found.shape) == ("J", table.shape)
-    panel = MOTIONS["kinetic_energy"](Seen(frames, drawable_frames(frames), Support()))
+    panel = MOTIONS["kinetic_energy"](FramesInView(frames, drawable_frames(frames), Support()))
     assert panel.label == "kinetic energy (mJ)"
     np.testing.assert_allclose(panel.values, 1e3 * table)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blocksim.world.systems.soils import SOILS, connected, ending, pressure, surface, touching
-from blocksim.world.systems.system import Present, Track
+from blocksim.world.systems.soils import SOILS, body_contacts, connected_span, final_table, pressure, surface
+from blocksim.world.systems.system import SystemInScene, Track
 from tests.soils import LEFT, Soil, column, right, scene
 
 SPACING = 0.005
@@ -14,7 +14,7 @@ SCENE = scene(column(0.05, 0.05, SPACING), walls=[LEFT])
 
 def still(**changed: NDArray[np.float64]) -> Track:
     """Return the track of a column that rests for two frames, some quantities of which are changed in the last."""
-    present = Present(SOILS, SOILS.elements(SCENE))
+    present = SystemInScene(SOILS, SOILS.elements(SCENE))
     values = np.stack([present.elements.start, present.elements.start])
     track = Track(present, values)
     for name, new in changed.items():
@@ -25,7 +25,7 @@ def still(**changed: NDArray[np.float64]) -> Track:
 def test_contacts_with_bodies_add_up_to_the_forces_on_them() -> None:
     soil = Soil(SCENE)
     soil.to_time(0.02)
-    found = touching(soil.soils, soil.world)
+    found = body_contacts(soil.soils, soil.world)
     ground = soil.world.bodies.size - 1
     for body in (1, ground):
         own = found.body == body
@@ -41,11 +41,11 @@ def test_contacts_with_bodies_add_up_to_the_forces_on_them() -> None:
 
 def test_the_front_ends_at_the_first_gap_and_the_last_particle_is_told_beside_it() -> None:
     x = np.array([0.0, 0.01, 0.02, 0.03, 0.045, 0.2, -0.3])
-    assert connected(x, 0.02) == (0.0, 0.045)
+    assert connected_span(x, 0.02) == (0.0, 0.045)
     track = still()
     places = track["x"][0].copy()
     places[places > 0.045] += 0.03  # the last column has left
-    moved = ending(SCENE, still(x=places, vx=np.where(places > 0.045, 1.0, 0.0)))
+    moved = final_table(SCENE, still(x=places, vx=np.where(places > 0.045, 1.0, 0.0)))
     assert moved["soil"] == ["column"]
     assert [moved[name][0] for name in ("left_mm", "right_mm", "first_mm", "last_mm")] == pytest.approx([0, 45, 0, 80])
     assert (moved["back"], moved["at_rest"]) == (["left"], [0.9])
@@ -59,7 +59,7 @@ def test_the_back_of_a_soil_is_the_same_however_little_its_ends_have_moved() -> 
     for walls, back in (([LEFT], "left"), ([end], "right"), ([LEFT, end], "left"), ([], "left")):
         walled = scene(column(0.05, 0.05, SPACING), walls=walls)
         for one_end in (0.0 * apart, np.maximum(apart, 0.0), np.minimum(apart, 0.0)):
-            assert ending(walled, still(x=places + one_end))["back"] == [back]
+            assert final_table(walled, still(x=places + one_end))["back"] == [back]
 
 
 def test_the_surface_is_the_top_of_columns_and_gaps_interrupt_it() -> None:
