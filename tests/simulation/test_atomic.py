@@ -69,8 +69,8 @@ def test_a_file_keeps_its_permissions_when_it_is_replaced(tmp_path: Path, mode: 
 WRITER = """
 import sys
 from pathlib import Path
-from blocksim.simulation.atomic import replacing
-with replacing(Path(sys.argv[1])) as temporary:
+from blocksim.simulation.atomic import atomic_path
+with atomic_path(Path(sys.argv[1])) as temporary:
     temporary.write_text("half")
     print("half", flush=True)
     sys.stdin.read()
