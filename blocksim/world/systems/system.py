@@ -3,7 +3,7 @@
 See blocksim/world/README.md. Nothing in here needs the compiler: stored runs are read without it.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -187,8 +187,3 @@ def discs(track: Track, chosen: Indices, radius: Floats, corners: int = 8) -> Fl
     around = radius[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     centres = np.stack([track["x"][chosen], track["y"][chosen]], axis=-1)
     return np.asarray(centres[:, :, None] + around)
-
-
-def values_of(presents: Sequence[SystemInScene], states: Sequence[Sequence[Floats]]) -> list[Floats]:
-    """Return the values (n, q, b) of every system, given its states in each of n frames."""
-    return [np.stack([frame[k] for frame in states]) for k in range(len(presents))]
