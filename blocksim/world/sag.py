@@ -114,7 +114,9 @@ def _ends(upper: int, lower: int | None, span: tuple[float, float], force: float
 
 
 def _lever(one: float, two: float, x: float) -> float:
-    """Return the share of a load at x that comes upon `two`."""
+    """Return the share of a load at x that comes upon `two`; half of it where both are one place to the last digit."""
+    if one == two:
+        return 0.5
     return min(1.0, max(0.0, (x - one) / (two - one)))
 
 

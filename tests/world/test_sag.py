@@ -152,3 +152,8 @@ def test_pairs_are_reported_without_springs_and_with_what_they_give_way_by() -> 
 
 def test_springs_have_no_sag_to_tell_of() -> None:
     assert describe(three_blocks()).rigid is None
+
+
+def test_a_block_so_far_away_that_its_corners_are_one_place_halves_its_load() -> None:
+    placed = place_bodies(Scene([{"x": 1e16, "y": 0.5 * HEIGHT}]).scenario())
+    assert [load.force for load in loads_at_rest(placed, 2.0 / placed[0].mass)] == pytest.approx([1.0, 1.0])
