@@ -167,8 +167,11 @@ def _parameter(field: OptionField, option: Option) -> inspect.Parameter:
     """Return an option as typer takes it."""
     name, kind, default, _ = field
     kinds = [one for one in get_args(kind) if one is not NoneType] if get_origin(kind) in {Union, UnionType} else [kind]
-    typed: Any = Path if Path in kinds else str if option.read else kinds[0]
-    typed = list[str] if option.is_repeatable else Literal[option.choices] if option.choices else typed
+    typed: Any = Path if Path in kinds else str if option.read or option.is_repeatable else kinds[0]
+    if option.is_repeatable:  # typer has lists of enumerations, but not of literals
+        typed = list[StrEnum(name, {one: one for one in option.choices}) if option.choices else typed]  # type: ignore[misc]
+    elif option.choices:
+        typed = Literal[option.choices]
     is_plain = isinstance(default, bool | int | float | str | Path) or default is inspect.Parameter.empty
     default = (not default if option.is_negated else default) if is_plain else None
     more: dict[str, Any] = {"help": option.help, "metavar": option.metavar, "show_default": option.show_default}
@@ -200,8 +203,8 @@ def _made(group: Any, values: dict[str, Any]) -> Any:
     for name, kind, default, option in option_fields(group):
         if option is not None:
             value = values.pop(name)
-            if option.is_repeatable and option.read:
-                value = option.read(value or [])
+            if option.is_repeatable:
+                value = option.read(value or []) if option.read else value and list(map(str, value))
             if value is not None or default is inspect.Parameter.empty:
                 given[name] = not value if option.is_negated else value
         elif has_options(kind):

@@ -22,11 +22,13 @@ from enum import StrEnum
 from itertools import pairwise
 from math import inf, isfinite, log, log10, nan, sqrt
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
+from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies
 from blocksim.scenario.start import soil_tables
 from blocksim.silence import silent
@@ -303,23 +305,41 @@ PARTICLE_MODELS = frozenset({"particles", "kernel"})
 SOFTEST = 1e-3  # stiffness scale
 
 
-def converge(
-    scenario: Source,
-    *,
-    tolerance_mm: float = TOLERANCE_MM,
-    levels: int = LEVELS,
-    studies: Iterable[str] | None = None,
-    out: Path | str | None = None,
-    jobs: int | None = 1,
-    on_run: OnRun = silent,
-) -> Convergence:
+@dataclass(frozen=True, kw_only=True)
+class ConvergeOptions:
+    """What is refined, how far, and where its runs are kept."""
+
+    studies: Annotated[
+        Iterable[str] | None,
+        Option(
+            "What to refine (default: all that matters). Repeatable.",
+            flags=("--study",),
+            python="Some of step, stiffness, spacing, tolerance (default: all that mean something).",
+            is_repeatable=True,
+            choices=REFINEMENTS,
+        ),
+    ] = None
+    tolerance_mm: Annotated[
+        float,
+        Option("Largest change of the run-out that counts as converged, in mm.", flags=("--tolerance",), metavar="MM"),
+    ] = TOLERANCE_MM
+    levels: Annotated[
+        int, Option("Maximum number of refinements of the scenario's own value.", metavar="N", least=FEWEST_LEVELS)
+    ] = LEVELS
+    out: Path | str | None = None
+    jobs: int | None = 1
+    on_run: OnRun = silent
+
+
+@takes(ConvergeOptions)
+def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     """Refine each setting until two refinements in a row move no block by more than the tolerance.
 
-    `studies` names some of step, stiffness, spacing, tolerance (default: all that mean something); `levels` is how
-    often the scenario's own value is refined at most. The runs are kept in `out` (default: results/NAME/converge). With
-    more than one job (None: one a core), a script needs the guard `if __name__ == "__main__":`. Raises ScenarioError,
-    InvalidInputError, StepTooLargeError for the scenario as it is, and StoppedEarlyError on Ctrl-C.
+    The runs are kept in `out` (default: results/NAME/converge). With more than one of `jobs` (None: one a core), a
+    script needs the guard `if __name__ == "__main__":`. `on_run` is called with each level and its row. Raises
+    ScenarioError, InvalidInputError, StepTooLargeError for the scenario as it is, and StoppedEarlyError on Ctrl-C.
     """
+    tolerance_mm, levels, studies = options.tolerance_mm, options.levels, options.studies
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     if not tolerance_mm > 0.0 or levels < FEWEST_LEVELS:
@@ -330,8 +350,8 @@ def converge(
     build_scene(scenario)
     refinements = refinements_of(scenario, studies)
     compile_kernels(kernels_of(scenario))
-    folder = Path(out) if out is not None else files.RESULTS / scenario.name / FOLDER
-    runs = _Runs(folder, jobs or os.cpu_count() or 1, on_run)
+    folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / FOLDER
+    runs = _Runs(folder, options.jobs or os.cpu_count() or 1, options.on_run)
     found = _refine(scenario, refinements, runs, tolerance_mm, levels)
     return Convergence(
         name=scenario.name,
