@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Annotated, Any, Literal
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 Dimension = tuple[int, int, int, int]
@@ -23,12 +24,7 @@ DEGREE = Fraction(math.pi) / 180
 
 
 class UnitError(ValueError):
-    """The text is not a unit; `unknown` is the unknown name in it, or empty if the form is wrong."""
-
-    def __init__(self, unknown: str = "") -> None:
-        """Keep the unknown name."""
-        self.unknown = unknown
-        super().__init__(unknown)
+    """The text is not a unit; that of the error is the unknown name in it, or empty if the form is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,28 +75,7 @@ _PREFIXES: dict[str, Fraction] = {
     )
     for name in names.split()
 }
-_SUGGESTED: tuple[str, ...] = (
-    "m",
-    "cm",
-    "mm",
-    "um",
-    "km",
-    "s",
-    "ms",
-    "us",
-    "min",
-    "rad",
-    "deg",
-    "Hz",
-    "Pa",
-    "kPa",
-    "MPa",
-    "GPa",
-    "kN",
-    "N",
-    "kg",
-    "g",
-)
+_SUGGESTED = "m cm mm um km s ms us min rad deg Hz Pa kPa MPa GPa kN N kg g"
 
 _FACTOR = r"[A-Za-zµμ°_]+[0-9]?(?:\^-?[1-9][0-9]?)?"
 _EXPRESSION = re.compile(rf"{_FACTOR}(?:[ ]?[*/·][ ]?{_FACTOR}|[ ]{_FACTOR})*")
@@ -139,7 +114,7 @@ def _unit(name: str) -> Unit:
 def similar_unit(name: str, expression: str, dimension: Dimension) -> str | None:
     """Name the unit most like `name` with which the whole expression gets the dimension."""
     fitting = {}
-    for other in _SUGGESTED:
+    for other in _SUGGESTED.split():
         try:
             unit = parse_unit(re.sub(rf"\b{re.escape(name)}\b", other, expression))
         except UnitError:
@@ -234,30 +209,28 @@ _KINDS = (NUMBER, LENGTH, AREA, MASS, TIME, ANGLE, SPEED, FREQUENCY, SPIN, ACCEL
 _NAMES = {kind.dimension: kind.name for kind in (*_KINDS, UNIT_WEIGHT, STIFFNESS, FORCE, MOMENT)}
 
 
-class _Annotation:
-    """What annotations of a float field have in common: they read the value of the file before pydantic does."""
+class FieldReader:
+    """What annotations of a field have in common: they read the value of the file before pydantic does."""
 
-    def read(self, value: object) -> float:
-        """Turn the value of the file into an SI float; the pydantic error has what is allowed."""
+    def read(self, value: object) -> object:
+        """Return the value as the model has it, in SI; the pydantic error has what is allowed."""
         raise NotImplementedError
 
-    def json_schema(self) -> dict[str, Any]:
-        """JSON Schema of the value in the file."""
-        raise NotImplementedError
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
+        """Return the JSON Schema of the value in the file, from the usual one of its type."""
+        return usual
 
-    def __get_pydantic_core_schema__(self, _source: object, _handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Read the value first, then let pydantic see a float."""
-        return core_schema.no_info_before_validator_function(
-            self.read, core_schema.float_schema(strict=True, allow_inf_nan=False)
-        )
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the value first, then let pydantic see it."""
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
 
-    def __get_pydantic_json_schema__(self, _core_schema: CoreSchema, _handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Describe what may stand in the file."""
-        return self.json_schema()
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Describe to editors what may stand in the file."""
+        return self.json_schema(handler(schema))
 
 
 @dataclass(frozen=True)
-class Quantity(_Annotation):
+class Quantity(FieldReader):
     """Annotation of a float field: kind of quantity and allowed values (SI)."""
 
     kind: Kind
@@ -276,7 +249,17 @@ class Quantity(_Annotation):
 
     def read(self, value: object) -> float:
         """Turn the value of the file into an SI float; the pydantic error has what is allowed."""
-        number = self._text(value) if isinstance(value, str) else self._number(value)
+        if isinstance(value, str):
+            number = self._text(value)
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            raise invalid(f"{toml(value)} is not a number; {self.wanted} is needed")
+        else:
+            try:
+                number = float(value)
+            except OverflowError:
+                number = math.inf
+            if self.kind is ANGLE and number != 0 and math.isfinite(number):
+                raise invalid(f'{toml(value)} has no unit; write "{number:g} deg" (or "{number:g} rad")')
         if not math.isfinite(number):
             raise invalid(f"{toml(value)} is not a finite number; {self.wanted} is needed")
         too_small = (self.above is not None and number <= self.above) or (
@@ -293,17 +276,6 @@ class Quantity(_Annotation):
             raise invalid(f"{toml(value)} is too small to compute with; at least {LEAST:g} (SI) is allowed")
         return number
 
-    def _number(self, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise invalid(f"{toml(value)} is not a number; {self.wanted} is needed")
-        try:
-            number = float(value)
-        except OverflowError:
-            return math.inf
-        if self.kind is ANGLE and number != 0 and math.isfinite(number):
-            raise invalid(f'{toml(value)} has no unit; write "{number:g} deg" (or "{number:g} rad")')
-        return number
-
     def _text(self, text: str) -> float:
         try:
             number, dimension = parse_quantity(text, self.kind)
@@ -314,16 +286,15 @@ class Quantity(_Annotation):
             raise invalid(f"{toml(text)} is {name}; {self.wanted} is needed")
         return number
 
-    def json_schema(self) -> dict[str, Any]:
-        """JSON Schema of the value in the file: a number in SI or a string with a unit."""
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:  # noqa: ARG002 - one signature for all
+        """Return the JSON Schema of a number in SI or a string with a unit."""
         bounds = {
             "exclusiveMinimum": self.above,
             "minimum": self.at_least,
             "exclusiveMaximum": self.below,
             "maximum": self.at_most,
         }
-        number: dict[str, Any] = {"type": "number"}
-        number |= {name: bound for name, bound in bounds.items() if bound is not None}
+        number = {"type": "number", **{name: bound for name, bound in bounds.items() if bound is not None}}
         if self.kind is NUMBER:
             return number
         if self.kind is ANGLE:
@@ -332,7 +303,7 @@ class Quantity(_Annotation):
 
 
 @dataclass(frozen=True)
-class FrictionCoefficient(_Annotation):
+class FrictionCoefficient(FieldReader):
     """Annotation of a float field: a coefficient, or a friction angle ("21 deg") whose tangent it is."""
 
     wanted = 'a number of at least 0 such as 0.31, or a friction angle below 90 deg such as "21 deg",'
@@ -345,8 +316,8 @@ class FrictionCoefficient(_Annotation):
             raise invalid(f"{toml(value)} is not a number; {self.wanted} is needed")
         return Quantity(NUMBER, at_least=0.0).read(value)
 
-    def json_schema(self) -> dict[str, Any]:
-        """JSON Schema of the value in the file: a number or an angle with its unit."""
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:  # noqa: ARG002 - one signature for all
+        """Return the JSON Schema of a number or an angle with its unit."""
         return {"anyOf": [{"type": "number", "minimum": 0}, _text_schema("21 deg")]}
 
 
@@ -365,21 +336,22 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
     comma = _DECIMAL_COMMA.fullmatch(text) if len(text) <= _MAX_LENGTH_QUANTITIES else None
     if comma:
         raise ValueError(f'write a decimal point: "{comma[1]}.{comma[2]}{comma[3]}"')
-    if wanted is NUMBER and (found is None or found[2] is None):
+    number, unit = (None, None) if found is None else found.groups()
+    if wanted is NUMBER and unit is None:
         raise ValueError("write a number without quotes")
-    if found is None:
+    if number is None:
         raise ValueError(f'write a number and a unit, such as "{wanted.example}"')
-    number, unit = found.groups()
     if unit is None:
         raise ValueError(f'the unit is missing, write it as in "{wanted.example}"')
     try:
         worth = parse_unit("g0" if wanted is ACCELERATION and unit == "g" else unit)
     except UnitError as error:
-        if not error.unknown:
+        unknown = str(error)
+        if not unknown:
             raise ValueError(f"{toml(unit)[1:-1]!r} is not a unit") from None
-        similar = similar_unit(error.unknown, unit, wanted.dimension)
+        similar = similar_unit(unknown, unit, wanted.dimension)
         hint = f"did you mean {similar!r}?" if similar else f'write it as in "{wanted.example}"'
-        raise ValueError(f"unknown unit {error.unknown!r}, {hint}") from None
+        raise ValueError(f"unknown unit {unknown!r}, {hint}") from None
     rough = float(number)
     if rough == 0 or math.isinf(rough):  # before "1e999999999" becomes a whole number of a billion digits
         return rough, worth.dimension

@@ -3,24 +3,14 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    ValidationInfo,
-    create_model,
-)
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
 
 from blocksim.scenario.input_files import OutOfReachError, table_in
 from blocksim.scenario.spelling import nearest
-from blocksim.scenario.units import TIME, Quantity, invalid, toml
+from blocksim.scenario.units import TIME, FieldReader, Quantity, invalid, toml
 
 if TYPE_CHECKING:
     from blocksim.scenario.models.scenario import Scenario
@@ -29,27 +19,18 @@ if TYPE_CHECKING:
 class Table(BaseModel):
     """One TOML table: frozen, no unknown keys, no silent conversions."""
 
-    model_config = ConfigDict(
-        frozen=True,
-        strict=True,
-        extra="forbid",
-        allow_inf_nan=False,
-    )
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+    @model_validator(mode="after")
+    def _checked(self) -> Self:
+        self._check()
+        return self
+
+    def _check(self) -> None:
+        """Raise pydantic's error where values do not go together, each valid by itself."""
 
 
 POSITIVE_TIME = Quantity(TIME, above=0.0)
-
-
-class FieldReader:
-    """What annotations of a field have in common: they read the value of the file before pydantic does."""
-
-    def read(self, value: object) -> object:
-        """Return the value; raises a pydantic error."""
-        raise NotImplementedError
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Read the value first, then let pydantic see it."""
-        return core_schema.no_info_before_validator_function(self.read, handler(source))
 
 
 @dataclass(frozen=True)
@@ -91,9 +72,9 @@ class TimeOr(FieldReader):
             raise invalid(f'{toml(value)} is not {self.what}; use "{self.word}" or {POSITIVE_TIME.wanted}')
         return POSITIVE_TIME.read(value)
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Describe both to editors."""
-        return {"anyOf": [{"const": self.word}, *POSITIVE_TIME.json_schema()["anyOf"]]}
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
+        """Return the JSON Schema of both."""
+        return {"anyOf": [{"const": self.word}, *POSITIVE_TIME.json_schema(usual)["anyOf"]]}
 
 
 @dataclass(frozen=True)
@@ -109,9 +90,9 @@ class Whole(FieldReader):
             raise invalid(f"{toml(value)} is not a whole number from {self.least} to {self.most}")
         return value
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Describe the range to editors."""
-        return {**handler(schema), "minimum": self.least, "maximum": self.most}
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
+        """Return the JSON Schema with the range."""
+        return {**usual, "minimum": self.least, "maximum": self.most}
 
 
 def by_kind(union: Any) -> dict[str, type[Any]]:

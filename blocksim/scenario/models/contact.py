@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -60,18 +60,16 @@ class PairFriction(Table):
         message = f"{q.toml(value)} is not a friction coefficient; write a number, an angle, or {{ static, kinetic }}"
         raise q.invalid(message)
 
-    @model_validator(mode="after")
-    def _kinetic_once_and_not_above_static(self) -> Self:
+    def _check(self) -> None:
         if self.kinetic_ratio is not None and "kinetic" in self.model_fields_set:
             raise q.invalid("kinetic and kinetic_ratio mean the same; keep one of the two", "kinetic_ratio", at="key")
         if self.kinetic > self.static:
             raise q.invalid(f"kinetic friction {self.kinetic:g} is above static friction {self.static:g}", "kinetic")
-        return self
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Accept a bare number or angle."""
-        return or_bare(handler(schema), q.FrictionCoefficient().json_schema())
+        return or_bare(handler(schema), q.FrictionCoefficient().json_schema({}))
 
 
 class Friction(Table):
@@ -118,11 +116,9 @@ class Pair(Table):
     shear_stiffness_ratio: q.PositiveNumber | None = Field(default=None, description="shear over normal stiffness")
     shear_damping_ratio: q.NonNegativeNumber | None = Field(default=None, description="damping ratio in shear")
 
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
+    def _check(self) -> None:
         if not self.model_fields_set:
             raise q.invalid("this pair is empty; give friction, restitution, a stiffness or a damping ratio")
-        return self
 
 
 class Contact(Table):
@@ -180,8 +176,7 @@ class Contact(Table):
         """Radius in m at which the kernel function ends."""
         return SUPPORT[self.kernel] * self.resolved_smoothing_length
 
-    @model_validator(mode="after")
-    def _stiffness_and_neighbours(self) -> Self:
+    def _check(self) -> None:
         if self.law == "hertz-mindlin" and self.normal_stiffness is not None:
             raise q.invalid(NO_FIXED_STIFFNESS, "normal_stiffness")
         least = LEAST_SPACINGS * self.particle_spacing
@@ -191,4 +186,3 @@ class Contact(Table):
                 f"particle_spacing ({least * 1e3:g} mm) is needed"
             )
             raise q.invalid(message, "smoothing_length")
-        return self

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain, pairwise
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     ConfigDict,
@@ -55,8 +55,7 @@ class Material(Table):
         "mohr-coulomb, which fails as they say; plane-strain-associated is the value often printed, too weak here)",
     )
 
-    @model_validator(mode="after")
-    def _one_density_and_soil_with_an_angle(self) -> Self:
+    def _check(self) -> None:
         missing = 'the density is missing: give density (such as "2700 kg/m^3") or unit_weight'
         require_one(missing, density=self.given_density, unit_weight=self.unit_weight)
         for key in () if self.is_soil else ("cohesion", "dilation", "yield_surface"):
@@ -66,7 +65,6 @@ class Material(Table):
                 )
         if self.dilation:
             raise q.invalid("soil that dilates is not available; leave dilation out", "dilation")
-        return self
 
     @property
     def is_soil(self) -> bool:
@@ -135,8 +133,7 @@ class Block(Table):
             raise PydanticKnownError("missing")
         return value
 
-    @model_validator(mode="after")
-    def _one_shape(self) -> Self:
+    def _check(self) -> None:
         shape = next((key for key in (*OUTLINE_KEYS, "width", "depth") if self._has(key)), "")
         fields = type(self).model_fields
         given = [fields[name].alias or name for name in fields if name in self.model_fields_set]
@@ -154,7 +151,6 @@ class Block(Table):
             raise q.invalid(message, "outline", *(() if number is None else (number,)))
         for _, message in geometry.faults(self.polygon) if self.sides is not None and self.radius is not None else ():
             raise q.invalid(message, "radius")
-        return self
 
     @model_serializer(mode="wrap")
     def _own_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -222,15 +218,13 @@ class BodySpec(Table):
     motion: AnyDrive | None = Field(default=None, description="prescribed motion of this body alone")
     name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
 
-    @model_validator(mode="after")
-    def _fixed_or_driven_or_free(self) -> Self:
+    def _check(self) -> None:
         if self.fixed and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
             raise q.invalid("a fixed body cannot have a velocity or a spin", "fixed")
         if self.motion is not None and self.fixed:
             raise q.invalid("a body with a motion is driven, not fixed; remove one of the two", "fixed")
         if self.motion is not None and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
             raise q.invalid("velocity and spin of a driven body follow from its motion", "motion")
-        return self
 
 
 class Ground(Table):
@@ -244,10 +238,9 @@ class Ground(Table):
         json_schema_extra={"minItems": 2},
     )
 
-    @model_validator(mode="after")
-    def _profile_is_a_surface(self) -> Self:
+    def _check(self) -> None:
         if self.profile is None:
-            return self
+            return
         if len(self.profile) < 2:
             raise q.invalid("a profile needs at least two points [x, y]", "profile")
         for number, ((x_before, y_before), (x, y)) in enumerate(pairwise(self.profile), start=1):
@@ -261,7 +254,6 @@ class Ground(Table):
                 message = "the profile goes back over its own vertical segment"
             if message:
                 raise q.invalid(message, "profile", number)
-        return self
 
 
 class Wall(Table):
@@ -273,8 +265,6 @@ class Wall(Table):
     end: Point = Field(alias="to", description="[x, y] of its end")
     material: str | None = Field(default=None, description="the name of its material (default: as the ground)")
 
-    @model_validator(mode="after")
-    def _has_a_length(self) -> Self:
+    def _check(self) -> None:
         if self.start == self.end:
             raise q.invalid("start and end of a wall must differ", "to")
-        return self

@@ -20,7 +20,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import Field, ValidationInfo, model_validator
 
@@ -63,12 +63,10 @@ class Ramp(Table):
     first: q.Number = Field(default=0.0, alias="from", description="factor until the ramp begins")
     last: q.Number = Field(default=1.0, alias="to", description="factor once it has ended")
 
-    @model_validator(mode="after")
-    def _takes_time(self) -> Self:
+    def _check(self) -> None:
         if not self.end > self.start:
             message = f"a ramp that begins at {self.start:g} s cannot end at {self.end:g} s; use steps for a jump"
             raise q.invalid(message, "end")
-        return self
 
     def stretches(self) -> tuple[Stretch, ...]:
         """Return the factor over time."""
@@ -82,10 +80,8 @@ class Steps(Table):
     times: Times = Field(description="times at which the factor changes")
     factors: tuple[q.Number, ...] = Field(description="factor from each of these times on; 0 before")
 
-    @model_validator(mode="after")
-    def _fit(self) -> Self:
+    def _check(self) -> None:
         check_samples(self.times, self.factors, "factors", least=1)
-        return self
 
     def stretches(self) -> tuple[Stretch, ...]:
         """Return the factor over time."""
@@ -108,10 +104,8 @@ class Samples(Table):
     def _read(cls, value: object, info: ValidationInfo) -> object:
         return read_samples(value, info, "factor", "factors")
 
-    @model_validator(mode="after")
-    def _fit(self) -> Self:
+    def _check(self) -> None:
         check_samples(self.times, self.factors, "factors", least=2)
-        return self
 
     def stretches(self) -> tuple[Stretch, ...]:
         """Return the factor over time."""
@@ -259,13 +253,11 @@ class Pressure(VaryingLoad):
     )
     unit_weight: q.UnitWeight = Field(default=WATER, description="weight per volume of the water")
 
-    @model_validator(mode="after")
-    def _one_pressure(self) -> Self:
+    def _check(self) -> None:
         missing = 'the pressure is missing: give magnitude (such as "10 kPa") or water_level'
         require_one(missing, magnitude=self.magnitude, water_level=self.water_level)
         if self.magnitude is not None and "unit_weight" in self.model_fields_set and self.unit_weight != WATER:
             raise q.invalid("a uniform pressure has no unit weight, which belongs to water_level", "unit_weight")
-        return self
 
 
 class Horizontal(VaryingLoad):
@@ -304,19 +296,17 @@ class Gravity(Load):
             return value
         return {**read, "tilts": tuple(f"{degrees!r} deg" for degrees in read["tilts"])}
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    def _check(self) -> None:
         turns = {"to": self.last, "rate": self.rate}
         given = [key for key, value in {**turns, "from": self.first}.items() if value is not None]
         if self.times or self.tilts:
             if given:
                 raise q.invalid(f"{given[0]} and samples of the tilt are both given; keep one of them", given[0])
             check_samples(self.times, self.tilts, "tilts", least=2)
-            return self
+            return
         for key, value in turns.items():
             if value is None:
                 raise q.invalid(f'{key} is missing: give to and rate (such as "0.1 deg/s"), or a table')
-        return self
 
     def stretches_from(self, tilt: float) -> tuple[Stretch, ...]:
         """Return the tilt (rad) over time, given that of the ground."""

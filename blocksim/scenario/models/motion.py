@@ -22,9 +22,9 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal, Self, TypeVar, get_args
+from typing import Annotated, Literal, TypeVar, get_args
 
-from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema, model_validator
+from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import units as q
@@ -85,11 +85,9 @@ class Harmonic(Table):
             if until > begin:
                 yield begin, until, math.ceil((until - begin) / length * PIECES_PER_CYCLE)
 
-    @model_validator(mode="after")
-    def _room_for_ramps(self) -> Self:
+    def _check(self) -> None:
         if self.duration is not None and self.duration < 2.0 * self.resolved_ramp:
             raise q.invalid(f"{self.duration:g} s is too short for two ramps of {self.resolved_ramp:g} s", "duration")
-        return self
 
 
 class MotionTableError(ValueError):
@@ -280,15 +278,13 @@ class Pulse(Table):
         """Angular frequency w (rad/s)."""
         return 2.0 * math.pi * self.resolved_cycles / self.resolved_duration
 
-    @model_validator(mode="after")
-    def _one_of_two(self) -> Self:
+    def _check(self) -> None:
         if (self.frequency is None) == (self.duration is None):
             found = "neither is" if self.frequency is None else "both are"
             raise q.invalid(f"frequency or duration is needed; {found} given", "duration")
         if self.shape in SINGLE and self.cycles != 1.0:
             message = f'shape {q.toml(self.shape)} is a single half cycle; cycles belongs to "sine" and "cosine"'
             raise q.invalid(message, "cycles")
-        return self
 
 
 Course = Literal["constant", "smooth"]
@@ -313,10 +309,8 @@ class Ramp(Table):
     )
     start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the body rests before")
 
-    @model_validator(mode="after")
-    def _duration_or_speed(self) -> Self:
+    def _check(self) -> None:
         require_one("give duration or speed", duration=self.duration, speed=self.speed)
-        return self
 
     @property
     def resolved_duration(self) -> float:
@@ -341,12 +335,10 @@ class Rotation(Table):
     )
     start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the body rests before")
 
-    @model_validator(mode="after")
-    def _duration_or_spin(self) -> Self:
+    def _check(self) -> None:
         require_one("give duration or spin", duration=self.duration, spin=self.spin)
         if self.angle == 0.0:
             raise q.invalid("a turn by 0 is none", "angle")
-        return self
 
     @property
     def resolved_duration(self) -> float:

@@ -18,9 +18,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, Self, get_args
+from typing import Annotated, Literal, NamedTuple, get_args
 
-from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema, model_validator
+from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema
 
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf, Table, by_kind
@@ -234,8 +234,7 @@ class Record(Table):
         """Factor from the table's values to m/s²."""
         return UNITS[self.unit] if self.table.unit is None and self.unit is not None else 1.0
 
-    @model_validator(mode="after")
-    def _has_one_unit_and_scale(self) -> Self:
+    def _check(self) -> None:
         name, said = self.table.path.name, self.table.unit
         if said is None and self.unit is None:
             raise q.invalid(f'{name} does not say its unit; write unit = "g", "m/s^2" or "cm/s^2"', "table")
@@ -245,7 +244,6 @@ class Record(Table):
             raise q.invalid("scale and pga are both given; one of them decides the accelerations", "pga")
         if self.pga is not None and not any(self.table.values):
             raise q.invalid(f"{self.table.path.name} is zero throughout; it cannot be scaled", "pga")
-        return self
 
 
 AnyMotion = Annotated[Harmonic | FromTable | Pulse | Record, Field(discriminator="kind")]

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from blocksim.scenario import geometry
 from blocksim.scenario import units as q
@@ -58,8 +58,7 @@ class SoilTable(SystemTable):
         description="corrected, or raw: two thirds of the time, but on a rough base too little thrust on blocks",
     )
 
-    @model_validator(mode="after")
-    def _one_shape_with_an_inside(self) -> Self:
+    def _check(self) -> None:
         wanted = SHAPES[self.kind]
         for key in ("outline", "x", "y", "angle"):
             is_given = getattr(self, key) is not None
@@ -74,7 +73,7 @@ class SoilTable(SystemTable):
         if self.angle is not None and self.x is not None and max(self._heads) >= self.x[1] - self.x[0]:
             raise q.invalid("the face reaches the other end below the crest", "angle")
         if self.outline is None:
-            return self
+            return
         if len(self.outline) < 3:
             raise q.invalid("an outline needs at least three corners [x, y]", "outline")
         if len(set(self.outline)) < len(self.outline):
@@ -83,7 +82,6 @@ class SoilTable(SystemTable):
             raise q.invalid(f"edges {one + 1} and {other + 1} of the outline meet", "outline")
         if abs(geometry.signed_area(np.array(self.outline))) <= geometry.ROUND_OFF**2:
             raise q.invalid("the outline has no area", "outline")
-        return self
 
     @property
     def corners(self) -> "NDArray[np.float64]":

@@ -1,7 +1,7 @@
 """What happens over time: stepping, recording, the start, events and probes."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, Self, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import (
     BeforeValidator,
@@ -12,7 +12,6 @@ from pydantic import (
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
-    model_validator,
 )
 
 from blocksim.scenario import units as q
@@ -157,13 +156,11 @@ class Start(Table):
         "records how it falls",
     )
 
-    @model_validator(mode="after")
-    def _holds_while_it_settles(self) -> Self:
+    def _check(self) -> None:
         if self.hold and not self.settle:
             raise q.invalid("nothing is held without settle = true", "hold")
         if self.release != "at rest" and not self.settle:
             raise q.invalid("all is released at once without settle = true", "release")
-        return self
 
 
 When = Literal["rest"]
@@ -179,11 +176,9 @@ class NewVelocity(Table):
     vy: q.Speed | None = Field(default=None, description="velocity of the centre along y (default: as it is)")
     spin: q.Spin | None = Field(default=None, description="angular velocity (default: as it is)")
 
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
+    def _check(self) -> None:
         if self.vx is None and self.vy is None and self.spin is None:
             raise q.invalid("give vx, vy or spin")
-        return self
 
 
 class Event(Table):
@@ -199,12 +194,10 @@ class Event(Table):
     unload: Names = Field(default=(), description="names of loads that end")
     velocity: NewVelocity | None = Field(default=None, description="velocity that a body gets")
 
-    @model_validator(mode="after")
-    def _has_one_moment_and_an_effect(self) -> Self:
+    def _check(self) -> None:
         require_one('give a time, such as at = "0.2 s", or when = "rest"', at=self.at, when=self.when)
         if not any(getattr(self, action) for action in ACTIONS):
             raise q.invalid("nothing happens; give remove, fix, free, unload or velocity")
-        return self
 
 
 STEP = "step"

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     BeforeValidator,
@@ -358,8 +358,7 @@ class Sweep(Table):
         """Put lists before distributions, as in a resolved file: Sobol's dimensions follow the order of keys."""
         return dict(sorted(vary.items(), key=lambda entry: not isinstance(entry[1], tuple)))
 
-    @model_validator(mode="after")
-    def _suits_its_mode(self) -> Self:
+    def _check(self) -> None:
         counts = {key: len(values) for key, values in self.vary.items() if isinstance(values, tuple)}
         if self.mode == "list" and len(set(counts.values())) > 1:
             told = ", ".join(f"{count} for {key}" for key, count in counts.items())
@@ -367,7 +366,6 @@ class Sweep(Table):
             raise q.invalid(message, "mode")
         if self.mode == "table" and self.table is None:
             raise q.invalid('mode "table" needs the path of a table, as in table = "samples.csv"', "mode")
-        return self
 
     @property
     def is_sampled(self) -> bool:

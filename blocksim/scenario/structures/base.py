@@ -3,11 +3,11 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from blocksim.scenario import geometry
 from blocksim.scenario import units as q
@@ -96,12 +96,10 @@ class Courses(Structure):
         """All courses, whether or not the highest has a block left."""
         return self.rows * block.size_y
 
-    @model_validator(mode="after")
-    def _not_too_many(self) -> Self:
+    def _check(self) -> None:
         if self.size > MAX_BLOCKS:
             message = f"{self.size} blocks are too many; a structure has at most {MAX_BLOCKS}"
             raise q.invalid(message, "rows")
-        return self
 
 
 def poses_at(x: Floats, y: Floats, angle: Floats | None = None) -> list[Pose]:

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 
 from blocksim.scenario import geometry
 from blocksim.scenario import units as q
@@ -39,14 +39,12 @@ class Arch(PolygonStructure):
     count: Annotated[int, Whole(1, MOST_VOUSSOIRS)] = Field(description="number of voussoirs")
     abutments: bool = Field(default=True, description="whether fixed blocks hold the springings")
 
-    @model_validator(mode="after")
-    def _one_size(self) -> Self:
+    def _check(self) -> None:
         missing = "the size is missing: give radius (of the middle of the ring) or span"
         require_one(missing, radius=self.radius, span=self.span)
         if self.mean_radius <= 0.5 * self.thickness:
             message = f"a ring of {1e3 * self.thickness:g} mm needs a mean radius of more than half of that"
             raise q.invalid(message, "thickness")
-        return self
 
     @property
     def mean_radius(self) -> float:
@@ -139,8 +137,7 @@ class Voronoi(PolygonStructure):
         default=None, description="least width of a cell (default: a tenth of the side of a square of the mean area)"
     )
 
-    @model_validator(mode="after")
-    def _one_region(self) -> Self:
+    def _check(self) -> None:
         sides = (self.width, self.tall)
         if self.region is None and None in sides:
             raise q.invalid("the size is missing: give width and height of a wall, or region")
@@ -148,7 +145,6 @@ class Voronoi(PolygonStructure):
             raise q.invalid("region and the sides of a wall are both given; keep one of them", "region")
         for number, message in geometry.faults(self.region) if self.region is not None else ():
             raise q.invalid(message, "region", *(() if number is None else (number,)))
-        return self
 
     @property
     def whole(self) -> Sequence[Corner]:
@@ -228,13 +224,11 @@ class Rubble(PolygonStructure):
     gap: q.NonNegativeLength = Field(default=0.0, description="least distance of neighbours")
     seed: Seed = Field(default=1, description="seed of shapes and sizes")
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check(self) -> None:
         if self.smallest > self.largest:
             raise q.invalid(f"the smallest size is above the largest, {1e3 * self.largest:g} mm", "smallest")
         if self.fewest_sides > self.most_sides:
             raise q.invalid(f"the least number of sides is above the most, {self.most_sides}", "fewest_sides")
-        return self
 
     @property
     def drawn(self) -> Sequence[Cell]:

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf
@@ -100,8 +100,8 @@ class BlockWall(Courses):
     )
     seed: Seed = Field(default=0, description="random seed of shifts and blocks left out")
 
-    @model_validator(mode="after")
-    def _holes_are_inside_and_neighbours_apart(self) -> Self:
+    def _check(self) -> None:
+        super()._check()
         seen = set()
         for number, (row, column) in enumerate(self.holes):
             if row > self.rows or column > self.columns:
@@ -119,7 +119,6 @@ class BlockWall(Courses):
                 f"at most half of the gap, {0.5e3 * self.gap:g} mm, is allowed"
             )
             raise q.invalid(message, "offset")
-        return self
 
     @property
     def size(self) -> int:

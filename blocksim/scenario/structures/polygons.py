@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple
 
 from pydantic import Field, ValidationInfo, model_validator
 
@@ -183,11 +183,9 @@ class DrawnBlock(Table):
     fixed: bool = Field(default=False, description="true for a body that never moves")
     name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
 
-    @model_validator(mode="after")
-    def _convex(self) -> Self:
+    def _check(self) -> None:
         for number, message in geometry.faults(self.outline):
             raise q.invalid(message, "outline", *(() if number is None else (number,)))
-        return self
 
 
 class Polygons(PolygonStructure):
@@ -233,13 +231,12 @@ class Polygons(PolygonStructure):
             cells.append({"outline": tuple((x * unit, y * unit) for x, y in one.outline), **known})
         return {**{key: value for key, value in data.items() if key not in ("table", "unit")}, "cells": tuple(cells)}
 
-    @model_validator(mode="after")
-    def _some_and_not_shrunk_away(self) -> Self:
+    def _check(self) -> None:
         if not 0 < len(self.cells_given) <= MOST_OUTLINES:
             message = f"{len(self.cells_given)} blocks; 1 to {MOST_OUTLINES} are allowed, in cells or in the file table"
             raise q.invalid(message)
         if not self.shrink:
-            return self
+            return
         width = min(geometry.least_width(tuple(one.outline)) for one in self.cells_given)
         if self.shrink > MOST_SHRINK * width:
             most = f"at most {MOST_SHRINK:g} of the least width of a block, {1e3 * MOST_SHRINK * width:.4g} mm"
@@ -247,7 +244,6 @@ class Polygons(PolygonStructure):
         for number, one in enumerate(self.cells_given):
             if any(geometry.faults(self._outline(one))):
                 raise q.invalid(f"block {number + 1} loses an edge; shrink less", "shrink")
-        return self
 
     @property
     def drawn(self) -> Sequence[Cell]:
