@@ -186,6 +186,7 @@ LONGEST_LINE = 1_000  # characters
 MOST_PROBLEMS_SHOWN = 20
 
 CELL = re.compile(r'[ ]*("(?:[^"]|"")*"|[^",]*)[ ]*(,|$)')
+QUOTED = re.compile(r'^"([^"]*)"$')
 DIALECT = "separate them by commas, and write decimals with a point"
 NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
@@ -298,13 +299,13 @@ def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
 
 
 def bare_rows(content: bytes) -> list[tuple[int, list[str]]]:
-    """Return number (from 1) and cells of every line of a table that is neither empty nor a comment; no quotes.
+    """Return number (from 1) and cells of every line of a table that is neither empty nor a comment.
 
     Raises UnicodeDecodeError where the content is not UTF-8 text.
     """
     lines = _numbered(content.decode("utf-8-sig"))
     kept = [(number, line) for number, line in lines if line.strip() and not _is_comment(line)]
-    return [(number, [cell.strip() for cell in line.split(",")]) for number, line in kept]
+    return [(number, [QUOTED.sub(r"\1", cell.strip()) for cell in line.split(",")]) for number, line in kept]
 
 
 def _content(lines: Sequence[Line]) -> tuple[tuple[str, ...], list[Line]]:

@@ -26,7 +26,7 @@ def pulse_samples(pulse: Pulse) -> tuple[Floats, Floats, Floats]:
     """
     count = 1 if pulse.shape == "rectangular" else min(MOST_PIECES, math.ceil(PIECES_PER_CYCLE * pulse.resolved_cycles))
     t = np.linspace(0.0, pulse.resolved_duration, 1 + count)
-    w, a = pulse.angular_frequency, pulse.amplitude
+    w, a = 2.0 * math.pi * pulse.resolved_cycles / pulse.resolved_duration, pulse.amplitude
     if pulse.shape == "rectangular":
         return pulse.start + t, 0.5 * a * t * t, a * t
     half = np.sin(0.5 * w * t)
@@ -254,8 +254,13 @@ def motion_peaks(pieces: MotionPieces, end: float) -> MotionPeaks:
 
 def shortest_cycle(scenario: Scenario) -> float:
     """Return the shortest cycle (s) of harmonic motions and pulses, of supports or bodies; infinite without any."""
-    motions = (scenario.motion, *(body.motion for body in scenario.bodies))
-    return min((motion.cycle for motion in motions if isinstance(motion, Harmonic | Pulse)), default=math.inf)
+    cycles = [math.inf]
+    for motion in (scenario.motion, *(body.motion for body in scenario.bodies)):
+        if isinstance(motion, Harmonic):
+            cycles.append(1.0 / motion.frequency)
+        elif isinstance(motion, Pulse):
+            cycles.append(motion.resolved_duration / motion.resolved_cycles)
+    return min(cycles)
 
 
 def shortest_period(scenario: Scenario) -> float:
@@ -330,12 +335,15 @@ def _course(motion: Ramp | Rotation, way: float, end: float) -> MotionPieces:
     """Return the pieces of a way (m or rad) from the start of a motion on, until `end` (s) at least."""
     count = PIECES_OF_A_RAMP if motion.course == "smooth" else 1
     share = np.linspace(0.0, 1.0, count + 1)
-    times = motion.start + motion.resolved_duration * share
+    speed = (motion.speed if isinstance(motion, Ramp) else motion.spin) or math.nan
+    steepest = 15.0 / 8.0 if motion.course == "smooth" else 1.0  # greatest speed over its mean
+    duration = abs(way) / speed * steepest if motion.duration is None else motion.duration
+    times = motion.start + duration * share
     if count == 1:
-        pieces = MotionPieces(times, np.array([[0.0, way / motion.resolved_duration, 0.0, 0.0]]), 0.0)
+        pieces = MotionPieces(times, np.array([[0.0, way / duration, 0.0, 0.0]]), 0.0)
     else:
         values = way * share**3 * (10.0 - 15.0 * share + 6.0 * share * share)
-        rates = way / motion.resolved_duration * 30.0 * (share * (1.0 - share)) ** 2
+        rates = way / duration * 30.0 * (share * (1.0 - share)) ** 2
         pieces = hermite_pieces(times, values, rates)
     pieces = extend_pieces(end, pieces)
     last = pieces.coefficients[-1]

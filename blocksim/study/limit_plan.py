@@ -25,7 +25,7 @@ import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Document, Scenario, place_bodies, place_segments, scenario_hash
-from blocksim.scenario.models.loads import Gravity
+from blocksim.scenario.models.loads import AnyLoad, stretches_of
 from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
 from blocksim.scenario.models.study import Uniform, is_descending
 from blocksim.scenario.overlap import Outlines, penetration
@@ -209,10 +209,8 @@ def is_sustained(scenario: Scenario) -> bool:
     return all(_is_constant(scenario, load) for load in scenario.loads) and not _drops(scenario)
 
 
-def _is_constant(scenario: Scenario, load: object) -> bool:
-    stretches = (
-        load.stretches_from(scenario.ground.tilt) if isinstance(load, Gravity) else load.stretches()  # type: ignore[attr-defined]
-    )
+def _is_constant(scenario: Scenario, load: AnyLoad) -> bool:
+    stretches = stretches_of(load, scenario.ground.tilt)
     return all(stretch.rate == 0.0 and stretch.value == stretches[0].value for stretch in stretches)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import PlacedSegment, Scenario, place_bodies
 from blocksim.scenario.events import wall_names
-from blocksim.scenario.models.loads import AnyLoad, Gravity, OnBody, Stretch
+from blocksim.scenario.models.loads import AnyLoad, OnBody, Stretch, stretches_of
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.scenario.placement import ENDLESS, wall_segments
 from blocksim.simulation.result import EventRecord
@@ -42,7 +42,7 @@ def acting_loads(scenario: Scenario, event_times: Sequence[float]) -> tuple[Acti
     tilt = scenario.ground.tilt
     found = []
     for load in scenario.loads:
-        stretches = load.stretches_from(tilt) if isinstance(load, Gravity) else load.stretches()
+        stretches = stretches_of(load, tilt)
         ends = (at for event, at in zip(scenario.events, event_times, strict=True) if load.name in event.unload)
         body = numbers[load.body] if isinstance(load, OnBody) else -1
         found.append(ActingLoad(load, body, stretches, min(ends, default=math.inf)))

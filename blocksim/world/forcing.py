@@ -20,7 +20,18 @@ from blocksim.kernels.common.arrays import (
 )
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.geometry import Corner
-from blocksim.scenario.models.loads import AnyLoad, Face, Force, Gravity, Horizontal, Moment, OnBody, Pressure, Stretch
+from blocksim.scenario.models.loads import (
+    AnyLoad,
+    Face,
+    Force,
+    Gravity,
+    Horizontal,
+    Moment,
+    OnBody,
+    Pressure,
+    Stretch,
+    stretches_of,
+)
 from blocksim.scenario.motion import Drive, MotionPieces, drives_of, greatest_rate
 from blocksim.scenario.start import NORMALS, face_of
 
@@ -37,7 +48,7 @@ class LoadArrays(NamedTuple):
 def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
     """Return the loads of a scenario, in its order."""
     numbers = {body.name: number for number, body in enumerate(placed)} if scenario.loads else {}
-    histories = [stretches_of(scenario, load) for load in scenario.loads]
+    histories = [stretches_of(load, scenario.ground.tilt) for load in scenario.loads]
     loads = zeros(len(scenario.loads), LOAD)
     first = 0
     for record, load, stretches in zip(loads, scenario.loads, histories, strict=True):
@@ -54,11 +65,6 @@ def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
     return LoadArrays(
         loads, pieces, sum(_pushes(scenario, placed)), max((one[-1].start for one in histories), default=0.0)
     )
-
-
-def stretches_of(scenario: Scenario, load: AnyLoad) -> tuple[Stretch, ...]:
-    """Return the factor of a load, or the tilt (rad) of gravity that turns, over time."""
-    return load.stretches_from(scenario.ground.tilt) if isinstance(load, Gravity) else load.stretches()
 
 
 def _in_units(load: AnyLoad, one: Stretch) -> Stretch:
@@ -124,7 +130,7 @@ def _pushes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[float]
     for load in scenario.loads:
         if isinstance(load, Gravity):
             continue  # it turns, and gets no larger
-        largest = max(abs(one.value) for one in load.stretches())
+        largest = max(abs(one.value) for one in stretches_of(load, 0.0))
         if isinstance(load, Horizontal):
             yield largest * abs(load.magnitude) * scenario.gravity
         else:
@@ -155,8 +161,9 @@ def greatest_push(scenario: Scenario) -> float:
 
 def steepest_tilt(scenario: Scenario) -> float:
     """Return the greatest slope (rad) that gravity has in a run, without its sign."""
-    tilts = [one.value for load in scenario.loads if isinstance(load, Gravity) for one in stretches_of(scenario, load)]
-    return max(abs(tilt) for tilt in (scenario.ground.tilt, *tilts))
+    tilt = scenario.ground.tilt
+    turns = [stretches_of(load, tilt) for load in scenario.loads if isinstance(load, Gravity)]
+    return max(abs(one) for one in (tilt, *(stretch.value for stretches in turns for stretch in stretches)))
 
 
 def stack_loads(applied: Sequence[LoadArrays]) -> tuple[Records, Records]:

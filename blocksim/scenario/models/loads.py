@@ -1,6 +1,8 @@
-"""How a number goes with time: constant, a ramp, steps, or samples that straight lines join, given or from a table.
+"""Loads, [[loads]]: forces, moments and pressures on bodies, and accelerations of all free bodies, over time.
 
-A table is CSV with the columns `time_s` and that of the number, `factor` for loads:
+Coordinates and angles are those of the ground: a tilted ground is tilted gravity. What a load does at a time is its
+magnitude times the factor of its history at that time: constant, a ramp, steps, or samples that straight lines join,
+given or from a table. A table is CSV with the columns `time_s` and that of the number, `factor` for loads:
 
     # test 3, jack
     time_s,factor
@@ -9,30 +11,22 @@ A table is CSV with the columns `time_s` and that of the number, `factor` for lo
 
 Lines that begin with `#` are notes. Times increase and are not negative. The number is that of the first line before it
 and that of the last line after it. The resolved scenario holds the samples, so that it needs no copy of the table.
-
-Loads, [[loads]]: forces, moments and pressures on bodies, and accelerations of all free bodies, over time.
-
-Coordinates and angles are those of the ground: a tilted ground is tilted gravity. What a load does at a time is its
-magnitude times the factor of its history at that time.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args
+from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from blocksim.errors import BlocksimError
 from blocksim.scenario import units as q
-from blocksim.scenario.input_files import read_open_table
 from blocksim.scenario.models.base import Identifier, OneOf, Table, by_kind, require_one, table_path
 from blocksim.scenario.models.geometry import Point
+from blocksim.scenario.models.motion import TIME, MotionTableError, content_of, read_series
 
 MAX_BYTES = 1_000_000
 MAX_ROWS = 10_000
-TIME = "time_s"
 Times = tuple[q.NonNegativeTime, ...]
 
 
@@ -49,10 +43,6 @@ class Constant(Table):
 
     kind: Literal["constant"] = Field(description="kind of history")
 
-    def stretches(self) -> tuple[Stretch, ...]:
-        """Return the factor over time."""
-        return (Stretch(0.0, 1.0, 0.0),)
-
 
 class Ramp(Table):
     """A factor that changes evenly from one time to another, and stays."""
@@ -68,10 +58,6 @@ class Ramp(Table):
             message = f"a ramp that begins at {self.start:g} s cannot end at {self.end:g} s; use steps for a jump"
             raise q.invalid(message, "end")
 
-    def stretches(self) -> tuple[Stretch, ...]:
-        """Return the factor over time."""
-        return straight_lines((self.start, self.end), (self.first, self.last))
-
 
 class Steps(Table):
     """Factors that hold from their time on; none before the first."""
@@ -82,11 +68,6 @@ class Steps(Table):
 
     def _check(self) -> None:
         check_samples(self.times, self.factors, "factors", least=1)
-
-    def stretches(self) -> tuple[Stretch, ...]:
-        """Return the factor over time."""
-        steps = tuple(Stretch(time, factor, 0.0) for time, factor in zip(self.times, self.factors, strict=True))
-        return steps if self.times[0] == 0.0 else (Stretch(0.0, 0.0, 0.0), *steps)
 
 
 class Samples(Table):
@@ -107,23 +88,11 @@ class Samples(Table):
     def _check(self) -> None:
         check_samples(self.times, self.factors, "factors", least=2)
 
-    def stretches(self) -> tuple[Stretch, ...]:
-        """Return the factor over time."""
-        return straight_lines(self.times, self.factors)
-
 
 AnyHistory = Annotated[Constant | Ramp | Steps | Samples, Field(discriminator="kind")]
 """Any history, distinguished by its `kind`."""
 HISTORIES: dict[str, type[Table]] = by_kind(AnyHistory)
 """Class by kind, as written in a scenario."""
-
-
-def straight_lines(times: Sequence[float], values: Sequence[float]) -> tuple[Stretch, ...]:
-    """Return the straight lines that join samples, with the first value before them and the last one after them."""
-    rows = [Stretch(0.0, values[0], 0.0)] if times[0] > 0.0 else []
-    for (begin, one), (end, other) in pairwise(zip(times, values, strict=True)):
-        rows.append(Stretch(begin, one, (other - one) / (end - begin)))
-    return (*rows, Stretch(times[-1], values[-1], 0.0))
 
 
 def check_samples(times: Sequence[float], values: Sequence[float], name: str, *, least: int) -> None:
@@ -146,47 +115,12 @@ def read_samples(value: object, info: ValidationInfo, column: str, key: str) -> 
         if other in value:
             raise q.invalid(f"table and {other} are both given; keep one of them", other)
     path = table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv")
-    rows: Any = tuple(zip(*_rows(path, column), strict=True))
-    kept = {name: entry for name, entry in value.items() if name != "table"}
-    return {**kept, "times": rows[0], key: rows[1]}
-
-
-def _rows(path: Path, column: str) -> list[tuple[float, float]]:
-    """Read time (s) and value of every line; raises pydantic's error with the line of the first mistake."""
-
-    def mistake(line: int, message: str) -> Exception:
-        return q.invalid(f"{path.name}: line {line}: {message}", "table")
-
     try:
-        heads, table = read_open_table(path, MAX_BYTES)
-    except BlocksimError as error:
-        raise q.invalid(str(error).splitlines()[0], "table") from None
-    names = [head.text for head in heads]
-    if sorted(names) != sorted((TIME, column)):
-        raise mistake(table.header.number, f"the columns are {','.join(names)}; {TIME},{column} are needed")
-    if table.problems:
-        first = min(table.problems, key=lambda problem: problem.line_number or 0)
-        raise mistake(first.line_number or 1, first.message)
-    if not 2 <= len(table.rows) <= MAX_ROWS:
-        message = f"{len(table.rows)} lines with samples; 2 to {MAX_ROWS} are allowed"
-        raise q.invalid(f"{path.name}: {message}", "table")
-    rows: list[tuple[float, float]] = []
-    for row in table.rows:
-        line, numbers = row[TIME].line.number, []
-        for cell in (row[TIME], row[column]):
-            if not cell.text:
-                raise mistake(line, f"the {cell.column} is missing")
-            try:
-                numbers.append(cell.number())
-            except ValueError as error:
-                raise mistake(line, str(error)) from None
-        time, value = numbers
-        before = rows[-1][0] if rows else -1.0
-        if time < 0.0 or time <= before:
-            why = "times must not be negative" if time < 0.0 else f"times must increase, the one before is {before:g} s"
-            raise mistake(line, f"time {time:g} s: {why}")
-        rows.append((time, value))
-    return rows
+        _, times, values = read_series(content_of(path, MAX_BYTES), (column,), f"{TIME},{column}", MAX_ROWS)
+    except MotionTableError as error:
+        raise q.invalid(f"{path.name}: {error}", "table") from None
+    kept = {name: entry for name, entry in value.items() if name != "table"}
+    return {**kept, "times": times, key: values}
 
 
 Axes = Literal["world", "body"]
@@ -207,10 +141,6 @@ class VaryingLoad(Load):
     """A load that goes with a factor."""
 
     history: AnyHistory = Field(default=Constant(kind="constant"), description="factor over time")
-
-    def stretches(self) -> tuple[Stretch, ...]:
-        """Return the factor over time."""
-        return self.history.stretches()
 
 
 class Force(VaryingLoad):
@@ -308,16 +238,6 @@ class Gravity(Load):
             if value is None:
                 raise q.invalid(f'{key} is missing: give to and rate (such as "0.1 deg/s"), or a table')
 
-    def stretches_from(self, tilt: float) -> tuple[Stretch, ...]:
-        """Return the tilt (rad) over time, given that of the ground."""
-        if self.times:
-            return straight_lines(self.times, self.tilts)
-        first = tilt if self.first is None else self.first
-        last, rate = self.last or 0.0, self.rate or math.nan
-        if last == first:
-            return (Stretch(0.0, first, 0.0),)
-        return straight_lines((self.start, self.start + abs(last - first) / rate), (first, last))
-
 
 AnyLoad = Annotated[Force | Moment | Pressure | Horizontal | Gravity, Field(discriminator="kind")]
 """Any load, distinguished by its `kind`."""
@@ -325,3 +245,32 @@ LOADS: dict[str, type[Load]] = by_kind(AnyLoad)
 """Class by kind, as written in a scenario."""
 OnBody = Force | Moment | Pressure
 """Those that act on one body."""
+
+
+def stretches_of(load: AnyLoad, tilt: float) -> tuple[Stretch, ...]:
+    """Return the factor of a load over time; of gravity the tilt (rad), given that of the ground."""
+    history = load if isinstance(load, Gravity) else load.history
+    times: Times
+    values: tuple[float, ...]
+    match history:
+        case Constant():
+            return (Stretch(0.0, 1.0, 0.0),)
+        case Ramp():
+            times, values = (history.start, history.end), (history.first, history.last)
+        case Gravity(times=()):
+            first, last = tilt if history.first is None else history.first, history.last or 0.0
+            if last == first:
+                return (Stretch(0.0, first, 0.0),)
+            times, values = (
+                (history.start, history.start + abs(last - first) / (history.rate or math.nan)),
+                (first, last),
+            )
+        case Gravity():
+            times, values = history.times, history.tilts
+        case _:
+            times, values = history.times, history.factors
+    is_stepped = isinstance(history, Steps)
+    rows = [Stretch(0.0, 0.0 if is_stepped else values[0], 0.0)] if times[0] > 0.0 else []
+    for (begin, one), (end, other) in pairwise(zip(times, values, strict=True)):
+        rows.append(Stretch(begin, one, 0.0 if is_stepped else (other - one) / (end - begin)))
+    return (*rows, Stretch(times[-1], values[-1], 0.0))

@@ -1,4 +1,9 @@
-"""Prescribed motion of the supports: the ground, walls and fixed bodies move together along one direction.
+"""Prescribed motion of the supports, and of single bodies; tables of samples over time.
+
+The ground, walls and fixed bodies move together along one direction: with a vibration, a pulse of acceleration (sine,
+half-sine, rectangular, cosine), or the samples of a table. A body of its own motion moves as the supports could, or
+once from start to end along a line or about a point. It has friction and restitution at its faces as any other; forces
+do not move it, and [motion] does not either. Two bodies neither of which is free do not touch.
 
 A table of motion is CSV with the columns `time_s` and one of displacement or acceleration:
 
@@ -8,23 +13,18 @@ A table of motion is CSV with the columns `time_s` and one of displacement or ac
     0.01,0.12
 
 Lines that begin with `#` are notes. Times increase and are not negative; the motion begins with the first of them.
-
-Acceleration pulses of the supports: sine, half-sine, rectangular, cosine.
-
-Prescribed motion of single bodies: as that of the supports, or once from start to end along a line or about a point.
-
-A driven body has friction and restitution at its faces as any other; forces do not move it, and [motion] does not
-either. Two bodies neither of which is free do not touch.
 """
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar, get_args
+from typing import Annotated, Literal, get_args
 
-from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import units as q
@@ -65,18 +65,13 @@ class Harmonic(Table):
     )
 
     @property
-    def cycle(self) -> float:
-        """Time (s) of one cycle."""
-        return 1.0 / self.frequency
-
-    @property
     def resolved_ramp(self) -> float:
         """Time (s) of the rise, as given or by default."""
         return 1.0 / self.frequency if self.ramp is None else self.ramp
 
     def sections(self, end: float) -> Iterator[tuple[float, float, int]]:
         """Yield start and end (s) of rise, steady part and fall, up to `end`, and the number of pieces of each."""
-        ramp, cycle = self.resolved_ramp, self.cycle
+        ramp, cycle = self.resolved_ramp, 1.0 / self.frequency
         stop = math.inf if self.duration is None else self.start + self.duration
         breaks = [(self.start, min(cycle, ramp)), (self.start + ramp, cycle), (stop - ramp, min(cycle, ramp))]
         lasts = [begin for begin, _ in breaks[1:]] + [stop]
@@ -110,13 +105,10 @@ class MotionTable:
         return hashlib.sha256(repr((self.quantity, self.times, self.values)).encode()).hexdigest()
 
 
-Samples = TypeVar("Samples", bound=MotionTable)
-
-
-def content_of(path: Path) -> bytes:
-    """Return what a file of motion holds; raises MotionTableError where it cannot be read, or is too large."""
+def content_of(path: Path, most: int = MAX_BYTES) -> bytes:
+    """Return what a file of samples holds; raises MotionTableError where it cannot be read, or has too many bytes."""
     try:
-        return read_limited(path, MAX_BYTES, links=True)
+        return read_limited(path, most, links=True)
     except BlocksimError as error:
         raise MotionTableError(str(error).removeprefix(f"{path}: ")) from None
 
@@ -124,25 +116,39 @@ def content_of(path: Path) -> bytes:
 def read_motion_table(path: Path) -> MotionTable:
     """Read a table of motion; raises MotionTableError with the line of the first mistake."""
     content = content_of(path)
+    name, times, values = read_series(content, COLUMNS, f"{TIME} and one of {', '.join(COLUMNS)}", MAX_ROWS)
+    quantity, unit = COLUMNS[name]
+    return MotionTable(path, quantity, times, tuple(unit * value for value in values), content)
+
+
+def read_series(
+    content: bytes, columns: Collection[str], needed: str, most: int
+) -> tuple[str, tuple[float, ...], tuple[float, ...]]:
+    """Read a table of times (s) and the values of one of some columns: its name, times and values, 2 to `most`.
+
+    Raises MotionTableError with the line of the first mistake; `needed` names the columns.
+    """
     try:
         lines = bare_rows(content)
     except UnicodeDecodeError:
         raise MotionTableError("not a text file in UTF-8") from None
     line, names = lines[0] if lines else (1, [])
     others = [name for name in names if name != TIME]
-    if len(names) != 2 or len(others) != 1 or others[0] not in COLUMNS:
+    if len(names) != 2 or len(others) != 1 or others[0] not in columns:
         found = q.toml(",".join(names))
-        message = f"the columns are {found}; {TIME} and one of {', '.join(COLUMNS)} are needed"
+        message = f"the columns are {found}; {needed} are needed"
         if ";" in found:
             message = f"{found}: columns are separated by semicolons; {DIALECT}"
         raise MotionTableError(f"line {line}: {message}")
-    quantity, unit = COLUMNS[others[0]]
     times: list[float] = []
     values: list[float] = []
     for line, cells in lines[1:]:
         if len(cells) != 2:
             hint = f"; {DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""
             raise MotionTableError(f"line {line}: {q.toml(','.join(cells))}: a time and a value are needed{hint}")
+        empty = next((name for name, cell in zip(names, cells, strict=True) if not cell), "")
+        if empty:
+            raise MotionTableError(f"line {line}: the {empty} is missing")
         numbers = dict(zip(names, (finite_number(line, cell, cell) for cell in cells), strict=True))
         time, before = numbers[TIME], times[-1] if times else -math.inf
         if time < 0.0 or time <= before:
@@ -150,10 +156,10 @@ def read_motion_table(path: Path) -> MotionTable:
             why = "the time of the line before is repeated" if time == before else why
             raise MotionTableError(f"line {line}: time {time:g} s: {why}")
         times.append(time)
-        values.append(unit * numbers[others[0]])
-    if not LEAST_ROWS <= len(times) <= MAX_ROWS:
-        raise MotionTableError(f"{len(times)} lines with samples; {LEAST_ROWS} to {MAX_ROWS} are allowed")
-    return MotionTable(path, quantity, tuple(times), tuple(values), content)
+        values.append(numbers[others[0]])
+    if not LEAST_ROWS <= len(times) <= most:
+        raise MotionTableError(f"{len(times)} lines with samples; {LEAST_ROWS} to {most} are allowed")
+    return others[0], tuple(times), tuple(values)
 
 
 def finite_number(line: int, text: str, digits: str) -> float:
@@ -167,29 +173,34 @@ def finite_number(line: int, text: str, digits: str) -> float:
     return number
 
 
-def table_from(
-    value: object, info: ValidationInfo, kind: type[Samples], read: Callable[[Path], Samples], example: str
-) -> Samples:
-    """Return a table as it is, or read it; its path is relative to the scenario's folder, the validation context.
+@dataclass(frozen=True)
+class TableFile:
+    """Annotation of a table: the path of its file, relative to the scenario's folder, which is the validation context.
 
-    Raises a pydantic error with the name of the file for what `read` finds wrong, and for what is no path.
+    What `read` finds wrong becomes a pydantic error with the name of the file, and so does what is no path.
     """
-    if isinstance(value, kind):
-        return value
-    path = table_path(value, (info.context or {}).get("folder", ""), example)
-    try:
-        return read(path)
-    except MotionTableError as error:
-        raise q.invalid(f"{path.name}: {error}") from None
 
+    read: Callable[[Path], MotionTable]
+    example: str
 
-def _table(value: object, info: ValidationInfo) -> MotionTable:
-    return table_from(value, info, MotionTable, read_motion_table, "shaking.csv")
+    def __get_pydantic_core_schema__(self, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Pass a table as it is, or read it; write its path."""
 
+        def load(value: object, info: core_schema.ValidationInfo) -> object:
+            if isinstance(value, source):
+                return value
+            path = table_path(value, (info.context or {}).get("folder", ""), self.example)
+            try:
+                return self.read(path)
+            except MotionTableError as error:
+                raise q.invalid(f"{path.name}: {error}") from None
 
-def path_of(table: MotionTable) -> str:
-    """Return the path of a table as a scenario has it."""
-    return table.path.as_posix()
+        write = core_schema.plain_serializer_function_ser_schema(lambda table: table.path.as_posix())
+        return core_schema.with_info_plain_validator_function(load, serialization=write)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Describe the path to editors."""
+        return {"type": "string", "minLength": 1}
 
 
 class FromTable(Table):
@@ -200,12 +211,7 @@ class FromTable(Table):
     """
 
     kind: Literal["table"] = Field(description="kind of motion")
-    table: Annotated[
-        MotionTable,
-        PlainValidator(_table),
-        PlainSerializer(path_of),
-        WithJsonSchema({"type": "string", "minLength": 1}),
-    ] = Field(
+    table: Annotated[MotionTable, TableFile(read_motion_table, "shaking.csv")] = Field(
         description="CSV table, relative to the scenario file: time_s and displacement_m, _mm or acceleration_g, _m_s2"
     )
     scale: q.Number = Field(default=1.0, description="factor on the table's values")
@@ -221,8 +227,6 @@ SINGLE = ("half-sine", "rectangular")
 """Shapes of half a cycle, which do not repeat."""
 ABRUPT = ("rectangular", "cosine")
 """Shapes that begin at their largest acceleration."""
-_SHAPES = OneOf(get_args(Shape))
-_Cycles = Annotated[float, q.Quantity(q.NUMBER, above=0.0, at_most=MOST_CYCLES)]
 Acceleration = Annotated[float, q.Quantity(q.ACCELERATION, above=0.0)]
 
 
@@ -240,13 +244,15 @@ class Pulse(Table):
     """
 
     kind: Literal["pulse"] = Field(description="kind of motion")
-    shape: Annotated[Shape, _SHAPES] = Field(description="course of the acceleration")
+    shape: Annotated[Shape, OneOf(get_args(Shape))] = Field(description="course of the acceleration")
     amplitude: Acceleration = Field(description="largest acceleration; 0.5 g is written as such")
     frequency: q.PositiveFrequency | None = Field(
         default=None, description="cycles per second; give this or duration (a half-sine, a rectangle: half a cycle)"
     )
     duration: q.PositiveTime | None = Field(default=None, description="duration of the whole pulse")
-    cycles: _Cycles = Field(default=1.0, description="number of cycles of a sine or cosine, at most 1000")
+    cycles: Annotated[float, q.Quantity(q.NUMBER, above=0.0, at_most=MOST_CYCLES)] = Field(
+        default=1.0, description="number of cycles of a sine or cosine, at most 1000"
+    )
     direction: q.Angle = Field(default=0.0, description="direction of positive acceleration, counter-clockwise from +x")
     start: q.NonNegativeTime = Field(default=0.0, description="start of the pulse; the supports rest before")
 
@@ -268,16 +274,6 @@ class Pulse(Table):
         assert self.frequency is not None  # noqa: S101 - one of the two is there
         return self.resolved_cycles / self.frequency
 
-    @property
-    def cycle(self) -> float:
-        """Time (s) of one cycle, whole or not."""
-        return self.resolved_duration / self.resolved_cycles
-
-    @property
-    def angular_frequency(self) -> float:
-        """Angular frequency w (rad/s)."""
-        return 2.0 * math.pi * self.resolved_cycles / self.resolved_duration
-
     def _check(self) -> None:
         if (self.frequency is None) == (self.duration is None):
             found = "neither is" if self.frequency is None else "both are"
@@ -288,12 +284,8 @@ class Pulse(Table):
 
 
 Course = Literal["constant", "smooth"]
-COURSES: tuple[Course, ...] = ("constant", "smooth")
 MOST_BODY_TABLES = 16
 """Different tables of motion of bodies, which are copied into the folder of a run."""
-STEEPEST = 15.0 / 8.0
-"""Greatest speed of a smooth course over its mean."""
-POSITIVE_SPIN = q.Quantity(q.SPIN, above=0.0)
 
 
 class Ramp(Table):
@@ -304,18 +296,13 @@ class Ramp(Table):
     direction: q.Angle = Field(default=0.0, description="direction of the motion, counter-clockwise from +x")
     duration: q.PositiveTime | None = Field(default=None, description="time from start to end; give this or speed")
     speed: q.PositiveSpeed | None = Field(default=None, description="greatest speed; give this or duration")
-    course: Annotated[Course, OneOf(COURSES)] = Field(
+    course: Annotated[Course, OneOf(get_args(Course))] = Field(
         default="constant", description="constant (at once at full speed) or smooth (starts and ends without a jerk)"
     )
     start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the body rests before")
 
     def _check(self) -> None:
         require_one("give duration or speed", duration=self.duration, speed=self.speed)
-
-    @property
-    def resolved_duration(self) -> float:
-        """Time (s) from start to end."""
-        return _duration(self.duration, self.distance, self.speed, self.course)
 
 
 class Rotation(Table):
@@ -327,10 +314,8 @@ class Rotation(Table):
         default=None, description="[x, y] of the point that it turns about (default: the centre of the body)"
     )
     duration: q.PositiveTime | None = Field(default=None, description="time from start to end; give this or spin")
-    spin: Annotated[float, POSITIVE_SPIN] | None = Field(
-        default=None, description="greatest angular velocity; give this or duration"
-    )
-    course: Annotated[Course, OneOf(COURSES)] = Field(
+    spin: q.PositiveSpin | None = Field(default=None, description="greatest angular velocity; give this or duration")
+    course: Annotated[Course, OneOf(get_args(Course))] = Field(
         default="constant", description="constant (at once at full spin) or smooth (starts and ends without a jerk)"
     )
     start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the body rests before")
@@ -339,17 +324,6 @@ class Rotation(Table):
         require_one("give duration or spin", duration=self.duration, spin=self.spin)
         if self.angle == 0.0:
             raise q.invalid("a turn by 0 is none", "angle")
-
-    @property
-    def resolved_duration(self) -> float:
-        """Time (s) from start to end."""
-        return _duration(self.duration, abs(self.angle), self.spin, self.course)
-
-
-def _duration(duration: float | None, way: float, speed: float | None, course: Course) -> float:
-    if duration is not None:
-        return duration
-    return way / (speed or math.nan) * (STEEPEST if course == "smooth" else 1.0)
 
 
 AnyDrive = Annotated[Harmonic | FromTable | Ramp | Rotation, Field(discriminator="kind")]

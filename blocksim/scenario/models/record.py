@@ -1,4 +1,4 @@
-"""Accelerograms as files have them: PEER AT2, and text or CSV with a column of time and one of acceleration.
+"""Recorded accelerations of the supports: PEER AT2, and text or CSV with a column of time and one of acceleration.
 
 AT2, of the PEER and NGA data bases: four lines of head with the unit in the third and `NPTS= 4000, DT= .0050 SEC` in
 the fourth (older files: `4000 0.0050 NPTS, DT`), then the samples, several a line. The format follows from this line,
@@ -7,9 +7,6 @@ not from the file's name.
 Two columns, separated by blanks, commas or semicolons: times in s at a constant step, accelerations. Lines that begin
 with `#` or `%` are notes. A first line with names may say the unit: g, m/s2, cm/s2 (gal).
 
-Recorded accelerations of the supports, from the files of `blocksim.scenario.models.record`.
-
-All kinds of prescribed motion of the supports.
 """
 
 import re
@@ -20,7 +17,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple, get_args
 
-from pydantic import Field, PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema
+from pydantic import Field
 
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf, Table, by_kind
@@ -33,10 +30,9 @@ from blocksim.scenario.models.motion import (
     MotionTable,
     MotionTableError,
     Pulse,
+    TableFile,
     content_of,
     finite_number,
-    path_of,
-    table_from,
 )
 from blocksim.scenario.units import STANDARD_GRAVITY, toml
 
@@ -81,24 +77,19 @@ def read_record(path: Path) -> RecordTable:
     content = content_of(path)
     text = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     lines = [Line(number, line) for number, line in enumerate(text.split("\n"), start=1)]
-    head = next((line for line in lines[:HEAD_LINES] if _size_of(line)), None)
-    unit, times, values = _two_columns(lines) if head is None else _at2(lines, head)
+    sizes = (_AT2.search(line.text) or _OLD_AT2.search(line.text) for line in lines[:HEAD_LINES])
+    head = next(((line, size) for line, size in zip(lines, sizes, strict=False) if size), None)
+    unit, times, values = _two_columns(lines) if head is None else _at2(lines, *head)
     factor = 1.0 if unit is None else UNITS[unit]
     return RecordTable(path, "acceleration", tuple(times), tuple(factor * one for one in values), content, unit=unit)
 
 
-def _size_of(line: Line) -> re.Match[str] | None:
-    return _AT2.search(line.text) or _OLD_AT2.search(line.text)
-
-
-def _at2(lines: Sequence[Line], head: Line) -> tuple[Unit | None, Iterable[float], list[float]]:
-    """Return unit, times and values of an AT2 file, of which `head` has number and step."""
+def _at2(lines: Sequence[Line], head: Line, found: re.Match[str]) -> tuple[Unit | None, Iterable[float], list[float]]:
+    """Return unit, times and values of an AT2 file, in whose line `head` number and step were found."""
     before = lines[: head.number - 1]
     other = next((line for line in before if _OTHER.search(line.text)), None)
     if other is not None:
         raise MotionTableError(f"line {other.number}: {toml(other.text.strip())}: an acceleration is needed")
-    found = _size_of(head)
-    assert found is not None  # noqa: S101 - this is how the line was found
     count, step = int(found[1]), _number(head.number, found[2])
     if step <= 0.0:
         raise MotionTableError(f"line {head.number}: step {found[2]} s: it must be above 0")
@@ -196,10 +187,6 @@ def _number(line: int, text: str) -> float:
 Baseline = Literal["rest", "parabolic", "none"]
 
 
-def _record(value: object, info: ValidationInfo) -> RecordTable:
-    return table_from(value, info, RecordTable, read_record, "record.AT2")
-
-
 class Record(Table):
     """A recorded accelerogram, corrected, scaled, joined by straight lines and integrated from rest.
 
@@ -208,12 +195,9 @@ class Record(Table):
     """
 
     kind: Literal["record"] = Field(description="kind of motion")
-    table: Annotated[
-        RecordTable,
-        PlainValidator(_record),
-        PlainSerializer(path_of),
-        WithJsonSchema({"type": "string", "minLength": 1}),
-    ] = Field(description="accelerogram, relative to the scenario file: PEER AT2, or text or CSV of time and value")
+    table: Annotated[RecordTable, TableFile(read_record, "record.AT2")] = Field(
+        description="accelerogram, relative to the scenario file: PEER AT2, or text or CSV of time and value"
+    )
     unit: Annotated[Unit, OneOf(get_args(Unit))] | None = Field(
         default=None, description="unit of the accelerations, g, m/s^2 or cm/s^2, where the file does not say it"
     )

@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
-from blocksim.scenario.models.loads import Gravity, Stretch, VaryingLoad
+from blocksim.scenario.models.loads import Gravity, Stretch, VaryingLoad, stretches_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -79,10 +79,10 @@ def test_two_loads_that_turn_gravity_are_refused() -> None:
     ("text", "message"),
     [
         ("time_s,factor\n0,1\n1,\n", "load.csv: line 3: the factor is missing"),
-        ("time_s,force\n0,1\n1,2\n", "load.csv: line 1: the columns are time_s,force; time_s,factor are needed"),
+        ("time_s,force\n0,1\n1,2\n", 'load.csv: line 1: the columns are "time_s,force"; time_s,factor are needed'),
         ("time_s,factor\n1,1\n0.5,2\n", "load.csv: line 3: time 0.5 s: times must increase"),
         ("time_s,factor\n0,1\n", "load.csv: 1 lines with samples"),
-        ("time_s,factor\n0,1\n1,2 N\n", "load.csv: line 3: '2 N' is not a number"),
+        ("time_s,factor\n0,1\n1,2 N\n", 'load.csv: line 3: "2 N" is not a finite number'),
     ],
 )
 def test_a_table_with_a_gap_or_of_other_columns_is_refused_with_its_line(
@@ -103,7 +103,7 @@ def test_a_table_is_read_and_the_resolved_scenario_needs_it_no_more(tmp_path: Pa
     )
     one, two = read.loads
     assert isinstance(one, VaryingLoad)
-    assert one.stretches() == (Stretch(0.0, 1.0, 0.0), Stretch(0.5, 1.0, 2.0), Stretch(1.5, 3.0, 0.0))
+    assert stretches_of(one, 0.0) == (Stretch(0.0, 1.0, 0.0), Stretch(0.5, 1.0, 2.0), Stretch(1.5, 3.0, 0.0))
     assert isinstance(two, Gravity)
     assert two.tilts == pytest.approx((0.0, 0.3490658503988659))
     (tmp_path / "scenario.toml").write_text(scenario_to_toml(read))
