@@ -12,16 +12,12 @@ from pydantic import ValidationError
 from blocksim.scenario import geometry, overrides
 from blocksim.scenario.geometry import count_across
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, mistakes_of
-from blocksim.scenario.models.base import SYSTEMS
-from blocksim.scenario.models.contact import GROUND, Contact, Pair
+from blocksim.scenario.models import base, contact, stepping, study
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.stepping import SCHEMES
-from blocksim.scenario.models.study import OWN_KEYS, Mode, Normal, Sweep, Uniform
 from blocksim.scenario.overrides import SYNONYMS, Data, UnfitOverrideError, with_value
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.start import impossible_starts, soil_tables, unfit_soils
-from blocksim.scenario.structures import PolygonStructure
-from blocksim.scenario.structures.polygons import Polygons
+from blocksim.scenario.structures import PolygonStructure, polygons
 from blocksim.scenario.units import toml
 
 BLOCKS_BY_NAME = ("structures", "bodies")
@@ -31,8 +27,8 @@ SPRING_CHOICES = ("model", "law")
 
 def wrong_names(data: Data) -> Iterator[Mistake]:
     """Find names of blocks and materials that do not exist, and scenarios without a body."""
-    if all(data.get(group, ()) == () for group in (*BLOCKS_BY_NAME, *SYSTEMS)):
-        *tables, last = (f"[[{name}]]" for name in (*BLOCKS_BY_NAME, *SYSTEMS))
+    if all(data.get(group, ()) == () for group in (*BLOCKS_BY_NAME, *base.SYSTEMS)):
+        *tables, last = (f"[[{name}]]" for name in (*BLOCKS_BY_NAME, *base.SYSTEMS))
         yield Mistake((), f"nothing to simulate: add a {', '.join(tables)} or {last} table")
     blocks = data.get("blocks")
     for name in blocks if isinstance(blocks, Mapping) else ():
@@ -56,24 +52,24 @@ def _unknown(data: Data, path: overrides.KeyPath, group: str) -> Iterator[Mistak
 
 def _wrong_pairs(data: Data) -> Iterator[Mistake]:
     materials, pairs = data.get("materials"), data.get("pairs")
-    known = [*materials, GROUND] if isinstance(materials, Mapping) else []
-    if GROUND in known[:-1]:
-        message = f"{toml(GROUND)} means the ground in [pairs]; give this material another name"
-        yield Mistake(("materials", GROUND), message, at="key")
+    known = [*materials, contact.GROUND] if isinstance(materials, Mapping) else []
+    if contact.GROUND in known[:-1]:
+        message = f"{toml(contact.GROUND)} means the ground in [pairs]; give this material another name"
+        yield Mistake(("materials", contact.GROUND), message, at="key")
     found: set[frozenset[str]] = set()
     for one, partners in pairs.items() if isinstance(pairs, Mapping) else ():
         if known and one not in known:
             yield Mistake(("pairs", one), f"unknown material {toml(one)}, {did_you_mean_or_list(one, known)}", at="key")
-        missing = f"name the other material too, as in [{overrides.format_key(('pairs', one, GROUND))}]"
+        missing = f"name the other material too, as in [{overrides.format_key(('pairs', one, contact.GROUND))}]"
         if partners == {}:
             yield Mistake(("pairs", one), missing, at="key")
         for other in partners if isinstance(partners, Mapping) else ():
             path = ("pairs", one, other)
-            if other in Pair.model_fields and other not in known:
+            if other in contact.Pair.model_fields and other not in known:
                 yield Mistake(path, missing, at="key")
             elif known and other not in known:
                 yield Mistake(path, f"unknown material {toml(other)}, {did_you_mean_or_list(other, known)}", at="key")
-            if one == other == GROUND:
+            if one == other == contact.GROUND:
                 yield Mistake(path, "the ground is not in contact with itself", at="key")
             elif frozenset((one, other)) in found:
                 twin = overrides.format_key(("pairs", other, one))
@@ -101,10 +97,10 @@ def unfit_choices(scenario: Scenario) -> Iterator[Mistake]:
     for number, structure in enumerate(scenario.structures):
         if why and isinstance(structure, PolygonStructure):
             yield Mistake(("structures", number, "kind"), why, relation=True)
-    springs = next(name for name, one in SCHEMES.items() if one.has_springs)
+    springs = next(name for name, one in stepping.SCHEMES.items() if one.has_springs)
     for key in () if scenario.time.has_springs else SPRING_CHOICES:
         chosen = getattr(scenario.contact, key)
-        if chosen != Contact.model_fields[key].default:
+        if chosen != contact.Contact.model_fields[key].default:
             message = f"{toml(chosen)} needs springs, time.scheme = {toml(springs)}; here contacts are rigid"
             yield Mistake(("contact", key), message, relation=True)
 
@@ -114,7 +110,7 @@ def _why_without_outlines(scenario: Scenario) -> str:
     scheme, model = scenario.time.scheme, scenario.contact.model
     if model not in scenario.time.models_of_outlines:
         why = ": its boundary particles lie on rectangles only" if scenario.time.has_springs else ""
-        known = ((name, one) for name, time in sorted(SCHEMES.items()) for one in time.models_of_outlines)
+        known = ((name, one) for name, time in sorted(stepping.SCHEMES.items()) for one in time.models_of_outlines)
         modelled = " or ".join(f"{toml(name)} and {toml(one)}" for name, one in known)
         where = f"with time.scheme = {toml(scheme)} and contact.model = {toml(model)}"
         return f"outlines are not modelled {where}{why}; use {modelled}"
@@ -176,7 +172,7 @@ def _bare_numbers(scenario: Scenario) -> Iterator[str]:
             if (size := getattr(block, side)) is not None and size > LONGEST:
                 yield f"{overrides.format_key(('blocks', name, side))} = {size:.4g} m; add the intended unit"
     for number, structure in enumerate(scenario.structures):
-        if isinstance(structure, Polygons):
+        if isinstance(structure, polygons.Polygons):
             size = median(dist(*geometry.box_of(one.outline)) for one in structure.cells_given)
             if size > LONGEST_DRAWN:
                 key = overrides.format_key(("structures", number))
@@ -198,9 +194,9 @@ def _friction_angles(scenario: Scenario) -> Iterator[str]:
         if "friction" not in (parts[0], *parts[3:4]) or parts[-1] in ("kinetic_ratio", "transition_speed"):
             continue
         match values:
-            case Uniform(angle=False):
+            case study.Uniform(angle=False):
                 frictions.append((key, values.high))
-            case Normal(angle=False):
+            case study.Normal(angle=False):
                 frictions.append((key, values.mean))
             case tuple():
                 bare = [float(value) for value in values if isinstance(value, int | float)]
@@ -212,7 +208,7 @@ def _friction_angles(scenario: Scenario) -> Iterator[str]:
 
 MAX_TRIED = 100
 MAX_VARIED = 100
-MODES = get_args(Mode)
+MODES = get_args(study.Mode)
 ENDS = ("from", "mean", "to")
 """Keys of a variation that is not a list, in the order in which they are reported."""
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
@@ -258,10 +254,10 @@ def _sweep(data: Data, folder: Path) -> Iterator[Mistake]:
     mode = {"mode": sweep["mode"]} if sweep.get("mode") in MODES else {}
     for key, values in sweep.items():
         try:
-            Sweep.model_validate({**mode, key: values})
+            study.Sweep.model_validate({**mode, key: values})
         except ValidationError:
             continue
-        if key not in OWN_KEYS:
+        if key not in study.OWN_KEYS:
             yield from islice(_varied(trial, str(key), values), 1)
     for key in map(str, sweep):
         table, dot, word = key.rpartition(".")

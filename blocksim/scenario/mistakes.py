@@ -7,12 +7,7 @@ from typing import Any, Literal, cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from blocksim.scenario.models.base import HELD, SYSTEMS
-from blocksim.scenario.models.loads import HISTORIES, LOADS
-from blocksim.scenario.models.motion import DRIVES
-from blocksim.scenario.models.record import MOTIONS
-from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.stepping import PROBES, SCHEMES, scheme_of
+from blocksim.scenario.models import base, loads, motion, record, scenario, stepping
 from blocksim.scenario.overrides import MISSING, NAMED, KeyPath, field_at, follow, keys_of, marks_of, table_at
 from blocksim.scenario.spelling import did_you_mean, meant_word, nearest
 from blocksim.scenario.structures import KINDS
@@ -23,11 +18,11 @@ MAX_MISTAKES = 200
 """Mistakes that are examined; a file of a million mistakes must not take minutes."""
 KINDS_IN: dict[str | int, Iterable[str]] = {
     "structures": KINDS,
-    "motion": MOTIONS,
-    "probes": PROBES,
-    "bodies": DRIVES,
-    "loads": LOADS,
-    "history": HISTORIES,
+    "motion": record.MOTIONS,
+    "probes": stepping.PROBES,
+    "bodies": motion.DRIVES,
+    "loads": loads.LOADS,
+    "history": loads.HISTORIES,
 }
 
 
@@ -81,7 +76,7 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
     """Drop what pydantic adds to the path of the file: the tag of a union, and the sweep's inner table."""
     path = tuple(loc)
     match path:
-        case (held, *_) if held == HELD:
+        case (held, *_) if held == base.HELD:
             path = path[1:]
         case ("structures" | "probes", *_):
             path = (*path[:2], *path[3:])
@@ -91,7 +86,7 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
             path = (*path[:2], "history", *path[5:])
         case ("loads", *_):
             path = (*path[:2], *path[3:])
-        case ("time", scheme, *_) if scheme not in SCHEMES:
+        case ("time", scheme, *_) if scheme not in stepping.SCHEMES:
             pass  # a scheme that is none of the union
         case ("motion" | "time", *_) | ("sweep", "vary", *_):
             path = (path[0], *path[2:])
@@ -116,23 +111,27 @@ def _missing(path: KeyPath, data: object) -> Mistake:
 
 
 def _unknown_key(path: KeyPath, data: object) -> Mistake:
-    schemes = [word for word, table in SCHEMES.items() if path[0] == "time" and path[-1] in keys_of(table)]
+    schemes = [word for word, table in stepping.SCHEMES.items() if path[0] == "time" and path[-1] in keys_of(table)]
     if schemes:
-        present = scheme_of(follow(data, path[:-1]))
+        present = stepping.scheme_of(follow(data, path[:-1]))
         return Mistake(
             path, f"this key belongs to scheme {toml(schemes[0])}; the scheme here is {toml(present)}", at="key"
         )
-    table = SCHEMES[scheme_of(follow(data, path[:-1]))] if path[0] == "time" else table_at(path[:-1], data)
+    table = (
+        stepping.SCHEMES[stepping.scheme_of(follow(data, path[:-1]))]
+        if path[0] == "time"
+        else table_at(path[:-1], data)
+    )
     known = keys_of(table) if table is not None else ()
     meant = meant_word(str(path[-1]), known)
     is_typing_error = nearest(str(path[-1]), known, most=1) is not None
     if not meant or (len(path) == 1 and not is_typing_error):
-        singles = (name for name in keys_of(Scenario) if name not in NAMED and name not in SYSTEMS)
+        singles = (name for name in keys_of(scenario.Scenario) if name not in NAMED and name not in base.SYSTEMS)
         tables = ((name, table_at((name,), {})) for name in singles)
         having = [name for name, one in tables if one is not None and path[-1] in keys_of(one)]
         if len(having) == 1:
             return Mistake(path, f"unknown key, did you mean {f'{having[0]}.{path[-1]}'!r}?", at="key")
-    if len(path) > 1 and not is_typing_error and path[-1] in keys_of(Scenario):
+    if len(path) > 1 and not is_typing_error and path[-1] in keys_of(scenario.Scenario):
         return Mistake(path, f"unknown key, {path[-1]} belongs at the top of the file", at="key")
     hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
     return Mistake(path, f"unknown key, {hint}", at="key", meant=(*path[:-1], meant) if meant else ())

@@ -8,31 +8,13 @@ from operator import attrgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import geometry, overlap, overrides
-from blocksim.scenario.events import impossible_events, unfit_probes
-from blocksim.scenario.geometry import Corner, edges_of, holds, section_of
-from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake
+from blocksim.scenario import events, geometry, mistakes, overlap, overrides, placement, resolved, spelling, units
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.overlap import Outlines, Rectangles, crossings, near_pairs, penetration
-from blocksim.scenario.placement import (
-    TOLERANCE,
-    PlacedBody,
-    origins_of,
-    place_bodies,
-    place_segments,
-    profile_segments,
-    smallest_width,
-    surface_heights,
-    wall_segments,
-)
-from blocksim.scenario.resolved import body_table_contents
-from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.structures import MAX_BLOCKS, Polygons, PolygonStructure, UnfitError
-from blocksim.scenario.units import toml
 
 MAX_LOADS = 1000
 STRIP = 1e-3
@@ -48,93 +30,103 @@ PARALLEL = 1e-6
 """Sine of the angle between the normal of a face and the axis of an outline that it is named after, at most."""
 
 
-def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
+def unfit_loads(scenario: Scenario, bodies: Sequence[placement.PlacedBody]) -> Iterator[mistakes.Mistake]:
     """Find loads that do not fit the placed bodies, and bodies that cannot be held; all is valid otherwise."""
     loads = scenario.loads
     if len(loads) > MAX_LOADS:
-        yield Mistake(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
+        yield mistakes.Mistake(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
         return
     by_name = {body.name: body for body in bodies} if loads or scenario.start.hold else {}
     names: set[str] = set()
     turns = False
     for number, load in enumerate(loads):
         if load.name is not None and load.name in names:
-            yield Mistake(("loads", number, "name"), f"two loads are named {toml(load.name)}")
+            yield mistakes.Mistake(("loads", number, "name"), f"two loads are named {units.toml(load.name)}")
         names.add(load.name or "")
         if isinstance(load, Gravity):
             if turns:
-                yield Mistake(("loads", number), "gravity turns already; one load of this kind is allowed")
+                yield mistakes.Mistake(("loads", number), "gravity turns already; one load of this kind is allowed")
             turns = True
         elif isinstance(load, OnBody):
             yield from _on_body(scenario, number, load, by_name)
     for number, name in enumerate(scenario.start.hold):
         if name not in by_name:
-            hint = did_you_mean_or_list(name, by_name)
-            yield Mistake(("start", "hold", number), f"unknown body {toml(name)}, {hint}")
+            hint = spelling.did_you_mean_or_list(name, by_name)
+            yield mistakes.Mistake(("start", "hold", number), f"unknown body {units.toml(name)}, {hint}")
         elif by_name[name].fixed:
-            yield Mistake(("start", "hold", number), f"body {toml(name)} is fixed and cannot be released")
+            yield mistakes.Mistake(
+                ("start", "hold", number), f"body {units.toml(name)} is fixed and cannot be released"
+            )
 
 
-def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, PlacedBody]) -> Iterator[Mistake]:
+def _on_body(
+    scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, placement.PlacedBody]
+) -> Iterator[mistakes.Mistake]:
     path = ("loads", number)
     body = bodies.get(load.body)
     if body is None:
-        hint = did_you_mean_or_list(load.body, bodies)
-        yield Mistake((*path, "body"), f"unknown body {toml(load.body)}, {hint}")
+        hint = spelling.did_you_mean_or_list(load.body, bodies)
+        yield mistakes.Mistake((*path, "body"), f"unknown body {units.toml(load.body)}, {hint}")
     elif body.fixed:
-        yield Mistake((*path, "body"), f"body {toml(load.body)} is fixed; a load has no effect on it")
+        yield mistakes.Mistake((*path, "body"), f"body {units.toml(load.body)} is fixed; a load has no effect on it")
     elif isinstance(load, Force):
         half = (0.5 * body.size_x, 0.5 * body.size_y)
         if body.outline:
-            is_inside = holds(body.outline, load.point, _margin(body))
+            is_inside = geometry.holds(body.outline, load.point, _margin(body))
         else:
             is_inside = all(abs(at) <= side * (1.0 + STRIP) for at, side in zip(load.point, half, strict=True))
         if not is_inside:
             size = f"{1e3 * body.size_x:g} x {1e3 * body.size_y:g} mm"
             about = f"an outline in a box of {size}" if body.outline else f"{size} about its centre"
-            yield Mistake((*path, "point"), f"the point lies outside of body {toml(load.body)}, {about}")
+            yield mistakes.Mistake((*path, "point"), f"the point lies outside of body {units.toml(load.body)}, {about}")
     elif isinstance(load, Pressure) and face_of(body, load.face) is None:
-        message = f"the outline of body {toml(load.body)} has no face whose normal points exactly that way"
-        yield Mistake((*path, "face"), message)
+        message = f"the outline of body {units.toml(load.body)} has no face whose normal points exactly that way"
+        yield mistakes.Mistake((*path, "face"), message)
     elif isinstance(load, Pressure):
         other = next(_covers(scenario, load, body, [*bodies.values()]), None)
         if other is not None:
-            message = f"this face of body {toml(load.body)} is covered by {other}; pressure needs a free face"
-            yield Mistake((*path, "face"), message)
+            message = f"this face of body {units.toml(load.body)} is covered by {other}; pressure needs a free face"
+            yield mistakes.Mistake((*path, "face"), message)
 
 
-def face_of(body: PlacedBody, face: Face) -> tuple[Corner, Corner] | None:
+def face_of(body: placement.PlacedBody, face: Face) -> tuple[geometry.Corner, geometry.Corner] | None:
     """Return the middle of a face and half its extents along x and y (m, in the body); None where there is none."""
     nx, ny = NORMALS[face]
-    for (ax, ay), (bx, by), (x, y) in edges_of(body.corners):
+    for (ax, ay), (bx, by), (x, y) in geometry.edges_of(body.corners):
         if nx * x + ny * y > 0.0 and abs(nx * y - ny * x) <= PARALLEL:
             return (0.5 * (ax + bx), 0.5 * (ay + by)), (0.5 * abs(bx - ax), 0.5 * abs(by - ay))
     return None
 
 
-def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequence[PlacedBody]) -> Iterator[str]:
+def _covers(
+    scenario: Scenario, load: Pressure, body: placement.PlacedBody, bodies: Sequence[placement.PlacedBody]
+) -> Iterator[str]:
     """Yield what lies against a part of a face that is more than a line."""
     strip = strip_before(body, load.face)
-    if scenario.ground.profile is None and float(Outlines.of([strip]).bottom[0]) < -_margin(body):
+    if scenario.ground.profile is None and float(overlap.Outlines.of([strip]).bottom[0]) < -_margin(body):
         yield "the ground"
-    for _, segment, depth in crossings([strip], (*profile_segments(scenario), *wall_segments(scenario))):
+    for _, segment, depth in overlap.crossings(
+        [strip], (*placement.profile_segments(scenario), *placement.wall_segments(scenario))
+    ):
         if depth > _margin(body):
-            yield "the ground" if segment < len(profile_segments(scenario)) else "a wall"
-    boxes = Rectangles.of([strip, *bodies])
-    for one, other in chain.from_iterable(zip(*pairs, strict=True) for pairs in near_pairs(boxes)):
+            yield "the ground" if segment < len(placement.profile_segments(scenario)) else "a wall"
+    boxes = overlap.Rectangles.of([strip, *bodies])
+    for one, other in chain.from_iterable(zip(*pairs, strict=True) for pairs in overlap.near_pairs(boxes)):
         first, second = sorted((int(one), int(other)))
         if first == 0 and bodies[second - 1] is not body:
-            depth = float(penetration(Outlines.of([strip]), Outlines.of([bodies[second - 1]]))[0])
+            depth = float(
+                overlap.penetration(overlap.Outlines.of([strip]), overlap.Outlines.of([bodies[second - 1]]))[0]
+            )
             if depth > _margin(body):
-                yield f"body {toml(bodies[second - 1].name)}"
+                yield f"body {units.toml(bodies[second - 1].name)}"
 
 
-def _margin(body: PlacedBody) -> float:
+def _margin(body: placement.PlacedBody) -> float:
     """Return how far (m) anything may reach into the strip: half of it."""
     return 0.5 * STRIP * body.least_width
 
 
-def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
+def strip_before(body: placement.PlacedBody, face: Face) -> placement.PlacedBody:
     """Return the strip before a face of a body, a little shorter than the face at both ends."""
     thickness = STRIP * body.least_width
     nx, ny = NORMALS[face]
@@ -179,10 +171,10 @@ def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
     corners = soil.corners
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     for x, y in np.concatenate([corners, middles]):
-        if y < float(surface_heights(scenario, np.array([x]))[0]) - TOLERANCE:
+        if y < float(placement.surface_heights(scenario, np.array([x]))[0]) - placement.TOLERANCE:
             yield f"the ground at x = {x:.6g} m"
             return
-    segments = place_segments(scenario)
+    segments = placement.place_segments(scenario)
     places = np.linspace(0.0, 1.0, PLACES_ON_A_WALL)[1:-1, None]
     for number, piece in enumerate(segments, start=1 - (len(segments) - len(scenario.walls))):
         begin, end = np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1])
@@ -198,7 +190,7 @@ def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
 
 def _blocks(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[str]:
     low, high = corners.min(axis=0), corners.max(axis=0)
-    for body in place_bodies(scenario):
+    for body in placement.place_bodies(scenario):
         reach = 0.5 * float(np.hypot(body.size_x, body.size_y))
         if low[0] - reach < body.x < high[0] + reach and low[1] - reach < body.y < high[1] + reach:
             u, v = (UNIT_CORNERS * (body.size_x, body.size_y)).T
@@ -208,16 +200,16 @@ def _blocks(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[str]:
                 yield f"block {body.name}"
 
 
-def unfit_soils(scenario: Scenario) -> Iterator[Mistake]:
+def unfit_soils(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     """Find blocks of soil, and a contact model that soil does not go with."""
     for name, block in scenario.blocks.items():
         material = scenario.materials.get(block.material)
         if material is not None and material.is_soil:
-            message = f"{toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
-            yield Mistake(("blocks", name, "material"), message, relation=True)
+            message = f"{units.toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
+            yield mistakes.Mistake(("blocks", name, "material"), message, relation=True)
     if scenario.systems.get("soils") and scenario.contact.model != "surface":
-        message = f'{toml(scenario.contact.model)} does not go with soil; use model = "surface"'
-        yield Mistake(("contact", "model"), message, relation=True)
+        message = f'{units.toml(scenario.contact.model)} does not go with soil; use model = "surface"'
+        yield mistakes.Mistake(("contact", "model"), message, relation=True)
 
 
 MAX_SEGMENTS = 1000
@@ -241,7 +233,7 @@ ROUND_OFFS = 100
 distances are differences of a few rounded places."""
 
 
-def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
+def impossible_starts(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     """Place everything and find impossible starts; the scenario is valid otherwise."""
     unplaceable = [*_too_many(scenario)] or [*_shapeless(scenario)]
     if unplaceable:
@@ -251,41 +243,41 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
     if scenario.contact.law != "linear":
         for one, partners in scenario.pairs.items():
             for other in (name for name, pair in partners.items() if pair.normal_stiffness is not None):
-                yield Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
+                yield mistakes.Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
     yield from _impossible_masses(scenario)
     try:
-        bodies, origins = place_bodies(scenario), origins_of(scenario)
+        bodies, origins = placement.place_bodies(scenario), placement.origins_of(scenario)
     except UnfitError:
         for number, structure in enumerate(scenario.structures):
             try:
                 structure.start(scenario.blocks[structure.block])
             except UnfitError as error:
-                yield Mistake(("structures", number, error.key), str(error))
+                yield mistakes.Mistake(("structures", number, error.key), str(error))
         return
     endless = [*_endless(origins, bodies)]
     if endless:
         yield from endless
         return
-    smallest = smallest_width({(body.size_x, body.size_y, body.outline): body for body in bodies}.values())
+    smallest = placement.smallest_width({(body.size_x, body.size_y, body.outline): body for body in bodies}.values())
     yield from _unfit_particles(scenario, smallest)
     yield from _unfit_skin(scenario, smallest, max((max(abs(b.x), abs(b.y)) for b in bodies), default=0.0))
     yield from _short_segments(scenario, SHORTEST_SHARE * smallest if bodies else 0.0)
     seen: set[str] = set()
     for origin, body in zip(origins, bodies, strict=True):
         if body.name in seen:
-            message = f"two bodies are named {toml(body.name)}; a body without a name is called by its number"
-            yield Mistake((*origin, "name"), message)
+            message = f"two bodies are named {units.toml(body.name)}; a body without a name is called by its number"
+            yield mistakes.Mistake((*origin, "name"), message)
         seen.add(body.name)
     yield from _overlaps(scenario, origins, bodies)
     yield from unfit_loads(scenario, bodies)
     for name, tables in scenario.systems.items():
         for number, table in enumerate(tables):
-            yield from (Mistake((name, number, key), message) for key, message in table.impossible(scenario))
-    yield from unfit_probes(scenario, bodies)
-    yield from impossible_events(scenario, bodies)
+            yield from (mistakes.Mistake((name, number, key), message) for key, message in table.impossible(scenario))
+    yield from events.unfit_probes(scenario, bodies)
+    yield from events.impossible_events(scenario, bodies)
 
 
-def _too_many(scenario: Scenario) -> Iterator[Mistake]:
+def _too_many(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     bodies = sum(structure.size for structure in scenario.structures) + len(scenario.bodies)
     counts: tuple[tuple[overrides.KeyPath, int, str, int], ...] = (
         (("structures",), bodies, "bodies", MAX_BLOCKS),
@@ -296,10 +288,10 @@ def _too_many(scenario: Scenario) -> Iterator[Mistake]:
     for path, count, what, most in counts:
         if count > most:
             cure = " (output.contacts = true keeps the forces of all contacts)" if what == "probes" else ""
-            yield Mistake(path, f"{count} {what} are too many; at most {most} are allowed{cure}")
+            yield mistakes.Mistake(path, f"{count} {what} are too many; at most {most} are allowed{cure}")
 
 
-def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
+def _shapeless(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     """Find blocks without a shape where one is needed, and drawn blocks that do not exist."""
     needing: list[tuple[overrides.KeyPath, str]] = [
         (("bodies", number, "block"), spec.block) for number, spec in enumerate(scenario.bodies)
@@ -309,15 +301,15 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
             needing.append((("structures", number, "block"), structure.block))
         for place, cell in enumerate(structure.drawn if isinstance(structure, Polygons) else ()):
             if cell.block is not None and cell.block not in scenario.blocks:
-                hint = did_you_mean_or_list(cell.block, scenario.blocks)
+                hint = spelling.did_you_mean_or_list(cell.block, scenario.blocks)
                 where = ("structures", number, "cells", place, "block")
-                yield Mistake(where, f"unknown block {toml(cell.block)}, {hint}")
+                yield mistakes.Mistake(where, f"unknown block {units.toml(cell.block)}, {hint}")
     for path, block in needing:
         if not scenario.blocks[block].is_shaped:
-            yield Mistake(path, f"block {toml(block)} has no shape; {SHAPES}")
+            yield mistakes.Mistake(path, f"block {units.toml(block)} has no shape; {SHAPES}")
 
 
-def _endless_motion(scenario: Scenario) -> Iterator[Mistake]:
+def _endless_motion(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     """Find vibrations of too many cycles, and too many tables."""
     motions: list[tuple[overrides.KeyPath, object]] = [((), scenario.motion)]
     motions += [(("bodies", number), body.motion) for number, body in enumerate(scenario.bodies)]
@@ -325,13 +317,13 @@ def _endless_motion(scenario: Scenario) -> Iterator[Mistake]:
         pieces = sum(count for *_, count in motion.sections(scenario.time.end)) if isinstance(motion, Harmonic) else 0
         if pieces > MAX_PIECES:
             message = f"{pieces / PIECES_PER_CYCLE:.6g} cycles are too many; at most {MAX_PIECES // PIECES_PER_CYCLE}"
-            yield Mistake((*path, "motion", "frequency"), f"{message} are allowed")
-    if len(tables := body_table_contents(scenario)) > MOST_BODY_TABLES:
+            yield mistakes.Mistake((*path, "motion", "frequency"), f"{message} are allowed")
+    if len(tables := resolved.body_table_contents(scenario)) > MOST_BODY_TABLES:
         message = f"{len(tables)} different tables of motion of bodies are too many; at most {MOST_BODY_TABLES}"
-        yield Mistake(("bodies",), f"{message} are allowed")
+        yield mistakes.Mistake(("bodies",), f"{message} are allowed")
 
 
-def _impossible_masses(scenario: Scenario) -> Iterator[Mistake]:
+def _impossible_masses(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     """Find blocks with valid sizes but an invalid mass or inertia."""
     for name, block in scenario.blocks.items():
         if not block.is_shaped:
@@ -340,9 +332,9 @@ def _impossible_masses(scenario: Scenario) -> Iterator[Mistake]:
         mass = density * block.size_x * block.size_y * block.depth
         inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0
         if block.polygon:
-            mass, inertia = (density * block.depth * moment for moment in section_of(block.polygon))
+            mass, inertia = (density * block.depth * moment for moment in geometry.section_of(block.polygon))
         if not _is_possible(mass, inertia):
-            yield Mistake(("blocks", name), f"{_unsimulated(mass, inertia)}; check its sides and density")
+            yield mistakes.Mistake(("blocks", name), f"{_unsimulated(mass, inertia)}; check its sides and density")
 
 
 def _is_possible(mass: float, inertia: float) -> bool:
@@ -353,7 +345,9 @@ def _unsimulated(mass: float, inertia: float) -> str:
     return f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
 
 
-def _endless(origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
+def _endless(
+    origins: Sequence[overrides.KeyPath], bodies: Sequence[placement.PlacedBody]
+) -> Iterator[mistakes.Mistake]:
     """Find bodies with places or velocities beyond all numbers, or else outlines with such masses; one an origin."""
     numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
     values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
@@ -363,15 +357,15 @@ def _endless(origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody])
             f"body {body.name} would be at ({body.x:g}, {body.y:g}) m with a velocity of "
             f"({body.vx:g}, {body.vy:g}) m/s and a spin of {body.spin:g} rad/s; check the keys of its structure"
         )
-        yield Mistake(origin, message)
+        yield mistakes.Mistake(origin, message)
     told: set[overrides.KeyPath] = set()
     for origin, body in () if lost else zip(origins, bodies, strict=True):
         if body.outline and origin not in told and not _is_possible(body.mass, body.inertia):
             told.add(origin)
-            yield Mistake(origin, f"body {body.name}: {_unsimulated(body.mass, body.inertia)}")
+            yield mistakes.Mistake(origin, f"body {body.name}: {_unsimulated(body.mass, body.inertia)}")
 
 
-def _unfit_particles(scenario: Scenario, smallest: float) -> Iterator[Mistake]:
+def _unfit_particles(scenario: Scenario, smallest: float) -> Iterator[mistakes.Mistake]:
     """Find particles too far apart for the smallest side (m), kernels that reach through it, and too many particles."""
     contact = scenario.contact
     if contact.model == "surface":
@@ -379,20 +373,20 @@ def _unfit_particles(scenario: Scenario, smallest: float) -> Iterator[Mistake]:
     spacing, side = contact.particle_spacing, f"the smallest side of a block, {_mm(smallest)}"
     if spacing > 0.5 * smallest:
         message = f"{_mm(spacing)} is more than half of {side}"
-        yield Mistake(("contact", "particle_spacing"), message, relation=True)
+        yield mistakes.Mistake(("contact", "particle_spacing"), message, relation=True)
     elif contact.model == "kernel" and contact.support_radius >= smallest:
         key = "particle_spacing" if contact.smoothing_length is None else "smoothing_length"
         length = _mm(contact.resolved_smoothing_length)
         message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)}"
-        yield Mistake(("contact", key), f"{message}, through {side}", relation=True)
+        yield mistakes.Mistake(("contact", key), f"{message}, through {side}", relation=True)
     sides = [length / spacing for block in scenario.blocks.values() for length in (block.size_x, block.size_y)]
     if max(sides) > MAX_INTERVALS or 2.0 * sum(sides) > MAX_PARTICLES:
         message = f"{_mm(spacing)} is too small: the longest side would have {max(sides):.6g} particles"
         most = f"at most {MAX_INTERVALS} on a side and {MAX_PARTICLES} around one block of each kind are allowed"
-        yield Mistake(("contact", "particle_spacing"), f"{message}; {most}", relation=True)
+        yield mistakes.Mistake(("contact", "particle_spacing"), f"{message}; {most}", relation=True)
 
 
-def _unfit_skin(scenario: Scenario, smallest: float, farthest: float) -> Iterator[Mistake]:
+def _unfit_skin(scenario: Scenario, smallest: float, farthest: float) -> Iterator[mistakes.Mistake]:
     """Find a skin that does not suit the smallest side (m) of the blocks and their farthest coordinate (m)."""
     skin = scenario.contact.skin
     if skin is None:
@@ -403,13 +397,15 @@ def _unfit_skin(scenario: Scenario, smallest: float, farthest: float) -> Iterato
     )
     if skin > smallest:
         message = f"{_mm(skin)} is more than the smallest side of a block, {_mm(smallest)}"
-        yield Mistake(("contact", "skin"), f"{message}; distant blocks would be listed as neighbours", relation=True)
+        yield mistakes.Mistake(
+            ("contact", "skin"), f"{message}; distant blocks would be listed as neighbours", relation=True
+        )
     elif skin < least:
         message = f"{_mm(skin)} is too small; at least {_mm(least)} is needed, {why}"
-        yield Mistake(("contact", "skin"), message, relation=True)
+        yield mistakes.Mistake(("contact", "skin"), message, relation=True)
 
 
-def _short_segments(scenario: Scenario, least: float) -> Iterator[Mistake]:
+def _short_segments(scenario: Scenario, least: float) -> Iterator[mistakes.Mistake]:
     """Find segments of boundary shorter than `least` (m): a corner could miss them."""
     pieces: list[tuple[overrides.KeyPath, float]] = [
         (("ground", "profile", number), math.dist(*ends))
@@ -419,38 +415,42 @@ def _short_segments(scenario: Scenario, least: float) -> Iterator[Mistake]:
     for path, length in pieces:
         if length < least:
             why = f"at least {_mm(least)} is needed, {100 * SHORTEST_SHARE:g} % of the smallest side of a block"
-            yield Mistake(path, f"this segment is only {_mm(length)} long; {why}", relation=True)
+            yield mistakes.Mistake(path, f"this segment is only {_mm(length)} long; {why}", relation=True)
 
 
 def _overlaps(
-    scenario: Scenario, origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody]
-) -> Iterator[Mistake]:
+    scenario: Scenario, origins: Sequence[overrides.KeyPath], bodies: Sequence[placement.PlacedBody]
+) -> Iterator[mistakes.Mistake]:
     """Find bodies in the ground, each with its largest depth, bodies in walls, and bodies in one another."""
     if scenario.ground.profile is None:
         bottom = overlap.Outlines.of(bodies).bottom
-        for index in np.flatnonzero(bottom < -TOLERANCE)[:MAX_MISTAKES]:
+        for index in np.flatnonzero(bottom < -placement.TOLERANCE)[: mistakes.MAX_MISTAKES]:
             depth = _mm(-float(bottom[index]))
-            yield Mistake(origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)")
+            yield mistakes.Mistake(
+                origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)"
+            )
     else:
         depths: dict[int, float] = {}
-        for index, _, sunk in overlap.crossings(bodies, profile_segments(scenario)):
+        for index, _, sunk in overlap.crossings(bodies, placement.profile_segments(scenario)):
             depths[index] = max(depths.get(index, 0.0), sunk)
-        surface = surface_heights(scenario, np.array([body.x for body in bodies]))
+        surface = placement.surface_heights(scenario, np.array([body.x for body in bodies]))
         for index, (origin, body) in enumerate(zip(origins, bodies, strict=True)):
             if index in depths:
-                yield Mistake(origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile")
+                yield mistakes.Mistake(
+                    origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile"
+                )
             elif body.y < surface[index]:
-                yield Mistake(origin, f"body {body.name} lies below the ground's profile")
-    for index, wall, sunk in islice(overlap.crossings(bodies, wall_segments(scenario)), MAX_OVERLAPS):
+                yield mistakes.Mistake(origin, f"body {body.name} lies below the ground's profile")
+    for index, wall, sunk in islice(overlap.crossings(bodies, placement.wall_segments(scenario)), MAX_OVERLAPS):
         message = f"body {bodies[index].name} and walls.{wall} overlap by {_mm(sunk)}; they may only touch"
-        yield Mistake(origins[index], message)
+        yield mistakes.Mistake(origins[index], message)
     for first, second, sunk in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):
         one, other, origin = bodies[first], bodies[second], origins[second]
         is_drawn = origin[0] == "structures" and scenario.structures[int(origin[1])].kind == "polygons"
-        is_small = sunk <= ROUNDING * smallest_width((one, other))
+        is_small = sunk <= ROUNDING * placement.smallest_width((one, other))
         cure = f'; shrink = "{_mm(sunk)}" of its structure parts them' if is_drawn and is_small else ""
         message = f"bodies {one.name} and {other.name} overlap by {_mm(sunk)}; they may only touch{cure}"
-        yield Mistake(origin, message)
+        yield mistakes.Mistake(origin, message)
 
 
 def _mm(length: float) -> str:

@@ -20,20 +20,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 from pydantic import Field
 
 from blocksim.scenario import units as q
-from blocksim.scenario.models.base import OneOf, Table, by_kind
-from blocksim.scenario.models.motion import (
-    LEAST_ROWS,
-    MAX_ROWS,
-    Acceleration,
-    FromTable,
-    Harmonic,
-    MotionTable,
-    MotionTableError,
-    Pulse,
-    TableFile,
-    content_of,
-    finite_number,
-)
+from blocksim.scenario.models import base, motion
 from blocksim.scenario.units import STANDARD_GRAVITY, toml
 
 Unit = Literal["g", "m/s^2", "cm/s^2"]
@@ -66,7 +53,7 @@ class Line(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RecordTable(MotionTable):
+class RecordTable(motion.MotionTable):
     """Samples of acceleration at a constant step, in m/s² where the file says its unit, otherwise as in the file."""
 
     unit: Unit | None = field(kw_only=True)  # as the file says
@@ -74,7 +61,7 @@ class RecordTable(MotionTable):
 
 def read_record(path: Path) -> RecordTable:
     """Read an accelerogram; raises MotionTableError with the line of the first mistake."""
-    content = content_of(path)
+    content = motion.content_of(path)
     text = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     lines = [Line(number, line) for number, line in enumerate(text.split("\n"), start=1)]
     sizes = (_AT2.search(line.text) or _OLD_AT2.search(line.text) for line in lines[:HEAD_LINES])
@@ -89,15 +76,15 @@ def _at2(lines: Sequence[Line], head: Line, found: re.Match[str]) -> tuple[Unit 
     before = lines[: head.number - 1]
     other = next((line for line in before if _OTHER.search(line.text)), None)
     if other is not None:
-        raise MotionTableError(f"line {other.number}: {toml(other.text.strip())}: an acceleration is needed")
+        raise motion.MotionTableError(f"line {other.number}: {toml(other.text.strip())}: an acceleration is needed")
     count, step = int(found[1]), _number(head.number, found[2])
     if step <= 0.0:
-        raise MotionTableError(f"line {head.number}: step {found[2]} s: it must be above 0")
+        raise motion.MotionTableError(f"line {head.number}: step {found[2]} s: it must be above 0")
     values = [_number(line.number, word) for line in lines[head.number :] for word in line.text.split()]
     if len(values) != count:
         last = max((line.number for line in lines if line.text.strip()), default=head.number)
         message = f"line {last}: the file ends after {len(values)} samples; line {head.number} has NPTS = {count}"
-        raise MotionTableError(message)
+        raise motion.MotionTableError(message)
     _check_count(count)
     said = (_IN_UNITS.search(line.text) for line in before)
     unit = next((_unit_in(one[1]) for one in said if one is not None and one[1]), None)
@@ -117,7 +104,7 @@ def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], l
             has_commas = is_pair or (len(by_others) == 1 and text.count(",") == 1 + COLUMNS)
             hint = "; decimals are written with a point" if has_commas else ""
             why = f"a time and an acceleration are needed{hint}"
-            raise MotionTableError(f"line {number}: {toml(text.strip())}: {why}")
+            raise motion.MotionTableError(f"line {number}: {toml(text.strip())}: {why}")
         rows.append((number, _number(number, cells[0]), _number(number, cells[1])))
     _check_count(len(rows))
     times = [time for _, time, _ in rows]
@@ -141,9 +128,9 @@ def _named_unit(line: Line) -> tuple[Unit | None, bool]:
     text = line.text.strip()
     if not re.match(r"\W*t", text, re.IGNORECASE):
         message = f"line {line.number}: {toml(text)}: neither numbers nor columns of time and acceleration"
-        raise MotionTableError(message)
+        raise motion.MotionTableError(message)
     if re.match(r"[^,;]*(?<![a-z])ms(?![a-z/])", text, re.IGNORECASE):
-        raise MotionTableError(f"line {line.number}: {toml(text)}: times in s are needed")
+        raise motion.MotionTableError(f"line {line.number}: {toml(text)}: times in s are needed")
     first = re.split(r"[,;]", text, maxsplit=1) if re.search(r"[,;]", text) else text.split(maxsplit=1)
     return _unit_in(first[-1]), True
 
@@ -153,8 +140,8 @@ def _unit_in(text: str) -> Unit | None:
 
 
 def _check_count(count: int) -> None:
-    if not LEAST_ROWS <= count <= MAX_ROWS:
-        raise MotionTableError(f"{count} samples; {LEAST_ROWS} to {MAX_ROWS} are allowed")
+    if not motion.LEAST_ROWS <= count <= motion.MAX_ROWS:
+        raise motion.MotionTableError(f"{count} samples; {motion.LEAST_ROWS} to {motion.MAX_ROWS} are allowed")
 
 
 def _check_steps(lines: Sequence[int], times: Sequence[float], mean: float) -> None:
@@ -176,18 +163,18 @@ def _check_steps(lines: Sequence[int], times: Sequence[float], mean: float) -> N
     elif (place := next(uneven, 0)) > 0:
         why = f'not at a constant step of {usual:g} s; a motion of kind "table" takes any steps'
     if why:
-        raise MotionTableError(f"line {lines[place]}: time {times[place]:g} s: {why}")
+        raise motion.MotionTableError(f"line {lines[place]}: time {times[place]:g} s: {why}")
 
 
 def _number(line: int, text: str) -> float:
     """Return a number of the file, also with the D of Fortran in its exponent."""
-    return finite_number(line, text, re.sub(r"(?<=[0-9.])[dD](?=[+-]?\d)", "E", text))
+    return motion.finite_number(line, text, re.sub(r"(?<=[0-9.])[dD](?=[+-]?\d)", "E", text))
 
 
 Baseline = Literal["rest", "parabolic", "none"]
 
 
-class Record(Table):
+class Record(base.Table):
     """A recorded accelerogram, corrected, scaled, joined by straight lines and integrated from rest.
 
     The order is: unit, baseline, then `scale`, or the factor that makes the largest acceleration `pga`. After the last
@@ -195,15 +182,17 @@ class Record(Table):
     """
 
     kind: Literal["record"] = Field(description="kind of motion")
-    table: Annotated[RecordTable, TableFile(read_record, "record.AT2")] = Field(
+    table: Annotated[RecordTable, motion.TableFile(read_record, "record.AT2")] = Field(
         description="accelerogram, relative to the scenario file: PEER AT2, or text or CSV of time and value"
     )
-    unit: Annotated[Unit, OneOf(get_args(Unit))] | None = Field(
+    unit: Annotated[Unit, base.OneOf(get_args(Unit))] | None = Field(
         default=None, description="unit of the accelerations, g, m/s^2 or cm/s^2, where the file does not say it"
     )
     scale: q.Number = Field(default=1.0, description="factor on the accelerations; give this or pga")
-    pga: Acceleration | None = Field(default=None, description="largest acceleration that the record is scaled to")
-    baseline: Annotated[Baseline, OneOf(get_args(Baseline))] = Field(
+    pga: motion.Acceleration | None = Field(
+        default=None, description="largest acceleration that the record is scaled to"
+    )
+    baseline: Annotated[Baseline, base.OneOf(get_args(Baseline))] = Field(
         default="rest",
         description="correction of the accelerations: rest subtracts the straight line with which the supports end at "
         "rest where they began, parabolic the parabola that makes the velocities least in the mean square, none",
@@ -230,9 +219,9 @@ class Record(Table):
             raise q.invalid(f"{self.table.path.name} is zero throughout; it cannot be scaled", "pga")
 
 
-AnyMotion = Annotated[Harmonic | FromTable | Pulse | Record, Field(discriminator="kind")]
+AnyMotion = Annotated[motion.Harmonic | motion.FromTable | motion.Pulse | Record, Field(discriminator="kind")]
 """Any prescribed motion, distinguished by its `kind`."""
-MOTIONS: dict[str, type[Table]] = by_kind(AnyMotion)
+MOTIONS: dict[str, type[base.Table]] = base.by_kind(AnyMotion)
 """Class by kind, as written in a scenario."""
-TABLED = (FromTable, Record)
+TABLED = (motion.FromTable, Record)
 """Those that read a file, named by the key `table`."""
