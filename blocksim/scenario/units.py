@@ -286,7 +286,7 @@ class Quantity(FieldReader):
             raise invalid(f"{toml(text)} is {name}; {self.wanted} is needed")
         return number
 
-    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:  # noqa: ARG002 - one signature for all
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
         """Return the JSON Schema of a number in SI or a string with a unit."""
         bounds = {
             "exclusiveMinimum": self.above,
@@ -294,7 +294,7 @@ class Quantity(FieldReader):
             "exclusiveMaximum": self.below,
             "maximum": self.at_most,
         }
-        number = {"type": "number", **{name: bound for name, bound in bounds.items() if bound is not None}}
+        number = {**usual, **{name: bound for name, bound in bounds.items() if bound is not None}}
         if self.kind is NUMBER:
             return number
         if self.kind is ANGLE:
@@ -316,9 +316,9 @@ class FrictionCoefficient(FieldReader):
             raise invalid(f"{toml(value)} is not a number; {self.wanted} is needed")
         return Quantity(NUMBER, at_least=0.0).read(value)
 
-    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:  # noqa: ARG002 - one signature for all
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
         """Return the JSON Schema of a number or an angle with its unit."""
-        return {"anyOf": [{"type": "number", "minimum": 0}, _text_schema("21 deg")]}
+        return {"anyOf": [{**usual, "minimum": 0}, _text_schema("21 deg")]}
 
 
 def _text_schema(example: str) -> dict[str, Any]:

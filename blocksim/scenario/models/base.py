@@ -74,7 +74,8 @@ class TimeOr(FieldReader):
 
     def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
         """Return the JSON Schema of both."""
-        return {"anyOf": [{"const": self.word}, *POSITIVE_TIME.json_schema(usual)["anyOf"]]}
+        number, _ = usual["anyOf"]
+        return {"anyOf": [{"const": self.word}, *POSITIVE_TIME.json_schema(number)["anyOf"]]}
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ class PairFriction(Table):
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Accept a bare number or angle."""
-        return or_bare(handler(schema), q.FrictionCoefficient().json_schema({}))
+        return or_bare(handler(schema), q.FrictionCoefficient().json_schema({"type": "number"}))
 
 
 class Friction(Table):
