@@ -12,18 +12,8 @@ from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.simulation.compilation import kernel_set
-from blocksim.verification.case import (
-    Outcome,
-    Row,
-    Setting,
-    Verdict,
-    error_text,
-    expected_text,
-    number,
-    run_case,
-    tolerance_text,
-)
-from blocksim.verification.cases import SettingError, choose_cases, choose_soil_cases, excluded_cases, refuse_springs
+from blocksim.verification.case import Outcome, Setting, run_case
+from blocksim.verification.cases import SettingError, choose_cases, excluded_cases, refuse_springs
 
 COLUMNS = ("quantity", "expected", "measured", "error", "tolerance", "verdict")
 
@@ -52,7 +42,7 @@ def verify_command(
     refuse_springs(setting)
     if soil and (not setting.has_springs or setting != replace(Setting(), quick=quick)):
         raise SettingError("--soil has one setting: the surface model, linear springs, the explicit scheme")
-    wanted = choose_soil_cases(cases or []) if soil else choose_cases(cases or [], setting.scheme)
+    wanted = choose_cases(cases or [], setting.scheme, soil=soil)
     announce_compilation(kernel_set(setting.scheme, setting.model), quiet=screen.silent)
     outcomes: list[Outcome] = []
     try:
@@ -68,7 +58,11 @@ def verify_command(
 
 
 def _report(outcomes: list[Outcome]) -> Report:
-    groups = ((_heading(outcome), [_cells(row) for row in outcome.rows]) for outcome in outcomes)
+    groups = []
+    for outcome in outcomes:
+        case, texts = outcome.case, [row.texts for row in outcome.rows]
+        heading = f"{case.id} {case.title} ({case.source}): {outcome.seconds:.1f} s"
+        groups.append((heading, [(f"  {row['quantity']}", *(row[key] for key in COLUMNS[1:])) for row in texts]))
     return Report(
         grouped_lines(COLUMNS, groups),
         [row for outcome in outcomes for row in outcome.to_dicts()],
@@ -77,25 +71,10 @@ def _report(outcomes: list[Outcome]) -> Report:
     )
 
 
-def _heading(outcome: Outcome) -> str:
-    return f"{outcome.case.id} {outcome.case.title} ({outcome.case.source}): {outcome.seconds:.1f} s"
-
-
-def _cells(row: Row) -> tuple[str, ...]:
-    return (
-        f"  {row.quantity}, {row.unit}" if row.unit else f"  {row.quantity}",
-        expected_text(row),
-        number(row.measured),
-        error_text(row),
-        tolerance_text(row),
-        str(row.verdict),
-    )
-
-
 def _notes(outcomes: list[Outcome]) -> Iterator[str]:
     missed = [outcome for outcome in outcomes if not outcome.inside]
     for outcome in missed:
-        count = sum(row.verdict == Verdict.OUTSIDE for row in outcome.rows)
+        count = sum(not row.is_inside for row in outcome.rows)
         why = f": {outcome.remark}" if outcome.remark else ""
         yield f"{outcome.case.id} {outcome.case.title}: {count} of {len(outcome.rows)} outside{why}"
     for outcome in outcomes:

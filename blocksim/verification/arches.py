@@ -7,20 +7,16 @@ cuts half-planes off the plane of both; the arch stands where something of it is
 `python -m blocksim.verification.arches scenarios/published/arch_thickness.csv` writes the table for the picture.
 """
 
-from __future__ import annotations
-
 import sys
+from collections.abc import Sequence
 from itertools import pairwise
 from math import cos, pi, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from blocksim.scenario.geometry import area_of, centroid
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 RADIUS = 10.0  # m, of scenarios/arch.toml
 VOUSSOIRS = 27  # in it
@@ -79,28 +75,27 @@ def ring(count: int) -> list[Joint]:
 
 
 def stands(joints: Sequence[Joint], thickness: float, friction: float) -> bool:
-    """Return True where some thrust and moment at the crown let every joint carry what is above it."""
+    """Return True where some thrust and moment at the crown let every joint carry what is above it.
+
+    A joint needs a thrust + b moment >= c, for both senses of sliding and both of its ends. Normal force N = H cos +
+    W sin, shear V = W cos - H sin; N acts where its moment about the centre is K + M, of the thrust H at the crown and
+    of the weight W.
+    """
     left: list[Point] = [(0.0, -FAR), (FAR, -FAR), (FAR, FAR), (0.0, FAR)]
-    for joint in joints:
-        for line in _needs(joint, thickness, friction):
+    inner, outer = 1.0 - 0.5 * thickness, 1.0 + 0.5 * thickness
+    for angle, weight, moment in joints:
+        c, s = cos(angle), sin(angle)
+        needs = (
+            (friction * c + s, 0.0, weight * (c - friction * s)),
+            (friction * c - s, 0.0, -weight * (c + friction * s)),
+            (-inner * c, 1.0, inner * weight * s - moment),
+            (outer * c, -1.0, moment - outer * weight * s),
+        )
+        for line in needs:
             left = _cut(left, line)
             if not left:
                 return False
     return True
-
-
-def _needs(joint: Joint, thickness: float, friction: float) -> Iterator[tuple[float, float, float]]:
-    """Yield (a, b, c): a thrust + b moment >= c, for both senses of sliding and both ends of a joint.
-
-    Normal force N = H cos + W sin, shear V = W cos - H sin; N acts where its moment about the centre is K + M, of the
-    thrust H at the crown and of the weight W.
-    """
-    c, s = cos(joint.angle), sin(joint.angle)
-    inner, outer = 1.0 - 0.5 * thickness, 1.0 + 0.5 * thickness
-    yield friction * c + s, 0.0, joint.weight * (c - friction * s)
-    yield friction * c - s, 0.0, -joint.weight * (c + friction * s)
-    yield -inner * c, 1.0, inner * joint.weight * s - joint.moment
-    yield outer * c, -1.0, joint.moment - outer * joint.weight * s
 
 
 def _cut(corners: Sequence[Point], line: tuple[float, float, float]) -> list[Point]:
@@ -124,17 +119,14 @@ def least_thickness(friction: float, count: int | None = VOUSSOIRS) -> float | N
 
     Without `count` that of a ring with its weight on the centre line.
     """
-    low, high = 0.0, WIDEST
-    if not _stands_with(high, friction, count):
-        return None
-    for _ in range(HALVINGS):
+    low, high = 0.0, 2.0 * WIDEST  # so the widest is tried first
+    for _ in range(HALVINGS + 1):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _stands_with(middle, friction, count) else (middle, high)
+        joints = ring(JOINTS) if count is None else voussoirs(count, middle)
+        low, high = (low, middle) if stands(joints, middle, friction) else (middle, high)
+        if low >= WIDEST:
+            return None
     return high
-
-
-def _stands_with(thickness: float, friction: float, count: int | None) -> bool:
-    return stands(ring(JOINTS) if count is None else voussoirs(count, thickness), thickness, friction)
 
 
 def table() -> str:

@@ -3,169 +3,124 @@
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.verification import collapse, energy, impacts, resting, toppling
-from blocksim.verification import collapse as convergence
-from blocksim.verification import collapse as symmetry
-from blocksim.verification import impacts as flight
-from blocksim.verification import impacts as seats
-from blocksim.verification import resting as sliding
-from blocksim.verification import toppling as dominoes
-from blocksim.verification import toppling as rocking
 from blocksim.verification.case import Case, Setting
 from blocksim.verification.soil import SOIL_CASES
 
 # Why models with particles miss tolerances; printed only where a case is outside.
-BUMPS = "equal spacings of the two boundaries interlock, so bodies climb over bumps as high as (1 − √3/2) spacing"
-SETTLING = "particles settle in the gaps between those opposite, (1 − √3/2) spacing deeper than flat faces"
-ROUNDING = "corners are rounded by half a spacing, which moves the contact point inwards"
-SAMPLING = "the position of the opposite particles decides how strongly an edge acts; small differences grow"
-SHARED_IMPACT = "several particles along the face share the impact, so it acts a little inside of the corner"
-EXACT_PLANE = "the plane is exact, the face of a fixed block is made of particles; bounces multiply the difference"
-NO_DISC = "probably because ends of ground segments have no disc, so contacts at edges end at full overlap"
-PAIRWISE = "dashpots of a pair stand for the whole block, also where other pairs bear it too"
-SMOOTHED = "edges are felt within a smoothing length of 1.3 mm, as if they were rounded"
+BUMPS = {
+    "particles": "equal spacings of the two boundaries interlock, so bodies climb over bumps as high as "
+    "(1 − √3/2) spacing"
+}
+SETTLING = {
+    "particles": "particles settle in the gaps between those opposite, (1 − √3/2) spacing deeper than flat faces"
+}
+ROUNDING = {"particles": "corners are rounded by half a spacing, which moves the contact point inwards"}
+SHARED = {"kernel": "several particles along the face share the impact, so it acts a little inside of the corner"}
+SMOOTHED = {"kernel": "edges are felt within a smoothing length of 1.3 mm, as if they were rounded"}
+EXACT_PLANE = {
+    "kernel": "the plane is exact, the face of a fixed block is made of particles; bounces multiply the difference"
+}
+MEANS = {"kernel": "distances and normals are means over a smoothing length, which is halved with the spacing"}
+FEW_AT_EDGES = {
+    "kernel": "probably because few particles bear at an edge, which overlaps too far with these soft contacts"
+}
+LEDGER = {
+    "particles": "probably because ends of ground segments have no disc, so contacts at edges end at full overlap",
+    "kernel": "the stiffness of a particle changes with its angle to the face, without a corresponding torque",
+}
+SAMPLING = dict.fromkeys(
+    ("particles", "kernel"),
+    "the position of the opposite particles decides how strongly an edge acts; small differences grow",
+)
+PAIRWISE = dict.fromkeys(
+    ("particles", "kernel"), "dashpots of a pair stand for the whole block, also where other pairs bear it too"
+)
 
 CASES = (
-    Case("V1", "free flight and free spin", "parabola, constant spin", flight.free_flight),
+    Case("V1", "free flight and free spin", "parabola, constant spin", impacts.free_flight),
     Case(
         "V2",
         "static overlap on the ground",
         "weight = contact force",
         resting.static_overlap,
-        remarks={"particles": SETTLING},
+        remarks=SETTLING,
         not_for={IMPULSES: "rigid blocks have no stiffness; their overlap follows from the step, see blocksim check"},
     ),
-    Case("V3", "flat drop from 0.1 m, e = 0.5", "Eq 12", flight.bounces, remarks={"particles": SETTLING}),
+    Case("V3", "flat drop from 0.1 m, e = 0.5", "Eq 12", impacts.bounces, remarks=SETTLING),
     Case(
         "V4",
         "restitution of flat and corner impacts",
         "Eq 11",
         impacts.restitution,
-        quick="one particle spacing instead of four",
-        remarks={"particles": ROUNDING},
+        "one particle spacing instead of four",
+        ROUNDING,
     ),
-    Case(
-        "V5",
-        "corner impact without friction",
-        "impulse and moment",
-        impacts.frictionless_corner,
-        remarks={"particles": ROUNDING},
-    ),
+    Case("V5", "corner impact without friction", "impulse and moment", impacts.frictionless_corner, remarks=ROUNDING),
     Case("V6", "corner impact that sticks", "impulse and moment", impacts.sticking_corner),
-    Case("V7", "sliding to a stop on level ground", "Eq 13", sliding.sliding_to_rest, remarks={"particles": BUMPS}),
-    Case("V8", "sliding down a slope of 30°", "g (sin a − μ cos a)", sliding.slope, remarks={"particles": BUMPS}),
+    Case("V7", "sliding to a stop on level ground", "Eq 13", resting.sliding_to_rest, remarks=BUMPS),
+    Case("V8", "sliding down a slope of 30°", "g (sin a − μ cos a)", resting.slope, remarks=BUMPS),
     Case(
         "V9",
         "sticking below the friction angle, sliding above",
         "arctan μ",
-        sliding.friction_angle,
-        quick="creep over 1–2 s instead of 5–10 s",
-        remarks={"particles": BUMPS},
+        resting.friction_angle,
+        "creep over 1–2 s instead of 5–10 s",
+        BUMPS,
     ),
-    Case(
-        "V10",
-        "sliding and toppling on a slope",
-        "Ashby 1971, Sagaseta 1986",
-        toppling.chart,
-        remarks={"particles": BUMPS},
-    ),
-    Case("V11", "free rocking", "quadrature of the energy", rocking.quarter_period, remarks={"particles": ROUNDING}),
-    Case(
-        "V12",
-        "spin lost in a rocking impact",
-        "Housner 1963",
-        rocking.housner,
-        remarks={"particles": ROUNDING, "kernel": SHARED_IMPACT},
-    ),
+    Case("V10", "sliding and toppling on a slope", "Ashby 1971, Sagaseta 1986", toppling.chart, remarks=BUMPS),
+    Case("V11", "free rocking", "quadrature of the energy", toppling.quarter_period, remarks=ROUNDING),
+    Case("V12", "spin lost in a rocking impact", "Housner 1963", toppling.housner, remarks=ROUNDING | SHARED),
     Case(
         "V13",
         "overhanging stacks at their limit",
         "moments about edges",
         resting.overhanging_stacks,
-        quick="linear law: a hundredth of the stiffness",
-        remarks={
-            "particles": ROUNDING,
-            "kernel": "probably because few particles bear at an edge, which overlaps too far with these soft contacts",
-        },
+        "linear law: a hundredth of the stiffness",
+        ROUNDING | FEW_AT_EDGES,
     ),
     Case(
         "V14",
         "stack of ten blocks",
         "rest",
         resting.tower,
-        quick="creep over 0.5–1 s instead of 5–10 s, a hundredth of the stiffness",
+        "creep over 0.5–1 s instead of 5–10 s, a hundredth of the stiffness",
     ),
     Case("V15", "kinetic energy in 4950 impacts", "no gain", energy.impacts),
     Case("V16", "two free blocks colliding off-centre", "conservation", impacts.two_blocks),
-    Case(
-        "V17", "ladder 1:100 at a smooth wall, 60°", "(cot a − t/L)/2", toppling.ladder, remarks={"particles": ROUNDING}
-    ),
+    Case("V17", "ladder 1:100 at a smooth wall, 60°", "(cot a − t/L)/2", toppling.ladder, remarks=ROUNDING),
     Case(
         "V18",
         "24 dominoes",
         "van Leeuwen 2010",
-        dominoes.dominoes,
-        quick="gaps 0.2 h and 0.3 h only, a hundredth of the stiffness",
-        remarks={"particles": ROUNDING, "kernel": SHARED_IMPACT},
+        toppling.dominoes,
+        "gaps 0.2 h and 0.3 h only, a hundredth of the stiffness",
+        ROUNDING | SHARED,
     ),
-    Case(
-        "V19",
-        "mirrored, relabelled, moved collapse",
-        "symmetry",
-        symmetry.symmetries,
-        remarks={"particles": SAMPLING, "kernel": SAMPLING},
-    ),
+    Case("V19", "mirrored, relabelled, moved collapse", "symmetry", collapse.symmetries, remarks=SAMPLING),
     Case(
         "V20",
         "convergence in step and spacing",
         "second order",
-        convergence.convergence,
-        remarks={
-            "particles": BUMPS,
-            "kernel": "distances and normals are means over a smoothing length, which is halved with the spacing",
-        },
+        collapse.convergence,
+        remarks=BUMPS | MEANS,
         not_for={IMPULSES: "it is about the second order of springs; rigid contacts are first order in the step"},
     ),
-    Case(
-        "V21",
-        "ground as a fixed block",
-        "same motion",
-        symmetry.fixed_block,
-        remarks={
-            "particles": BUMPS,
-            "kernel": EXACT_PLANE,
-        },
-    ),
-    Case(
-        "V22",
-        "three blocks at rest, e = 0",
-        "ten engines",
-        collapse.at_rest,
-        remarks={"particles": BUMPS, "kernel": SMOOTHED},
-    ),
-    Case(
-        "V23",
-        "energy ledger of every scenario",
-        "balance",
-        energy.ledgers,
-        quick="a hundredth of the stiffness",
-        remarks={
-            "particles": NO_DISC,
-            "kernel": "the stiffness of a particle changes with its angle to the face, without a corresponding torque",
-        },
-    ),
+    Case("V21", "ground as a fixed block", "same motion", collapse.fixed_block, remarks=BUMPS | EXACT_PLANE),
+    Case("V22", "three blocks at rest, e = 0", "ten engines", collapse.at_rest, remarks=BUMPS | SMOOTHED),
+    Case("V23", "energy ledger of every scenario", "balance", energy.ledgers, "a hundredth of the stiffness", LEDGER),
     Case(
         "V24",
         "three blocks before their first impact",
         "pymunk, Box2D",
         collapse.before_impact,
-        remarks={"particles": BUMPS, "kernel": SMOOTHED},
+        remarks=BUMPS | SMOOTHED,
     ),
     Case(
         "V25",
         "flat landings on one to three seats",
         "restitution, no spin",
-        seats.seats,
-        remarks={"particles": PAIRWISE, "kernel": PAIRWISE},
+        impacts.seats,
+        remarks=PAIRWISE,
         not_for={IMPULSES: "it is about springs of several pairs below one block; V4 has rigid restitution"},
     ),
 )
@@ -189,26 +144,21 @@ def refuse_springs(setting: Setting) -> None:
         raise SettingError(f"{wrong} needs springs; contacts of --scheme {setting.scheme} are rigid")
 
 
-def choose_cases(ids: list[str], scheme: str = SPRINGS) -> tuple[Case, ...]:
-    """Return the cases of some ids (upper or lower case), in the order of the table; without ids all of the scheme."""
-    wanted = {name.upper() for name in ids}
-    unknown = sorted(wanted - {case.id for case in CASES})
+def choose_cases(ids: list[str], scheme: str = SPRINGS, *, soil: bool = False) -> tuple[Case, ...]:
+    """Return the cases of some ids (upper or lower case), in the order of the table; without ids all of the scheme.
+
+    Raises UnknownCaseError, and SettingError for a case that does not apply to the scheme.
+    """
+    table, wanted = SOIL_CASES if soil else CASES, {name.upper() for name in ids}
+    unknown = sorted(wanted - {case.id for case in table})
     if unknown:
-        raise UnknownCaseError(f"{', '.join(unknown)}: no such case; choose {CASES[0].id} to {CASES[-1].id}")
+        known = f"{CASES[0].id} to {CASES[-1].id}"
+        wrong = f"case of soil; choose {', '.join(case.id for case in table)}" if soil else f"case; choose {known}"
+        raise UnknownCaseError(f"{', '.join(unknown)}: no such {wrong}")
     foreign = [reason for reason in excluded_cases(scheme) if reason.split()[0] in wanted]
     if foreign:
         raise SettingError(f"not for --scheme {scheme}: {'; '.join(foreign)}")
-    return tuple(case for case in CASES if scheme not in case.not_for and (not wanted or case.id in wanted))
-
-
-def choose_soil_cases(ids: list[str]) -> tuple[Case, ...]:
-    """Return the cases of soil of some ids (upper or lower case), in the order of the table; without ids all."""
-    wanted = {name.upper() for name in ids}
-    unknown = sorted(wanted - {case.id for case in SOIL_CASES})
-    if unknown:
-        known = ", ".join(case.id for case in SOIL_CASES)
-        raise UnknownCaseError(f"{', '.join(unknown)}: no such case of soil; choose {known}")
-    return tuple(case for case in SOIL_CASES if not wanted or case.id in wanted)
+    return tuple(case for case in table if scheme not in case.not_for and (not wanted or case.id in wanted))
 
 
 def excluded_cases(scheme: str) -> tuple[str, ...]:

@@ -1,25 +1,16 @@
 """The three blocks: V22 and V24 places, V19 and V21 symmetry, V20 convergence."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator, Sequence
 from math import sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from blocksim.kernels.common.arrays import World
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, at_least
 from blocksim.verification.resting import CONTACT_RADIUS, resting_overlap
-from blocksim.verification.scene import HEIGHT, Throw, Thrower
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.common.arrays import World
-    from blocksim.verification.scene import Simulation
-
+from blocksim.verification.scene import HEIGHT, Simulation, Throw, Thrower
 
 SIZES = {"width": 0.032, "height": 0.05, "length": 0.025}  # m, upright = "length"
 STEP_X = 0.022  # m, offset of each block against the one below: an overlap of 10 mm
@@ -42,9 +33,8 @@ def staircase(order: Sequence[int] = (0, 1, 2), side: float = 1.0, shift: float 
 def collapse(setting: Setting, restitution: float, spacing: float = 1e-3, scale: float = 1.0) -> Simulation:
     """Let go of the three blocks; they stop once they rest."""
     contact = {"particle_spacing": spacing, "stiffness_scale": scale}
-    return setting.start(
-        staircase(), restitution=restitution, contact=contact, time={"stop_at_rest": True, "end": LONGEST}
-    )
+    time = {"stop_at_rest": True, "end": LONGEST}
+    return setting.start(staircase(), restitution=restitution, contact=contact, time=time)
 
 
 def before_impact(setting: Setting) -> Iterator[Row]:
@@ -53,21 +43,13 @@ def before_impact(setting: Setting) -> Iterator[Row]:
     Restitution 0, as in V22: no impact yet, but the weight comes suddenly upon the springs at the start, and the rigid
     contacts of the reference do not swing back from that.
     """
-    for time, (place, angle) in off_reference(setting).items():
-        yield absolute(f"{time:.2f} s, place off by", "mm", 0.0, place, 0.1)
-        yield absolute(f"{time:.2f} s, angle off by", "°", 0.0, angle, 0.15)
-
-
-def off_reference(setting: Setting) -> dict[float, tuple[float, float]]:
-    """Return by how much (mm, degrees) blocks 2 and 3 are off the reference at most, at every time (s) of it."""
     scene = collapse(setting, 0.0)
-    found = {}
     for time, blocks in BEFORE_FIRST_IMPACT.items():
         upper = scene.to_time(time).bodies[1:]
         places = np.array([1e3 * upper.x, 1e3 * upper.y, np.degrees(upper.angle)]).T
         off = np.abs(places - np.array(blocks)).max(axis=0)
-        found[time] = (float(max(off[0], off[1])), float(off[2]))
-    return found
+        yield absolute(f"{time:.2f} s, place off by", "mm", 0.0, max(off[0], off[1]), 0.1)
+        yield absolute(f"{time:.2f} s, angle off by", "°", 0.0, off[2], 0.15)
 
 
 def at_rest(setting: Setting) -> Iterator[Row]:
@@ -82,9 +64,7 @@ def at_rest(setting: Setting) -> Iterator[Row]:
 BEFORE, AFTER = 0.2, 0.45  # s: just before the first impact; all impacts are over
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])  # x, y, angle, vx, vy, spin
 RELABELLED = (2, 1, 0)
-SHIFT = 1.0  # m
 CORNER = 0.03  # m, from the centre of a block
-PLINTH: dict[str, object] = {"x": 0.0, "y": 0.05, "width": 1.0, "height": 0.1, "fixed": True}
 LANDING = 0.3  # s
 SAME, REORDERED = 1e-9, 1e-6  # m, before impacts
 SOLVED = {"velocity_tolerance": 1e-12}  # m/s: round-off may decide on one sweep more or less of rigid contacts
@@ -98,22 +78,28 @@ def symmetries(setting: Setting) -> Iterator[Row]:
     step in which a point of a face lifts off, after 0.1 s. One step sooner changes a velocity by less than g h, and a
     place by less than g h 0.1 s until the first impact, which is 1e-5 m; a tenth of that is allowed.
     """
-    usual = states(setting, staircase())
-    mirrored = [state * MIRROR for state in states(setting, staircase(side=-1.0))]
-    relabelled = [state[np.argsort(RELABELLED)] for state in states(setting, staircase(RELABELLED))]
-    back = np.array([SHIFT, 0.0, 0.0, 0.0, 0.0, 0.0])
-    moved = [state - back for state in states(setting, staircase(shift=SHIFT))]
-    for name, other in (("mirrored", mirrored), ("relabelled", relabelled), ("moved 1 m", moved)):
-        before, after = (distance(one, two) for one, two in zip(usual, other, strict=True))
-        allowed = SAME if setting.has_springs or other is not relabelled else REORDERED
+
+    def states(bodies: Sequence[dict[str, object]]) -> list[NDArray[np.float64]]:
+        scene = setting.start(bodies, time={} if setting.has_springs else SOLVED)
+        return [scene.to_time(time).state() for time in (BEFORE, AFTER)]
+
+    usual = states(staircase())
+    for name, others, allowed in (
+        ("mirrored", [state * MIRROR for state in states(staircase(side=-1.0))], SAME),
+        (
+            "relabelled",
+            [state[np.argsort(RELABELLED)] for state in states(staircase(RELABELLED))],
+            SAME if setting.has_springs else REORDERED,
+        ),
+        (
+            "moved 1 m",
+            [state - np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]) for state in states(staircase(shift=1.0))],
+            SAME,
+        ),
+    ):
+        before, after = (distance(one, two) for one, two in zip(usual, others, strict=True))
         yield absolute(f"{name}, before impacts", "m", 0.0, before, allowed)
         yield absolute(f"{name}, at the end", "mm", 0.0, 1e3 * after, 0.05)
-
-
-def states(setting: Setting, bodies: Sequence[dict[str, object]]) -> list[NDArray[np.float64]]:
-    """Return the state just before the first impact and that after the last one."""
-    collapse = setting.start(bodies, time={} if setting.has_springs else SOLVED)
-    return [collapse.to_time(time).state() for time in (BEFORE, AFTER)]
 
 
 def distance(one: NDArray[np.float64], two: NDArray[np.float64]) -> float:
@@ -123,21 +109,16 @@ def distance(one: NDArray[np.float64], two: NDArray[np.float64]) -> float:
 
 
 def fixed_block(setting: Setting) -> Iterator[Row]:
-    """Let a block tumble over the ground and over a fixed block, at one step: the same motion."""
-    plinth = tumbling(setting, [PLINTH], 0.1)
-    ground = tumbling(setting, [], 0.0, step=plinth.step)
+    """Let a tilted block slide and tumble over the ground and over a fixed block, at one step: the same motion."""
+    body = {"y": HEIGHT, "angle": 0.4, "velocity": [0.3, -0.5]}
+    fixed = {"x": 0.0, "y": 0.05, "width": 1.0, "height": 0.1, "fixed": True}
+    plinth = setting.start([{**body, "y": 0.1 + HEIGHT}, fixed], friction=0.38, ground_friction=0.38)
+    ground = setting.start([body], friction=0.38, ground_friction=0.38, time={"step": plinth.step})
     apart = 0.0
     for time in np.linspace(0.0, LANDING, 31)[1:]:
         one, two = (scene.to_time(float(time)).state()[:1] for scene in (ground, plinth))
         apart = max(apart, distance(one, two - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])))
     yield absolute("motions apart", "µm", 0.0, 1e6 * apart, 1.0)
-
-
-def tumbling(setting: Setting, others: Sequence[dict[str, object]], level: float, step: float = 0.0) -> Simulation:
-    """Drop a tilted block that slides and turns onto a level (m); `step` (s) is the scene's own where zero."""
-    body = {"y": level + HEIGHT, "angle": 0.4, "velocity": [0.3, -0.5]}
-    time = {"step": step} if step else {}
-    return setting.start([body, *others], friction=0.38, ground_friction=0.38, time=time)
 
 
 ORDER = 1.8
@@ -155,7 +136,11 @@ def convergence(setting: Setting) -> Iterator[Row]:
     """Order in dt of an oscillation and of the restitution; change of the run-out when the spacing is halved."""
     coarse, middle, fine = (oscillation(setting, refinement) for refinement in REFINEMENTS)
     yield at_least("oscillation, order in dt", "", ORDER, np.log2(rms(coarse - middle) / rms(middle - fine)))
-    errors = [rms(restitution_errors(setting, safety)) for safety in SAFETIES]
+    errors = []
+    for safety in SAFETIES:  # of flat impacts that begin at different phases of a step
+        thrower = Thrower(setting, RESTITUTION, time={"safety": safety})
+        throws = [thrower.throw(Throw(phase=(k + 0.5) / PHASES)).vy for k in range(PHASES)]
+        errors.append(rms(np.array(throws) - RESTITUTION))
     order = np.log2(errors[0] / errors[-1]) / np.log2(SAFETIES[0] / SAFETIES[-1])
     yield at_least("restitution, order in dt", "", ORDER, order)
     one, half = (collapse(setting, 0.2, spacing, SOFT).to_time(LONGEST).bodies.x for spacing in (1e-3, 5e-4))
@@ -181,10 +166,3 @@ def oscillation(setting: Setting, refinement: int) -> NDArray[np.float64]:
     scene = setting.start([{"y": HEIGHT / 2}], press, restitution=1.0, contact=contact, time=time)
     every = refinement * round(2.0 * np.pi / COARSEST * PERIODS / SAMPLES)
     return np.array([scene.to_step(every * k).bodies[0].y for k in range(1, SAMPLES + 1)])
-
-
-def restitution_errors(setting: Setting, safety: float) -> NDArray[np.float64]:
-    """Return the errors of the restitution of flat impacts that begin at different phases of a step."""
-    thrower = Thrower(setting, RESTITUTION, time={"safety": safety})
-    throws = [thrower.throw(Throw(phase=(k + 0.5) / PHASES)).vy for k in range(PHASES)]
-    return np.array(throws) - RESTITUTION

@@ -14,8 +14,7 @@ from typing import Any
 
 from blocksim import __version__
 from blocksim.analysis.compare import Verdict
-from blocksim.scenario import load_scenario
-from blocksim.scenario.key_table import with_part
+from blocksim.scenario import key_table, load_scenario
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
 from blocksim.verification.reference import markdown
@@ -81,25 +80,19 @@ def measure_finding(finding: Finding) -> dict[str, Any]:
     }
 
 
-def table(stored: Sequence[dict[str, Any]]) -> str:
-    """Return the kept findings as Markdown, in the order of FINDINGS."""
-    by_command = {row["command"]: row for row in stored}
-    return markdown(HEADS, [_cells(one, row) for one in FINDINGS if (row := by_command.get(one.command)) is not None])
-
-
-def _cells(finding: Finding, row: dict[str, Any]) -> list[str]:
-    cells = [
-        f"{x:.2f} ({beyond:.2f} {'too far' if far else 'short'})" if beyond else f"{x:.2f}"
-        for x, beyond, far in zip(row["x_mm"], row["beyond_mm"], row["long"], strict=True)
-    ]
-    everything = [*(f"block {block}" for block in BLOCKS), "rotations"]
-    inside = "all" if row["inside"] == everything else ", ".join(row["inside"])
-    return [finding.title, f"`{finding.command}`", *cells, inside]
-
-
 def with_table(text: str, stored: Sequence[dict[str, Any]]) -> str:
-    """Return a page with the table between the two marks replaced."""
-    return with_part(text, BEGIN, table(stored), END)
+    """Return a page with the table of the kept findings between the two marks, in the order of FINDINGS."""
+    by_command = {row["command"]: row for row in stored}
+    rows = []
+    for finding in (one for one in FINDINGS if one.command in by_command):
+        row = by_command[finding.command]
+        cells = [
+            f"{x:.2f} ({beyond:.2f} {'too far' if far else 'short'})" if beyond else f"{x:.2f}"
+            for x, beyond, far in zip(row["x_mm"], row["beyond_mm"], row["long"], strict=True)
+        ]
+        inside = "all" if len(row["inside"]) == len((*BLOCKS, "rotations")) else ", ".join(row["inside"])
+        rows.append([finding.title, f"`{finding.command}`", *cells, inside])
+    return key_table.with_part(text, BEGIN, markdown(HEADS, rows), END)
 
 
 def main(arguments: Sequence[str]) -> None:

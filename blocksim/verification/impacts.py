@@ -1,24 +1,15 @@
 """V1 flight, V3 bounces, V4 to V6 and V16 impacts, V25 flat landings on several blocks."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator, Sequence
 from itertools import pairwise, product
 from math import atan2, cos, radians, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, farthest, relative
 from blocksim.verification.scene import GOLDEN, HEIGHT, POLL, WIDTH, PaperBlock, Simulation, Throw, Thrower
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    from blocksim.verification.scene import Simulation
-
 
 SPACINGS = (5e-4, 1e-3, 2e-3, 4e-3)  # m, of boundary particles
 DROP, RESTITUTION = 0.1, 0.5  # m, -
@@ -42,7 +33,7 @@ def free_flight(setting: Setting) -> Iterator[Row]:
 
 def bounces(setting: Setting) -> Iterator[Row]:
     """Drop a block flat; apexes and flight time at four particle spacings, the farthest off counts."""
-    found = [observe_bounces(drop_flat(setting, spacing), 3) for spacing in setting.distinct(SPACINGS)]
+    found = [observe_bounces(drop_flat(setting, spacing)) for spacing in setting.distinct(SPACINGS)]
     for impact, tolerance in enumerate(BOUNCE_TOLERANCES, start=1):
         expected = forms.apex_height(DROP, RESTITUTION, impact)
         apex = farthest(expected, [apexes[impact - 1] for _, apexes in found])
@@ -58,8 +49,8 @@ def drop_flat(setting: Setting, spacing: float) -> Simulation:
     return setting.start([body], restitution=RESTITUTION, contact={"particle_spacing": spacing})
 
 
-def observe_bounces(fall: Simulation, impacts: int) -> tuple[list[float], list[float]]:
-    """Return the times (s) of so many impacts and one more, and the apexes (m) between them; NaN where there is none.
+def observe_bounces(fall: Simulation) -> tuple[list[float], list[float]]:
+    """Return the times (s) of the impacts and one more, and the apexes (m) between them; NaN where there is none.
 
     The time of an impact is that of the steepest change of speed, half a poll either way.
     """
@@ -67,16 +58,15 @@ def observe_bounces(fall: Simulation, impacts: int) -> tuple[list[float], list[f
     apexes = [0.0]
     falling = True
     poll = max(FALL_POLL, fall.step)
-    while len(times) <= impacts and fall.time < LONGEST:
-        fall.to_time(fall.time + poll)
-        body = fall.bodies[0]
+    while len(times) <= len(BOUNCE_TOLERANCES) and fall.time < LONGEST:
+        body = fall.to_time(fall.time + poll).bodies[0]
         if falling and body.vy > 0.0:
             times.append(fall.time - poll / 2)
             apexes.append(0.0)
         falling = body.vy < 0.0
         apexes[-1] = max(apexes[-1], float(body.y) - HEIGHT / 2)
-    missing = impacts + 1 - len(times)
-    return times + [np.nan] * missing, [*apexes[1:-1], *([np.nan] * missing)]
+    missing = [np.nan] * (len(BOUNCE_TOLERANCES) + 1 - len(times))
+    return times + missing, apexes[1:-1] + missing
 
 
 ASKED = tuple(tenth / 10 for tenth in range(11))
@@ -95,20 +85,16 @@ REBOUNDS, REBOUND = (0.2, 0.8), 1e-3  # restitutions; off them by, as arms are t
 def restitution(setting: Setting) -> Iterator[Row]:
     """Throw a block at 7 speeds for 11 restitutions at 4 spacings; the farthest off counts."""
     spacings = setting.distinct(SPACINGS[1:2] if setting.quick else SPACINGS)
+    no_threshold = {} if setting.has_springs else {"restitution_threshold": 0.0}  # the slowest impacts rebound too
     for landing, angle in LANDINGS.items():
         errors: dict[float, list[float]] = {asked: [] for asked in ASKED}
         for asked, spacing, (number, speed) in product(ASKED, spacings, enumerate(SPEEDS)):
-            thrower = Thrower(setting, asked, speed, contact={"particle_spacing": spacing}, time=no_threshold(setting))
+            thrower = Thrower(setting, asked, speed, contact={"particle_spacing": spacing}, time=no_threshold)
             body = thrower.throw(Throw(angle, phase=(GOLDEN * (number + 1 + 10 * asked)) % 1.0))
             errors[asked].append(float(body.vy) / speed - asked)
         worst = farthest(0.0, [error for asked in ASKED[1:] for error in errors[asked]])
         yield absolute(f"{landing}, e ≥ 0.1, off by", "", 0.0, worst, 0.01)
         yield absolute(f"{landing}, e = 0, rebound", "", 0.0, farthest(0.0, errors[0.0]), 0.01)
-
-
-def no_threshold(setting: Setting) -> dict[str, object]:
-    """Return the key of [time] that lets the slowest impacts rebound too; springs have no such threshold."""
-    return {} if setting.has_springs else {"restitution_threshold": 0.0}
 
 
 def first_look(setting: Setting) -> int:
@@ -149,15 +135,21 @@ def momenta(scene: Simulation) -> NDArray[np.float64]:
 
 
 def two_blocks(setting: Setting) -> Iterator[Row]:
-    """Collide two blocks; momentum and angular momentum are kept to round-off times steps."""
+    """Collide two blocks; momentum and angular momentum are kept to round-off times steps.
+
+    Of rigid blocks, impulses act with the arms that they had when the step began, and so may create angular momentum.
+    Blocks that pass each other at u are h u apart from there when the velocity pass adds its impulses J: h u J, with
+    J = m' u (1 + e) at most, m' a quarter of both masses; both are of 1 m/s here.
+    """
     scenes = [collision(setting, e) for e in (0.0, 0.2, 1.0)]
     before = [momenta(scene) for scene in scenes]
-    steps = COLLISION_STEPS if setting.has_springs else round(COLLISION_END / scenes[0].step)
+    step = scenes[0].step
+    steps = COLLISION_STEPS if setting.has_springs else round(COLLISION_END / step)
     after = [momenta(scene.to_step(steps)) for scene in scenes]
     worst = np.abs(np.array(after) - np.array(before)).max(axis=0)
     mass = float(scenes[0].bodies.mass.sum())
     round_off = steps * float(np.finfo(float).eps) * mass  # speeds of 1 m/s
-    turning = 0.1 * round_off if setting.has_springs else frozen_arms(scenes[0].step, mass)  # arms of 0.1 m
+    turning = 0.1 * round_off if setting.has_springs else step * 0.25 * mass * 2.0  # arms of 0.1 m
     yield absolute("momentum", "kg m/s", 0.0, max(worst[0], worst[1]), round_off)
     yield absolute("angular momentum", "kg m²/s", 0.0, worst[2], turning)
     if not setting.has_springs:
@@ -173,46 +165,28 @@ def rebound(scene: Simulation) -> float:
     before = after = scene.state()
     while after[0, 3] == before[0, 3]:
         before, after = after, scene.to_step(scene.steps + 1).state()
-    place = meeting(before) if scene.scene.contacts.stepping[0].is_divided else before
-    return -parting(after, place) / parting(before, place)
+    place, time = before.copy(), 0.0
+    if scene.scene.contacts.stepping[0].is_divided:
+        for _ in range(10):  # Newton's method
+            gap, speed = facing(before, place)
+            time -= gap / speed
+            place[:, :3] = before[:, :3] + time * before[:, 3:]
+    return -facing(after, place)[1] / facing(before, place)[1]
 
 
-def meeting(state: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return where two blocks meet that move as they do in a state, without gravity."""
-    place = state.copy()
-    time = 0.0
-    for _ in range(10):  # Newton's method
-        corner_x, corner_y = corner(place)
-        x_two, y_two, angle_two = place[1, :3]
-        gap = cos(angle_two) * (x_two - corner_x) + sin(angle_two) * (y_two - corner_y) - WIDTH_TWO / 2
-        time -= gap / parting(state, place)
-        place[:, :3] = state[:, :3] + time * state[:, 3:]
-    return place
+def facing(state: NDArray[np.float64], place: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the gap (m) between corner and face, and the speed (m/s) in a state at which they part.
 
-
-def corner(place: NDArray[np.float64]) -> tuple[float, float]:
-    """Return where the upper right corner of the left block is (m)."""
-    x, y, angle = place[0, :3]
-    return x + (cos(angle) * WIDTH - sin(angle) * HEIGHT) / 2, y + (sin(angle) * WIDTH + cos(angle) * HEIGHT) / 2
-
-
-def parting(state: NDArray[np.float64], place: NDArray[np.float64]) -> float:
-    """Return the speed (m/s) in a state at which corner and face part, at their places and angles in another one."""
-    (x, y, _), (x_two, y_two, angle_two) = place[:, :3]
-    corner_x, corner_y = corner(place)
+    Places and angles are those of another state.
+    """
+    (x, y, angle), (x_two, y_two, angle_two) = place[:, :3]
+    corner_x = x + (cos(angle) * WIDTH - sin(angle) * HEIGHT) / 2
+    corner_y = y + (sin(angle) * WIDTH + cos(angle) * HEIGHT) / 2
+    gap = cos(angle_two) * (x_two - corner_x) + sin(angle_two) * (y_two - corner_y) - WIDTH_TWO / 2
     (vx, vy, spin), (vx_two, vy_two, spin_two) = state[:, 3:]
     along = vx_two - spin_two * (corner_y - y_two) - vx + spin * (corner_y - y)
     across = vy_two + spin_two * (corner_x - x_two) - vy - spin * (corner_x - x)
-    return float(cos(angle_two) * along + sin(angle_two) * across)
-
-
-def frozen_arms(step: float, mass: float) -> float:
-    """Return the angular momentum (kg m2/s) that impulses may create as their arms are those when the step began.
-
-    Blocks that pass each other at u are h u apart from there when the velocity pass adds its impulses J: h u J, with
-    J = m' u (1 + e) at most, m' a quarter of both masses; both are of 1 m/s here.
-    """
-    return step * 0.25 * mass * 2.0
+    return gap, float(cos(angle_two) * along + sin(angle_two) * across)
 
 
 FAR = 0.05  # m, where the outermost seats end, beyond the block

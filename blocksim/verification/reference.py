@@ -15,19 +15,8 @@ from typing import Any
 from blocksim.scenario.key_table import with_part
 from blocksim.scenario.models.stepping import IMPULSES
 from blocksim.simulation.atomic import write_text
-from blocksim.verification.case import (
-    Case,
-    Row,
-    Setting,
-    Verdict,
-    error_text,
-    expected_text,
-    number,
-    run_case,
-    tolerance_text,
-)
-from blocksim.verification.cases import CASES, choose_cases, excluded_cases
-from blocksim.verification.soil import SOIL_CASES
+from blocksim.verification import cases, soil
+from blocksim.verification.case import Case, Row, Setting, run_case
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"
@@ -41,43 +30,21 @@ COLUMNS = {  # head of the column: how it is measured
     "`particles`, quick": Setting("particles", quick=True),
 }
 RIGID = IMPULSES  # head of the second table's column
-RIGID_HEADS = ("case", "quantity", "expected", "tolerance", "measured")
 SOIL = "soil"  # the cases of soil, in a table of their own
-SOIL_HEADS = ("case", "source", "quantity", "expected", "tolerance", "measured", "error")
 SETTINGS = {**COLUMNS, RIGID: Setting(scheme=IMPULSES), SOIL: Setting()}
 FIELDS = ("quantity", "unit", "expected", "measured", "tolerance", "relative", "at_least")
-SIGNS = {Verdict.INSIDE: "✓", Verdict.OUTSIDE: "✗"}
 Stored = dict[str, dict[str, list[dict[str, Any]]]]  # head of the column, case id, rows
 
 
 def cases_of(head: str) -> tuple[Case, ...]:
     """Return the cases of a column."""
-    return SOIL_CASES if head == SOIL else choose_cases([], SETTINGS[head].scheme)
-
-
-def _measured(head: str) -> Iterator[tuple[str, list[dict[str, Any]]]]:
-    setting = SETTINGS[head]
-    for case in cases_of(head):
-        outcome = run_case(case, setting)
-        name = f"{setting.scheme} {setting.model} {setting.law} {case.id}"
-        print(f"{name}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
-        yield case.id, [{name: getattr(row, name) for name in FIELDS} for row in outcome.rows]
+    return soil.SOIL_CASES if head == SOIL else cases.choose_cases([], SETTINGS[head].scheme)
 
 
 def stored_rows(stored: Stored, head: str, case: Case) -> list[Row]:
-    """Return the kept rows of one case in one setting."""
-    return [Row(**{**row, "measured": _number(row["measured"])}) for row in stored.get(head, {}).get(case.id, [])]
-
-
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else value
-
-
-def table(stored: Stored) -> str:
-    """Return the tables as Markdown: with the reasons for misses of models and for cases left out."""
-    heads = ("case", "quantity", "expected", "tolerance", *COLUMNS)
-    lines = markdown(heads, [cells for case in CASES for cells in _case_cells(stored, case)])
-    return "\n".join([lines, *_remarks(stored), "", *_rigid_table(stored)])
+    """Return the kept rows of one case in one setting; a number that is not finite is kept as None."""
+    rows = stored.get(head, {}).get(case.id, [])
+    return [Row(**{**row, "measured": float("nan") if row["measured"] is None else row["measured"]}) for row in rows]
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -86,66 +53,62 @@ def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join([head, f"|{' --- |' * len(heads)}", *lines])
 
 
+def table(stored: Stored) -> str:
+    """Return the tables of blocks as Markdown, with the reasons for misses of models and for cases left out."""
+    rows = []
+    for case in cases.CASES:
+        columns = [{row.quantity: row for row in stored_rows(stored, head, case)} for head in COLUMNS]
+        name = f"{case.id} {case.title}"
+        for quantity, row in columns[0].items():
+            others = [column.get(quantity) for column in columns]
+            texts = [other.texts for other in others[:2] if other is not None]
+            stated = [" / ".join(dict.fromkeys(text[key] for text in texts)) for key in ("expected", "tolerance")]
+            rows.append([name, row.texts["quantity"], *stated, *map(_cell, others)])
+            name = ""
+    reasons = [reason for head in COLUMNS for reason in _reasons(stored, head, f"{head} ")]
+    if reasons:
+        reasons = ["", "Where models other than `surface` miss a tolerance:", "", *reasons]
+    heads, scheme = ("case", "quantity", "expected", "tolerance"), SETTINGS[RIGID].scheme
+    rigid = [
+        f"Rigid contacts, `blocksim verify --scheme {scheme}`:",
+        "",
+        markdown((*heads, "measured"), list(_rows(stored, RIGID))),
+        "",
+        f"Left out: {'; '.join(cases.excluded_cases(scheme))}.",
+    ]
+    return "\n".join([markdown((*heads, *COLUMNS), rows), *reasons, "", *rigid])
+
+
 def soil_table(stored: Stored) -> str:
     """Return the table of soil as Markdown, misses among it, and their reasons."""
-    rows = [cells for case in SOIL_CASES for cells in _cells(stored, SOIL, case)]
-    found = _missed(stored, SOIL)
-    reasons = ["", "Where a tolerance is missed:", "", *found] if found else []
-    return "\n".join([markdown(SOIL_HEADS, rows), *reasons])
+    heads = ("case", "source", "quantity", "expected", "tolerance", "measured", "error")
+    reasons = list(_reasons(stored, SOIL))
+    if reasons:
+        reasons = ["", "Where a tolerance is missed:", "", *reasons]
+    return "\n".join([markdown(heads, list(_rows(stored, SOIL))), *reasons])
 
 
-def _rigid_table(stored: Stored) -> Iterator[str]:
-    scheme = SETTINGS[RIGID].scheme
-    yield from [f"Rigid contacts, `blocksim verify --scheme {scheme}`:", ""]
-    yield markdown(RIGID_HEADS, [cells for case in choose_cases([], scheme) for cells in _cells(stored, RIGID, case)])
-    yield from ["", f"Left out: {'; '.join(excluded_cases(scheme))}."]
-
-
-def _cells(stored: Stored, head: str, case: Case) -> Iterator[list[str]]:
-    """Yield the cells of a table of one column; that of soil has the sources and errors too."""
-    names = [f"{case.id} {case.title}", *([case.source] if head == SOIL else [])]
-    for row in stored_rows(stored, head, case):
-        quantity = f"{row.quantity}, {row.unit}" if row.unit else row.quantity
-        errors = [error_text(row)] if head == SOIL else []
-        yield [*names, quantity, expected_text(row), tolerance_text(row), _cell(row), *errors]
-        names = [""] * len(names)
-
-
-def _case_cells(stored: Stored, case: Case) -> Iterator[list[str]]:
-    columns = [{row.quantity: row for row in stored_rows(stored, head, case)} for head in COLUMNS]
-    name = f"{case.id} {case.title}"
-    for quantity, row in columns[0].items():
-        others = [column.get(quantity) for column in columns]
-        laws = [other for other in others[:2] if other is not None]
-        yield [
-            name,
-            f"{quantity}, {row.unit}" if row.unit else quantity,
-            " / ".join(dict.fromkeys(expected_text(other) for other in laws)),
-            " / ".join(dict.fromkeys(tolerance_text(other) for other in laws)),
-            *(_cell(other) for other in others),
-        ]
-        name = ""
+def _rows(stored: Stored, head: str) -> Iterator[list[str]]:
+    """Yield the rows of a table of one column; that of soil has the sources and errors too."""
+    for case in cases_of(head):
+        names = [f"{case.id} {case.title}", *([case.source] if head == SOIL else [])]
+        for row in stored_rows(stored, head, case):
+            texts = row.texts
+            errors = [texts["error"]] if head == SOIL else []
+            yield [*names, texts["quantity"], texts["expected"], texts["tolerance"], _cell(row), *errors]
+            names = [""] * len(names)
 
 
 def _cell(row: Row | None) -> str:
-    return "–" if row is None else f"{number(row.measured)} {SIGNS[row.verdict]}"
+    return "–" if row is None else f"{row.texts['measured']} {'✓' if row.is_inside else '✗'}"
 
 
-def _remarks(stored: Stored) -> Iterator[str]:
-    found = [text for head in COLUMNS for text in _missed(stored, head, f"{head} ")]
-    if found:
-        yield from ["", "Where models other than `surface` miss a tolerance:", "", *found]
-
-
-def _missed(stored: Stored, head: str, before: str = "") -> list[str]:
-    """Return the reasons of cases that miss a tolerance."""
+def _reasons(stored: Stored, head: str, before: str = "") -> Iterator[str]:
+    """Yield the reasons of cases that miss a tolerance."""
     model = SETTINGS[head].model
-    missed = [
-        case
-        for case in cases_of(head)
-        if any(row.verdict == Verdict.OUTSIDE for row in stored_rows(stored, head, case)) and model in case.remarks
-    ]
-    return [f"* {before}{case.id}: {case.remarks[model]}" for case in missed]
+    for case in cases_of(head):
+        if model in case.remarks and not all(row.is_inside for row in stored_rows(stored, head, case)):
+            yield f"* {before}{case.id}: {case.remarks[model]}"
 
 
 def with_table(text: str, stored: Stored) -> str:
@@ -159,30 +122,33 @@ def read_store(path: Path) -> Stored:
     return stored
 
 
-def write_store(path: Path, stored: Stored) -> None:
-    """Keep results; one row a line, numbers that are not finite as null."""
-    finite = json.loads(json.dumps(stored), parse_constant=lambda _: None)
-    text = json.dumps(finite, indent=1, ensure_ascii=False, allow_nan=False)
-    folded = re.sub(r"\{\n\s+\"quantity\".*?\}", lambda row: " ".join(row.group().split()), text, flags=re.DOTALL)
-    write_text(path, folded + "\n")
+def measure(store: Path, heads: Sequence[str]) -> None:
+    """Run all cases in the settings of some columns and keep the results, column by column.
+
+    One row is a line of the file; numbers that are not finite are null.
+    """
+    for head in heads:
+        setting, column = SETTINGS[head], {}
+        for case in cases_of(head):
+            outcome = run_case(case, setting)
+            name = f"{setting.scheme} {setting.model} {setting.law} {case.id}"
+            print(f"{name}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
+            column[case.id] = [{name: getattr(row, name) for name in FIELDS} for row in outcome.rows]
+        stored = {**(read_store(store) if store.is_file() else {}), head: column}
+        finite = json.loads(
+            json.dumps({name: stored[name] for name in SETTINGS if name in stored}), parse_constant=lambda _: None
+        )
+        text = json.dumps(finite, indent=1, ensure_ascii=False, allow_nan=False)
+        folded = re.sub(r"\{\n\s+\"quantity\".*?\}", lambda row: " ".join(row.group().split()), text, flags=re.DOTALL)
+        write_text(store, folded + "\n")
 
 
 def main(arguments: Sequence[str]) -> None:
     """Write the table into the README named first, after measuring where asked to."""
     readme, *options = arguments
-    store = STORE
     if options[:1] == ["--measure"]:
-        measure(store, options[1:] or list(SETTINGS))
-    text = Path(readme).read_text(encoding="utf-8")
-    write_text(Path(readme), with_table(text, read_store(store)))
-
-
-def measure(store: Path, heads: Sequence[str]) -> None:
-    """Run all cases in the settings of some columns and keep the results, column by column."""
-    for head in heads:
-        stored = read_store(store) if store.is_file() else {}
-        stored[head] = dict(_measured(head))
-        write_store(store, {name: stored[name] for name in SETTINGS if name in stored})
+        measure(STORE, options[1:] or list(SETTINGS))
+    write_text(Path(readme), with_table(Path(readme).read_text(encoding="utf-8"), read_store(STORE)))
 
 
 if __name__ == "__main__":

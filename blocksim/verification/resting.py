@@ -1,20 +1,14 @@
-"""V2 static overlap, V13 overhanging stacks, V14 a stack that must not creep, V7 to V9 sliding and sticking."""
+"""V2 static overlap, V7 to V9 sliding and sticking, V13 overhanging stacks, V14 a stack that must not creep."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
-from math import atan, degrees, radians
-from typing import TYPE_CHECKING
+from math import degrees, radians
 
 import numpy as np
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, count, farthest, relative
 from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, Simulation
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
 
 CONTACT_RADIUS = 1e-3  # m
 STANDING, FALLING = (10.5e-3, 0.99), (10.8e-3, 1.01)  # m, equal offset; share of the harmonic overhang
@@ -69,7 +63,11 @@ def outcome(setting: Setting, bodies: Sequence[Mapping[str, object]]) -> bool | 
     soft = setting.quick and not setting.hertzian
     stack = setting.start(bodies, contact={"stiffness_scale": SOFT if soft else 1.0})
     before = stack.state()
-    load_gently(stack)
+    controls = stack.world.controls[0]
+    gravity = float(controls.gravity_y)
+    for k in range(1, LOADING_STEPS + 1):
+        controls.gravity_y = gravity * k / LOADING_STEPS
+        stack.to_time(LOADING * k / LOADING_STEPS)
     middle = stack.to_time(LOADING + OBSERVED - STILL).state()
     after = stack.to_time(LOADING + OBSERVED).state()
     if (before - after)[:, 1].max() > FALLEN * HEIGHT:
@@ -77,36 +75,19 @@ def outcome(setting: Setting, bodies: Sequence[Mapping[str, object]]) -> bool | 
     return False if np.abs(after - middle)[:, :2].max() < KEPT else None
 
 
-def load_gently(stack: Simulation) -> None:
-    """Bring gravity up from zero in small steps."""
-    controls = stack.world.controls[0]
-    gravity = float(controls.gravity_y)
-    for k in range(1, LOADING_STEPS + 1):
-        controls.gravity_y = gravity * k / LOADING_STEPS
-        stack.to_time(LOADING * k / LOADING_STEPS)
-
-
 def tower(setting: Setting) -> Iterator[Row]:
-    """Ten blocks straight up: their creep speed and largest gain of mechanical energy."""
-    begin, end = (0.5, 1.0) if setting.quick else (5.0, 10.0)
+    """Ten blocks straight up: their creep speed and largest gain of mechanical energy over that at the start."""
     contact = {"stiffness_scale": SOFT if setting.quick else 1.0}
     stack = setting.start([{"y": (i + 0.5) * HEIGHT} for i in range(TOWER)], contact=contact)
-    gain = climb(stack, begin)
-    before, time = stack.state(), stack.time
-    gain = max(gain, climb(stack, end))
-    creep = np.abs(stack.state()[:, :2] - before[:, :2]).max() / (stack.time - time)
+    gain, halves = 0.0, []
+    for end in (0.5, 1.0) if setting.quick else (5.0, 10.0):
+        for time in np.linspace(stack.time, end, 51)[1:]:
+            gain = max(gain, stack.to_time(float(time)).mechanical - stack.start_energy)
+        halves.append((stack.time, stack.state()[:, :2]))
+    (begin, before), (end, after) = halves
     fall = float(stack.bodies.mass.sum()) * 9.81 * 1e-3
-    yield absolute("creep", "µm/s", 0.0, 1e6 * creep, 1.0)
+    yield absolute("creep", "µm/s", 0.0, 1e6 * (np.abs(after - before).max() / (end - begin)), 1.0)
     yield absolute("energy gained / m g 1 mm", "", 0.0, gain / fall, 1e-3)
-
-
-def climb(stack: Simulation, until: float) -> float:
-    """Continue; return the largest excess (J) of the mechanical energy over that at the start, or 0."""
-    highest = 0.0
-    for time in np.linspace(stack.time, until, 51)[1:]:
-        stack.to_time(float(time))
-        highest = max(highest, stack.mechanical - stack.start_energy)
-    return highest
 
 
 SPACINGS = (5e-4, 1e-3, 4e-3)  # m
@@ -120,21 +101,18 @@ FRICTIONS = (0.31, 0.38)
 
 def sliding_to_rest(setting: Setting) -> Iterator[Row]:
     """Push a block along level ground at three particle spacings; the farthest off counts."""
-    slides = [slide(setting, spacing) for spacing in setting.distinct(SPACINGS)]
+    slides = []  # where (m) and when (s) the block stops
+    for spacing in setting.distinct(SPACINGS):
+        body, contact = {"y": HEIGHT / 2, "velocity": [SPEED, 0.0]}, {"particle_spacing": spacing}
+        scene = setting.start([body], ground_friction=LEVEL_FRICTION, contact=contact)
+        while scene.bodies[0].vx > STOPPED * SPEED and scene.time < LONGEST:
+            scene.to_time(scene.time + POLL)
+        stop = scene.time
+        slides.append((float(scene.to_time(stop + 0.02).bodies[0].x), stop))
     distance = forms.sliding_stop_distance(SPEED, LEVEL_FRICTION)
     time = forms.sliding_stop_time(SPEED, LEVEL_FRICTION)
     yield relative("distance", "mm", 1e3 * distance, 1e3 * farthest(distance, [end for end, _ in slides]), 0.005)
     yield relative("time", "s", time, farthest(time, [stop for _, stop in slides]), 0.005)
-
-
-def slide(setting: Setting, spacing: float) -> tuple[float, float]:
-    """Return where (m) and when (s) a pushed block stops."""
-    body = {"y": HEIGHT / 2, "velocity": [SPEED, 0.0]}
-    scene = setting.start([body], ground_friction=LEVEL_FRICTION, contact={"particle_spacing": spacing})
-    while scene.bodies[0].vx > STOPPED * SPEED and scene.time < LONGEST:
-        scene.to_time(scene.time + POLL)
-    stop = scene.time
-    return float(scene.to_time(stop + 0.02).bodies[0].x), stop
 
 
 def on_slope(setting: Setting, slope: float, friction: float) -> Simulation:
@@ -155,12 +133,12 @@ def friction_angle(setting: Setting) -> Iterator[Row]:
     """Half a degree below the friction angle nothing creeps, half a degree above the block slides."""
     begin, end = (1.0, 2.0) if setting.quick else (5.0, 10.0)
     for friction in FRICTIONS:
-        name = f"{degrees(atan(friction)):.2f}°"
-        rest = on_slope(setting, atan(friction) - MARGIN, friction).to_time(begin)
+        limit = forms.sliding_slope(friction)
+        name = f"{degrees(limit):.2f}°"
+        rest = on_slope(setting, limit - MARGIN, friction).to_time(begin)
         time, place = rest.time, float(rest.bodies[0].x)
         creep = (float(rest.to_time(end).bodies[0].x) - place) / (rest.time - time)
         yield absolute(f"{name} − 0.5°, creep", "µm/s", 0.0, 1e6 * creep, 1.0)
-        steep = atan(friction) + MARGIN
-        expected = forms.fall_distance(0.5, forms.incline_acceleration(steep, friction))
-        way = float(on_slope(setting, steep, friction).to_time(0.5).bodies[0].x)
+        expected = forms.fall_distance(0.5, forms.incline_acceleration(limit + MARGIN, friction))
+        way = float(on_slope(setting, limit + MARGIN, friction).to_time(0.5).bodies[0].x)
         yield relative(f"{name} + 0.5°, way in 0.5 s", "mm", 1e3 * expected, 1e3 * way, 0.02)

@@ -1,46 +1,33 @@
-"""Scenes with soil for verification: columns, walls that are drawn back, walls of blocks. Everything 50 mm deep, SI.
+"""S1 to S11: soil by itself and with blocks, against closed forms, measurements and another code; `verify --soil`.
 
-S8: the path of one particle, by the law itself: compression beside a constant pressure, shear, a rigid turn.
-
-S1 to S6, S11: what soil does to walls that hold it or are drawn back, and to walls of blocks that slide or turn.
-
-S7, S9, S10: what soil that moves conserves, how far columns of it run, how much of their energy they keep.
-
-S1 to S11: soil by itself and with blocks, against closed forms, measurements and another code; `verify --soil`.
+S1 to S6 and S11 are about what soil does to walls that hold it or are drawn back, and to walls of blocks that slide or
+turn; S7, S9 and S10 about what moving soil conserves, how far columns of it run and how much of their energy they keep;
+S8 leads one particle through the law itself. Everything is 50 mm deep, in SI units.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import zeros
-from blocksim.kernels.soil.arrays import STATE
-from blocksim.kernels.soil.stress import invariants, strain
+from blocksim.kernels.soil import arrays, stress
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes import build_scene, ledger_names
 from blocksim.verification.case import Case, Row, Setting, absolute, at_least, count, relative
 from blocksim.verification.scene import Simulation
 from blocksim.world.systems.soils import connected_span
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from blocksim.verification.case import Setting
-
-
 DEPTH, UNIT_WEIGHT, DENSITY = 0.05, 20e3, 2721.7  # m, N/m3 of soil, kg/m3 of blocks
-YOUNG_MODULUS, POISSON_RATIO = 5.84e6, 0.3
 ANGLE = math.radians(21.9)  # of friction: the rods of the paper's field
 ROUGH, SMOOTH = math.tan(ANGLE), 0.0
 WIDTH, HEIGHT = 0.032, 0.025  # m, of blocks
-COARSE, FINE = 0.005, 0.0025  # m: spacings
-TALL = 0.1  # m, of columns
-WALL = 0.3  # m: height of walls
+COARSE, FINE, FINEST = 0.005, 0.0025, 0.00125  # m: spacings
+BLOCK_SPACING = 0.003125  # m: an eighth of the height of a block
+TALL, WALL = 0.1, 0.3  # m: heights of columns and of walls
 GRAVITY = 9.81
 SINE = math.sin(ANGLE)
 ACTIVE = (1.0 - SINE) / (1.0 + SINE)  # K = sigma_x/sigma_y: Mohr and Coulomb's
@@ -48,7 +35,7 @@ BAND = math.sin(math.atan(SINE))  # soil of constant volume slips in a band at t
 ACTIVE_OF_BANDS = (1.0 - BAND) / (1.0 + BAND)
 AT_REST = (1.0 - SINE / math.sqrt(3.0)) / (1.0 + 2.0 * SINE / math.sqrt(3.0))  # Drucker and Prager's, no strain aside
 EVERY = 20  # steps between two samples of a force
-SOFT = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
+SOFT = {"young_modulus": 5.84e6, "poisson_ratio": 0.3}
 RODS = {**SOFT, "unit_weight": UNIT_WEIGHT, "friction_angle": f"{math.degrees(ANGLE)!r} deg"}
 MATERIALS: dict[str, dict[str, Any]] = {
     "rods": RODS,
@@ -58,6 +45,11 @@ MATERIALS: dict[str, dict[str, Any]] = {
 }
 GRADIENTS = (("raw", ""), ("corrected", "corrected: "))  # and how names of their rows begin
 FAR = {"block": "far", "x": -1.0, "y": 0.02}  # out of the way
+
+
+def block(width: float, height: float, material: str = "block") -> dict[str, Any]:
+    """Return the table of a type of block (m)."""
+    return {"width": width, "height": height, "length": DEPTH, "material": material}
 
 
 class SoilScene(Simulation):
@@ -80,18 +72,23 @@ class SoilScene(Simulation):
         **keys: Any,
     ) -> None:
         """Build and start it; `walls` are places of faces, that at 0 to the right, others to the left."""
-        far = {"far": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "block"}}
-        table = {"name": "soil", "material": "rods", "kind": "rectangle", "spacing": spacing, **keys}
-        pairs = {"ground": {"friction": base}, "wall": {"friction": wall}, "block": {"friction": SMOOTH}}
+        soil = {"name": "soil", "material": "rods", "kind": "rectangle", "spacing": spacing, **keys}
+        ends = [(place, (0.0, WALL) if place else (WALL, 0.0)) for place in walls]
         data = {
             "schema": 1,
             "name": "soil",
             "materials": MATERIALS,
-            "blocks": {**far, **(blocks or {})},
+            "blocks": {"far": block(0.04, 0.04), **(blocks or {})},
             "bodies": list(bodies),
-            "soils": [{**table, "x": [x, x + size[0]], "y": [y, y + size[1]]}],
-            "walls": [_wall(place, is_left=place == 0.0) for place in walls],
-            "pairs": {str(table["material"]): pairs},
+            "soils": [{**soil, "x": [x, x + size[0]], "y": [y, y + size[1]]}],
+            "walls": [{"from": [at, first], "to": [at, last], "material": "wall"} for at, (first, last) in ends],
+            "pairs": {
+                str(soil["material"]): {
+                    "ground": {"friction": base},
+                    "wall": {"friction": wall},
+                    "block": {"friction": SMOOTH},
+                }
+            },
             "friction": {"block_block": 1.0, "block_ground": friction},
             "gravity": gravity,
             "time": {"end": 10.0, "stop_at_rest": False},
@@ -109,34 +106,22 @@ class SoilScene(Simulation):
         """Places and velocities of all particles."""
         return self.soils.points
 
-    @property
-    def weight(self) -> float:
-        """Weight (N) of the soil."""
-        return float(self.soils.kinds["mass"][0]) * len(self.points) * float(abs(self.world.controls[0].gravity_y))
-
-    def force_on(self, body: int) -> NDArray[np.float64]:
-        """Return what the soil does to a body (N, x and y); a negative number counts from the last, the ground."""
-        number = body % self.world.bodies.size
-        touches = self.soils.touches[: int(self.soils.controls.touch_count[0])]
-        on_it = touches[(touches["body"] == number) & (touches["normal_force"] > 0.0)]
-        return -np.array([on_it["fx"].sum(), on_it["fy"].sum()])
-
     def mean_force_on(self, body: int, end: float) -> NDArray[np.float64]:
-        """Return the mean of that until a time (s)."""
-        found = []
+        """Return the mean of what the soil does to a body (N, x and y) until a time (s).
+
+        A negative number counts from the last body, the ground.
+        """
+        number, forces = body % self.world.bodies.size, []
         while self.time < end:
             self.to_step(self.steps + EVERY)
-            found.append(self.force_on(body))
-        return np.asarray(np.mean(found, axis=0))
+            touches = self.soils.touches[: int(self.soils.controls.touch_count[0])]
+            on_it = touches[(touches["body"] == number) & (touches["normal_force"] > 0.0)]
+            forces.append(-np.array([on_it["fx"].sum(), on_it["fy"].sum()]))
+        return np.asarray(np.mean(forces, axis=0))
 
     def entries(self) -> dict[str, float]:
         """Return the entries (J) of the ledger."""
         return dict(zip(ledger_names(self.scene), self.measured().tolist(), strict=False))
-
-
-def _wall(place: float, *, is_left: bool) -> dict[str, Any]:
-    ends = ([place, WALL], [place, 0.0]) if is_left else ([place, 0.0], [place, WALL])
-    return {"from": ends[0], "to": ends[1], "material": "wall"}
 
 
 def pressure_share(force: float, height: float) -> float:
@@ -144,79 +129,63 @@ def pressure_share(force: float, height: float) -> float:
     return 2.0 * abs(force) / (UNIT_WEIGHT * height**2 * DEPTH)
 
 
-def gradients(setting: Setting) -> tuple[tuple[str, str], ...]:
-    """Return the gradients of a case and how names of its rows begin: both, or the raw one alone at quick sizes."""
-    return GRADIENTS[:1] if setting.quick else GRADIENTS
-
-
 STEP = 1e-5  # s
 STEPS = 3000  # at a strain rate of 1/s: a strain of 3 %, a hundred times that at yield
 PRESSURE = 1e3  # Pa
 NUDGE = 0.01  # 1/s
 STRESSES = ("sxx", "syy", "szz", "sxy")
+TURNED_FROM = (-600.0, -500.0, -550.0, 30.0)  # Pa, inside the yield surface
 
 
-def _under(sxx: float, syy: float, szz: float, sxy: float = 0.0) -> Any:
-    state = zeros(1, STATE)[0]
-    for name, value in zip(STRESSES, (sxx, syy, szz, sxy), strict=True):
+def particle(*stresses: float) -> Any:
+    """Return one under stresses (Pa)."""
+    state = zeros(1, arrays.STATE)[0]
+    for name, value in zip(STRESSES, stresses, strict=False):
         state[name] = value
     return state
 
 
-def _strained(state: Any, kind: Any, sideways: float) -> Any:
-    """Return a copy of a particle after a step of upright compression and a strain rate (1/s) sideways."""
-    after = state.copy()
-    strain(after, kind, sideways, 0.0, 0.0, -1.0, STEP)
-    return after
+def path(_setting: Setting) -> Iterator[Row]:
+    """Lead one particle of the soil of all cases along three paths."""
+    kind = SoilScene((0.04, 0.04), COARSE).soils.kinds[0]
 
+    def compress(before: Any, sideways: float) -> Any:
+        after = before.copy()
+        stress.strain(after, kind, sideways, 0.0, 0.0, -1.0, STEP)
+        return after
 
-def _least_over_largest(kind: Any) -> float:
-    """Compress a particle upright beside a constant pressure; return the ratio of the stresses."""
-    state, sideways = _under(-PRESSURE, -PRESSURE, -PRESSURE), 0.0
-    for _ in range(STEPS):
-        for _ in range(2):  # the stress sideways is all but linear in the strain of one step
-            one, other = (_strained(state, kind, rate).sxx for rate in (sideways, sideways + NUDGE))
+    state, sideways = particle(-PRESSURE, -PRESSURE, -PRESSURE), 0.0
+    for _ in range(STEPS):  # upright, at the strain rate sideways that keeps the pressure there
+        for _ in range(2):  # that pressure is all but linear in the strain of one step
+            one, other = (compress(state, rate).sxx for rate in (sideways, sideways + NUDGE))
             sideways -= NUDGE * (one + PRESSURE) / (other - one)
-        state = _strained(state, kind, sideways)
-    return float(state.sxx / state.syy)
+        state = compress(state, sideways)
+    yield relative("compression: least / largest stress", "", ACTIVE, float(state.sxx / state.syy), 1e-4)
 
-
-def _shear_over_strength(kind: Any) -> float:
-    """Shear a particle under pressure; return the root of J2 over a I1."""
-    state = _under(-PRESSURE, -PRESSURE, -PRESSURE)
+    state = particle(-PRESSURE, -PRESSURE, -PRESSURE)
     for _ in range(STEPS):
-        strain(state, kind, 0.0, 1.0, 0.0, 0.0, STEP)
-    total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
-    return float(deviator / (kind.cohesion - kind.slope * total))
+        stress.strain(state, kind, 0.0, 1.0, 0.0, 0.0, STEP)
+    total, deviator = stress.invariants(state.sxx, state.syy, state.szz, state.sxy)
+    yield relative("shear: √J₂ / α I₁", "", 1.0, float(deviator / (kind.cohesion - kind.slope * total)), 1e-4)
 
-
-def _stress_of_a_turn(kind: Any) -> float:
-    """Turn a stressed particle by 90 degrees; return how far its stress is from the turned one, as a share."""
-    before = (-600.0, -500.0, -550.0, 30.0)  # inside the yield surface
-    state = _under(*before)
+    state = particle(*TURNED_FROM)
     steps = round(0.5 * math.pi / (100.0 * STEP))
     spin = 0.5 * math.pi / (steps * STEP)
     for _ in range(steps):
-        strain(state, kind, 0.0, -spin, spin, 0.0, STEP)
-    turned = (before[1], before[0], before[2], -before[3])
-    off = max(abs(float(state[name]) - value) for name, value in zip(STRESSES, turned, strict=True))
-    return off / abs(before[0])
+        stress.strain(state, kind, 0.0, -spin, spin, 0.0, STEP)
+    sxx, syy, szz, sxy = TURNED_FROM
+    off = max(abs(float(state[name]) - to) for name, to in zip(STRESSES, (syy, sxx, szz, -sxy), strict=True))
+    yield absolute("turn by 90°: stress off / stress", "", 0.0, off / abs(sxx), 0.005)
 
 
-def path(_: Setting) -> Iterator[Row]:
-    """Lead one particle of the soil of all cases along three paths."""
-    kind = SoilScene((0.04, 0.04), COARSE, bodies=[FAR]).soils.kinds[0]
-    yield relative("compression: least / largest stress", "", ACTIVE, _least_over_largest(kind), 1e-4)
-    yield relative("shear: √J₂ / α I₁", "", 1.0, _shear_over_strength(kind), 1e-4)
-    yield absolute("turn by 90°: stress off / stress", "", 0.0, _stress_of_a_turn(kind), 0.005)
+def gradients(setting: Setting) -> Sequence[tuple[str, str]]:
+    """Return those that walls of blocks try: both, or the raw one alone at quick sizes."""
+    return GRADIENTS[:1] if setting.quick else GRADIENTS
 
 
-TOPPLED = math.radians(45.0)
-LEANING = math.radians(10.0)
-TURNING = math.radians(1.0)
+TOPPLED, LEANING, TURNING = math.radians(45.0), math.radians(10.0), math.radians(1.0)
 SLAB, PITCH = 0.029, 0.03  # m, of a surcharge: width and distance
 SLIDING = 1e-4  # m in 0.1 s
-BLOCK_SPACING = 0.003125  # m: an eighth of the height of a block
 
 
 def at_rest(setting: Setting) -> Iterator[Row]:
@@ -225,15 +194,16 @@ def at_rest(setting: Setting) -> Iterator[Row]:
     for gradient, prefix in GRADIENTS:
         for start in ("ramp", "geostatic"):
             scene = SoilScene((width, TALL), spacing, walls=(0.0, width), base=SMOOTH, start=start, gradient=gradient)
+            weight = float(scene.soils.kinds["mass"][0]) * len(scene.points) * GRAVITY
             scene.to_time(0.3)
             thrust, base = scene.mean_force_on(1, 0.325)[0], scene.mean_force_on(-1, 0.35)[1]
-            yield relative(f"{prefix}{start}: base / weight", "", 1.0, -base / scene.weight, 0.005)
+            yield relative(f"{prefix}{start}: base / weight", "", 1.0, -base / weight, 0.005)
             yield relative(f"{prefix}{start}: K on the wall", "", AT_REST, pressure_share(thrust, TALL), 0.01)
 
 
 def draw_wall_back(spacing: float, base: float, speed: float, gradient: str) -> SoilScene:
     """Return soil at rest behind a smooth wall that begins to leave at a speed (m/s)."""
-    blocks = {"wall": {"width": 0.04, "height": 0.16, "length": DEPTH, "material": "wall"}}
+    blocks = {"wall": block(0.04, 0.16, "wall")}
     bodies = [{"block": "wall", "x": -0.02, "y": 0.08, "fixed": True}, FAR]
     scene = SoilScene((0.15, TALL), spacing, walls=(0.15,), base=base, bodies=bodies, blocks=blocks, gradient=gradient)
     scene.to_time(0.05)
@@ -243,11 +213,10 @@ def draw_wall_back(spacing: float, base: float, speed: float, gradient: str) -> 
 
 def active_share(spacing: float, base: float, gradient: str) -> float:
     """Return K of a smooth wall drawn back by 1 % of the height at 5 mm/s: the mean over its second half."""
-    scene = draw_wall_back(spacing, base, 0.005, gradient)
-    scene.to_time(0.15)
+    scene = draw_wall_back(spacing, base, 0.005, gradient).to_time(0.15)
     thrust, _ = scene.mean_force_on(0, 0.25)
-    columns = np.arange(0.0, 0.02, spacing)
     x, y = scene.points["x"], scene.points["y"]
+    columns = np.arange(0.0, 0.02, spacing)
     tops = [y[(x >= left - 0.001) & (x < left + spacing)].max() for left in columns]
     return pressure_share(thrust, float(np.mean(tops)) + 0.5 * spacing)
 
@@ -276,58 +245,45 @@ def active_on_rough_base(setting: Setting) -> Iterator[Row]:
             yield at_least(f"{prefix}K, smooth base less rough, 2.5 mm", "", 0.0, ACTIVE - fine)
 
 
-def slope_of_wedge(scene: SoilScene, before: NDArray[np.float64]) -> float:
-    """Return the angle (degrees) of the lower edge of what has moved by half of the wall's way, or more.
-
-    A row of particles ends in the wedge where it last has moved so far; a line is laid through the ends of the rows
-    between a fifth and four fifths of the height.
-    """
-    soils, spacing = scene.soils, float(2.0 * scene.soils.controls["radius"][0])
-    start = before[:, soils.states["number"]]
-    moved = np.hypot(scene.points["x"] - start[0], scene.points["y"] - start[1])
-    way = -0.02 - float(scene.bodies[0].x)
-    rows = np.rint(start[1] / spacing - 0.5).astype(int)
-    ends = {
-        (row + 0.5) * spacing: start[0][(rows == row) & (moved > 0.5 * way)].max(initial=0.0) for row in np.unique(rows)
-    }
-    heights = np.array([height for height in ends if 0.2 * TALL < height < 0.8 * TALL])
-    rise = np.polyfit(heights, [ends[height] for height in heights], 1)[0]
-    return math.degrees(math.atan2(1.0, rise))
-
-
 def shear_band(setting: Setting) -> Iterator[Row]:
-    """Draw a smooth wall back from soil on a rough base by 4 mm: inclination of the band that bounds the wedge."""
+    """Draw a smooth wall back from soil on a rough base by 4 mm: inclination of the band that bounds the wedge.
+
+    The wedge is what has moved by half of the wall's way, or more. A row of particles ends in the wedge where it last
+    has moved so far; a line is laid through the ends of the rows between a fifth and four fifths of the height.
+    """
     spacing, coulomb = COARSE if setting.quick else FINE, 45.0 + 0.5 * math.degrees(ANGLE)
     for gradient, prefix in GRADIENTS:
         scene = draw_wall_back(spacing, ROUGH, 0.02, gradient)
         before = np.empty((2, len(scene.points)))
         before[:, scene.soils.states["number"]] = scene.points["x"], scene.points["y"]
         scene.to_time(0.25)
+        x, y = before[:, scene.soils.states["number"]]
+        way = -0.02 - float(scene.bodies[0].x)
+        in_wedge = np.hypot(scene.points["x"] - x, scene.points["y"] - y) > 0.5 * way
+        pitch = float(2.0 * scene.soils.controls["radius"][0])
+        rows = np.rint(y / pitch - 0.5).astype(int)
+        among = [row for row in np.unique(rows) if 0.2 * TALL < (row + 0.5) * pitch < 0.8 * TALL]
+        ends = [x[(rows == row) & in_wedge].max(initial=0.0) for row in among]
+        rise = np.polyfit(np.array([(row + 0.5) * pitch for row in among]), ends, 1)[0]
         name = f"{prefix}inclination, Roscoe to Coulomb, s {1e3 * spacing:g} mm"
-        found = slope_of_wedge(scene, before)
+        found = math.degrees(math.atan2(1.0, rise))
         yield absolute(name, "°", 0.5 * (45.0 + coulomb), found, 0.5 * (coulomb - 45.0))
 
 
-def wall_of(
-    blocks: int, friction: float, spacing: float, base: float, *, gradient: str = "raw", load: float = 0.0
-) -> SoilScene:
+def wall_of(blocks: int, spacing: float, base: float = ROUGH, load: float = 0.0, **values: Any) -> SoilScene:
     """Return so many blocks on one another that hold soil of their height, under slabs that weigh a load (Pa)."""
-    kinds = {"b": {"width": WIDTH, "height": HEIGHT, "length": DEPTH, "material": "block"}}
+    thick = load / (DENSITY * GRAVITY) * PITCH / SLAB
     bodies = [{"block": "b", "x": 0.5 * WIDTH, "y": HEIGHT * (k + 0.5)} for k in range(blocks)]
-    if load:
-        thick = load / (DENSITY * GRAVITY) * PITCH / SLAB
-        kinds["s"] = {"width": SLAB, "height": thick, "length": DEPTH, "material": "block"}
-        bodies += [{"block": "s", "x": WIDTH + PITCH * (k + 0.5), "y": blocks * HEIGHT + 0.5 * thick} for k in range(5)]
+    slabs = [{"block": "s", "x": WIDTH + PITCH * (k + 0.5), "y": blocks * HEIGHT + 0.5 * thick} for k in range(5)]
     return SoilScene(
         (0.15, blocks * HEIGHT),
         spacing,
         x=WIDTH,
         walls=(WIDTH + 0.15,),
         base=base,
-        bodies=bodies,
-        blocks=kinds,
-        friction=friction,
-        gradient=gradient,
+        bodies=bodies + slabs if load else bodies,
+        blocks={"b": block(WIDTH, HEIGHT)} | ({"s": block(SLAB, thick)} if load else {}),
+        **values,
     )
 
 
@@ -336,25 +292,11 @@ def friction_needed(setting: Setting) -> Iterator[Row]:
     retained = 3.0 * HEIGHT
     needed = 0.5 * ACTIVE * UNIT_WEIGHT * retained**2 / (DENSITY * GRAVITY * WIDTH * retained)
     bases = ((SMOOTH, "smooth base"),) if setting.quick else ((SMOOTH, "smooth base"), (ROUGH, "rough base"))
-    for gradient, prefix in gradients(setting):
-        for base, name in bases:
-            for share, slides in ((0.94, 1), (1.06, 0)):
-                scene = wall_of(3, share * needed, FINE, base, gradient=gradient)
-                scene.to_time(0.4)
-                before = float(scene.bodies[0].x)
-                scene.to_time(0.5)
-                found = int(before - float(scene.bodies[0].x) > SLIDING)
-                yield count(f"{prefix}{name}, {share:.2f} of the friction: slides", slides, found)
-
-
-def first_to_turn(scene: SoilScene, blocks: int, end: float) -> int:
-    """Return the number, from below, of the lowest block that turns when one has turned by 10 degrees; 0 if none."""
-    while scene.time < end:
-        scene.to_step(scene.steps + 100)
-        angles = np.abs(scene.bodies[:blocks]["angle"])
-        if angles.max() > LEANING:
-            return 1 + int(np.argmax(angles > TURNING))
-    return 0
+    for (gradient, prefix), (base, name), (share, slides) in product(gradients(setting), bases, ((0.94, 1), (1.06, 0))):
+        scene = wall_of(3, FINE, base, friction=share * needed, gradient=gradient).to_time(0.4)
+        before = float(scene.bodies[0].x)
+        found = int(before - float(scene.to_time(0.5).bodies[0].x) > SLIDING)
+        yield count(f"{prefix}{name}, {share:.2f} of the friction: slides", slides, found)
 
 
 def toppling(setting: Setting) -> Iterator[Row]:
@@ -362,20 +304,21 @@ def toppling(setting: Setting) -> Iterator[Row]:
 
     Thrust turns about the toe with the third power of the height, weight with the first: the lowest joint opens.
     """
-    end = 0.4 if setting.quick else 0.6
-    for gradient, prefix in gradients(setting):
-        for blocks, falls in ((2, 0), (6, 1)) if setting.quick else ((2, 0), (3, 0), (6, 1)):
-            scene = wall_of(blocks, 1.2, BLOCK_SPACING, ROUGH, gradient=gradient)
-            first = first_to_turn(scene, blocks, end)
-            scene.to_time(end)
-            own = scene.bodies[:blocks]
-            turned = int(np.abs(own["angle"]).max() > TOPPLED)
-            yield count(f"{prefix}{blocks} blocks: topple", falls, turned)
-            if falls:
-                yield count(f"{prefix}{blocks} blocks: lowest that turns", 1, first)
-            else:
-                moved = float(np.hypot(own["vx"], own["vy"]).max())
-                yield absolute(f"{prefix}{blocks} blocks: speed at the end", "mm/s", 0.0, 1e3 * moved, 1.0)
+    end, walls = (0.4, ((2, 0), (6, 1))) if setting.quick else (0.6, ((2, 0), (3, 0), (6, 1)))
+    for (gradient, prefix), (blocks, falls) in product(gradients(setting), walls):
+        scene = wall_of(blocks, BLOCK_SPACING, friction=1.2, gradient=gradient)
+        lowest = 0  # number, from below, of the lowest block that turns when one has turned by 10 degrees
+        while scene.time < end and not lowest:
+            angles = np.abs(scene.to_step(scene.steps + 100).bodies[:blocks]["angle"])
+            if angles.max() > LEANING:
+                lowest = 1 + int(np.argmax(angles > TURNING))
+        own = scene.to_time(end).bodies[:blocks]
+        yield count(f"{prefix}{blocks} blocks: topple", falls, int(np.abs(own["angle"]).max() > TOPPLED))
+        if falls:
+            yield count(f"{prefix}{blocks} blocks: lowest that turns", 1, lowest)
+        else:
+            moved = float(np.hypot(own["vx"], own["vy"]).max())
+            yield absolute(f"{prefix}{blocks} blocks: speed at the end", "mm/s", 0.0, 1e3 * moved, 1.0)
 
 
 def surcharge(setting: Setting) -> Iterator[Row]:
@@ -386,64 +329,44 @@ def surcharge(setting: Setting) -> Iterator[Row]:
     height = 2.0 * HEIGHT
     weight = DENSITY * GRAVITY * WIDTH * height
     most = (0.5 * weight * WIDTH / ACTIVE - UNIT_WEIGHT * height**3 / 6.0) * 2.0 / height**2
-    for gradient, prefix in gradients(setting):
-        for share, falls in ((0.8, 0), (1.2, 1)):
-            scene = wall_of(2, 1.2, BLOCK_SPACING, ROUGH, gradient=gradient, load=share * most)
-            scene.to_time(0.4 if setting.quick else 0.6)
-            leans = float(np.abs(scene.bodies[:2]["angle"]).max())
-            yield count(f"{prefix}{share:g} of the load: topples", falls, int(leans > LEANING))
+    for (gradient, prefix), (share, falls) in product(gradients(setting), ((0.8, 0), (1.2, 1))):
+        scene = wall_of(2, BLOCK_SPACING, load=share * most, friction=1.2, gradient=gradient)
+        own = scene.to_time(0.4 if setting.quick else 0.6).bodies[:2]
+        yield count(f"{prefix}{share:g} of the load: topples", falls, int(float(np.abs(own["angle"]).max()) > LEANING))
 
 
-FINEST = 0.00125  # m
 REFERENCES = ((0.1 / 0.7, "143"), (0.1, "100"), (0.1 / 1.5, "67"))  # m: widths of the source's columns
 STRIKER = 0.04  # m: side of a block that is thrown at soil
 THROWN = 2.0  # m/s
 
 
-def momentum_gained(gradient: str) -> float:
-    """Throw a block at soil that flies apart, without gravity; return the momentum gained over all that moves.
-
-    The last is the sum of m |v| of particles and block at the start.
-    """
-    striker = {"block": "striker", "x": -0.6 * STRIKER, "y": 0.52, "velocity": [THROWN, -0.3 * THROWN]}
-    sides = {"width": STRIKER, "height": STRIKER, "length": DEPTH, "material": "block"}
-    scene = SoilScene(
-        (0.05, 0.05), COARSE, y=0.5, bodies=[striker], blocks={"striker": sides}, gravity=0.0, gradient=gradient
-    )
-    points = scene.points
-    mass = scene.soils.kinds["mass"][scene.soils.states["kind"]]
-    random = np.random.default_rng(7)
-    for name in ("vx", "vy"):
-        points[name] = random.uniform(-0.5, 0.5, len(points))
-    block = DENSITY * STRIKER**2 * DEPTH
-
-    def momentum() -> tuple[float, float]:
-        body = scene.bodies[0]
-        return (
-            float(block * body["vx"] + mass[0] * scene.points["vx"].sum()),
-            float(block * body["vy"] + mass[0] * scene.points["vy"].sum()),
-        )
-
-    moving = float(
-        block * np.hypot(*scene.bodies[0][["vx", "vy"]].item()) + mass @ np.hypot(points["vx"], points["vy"])
-    )
-    before = momentum()
-    scene.to_time(0.02)
-    after = momentum()
-    return float(np.hypot(after[0] - before[0], after[1] - before[1])) / moving
-
-
 def conservation(_: Setting) -> Iterator[Row]:
-    """Let a column 50 x 100 mm collapse, with both gradients; throw a block at soil that flies without gravity."""
+    """Let a column 50 x 100 mm collapse, with both gradients; throw a block at soil that flies without gravity.
+
+    The momentum gained is a share of the sum of m |v| of particles and block at the start.
+    """
     for gradient, prefix in GRADIENTS:
-        scene = SoilScene((0.05, TALL), COARSE, walls=(0.0,), gradient=gradient)
-        before = scene.entries()
-        scene.to_time(0.25)
-        after = scene.entries()
-        residual = sum(after.values()) - sum(before.values())
-        share = residual / before["soils_potential"]
+        column = SoilScene((0.05, TALL), COARSE, walls=(0.0,), gradient=gradient)
+        before = column.entries()
+        after = column.to_time(0.25).entries()
+        share = (sum(after.values()) - sum(before.values())) / before["soils_potential"]
         yield absolute(f"{prefix}energy off / at the start", "", 0.0, share, 0.002)
-        yield absolute(f"{prefix}momentum gained / moving", "", 0.0, momentum_gained(gradient), 1e-12)
+
+        striker = {"block": "striker", "x": -0.6 * STRIKER, "y": 0.52, "velocity": [THROWN, -0.3 * THROWN]}
+        blocks = {"striker": block(STRIKER, STRIKER)}
+        throw = SoilScene((0.05, 0.05), COARSE, y=0.5, bodies=[striker], blocks=blocks, gravity=0.0, gradient=gradient)
+        mass, mass_of_block = throw.soils.kinds["mass"][throw.soils.states["kind"]], DENSITY * STRIKER**2 * DEPTH
+        random = np.random.default_rng(7)
+        for name in ("vx", "vy"):
+            throw.points[name] = random.uniform(-0.5, 0.5, len(throw.points))
+        vx, vy = throw.bodies[0][["vx", "vy"]].item()
+        moving = float(mass_of_block * np.hypot(vx, vy) + mass @ np.hypot(throw.points["vx"], throw.points["vy"]))
+        momenta = []
+        for time in (0.0, 0.02):
+            body = throw.to_time(time).bodies[0]
+            momenta.append([mass_of_block * body[name] + mass[0] * throw.points[name].sum() for name in ("vx", "vy")])
+        gained = float(np.hypot(*(np.array(momenta[1]) - momenta[0]))) / moving
+        yield absolute(f"{prefix}momentum gained / moving", "", 0.0, gained, 1e-12)
 
 
 def columns_of_rods(setting: Setting) -> Iterator[Row]:
@@ -457,8 +380,7 @@ def columns_of_rods(setting: Setting) -> Iterator[Row]:
     cases += [(square, spacing, "corrected") for spacing in (COARSE, FINE)]
     for (width, name), spacing, gradient in cases[1:2] if setting.quick else cases:
         place = spacing * round(width / spacing)
-        scene = SoilScene((place, TALL), spacing, walls=(0.0,), wall=ROUGH, gradient=gradient)
-        scene.to_time(1.0)
+        scene = SoilScene((place, TALL), spacing, walls=(0.0,), wall=ROUGH, gradient=gradient).to_time(1.0)
         ratio = TALL / place
         x, y = scene.points["x"], scene.points["y"]
         front = connected_span(x, 2.0 * spacing)[1] + 0.5 * spacing
@@ -485,66 +407,46 @@ def energy_kept(setting: Setting) -> Iterator[Row]:
     for spacing, (material, name), gradient in cases:
         scene = SoilScene((0.2, TALL), spacing, walls=(0.0,), wall=ROUGH, material=material, gradient=gradient)
         before = scene.entries()["soils_potential"]
-        scene.to_time(1.0)
-        left = scene.entries()["soils_potential"] / before
+        left = scene.to_time(1.0).entries()["soils_potential"] / before
         yield absolute(f"{dict(GRADIENTS)[gradient]}{name}, energy left, s {1e3 * spacing:g} mm", "", 0.691, left, 0.03)
 
 
-WALLS = (
-    "beside upright faces soil without cohesion would yield under what corrected forces need there: the two columns "
-    "at a wall carry 0.22 of a column less and the others more, 1.9 % here; less with finer particles or wider soil"
-)
-ROUGH_BASE = (
-    "the formula is that of a smooth base; a rough one carries part of the thrust, 4.2 % at 2.5 mm by S3 "
+WALLS = {
+    "surface": "beside upright faces soil without cohesion would yield under what corrected forces need there: the two "
+    "columns at a wall carry 0.22 of a column less and the others more, 1.9 % here; less with finer particles or wider "
+    "soil"
+}
+ROUGH_BASE = {
+    "surface": "the formula is that of a smooth base; a rough one carries part of the thrust, 4.2 % at 2.5 mm by S3 "
     "with raw gradients, and less the finer the particles"
-)
-BANDS = (
-    "the formula is that of soil that yields everywhere. The finer the particles and the better the gradients, the "
-    "more it slips in bands, and soil that keeps its volume slips at tan φ* = sin φ (E. H. Davis, 1968): K = 0.482. "
-    "What is measured lies between"
-)
-SHORT = (
-    "an error of first order in the spacing, as the rows with 5, 2.5 and 1.25 mm show. A last bit more or less of "
-    "speed moves ends by 1 to 4 %, and heights with 5 mm know whole particles only, of 7 %"
-)
-ONE_SPACING = (
-    "the reference is one spacing, 2 mm, of another code. What is left falls with the spacing, by a hundredth from 5 "
-    "to 2 mm with raw gradients, as fronts run farther (S9), and is less with corrected ones"
-)
+}
+BANDS = {
+    "surface": "the formula is that of soil that yields everywhere. The finer the particles and the better the "
+    "gradients, the more it slips in bands, and soil that keeps its volume slips at tan φ* = sin φ (E. H. Davis, "
+    "1968): K = 0.482. What is measured lies between"
+}
+SHORT = {
+    "surface": "an error of first order in the spacing, as the rows with 5, 2.5 and 1.25 mm show. A last bit more or "
+    "less of speed moves ends by 1 to 4 %, and heights with 5 mm know whole particles only, of 7 %"
+}
+ONE_SPACING = {
+    "surface": "the reference is one spacing, 2 mm, of another code. What is left falls with the spacing, by a "
+    "hundredth from 5 to 2 mm with raw gradients, as fronts run farther (S9), and is less with corrected ones"
+}
 SOIL_CASES = (
-    Case(
-        "S1",
-        "column at rest between smooth walls",
-        "pressure at rest",
-        at_rest,
-        "5 mm instead of 2.5 mm",
-        {"surface": WALLS},
-    ),
-    Case(
-        "S2",
-        "smooth wall drawn back, smooth base",
-        "active pressure, Mohr and Coulomb",
-        active,
-        "5 mm only",
-        {"surface": BANDS},
-    ),
-    Case("S3", "smooth wall drawn back, rough base", "below S2", active_on_rough_base, "5 mm only", {"surface": BANDS}),
-    Case("S4", "shear band behind a wall drawn back", "Roscoe 45°, Coulomb 45° + φ/2", shear_band, quick="5 mm"),
+    Case("S1", "column at rest between smooth walls", "pressure at rest", at_rest, "5 mm instead of 2.5 mm", WALLS),
+    Case("S2", "smooth wall drawn back, smooth base", "active pressure, Mohr and Coulomb", active, "5 mm only", BANDS),
+    Case("S3", "smooth wall drawn back, rough base", "below S2", active_on_rough_base, "5 mm only", BANDS),
+    Case("S4", "shear band behind a wall drawn back", "Roscoe 45°, Coulomb 45° + φ/2", shear_band, "5 mm"),
     Case(
         "S5",
         "three blocks hold 75 mm",
         "½ K_a γ H² / W, for a smooth base",
         friction_needed,
         "smooth base, raw gradient",
-        {"surface": ROUGH_BASE},
+        ROUGH_BASE,
     ),
-    Case(
-        "S6",
-        "walls of blocks that stand and topple",
-        "moments about the toe",
-        toppling,
-        quick="two and six blocks, raw",
-    ),
+    Case("S6", "walls of blocks that stand and topple", "moments about the toe", toppling, "two and six blocks, raw"),
     Case("S7", "energy of a collapse, momentum of a throw", "conservation", conservation),
     Case("S8", "path of one particle", "Mohr and Coulomb, J₂ and I₁, Jaumann's rate", path),
     Case(
@@ -552,16 +454,9 @@ SOIL_CASES = (
         "columns of rods 100 mm high",
         "true two-dimensional rods, arXiv 1512.05180",
         columns_of_rods,
-        quick="one column, 5 mm",
-        remarks={"surface": SHORT},
+        "one column, 5 mm",
+        SHORT,
     ),
-    Case(
-        "S10",
-        "energy that a column 200 × 100 mm keeps",
-        "SPHinXsys",
-        energy_kept,
-        "5 mm, raw",
-        {"surface": ONE_SPACING},
-    ),
-    Case("S11", "surcharge behind two blocks", "moments about the toe", surcharge, quick="0.4 s, raw"),
+    Case("S10", "energy that a column 200 × 100 mm keeps", "SPHinXsys", energy_kept, "5 mm, raw", ONE_SPACING),
+    Case("S11", "surcharge behind two blocks", "moments about the toe", surcharge, "0.4 s, raw"),
 )

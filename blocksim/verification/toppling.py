@@ -1,42 +1,30 @@
-"""V11 the time of free rocking and V12 the loss of spin when the block comes down on its other corner.
+"""V10 sliding and toppling on a slope, V11 and V12 a block that rocks, V17 a leaning ladder, V18 a row of dominoes.
 
-V10 the chart of sliding and toppling on a slope, V17 the leaning ladder.
-
-V18: a row of dominoes falls as fast as the collective model of J. M. J. van Leeuwen says.
-
-Dominoes of height h and thickness d stand with free gaps s. They turn about their lower front edges, which do not slip;
-faces are frictionless and collisions lose everything: a domino that has struck the next continues leaning on it. So all
-fallen dominoes and the foremost one move with one degree of freedom, the foremost one's angle. Between two collisions
-their energy is kept. In a collision the velocities are projected, in the metric of the kinetic energy, on those that
-the new contact allows; impulses between leaning dominoes are what makes the projection. (Am. J. Phys. 78 (2010)
-721-727.)
-
-Lengths of the model in units of h, time in units of sqrt(h/g); angles from the vertical.
+Dominoes fall as fast as the collective model of J. M. J. van Leeuwen says (Am. J. Phys. 78 (2010) 721-727). They stand
+with free gaps s, h high and d thick, and turn about their lower front edges, which do not slip; faces are frictionless
+and collisions lose everything: a domino that has struck the next continues leaning on it. So all fallen dominoes and
+the foremost one move with one degree of freedom, the foremost one's angle. Between two collisions their energy is kept.
+In a collision the velocities are projected, in the metric of the kinetic energy, on those that the new contact allows;
+impulses between leaning dominoes are what makes the projection. Lengths of the model are in units of h, time in units
+of sqrt(h/g), angles from the vertical.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import asin, cos, degrees, hypot, radians, sin, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, absolute, count, relative
-from blocksim.verification.scene import HEIGHT, WIDTH
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from blocksim.verification.scene import Simulation
-
+from blocksim.verification.scene import HEIGHT, WIDTH, Simulation
 
 SLENDER, TALL = 0.010, 0.040  # m
 NO_SLIP = 5.0  # friction coefficient
 LONGEST = 0.2  # s
 SETTLED = 1e-3  # s after the impact
+GRAVITY = forms.GRAVITY
 
 
 def start_rocking(setting: Setting, restitution: float) -> Simulation:
@@ -55,20 +43,20 @@ def start_rocking(setting: Setting, restitution: float) -> Simulation:
 
 def quarter_period(setting: Setting) -> Iterator[Row]:
     """Time the way from release to standing upright."""
-    time, _ = until_upright(start_rocking(setting, 0.2))
+    time = until_upright(start_rocking(setting, 0.2))
     expected = forms.rocking_quarter_time(SLENDER, TALL, forms.toppling_slope(SLENDER, TALL) / 2)
     yield relative("time to upright", "s", expected, time, 0.005)
 
 
-def until_upright(scene: Simulation) -> tuple[float, float]:
-    """Continue until the angle changes its sign; return time (s) and spin (rad/s) there, by interpolation."""
+def until_upright(scene: Simulation) -> float:
+    """Continue until the angle changes its sign; return the time (s) there, by interpolation."""
     block, steps = scene.bodies[0], scene.steps
     angle = float(block.angle)
     while block.angle < 0.0 and scene.time < LONGEST:
         angle, steps = float(block.angle), scene.steps
         scene.to_step(steps + 10)
     share = angle / (angle - float(block.angle))
-    return (steps + share * (scene.steps - steps)) * scene.step, float(block.spin)
+    return (steps + share * (scene.steps - steps)) * scene.step
 
 
 def housner(setting: Setting) -> Iterator[Row]:
@@ -78,105 +66,75 @@ def housner(setting: Setting) -> Iterator[Row]:
     follows from the energy about the corner, w^2 + (3/2) g (cos(alpha) - cos(alpha - |angle|)) / R.
     """
     scene = start_rocking(setting, 0.0)
-    time, _ = until_upright(scene)
-    block = scene.to_time(time + SETTLED).bodies[0]
+    block = scene.to_time(until_upright(scene) + SETTLED).bodies[0]
     half, alpha = hypot(SLENDER, TALL) / 2, forms.toppling_slope(SLENDER, TALL)
-    lifted = 1.5 * 9.81 / half * (cos(alpha - abs(block.angle)) - cos(alpha))
-    before = (1.5 * 9.81 / half * (cos(alpha - alpha / 2) - cos(alpha))) ** 0.5  # let go at half of alpha
+    lifted = 1.5 * GRAVITY / half * (cos(alpha - abs(block.angle)) - cos(alpha))
+    before = (1.5 * GRAVITY / half * (cos(alpha - alpha / 2) - cos(alpha))) ** 0.5  # let go at half of alpha
     after = (block.spin**2 + lifted) ** 0.5
     yield relative("spin ratio", "", forms.housner_ratio(SLENDER, TALL), after / before, 0.05)
 
 
 ROUGH = 2.0  # friction coefficient at which no slope of this chart lets a block slide before it topples
 BRACKET = radians(1.0)  # either way of the expected limit
-SLOPE_HALVINGS = 6
+SLOPE_HALVINGS, LADDER_HALVINGS = 6, 7
 OBSERVED = 0.35  # s; enough to see a block go at a hundredth of a degree beyond a limit
-SLID = 1e-5  # m, before the block has turned by TURNED
-TURNED = radians(1.0)
-
+SLID, TURNED = 1e-5, radians(1.0)  # m, before the block has turned by so much
 LADDER, LADDER_THICKNESS, LADDER_SLOPE = 1.0, 0.01, radians(60.0)  # m, m, rad
-LADDER_HALVINGS = 7
 SLIPPED = 1e-4  # rad, of turning
 WALL = 0.2  # m, thickness
 
 
-@dataclass(frozen=True)
-class Slope:
-    """A block on a slope that goes down towards +x."""
-
-    width: float  # m
-    height: float  # m
-    angle: float  # rad
-    friction: float
-
-
-def motion(setting: Setting, slope: Slope) -> tuple[bool, bool]:
-    """Return True if the block slides, and whether it topples.
+def motion(setting: Setting, width: float, height: float, angle: float, friction: float) -> tuple[bool, bool]:
+    """Return whether a block (m) on a slope (rad) slides, and whether it topples; the slope goes down towards +x.
 
     Sliding is seen while the block has hardly turned: a block that has toppled falls on its side and slides then.
     """
-    body = {"y": slope.height / 2, "width": slope.width, "height": slope.height}
-    scene = setting.start([body], ground_friction=slope.friction, tilt=-slope.angle)
+    body = {"y": height / 2, "width": width, "height": height}
+    scene = setting.start([body], ground_friction=friction, tilt=-angle)
     slides = topples = False
     while scene.time < OBSERVED and not topples:
-        scene.to_time(scene.time + 2e-3)
-        block = scene.bodies[0]
+        block = scene.to_time(scene.time + 2e-3).bodies[0]
         topples = bool(-block.angle > TURNED)
-        foot = block.x + cos(block.angle) * slope.width / 2 + sin(block.angle) * slope.height / 2
-        slides = slides or bool(foot - slope.width / 2 > SLID)
+        foot = block.x + cos(block.angle) * width / 2 + sin(block.angle) * height / 2
+        slides = slides or bool(foot - width / 2 > SLID)
     return slides, topples
 
 
 def chart(setting: Setting) -> Iterator[Row]:
-    """Find the limits of sliding and toppling on a slope, and one point of every regime."""
-    for friction in (0.31, 0.38):
-        expected = forms.sliding_slope(friction)
-        found = slope_limit(setting, WIDTH, HEIGHT, friction, expected, 0)
-        yield absolute(f"slides, μ = {friction:g}", "°", degrees(expected), degrees(found), 0.2)
-    for width, height, name in ((WIDTH, HEIGHT, "32 × 25"), (HEIGHT, WIDTH, "25 × 32")):
-        expected = forms.toppling_slope(width, height)
-        found = slope_limit(setting, width, height, ROUGH, expected, 1)
-        yield absolute(f"topples, {name}", "°", degrees(expected), degrees(found), 0.2)
-    points = list(regimes())
-    yield count("regimes", len(points), sum(motion(setting, slope) == expected for slope, expected in points))
+    """Find the limits of sliding and toppling on a slope, and one point of every regime.
 
-
-def slope_limit(setting: Setting, width: float, height: float, friction: float, expected: float, which: int) -> float:
-    """Return the slope (rad) from which on a block slides (`which` 0) or topples (1)."""
-
-    def happens(angle: float) -> bool:
-        return motion(setting, Slope(width, height, angle, friction))[which]
-
-    return limit(happens, expected - BRACKET, expected + BRACKET, SLOPE_HALVINGS)
-
-
-def regimes() -> Iterator[tuple[Slope, tuple[bool, bool]]]:
-    """Return one slope of every regime and what the block on end does there: slides, topples.
-
-    Steeper than both limits the block slides without toppling where mu < b/h (friction, not gravity, turns it), topples
-    first where mu is above `rolling_friction_limit`, and does both in between.
+    The regimes are of a block on end. Steeper than both limits it slides without toppling where mu < b/h (friction, not
+    gravity, turns it), topples first where mu is above `rolling_friction_limit`, and does both in between.
     """
+
+    def row(name: str, width: float, height: float, friction: float, expected: float) -> Row:
+        def goes(angle: float) -> bool:
+            slides, topples = motion(setting, width, height, angle, friction)
+            return topples if friction == ROUGH else slides
+
+        found = limit(goes, expected - BRACKET, expected + BRACKET, SLOPE_HALVINGS)
+        return absolute(name, "°", degrees(expected), degrees(found), 0.2)
+
+    for friction in (0.31, 0.38):
+        yield row(f"slides, μ = {friction:g}", WIDTH, HEIGHT, friction, forms.sliding_slope(friction))
+    for width, height, name in ((WIDTH, HEIGHT, "32 × 25"), (HEIGHT, WIDTH, "25 × 32")):
+        yield row(f"topples, {name}", width, height, ROUGH, forms.toppling_slope(width, height))
     width, height = HEIGHT, WIDTH
-    steep = radians(60.0)
+    flat, steep = radians(30.0), radians(60.0)
     needed = forms.rolling_friction_limit(width, height, steep)
-    both = 0.5 * (width / height + needed)
-    yield Slope(width, height, radians(30.0), ROUGH), (False, False)
-    yield Slope(width, height, radians(30.0), 0.5), (True, False)
-    yield Slope(width, height, steep, 0.9 * width / height), (True, False)
-    yield Slope(width, height, steep, both), (True, True)
-    yield Slope(width, height, steep, 1.1 * needed), (False, True)
+    points = (
+        (flat, ROUGH, (False, False)),
+        (flat, 0.5, (True, False)),
+        (steep, 0.9 * width / height, (True, False)),
+        (steep, 0.5 * (width / height + needed), (True, True)),
+        (steep, 1.1 * needed, (False, True)),
+    )
+    as_expected = [motion(setting, width, height, angle, friction) == moves for angle, friction, moves in points]
+    yield count("regimes", len(points), sum(as_expected))
 
 
 def ladder(setting: Setting) -> Iterator[Row]:
-    """Find the ground friction below which a ladder at a smooth wall slips."""
-    slenderness = LADDER_THICKNESS / LADDER
-    expected = forms.ladder_friction(LADDER_SLOPE, slenderness)
-    found = limit(lambda friction: not slips(setting, friction), 0.9 * expected, 1.1 * expected, LADDER_HALVINGS)
-    yield relative("friction needed", "", expected, found, 0.02)
-
-
-def slips(setting: Setting, friction: float) -> bool:
-    """Return True if the ladder comes down: the wall stands at x < 0, the foot is to the right."""
+    """Find the ground friction below which a ladder at a smooth wall slips: its foot is to the right of the wall."""
     along, across = (cos(LADDER_SLOPE), sin(LADDER_SLOPE)), (sin(LADDER_SLOPE), cos(LADDER_SLOPE))
     rod = {
         "x": (LADDER * along[0] + LADDER_THICKNESS * across[0]) / 2,
@@ -186,8 +144,14 @@ def slips(setting: Setting, friction: float) -> bool:
         "angle": radians(90.0) - LADDER_SLOPE,
     }
     wall = {"x": -WALL / 2, "y": LADDER / 2, "width": WALL, "height": LADDER, "fixed": True}
-    scene = setting.start([rod, wall], friction=0.0, ground_friction=friction)
-    return bool(abs(scene.to_time(1.0).bodies[0].angle - rod["angle"]) > SLIPPED)
+
+    def stays(friction: float) -> bool:
+        scene = setting.start([rod, wall], friction=0.0, ground_friction=friction)
+        return bool(abs(scene.to_time(1.0).bodies[0].angle - rod["angle"]) <= SLIPPED)
+
+    expected = forms.ladder_friction(LADDER_SLOPE, LADDER_THICKNESS / LADDER)
+    found = limit(stays, 0.9 * expected, 1.1 * expected, LADDER_HALVINGS)
+    yield relative("friction needed", "", expected, found, 0.02)
 
 
 def limit(outcome: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
@@ -210,7 +174,6 @@ COUNT = 24
 GAPS = (0.2, 0.3, 0.5, 0.7)  # of the height
 FIRST, LAST = 10, 20
 PUSH = 6.5  # spin of the first domino in units of sqrt(g/h): near that of the stationary wave for every gap
-GRAVITY = 9.81  # m/s2
 SOFT = 0.01  # stiffness scale of the quick size
 POLL = 2e-4  # s
 LONGEST_WAVE = 2.0  # s
@@ -233,10 +196,6 @@ class Dominoes:
         """Angle (rad) at which a domino strikes the next, still upright one."""
         return asin(self.gap)
 
-    def height(self, angles: Floats) -> float:
-        """Return the sum of the heights of all centres."""
-        return float(0.5 * np.sum(np.cos(angles) + self.thickness * np.sin(angles)))
-
     def leaning(self, foremost: float, count: int) -> tuple[Floats, Floats]:
         """Return angles of `count` dominoes that lean on one another, foremost first, and d angle/d foremost.
 
@@ -252,72 +211,60 @@ class Dominoes:
             rates.append(slope * rates[-1])
         return np.array(angles), np.array(rates)
 
+    def struck_spin(self, fallen: int, spin: float) -> float:
+        """Return the spin of the domino that is struck by the foremost of `fallen` ones turning with `spin`."""
+        _, before = self.leaning(self.strike, fallen)
+        _, after = self.leaning(0.0, fallen + 1)
+        return spin * float(before @ after[1:]) / float(after @ after)
 
-def collision_times(dominoes: Dominoes, count: int, spin: float) -> Floats:
-    """Return the times at which domino 1, 2, ... `count` strikes the next; domino 1 starts upright with `spin`."""
-    time, times = 0.0, []
-    for fallen in range(1, count + 1):
-        taken, spin = _turn(dominoes, fallen, spin)
-        time += taken
-        times.append(time)
-        spin = _strike(dominoes, fallen, spin)
-    return np.array(times)
+    def collision_times(self, count: int, spin: float) -> Floats:
+        """Return the times at which domino 1, 2, ... `count` strikes the next; domino 1 starts upright with `spin`.
 
+        Raises ValueError where the row stops before.
+        """
+        time, times = 0.0, []
+        nodes = self.strike * np.linspace(0.0, 1.0, STEPS + 1)  # of the foremost one, from upright to the next
+        for fallen in range(1, count + 1):
+            states = [self.leaning(float(angle), fallen) for angle in nodes]
+            masses = np.array([0.5 * self.inertia * float(rates @ rates) for _, rates in states])
+            heights = np.array(  # sums of those of all centres
+                [float(0.5 * np.sum(np.cos(angles) + self.thickness * np.sin(angles))) for angles, _ in states]
+            )
+            squares = (masses[0] * spin**2 + heights[0] - heights) / masses
+            if squares.min() <= 0.0:
+                raise ValueError(f"the row stops at domino {fallen}")
+            slowness = 1.0 / np.sqrt(squares)
+            time += float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(nodes)))
+            times.append(time)
+            spin = self.struck_spin(fallen, float(np.sqrt(squares[-1])))
+        return np.array(times)
 
-def _turn(dominoes: Dominoes, fallen: int, spin: float) -> tuple[float, float]:
-    """Let the foremost of `fallen` dominoes turn from upright to the next one; return the time taken and its spin."""
-    nodes = dominoes.strike * np.linspace(0.0, 1.0, STEPS + 1)
-    states = [dominoes.leaning(float(angle), fallen) for angle in nodes]
-    masses = np.array([0.5 * dominoes.inertia * float(rates @ rates) for _, rates in states])
-    heights = np.array([dominoes.height(angles) for angles, _ in states])
-    squares = (masses[0] * spin**2 + heights[0] - heights) / masses
-    if squares.min() <= 0.0:
-        message = f"the row stops at domino {fallen}"
-        raise ValueError(message)
-    slowness = 1.0 / np.sqrt(squares)
-    return float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(nodes))), float(np.sqrt(squares[-1]))
-
-
-def _strike(dominoes: Dominoes, fallen: int, spin: float) -> float:
-    """Return the spin of the domino that is struck by the foremost of `fallen` ones turning with `spin`."""
-    _, before = dominoes.leaning(dominoes.strike, fallen)
-    _, after = dominoes.leaning(0.0, fallen + 1)
-    return spin * float(before @ after[1:]) / float(after @ after)
-
-
-def wave_speed(dominoes: Dominoes, first: int, last: int, spin: float) -> float:
-    """Return the speed of the wave between two collisions, in units of sqrt(g h)."""
-    times = collision_times(dominoes, last, spin)
-    return (last - first) * (dominoes.gap + dominoes.thickness) / float(times[last - 1] - times[first - 1])
+    def wave_speed(self, first: int, last: int, spin: float) -> float:
+        """Return the speed of the wave between two collisions, in units of sqrt(g h)."""
+        times = self.collision_times(last, spin)
+        return (last - first) * (self.gap + self.thickness) / float(times[last - 1] - times[first - 1])
 
 
 def dominoes(setting: Setting) -> Iterator[Row]:
-    """Push the first of 24 dominoes; time the wave from the collision of domino 10 to that of domino 20."""
-    for gap in GAPS[:2] if setting.quick else GAPS:
-        model = wave_speed(Dominoes(THICK / DOMINO_TALL, gap), FIRST, LAST, PUSH) * sqrt(GRAVITY * DOMINO_TALL)
-        times = strike_times(row(setting, gap))
-        speed = (LAST - FIRST) * (gap * DOMINO_TALL + THICK) / (times[LAST - 1] - times[FIRST - 1])
-        yield relative(f"gap {gap:g} h, speed", "m/s", model, speed, 0.05)
+    """Push the first of 24 dominoes, about its lower front edge; time the wave from collision 10 to collision 20.
 
-
-def row(setting: Setting, gap: float) -> Simulation:
-    """Start the row; the first domino turns about its lower front edge."""
+    A domino strikes the next when that one starts to turn.
+    """
     spin = -PUSH * sqrt(GRAVITY / DOMINO_TALL)  # clockwise
-    pitch = gap * DOMINO_TALL + THICK
-    bodies: list[dict[str, object]] = [
-        {"x": i * pitch, "y": DOMINO_TALL / 2, "width": THICK, "height": DOMINO_TALL} for i in range(COUNT)
-    ]
-    bodies[0] |= {"spin": spin, "velocity": [-spin * DOMINO_TALL / 2, -spin * -THICK / 2]}
-    contact = {"stiffness_scale": SOFT if setting.quick else 1.0}
-    return setting.start(bodies, restitution=0.0, friction=0.0, ground_friction=NO_SLIP, contact=contact)
-
-
-def strike_times(scene: Simulation) -> list[float]:
-    """Return when each domino strikes the next: when that one starts to turn. NaN where it does not."""
     moving = 1e-2 * sqrt(GRAVITY / DOMINO_TALL)  # rad/s
-    times = [np.nan] * (COUNT - 1)
-    while scene.time < LONGEST_WAVE and np.isnan(times[LAST - 1]):
-        scene.to_time(scene.time + POLL)
-        for i in np.flatnonzero(scene.bodies.spin[1:] < -moving):
-            times[i] = scene.time if np.isnan(times[i]) else times[i]
-    return times
+    for gap in GAPS[:2] if setting.quick else GAPS:
+        pitch = gap * DOMINO_TALL + THICK
+        bodies: list[dict[str, object]] = [
+            {"x": i * pitch, "y": DOMINO_TALL / 2, "width": THICK, "height": DOMINO_TALL} for i in range(COUNT)
+        ]
+        bodies[0] |= {"spin": spin, "velocity": [-spin * DOMINO_TALL / 2, -spin * -THICK / 2]}
+        contact = {"stiffness_scale": SOFT if setting.quick else 1.0}
+        scene = setting.start(bodies, restitution=0.0, friction=0.0, ground_friction=NO_SLIP, contact=contact)
+        times = [np.nan] * (COUNT - 1)
+        while scene.time < LONGEST_WAVE and np.isnan(times[LAST - 1]):
+            scene.to_time(scene.time + POLL)
+            for i in np.flatnonzero(scene.bodies.spin[1:] < -moving):
+                times[i] = scene.time if np.isnan(times[i]) else times[i]
+        speed = (LAST - FIRST) * pitch / (times[LAST - 1] - times[FIRST - 1])
+        model = Dominoes(THICK / DOMINO_TALL, gap).wave_speed(FIRST, LAST, PUSH) * sqrt(GRAVITY * DOMINO_TALL)
+        yield relative(f"gap {gap:g} h, speed", "m/s", model, speed, 0.05)

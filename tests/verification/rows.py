@@ -6,17 +6,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from blocksim.verification.case import Row, Verdict
-
 if TYPE_CHECKING:
-    from blocksim.verification.case import Outcome
+    from blocksim.verification.case import Outcome, Row
 
 SHARE = 0.2  # of its tolerance by which a measured number may differ from the kept one
 ORDER_SHARE = 0.1  # of its bound, for a number with a lower bound only
 
 
 def missed(outcome: Outcome) -> list[Row]:
-    return [row for row in outcome.rows if row.verdict != Verdict.INSIDE]
+    return [row for row in outcome.rows if not row.is_inside]
 
 
 def same_kind(kept: Row, now: Row) -> bool:

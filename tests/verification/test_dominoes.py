@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from blocksim.verification import toppling
-from blocksim.verification.toppling import Dominoes, collision_times, wave_speed
+from blocksim.verification.toppling import Dominoes
 
 ROW = Dominoes(thickness=7.5 / 48.0, gap=0.3)
 UNIT = sqrt(9.81 * 0.048)  # m/s
@@ -41,20 +40,20 @@ def test_the_first_domino_falls_as_integrated() -> None:
         rtol=1e-10,
         atol=1e-12,
     )
-    assert collision_times(ROW, 1, 1.0)[0] == pytest.approx(float(torque.t_events[0][0]), rel=1e-5)
+    assert ROW.collision_times(1, 1.0)[0] == pytest.approx(float(torque.t_events[0][0]), rel=1e-5)
 
 
 def test_a_plastic_strike_on_an_upright_domino_leaves_both_half_of_the_spin() -> None:
     # edge and face meet at one height and continue together, so both get the same spin; the impulse is horizontal and
     # has the same arm about both feet, so the sum of the spins is kept
-    assert toppling._strike(ROW, 1, 3.0) == pytest.approx(1.5)
+    assert ROW.struck_spin(1, 3.0) == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("fallen", [2, 5, 9])
 def test_a_strike_loses_energy_and_no_other_spin_would_be_nearer_to_the_old_ones(fallen: int) -> None:
     before = np.append(0.0, ROW.leaning(ROW.strike, fallen)[1])  # the struck domino first, at rest
     rates = ROW.leaning(0.0, fallen + 1)[1]
-    spin = toppling._strike(ROW, fallen, 1.0)
+    spin = ROW.struck_spin(fallen, 1.0)
     left = [float(np.sum((before - other * rates) ** 2)) for other in (0.99 * spin, spin, 1.01 * spin)]
     assert left[1] < min(left[0], left[2])
     assert spin**2 * float(rates @ rates) < float(before @ before)
@@ -62,11 +61,11 @@ def test_a_strike_loses_energy_and_no_other_spin_would_be_nearer_to_the_old_ones
 
 @pytest.mark.parametrize(("gap", "speed"), [(0.2, 1.35), (0.3, 1.26), (0.5, 1.16), (0.7, 1.09)])
 def test_stationary_speeds_of_the_verification_table_whatever_the_push(gap: float, speed: float) -> None:
-    slow, fast = (wave_speed(Dominoes(7.5 / 48.0, gap), 32, 36, push) for push in (1.0, 5.0))
+    slow, fast = (Dominoes(7.5 / 48.0, gap).wave_speed(32, 36, push) for push in (1.0, 5.0))
     assert slow * UNIT == pytest.approx(speed, rel=5e-3)
     assert slow == pytest.approx(fast, rel=2e-3)
 
 
 def test_a_row_that_is_pushed_too_gently_does_not_fall() -> None:
     with pytest.raises(ValueError, match="domino 1"):
-        collision_times(ROW, 1, 0.01)
+        ROW.collision_times(1, 0.01)

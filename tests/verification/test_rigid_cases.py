@@ -95,9 +95,8 @@ def test_what_is_about_springs_is_left_out_and_says_why() -> None:
 
 
 def test_settings_of_rigid_contacts_do_not_reach_scenes_of_springs() -> None:
-    assert Setting().stepped(1.0).stepping == {}
     body = [{"y": 1.0}]
-    assert Setting().stepped(1.0).scene(body) == Setting().scene(body)
+    assert Setting(rigid_step=1.0).scene(body) == Setting().scene(body)
 
 
 @dataclass(frozen=True)

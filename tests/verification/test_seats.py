@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from blocksim.verification.case import Setting, Verdict
+from blocksim.verification.case import Setting
 from blocksim.verification.impacts import OVERHANG, SEATS, land, seats
 
 
 def test_block_leaves_several_seats_with_the_requested_restitution_and_without_spin() -> None:
     rows = list(seats(Setting()))
     assert len(rows) == 2 * len(SEATS) + 2
-    assert [row.quantity for row in rows if row.verdict is not Verdict.INSIDE] == []
+    assert [row.quantity for row in rows if not row.is_inside] == []
 
 
 @pytest.mark.parametrize("restitution", [0.2, 0.8])
