@@ -126,7 +126,7 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
         os.fsync(file.fileno())
 
 
-def write_bytes(path: Path, content: bytes) -> None:
+def write_bytes(path: Path, content: "bytes | memoryview") -> None:
     """Write a file through a temporary one beside it; raises OutputError and leaves nothing behind when that fails."""
     with atomic_file(path) as file:
         file.write(content)

@@ -1,45 +1,39 @@
-"""run.h5: the table of its data sets, and reading frames, contacts and probes."""
+"""run.h5: the table of its data sets, opening a file whoever wrote it, and reading frames, contacts and probes."""
 
+import io
 import math
+import os
+import struct
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.errors import InvalidInputError
+from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.scenario.events import probe_names
+from blocksim.scenario.input_files import check_regular, read_head
 from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames, empty_rows
 from blocksim.simulation.probes import CHUNK_ROWS, ProbeSeries
 from blocksim.simulation.recorder import Frame, Rows, frames_from_rows
-from blocksim.simulation.stores import hdf5_files as safety
-from blocksim.simulation.stores.hdf5_files import DAMAGE, is_left_open, open_hdf5
+from blocksim.world.free_memory import available_bytes, readable
 from blocksim.world.systems import others_of
-from blocksim.world.systems.blocks import BLOCKS as _BLOCKS
 from blocksim.world.systems.blocks import blocks_placed
 from blocksim.world.systems.system import System, SystemInScene
 
-PARTICLES = "particles"
-BLOCKS = f"{PARTICLES}/{_BLOCKS.name}"
-OBSERVABLES = "observables"
+PARTICLES, OBSERVABLES, CONTACTS, PROBES = "particles", "observables", "contacts", "probes"
 COMMITTED = "n_committed"
-STEP = f"{BLOCKS}/step"
-TIME = f"{BLOCKS}/time"
+STEP, TIME, ENDS = f"{PARTICLES}/blocks/step", f"{PARTICLES}/blocks/time", f"{CONTACTS}/end"
 SCENARIO_TEXT = "parameters/scenario"
-OUTLINES = "outlines"  # of every element, where they are no rectangles: (b, k, 2), the last corner repeated
-CONTACTS = "contacts"
-ENDS = f"{CONTACTS}/end"
-PROBES = "probes"
 PROBE_STEP, PROBE_TIME = "step", "time"
-
 COUNTED_UNITS = {"contact_count": "1", "largest_overlap": "m"}
-TEXT_UNIT = "TOML"
 Values = NDArray[Any]
 
 
@@ -55,34 +49,10 @@ class DataSet:
     chunk: int = CHUNK_ROWS  # rows
     is_sum: bool = False  # what it counts goes on from its last row
 
-    def create(self, file: Any) -> None:
-        """Create it, empty."""
-        # a scene may have no blocks; a chunk of nothing cannot be
-        chunks, most = (self.chunk, *(one or 1 for one in self.row)), (None, *(one or None for one in self.row))
-        data_set = file.create_dataset(self.name, (0, *self.row), dtype=self.kind, maxshape=most, chunks=chunks)
-        data_set.attrs["unit"] = self.unit
-
-    def room(self, values: Values) -> int:
-        """Return the most bytes that adding these rows takes, chunks that are begun included."""
-        return (len(values) + 2 * self.chunk) * math.prod(self.row) * int(np.dtype(self.kind).itemsize)
-
-    def append(self, file: Any, values: Values) -> None:
-        """Write rows after those that are there."""
-        data_set = file[self.name]
-        count = data_set.shape[0]
-        before = data_set[count - 1] if self.is_sum and count else 0
-        data_set.resize(count + len(values), axis=0)
-        data_set[count:] = before + values if self.is_sum else values
-
 
 def places_of(system: System) -> list[str]:
     """Return the data sets of what frames keep of a system, in the order of its `quantities`."""
     return [f"{PARTICLES}/{system.name}/{one.name}" for one in system.quantities]
-
-
-def measured_units(ledger: Iterable[str]) -> dict[str, str]:
-    """Return the units of all that is measured at every frame, given the names of the energies."""
-    return {**dict.fromkeys(ledger, "J"), **COUNTED_UNITS}
 
 
 def sets_of_frames(
@@ -90,66 +60,203 @@ def sets_of_frames(
 ) -> Iterator[DataSet]:
     """Yield the data sets of frames with steps of `time_step` (s), in chunks of so many rows.
 
-    Each `of` takes a list of frames. Contacts are among them where these are recorded.
+    Each `of` takes a list of frames. `ledger` names the energies. Contacts are among them where these are recorded.
     """
-    yield DataSet(STEP, "1", _steps, np.int64, chunk=chunk)
-    yield DataSet(TIME, "s", lambda frames: _steps(frames) * time_step, chunk=chunk)
-    for number, present in enumerate(systems):
+    yield DataSet(STEP, "1", lambda frames: np.array([one.step for one in frames]), np.int64, chunk=chunk)
+    yield DataSet(TIME, "s", lambda frames: np.array([one.step for one in frames]) * time_step, chunk=chunk)
+    for n, present in enumerate(systems):
         for k, (place, one) in enumerate(zip(places_of(present.system), present.system.quantities, strict=True)):
-            yield DataSet(place, one.stored_unit, partial(_state, number, k), row=(present.count,), chunk=chunk)
-    for k, (name, unit) in enumerate(measured_units(ledger).items()):
-        yield DataSet(f"{OBSERVABLES}/{name}", unit, partial(_measured, k), chunk=chunk)
+            yield DataSet(
+                place,
+                one.stored_unit,
+                partial(lambda n, k, frames: np.stack([frame.states[n][k] for frame in frames]), n, k),
+                row=(present.count,),
+                chunk=chunk,
+            )
+    for k, (name, unit) in enumerate({**dict.fromkeys(ledger, "J"), **COUNTED_UNITS}.items()):
+        of = partial(lambda k, frames: np.array([one.measured[k] for one in frames]), k)
+        yield DataSet(f"{OBSERVABLES}/{name}", unit, of, chunk=chunk)
     if contacts:
-        yield DataSet(ENDS, "1", _ends, np.int64, chunk=chunk, is_sum=True)
+        yield DataSet(
+            ENDS,
+            "1",
+            lambda frames: np.cumsum([0 if one.contacts is None else len(one.contacts) for one in frames]),
+            np.int64,
+            chunk=chunk,
+            is_sum=True,
+        )
         yield from sets_of_contacts()
 
 
 def sets_of_contacts() -> Iterator[DataSet]:
     """Yield the data sets with a row a contact."""
+    none = empty_rows(0)
+
+    def column(name: str, frames: Sequence[Frame]) -> Values:
+        return np.concatenate([(none if one.contacts is None else one.contacts)[name] for one in frames])
+
     for name, unit in {**dict.fromkeys(BODIES, "1"), **UNITS}.items():
-        yield DataSet(f"{CONTACTS}/{name}", unit, partial(_contact_column, name), CONTACT_ROW[name])
+        yield DataSet(f"{CONTACTS}/{name}", unit, partial(column, name), CONTACT_ROW[name])
 
 
-def sets_of_probe(probe: ProbeSeries) -> Iterator[DataSet]:
-    """Yield the data sets of the samples of a probe; each `of` takes a ProbeSeries with these columns."""
-    place = f"{PROBES}/{probe.name}"
-    yield DataSet(f"{place}/{PROBE_STEP}", "1", attrgetter("step"), np.int64)
-    yield DataSet(f"{place}/{PROBE_TIME}", "s", attrgetter("time"))
-    for name, unit in probe.units.items():
-        yield DataSet(f"{place}/{name}", unit, partial(_column, name))
+DAMAGE = (AttributeError, KeyError, MemoryError, OSError, OverflowError, RuntimeError, TypeError, ValueError)
+"""What h5py raises for what HDF5 finds wrong."""
+SUPERBLOCK = struct.Struct("<8s4B3QQI")  # signature; version, sizes, flags; base, extension, end; root; checksum
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+VERSION = 3
+SIZE_OF_ADDRESS = 8
+WRITING, SWMR = 1, 4  # flags: HDF5 file format specification, II.A
+WORD = 0xFFFFFFFF
+MOST_MEMBERS = 64  # of a group; the schemes have a dozen energies
+LONGEST_CAUSE = 200  # characters of what HDF5 says
+PAUSES = (0.05, 0.2)  # s
 
 
-def constants_of(present: SystemInScene) -> Iterator[tuple[str, str, Values]]:
-    """Yield what is written once of a system: place, unit, values."""
-    place = f"{PARTICLES}/{present.system.name}"
-    for one, values in zip(present.system.constants, present.elements.constants, strict=True):
-        yield f"{place}/{one.name}", one.stored_unit, values
-    if present.elements.outlines is not None:
-        yield f"{place}/{OUTLINES}", "m", present.elements.outlines
+class UnsafeError(ValueError):
+    """A run file that is not as blocksim writes it; the text says where."""
 
 
-def _steps(frames: Sequence[Frame]) -> Values:
-    return np.array([frame.step for frame in frames])
+@contextmanager
+def refuse_damage(path: Path, what: str) -> Iterator[None]:
+    """Raise InvalidInputError for what h5py raises for a file that is `what`, in one short line."""
+    try:
+        yield
+    except DAMAGE as error:
+        text = " ".join(str(error).split())
+        text = text if len(text) <= LONGEST_CAUSE else f"{text[:LONGEST_CAUSE]} ..."
+        message = f"{path}: {what}: {text}"
+        raise InvalidInputError(message) from error
 
 
-def _state(system: int, quantity: int, frames: Sequence[Frame]) -> Values:
-    return np.stack([frame.states[system][quantity] for frame in frames])
+@contextmanager
+def open_hdf5(path: Path) -> Iterator[Any]:
+    """Give the file to read from. Raises as `check_regular`; InvalidInputError for no HDF5 file, or one cut off.
+
+    One that its writer has not closed is read as if it were: HDF5 itself refuses it, or reads damage for ever.
+    """
+    check_regular(path)  # again by name below: HDF5 opens most files by itself
+    with refuse_damage(path, "not a readable HDF5 file"), ClosedFileView(path) as raw:
+        head = raw.read(SUPERBLOCK.size)
+        if not _is_open(head):
+            with h5py.File(path, "r") as file:
+                yield file
+            return
+        size = raw.seek(0, os.SEEK_END)
+        signature, version, offsets, lengths, flags, base, extension, end, root, checksum = SUPERBLOCK.unpack(head)
+        if size < end:
+            message = f"{path}: not a complete run file: cut off at {size} of {end} bytes"
+            raise InvalidInputError(message)
+        if checksum != lookup3(head[:-4]) or offsets != SIZE_OF_ADDRESS:
+            message = f"{path}: not a readable HDF5 file: its superblock is damaged"
+            raise InvalidInputError(message)
+        flags &= ~(WRITING | SWMR)
+        closed = SUPERBLOCK.pack(signature, version, offsets, lengths, flags, base, extension, size, root, 0)[:-4]
+        raw.head = closed + lookup3(closed).to_bytes(4, "little")
+        with h5py.File(raw, "r") as file:
+            yield file
 
 
-def _measured(place: int, frames: Sequence[Frame]) -> Values:
-    return np.array([frame.measured[place] for frame in frames])
+def _is_open(head: bytes) -> bool:
+    """Return True for the superblock of a file whose writer has not closed it: a run continues, or was killed."""
+    return len(head) == SUPERBLOCK.size and head.startswith(SIGNATURE) and head[8] == VERSION and bool(head[11] & SWMR)
 
 
-def _ends(frames: Sequence[Frame]) -> Values:
-    return np.cumsum([0 if frame.contacts is None else len(frame.contacts) for frame in frames])
+class ClosedFileView(io.FileIO):
+    """A file with another beginning."""
+
+    head = b""
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill a buffer from the place on."""
+        view, place, count = memoryview(buffer).cast("B"), self.tell(), 0
+        while count < len(view) and (part := self.read(len(view) - count)):
+            view[count : count + len(part)] = part
+            count += len(part)
+        covered = max(0, min(len(self.head) - place, count))
+        view[:covered] = self.head[place : place + covered]
+        return count
 
 
-def _contact_column(name: str, frames: Sequence[Frame]) -> Values:
-    return np.concatenate([(empty_rows(0) if one.contacts is None else one.contacts)[name] for one in frames])
+def lookup3(data: bytes) -> int:
+    """Return the checksum of HDF5's metadata: Jenkins' lookup3 with the initial value 0."""
+    a = b = c = (0xDEADBEEF + len(data)) & WORD
+    words = struct.unpack(f"<{-(-len(data) // 12) * 3}I", data.ljust(-(-len(data) // 12) * 12, b"\0"))
+    for place in range(0, len(words), 3):
+        a, b, c = ((one + two) & WORD for one, two in zip((a, b, c), words[place : place + 3], strict=True))
+        if place + 3 < len(words):
+            a, b, c = _mixed(a, b, c)
+    for turn_b, turn_c, turn_a in ((14, 11, 25), (16, 4, 14)):
+        c = ((c ^ b) - _turned(b, turn_b)) & WORD
+        a = ((a ^ c) - _turned(c, turn_c)) & WORD
+        b = ((b ^ a) - _turned(a, turn_a)) & WORD
+    return ((c ^ b) - _turned(b, 24)) & WORD
 
 
-def _column(name: str, probe: ProbeSeries) -> Values:
-    return probe.columns[name]
+def _mixed(a: int, b: int, c: int) -> tuple[int, int, int]:
+    for turns in ((4, 6, 8), (16, 19, 4)):
+        a, c = ((a - c) & WORD) ^ _turned(c, turns[0]), (c + b) & WORD
+        b, a = ((b - a) & WORD) ^ _turned(a, turns[1]), (a + c) & WORD
+        c, b = ((c - b) & WORD) ^ _turned(b, turns[2]), (b + a) & WORD
+    return a, b, c
+
+
+def _turned(word: int, bits: int) -> int:
+    return ((word << bits) | (word >> (32 - bits))) & WORD
+
+
+def data_set(file: Any, name: str, dimensions: int) -> Any:
+    """Return a data set of plain numbers, reached by no links but its own groups. Raises UnsafeError, KeyError."""
+    found = member(file, name)
+    if not isinstance(found, h5py.Dataset):
+        raise UnsafeError(f"{name}: not a data set")
+    if found.is_virtual or found.external:
+        raise UnsafeError(f"{name}: its values are in other files, which are not read")
+    if found.dtype.kind not in "if" or found.dtype.itemsize > 8 or found.dtype.shape:
+        raise UnsafeError(f"{name}: holds {found.dtype}, not plain numbers")
+    if found.ndim != dimensions:
+        raise UnsafeError(f"{name}: has {found.ndim} dimensions, not {dimensions}")
+    if found.id.get_create_plist().get_nfilters():
+        raise UnsafeError(f"{name}: compressed, unlike any run file")
+    return found
+
+
+def group(file: Any, name: str) -> Any:
+    """Return a group with a number of members that a run can have. Raises UnsafeError, KeyError."""
+    found = member(file, name)
+    if not isinstance(found, h5py.Group):
+        raise UnsafeError(f"{name}: not a group")
+    if len(found) > MOST_MEMBERS:
+        raise UnsafeError(f"{name}: {len(found)} members; at most {MOST_MEMBERS} are read")
+    return found
+
+
+def member(file: Any, name: str) -> Any:
+    """Return what a name means, where no part of it is a link to elsewhere. Raises UnsafeError, KeyError."""
+    place = file
+    for part in name.split("/"):
+        if not isinstance(place, h5py.Group):
+            raise UnsafeError(f"{name}: not in a group")
+        if place.id.links.get_info(part.encode()).type != h5py.h5l.TYPE_HARD:  # h5py's own get() follows links first
+            raise UnsafeError(f"{name}: a link to another place; links are not followed")
+        place = place[part]
+    return place
+
+
+def refuse_too_many(path: Path, sets: dict[str, Any], rows: int, what: str = "frames") -> None:
+    """Raise UnsafeError where the first `rows` of data sets cannot all be in the file, or not in the memory."""
+    size, wanted = path.stat().st_size, 0
+    for name, one in sets.items():
+        if one.shape[0] < rows:
+            raise UnsafeError(f"{name}: holds {one.shape[0]} {what}, not {rows}")
+        row_bytes = one.dtype.itemsize * (one.shape[1] if one.ndim > 1 else 1)
+        wanted += rows * row_bytes
+    if wanted > size:
+        raise UnsafeError(f"announces {readable(wanted)} of {what} in a file of {readable(size)}")
+    available = available_bytes()
+    if available is not None and 3 * wanted > available:  # as read, put together, and as frames
+        raise UnsafeError(
+            f"its {what} need about {readable(3 * wanted)} of memory; {readable(available)} are available"
+        )
 
 
 def read_probes(path: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
@@ -160,79 +267,66 @@ def read_probes(path: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
     names = probe_names(scenario)
     if not names:
         return {}
-    with open_hdf5(path) as file:
-        try:
-            return {name: _samples(path, file, name) for name in names}
-        except DAMAGE as error:
-            message = f"{path}: its probes cannot be read: {safety.short_cause(error)}"
-            raise InvalidInputError(message) from error
+    with open_hdf5(path) as file, refuse_damage(path, "its probes cannot be read"):
+        return {name: _samples(path, file, name) for name in names}
 
 
 def _samples(path: Path, file: Any, name: str) -> ProbeSeries:
     place = f"{PROBES}/{name}"
-    count = int(safety.data_set(file, f"{place}/{COMMITTED}", 0)[()])
-    found = safety.group(file, place)
-    sets = {one: safety.data_set(file, f"{place}/{one}", 1) for one in found if one != COMMITTED}
+    count = int(data_set(file, f"{place}/{COMMITTED}", 0)[()])
+    sets = {one: data_set(file, f"{place}/{one}", 1) for one in group(file, place) if one != COMMITTED}
     if count < 0:
         raise ValueError(f"{place} holds {count} samples")
-    safety.refuse_too_many(path, {f"{place}/{one}": data for one, data in sets.items()}, count, "samples")
-    columns = {
-        one: np.asarray(data[:count], dtype=np.float64)
-        for one, data in sets.items()
-        if one not in (PROBE_STEP, PROBE_TIME)
-    }
-    steps = np.asarray(sets[PROBE_STEP][:count], dtype=np.int64)
+    refuse_too_many(path, {f"{place}/{one}": data for one, data in sets.items()}, count, "samples")
+    kind, steps = str(file[place].attrs["kind"]), np.asarray(sets.pop(PROBE_STEP)[:count], dtype=np.int64)
     if (np.diff(steps) <= 0).any():
         raise ValueError(f"{place}/{PROBE_STEP} does not increase")
-    units = {one: _text(sets[one].attrs["unit"]) for one in columns}
-    times = np.asarray(sets[PROBE_TIME][:count], dtype=np.float64)
-    return ProbeSeries(name, _text(file[place].attrs["kind"]), steps, times, columns, units)
-
-
-def _text(value: Any) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)
-
-
-PAUSES = (0.05, 0.2)  # s
+    times = np.asarray(sets.pop(PROBE_TIME)[:count], dtype=np.float64)
+    columns = {one: np.asarray(data[:count], dtype=np.float64) for one, data in sets.items()}
+    units = {one: str(data.attrs["unit"]) for one, data in sets.items()}
+    return ProbeSeries(name, kind, steps, times, columns, units)
 
 
 def read_frames(path: Path, scenario: Scenario) -> Frames:
     """Return the committed frames of a run file; `scenario` is the one that lies beside it.
 
-    Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty. What a run
-    that continues writes at this moment may look like damage, so a file without an end is tried a few times.
+    Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty.
     """
     return read_systems(path, (blocks_placed(place_bodies(scenario)), *others_of(scenario)))
 
 
 def read_systems(path: Path, systems: Sequence[SystemInScene]) -> Frames:
-    """Return the committed frames of a run file of these systems, blocks first. Raises as `read_frames`."""
-    for pause in PAUSES:
+    """Return the committed frames of a run file of these systems, blocks first. Raises as `read_frames`.
+
+    What a run that continues writes at this moment may look like damage: a file without an end is tried a few times.
+    """
+    pauses = iter(PAUSES)
+    while True:
         try:
-            return _frames(path, systems)
+            with open_hdf5(path) as file, refuse_damage(path, "not a complete run file"):
+                time_step, rows = _read(path, file, systems)
+            return frames_from_rows(systems, time_step, rows)
         except InvalidInputError:
-            if not is_left_open(path):
+            pause = next(pauses, None)
+            if pause is None or not is_left_open(path):
                 raise
             time.sleep(pause)
-    return _frames(path, systems)
 
 
-def _frames(path: Path, systems: Sequence[SystemInScene]) -> Frames:
-    with open_hdf5(path) as file:
-        try:
-            time_step, rows = _read(path, file, systems)
-        except DAMAGE as error:
-            message = f"{path}: not a complete run file: {safety.short_cause(error)}"
-            raise InvalidInputError(message) from error
-    return frames_from_rows(systems, time_step, rows)
+def is_left_open(path: Path) -> bool:
+    """Return True if a file has a writer who has not closed it: a run that continues, or was killed."""
+    try:
+        return _is_open(read_head(path, SUPERBLOCK.size))
+    except BlocksimError:
+        return False
 
 
 def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, Rows]:
     """Return step (s) and rows of all committed frames, after looking at what would be read."""
-    count = int(safety.data_set(file, COMMITTED, 0)[()])
-    ledger = tuple(name for name in safety.group(file, OBSERVABLES) if name not in COUNTED_UNITS)
+    count = int(data_set(file, COMMITTED, 0)[()])
+    ledger = tuple(name for name in group(file, OBSERVABLES) if name not in COUNTED_UNITS)
     table = sets_of_frames(systems, ledger, math.nan, 1, contacts=False)
-    sets = {one.name: safety.data_set(file, one.name, 1 + len(one.row)) for one in table if one.name != TIME}
+    sets = {one.name: data_set(file, one.name, 1 + len(one.row)) for one in table if one.name != TIME}
     for present in systems:
         found = {sets[place].shape[1] for place in places_of(present.system)}
         if found != {present.count}:
@@ -240,19 +334,19 @@ def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[floa
             raise ValueError(f"holds {'/'.join(map(str, sorted(found)))} {what}, not {present.count}")
     if count <= 0:
         raise ValueError("holds no frame: the run was killed before its first one, or has just started")
-    safety.refuse_too_many(path, sets, count)
+    refuse_too_many(path, sets, count)
     values = {name: one[:count] for name, one in sets.items()}
-    observables = [values[f"{OBSERVABLES}/{name}"] for name in measured_units(ledger)]
-    rows = Rows(
-        values[STEP],
-        tuple(
-            np.stack([values[place] for place in places_of(one.system)], axis=1, dtype=np.float64) for one in systems
-        ),
-        np.stack(observables, axis=1, dtype=np.float64),
-        ledger,
-        _contacts(path, file, count, systems[0].count),
+    measured = [values[f"{OBSERVABLES}/{name}"] for name in (*ledger, *COUNTED_UNITS)]
+    steps, time_step = values[STEP], float(sets[STEP].attrs["time_step"])
+    if steps.dtype.kind != "i" or steps.min() < 0:
+        raise ValueError("its step numbers are invalid")
+    if not (math.isfinite(time_step * float(steps.max())) and time_step > 0.0):
+        raise ValueError(f"its time step of {time_step:g} s is invalid")
+    states = tuple(
+        np.stack([values[place] for place in places_of(one.system)], axis=1, dtype=np.float64) for one in systems
     )
-    return _time_step(sets[STEP], rows.steps), rows
+    contacts = _contacts(path, file, count, systems[0].count)
+    return time_step, Rows(steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts)
 
 
 def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | None:
@@ -260,14 +354,14 @@ def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | Non
 
     Raises KeyError or ValueError where columns are missing, do not go together or name no body.
     """
-    if not safety.has(file, CONTACTS):
+    if not file.id.links.exists(CONTACTS.encode()):
         return None
-    ends = safety.data_set(file, ENDS, 1)[:frames].astype(np.int64)
+    ends = data_set(file, ENDS, 1)[:frames].astype(np.int64)
     if len(ends) != frames or (np.diff(ends, prepend=0) < 0).any():
         raise ValueError(f"{ENDS} does not count the contacts of {frames} frames")
     count = int(ends[-1]) if frames else 0
-    sets = {one.name: safety.data_set(file, one.name, 1) for one in sets_of_contacts()}
-    safety.refuse_too_many(path, sets, count, "contacts")
+    sets = {one.name: data_set(file, one.name, 1) for one in sets_of_contacts()}
+    refuse_too_many(path, sets, count, "contacts")
     rows = empty_rows(count)
     for name, one in sets.items():
         rows[name.removeprefix(f"{CONTACTS}/")] = one[:count]
@@ -275,13 +369,3 @@ def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | Non
         if count and not (least <= rows[name].min() and rows[name].max() < bodies):
             raise ValueError(f"{CONTACTS}/{name} names bodies that are not among the {bodies}")
     return Contacts(ends, rows)
-
-
-def _time_step(data_set: Any, steps: NDArray[np.int64]) -> float:
-    """Return the time step (s) that goes with numbers of steps; raises ValueError where they make no times."""
-    time_step = float(data_set.attrs["time_step"])
-    if steps.dtype.kind != "i" or steps.min() < 0:
-        raise ValueError("its step numbers are invalid")
-    if not (math.isfinite(time_step * float(steps.max())) and time_step > 0.0):
-        raise ValueError(f"its time step of {time_step:g} s is invalid")
-    return time_step

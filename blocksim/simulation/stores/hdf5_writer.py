@@ -6,10 +6,13 @@ is followed by a new value of `n_committed`. HDF5 cannot recover from a write th
 """
 
 import contextlib
+import itertools
+import math
 import os
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from operator import attrgetter, itemgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -23,7 +26,6 @@ from blocksim.simulation.atomic import PERMISSIONS, permissions_of, sync_file
 from blocksim.simulation.probes import NO_PROBES, Probes
 from blocksim.simulation.recorder import Frame
 from blocksim.simulation.stores import hdf5 as layout
-from blocksim.simulation.stores.hdf5_files import SIGNATURE, SUPERBLOCK, VERSION
 from blocksim.world.memory import chunk_rows
 from blocksim.world.systems.blocks import blocks_placed
 from blocksim.world.systems.system import SystemInScene
@@ -31,16 +33,6 @@ from blocksim.world.systems.system import SystemInScene
 FLUSH_SECONDS = 0.25
 APART = 10.0  # times what the last flush took: a tenth of a run at most
 RESERVE = 1 << 18  # bytes
-
-
-def _give_back(path: Path) -> None:
-    """Cut off what was reserved at the end of a closed file, which HDF5 knows nothing of. Raises OSError."""
-    with path.open("r+b") as file:
-        head = file.read(SUPERBLOCK.size)
-        if len(head) == SUPERBLOCK.size:
-            signature, version, *_, end, _, _ = SUPERBLOCK.unpack(head)
-            if (signature, version) == (SIGNATURE, VERSION) and SUPERBLOCK.size < end < path.stat().st_size:
-                file.truncate(end)
 
 
 class FrameFile:
@@ -70,14 +62,21 @@ class FrameFile:
         chunk = chunk_rows(max(one.count for one in self.systems))
         self.sets = [*layout.sets_of_frames(self.systems, ledger, time_step, chunk, contacts=contacts)]
         self.probes = probes
-        self.probe_sets = {name: [*layout.sets_of_probe(one)] for name, one in probes.series().items()}
+        self.probe_sets = {
+            name: [
+                layout.DataSet(f"{layout.PROBES}/{name}/{layout.PROBE_STEP}", "1", attrgetter("step"), np.int64),
+                layout.DataSet(f"{layout.PROBES}/{name}/{layout.PROBE_TIME}", "s", attrgetter("time")),
+                *(layout.DataSet(f"{layout.PROBES}/{name}/{of}", unit, itemgetter(of)) for of, unit in units),
+            ]
+            for name, units in ((name, one.units.items()) for name, one in probes.series().items())
+        }
         self.count = 0
         self.is_broken = False
         self.waiting: list[Frame] = []
         self.flushed_at = -np.inf
         self.flush_seconds = 0.0
         unnamed = path.with_name(f".{path.name}.new")
-        with self._telling_trouble():
+        with self._locate_errors():
             try:  # before HDF5 does: room for a small file
                 unnamed.write_bytes(bytes(RESERVE))
             finally:
@@ -100,6 +99,7 @@ class FrameFile:
                 raise
 
     def _create(self, scenario_toml: str) -> None:
+        """Create all data sets, those that grow empty."""
         h5md = self.file.create_group("h5md")
         h5md.attrs["version"] = np.array([1, 1])
         h5md.create_group("creator").attrs["name"] = "blocksim"
@@ -109,13 +109,20 @@ class FrameFile:
             group = self.file.create_group(f"{layout.PROBES}/{name}", track_order=True)
             group.attrs["kind"] = probe.kind
             group.create_dataset(layout.COMMITTED, (), dtype=np.int64).attrs["unit"] = "1"
-        for one in (*self.sets, *(one for sets in self.probe_sets.values() for one in sets)):
-            one.create(self.file)
-        for present in self.systems:
-            for place, unit, values in layout.constants_of(present):
-                self.file.create_dataset(place, data=values).attrs["unit"] = unit
+        for one in itertools.chain(self.sets, *self.probe_sets.values()):
+            # a scene may have no blocks; a chunk of nothing cannot be
+            chunks, most = (one.chunk, *(size or 1 for size in one.row)), (None, *(size or None for size in one.row))
+            data_set = self.file.create_dataset(one.name, (0, *one.row), dtype=one.kind, maxshape=most, chunks=chunks)
+            data_set.attrs["unit"] = one.unit
+        for system, elements in ((present.system, present.elements) for present in self.systems):
+            place = f"{layout.PARTICLES}/{system.name}"
+            for constant, values in zip(system.constants, elements.constants, strict=True):
+                data_set = self.file.create_dataset(f"{place}/{constant.name}", data=values)
+                data_set.attrs["unit"] = constant.stored_unit
+            if elements.outlines is not None:  # (b, k, 2) of every element, the last corner repeated
+                self.file.create_dataset(f"{place}/outlines", data=elements.outlines).attrs["unit"] = "m"
         text = self.file.create_dataset(layout.SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))
-        text.attrs["unit"] = layout.TEXT_UNIT
+        text.attrs["unit"] = "TOML"
 
     def _reserve(self, size: int) -> None:
         """Make sure of the space on the disk, and of what HDF5 adds: after a write that fails it cannot continue."""
@@ -136,14 +143,23 @@ class FrameFile:
         """Bring all frames so far to the disk and then say how many there are. Raises OutputError (disk full …)."""
         began = time.monotonic()
         samples = {name: series for name, series in self.probes.taken().items() if len(series)}
-        with self._telling_trouble():
+        with self._locate_errors():
             added = [(one, one.of(self.waiting)) for one in self.sets if self.waiting]
             for name, series in samples.items():
                 added.extend((one, one.of(series)) for one in self.probe_sets[name])
-            if added:
-                self._reserve(sum(one.room(values) for one, values in added))
+            if added:  # room for chunks that are begun, too
+                self._reserve(
+                    sum(
+                        (len(values) + 2 * one.chunk) * math.prod(one.row) * int(np.dtype(one.kind).itemsize)
+                        for one, values in added
+                    )
+                )
                 for one, values in added:
-                    one.append(self.file, values)
+                    data_set = self.file[one.name]
+                    count = data_set.shape[0]
+                    before = data_set[count - 1] if one.is_sum and count else 0
+                    data_set.resize(count + len(values), axis=0)
+                    data_set[count:] = before + values if one.is_sum else values
                 self.count += len(self.waiting)
                 self.waiting.clear()
                 self.file.flush()
@@ -158,32 +174,19 @@ class FrameFile:
     def sync(self) -> None:
         """Commit, and wait until it is on the disk, where it outlives a power failure. Raises OutputError."""
         self.commit()
-        with self._telling_trouble():
+        with self._locate_errors():
             os.fsync(self.file.id.get_vfd_handle())
 
     @contextmanager
-    def _telling_trouble(self) -> Iterator[None]:
+    def _locate_errors(self) -> Iterator[None]:
         """Turn what HDF5 raises into one line; nothing more is written then."""
         try:
             yield
         except (OSError, RuntimeError) as error:
             self.is_broken = True
             number = getattr(error, "errno", None)
-            reason = os.strerror(number) if number else str(error)
-            message = f"{self.path}: cannot be written: {reason}"
+            message = f"{self.path}: cannot be written: {os.strerror(number) if number else error}"
             raise OutputError(message) from error
-
-    def close(self) -> None:
-        """Commit, close the file normally, wait for the disk. Raises OutputError, once."""
-        if self.is_broken:
-            with contextlib.suppress(OSError, RuntimeError):
-                self.file.close()
-            return
-        self.commit()
-        with self._telling_trouble():
-            self.file.close()
-            _give_back(self.path)
-            sync_file(self.path)  # no mark of a finished run may outlive its frames
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -195,3 +198,17 @@ class FrameFile:
         """Close the file, whatever happened; who asks for the second time to stop at once does not wait for frames."""
         self.is_broken |= kind is not None and not issubclass(kind, Exception)
         self.close()
+
+    def close(self) -> None:
+        """Commit, close the file normally, wait for the disk. Raises OutputError, once."""
+        if self.is_broken:
+            with contextlib.suppress(OSError, RuntimeError):
+                self.file.close()
+            return
+        self.commit()
+        with self._locate_errors():
+            self.file.close()
+            with self.path.open("r+b") as file:  # cut off what was reserved, which HDF5 knows nothing of
+                *_, end, _, _ = layout.SUPERBLOCK.unpack(file.read(layout.SUPERBLOCK.size))
+                file.truncate(end)
+            sync_file(self.path)  # no mark of a finished run may outlive its frames

@@ -10,8 +10,7 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.simulation.recorder import MOTION, Frame
-from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.stores.hdf5_files import SUPERBLOCK, is_left_open, lookup3, open_hdf5
+from blocksim.simulation.stores.hdf5 import SUPERBLOCK, is_left_open, lookup3, open_hdf5, read_frames
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 
 FRAMES = 300

@@ -162,7 +162,7 @@ def test_full_disk_is_reported_and_leaves_the_older_file(tmp_path: Path, monkeyp
         raise OSError(errno.ENOSPC, "No space left on device")
 
     (tmp_path / "run.vtkhdf").write_text("older")
-    monkeypatch.setattr("os.pwrite", no_room)
+    monkeypatch.setattr("os.fsync", no_room)
     with pytest.raises(OutputError, match=r"run\.vtkhdf: cannot be written: No space left on device$"):
         write_vtkhdf(tmp_path / "run.vtkhdf", toppling(1), LEVEL)
     assert (tmp_path / "run.vtkhdf").read_text() == "older"
