@@ -46,6 +46,5 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
-        message = f"module 'blocksim.simulation' has no attribute '{name}'"
-        raise AttributeError(message)
+        raise AttributeError(f"module 'blocksim.simulation' has no attribute '{name}'")
     return getattr(import_module(f"blocksim.simulation.{_HOMES[name]}"), name)

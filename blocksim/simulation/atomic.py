@@ -31,46 +31,32 @@ def atomic_path(path: Path) -> Iterator[Path]:
     handle = -1
     try:
         _remove_leftovers(path)
-        handle, temporary = _created_beside(path)
-        mode = _take_permissions(path, handle)
+        while temporary is None:  # not `tempfile`, which takes away what the umask would leave, and defaults of folders
+            name = path.with_name(f".{path.name}.{secrets.token_hex(DIGITS // 2)}{path.suffix}")
+            handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL, PERMISSIONS)
+            with contextlib.suppress(OSError):  # file systems without locks
+                fcntl.flock(handle, fcntl.LOCK_EX)  # so that others see that the writer lives
+            if name.exists():
+                temporary = name
+            else:
+                os.close(handle)  # taken for a leftover before it was locked
+        old = permissions_of(path)
+        mode = stat.S_IMODE(os.fstat(handle).st_mode) if old is None else old
+        if old is not None:
+            with contextlib.suppress(OSError):  # a group that one is not in
+                os.fchown(handle, -1, path.stat().st_gid)
+            os.fchmod(handle, old | stat.S_IWUSR)  # before it holds anything
         yield temporary
         temporary.chmod(mode)
         temporary.replace(path)
         sync_folder(path.parent)
     except OSError as error:
-        message = f"{path}: cannot be written: {error.strerror or error}"
-        raise OutputError(message) from error
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         if temporary is not None:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
             os.close(handle)  # only now: with it goes the lock
-
-
-def _created_beside(path: Path) -> tuple[int, Path]:
-    """Return an empty file beside another, open and locked, so that others see that its writer lives. Raises OSError.
-
-    It is not made by `tempfile`, which takes away what the umask would leave, and default permissions of the folder.
-    """
-    while True:
-        name = path.with_name(f".{path.name}.{secrets.token_hex(DIGITS // 2)}{path.suffix}")
-        handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_EXCL, PERMISSIONS)
-        with contextlib.suppress(OSError):  # file systems without locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
-        if name.exists():
-            return handle, name
-        os.close(handle)  # taken for a leftover before it was locked
-
-
-def _take_permissions(path: Path, handle: int) -> int:
-    """Give a new file the group of the one that it replaces, and return the permissions that it is to have."""
-    old = permissions_of(path)
-    if old is None:
-        return stat.S_IMODE(os.fstat(handle).st_mode)
-    with contextlib.suppress(OSError):  # a group that one is not in
-        os.fchown(handle, -1, path.stat().st_gid)
-    os.fchmod(handle, old | stat.S_IWUSR)  # before it holds anything
-    return old
 
 
 def permissions_of(path: Path) -> int | None:
@@ -126,7 +112,7 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
         os.fsync(file.fileno())
 
 
-def write_bytes(path: Path, content: "bytes | memoryview") -> None:
+def write_bytes(path: Path, content: bytes | memoryview) -> None:
     """Write a file through a temporary one beside it; raises OutputError and leaves nothing behind when that fails."""
     with atomic_file(path) as file:
         file.write(content)

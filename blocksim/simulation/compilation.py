@@ -47,11 +47,10 @@ def compile_kernels(kernels: str = DEFAULT) -> float:
         with compiling():
             _compile(kernels)
     except OSError as error:
-        message = (
+        raise OutputError(
             f"{jit.cache_folder()}: the compiled solver cannot be stored there: {error.strerror or error}; "
             "free some space, or set BLOCKSIM_CACHE_DIR to a folder on another disk"
-        )
-        raise OutputError(message) from error
+        ) from error
     return time.perf_counter() - began
 
 

@@ -196,8 +196,7 @@ def run_in_batches(
     count = os.cpu_count() or 1 if threads is None else threads
     for what, number in (("threads", count), ("members", most)):
         if number < 1:
-            message = f"{what} must be at least 1, not {number}"
-            raise ValueError(message)
+            raise ValueError(f"{what} must be at least 1, not {number}")
     return _run_all(scenarios, count, most, peaks=peaks)
 
 

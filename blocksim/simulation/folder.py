@@ -9,7 +9,7 @@ import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO, Self
+from typing import Self
 
 from pydantic import BaseModel
 
@@ -40,6 +40,7 @@ LONGEST_HEADER = 100_000  # bytes
 MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = MEGABYTE  # of a table of an experiment, which is not read if larger
 RESOLVED = MARK.encode()
+CHANGED = "changed since blocksim wrote it; move it away, or write elsewhere with --out DIR"
 Kind = Callable[[bytes], bool]  # whether the first HEAD_BYTES of a file are of a kind
 
 
@@ -67,14 +68,10 @@ class TableRecord(BaseModel, frozen=True):
     @classmethod
     def of(cls, path: Path) -> Self:
         """Return that of a table, which may still have another name. Raises OSError."""
-        return cls(header=header_of(path), sha256=sha256_of(path))
-
-
-def header_of(path: Path) -> str:
-    """Return the first line of a table, nothing where it is long. Raises OSError."""
-    with path.open("rb") as file:
-        line = file.readline(LONGEST_HEADER).rstrip(b"\r\n")
-    return "" if len(line) >= LONGEST_HEADER else line.decode(errors="replace")
+        with path.open("rb") as file:
+            line = file.readline(LONGEST_HEADER).rstrip(b"\r\n")
+        header = "" if len(line) >= LONGEST_HEADER else line.decode(errors="replace")
+        return cls(header=header, sha256=sha256_of(path))
 
 
 def is_own(path: Path, records: Iterable[TableRecord]) -> bool:
@@ -82,11 +79,7 @@ def is_own(path: Path, records: Iterable[TableRecord]) -> bool:
 
     `records` are of what was written last, and before: they are noted first, and a kill may come between.
     """
-    try:
-        head = read_head(path, HEAD_BYTES)
-    except BlocksimError:
-        return False
-    return not head.strip(b"\0") or TableRecord.of(path) in records
+    return _is_of_kind(path, lambda _: TableRecord.of(path) in records)
 
 
 def columns_added(path: Path, records: Iterable[TableRecord]) -> list[str] | None:
@@ -94,21 +87,32 @@ def columns_added(path: Path, records: Iterable[TableRecord]) -> list[str] | Non
 
     None where some of those are not there: it is another table.
     """
-    present = _columns(header_of(path))
-    written = [columns for record in records if set(columns := _columns(record.header)) <= set(present)]
-    if not written:
+    present, *written = (next(csv.reader([one.header]), []) for one in (TableRecord.of(path), *records))
+    known = [columns for columns in written if set(columns) <= set(present)]
+    if not known:
         return None
-    return [name for name in present if name not in written[-1]] if written[-1] else []
-
-
-def _columns(header: str) -> list[str]:
-    return next(csv.reader([header]), [])
+    return [name for name in present if name not in known[-1]] if known[-1] else []
 
 
 def has_keys(*names: str) -> Kind:
     """Return the kind of content that is a JSON object with these keys near its start, however it is laid out."""
     keys = [re.compile(rb'"' + name.encode() + rb'"\s*:') for name in names]
     return lambda head: head.lstrip().startswith(b"{") and all(key.search(head) for key in keys)
+
+
+def _is_of_kind(path: Path, is_kind: Kind) -> bool:
+    """Return True for a file of a kind, or one that holds nothing: zeros are what a power failure leaves."""
+    try:
+        head = read_head(path, HEAD_BYTES)
+    except BlocksimError:
+        return False
+    return not head.strip(b"\0") or is_kind(head)
+
+
+def is_resolved(plan: Path) -> bool:
+    """Return True for a scenario (or the plan of a sweep) that blocksim wrote, False for that of a person."""
+    # a sweep has a line of its own before
+    return _is_of_kind(plan, lambda head: any(line.startswith(RESOLVED) for line in head.split(b"\n")[:2]))
 
 
 COPIES = (EXPERIMENT, MOTION, *BODY_MOTIONS)
@@ -125,7 +129,7 @@ def is_of_run(path: Path) -> bool:
     Only in the folder of a run: see `is_resolved`.
     """
     name = path.name
-    if not _is_plain_file(path):
+    if path.is_symlink() or not path.is_file():
         return False
     if name in COPIES:
         return name in copies(path.parent)
@@ -134,21 +138,13 @@ def is_of_run(path: Path) -> bool:
 
 def is_written(path: Path, kinds: Mapping[str, Kind], plan: str) -> bool:
     """Return True if a study wrote a file: one of these kinds, a copy that the plan beside it names, or a leftover."""
-    if not _is_plain_file(path):
+    if path.is_symlink() or not path.is_file():
         return False
     if path.name in COPIES:
         return path.name in copies(path.parent, plan)
     if path.name in kinds:
         return _is_of_kind(path, kinds[path.name])
     return is_leftover(path.name, (*kinds, *COPIES))
-
-
-def _is_of_kind(path: Path, kind: Kind) -> bool:
-    try:
-        head = read_head(path, HEAD_BYTES)
-    except BlocksimError:
-        return False
-    return not head.strip(b"\0") or kind(head)
 
 
 def is_leftover(name: str, names: Iterable[str]) -> bool:
@@ -171,36 +167,16 @@ def copies(folder: Path, plan: str = SCENARIO) -> frozenset[str]:
     """
     if not is_resolved(folder / plan):
         return frozenset()
-    listed = _listed(folder / origin_of(plan))
+    listed: dict[str, object] = {}
+    with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
+        listed = dict(json.loads(read_limited(folder / origin_of(plan), MOST_BYTES))["sha256"])
     lines = read_limited(folder / plan, MOST_BYTES).splitlines()
-    present = {name: listed.get(name) for name in COPIES if _is_plain_file(folder / name)}
+    present = [name for name in COPIES if (folder / name).is_file() and not (folder / name).is_symlink()]
     return frozenset(
         name
-        for name, digest in present.items()
-        if (f'table = "{name}"'.encode() in lines if digest is None else digest == sha256_of(folder / name))
+        for name in present
+        if (listed[name] == sha256_of(folder / name) if name in listed else f'table = "{name}"'.encode() in lines)
     )
-
-
-def _listed(path: Path) -> dict[str, object]:
-    """Return the checksums (hexadecimal) of files that a summary lists by name."""
-    try:
-        return dict(json.loads(read_limited(path, MOST_BYTES))["sha256"])
-    except (BlocksimError, ValueError, KeyError, TypeError, RecursionError):
-        return {}
-
-
-def is_resolved(plan: Path) -> bool:
-    """Return True for a scenario (or the plan of a sweep) that blocksim wrote, False for that of a person."""
-    try:
-        lines = read_head(plan, HEAD_BYTES).splitlines(keepends=True)
-    except BlocksimError:
-        return False
-    is_marked = any(line.startswith(RESOLVED) for line in lines[:2])  # a sweep has a line of its own before
-    return is_marked or not b"".join(lines).strip(b"\0")  # zeros or nothing are what a power failure leaves
-
-
-def _is_plain_file(path: Path) -> bool:
-    return path.is_file() and not path.is_symlink()
 
 
 def read_tables(scenario: Scenario) -> dict[str, bytes]:
@@ -226,9 +202,12 @@ def keep_scenario(
     """
     before = copies(folder, plan)
     refuse_foreign_copies(tables, folder, plan)
-    if _is_there(folder / plan) and not is_resolved(folder / plan):
-        raise _foreign(folder / plan)
-    text = head + resolved_text(scenario, tables, is_varied=plan != SCENARIO)
+    if os.path.lexists(folder / plan) and not is_resolved(folder / plan):
+        raise OutputExistsError(f"{folder / plan}: {CHANGED}")
+    names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
+    of_bodies = dict(zip(body_table_contents(scenario), BODY_MOTIONS, strict=False))
+    is_varied = plan != SCENARIO  # the base of others
+    text = head + scenario_to_toml(scenario, names[EXPERIMENT], names[MOTION], of_bodies, is_varied=is_varied)
     write_text(folder / plan, text)
     for name, content in tables.items():
         write_bytes(folder / name, content)
@@ -240,34 +219,12 @@ def keep_scenario(
 def refuse_foreign_copies(tables: Mapping[str, bytes], folder: Path, plan: str = SCENARIO) -> None:
     """Raise OutputExistsError where a table of somebody else has the name of a copy, and another content."""
     ours = copies(folder, plan)
-    for name, content in tables.items():
-        path = folder / name
-        if _is_there(path) and not (name in ours or _holds(path, content)):
-            raise _foreign(path)
-
-
-def _is_there(path: Path) -> bool:
-    return path.exists() or path.is_symlink()
-
-
-def _holds(path: Path, content: bytes) -> bool:
-    try:
-        return read_limited(path, len(content)) == content
-    except BlocksimError:
-        return False
-
-
-def _foreign(path: Path) -> OutputExistsError:
-    return OutputExistsError(
-        f"{path}: changed since blocksim wrote it; move it away, or write elsewhere with --out DIR"
-    )
-
-
-def resolved_text(scenario: Scenario, tables: Mapping[str, bytes], *, is_varied: bool = False) -> str:
-    """Return the resolved scenario (TOML) that refers to the copies beside it; the base of others is `is_varied`."""
-    names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
-    of_bodies = dict(zip(body_table_contents(scenario), BODY_MOTIONS, strict=False))
-    return scenario_to_toml(scenario, names[EXPERIMENT], names[MOTION], of_bodies, is_varied=is_varied)
+    for path, content in ((folder / name, content) for name, content in tables.items() if name not in ours):
+        is_same = False
+        with contextlib.suppress(BlocksimError):
+            is_same = read_limited(path, len(content)) == content
+        if os.path.lexists(path) and not is_same:
+            raise OutputExistsError(f"{path}: {CHANGED}")
 
 
 NAME = b"blocksim"
@@ -297,37 +254,33 @@ def refuse_foreign(path: Path, *, overwrite: bool = False) -> None:
 
     To be called before the work begins. Raises OutputError where the folder for the file is missing.
     """
-    if not (path.exists() or path.is_symlink()):
+    if not os.path.lexists(path):
         if not path.parent.exists():
-            message = f"{path}: cannot be written: there is no folder {path.parent}"
-            raise OutputError(message)
+            raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
         return
     try:
         with open_regular(path, links=True) as file:
-            if overwrite or _is_marked(file):
-                return
+            text = file.read(END_BYTES)
+            if (size := file.seek(0, os.SEEK_END)) > END_BYTES:
+                file.seek(max(END_BYTES, size - END_BYTES))
+                text += file.read()
     except BlocksimError as error:
-        message = f"{error}; write elsewhere with --out"
-        raise OutputExistsError(message) from None
-    message = f"{path}: already exists; rerun with --overwrite"
-    raise OutputExistsError(message)
-
-
-def _is_marked(file: BinaryIO) -> bool:
-    """Return True for a file that bears the mark of blocksim at its start or its end."""
-    text = file.read(END_BYTES)
-    if (size := file.seek(0, os.SEEK_END)) > END_BYTES:
-        file.seek(max(END_BYTES, size - END_BYTES))
-        text += file.read()
-    if text.startswith(b"%PDF-"):
-        return set(PDF_CREATOR.findall(text)) == {NAME}
-    return MARKS.search(text) is not None
+        raise OutputExistsError(f"{error}; write elsewhere with --out") from None
+    is_pdf = text.startswith(b"%PDF-")
+    is_marked = set(PDF_CREATOR.findall(text)) == {NAME} if is_pdf else MARKS.search(text) is not None
+    if not (overwrite or is_marked):
+        raise OutputExistsError(f"{path}: already exists; rerun with --overwrite")
 
 
 RESULTS = Path("results")
 DONE_BYTES = MEGABYTE  # of done.json
 PATIENCE = 30.0  # s that files of a study may take to change together; jobs of an array begin at the same time
 POLL = 0.01  # s
+FINISHED = "contains another run; --overwrite replaces it, --out DIR writes elsewhere"
+UNFINISHED = (
+    "contains an unfinished run (stopped or failed); --resume continues it, --overwrite replaces it, "
+    "--out DIR writes elsewhere"
+)
 
 
 def default_folder(scenario: Scenario) -> Path:
@@ -348,6 +301,15 @@ def holds_run(folder: Path, scenario: Scenario) -> bool:
     return False
 
 
+@contextlib.contextmanager
+def _locate_errors(place: Path, what: str, kind: type[BlocksimError] = OutputExistsError) -> Iterator[None]:
+    """Raise an error that names a folder, and what cannot be done to it, for what the system raises."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{place}: cannot be {what}: {error.strerror or error}") from error
+
+
 def make_folder(folder: Path) -> None:
     """Create a folder and those around it, where they are missing; links to folders are followed.
 
@@ -356,21 +318,14 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        message = f"{folder}: cannot be created: {_what_is_in_the_way(folder) or error.strerror or error}"
-        raise OutputExistsError(message) from error
-
-
-def _what_is_in_the_way(folder: Path) -> str:
-    """Return which part of a path is no folder and what it is instead, or nothing."""
-    try:
-        for place in (folder, *folder.parents):
-            if place.is_symlink() and not place.exists():
-                return f"{place} is a broken link"
-            if place.exists() and not place.is_dir():
-                return f"{place} is a file, not a folder"
-    except OSError:  # a name that is too long, which the system reports
-        pass
-    return ""
+        reason = error.strerror or str(error)
+        with contextlib.suppress(OSError):  # a name that is too long, which the system reports
+            for place in reversed((folder, *folder.parents)):
+                if place.is_symlink() and not place.exists():
+                    reason = f"{place} is a broken link"
+                elif place.exists() and not place.is_dir():
+                    reason = f"{place} is a file, not a folder"
+        raise OutputExistsError(f"{folder}: cannot be created: {reason}") from error
 
 
 def prepare_folder(folder: Path, *, overwrite: bool) -> None:
@@ -378,34 +333,44 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
 
     Raises OutputExistsError when something is there that may not go, or the folder cannot be created.
     """
-    try:
-        make_folder(folder)
-        present = {path.name for path in folder.iterdir()}
-        _refuse_foreign(folder, present)
+    make_folder(folder)
+    with _locate_errors(folder, "created"):
+        present = _run_files(folder)
         if present and not overwrite:
-            _refuse_finished(folder)
-            message = (
-                f"{folder}: contains an unfinished run (stopped or failed); --resume continues it, "
-                "--overwrite replaces it, --out DIR writes elsewhere"
-            )
-            raise OutputExistsError(message)
+            raise OutputExistsError(f"{folder}: {FINISHED if is_finished(folder) else UNFINISHED}")
         # the mark of a finished run goes first, and last what shows that this is the folder of a run
         for name in sorted(present, key=lambda name: (name != DONE, name == SCENARIO)):
             (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        message = f"{folder}: cannot be created: {error.strerror}"
-        raise OutputExistsError(message) from error
 
 
 def check_folder(folder: Path) -> None:
     """Raise OutputExistsError unless a run in this folder may continue: nothing but an unfinished run is there."""
-    try:
-        present = {path.name for path in folder.iterdir()}
-        _refuse_foreign(folder, present)
-        _refuse_finished(folder)
-    except OSError as error:
-        message = f"{folder}: cannot be read: {error.strerror}"
-        raise OutputExistsError(message) from error
+    with _locate_errors(folder, "read"):
+        _run_files(folder)
+        if is_finished(folder):
+            raise OutputExistsError(f"{folder}: {FINISHED}")
+
+
+def _run_files(folder: Path) -> set[str]:
+    """Return the names of what a run has written here. Raises OutputExistsError where there is anything else."""
+    present = {path.name for path in folder.iterdir()}
+    if foreign := _foreign_names(folder, present):
+        raise OutputExistsError(
+            f"{folder}: holds files that are not a blocksim run ({foreign[0]}); "
+            "move them away, or choose another folder with --out"
+        )
+    return present
+
+
+def _foreign_names(folder: Path, present: set[str]) -> list[str]:
+    """Return the names of files that no run has written; all, where there is no scenario that a run has resolved."""
+    is_resolved_here = is_resolved(folder / SCENARIO)
+    if SCENARIO in present and not is_resolved_here:
+        return [SCENARIO]
+    foreign = sorted(name for name in present if not is_of_run(folder / name))
+    if foreign or is_resolved_here:
+        return foreign
+    return sorted(name for name in present if not is_leftover(name, OURS))
 
 
 def takes_lock(handle: int) -> bool:
@@ -423,22 +388,20 @@ def takes_lock(handle: int) -> bool:
 
 
 @contextlib.contextmanager
-def brief_lock(folder: Path) -> Iterator[None]:
-    """Keep other processes out of a folder while files in it change together; waits for them to be ready.
+def brief_lock(
+    folder: Path, patience: float = PATIENCE, reason: str = "another process is writing here"
+) -> Iterator[None]:
+    """Keep other processes out of a folder while files in it change together; waits (s) for them to be ready.
 
-    Raises OutputExistsError where one has the folder for long, as a run in it, or where it cannot be opened.
+    Raises OutputExistsError with the reason where one has the folder longer, or where it cannot be opened.
     """
-    try:
+    with _locate_errors(folder, "opened"):
         handle = os.open(folder, os.O_RDONLY)
-    except OSError as error:
-        message = f"{folder}: cannot be opened: {error.strerror}"
-        raise OutputExistsError(message) from error
-    latest = time.monotonic() + PATIENCE
+    latest = time.monotonic() + patience
     try:
         while not takes_lock(handle):
             if time.monotonic() > latest:
-                message = f"{folder}: another process is writing here; wait for it, or write elsewhere with --out DIR"
-                raise OutputExistsError(message)
+                raise OutputExistsError(f"{folder}: {reason}; wait for it, or write elsewhere with --out DIR")
             time.sleep(POLL)
         yield
     finally:
@@ -453,35 +416,22 @@ def folder_lock(folder: Path) -> Iterator[None]:
     """
     missing = [place for place in (folder, *folder.parents) if not place.exists()]  # the innermost first
     make_folder(folder)
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError as error:
-        message = f"{folder}: cannot be opened: {error.strerror}"
-        raise OutputExistsError(message) from error
-    try:
-        if not takes_lock(handle):
-            message = f"{folder}: a run is in progress here; wait for it, or write elsewhere with --out DIR"
-            raise OutputExistsError(message)
+    with brief_lock(folder, 0.0, "a run is in progress here"):
         try:
             yield
         finally:
             with contextlib.suppress(OSError):  # not empty
                 for place in missing:
                     place.rmdir()
-    finally:
-        os.close(handle)
 
 
 def clear_remains(folder: Path, names: Iterable[str]) -> None:
     """Remove files of these names, and what was half written when a run was killed. Raises OutputError."""
     chosen = set(names)
-    try:
+    with _locate_errors(folder, "written", OutputError):
         for path in folder.iterdir():
             if path.name in chosen or is_leftover(path.name, OURS):
                 path.unlink(missing_ok=True)
-    except OSError as error:
-        message = f"{folder}: cannot be written: {error.strerror}"
-        raise OutputError(message) from error
 
 
 def remove_run(folder: Path) -> None:
@@ -489,36 +439,10 @@ def remove_run(folder: Path) -> None:
     if folder.is_symlink() or not folder.is_dir():
         return
     present = {path.name for path in folder.iterdir()}
-    if not _foreign_folder(folder, present):
+    if not _foreign_names(folder, present):
         for name in sorted(present, key=SCENARIO.__eq__):
             (folder / name).unlink(missing_ok=True)
         folder.rmdir()
-
-
-def _refuse_finished(folder: Path) -> None:
-    if is_finished(folder):
-        message = f"{folder}: contains another run; --overwrite replaces it, --out DIR writes elsewhere"
-        raise OutputExistsError(message)
-
-
-def _refuse_foreign(folder: Path, present: set[str]) -> None:
-    """Raise OutputExistsError unless everything here was written by a run."""
-    if foreign := _foreign_folder(folder, present):
-        raise OutputExistsError(
-            f"{folder}: holds files that are not a blocksim run ({foreign[0]}); "
-            "move them away, or choose another folder with --out"
-        )
-
-
-def _foreign_folder(folder: Path, present: set[str]) -> list[str]:
-    """Return the names of files that no run has written; all, where there is no scenario that a run has resolved."""
-    is_resolved_here = is_resolved(folder / SCENARIO)
-    if SCENARIO in present and not is_resolved_here:
-        return [SCENARIO]
-    foreign = sorted(name for name in present if not is_of_run(folder / name))
-    if foreign or is_resolved_here:
-        return foreign
-    return sorted(name for name in present if not is_leftover(name, OURS))
 
 
 def newest_finished(folder: Path) -> Path | None:

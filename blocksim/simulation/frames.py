@@ -286,8 +286,7 @@ def read_table(path: Path) -> Columns:
         text = read_limited(path, MOST_BYTES).decode()
         return _columns_of(line for line in csv.reader(io.StringIO(text, newline="")) if line)
     except (ValueError, csv.Error) as error:
-        message = f"{path}: not a final table: {error}"
-        raise InvalidInputError(message) from error
+        raise InvalidInputError(f"{path}: not a final table: {error}") from error
 
 
 def _columns_of(lines: Iterator[list[str]]) -> Columns:

@@ -123,8 +123,9 @@ def read_summary(path: Path) -> Summary:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
-        message = f"{path}: not the summary of a run: {place + ': ' if place else ''}{first['msg']}"
-        raise InvalidInputError(message) from None
+        raise InvalidInputError(
+            f"{path}: not the summary of a run: {place + ': ' if place else ''}{first['msg']}"
+        ) from None
 
 
 def changed_files(folder: Path, summary: Summary) -> tuple[str, ...]:
@@ -240,8 +241,7 @@ def read_final(folder: Path, scenario: Scenario) -> Columns:
     path = folder / files.FINAL
     columns = read_table(path)
     if columns["block"] != [body.name for body in place_bodies(scenario)]:
-        message = f"{path}: its blocks are not those of {files.SCENARIO}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: its blocks are not those of {files.SCENARIO}")
     return columns
 
 

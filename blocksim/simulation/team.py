@@ -38,8 +38,7 @@ class Team:
     def __init__(self, threads: int = 1) -> None:
         """Take as many as are asked for, however many cores there are. Raises ValueError for less than one."""
         if threads < 1:
-            message = f"threads must be at least 1, not {threads}"
-            raise ValueError(message)
+            raise ValueError(f"threads must be at least 1, not {threads}")
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
@@ -53,8 +52,7 @@ class Team:
                 everybody.wait()
             except RuntimeError as error:  # no more threads, or one that does not start
                 everybody.abort()
-                message = f"{self.threads} threads cannot be started here: {error}"
-                raise InvalidInputError(message) from error
+                raise InvalidInputError(f"{self.threads} threads cannot be started here: {error}") from error
         return self
 
     def __exit__(

@@ -136,11 +136,9 @@ def _last_blocks(frames: Frames, scenario: Scenario) -> Iterator[tuple[Floats, P
     """
     somewhere = np.isfinite([frames.x, frames.y, frames.angle]).all(axis=(0, 2))
     if not somewhere.any():
-        message = "no frame to export"
-        raise InvalidInputError(message)
+        raise InvalidInputError("no frame to export")
     if not frames.names:
-        message = "no block to export"
-        raise InvalidInputError(message)
+        raise InvalidInputError("no block to export")
     last = int(np.flatnonzero(somewhere)[-1])
     local = local_corners(frames.size_x, frames.size_y, frames.outlines)
     places = placed_points(local, frames.x[last], frames.y[last], frames.angle[last])
@@ -173,8 +171,7 @@ def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
         finite &= np.isfinite(track.values).all(axis=(1, 2))
     chosen = np.flatnonzero(finite)
     if len(chosen) == 0 or not any(track.values.size for track in frames.tracks):
-        message = "no frame to export"
-        raise InvalidInputError(message)
+        raise InvalidInputError("no frame to export")
     tracks = (*frames.tracks, supports_track(scenario, frames.tracks[0], frames.time))
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
@@ -277,6 +274,5 @@ FORMATS: dict[str, Format] = {
 def format_named(name: str) -> Format:
     """Return what writes files of a format. Raises InvalidInputError for an unknown one."""
     if name not in FORMATS:
-        message = f"--format {name}: unsupported format; use {' or '.join(FORMATS)}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"--format {name}: unsupported format; use {' or '.join(FORMATS)}")
     return FORMATS[name]

@@ -124,8 +124,7 @@ def refuse_damage(path: Path, what: str) -> Iterator[None]:
     except DAMAGE as error:
         text = " ".join(str(error).split())
         text = text if len(text) <= LONGEST_CAUSE else f"{text[:LONGEST_CAUSE]} ..."
-        message = f"{path}: {what}: {text}"
-        raise InvalidInputError(message) from error
+        raise InvalidInputError(f"{path}: {what}: {text}") from error
 
 
 @contextmanager
@@ -144,11 +143,9 @@ def open_hdf5(path: Path) -> Iterator[Any]:
         size = raw.seek(0, os.SEEK_END)
         signature, version, offsets, lengths, flags, base, extension, end, root, checksum = SUPERBLOCK.unpack(head)
         if size < end:
-            message = f"{path}: not a complete run file: cut off at {size} of {end} bytes"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{path}: not a complete run file: cut off at {size} of {end} bytes")
         if checksum != lookup3(head[:-4]) or offsets != SIZE_OF_ADDRESS:
-            message = f"{path}: not a readable HDF5 file: its superblock is damaged"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{path}: not a readable HDF5 file: its superblock is damaged")
         flags &= ~(WRITING | SWMR)
         closed = SUPERBLOCK.pack(signature, version, offsets, lengths, flags, base, extension, size, root, 0)[:-4]
         raw.head = closed + lookup3(closed).to_bytes(4, "little")

@@ -185,8 +185,7 @@ class FrameFile:
         except (OSError, RuntimeError) as error:
             self.is_broken = True
             number = getattr(error, "errno", None)
-            message = f"{self.path}: cannot be written: {os.strerror(number) if number else error}"
-            raise OutputError(message) from error
+            raise OutputError(f"{self.path}: cannot be written: {os.strerror(number) if number else error}") from error
 
     def __enter__(self) -> Self:
         """Return itself."""
