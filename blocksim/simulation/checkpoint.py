@@ -5,11 +5,11 @@ import io
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
@@ -26,7 +26,7 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.atomic import atomic_file
 from blocksim.simulation.folder import CHECKPOINTS
 from blocksim.simulation.provenance import code_hashes, code_version, machine
-from blocksim.simulation.recorder import Recorder, Rows, rows_of_frames
+from blocksim.simulation.recorder import Recorder, rows_of_frames
 from blocksim.simulation.result import EventRecord, RestState
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stores.hdf5 import read_probes, read_systems
@@ -107,13 +107,17 @@ def write_checkpoint(path: Path, scene: AnyScene, position: Position, origin: Or
     arrays = arrays_of(scene)
     types = tuple(ArrayType(str(array.dtype), array.shape) for array in arrays)
     head = CheckpointHead(format=FORMAT, position=position, origin=origin, arrays=types)
+    digest = hashlib.sha256()
     with atomic_file(path) as file:
-        hashed = _Hashed(file)
-        hashed.write(head.model_dump_json().encode() + b"\n")
-        for array in arrays:
-            content = np.frombuffer(np.ascontiguousarray(array).tobytes(), dtype=np.uint8)
-            npy.write_array(hashed, content, allow_pickle=False)
-        file.write(hashed.digest())
+        for array in (None, *arrays):
+            part = io.BytesIO()
+            if array is None:
+                part.write(head.model_dump_json().encode() + b"\n")
+            else:
+                npy.write_array(part, np.frombuffer(array.tobytes(), dtype=np.uint8), allow_pickle=False)
+            digest.update(part.getbuffer())
+            file.write(part.getbuffer())
+        file.write(digest.digest())
 
 
 def read_checkpoint(path: Path) -> StoredCheckpoint:
@@ -153,39 +157,21 @@ def restore_scene(stored: StoredCheckpoint, built: AnyScene) -> AnyScene:
     return scene
 
 
-def _filled(part: Any, arrays: Iterator[tuple[ArrayType, NDArray[np.uint8]]], path: Path) -> Any:
+def _filled(part: Any, contents: Iterator[tuple[ArrayType, NDArray[np.uint8]]], path: Path) -> Any:
+    """Return a part of a scene with other contents; the size of an array may differ where lists have grown."""
     if part is None:
         return None
-    if isinstance(part, np.ndarray):
-        return _array_like(part, *next(arrays), path)
-    return with_parts(part, [_filled(one, arrays, path) for one in part])
-
-
-def _array_like(built: NDArray[Any], kind: ArrayType, content: NDArray[np.uint8], path: Path) -> NDArray[Any]:
-    """Return an array of the type of `built` with other content; its size may differ where lists have grown."""
+    if not isinstance(part, np.ndarray):
+        return with_parts(part, [_filled(one, contents, path) for one in part])
+    kind, content = next(contents)
     count = math.prod(kind.shape)
-    is_alike = kind.dtype == str(built.dtype) and len(kind.shape) == built.ndim and min(kind.shape, default=0) >= 0
-    if not is_alike or content.size != count * built.dtype.itemsize:
+    is_alike = kind.dtype == str(part.dtype) and len(kind.shape) == part.ndim and min(kind.shape, default=0) >= 0
+    if not is_alike or content.size != count * part.dtype.itemsize:
         raise InvalidInputError(f"{path}: an array {kind} does not fit this scene")
-    array: NDArray[Any] = zeros(kind.shape, built.dtype).view(type(built))
+    array: NDArray[Any] = zeros(kind.shape, part.dtype).view(type(part))
     if count:
-        array[...] = content.view(built.dtype).reshape(kind.shape)
+        array[...] = content.view(part.dtype).reshape(kind.shape)
     return array
-
-
-class _Hashed:
-    """A file to be written to, with the checksum of what was."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self.file = file
-        self.hash = hashlib.sha256()
-
-    def write(self, content: bytes) -> int:
-        self.hash.update(content)
-        return self.file.write(content)
-
-    def digest(self) -> bytes:
-        return self.hash.digest()
 
 
 CHECKPOINT_SECONDS = 60.0
@@ -239,15 +225,6 @@ class Past:
     step: int | None = None  # of that checkpoint
     settled: RestState | None = None  # how it came to rest before time zero, where it did
 
-    @classmethod
-    def of(cls, path: Path, position: Position) -> "Past":
-        """Return the past of a run that continues from a checkpoint."""
-        parts = (*position.resumed_from, position.step)
-        return cls(position.total_seconds, parts, path, position.step, position.settled)
-
-
-NO_PAST = Past()
-
 
 @dataclass
 class CheckpointWriter:
@@ -258,7 +235,7 @@ class CheckpointWriter:
     sync: Callable[[], None]  # brings all frames so far to the disk
     periods: tuple[int, ...] = ()  # in steps
     seconds: float = CHECKPOINT_SECONDS  # of wall time between two
-    past: Past = NO_PAST
+    past: Past = Past()
 
     def __post_init__(self) -> None:
         """Write nothing yet; the checkpoint that the run continues from is the last one to be replaced."""
@@ -293,10 +270,8 @@ class CheckpointWriter:
 
 
 MOST_NAMED = 6  # differences in a message
-NONE = "none"
 REMEDY = "--overwrite starts again"
 REMEDIES = f"{REMEDY}, --out DIR keeps both"
-STARTS_ANEW = "the run starts again"
 
 
 @dataclass(frozen=True)
@@ -304,80 +279,30 @@ class Resumption:
     """Where a run continues, and what its user should know about that."""
 
     checkpoint: StoredCheckpoint | None = None  # None: at the start
-    remarks: tuple[str, ...] = ()
-
-
-NEW = Resumption()
+    remarks: tuple[str, ...] = ()  # that the summary keeps as warnings
+    notes: tuple[str, ...] = ()
 
 
 def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
-    """Return where the run of a scenario can continue in a folder.
+    """Return where the run of a scenario can continue in a folder: at the checkpoint of the most steps that is whole.
 
     Raises InvalidInputError where another scenario or another version of the code has begun there, with what differs,
     or where no checkpoint is whole; OutputExistsError where the folder holds something else.
     """
     if not folder.exists() or not any(folder.iterdir()):
-        return NEW
+        which = "an unfinished run of another scenario or code version is in"
+        others = files.unfinished_siblings(folder)
+        return Resumption(notes=tuple(f"nothing to resume in {folder}; {which} {other}" for other in others))
     files.check_folder(folder)
     paths = [folder / name for name in files.CHECKPOINTS if (folder / name).is_file()]
     if not paths:
-        _refuse_other_start(folder, scenario)
-        return Resumption(remarks=(f"{folder}: no checkpoint saved; {STARTS_ANEW}",))
-    return _newest_good(paths, scenario)
-
-
-def remarks_on(found: Resumption, folder: Path) -> Iterator[str]:
-    """Yield what the user of a run that is to be resumed should know, a line each."""
-    yield from found.remarks
-    if found.checkpoint is not None:
-        position = found.checkpoint.position
-        yield f"resuming at step {position.step} ({position.frames} frames recorded): {folder}"
-    if found is NEW:
-        for other in files.unfinished_siblings(folder):
-            yield f"nothing to resume in {folder}; an unfinished run of another scenario or code version is in {other}"
-
-
-def stored_frames(folder: Path, recorder: Recorder) -> Rows:
-    """Return the frames at output times that an earlier part of a run has left. Raises what reading them raises.
-
-    Frames after the checkpoint are among them, as the run would only repeat them; that of the moment at which it was
-    stopped is not.
-    """
-    rows = rows_of_frames(read_systems(folder / files.FRAMES, recorder.systems))
-    return rows.chosen(np.array([recorder.is_output_time(step) for step in rows.steps.tolist()]))
-
-
-def check_frames(stored: StoredCheckpoint, recorder: Recorder) -> None:
-    """Raise InvalidInputError where frames before a checkpoint are missing, or are not as they were recorded.
-
-    `recorder` has taken over all frames that there are.
-    """
-    position = stored.position
-    path, count = stored.path.parent / files.FRAMES, recorder.count_until(position.step)
-    if count != position.frames:
-        raise InvalidInputError(
-            f"{path}: holds {count} of the {position.frames} frames before step {position.step}, at which "
-            f"{stored.path.name} resumes; {REMEDY}"
-        )
-    if recorder.digest_until(position.step) != position.frames_sha256:
-        raise InvalidInputError(
-            f"{path}: changed after the interruption: the {count} frames before step {position.step} do not "
-            f"match the SHA-256 in {stored.path.name}; {REMEDY}"
-        )
-
-
-def take_over_probes(stored: StoredCheckpoint, scenario: Scenario, recorder: Recorder) -> None:
-    """Begin with the samples of probes before a checkpoint. Raises InvalidInputError where some are missing."""
-    if recorder.probes.all:
-        path = stored.path.parent / files.FRAMES
-        missing = recorder.probes.take_over(read_probes(path, scenario), stored.position.step)
-        if missing:
-            where = f"before step {stored.position.step}, at which {stored.path.name} resumes"
-            raise InvalidInputError(f"{path}: samples of probe {missing[0]} are missing {where}; {REMEDY}")
-
-
-def _newest_good(paths: list[Path], scenario: Scenario) -> Resumption:
-    """Return the checkpoint of the most steps among those that are whole."""
+        path = folder / files.SCENARIO
+        try:
+            begun = load_stored(path)
+        except BlocksimError:  # killed before it was written, or damaged: there is nothing here to lose
+            begun = scenario
+        _refuse_other(path, "scenario", deciding_values(begun), deciding_values(scenario))
+        return Resumption(remarks=(f"{folder}: no checkpoint saved; the run starts again",))
     remarks: list[str] = []
     whole: list[StoredCheckpoint] = []
     for path in paths:
@@ -387,70 +312,71 @@ def _newest_good(paths: list[Path], scenario: Scenario) -> Resumption:
             remarks.append(str(error))
     whole.sort(key=lambda stored: stored.position.step)
     if not whole:
-        raise InvalidInputError("\n".join([*remarks, f"{paths[0].parent}: no checkpoint is complete; {REMEDY}"]))
+        raise InvalidInputError("\n".join([*remarks, f"{folder}: no checkpoint is complete; {REMEDY}"]))
     newest, origin = whole[-1], origin_of(scenario)
-    refuse_other(newest.path, newest.head.origin, origin)
+    was, position = newest.head.origin, newest.position
+    _refuse_other(newest.path, "scenario", was.scenario, origin.scenario)
+    _refuse_other(newest.path, "version of the code", was.versions, origin.versions)
+    rooms = [f"blocksim/{room}" for room in origin.rooms if was.rooms.get(room) != origin.rooms[room]]
+    if rooms:
+        what = f"of another version of the code: it differs in {', '.join(rooms)}"
+        raise InvalidInputError(f"{newest.path}: {what}; {REMEDIES}")
     if remarks:
         remarks.append(f"resuming from the other checkpoint, {newest.path.name}")
-    if newest.head.origin.machine != origin.machine:
-        was = newest.head.origin.machine
-        remarks.append(f"this part runs on another machine than before ({was}): the last digits may differ")
-    return Resumption(newest, tuple(remarks))
+    if was.machine != origin.machine:
+        remarks.append(f"this part runs on another machine than before ({was.machine}): the last digits may differ")
+    note = f"resuming at step {position.step} ({position.frames} frames recorded): {folder}"
+    return Resumption(newest, tuple(remarks), (note,))
 
 
-def _refuse_other_start(folder: Path, scenario: Scenario) -> None:
-    """Raise InvalidInputError where the unfinished run in a folder is of another scenario."""
-    path = folder / files.SCENARIO
-    try:
-        begun = load_stored(path)
-    except BlocksimError:  # killed before it was written, or damaged: there is nothing in this folder to lose
-        return
-    refuse_other_scenario(path, deciding_values(begun), deciding_values(scenario))
+def take_over(stored: StoredCheckpoint, scenario: Scenario, recorder: Recorder) -> None:
+    """Let a recorder begin with the frames at output times, and samples of probes, that earlier parts have left.
+
+    Frames after the checkpoint are among them, as the run would only repeat them; that of the moment at which it was
+    stopped is not. Raises what reading them raises, and InvalidInputError where some before the checkpoint are missing,
+    or are not as they were recorded.
+    """
+    position, path = stored.position, stored.path.parent / files.FRAMES
+    rows = rows_of_frames(read_systems(path, recorder.systems))
+    recorder.take_over(rows.chosen(np.array([recorder.is_output_time(step) for step in rows.steps.tolist()])))
+    count = recorder.count_until(position.step)
+    before = f"before step {position.step}, at which {stored.path.name} resumes; {REMEDY}"
+    if count != position.frames:
+        raise InvalidInputError(f"{path}: holds {count} of the {position.frames} frames {before}")
+    if recorder.digest_until(position.step) != position.frames_sha256:
+        raise InvalidInputError(
+            f"{path}: changed after the interruption: the {count} frames before step {position.step} do not "
+            f"match the SHA-256 in {stored.path.name}; {REMEDY}"
+        )
+    if recorder.probes.all:
+        missing = recorder.probes.take_over(read_probes(path, scenario), position.step)
+        if missing:
+            raise InvalidInputError(f"{path}: samples of probe {missing[0]} are missing {before}")
 
 
-def refuse_other(path: Path, old: Origin, new: Origin) -> None:
+def _refuse_other(path: Path, what: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
     """Raise InvalidInputError, which names what differs, where a run would continue to other bits."""
-    refuse_other_scenario(path, old.scenario, new.scenario)
-    changed = [*_changed(old.versions, new.versions)]
+    before, after = dict(_flat(old)), dict(_flat(new))
+    pairs = [(key, before.get(key), after.get(key)) for key in dict.fromkeys([*before, *after])]
+    changed = [
+        " ".join([key, *("none" if one is None else str(one) for one in (was, "->", now))])
+        for key, was, now in pairs
+        if was != now
+    ]
     if changed:
-        raise InvalidInputError(f"{path}: of another version of the code: {_listed(changed)}; {REMEDIES}")
-    rooms = [room for room in new.rooms if old.rooms.get(room) != new.rooms[room]]
-    if rooms:
-        where = _listed([f"blocksim/{room}" for room in rooms])
-        raise InvalidInputError(f"{path}: of another version of the code: it differs in {where}; {REMEDIES}")
-
-
-def refuse_other_scenario(path: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
-    """Raise InvalidInputError, which names the keys, where two scenarios differ in what decides the motion."""
-    changed = [*_changed(dict(_flat(old)), dict(_flat(new)))]
-    if changed:
-        raise InvalidInputError(f"{path}: of another scenario: {_listed(changed)}; {REMEDIES}")
+        more = f" and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
+        listed = ", ".join(changed[:MOST_NAMED]) + more
+        raise InvalidInputError(f"{path}: of another {what}: {listed}; {REMEDIES}")
 
 
 def _flat(data: object, key: str = "") -> Iterator[tuple[str, object]]:
     """Yield all values with their keys, as --set names them."""
-    entries: Sequence[tuple[object, object]] = ()
+    entries: Iterable[tuple[object, object]] = ()
     if isinstance(data, Mapping):
-        entries = [*data.items()]
+        entries = data.items()
     elif isinstance(data, list | tuple):
-        entries = [*enumerate(data)]
+        entries = enumerate(data)
     else:
         yield key, data
     for name, value in entries:
         yield from _flat(value, f"{key}.{name}" if key else str(name))
-
-
-def _changed(old: Mapping[str, object], new: Mapping[str, object]) -> Iterator[str]:
-    for key in dict.fromkeys([*old, *new]):
-        before, after = old.get(key), new.get(key)
-        if before != after:
-            yield f"{key} {_shown(before)} -> {_shown(after)}"
-
-
-def _shown(value: object) -> str:
-    return NONE if value is None else str(value)
-
-
-def _listed(changed: Sequence[str]) -> str:
-    more = len(changed) - MOST_NAMED
-    return ", ".join(changed[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -3,7 +3,7 @@
 import math
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -21,19 +21,14 @@ from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import (
     DEFAULTS,
-    NEW,
-    NO_PAST,
     CheckpointPolicy,
     CheckpointWriter,
     Past,
     Resumption,
-    check_frames,
     find_resumption,
     origin_of,
-    remarks_on,
     restore_scene,
-    stored_frames,
-    take_over_probes,
+    take_over,
 )
 from blocksim.simulation.compilation import compile_kernels, compile_systems, kernels_of
 from blocksim.simulation.events import Timeline
@@ -88,34 +83,30 @@ PROMISE = 5e-3  # error of a slip
 SAMPLES = 20_000  # of twice the duration of a pulse
 
 
-def onset_warning(scenario: Scenario, placed: Sequence[PlacedBody], world: World, settled: RestState | None) -> str:
-    """Return a warning where springs make a slip under an abrupt pulse too large by more than the promise."""
+def _onset_warnings(
+    scenario: Scenario, placed: Sequence[PlacedBody], world: World, settled: RestState | None
+) -> Iterator[str]:
+    """Yield a warning where springs make a slip under an abrupt pulse too large by more than the promise."""
     pulse = scenario.motion
     if not isinstance(pulse, Pulse) or not pulse.is_abrupt or not scenario.time.has_springs:
-        return ""
+        return
     if (settled is not None and pulse.start == 0.0) or scenario.ground.tilt != 0.0:
-        return ""
-    worst, name = max(_errors(scenario, pulse, placed, world), default=(0.0, ""))
-    if worst <= PROMISE:
-        return ""
-    return (
-        f"the pulse begins at its peak: springs give way before block {name} slips, and its slip is some {worst:.1%} "
-        "too large (as 1/sqrt(contact.stiffness_scale)); begin the pulse at time zero, or raise the scale"
-    )
-
-
-def _errors(
-    scenario: Scenario, pulse: Pulse, placed: Sequence[PlacedBody], world: World
-) -> Iterator[tuple[float, str]]:
-    """Yield the relative error of the slip of every block that slips on the ground, and its name."""
-    ground = int(world.bodies[-1]["contact_class"])
-    for body, one in zip(world.bodies[:-1], placed, strict=True):
+        return
+    ground, errors = int(world.bodies[-1]["contact_class"]), [(0.0, "")]
+    for body, one in zip(world.bodies[:-1], placed, strict=True):  # those that slip on the ground
         values = world.interactions[int(body["contact_class"]), ground]
         stiffness = 2.0 * float(values["normal_stiffness"] * values["shear_ratio"])
         limit = float(values["kinetic_friction"]) * scenario.gravity
         if stiffness > 0.0 and limit < pulse.amplitude and not one.fixed:
             gained = GAINED * pulse.amplitude * math.sqrt(one.mass / stiffness)
-            yield gained / mean_slip_rate(scenario, pulse, limit), one.name
+            errors.append((gained / mean_slip_rate(scenario, pulse, limit), one.name))
+    worst, name = max(errors)
+    if worst > PROMISE:
+        yield (
+            f"the pulse begins at its peak: springs give way before block {name} slips, and its slip is some "
+            f"{worst:.1%} too large (as 1/sqrt(contact.stiffness_scale)); begin the pulse at time zero, or raise the "
+            "scale"
+        )
 
 
 def mean_slip_rate(scenario: Scenario, pulse: Pulse, limit: float) -> float:
@@ -159,10 +150,9 @@ def simulate(
     built = build(scenario)
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
-    with _attended(built.scene, scenario, threads, limit, on_progress) as (team, control):
+    with _attended(built.scene, scenario, recorder, threads, limit, on_progress) as (team, control):
         scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
-        watched = replace(control, timeline=_timeline(scenario, recorder))
-        ended = run_loop(scene, recorder, scenario.time.end, team=team, control=watched)
+        ended = run_loop(scene, recorder, scenario.time.end, team=team, control=control)
     return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
 
 
@@ -190,20 +180,55 @@ def simulate_into(
     refuse_full_disk(folder, scenario, built.scene)
     tables = read_tables(scenario)
     with folder_lock(folder):
-        resumption = find_resumption(folder, scenario) if resume else NEW
-        for remark in remarks_on(resumption, folder) if resume else ():
+        resumption = find_resumption(folder, scenario) if resume else Resumption()
+        for remark in (*resumption.remarks, *resumption.notes):
             listener.on_remark(remark)
         began += _compiled(scenario, listener)
-        with _attended(built.scene, scenario, threads, limit, on_progress) as (team, control):
-            settled = None if resumption.checkpoint is None else resumption.checkpoint.position.settled
-            if resumption.checkpoint is None:
+        recorder, stored = _recorder(scenario, built), resumption.checkpoint
+        with _attended(built.scene, scenario, recorder, threads, limit, on_progress) as (team, control):
+            if stored is None:
                 scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
-                built = built._replace(scene=scene)
-            segment = RunSegment(scenario, folder, built, resumption, settled)
-            toml = segment.prepare(tables, overwrite=overwrite or resume)
-            ended = segment.run(toml, precautions, team, control)
-            result = _result(scenario, segment.recorder, ended, time.perf_counter() - began, settled)
-            return keep_result(result, segment.account(result.summary), folder)
+                past = Past(settled=settled)
+                files.prepare_folder(folder, overwrite=overwrite or resume)
+            else:
+                scene, position = restore_scene(stored, built.scene), stored.position
+                settled, parts = position.settled, (*position.resumed_from, position.step)
+                past = Past(position.total_seconds, parts, stored.path, position.step, settled)
+                take_over(stored, scenario, recorder)
+            toml = keep_scenario(scenario, tables, folder)
+            with FrameFile(
+                folder / files.FRAMES,
+                recorder.placed,
+                recorder.time_step,
+                toml,
+                ledger=ledger_names(scene),
+                kept=recorder.held,
+                others=recorder.systems[1:],
+                contacts=scenario.output.contacts,
+                probes=recorder.probes,
+            ) as sink:
+                recorder.pour_into(sink)
+                # of the part before
+                files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(scenario)))
+                periods = precautions.periods(recorder.time_step)
+                seconds = precautions.checkpoint_seconds
+                writer = CheckpointWriter(folder, origin_of(scenario), sink.sync, periods, seconds, past)
+                with_writer, since = replace(control, checkpoints=writer), stored and stored.position
+                ended = run_loop(scene, recorder, scenario.time.end, team=team, control=with_writer, since=since)
+            result = _result(scenario, recorder, ended, time.perf_counter() - began, settled)
+            altered, warnings = recorder.altered, (*resumption.remarks, *result.summary.warnings)
+            if altered:
+                more = f" and {len(altered) - 1} more" if len(altered) > 1 else ""
+                where = f"{folder / files.FRAMES}: the frame of step {altered[0]}{more}"
+                text = f"{where} differs from the recomputed one: it was changed after recording"
+                warnings = (*resumption.remarks, text, *result.summary.warnings)
+            whole_run = {
+                "total_seconds": past.seconds + result.summary.total_seconds,
+                "resumed_from": past.resumed_from,
+                "last_checkpoint": None if result.status == "finished" else writer.last_step,
+                "warnings": warnings,
+            }
+            return keep_result(result, result.summary.model_copy(update=whole_run), folder)
 
 
 def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> float:
@@ -218,17 +243,13 @@ def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> floa
 
 @contextmanager
 def _attended(
-    scene: AnyScene, scenario: Scenario, threads: int, limit: WallTime, on_progress: Watcher
+    scene: AnyScene, scenario: Scenario, recorder: Recorder, threads: int, limit: WallTime, on_progress: Watcher
 ) -> Iterator[tuple[Team, RunControl]]:
-    """Give the threads of a run, and what stops it: a signal, or the limit of wall time."""
+    """Give the threads of a run, its events, and what stops it: a signal, or the limit of wall time."""
     elements = sum(one.count for one in others_of(scenario))
+    timeline = Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
     with stop_requests() as requests, team_for(scene, threads, elements) as team:
-        yield team, RunControl(on_progress, lambda: requests.reason() or limit.reason())
-
-
-def _timeline(scenario: Scenario, recorder: Recorder) -> Timeline | None:
-    """Return the events of a run, None where it has none."""
-    return Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
+        yield team, RunControl(on_progress, lambda: requests.reason() or limit.reason(), timeline=timeline)
 
 
 def _recorder(scenario: Scenario, built: Built) -> Recorder:
@@ -240,102 +261,18 @@ def _recorder(scenario: Scenario, built: Built) -> Recorder:
     )
 
 
-class RunSegment:
-    """A run, or a part of one that was resumed, in its folder: its frames and checkpoints."""
-
-    def __init__(
-        self, scenario: Scenario, folder: Path, built: Built, resumption: Resumption, settled: RestState | None = None
-    ) -> None:
-        """Take the scene at time zero and go to the checkpoint, if there is one.
-
-        Nothing is written yet. Raises InvalidInputError where the checkpoint or the frames before it do not fit.
-        """
-        self.scenario, self.folder, self.resumption = scenario, folder, resumption
-        stored = resumption.checkpoint
-        self.scene = built.scene if stored is None else restore_scene(stored, built.scene)
-        self.recorder = _recorder(scenario, built)
-        self.step = self.recorder.time_step
-        self.past = replace(NO_PAST, settled=settled)
-        if stored is not None:
-            self.past = Past.of(stored.path, stored.position)
-            self.recorder.take_over(stored_frames(folder, self.recorder))
-            check_frames(stored, self.recorder)
-            take_over_probes(stored, scenario, self.recorder)
-
-    def prepare(self, tables: Mapping[str, bytes], *, overwrite: bool) -> str:
-        """Make the folder ready for this part; return the resolved scenario. Raises OutputExistsError, OutputError."""
-        if self.resumption.checkpoint is None:
-            files.prepare_folder(self.folder, overwrite=overwrite)
-        return keep_scenario(self.scenario, tables, self.folder)
-
-    def run(self, toml: str, precautions: CheckpointPolicy, team: Team, control: RunControl) -> LoopResult:
-        """Run to the end or an interruption; the file of the frames says `toml`. Raises OutputError."""
-        with FrameFile(
-            self.folder / files.FRAMES,
-            self.recorder.placed,
-            self.step,
-            toml,
-            ledger=ledger_names(self.scene),
-            kept=self.recorder.held,
-            others=self.recorder.systems[1:],
-            contacts=self.scenario.output.contacts,
-            probes=self.recorder.probes,
-        ) as sink:
-            self.recorder.pour_into(sink)
-            files.clear_remains(
-                self.folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(self.scenario))
-            )  # of the part before
-            self.writer = CheckpointWriter(
-                self.folder,
-                origin_of(self.scenario),
-                sink.sync,
-                precautions.periods(self.step),
-                precautions.checkpoint_seconds,
-                self.past,
-            )
-            control = replace(control, checkpoints=self.writer, timeline=_timeline(self.scenario, self.recorder))
-            since = self.resumption.checkpoint and self.resumption.checkpoint.position
-            return run_loop(self.scene, self.recorder, self.scenario.time.end, team=team, control=control, since=since)
-
-    def account(self, summary: Summary) -> Summary:
-        """Return the summary of this part as that of the whole run."""
-        last = None if summary.status == "finished" else self.writer.last_step
-        altered, warnings = self.recorder.altered, self.resumption.remarks
-        if altered:
-            more = f" and {len(altered) - 1} more" if len(altered) > 1 else ""
-            where = f"{self.folder / files.FRAMES}: the frame of step {altered[0]}{more}"
-            text = f"{where} differs from the recomputed one: it was changed after recording"
-            warnings = (*warnings, text)
-        return summary.model_copy(
-            update={
-                "total_seconds": self.past.seconds + summary.total_seconds,
-                "resumed_from": self.past.resumed_from,
-                "last_checkpoint": last,
-                "warnings": (*warnings, *summary.warnings),
-            }
-        )
-
-
 def _result(
     scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float, settled: RestState | None
 ) -> Result:
     frames = recorder.frames()
-    summary = _summary(scenario, recorder, ended, seconds)
-    added = [text for text in [onset_warning(scenario, recorder.placed, ended.scene.world, settled)] if text]
-    summary = summary.model_copy(update={"settled": settled, "warnings": (*summary.warnings, *added)})
-    probes = recorder.probes.series()
-    return Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
-
-
-def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float) -> Summary:
     world = ended.scene.world
-    step = float(world.controls[0].step)
+    step, outcome = float(world.controls[0].step), ended.outcome
     steps, ground = int(world.clock[0].steps), world.bodies[-1]
-    return Summary(
+    summary = Summary(
         name=scenario.name,
-        status=ended.outcome.status,
-        reason=ended.outcome.reason,
-        exit_code=ended.outcome.exit_code,
+        status=outcome.status,
+        reason=outcome.reason,
+        exit_code=outcome.exit_code,
         run=run_hash(scenario),
         scenario_hash=scenario_hash(scenario),
         final_state_sha256=state_hash(ended.scene),
@@ -348,14 +285,19 @@ def _summary(scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds:
         total_seconds=seconds,
         energy_J=ended.ledger,
         threads=ended.threads,
+        settled=settled,
         events=ended.events,
         movement=Movement.of(recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step),
-        warnings=tuple(_warnings(scenario, recorder.placed, ended)),
+        warnings=tuple(_warnings(scenario, recorder.placed, ended, settled)),
         environment=environment(),
     )
+    probes = recorder.probes.series()
+    return Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
 
 
-def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResult) -> Iterator[str]:
+def _warnings(
+    scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResult, settled: RestState | None
+) -> Iterator[str]:
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {RESIDUAL_PROMISE:g}"
@@ -368,3 +310,4 @@ def _warnings(scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResul
         sunk = scheme_of(ended.scene).warning(ended.scene, ended.overlap, smallest_width(placed))
         if sunk:
             yield sunk
+    yield from _onset_warnings(scenario, placed, ended.scene.world, settled)
