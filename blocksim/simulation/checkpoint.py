@@ -19,15 +19,12 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
-from blocksim.scenario import Scenario, load_stored
-from blocksim.scenario.resolved import deciding_values
-from blocksim.scenario.units import TIME, Quantity
+from blocksim.scenario import Scenario, load_stored, resolved, units
+from blocksim.scenario.units import TIME
+from blocksim.simulation import atomic, provenance, result
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import atomic_file
 from blocksim.simulation.folder import CHECKPOINTS
-from blocksim.simulation.provenance import code_hashes, code_version, machine
 from blocksim.simulation.recorder import Recorder, rows_of_frames
-from blocksim.simulation.result import EventRecord, RestState
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stores.hdf5 import read_probes, read_systems
 from blocksim.world.build import arrays_of, with_parts
@@ -49,9 +46,9 @@ class Position(BaseModel, frozen=True):
     solver_seconds: float  # of wall time, in all parts so far
     total_seconds: float = 0.0
     threads: int  # that it ran on; it can continue with any number
-    settled: RestState | None = None  # how it came to rest before time zero, where it did
+    settled: result.RestState | None = None  # how it came to rest before time zero, where it did
     resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run were resumed
-    events: tuple[EventRecord, ...] = ()  # that have happened so far
+    events: tuple[result.EventRecord, ...] = ()  # that have happened so far
 
 
 class Origin(BaseModel, frozen=True):
@@ -95,10 +92,10 @@ class StoredCheckpoint(NamedTuple):
 def origin_of(scenario: Scenario) -> Origin:
     """Return what a run of a scenario comes from, here and now."""
     return Origin(
-        scenario=deciding_values(scenario),
-        versions={"blocksim": code_version(), **{name: metadata.version(name) for name in COMPILERS}},
-        rooms=code_hashes(),
-        machine=machine(),
+        scenario=resolved.deciding_values(scenario),
+        versions={"blocksim": provenance.code_version(), **{name: metadata.version(name) for name in COMPILERS}},
+        rooms=provenance.code_hashes(),
+        machine=provenance.machine(),
     )
 
 
@@ -108,7 +105,7 @@ def write_checkpoint(path: Path, scene: AnyScene, position: Position, origin: Or
     types = tuple(ArrayType(str(array.dtype), array.shape) for array in arrays)
     head = CheckpointHead(format=FORMAT, position=position, origin=origin, arrays=types)
     digest = hashlib.sha256()
-    with atomic_file(path) as file:
+    with atomic.atomic_file(path) as file:
         for array in (None, *arrays):
             part = io.BytesIO()
             if array is None:
@@ -176,7 +173,7 @@ def _filled(part: Any, contents: Iterator[tuple[ArrayType, NDArray[np.uint8]]], 
 
 CHECKPOINT_SECONDS = 60.0
 NEVER = sys.maxsize  # steps
-SECONDS = Quantity(TIME, above=0.0)
+SECONDS = units.Quantity(TIME, above=0.0)
 
 
 @dataclass(frozen=True)
@@ -223,7 +220,7 @@ class Past:
     resumed_from: tuple[int, ...] = ()
     checkpoint: Path | None = None  # from which this part continues
     step: int | None = None  # of that checkpoint
-    settled: RestState | None = None  # how it came to rest before time zero, where it did
+    settled: result.RestState | None = None  # how it came to rest before time zero, where it did
 
 
 @dataclass
@@ -271,6 +268,7 @@ class CheckpointWriter:
 
 MOST_NAMED = 6  # differences in a message
 REMEDY = "--overwrite starts again"
+STARTS_ANEW = "the run starts again"
 REMEDIES = f"{REMEDY}, --out DIR keeps both"
 
 
@@ -301,8 +299,8 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
             begun = load_stored(path)
         except BlocksimError:  # killed before it was written, or damaged: there is nothing here to lose
             begun = scenario
-        _refuse_other(path, "scenario", deciding_values(begun), deciding_values(scenario))
-        return Resumption(remarks=(f"{folder}: no checkpoint saved; the run starts again",))
+        _refuse_other(path, "scenario", resolved.deciding_values(begun), resolved.deciding_values(scenario))
+        return Resumption(remarks=(f"{folder}: no checkpoint saved; {STARTS_ANEW}",))
     remarks: list[str] = []
     whole: list[StoredCheckpoint] = []
     for path in paths:

@@ -14,9 +14,7 @@ from typing import Self
 from pydantic import BaseModel
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
-from blocksim.scenario import Scenario, body_table_contents, motion_table_content, scenario_to_toml
-from blocksim.scenario.events import probe_names
-from blocksim.scenario.input_files import MEGABYTE, open_regular, read_head, read_limited
+from blocksim.scenario import Scenario, body_table_contents, events, input_files, motion_table_content, scenario_to_toml
 from blocksim.scenario.models.motion import MOST_BODY_TABLES
 from blocksim.scenario.resolved import MARK
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
@@ -37,8 +35,8 @@ CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run c
 OURS = (SCENARIO, EXPERIMENT, MOTION, *BODY_MOTIONS, FINAL, SOILS, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 HEAD_BYTES = 4096
 LONGEST_HEADER = 100_000  # bytes
-MOST_BYTES = 10 * MEGABYTE  # of a scenario or a summary
-TABLE_BYTES = MEGABYTE  # of a table of an experiment, which is not read if larger
+MOST_BYTES = 10 * input_files.MEGABYTE  # of a scenario or a summary
+TABLE_BYTES = input_files.MEGABYTE  # of a table of an experiment, which is not read if larger
 RESOLVED = MARK.encode()
 CHANGED = "changed since blocksim wrote it; move it away, or write elsewhere with --out DIR"
 Kind = Callable[[bytes], bool]  # whether the first HEAD_BYTES of a file are of a kind
@@ -103,7 +101,7 @@ def has_keys(*names: str) -> Kind:
 def _is_of_kind(path: Path, is_kind: Kind) -> bool:
     """Return True for a file of a kind, or one that holds nothing: zeros are what a power failure leaves."""
     try:
-        head = read_head(path, HEAD_BYTES)
+        head = input_files.read_head(path, HEAD_BYTES)
     except BlocksimError:
         return False
     return not head.strip(b"\0") or is_kind(head)
@@ -120,7 +118,7 @@ COPIES = (EXPERIMENT, MOTION, *BODY_MOTIONS)
 
 def probe_tables(scenario: Scenario) -> list[str]:
     """Return the names of the CSV files of the probes of a scenario."""
-    return [f"{PROBE}{name}.csv" for name in probe_names(scenario)]
+    return [f"{PROBE}{name}.csv" for name in events.probe_names(scenario)]
 
 
 def is_of_run(path: Path) -> bool:
@@ -169,8 +167,8 @@ def copies(folder: Path, plan: str = SCENARIO) -> frozenset[str]:
         return frozenset()
     listed: dict[str, object] = {}
     with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
-        listed = dict(json.loads(read_limited(folder / origin_of(plan), MOST_BYTES))["sha256"])
-    lines = read_limited(folder / plan, MOST_BYTES).splitlines()
+        listed = dict(json.loads(input_files.read_limited(folder / origin_of(plan), MOST_BYTES))["sha256"])
+    lines = input_files.read_limited(folder / plan, MOST_BYTES).splitlines()
     present = [name for name in COPIES if (folder / name).is_file() and not (folder / name).is_symlink()]
     return frozenset(
         name
@@ -186,7 +184,7 @@ def read_tables(scenario: Scenario) -> dict[str, bytes]:
     """
     tables = {}
     if scenario.experiment is not None:
-        tables[EXPERIMENT] = read_limited(scenario.experiment.table, TABLE_BYTES, links=True)
+        tables[EXPERIMENT] = input_files.read_limited(scenario.experiment.table, TABLE_BYTES, links=True)
     tables |= dict(zip(BODY_MOTIONS, body_table_contents(scenario).values(), strict=False))
     motion = motion_table_content(scenario)
     return tables if motion is None else {**tables, MOTION: motion}
@@ -222,7 +220,7 @@ def refuse_foreign_copies(tables: Mapping[str, bytes], folder: Path, plan: str =
     for path, content in ((folder / name, content) for name, content in tables.items() if name not in ours):
         is_same = False
         with contextlib.suppress(BlocksimError):
-            is_same = read_limited(path, len(content)) == content
+            is_same = input_files.read_limited(path, len(content)) == content
         if os.path.lexists(path) and not is_same:
             raise OutputExistsError(f"{path}: {CHANGED}")
 
@@ -259,7 +257,7 @@ def refuse_foreign(path: Path, *, overwrite: bool = False) -> None:
             raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
         return
     try:
-        with open_regular(path, links=True) as file:
+        with input_files.open_regular(path, links=True) as file:
             text = file.read(END_BYTES)
             if (size := file.seek(0, os.SEEK_END)) > END_BYTES:
                 file.seek(max(END_BYTES, size - END_BYTES))
@@ -273,7 +271,7 @@ def refuse_foreign(path: Path, *, overwrite: bool = False) -> None:
 
 
 RESULTS = Path("results")
-DONE_BYTES = MEGABYTE  # of done.json
+DONE_BYTES = input_files.MEGABYTE  # of done.json
 PATIENCE = 30.0  # s that files of a study may take to change together; jobs of an array begin at the same time
 POLL = 0.01  # s
 FINISHED = "contains another run; --overwrite replaces it, --out DIR writes elsewhere"
@@ -296,7 +294,7 @@ def is_finished(folder: Path) -> bool:
 def holds_run(folder: Path, scenario: Scenario) -> bool:
     """Return True if the folder holds a finished run of exactly this scenario and code."""
     with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
-        done = json.loads(read_limited(folder / DONE, DONE_BYTES))
+        done = json.loads(input_files.read_limited(folder / DONE, DONE_BYTES))
         return bool(done["run"] == run_hash(scenario))
     return False
 

@@ -13,36 +13,17 @@ import numpy as np
 
 from blocksim.errors import OutputError
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import PlacedBody, Scenario, scenario_hash
+from blocksim.scenario import PlacedBody, Scenario, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
-from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
-from blocksim.scenario.placement import smallest_width
 from blocksim.silence import silent
+from blocksim.simulation import checkpoint, compilation, events, ledger, loop, observables, provenance, settling
 from blocksim.simulation import folder as files
-from blocksim.simulation.checkpoint import (
-    DEFAULTS,
-    CheckpointPolicy,
-    CheckpointWriter,
-    Past,
-    Resumption,
-    find_resumption,
-    origin_of,
-    restore_scene,
-    take_over,
-)
-from blocksim.simulation.compilation import compile_kernels, compile_systems, kernels_of
-from blocksim.simulation.events import Timeline
 from blocksim.simulation.folder import CHECKPOINTS, folder_lock, keep_scenario, probe_tables, read_tables
 from blocksim.simulation.frames import final_columns
-from blocksim.simulation.ledger import RESIDUAL_PROMISE
-from blocksim.simulation.loop import LoopResult, RunControl, Watcher, last_step_of, run_loop
-from blocksim.simulation.observables import Movement
 from blocksim.simulation.probes import MovingSupport, bytes_of_series, probes_of
-from blocksim.simulation.provenance import environment, run_hash, state_hash
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import RestState, Result, Summary, describe_event, keep_result
 from blocksim.simulation.schemes import AnyScene, build, ledger_names, scheme_of
-from blocksim.simulation.settling import initial_scene
 from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.stores.hdf5_writer import FrameFile
 from blocksim.simulation.team import Team, team_for
@@ -68,7 +49,7 @@ def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
 
 def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
     """Return the bytes that the frames of a run and its checkpoints take at most."""
-    steps = last_step_of(scenario.time.end, float(scene.world.controls[0].step))
+    steps = loop.last_step_of(scenario.time.end, float(scene.world.controls[0].step))
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
     bodies, particles = scene.world.bodies.size - 1, scene.world.particles
     contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
@@ -112,7 +93,7 @@ def _onset_warnings(
 def mean_slip_rate(scenario: Scenario, pulse: Pulse, limit: float) -> float:
     """Return the mean velocity (m/s) of the first slip of a rigid block whose friction gives it `limit` (m/s2)."""
     times = pulse.start + np.linspace(0.0, 2.0 * pulse.resolved_duration, SAMPLES + 1)
-    _, velocity = displacement_and_velocity(motion_pieces(scenario), times)
+    _, velocity = motion.displacement_and_velocity(motion.motion_pieces(scenario), times)
     most = limit * float(times[1] - times[0])
     block = float(velocity[0])
     slip: list[float] = []
@@ -140,7 +121,7 @@ NO_CALLBACKS = RunCallbacks()
 
 
 def simulate(
-    scenario: Scenario, *, threads: int = 1, on_progress: Watcher = silent, wall_time: float | None = None
+    scenario: Scenario, *, threads: int = 1, on_progress: loop.Watcher = silent, wall_time: float | None = None
 ) -> Result:
     """Run a scenario in memory, without writing anything. A signal or the limit of wall time (s) interrupts it.
 
@@ -151,8 +132,8 @@ def simulate(
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
     with _attended(built.scene, scenario, recorder, threads, limit, on_progress) as (team, control):
-        scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
-        ended = run_loop(scene, recorder, scenario.time.end, team=team, control=control)
+        scene, settled = settling.initial_scene(built.scene, scenario, built.placed, team, control.stop)
+        ended = loop.run_loop(scene, recorder, scenario.time.end, team=team, control=control)
     return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
 
 
@@ -163,8 +144,8 @@ def simulate_into(
     overwrite: bool = False,
     resume: bool = False,
     threads: int = 1,
-    precautions: CheckpointPolicy = DEFAULTS,
-    on_progress: Watcher = silent,
+    precautions: checkpoint.CheckpointPolicy = checkpoint.DEFAULTS,
+    on_progress: loop.Watcher = silent,
     listener: RunCallbacks = NO_CALLBACKS,
 ) -> Result:
     """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
@@ -180,21 +161,21 @@ def simulate_into(
     refuse_full_disk(folder, scenario, built.scene)
     tables = read_tables(scenario)
     with folder_lock(folder):
-        resumption = find_resumption(folder, scenario) if resume else Resumption()
+        resumption = checkpoint.find_resumption(folder, scenario) if resume else checkpoint.Resumption()
         for remark in (*resumption.remarks, *resumption.notes):
             listener.on_remark(remark)
         began += _compiled(scenario, listener)
         recorder, stored = _recorder(scenario, built), resumption.checkpoint
         with _attended(built.scene, scenario, recorder, threads, limit, on_progress) as (team, control):
             if stored is None:
-                scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
-                past = Past(settled=settled)
+                scene, settled = settling.initial_scene(built.scene, scenario, built.placed, team, control.stop)
+                past = checkpoint.Past(settled=settled)
                 files.prepare_folder(folder, overwrite=overwrite or resume)
             else:
-                scene, position = restore_scene(stored, built.scene), stored.position
+                scene, position = checkpoint.restore_scene(stored, built.scene), stored.position
                 settled, parts = position.settled, (*position.resumed_from, position.step)
-                past = Past(position.total_seconds, parts, stored.path, position.step, settled)
-                take_over(stored, scenario, recorder)
+                past = checkpoint.Past(position.total_seconds, parts, stored.path, position.step, settled)
+                checkpoint.take_over(stored, scenario, recorder)
             toml = keep_scenario(scenario, tables, folder)
             with FrameFile(
                 folder / files.FRAMES,
@@ -212,9 +193,11 @@ def simulate_into(
                 files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(scenario)))
                 periods = precautions.periods(recorder.time_step)
                 seconds = precautions.checkpoint_seconds
-                writer = CheckpointWriter(folder, origin_of(scenario), sink.sync, periods, seconds, past)
+                writer = checkpoint.CheckpointWriter(
+                    folder, checkpoint.origin_of(scenario), sink.sync, periods, seconds, past
+                )
                 with_writer, since = replace(control, checkpoints=writer), stored and stored.position
-                ended = run_loop(scene, recorder, scenario.time.end, team=team, control=with_writer, since=since)
+                ended = loop.run_loop(scene, recorder, scenario.time.end, team=team, control=with_writer, since=since)
             result = _result(scenario, recorder, ended, time.perf_counter() - began, settled)
             altered, warnings = recorder.altered, (*resumption.remarks, *result.summary.warnings)
             if altered:
@@ -234,22 +217,22 @@ def simulate_into(
 def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> float:
     """Compile what a run needs and return the seconds it took, which are no part of the run. Raises OutputError."""
     began = time.perf_counter()
-    kernels = kernels_of(scenario)
+    kernels = compilation.kernels_of(scenario)
     listener.on_start(kernels)
-    compile_kernels(kernels)
-    compile_systems(scenario)
+    compilation.compile_kernels(kernels)
+    compilation.compile_systems(scenario)
     return time.perf_counter() - began
 
 
 @contextmanager
 def _attended(
-    scene: AnyScene, scenario: Scenario, recorder: Recorder, threads: int, limit: WallTime, on_progress: Watcher
-) -> Iterator[tuple[Team, RunControl]]:
+    scene: AnyScene, scenario: Scenario, recorder: Recorder, threads: int, limit: WallTime, on_progress: loop.Watcher
+) -> Iterator[tuple[Team, loop.RunControl]]:
     """Give the threads of a run, its events, and what stops it: a signal, or the limit of wall time."""
     elements = sum(one.count for one in others_of(scenario))
-    timeline = Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
+    timeline = events.Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
     with stop_requests() as requests, team_for(scene, threads, elements) as team:
-        yield team, RunControl(on_progress, lambda: requests.reason() or limit.reason(), timeline=timeline)
+        yield team, loop.RunControl(on_progress, lambda: requests.reason() or limit.reason(), timeline=timeline)
 
 
 def _recorder(scenario: Scenario, built: Built) -> Recorder:
@@ -262,7 +245,7 @@ def _recorder(scenario: Scenario, built: Built) -> Recorder:
 
 
 def _result(
-    scenario: Scenario, recorder: Recorder, ended: LoopResult, seconds: float, settled: RestState | None
+    scenario: Scenario, recorder: Recorder, ended: loop.LoopResult, seconds: float, settled: RestState | None
 ) -> Result:
     frames = recorder.frames()
     world = ended.scene.world
@@ -273,41 +256,43 @@ def _result(
         status=outcome.status,
         reason=outcome.reason,
         exit_code=outcome.exit_code,
-        run=run_hash(scenario),
+        run=provenance.run_hash(scenario),
         scenario_hash=scenario_hash(scenario),
-        final_state_sha256=state_hash(ended.scene),
+        final_state_sha256=provenance.state_hash(ended.scene),
         steps=steps,
         time_step_s=step,
         simulated_time_s=steps * step,
         ended_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        compile_seconds=compile_kernels(kernels_of(scenario, recorder.placed)),
+        compile_seconds=compilation.compile_kernels(compilation.kernels_of(scenario, recorder.placed)),
         solver_seconds=ended.solver_seconds,
         total_seconds=seconds,
         energy_J=ended.ledger,
         threads=ended.threads,
         settled=settled,
         events=ended.events,
-        movement=Movement.of(recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step),
+        movement=observables.Movement.of(
+            recorder.watch, recorder.held[-1].states[0], (ground.vx, ground.vy), steps * step
+        ),
         warnings=tuple(_warnings(scenario, recorder.placed, ended, settled)),
-        environment=environment(),
+        environment=provenance.environment(),
     )
     probes = recorder.probes.series()
     return Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
 
 
 def _warnings(
-    scenario: Scenario, placed: Sequence[PlacedBody], ended: LoopResult, settled: RestState | None
+    scenario: Scenario, placed: Sequence[PlacedBody], ended: loop.LoopResult, settled: RestState | None
 ) -> Iterator[str]:
     residual, every = ended.ledger.relative_residual, scenario.output.every
-    if residual > RESIDUAL_PROMISE:
-        yield f"relative energy error {residual:.1e}, above {RESIDUAL_PROMISE:g}"
+    if residual > ledger.RESIDUAL_PROMISE:
+        yield f"relative energy error {residual:.1e}, above {ledger.RESIDUAL_PROMISE:g}"
     if is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from warnings_of(scenario)
     for number in ended.pending if ended.outcome.is_finished else ():
         yield f"events.{number} has not happened, as nothing came to rest: {describe_event(scenario.events[number])}"
     if ended.outcome.is_finished and placed:
-        sunk = scheme_of(ended.scene).warning(ended.scene, ended.overlap, smallest_width(placed))
+        sunk = scheme_of(ended.scene).warning(ended.scene, ended.overlap, placement.smallest_width(placed))
         if sunk:
             yield sunk
     yield from _onset_warnings(scenario, placed, ended.scene.world, settled)

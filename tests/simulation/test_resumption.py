@@ -196,7 +196,7 @@ def test_other_scenario_is_refused_with_the_keys(begun: Path) -> None:
 
 
 def test_other_code_is_refused_with_what_differs(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    origin = "blocksim.simulation.checkpoint"
+    origin = "blocksim.simulation.provenance"
     other = {**code_hashes(), "kernels": "new", "world": "new"}
     monkeypatch.setattr(f"{origin}.code_hashes", lambda: other)
     with pytest.raises(InvalidInputError, match="it differs in blocksim/kernels, blocksim/world; --overwrite"):

@@ -17,16 +17,14 @@ from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.structures.polygons import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
-from blocksim.simulation.atomic import atomic_path, write_bytes, write_text
-from blocksim.simulation.folder import DXF_PROPERTY, GEOJSON_MARK
+from blocksim.simulation import atomic, folder, probes
 from blocksim.simulation.frames import BODIES, UNITS, Contacts, Frames
-from blocksim.simulation.probes import TABLE_UNITS
 from blocksim.world.systems.blocks import BLOCKS, are_removed, distinct, local_corners, placed_points, supports_track
 from blocksim.world.systems.system import Floats, System, Track
 
 FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
 CONTACT_NUMBERS = sorted(UNITS, key=lambda name: "m1N".index(UNITS[name]))  # lengths, directions, forces
-CONTACT_COLUMNS = ("time_s", *BODIES, *(f"{name}{TABLE_UNITS[UNITS[name]][0]}" for name in CONTACT_NUMBERS))
+CONTACT_COLUMNS = ("time_s", *BODIES, *(f"{name}{probes.TABLE_UNITS[UNITS[name]][0]}" for name in CONTACT_NUMBERS))
 NOBODY = ""
 """Name of what is no block: the ground, or a wall."""
 
@@ -60,7 +58,7 @@ def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
     names = np.array([*frames.names, NOBODY], dtype=object)  # the support has number -1
 
     def table(rows: NDArray[Any]) -> Iterator[tuple[Any, ...]]:
-        columns = [TABLE_UNITS[UNITS[name]][1] * rows[name] for name in CONTACT_NUMBERS]
+        columns = [probes.TABLE_UNITS[UNITS[name]][1] * rows[name] for name in CONTACT_NUMBERS]
         return zip(*(names[rows[name]] for name in BODIES), *(column.tolist() for column in columns), strict=True)
 
     _write(path, CONTACT_COLUMNS, frames.time, map(table, contacts.tables()))
@@ -69,7 +67,7 @@ def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
 
 def _write(path: Path, heads: Sequence[str], times: Floats, tables: Iterable[Iterable[tuple[Any, ...]]]) -> None:
     """Write a table of rows at each of the times (s); what is not finite is an empty cell."""
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with atomic.atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(heads)
         for time, rows in zip(times.tolist(), tables, strict=True):
@@ -103,7 +101,7 @@ def write_geojson(path: Path, frames: Frames, scenario: Scenario) -> int:
         for corners, body, rotation in _last_blocks(frames, scenario)
     ]
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
-    write_text(path, f'{{{GEOJSON_MARK}, "type": "FeatureCollection", "features": [\n{lines}\n]}}\n')
+    atomic.write_text(path, f'{{{folder.GEOJSON_MARK}, "type": "FeatureCollection", "features": [\n{lines}\n]}}\n')
     return len(features)
 
 
@@ -116,7 +114,7 @@ def write_dxf(path: Path, frames: Frames, scenario: Scenario) -> int:
     ezdxf = load_module("ezdxf", f"writing {path.name}", DXF)
     blocks = [*_last_blocks(frames, scenario)]
     document = ezdxf.new("R2010", units=METRES)
-    document.header.custom_vars.append(*DXF_PROPERTY)
+    document.header.custom_vars.append(*folder.DXF_PROPERTY)
     document.appids.new(DXF_APPLICATION)
     space = document.modelspace()
     for corners, body, _ in blocks:
@@ -124,7 +122,7 @@ def write_dxf(path: Path, frames: Frames, scenario: Scenario) -> int:
         line = space.add_lwpolyline(corners.tolist(), close=True, dxfattribs=layer)
         name = CONTROLS.sub("_", body.name)[:MOST_LETTERS]
         line.set_xdata(DXF_APPLICATION, [(DXF_TEXT, name), (DXF_INTEGER, int(body.fixed))])
-    with atomic_path(path) as temporary:
+    with atomic.atomic_path(path) as temporary:
         document.saveas(temporary)
     return len(blocks)
 
@@ -178,7 +176,7 @@ def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
         _write_grid(file.create_group("VTKHDF"), tracks, frames.time[chosen], chosen)
         names = [name.encode() for name in frames.names]
         file.create_dataset("blocksim/block_names", data=names, dtype=h5py.string_dtype())
-    write_bytes(path, content.getbuffer())
+    atomic.write_bytes(path, content.getbuffer())
     return len(chosen)
 
 

@@ -17,15 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import Scenario, place_bodies
-from blocksim.scenario.events import probe_names
-from blocksim.scenario.input_files import check_regular, read_head
+from blocksim.scenario import Scenario, events, input_files, place_bodies
+from blocksim.simulation import probes, recorder
 from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames, empty_rows
-from blocksim.simulation.probes import CHUNK_ROWS, ProbeSeries
-from blocksim.simulation.recorder import Frame, Rows, frames_from_rows
 from blocksim.world.free_memory import available_bytes, readable
-from blocksim.world.systems import others_of
-from blocksim.world.systems.blocks import blocks_placed
+from blocksim.world.systems import blocks, others_of
 from blocksim.world.systems.system import System, SystemInScene
 
 PARTICLES, OBSERVABLES, CONTACTS, PROBES = "particles", "observables", "contacts", "probes"
@@ -46,7 +42,7 @@ class DataSet:
     of: Callable[[Any], Values]  # its rows in frames, or in a ProbeSeries
     kind: Any = np.float64
     row: tuple[int, ...] = ()  # shape of a row
-    chunk: int = CHUNK_ROWS  # rows
+    chunk: int = probes.CHUNK_ROWS  # rows
     is_sum: bool = False  # what it counts goes on from its last row
 
 
@@ -92,7 +88,7 @@ def sets_of_contacts() -> Iterator[DataSet]:
     """Yield the data sets with a row a contact."""
     none = empty_rows(0)
 
-    def column(name: str, frames: Sequence[Frame]) -> Values:
+    def column(name: str, frames: Sequence[recorder.Frame]) -> Values:
         return np.concatenate([(none if one.contacts is None else one.contacts)[name] for one in frames])
 
     for name, unit in {**dict.fromkeys(BODIES, "1"), **UNITS}.items():
@@ -133,7 +129,7 @@ def open_hdf5(path: Path) -> Iterator[Any]:
 
     One that its writer has not closed is read as if it were: HDF5 itself refuses it, or reads damage for ever.
     """
-    check_regular(path)  # again by name below: HDF5 opens most files by itself
+    input_files.check_regular(path)  # again by name below: HDF5 opens most files by itself
     with refuse_damage(path, "not a readable HDF5 file"), ClosedFileView(path) as raw:
         head = raw.read(SUPERBLOCK.size)
         if not _is_open(head):
@@ -256,19 +252,19 @@ def refuse_too_many(path: Path, sets: dict[str, Any], rows: int, what: str = "fr
         )
 
 
-def read_probes(path: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
+def read_probes(path: Path, scenario: Scenario) -> dict[str, probes.ProbeSeries]:
     """Return the samples of all probes of a scenario in a run file, by name.
 
     Raises InputMissingError, or InvalidInputError for a damaged file or one without these probes.
     """
-    names = probe_names(scenario)
+    names = events.probe_names(scenario)
     if not names:
         return {}
     with open_hdf5(path) as file, refuse_damage(path, "its probes cannot be read"):
         return {name: _samples(path, file, name) for name in names}
 
 
-def _samples(path: Path, file: Any, name: str) -> ProbeSeries:
+def _samples(path: Path, file: Any, name: str) -> probes.ProbeSeries:
     place = f"{PROBES}/{name}"
     count = int(data_set(file, f"{place}/{COMMITTED}", 0)[()])
     sets = {one: data_set(file, f"{place}/{one}", 1) for one in group(file, place) if one != COMMITTED}
@@ -281,7 +277,7 @@ def _samples(path: Path, file: Any, name: str) -> ProbeSeries:
     times = np.asarray(sets.pop(PROBE_TIME)[:count], dtype=np.float64)
     columns = {one: np.asarray(data[:count], dtype=np.float64) for one, data in sets.items()}
     units = {one: str(data.attrs["unit"]) for one, data in sets.items()}
-    return ProbeSeries(name, kind, steps, times, columns, units)
+    return probes.ProbeSeries(name, kind, steps, times, columns, units)
 
 
 def read_frames(path: Path, scenario: Scenario) -> Frames:
@@ -289,7 +285,7 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
 
     Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty.
     """
-    return read_systems(path, (blocks_placed(place_bodies(scenario)), *others_of(scenario)))
+    return read_systems(path, (blocks.blocks_placed(place_bodies(scenario)), *others_of(scenario)))
 
 
 def read_systems(path: Path, systems: Sequence[SystemInScene]) -> Frames:
@@ -302,7 +298,7 @@ def read_systems(path: Path, systems: Sequence[SystemInScene]) -> Frames:
         try:
             with open_hdf5(path) as file, refuse_damage(path, "not a complete run file"):
                 time_step, rows = _read(path, file, systems)
-            return frames_from_rows(systems, time_step, rows)
+            return recorder.frames_from_rows(systems, time_step, rows)
         except InvalidInputError:
             pause = next(pauses, None)
             if pause is None or not is_left_open(path):
@@ -313,12 +309,12 @@ def read_systems(path: Path, systems: Sequence[SystemInScene]) -> Frames:
 def is_left_open(path: Path) -> bool:
     """Return True if a file has a writer who has not closed it: a run that continues, or was killed."""
     try:
-        return _is_open(read_head(path, SUPERBLOCK.size))
+        return _is_open(input_files.read_head(path, SUPERBLOCK.size))
     except BlocksimError:
         return False
 
 
-def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, Rows]:
+def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, recorder.Rows]:
     """Return step (s) and rows of all committed frames, after looking at what would be read."""
     count = int(data_set(file, COMMITTED, 0)[()])
     ledger = tuple(name for name in group(file, OBSERVABLES) if name not in COUNTED_UNITS)
@@ -343,7 +339,7 @@ def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[floa
         np.stack([values[place] for place in places_of(one.system)], axis=1, dtype=np.float64) for one in systems
     )
     contacts = _contacts(path, file, count, systems[0].count)
-    return time_step, Rows(steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts)
+    return time_step, recorder.Rows(steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts)
 
 
 def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | None:

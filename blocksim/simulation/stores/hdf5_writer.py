@@ -22,9 +22,8 @@ import numpy as np
 
 from blocksim.errors import OutputError
 from blocksim.scenario import PlacedBody
-from blocksim.simulation.atomic import PERMISSIONS, permissions_of, sync_file
+from blocksim.simulation import atomic, recorder
 from blocksim.simulation.probes import NO_PROBES, Probes
-from blocksim.simulation.recorder import Frame
 from blocksim.simulation.stores import hdf5 as layout
 from blocksim.world.memory import chunk_rows
 from blocksim.world.systems.blocks import blocks_placed
@@ -46,7 +45,7 @@ class FrameFile:
         scenario_toml: str,
         *,
         ledger: Sequence[str],
-        kept: Iterable[Frame] = (),
+        kept: Iterable[recorder.Frame] = (),
         others: Sequence[SystemInScene] = (),
         contacts: bool = False,
         probes: Probes = NO_PROBES,
@@ -72,7 +71,7 @@ class FrameFile:
         }
         self.count = 0
         self.is_broken = False
-        self.waiting: list[Frame] = []
+        self.waiting: list[recorder.Frame] = []
         self.flushed_at = -np.inf
         self.flush_seconds = 0.0
         unnamed = path.with_name(f".{path.name}.new")
@@ -90,7 +89,7 @@ class FrameFile:
                 self.waiting.extend(kept)
                 if self.waiting:  # and with them the samples of probes
                     self.sync()
-                unnamed.chmod(permissions_of(path) or permissions_of(unnamed) or PERMISSIONS)
+                unnamed.chmod(atomic.permissions_of(path) or atomic.permissions_of(unnamed) or atomic.PERMISSIONS)
                 unnamed.replace(path)
             except BaseException:
                 with contextlib.suppress(OSError, RuntimeError):
@@ -129,7 +128,7 @@ class FrameFile:
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(self.file.id.get_vfd_handle(), self.file.id.get_filesize(), size + RESERVE)
 
-    def append(self, frame: Frame) -> None:
+    def append(self, frame: recorder.Frame) -> None:
         """Take one frame; writes what has come together a few times a second. Raises OutputError."""
         self.waiting.append(frame)
         self.keep_up()
@@ -210,4 +209,4 @@ class FrameFile:
             with self.path.open("r+b") as file:  # cut off what was reserved, which HDF5 knows nothing of
                 *_, end, _, _ = layout.SUPERBLOCK.unpack(file.read(layout.SUPERBLOCK.size))
                 file.truncate(end)
-            sync_file(self.path)  # no mark of a finished run may outlive its frames
+            atomic.sync_file(self.path)  # no mark of a finished run may outlive its frames
