@@ -1,30 +1,21 @@
 """The scenes that are measured, made here so that they need no file, and how they are timed again and again."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode
+from blocksim.kernels.common.arrays import World
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.models.stepping import IMPULSES, Nonsmooth
-from blocksim.simulation.loop import BY_CODE
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.loop import BY_CODE, Outcome
+from blocksim.simulation.schemes import AnyScene, build_scene
 from blocksim.simulation.team import ALONE, Team
 from blocksim.world.build import arrays_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from blocksim.kernels.common.arrays import World
-    from blocksim.scenario import Scenario
-    from blocksim.simulation.loop import Outcome
-    from blocksim.simulation.schemes import AnyScene
-
 
 Table = Mapping[str, object]
 
@@ -109,10 +100,11 @@ class RunFailedError(BlocksimError):
 
 
 class TimedRun(NamedTuple):
-    """The scene at the end, and the CPU seconds of this process that it took to get there."""
+    """The scene at the end, and the seconds that it took to get there."""
 
     scene: AnyScene
-    seconds: float
+    seconds: float  # CPU time of this process
+    waited: float  # of the clock
     outcome: Outcome
 
     @property
@@ -142,50 +134,29 @@ class Rerun:
         scene = build_scene(scenario)
         scene.world.bodies.x[:-1] += shift
         self.scene, _ = ALONE.advance(scene, 0)
+        self.step = float(self.scene.world.controls[0].step)  # s
         self._arrays = arrays_of(self.scene)
+        self.bytes = sum(array.nbytes for array in self._arrays)  # memory of the scene
         self.keep()
 
     def keep(self) -> None:
         """Start from the present state from now on."""
         self._saved = [array.copy() for array in self._arrays]
 
-    @property
-    def step(self) -> float:
-        """Length of a step (s)."""
-        return float(self.scene.world.controls[0].step)
-
-    @property
-    def bytes(self) -> int:
-        """Memory of all arrays of the scene."""
-        return sum(array.nbytes for array in self._arrays)
-
-    def run(self, last_step: int) -> TimedRun:
+    def run(self, last_step: int, team: Team = ALONE) -> TimedRun:
         """Advance from the start to a step, or until all rests; more room for pairs is part of it.
 
         Raises RunFailedError: the time of a failed run is meaningless.
         """
-        timed = self.attempt(last_step)
-        _refuse_failed(timed.outcome)
+        timed = self.attempt(last_step, team)
+        if not timed.outcome.is_finished:
+            raise RunFailedError(f"a run that was to be timed failed: {timed.outcome.reason}")
         return timed
 
-    def attempt(self, last_step: int) -> TimedRun:
+    def attempt(self, last_step: int, team: Team = ALONE) -> TimedRun:
         """Do the same, but return a failed run too."""
-        self.restore()
-        began = time.process_time()
-        scene, status = ALONE.advance(self.scene, last_step)
-        return TimedRun(scene, time.process_time() - began, BY_CODE[status])
-
-    def restore(self) -> None:
-        """Go back to the start."""
         for array, saved in zip(self._arrays, self._saved, strict=True):
             np.copyto(array, saved)
-
-    def advance(self, last_step: int, team: Team) -> None:
-        """Continue from the present state. Raises RunFailedError."""
-        _, status = team.advance(self.scene, last_step)
-        _refuse_failed(BY_CODE[status])
-
-
-def _refuse_failed(outcome: Outcome) -> None:
-    if not outcome.is_finished:
-        raise RunFailedError(f"a run that was to be timed failed: {outcome.reason}")
+        cpu, clock = time.process_time(), time.perf_counter()
+        scene, status = team.advance(self.scene, last_step)
+        return TimedRun(scene, time.process_time() - cpu, time.perf_counter() - clock, BY_CODE[status])

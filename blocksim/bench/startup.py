@@ -1,7 +1,5 @@
 """Start of the command: waiting time of the user, in wall time."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -9,14 +7,13 @@ import tempfile
 import time
 from pathlib import Path
 
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeat
+from blocksim.bench.measurement import Findings, Measurement, Setting, repeat
 from blocksim.bench.scenes import three_blocks
 from blocksim.errors import BlocksimError
 from blocksim.scenario import scenario_to_toml
 
 MAIN = "from blocksim.cli.app import main; main()"
 COMPILE = "from blocksim.simulation.compilation import compile_kernels; compile_kernels()"
-CACHE = "BLOCKSIM_CACHE_DIR"
 
 
 class StartError(BlocksimError):
@@ -24,26 +21,18 @@ class StartError(BlocksimError):
 
 
 def measure(setting: Setting) -> Findings:
-    """Measure a bare start, a run with the solver compiled, and compiling it."""
-    with tempfile.TemporaryDirectory(prefix="blocksim-bench-") as name:
-        folder = Path(name)
-        numbers = [
-            repeat("blocksim --version", "s", lambda: _seconds(MAIN, "--version"), setting.repeats),
-            _run(folder, setting.repeats),
-        ]
+    """Measure a bare start, a run of the three blocks at full stiffness with the solver compiled, and compiling it."""
+    with tempfile.TemporaryDirectory(prefix="blocksim-bench-") as folder:
+        scenario = Path(folder) / "three_blocks.toml"
+        scenario.write_text(scenario_to_toml(three_blocks()), encoding="utf-8")
+        run = ("run", str(scenario), "--out", str(Path(folder) / "run"), "--overwrite", "--quiet")
+        numbers = [repeat("blocksim --version", "s", lambda: _seconds(MAIN, "--version"), setting.repeats)]
+        _seconds(MAIN, *run)  # warms all caches
+        numbers.append(repeat("blocksim run, three blocks", "s", lambda: _seconds(MAIN, *run), setting.repeats))
         if not setting.quick:
-            empty = {CACHE: str(folder / "cache")}
+            empty = {"BLOCKSIM_CACHE_DIR": str(Path(folder) / "cache")}
             numbers.append(repeat("first compilation", "s", lambda: _seconds(COMPILE, **empty), 1))
     return Findings(tuple(numbers), notes=("wall time of a new process; the first compilation happens once",))
-
-
-def _run(folder: Path, repeats: int) -> Number:
-    """Time `blocksim run` of the three blocks at full stiffness; a run before the first one warms all caches."""
-    scenario = folder / "three_blocks.toml"
-    scenario.write_text(scenario_to_toml(three_blocks()), encoding="utf-8")
-    arguments = ("run", str(scenario), "--out", str(folder / "run"), "--overwrite", "--quiet")
-    _seconds(MAIN, *arguments)
-    return repeat("blocksim run, three blocks", "s", lambda: _seconds(MAIN, *arguments), repeats)
 
 
 def _seconds(code: str, *arguments: str, **environment: str) -> float:

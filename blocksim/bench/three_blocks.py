@@ -1,18 +1,18 @@
 """The three blocks by both schemes: time of a step, time to a converged answer, and ensembles."""
 
-from __future__ import annotations
-
 import itertools
 import statistics
 import time
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeat
 from blocksim.bench.scenes import FRICTION, RESTITUTION, Rerun, Stepping, Table, three_blocks
+from blocksim.scenario import Scenario
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.scenario.structures.base import draws
 from blocksim.simulation.ensemble import Ensemble, run_ensemble
@@ -20,55 +20,41 @@ from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import build_stacks
 from blocksim.world.build import only_stack
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from blocksim.scenario import Scenario
-
-
 MEMBERS, QUICK_MEMBERS = 256, 8
 SCATTER = 0.1  # of both coefficients of friction, uniform
 SEED = 1
 THREADS = (1, 2)
-
-
-class SchemeSetting(NamedTuple):
-    """A scheme with the cheapest setting that ends within 0.2 mm, as the measurements of the three blocks find it."""
-
-    scheme: str
-    contact: Table
-    time: Table
-    text: str
-
-
 CONVERGED = Stepping(5e-4, substeps=1)
-SETTINGS = (
-    SchemeSetting(SPRINGS, {"stiffness_scale": 3e-4}, {"safety": 0.1}, "stiffness_scale 0.0003, safety 0.1"),
-    SchemeSetting(IMPULSES, {}, CONVERGED.time(), CONVERGED.setting),
-)
+SETTINGS: dict[str, tuple[Table, Table, str]] = {
+    SPRINGS: ({"stiffness_scale": 3e-4}, {"safety": 0.1}, "stiffness_scale 0.0003, safety 0.1"),
+    IMPULSES: ({}, CONVERGED.time(), CONVERGED.setting),
+}
+"""Tables [contact] and [time] of each scheme, and their text: the cheapest that end within 0.2 mm, as found below."""
 
 
 def measure_ensemble(setting: Setting) -> Findings:
     """Advance the same members on one thread and on two, by either scheme."""
     count = QUICK_MEMBERS if setting.quick else MEMBERS
-    numbers = [
-        number for one in SETTINGS for number in _numbers(one.scheme, scatter_friction(count, one), setting.repeats)
-    ]
+    numbers: list[Number] = []
+    for scheme in SETTINGS:
+        members = scatter_friction(count, scheme)
+        alone, together = (rates(members, threads, setting.repeats) for threads in THREADS)
+        found = (*alone, together[1])
+        numbers += [Number(f"{scheme}: {number.quantity}", number.unit, number.samples) for number in found]
+    converged = "; ".join(f"{scheme}: {text}" for scheme, (*_, text) in SETTINGS.items())
     note = (
         f"{count} members with friction scattered by {SCATTER:.0%}, until rest, each scheme within 0.2 mm of its own "
-        f"finest run ({'; '.join(f'{one.scheme}: {one.text}' for one in SETTINGS)}); building the scenes is not counted"
+        f"finest run ({converged}); building the scenes is not counted"
     )
     return Findings(tuple(numbers), notes=(note,))
 
 
-def scatter_friction(count: int, setting: SchemeSetting) -> list[Scenario]:
-    """Return three blocks with different friction."""
+def scatter_friction(count: int, scheme: str) -> list[Scenario]:
+    """Return three blocks with different friction, by the converged setting of a scheme."""
+    contact, stepping, _ = SETTINGS[scheme]
     scatter = SCATTER * (2.0 * draws(SEED, count, len(FRICTION)) - 1.0)
     values = np.array([*FRICTION.values()]) * (1.0 + scatter)
-    frictions = (dict(zip(FRICTION, row, strict=True)) for row in values.tolist())
-    return [three_blocks(setting.contact, setting.time, friction) for friction in frictions]
+    return [three_blocks(contact, stepping, dict(zip(FRICTION, row, strict=True))) for row in values.tolist()]
 
 
 def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[Number, Number]:
@@ -86,12 +72,6 @@ def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[Numb
 
     rate = repeat("a second and core", "1/s", sample, repeats)
     return rate, Number(f"a second, {threads} thread{'s' if threads > 1 else ''}", "1/s", tuple(clock))
-
-
-def _numbers(scheme: str, members: Sequence[Scenario], repeats: int) -> Iterable[Number]:
-    found = [rates(members, threads, repeats) for threads in THREADS]
-    for number in (found[0][0], *(clock for _, clock in found)):
-        yield Number(f"{scheme}: {number.quantity}", number.unit, number.samples)
 
 
 ENSEMBLE = Measurement("ensemble", "many collapses together", measure_ensemble, quick="8 members instead of 256")
@@ -128,7 +108,7 @@ class Level:
         """CPU seconds."""
         return statistics.median(self.seconds)
 
-    def off(self, other: Level) -> float:
+    def off(self, other: "Level") -> float:
         """Return the largest distance (m) between final positions of a block by this and another way."""
         return float(np.hypot(*(self.centres - other.centres)).max())
 
@@ -136,7 +116,7 @@ class Level:
         """Return its CPU time for the table."""
         return Number(quantity, "CPU ms", tuple(1e3 * one for one in self.seconds))
 
-    def detail(self, finest: Level) -> dict[str, object]:
+    def detail(self, finest: "Level") -> dict[str, object]:
         """Return it for programs."""
         return {
             **self.setting,
@@ -164,13 +144,19 @@ def solve_level(setting: Mapping[str, float], scenario: Scenario, repeats: int) 
 def measure_explicit(setting: Setting) -> Findings:
     """Measure a step at full stiffness, and the cheapest collapse that greater stiffnesses confirm."""
     scales = QUICK_SCALES if setting.quick else SCALES
-    rows = [[_explicit(scale, safety, setting.repeats) for scale in scales] for safety in SAFETIES]
+    rows = []
+    for safety in SAFETIES:
+        keys = [{"stiffness_scale": scale, "safety": safety} for scale in scales]
+        scenarios = [three_blocks({"stiffness_scale": scale}, {"safety": safety}) for scale in scales]
+        rows.append([solve_level(*one, setting.repeats) for one in zip(keys, scenarios, strict=True)])
     levels = [level for row in rows for level in row]
     finest = levels[-1]
     close = [level for row in rows for level in converged_levels(row, finest)]
     cheapest = min(close, key=lambda level: level.median)
+    scene = Rerun(three_blocks(time={"stop_at_rest": False}))  # the blocks are at rest for the last quarter
+    last = last_step_of(QUICK_DURATION if setting.quick else DURATION, scene.step)
     numbers = (
-        _step_time(setting),
+        repeat("a step", "ns", lambda: 1e9 * scene.run(last).seconds / last, setting.repeats),
         cheapest.number("time to a converged answer"),
         finest.number("the stiffest run, its measure"),
     )
@@ -182,58 +168,40 @@ def measure_explicit(setting: Setting) -> Findings:
     return Findings(numbers, notes=(note,), details=tuple(level.detail(finest) for level in levels))
 
 
-def _step_time(setting: Setting) -> Number:
-    """At the aluminium's own stiffness, with the blocks at rest for the last quarter."""
-    scene = Rerun(three_blocks(time={"stop_at_rest": False}))
-    last = last_step_of(QUICK_DURATION if setting.quick else DURATION, scene.step)
-    return repeat("a step", "ns", lambda: 1e9 * scene.run(last).seconds / last, setting.repeats)
-
-
-def _explicit(scale: float, safety: float, repeats: int) -> Level:
-    scenario = three_blocks(contact={"stiffness_scale": scale}, time={"safety": safety})
-    return solve_level({"stiffness_scale": scale, "safety": safety}, scenario, repeats)
-
-
 def measure_nonsmooth(setting: Setting) -> Findings:
     """Measure a collapse without restitution in few long steps, and one with restitution that finer steps confirm."""
-    without = _nonsmooth(ONE_SWEEP, 0.0, setting)
+
+    def solve(stepping: Stepping, restitution: float = RESTITUTION) -> Level:
+        scenario = three_blocks({"restitution": restitution}, stepping.time())
+        return solve_level(stepping.keys, scenario, setting.repeats)
+
+    without = solve(ONE_SWEEP, 0.0)
     steps, finest_step = (QUICK_STEPS, QUICK_FINEST) if setting.quick else (STEPS, FINEST)
-    finest = _nonsmooth(Stepping(finest_step, substeps=1), RESTITUTION, setting)
-    rows = [[_nonsmooth(Stepping(step, parts), RESTITUTION, setting) for step in steps] for parts in SUBSTEPS]
+    finest = solve(Stepping(finest_step, substeps=1))
+    rows = [[solve(Stepping(step, parts)) for step in steps] for parts in SUBSTEPS]
     close = [level for row in rows for level in converged_levels(row, finest)] or [finest]
     cheapest = min(close, key=lambda level: level.median)
     members = QUICK_MEMBERS if setting.quick else MEMBERS
-    numbers = (*_alone_and_among(members, 0.0, without), *_alone_and_among(members, RESTITUTION, cheapest))
-    meaning = (
-        f"e = 0: {without.text}, {without.steps} steps, blocks 2 and 3 at x = {_places(without)}; all runs until rest; "
-        f"alone includes one call from Python; among many: {members} equal members"
-    )
+    numbers, ends = [], []
+    for restitution, level in ((0.0, without), (RESTITUTION, cheapest)):
+        scenario = three_blocks({"restitution": restitution}, {"scheme": IMPULSES, **level.setting})
+        together, _ = rates([scenario] * members, 1, setting.repeats)
+        name, (_, two, three) = f"e = {restitution:g}", 1e3 * level.centres[0]
+        numbers += [
+            level.number(f"{name}: alone"),
+            Number(f"{name}: among many", "CPU ms", tuple(1e3 / one for one in together.samples)),
+            Number(f"{name}: collapses a second and core", "1/s", together.samples),
+        ]
+        at = f"blocks 2 and 3 at x = {two:.2f} and {three:.2f} mm"
+        ends.append(f"{name}: {level.text}, {level.steps} steps, {at}; ")
+    meaning = f"all runs until rest; alone includes one call from Python; among many: {members} equal members"
     converged = (
-        f"e = {RESTITUTION:g}: {cheapest.text}, {cheapest.steps} steps, blocks 2 and 3 at x = {_places(cheapest)}; the "
-        f"cheapest of {len(close)} settings that are, as all with shorter steps, within {1e3 * CLOSE:g} mm of "
+        f"the cheapest of {len(close)} settings that are, as all with shorter steps, within {1e3 * CLOSE:g} mm of "
         f"{finest.text}; itself off by {1e3 * cheapest.off(finest):.2f} mm"
     )
     details = [level.detail(finest) for row in rows for level in row]
     details += [finest.detail(finest), without.detail(without)]
-    return Findings(numbers, notes=(meaning, converged), details=tuple(details))
-
-
-def _nonsmooth(stepping: Stepping, restitution: float, setting: Setting) -> Level:
-    return solve_level(stepping.keys, three_blocks({"restitution": restitution}, stepping.time()), setting.repeats)
-
-
-def _places(level: Level) -> str:
-    _, two, three = 1e3 * level.centres[0]
-    return f"{two:.2f} and {three:.2f} mm"
-
-
-def _alone_and_among(members: int, restitution: float, level: Level) -> Iterable[Number]:
-    name = f"e = {restitution:g}"
-    scenario = three_blocks({"restitution": restitution}, {"scheme": IMPULSES, **level.setting})
-    together, _ = rates([scenario] * members, 1, len(level.seconds))
-    yield level.number(f"{name}: alone")
-    yield Number(f"{name}: among many", "CPU ms", tuple(1e3 / one for one in together.samples))
-    yield Number(f"{name}: collapses a second and core", "1/s", together.samples)
+    return Findings(tuple(numbers), notes=(ends[0] + meaning, ends[1] + converged), details=tuple(details))
 
 
 EXPLICIT = Measurement(

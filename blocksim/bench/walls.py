@@ -1,23 +1,18 @@
 """Pushed walls by both schemes: time of a step, memory, growth with the blocks, a whole fall, and two threads."""
 
-from __future__ import annotations
-
 import functools
-import time
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+import statistics
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeat, single
+from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
 from blocksim.bench.scenes import LOW_COURSES, Rerun, Stepping, pushed_wall
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.simulation.team import ALONE, Team, useful_threads
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+from blocksim.simulation.team import Team, useful_threads
 
 
 class Size(NamedTuple):
@@ -64,139 +59,134 @@ def growth(sizes: Sequence[Size], block_times: Sequence[Number]) -> float:
     return float(np.polyfit(np.log(blocks), np.log(times), 1)[0])
 
 
-@dataclass(frozen=True)
-class Wall:
-    """Result for one size on springs."""
-
-    size: Size
-    times: Number  # ns per block and step
-    bytes_a_block: float
-    rebuilds: int
-    duration: float  # s simulated
-
-    def detail(self) -> dict[str, object]:
-        """Return it for programs."""
-        return {
-            "blocks": self.size.blocks,
-            **self.size._asdict(),
-            "ns_per_block_and_step": self.times.median,
-            "bytes_per_block": self.bytes_a_block,
-            "rebuilds": self.rebuilds,
-            "simulated_s": self.duration,
-        }
-
-
 def measure_explicit(setting: Setting) -> Findings:
     """Measure all sizes from the same start, over the same time."""
-    sizes = QUICK_SIZES if setting.quick else SIZES
-    walls = [_explicit(size, setting) for size in sizes]
-    times = [wall.times for wall in walls]
-    numbers = (
-        *times,
-        *(single(f"{wall.times.quantity}, memory", "bytes/block", wall.bytes_a_block) for wall in walls),
-        single("growth exponent of a step's time", "", growth(sizes, times)),
-    )
-    first = walls[0]
+    sizes, steps = (QUICK_SIZES, QUICK_STEPS) if setting.quick else (SIZES, STEPS)
+    times, memory, details = [], [], []
+    for size in sizes:
+        scene, rounds = explicit_wall(size), max(1, FEWEST_BLOCKS // size.blocks)
+        repeats = [[scene.run(steps) for _ in range(rounds)] for _ in range(setting.repeats)]
+        share = 1e9 / (rounds * steps * size.blocks)
+        samples = tuple(share * sum(run.seconds for run in runs) for runs in repeats)
+        times.append(Number(f"{size.blocks} blocks", "ns/block/step", samples))
+        memory.append(single(f"{size.blocks} blocks, memory", "bytes/block", scene.bytes / size.blocks))
+        details.append(
+            {
+                "blocks": size.blocks,
+                **size._asdict(),
+                "ns_per_block_and_step": times[-1].median,
+                "bytes_per_block": scene.bytes / size.blocks,
+                "rebuilds": int(repeats[-1][-1].world.clock[0].rebuilds) - 1,
+                "simulated_s": steps * scene.step,
+            }
+        )
+    exponent = single("growth exponent of a step's time", "", growth(sizes, times))
+    first, last = details[0], details[-1]
     note = (
         f"running bond, pushed with 1 m/s y/H, restitution 0.1, stiffness_scale {STIFFNESS_SCALE:g}, the first "
-        f"{1e3 * first.duration:.1f} ms, {first.rebuilds} to {walls[-1].rebuilds} pair list updates"
+        f"{1e3 * first['simulated_s']:.1f} ms, {first['rebuilds']} to {last['rebuilds']} pair list updates"
     )
-    return Findings(numbers, notes=(note,), details=tuple(wall.detail() for wall in walls))
-
-
-def _explicit(size: Size, setting: Setting) -> Wall:
-    steps = QUICK_STEPS if setting.quick else STEPS
-    scene = explicit_wall(size)
-    rounds = max(1, FEWEST_BLOCKS // size.blocks)
-    rebuilds: list[int] = []
-
-    def sample() -> float:
-        runs = [scene.run(steps) for _ in range(rounds)]
-        rebuilds.append(int(runs[-1].world.clock[0].rebuilds))
-        return 1e9 * sum(run.seconds for run in runs) / (rounds * steps * size.blocks)
-
-    times = repeat(f"{size.blocks} blocks", "ns/block/step", sample, setting.repeats)
-    return Wall(size, times, scene.bytes / size.blocks, rebuilds[-1] - 1, steps * scene.step)
-
-
-@dataclass(frozen=True)
-class RigidWall:
-    """Result for one size with rigid contacts."""
-
-    size: Size
-    seconds: tuple[float, ...]  # CPU time of every repeat
-    steps: int
-    rebuilds: int  # of the pair list
-    sweeps: int  # of the velocity pass, over all substeps
-    mean_x: float  # m, of all centres at the end
-    mean_y: float  # m
-
-    @property
-    def substeps(self) -> int:
-        """Substeps of the run."""
-        return self.steps * USUAL.substeps
-
-    @property
-    def times(self) -> Number:
-        """Time of a block and substep."""
-        share = 1e9 / (self.substeps * self.size.blocks)
-        name = f"{self.size.blocks} blocks, a substep"
-        return Number(name, "ns/block", tuple(share * one for one in self.seconds))
-
-    def detail(self) -> dict[str, object]:
-        """Return it for programs."""
-        return {
-            "blocks": self.size.blocks,
-            **self.size._asdict(),
-            "cpu_s": self.times.median * self.size.blocks * 1e-9 * self.substeps,
-            "ns_per_block_and_substep": self.times.median,
-            "rebuilds": self.rebuilds,
-            "sweeps_per_substep": self.sweeps / self.substeps,
-            "mean_x_m": self.mean_x,
-            "mean_y_m": self.mean_y,
-        }
+    return Findings((*times, *memory, exponent), notes=(note,), details=tuple(details))
 
 
 def measure_nonsmooth(setting: Setting) -> Findings:
     """Measure all sizes from the same start, over the same time, and the smallest over its whole collapse."""
     end, common = (QUICK_END, QUICK_END) if setting.quick else (END, COMMON)
     sizes = QUICK_RIGID_SIZES if setting.quick else RIGID_SIZES
-    whole = _nonsmooth(sizes[0], end, setting.repeats)
-    walls = [_nonsmooth(size, common, setting.repeats) for size in sizes]
-    times = [wall.times for wall in walls]
-    name = f"{whole.size.blocks} blocks"
+
+    def watch(size: Size, end: float) -> tuple[tuple[float, ...], Number, dict[str, Any]]:
+        """Return the CPU seconds of all repeats, those of a substep and block, and more for programs."""
+        scene = nonsmooth_wall(size)
+        steps = last_step_of(end, scene.step)
+        runs = [scene.run(steps) for _ in range(setting.repeats)]
+        final, seconds = runs[-1], tuple(run.seconds for run in runs)  # every run ends with the same bits
+        substeps = steps * USUAL.substeps
+        samples = tuple(1e9 / (substeps * size.blocks) * one for one in seconds)
+        number = Number(f"{size.blocks} blocks, a substep", "ns/block", samples)
+        detail = {
+            "blocks": size.blocks,
+            **size._asdict(),
+            "cpu_s": statistics.median(seconds),
+            "ns_per_block_and_substep": number.median,
+            "rebuilds": int(final.world.clock[0].rebuilds),
+            "sweeps_per_substep": int(final.scene.contacts.stepping[0].sweeps) / substeps,  # of the velocity pass
+            "mean_x_m": float(final.bodies.x.mean()),
+            "mean_y_m": float(final.bodies.y.mean()),
+        }
+        return seconds, number, detail
+
+    seconds, substep, whole = watch(sizes[0], end)
+    walls = [watch(size, common) for size in sizes]
+    times, details = [number for _, number, _ in walls], [detail for *_, detail in walls]
+    name = f"{whole['blocks']} blocks"
     numbers = (
-        Number(f"{name}, {end:g} s", "CPU s", whole.seconds),
-        Number(f"{name}, {end:g} s, a substep", "ns/block", whole.times.samples),
+        Number(f"{name}, {end:g} s", "CPU s", seconds),
+        Number(f"{name}, {end:g} s, a substep", "ns/block", substep.samples),
         *times,
         single("growth exponent of a substep's time", "", growth(sizes, times)),
-        single(f"{name}, mean x at {end:g} s", "mm", 1e3 * whole.mean_x),
-        single(f"{name}, mean y at {end:g} s", "mm", 1e3 * whole.mean_y),
+        single(f"{name}, mean x at {end:g} s", "mm", 1e3 * whole["mean_x_m"]),
+        single(f"{name}, mean y at {end:g} s", "mm", 1e3 * whole["mean_y_m"]),
     )
-    first, last = walls[0], walls[-1]
+    first, last = details[0], details[-1]
     note = (
         f"running bond of 32 x 25 mm, pushed with 1 m/s y/H, restitution 0.1, {USUAL.setting}; a substep and growth: "
-        f"the first {common:g} s of every wall (a smaller part of higher walls has fallen), {first.rebuilds} to "
-        f"{last.rebuilds} pair list updates, {first.sweeps / first.substeps:.2f} to "
-        f"{last.sweeps / last.substeps:.2f} velocity sweeps a substep"
+        f"the first {common:g} s of every wall (a smaller part of higher walls has fallen), {first['rebuilds']} to "
+        f"{last['rebuilds']} pair list updates, {first['sweeps_per_substep']:.2f} to "
+        f"{last['sweeps_per_substep']:.2f} velocity sweeps a substep"
     )
-    return Findings(numbers, notes=(note,), details=tuple(wall.detail() for wall in (whole, *walls)))
+    return Findings(numbers, notes=(note,), details=(whole, *details))
 
 
-def _nonsmooth(size: Size, end: float, repeats: int) -> RigidWall:
-    scene = nonsmooth_wall(size)
-    last = last_step_of(end, scene.step)
-    runs = [scene.run(last) for _ in range(repeats)]
-    bodies, scene_at_end = runs[-1].bodies, runs[-1].scene  # every run ends with the same bits
-    return RigidWall(
-        size,
-        tuple(run.seconds for run in runs),
-        last,
-        rebuilds=int(scene_at_end.world.clock[0].rebuilds),
-        sweeps=int(scene_at_end.contacts.stepping[0].sweeps),
-        mean_x=float(bodies.x.mean()),
-        mean_y=float(bodies.y.mean()),
-    )
+THREADS = 2
+SOFT_SCALE = 1e-3  # a wall of a hundred blocks has fallen by then; softer ones would overlap too far
+
+
+def measure_threads(
+    setting: Setting,
+    *,
+    scheme: str,
+    wall: Callable[[Size], Rerun],
+    sizes: tuple[tuple[Size, ...], tuple[Size, ...]],
+    block_steps: tuple[int, int],
+    most_steps: tuple[int, int],
+) -> Findings:
+    """Advance walls with one thread and with two, in turns, from the start: the smaller they are, the longer.
+
+    Sizes, blocks times steps of one sample, and the most steps of one are given in full and quick.
+    """
+    most, limit = block_steps[setting.quick], most_steps[setting.quick]
+    numbers: list[Number] = []
+    alone = []  # walls that use one thread
+    for size in sizes[setting.quick]:
+        threads = useful_threads(THREADS, size.blocks, SCHEMES[scheme].least_bodies)
+        if threads == 1:
+            alone.append(str(size.blocks))
+        steps = min(limit, most // size.blocks)
+        numbers += thread_numbers(wall(size), size.blocks, steps, threads, setting.repeats)
+    notes = [f"speed-up: wall time of one thread over that of {THREADS}; {THREADS} cores must be idle"]
+    if alone:
+        notes.append(f"walls of {', '.join(alone)} blocks always use one thread")
+    return Findings(tuple(numbers), notes=tuple(notes))
+
+
+def thread_numbers(
+    scene: Rerun, count: int, steps: int, threads: int, repeats: int, element: str = "block"
+) -> Iterator[Number]:
+    """Yield the time of a scene of so many elements with two threads, and by how much that is faster than one.
+
+    `threads` are as many as are of use.
+    """
+    times, gains = [], []
+    with Team(threads) as team:
+        scene.run(1, team)  # starts everything that is started once
+        for _ in range(repeats):
+            alone = scene.run(steps).waited
+            times.append(scene.run(steps, team).waited)
+            gains.append(alone / times[-1])
+    share = 1e9 / (steps * count)
+    samples = tuple(share * one for one in times)
+    yield Number(f"{count} {element}s, {THREADS} threads", f"ns/{element}/step", samples)
+    yield Number(f"{count} {element}s, speed-up", "", tuple(gains))
 
 
 EXPLICIT = Measurement(
@@ -208,108 +198,29 @@ NONSMOOTH = Measurement(
     measure_nonsmooth,
     quick="walls of 40 and 160 blocks for 0.1 s",
 )
-
-
-THREADS = 2
-SOFT_SCALE = 1e-3  # a wall of a hundred blocks has fallen by then; softer ones would overlap too far
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Walls of a scheme, and how far they are advanced for one sample; the quick size second."""
-
-    scheme: str
-    wall: Callable[[Size], Rerun]
-    sizes: tuple[tuple[Size, ...], tuple[Size, ...]]
-    block_steps: tuple[int, int]
-    most_steps: tuple[int, int]
-
-
-@dataclass(frozen=True)
-class Case:
-    """A scene, and how far it is advanced for one sample."""
-
-    scene: Rerun
-    blocks: int
-    steps: int
-    least_bodies: int  # a thread, of the scheme
-    element: str = "block"
-
-    @property
-    def threads(self) -> int:
-        """How many are of use."""
-        return useful_threads(THREADS, self.blocks, self.least_bodies)
-
-
-def measure_threads(plan: Plan, setting: Setting) -> Findings:
-    """Advance walls with one thread and with two, in turns, from the start: the smaller they are, the longer."""
-    block_steps, most_steps = plan.block_steps[setting.quick], plan.most_steps[setting.quick]
-    least = SCHEMES[plan.scheme].least_bodies
-    cases = [
-        Case(plan.wall(size), size.blocks, min(most_steps, block_steps // size.blocks), least)
-        for size in plan.sizes[setting.quick]
-    ]
-    numbers = [number for case in cases for number in thread_numbers(case, setting.repeats)]
-    return Findings(tuple(numbers), notes=notes(cases))
-
-
-def thread_numbers(case: Case, repeats: int) -> Iterable[Number]:
-    """Yield the time with two threads, and by how much that is faster than one."""
-    times: list[float] = []
-    gains: list[float] = []
-    with Team(case.threads) as team:
-        _seconds(case.scene, team, 1)  # starts everything that is started once
-        for _ in range(repeats):
-            alone = _seconds(case.scene, ALONE, case.steps)
-            times.append(_seconds(case.scene, team, case.steps))
-            gains.append(alone / times[-1])
-    share = 1e9 / (case.steps * case.blocks)
-    yield Number(
-        f"{case.blocks} {case.element}s, {THREADS} threads",
-        f"ns/{case.element}/step",
-        tuple(share * one for one in times),
-    )
-    yield Number(f"{case.blocks} {case.element}s, speed-up", "", tuple(gains))
-
-
-def notes(cases: Sequence[Case]) -> tuple[str, ...]:
-    """Explain the speed-up, and which walls have none."""
-    note = f"speed-up: wall time of one thread over that of {THREADS}; {THREADS} cores must be idle"
-    few = [case.blocks for case in cases if case.threads == 1]
-    unused = f"walls of {', '.join(map(str, few))} blocks always use one thread"
-    return (note, unused) if few else (note,)
-
-
-def _seconds(scene: Rerun, team: Team, steps: int) -> float:
-    scene.restore()
-    began = time.perf_counter()
-    scene.advance(steps, team)
-    return time.perf_counter() - began
-
-
-SPRINGS_PLAN = Plan(
-    SPRINGS,
-    functools.partial(explicit_wall, stiffness_scale=SOFT_SCALE),
-    sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(125, 80)), (Size(10, 10), Size(25, 16))),
-    block_steps=(2_000_000, 200_000),
-    most_steps=(5000, 5000),
-)
-RIGID_PLAN = Plan(
-    IMPULSES,
-    nonsmooth_wall,
-    sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(90, 56)), (Size(8, 5), Size(40, 25))),
-    block_steps=(1_000_000, 1_000_000),
-    most_steps=(1000, 20),
-)
 EXPLICIT_THREADS = Measurement(
     "threads",
     "two threads on one wall",
-    functools.partial(measure_threads, SPRINGS_PLAN),
+    functools.partial(
+        measure_threads,
+        scheme=SPRINGS,
+        wall=functools.partial(explicit_wall, stiffness_scale=SOFT_SCALE),
+        sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(125, 80)), QUICK_SIZES),
+        block_steps=(2_000_000, 200_000),
+        most_steps=(5000, 5000),
+    ),
     quick="walls of 100 and 400 blocks, a tenth of the steps",
 )
 NONSMOOTH_THREADS = Measurement(
     "nonsmooth-threads",
     "two threads on one wall, non-smooth",
-    functools.partial(measure_threads, RIGID_PLAN),
+    functools.partial(
+        measure_threads,
+        scheme=IMPULSES,
+        wall=nonsmooth_wall,
+        sizes=((Size(10, 10), Size(20, 10), Size(40, 25), Size(90, 56)), (Size(8, 5), Size(40, 25))),
+        block_steps=(1_000_000, 1_000_000),
+        most_steps=(1000, 20),
+    ),
     quick="walls of 40 and 1000 blocks, 20 steps",
 )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from blocksim.bench.measurement import REPEATS, Machine, Number, Outcome, Setting, report, this_machine
+from blocksim.bench.measurement import REPEATS, Number, Outcome, Setting, machine_lines, report, this_machine
 from blocksim.bench.measurements import choose
 from blocksim.cli import command_line
 from blocksim.cli.output import grouped_lines, note, show
@@ -70,7 +70,7 @@ def bench_command(
             _show(machine, outcomes, out, as_json=as_json, quiet=silent)
 
 
-def _show(machine: Machine, outcomes: list[Outcome], out: Path | None, *, as_json: bool, quiet: bool) -> None:
+def _show(machine: dict[str, object], outcomes: list[Outcome], out: Path | None, *, as_json: bool, quiet: bool) -> None:
     data = report(machine, outcomes)
     if out is not None:
         write_text(out, json.dumps(data, indent=2) + "\n")
@@ -86,7 +86,7 @@ def _show(machine: Machine, outcomes: list[Outcome], out: Path | None, *, as_jso
 
 
 def _cells(one: Number) -> tuple[str, ...]:
-    spread = (one.smallest, one.largest) if one.is_repeated else (float("nan"),) * 2
+    spread = (min(one.samples), max(one.samples)) if len(one.samples) > 1 else (float("nan"),) * 2
     return (f"  {one.quantity}", one.unit, *(_shown(value) for value in (one.median, *spread)))
 
 
@@ -95,12 +95,12 @@ def _shown(value: float) -> str:
     return f"{value:.0f}" if LARGE <= abs(value) < math.inf else number(value, DIGITS)
 
 
-def _tell_end(machine: Machine, outcomes: list[Outcome]) -> None:
+def _tell_end(machine: dict[str, object], outcomes: list[Outcome]) -> None:
     for outcome in outcomes:
         for text in outcome.findings.notes:
             note(f"{outcome.measurement.name}: {text}")
         if outcome.shortened:
             note(f"{outcome.measurement.name} shortened: {outcome.shortened}")
-    for text in machine.lines():
+    for text in machine_lines(machine):
         note(text)
     note(f"{sum(outcome.seconds for outcome in outcomes):.0f} s")

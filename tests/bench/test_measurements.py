@@ -7,10 +7,10 @@ import pytest
 
 from blocksim.bench.measurement import (
     Findings,
-    Machine,
     Measurement,
     Number,
     Setting,
+    machine_lines,
     repeat,
     report,
     single,
@@ -23,8 +23,8 @@ from blocksim.errors import ExitCode
 def test_a_number_is_the_median_of_its_samples_with_their_spread() -> None:
     values = itertools.cycle((3.0, 9.0, 4.0))
     one = repeat("a step", "ns", lambda: next(values), 3)
-    assert (one.median, one.smallest, one.largest, one.is_repeated) == (4.0, 3.0, 9.0, True)
-    assert not single("memory", "bytes", 7).is_repeated
+    assert (one.median, one.samples) == (4.0, (3.0, 9.0, 4.0))
+    assert single("memory", "bytes", 7).samples == (7.0,)
 
 
 def test_chosen_keeps_the_order_of_the_registry() -> None:
@@ -52,13 +52,24 @@ def test_the_report_is_json_without_numbers_that_json_lacks() -> None:
     data = report(this_machine(), [measurement.run(Setting(quick=True))])
     (found,) = json.loads(json.dumps(data, allow_nan=False))["measurements"]
     assert (found["shortened"], found["notes"]) == ("less", ["said"])
-    assert found["numbers"][0]["samples"] == [1.0, 2.0]
-    assert [one["median"] for one in found["numbers"]] == [1.5, None]
+    there, never = found["numbers"]
+    spread = {"median": 1.5, "smallest": 1.0, "largest": 2.0, "samples": [1.0, 2.0]}
+    assert there == {"quantity": "there", "unit": "s", **spread}
+    assert never["median"] is None
 
 
-@pytest.mark.parametrize(("load", "told", "busy"), [(None, "unknown", 0), (0.1, "0.10", 0), (1.7, "1.70", 1)])
-def test_a_busy_machine_is_reported(load: float | None, told: str, busy: int) -> None:
-    machine = Machine("P9", 4, "Linux", "3.12", "0.6", "2.0", "1.0", "abc", load)
-    assert machine.to_dict()["busy"] == busy
-    assert sum("Other processes" in line for line in machine.lines()) == busy
-    assert machine.lines()[0] == f"P9, 4 cores, load {told} at the start"
+@pytest.mark.parametrize(("load", "told", "busy"), [(0.1, "0.10", 0), (1.7, "1.70", 1)])
+def test_a_busy_machine_is_reported(load: float, told: str, busy: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.getloadavg", lambda: (load, 0.0, 0.0))
+    machine = this_machine()
+    assert machine["busy"] == busy
+    lines = machine_lines(machine)
+    assert sum("Other processes" in line for line in lines) == busy
+    assert lines[0].endswith(f" cores, load {told} at the start")
+
+
+def test_a_load_that_the_system_does_not_know_is_not_busy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("os.getloadavg")
+    machine = this_machine()
+    assert (machine["load"], machine["busy"]) == (None, False)
+    assert machine_lines(machine)[0].endswith(" cores, load unknown at the start")

@@ -62,10 +62,10 @@ def test_ensemble_tells_its_rates_by_both_schemes_and_its_members_differ() -> No
     schemes = ("explicit", "nonsmooth")
     assert [one.quantity for one in found.numbers] == [f"{scheme}: {name}" for scheme in schemes for name in names]
     assert all(len(one.samples) == 2 and one.median > 1.0 for one in found.numbers)
-    for setting in three_blocks.SETTINGS:
-        members = three_blocks.scatter_friction(5, setting)
+    for scheme in three_blocks.SETTINGS:
+        members = three_blocks.scatter_friction(5, scheme)
         assert len({scenario.friction.model_dump_json() for scenario in members}) == 5
-        assert {scenario.time.scheme for scenario in members} == {setting.scheme}
+        assert {scenario.time.scheme for scenario in members} == {scheme}
 
 
 def test_walls_on_springs_tell_time_memory_and_growth() -> None:

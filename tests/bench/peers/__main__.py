@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.bench.measurement import REPEATS, Outcome, Setting, report, this_machine
+from blocksim.bench.measurement import REPEATS, Outcome, Setting, machine_lines, report, this_machine
 from blocksim.bench.measurements import choose
 from blocksim.errors import BlocksimError
 from tests.bench.peers.engine import Findings
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     outcomes = [one.run(Setting(asked.quick, max(1, asked.repeats))) for one in wanted]
     _print(outcomes)
     machine = this_machine()
-    print(*machine.lines(), sep="\n")  # noqa: T201 - the output of a script
+    print(*machine_lines(machine), sep="\n")  # noqa: T201 - the output of a script
     if asked.out is not None:
         asked.out.write_text(json.dumps(report(machine, outcomes), indent=2) + "\n", encoding="utf-8")
         found = [one.findings.panel for one in outcomes if isinstance(one.findings, Findings)]
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _print(outcomes: Sequence[Outcome]) -> None:
     for outcome in outcomes:
         rows = [
-            f"  {one.quantity:<54} {one.unit:<6} {one.median:9.4g} {one.smallest:9.4g} {one.largest:9.4g}"
+            f"  {one.quantity:<54} {one.unit:<6} {one.median:9.4g} {min(one.samples):9.4g} {max(one.samples):9.4g}"
             for one in outcome.findings.numbers
         ]
         print(f"\n{outcome.measurement.name}: {outcome.measurement.title}", *rows, *outcome.findings.notes, sep="\n")  # noqa: T201
