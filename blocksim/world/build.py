@@ -3,11 +3,7 @@
 Blocks are placed, step and skin chosen, bodies divided for the broad phase, the size checked, the arrays assembled.
 `build_stacks` does that for many scenarios at once, field by field over all members, as most of what building costs
 does not depend on their number. So all arrays have the members along their first axis, and `build_one` takes the only
-member of a stack.
-
-Build the flat arrays of a scene from a scenario.
-
-Build scenes of the explicit scheme that have further systems beside blocks and supports.
+member of a stack. `couple` adds systems beside blocks and supports.
 """
 
 import math
@@ -46,20 +42,10 @@ from blocksim.kernels.explicit.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import motion_direction
-from blocksim.world.bodies import (
-    Outline,
-    Outlines,
-    body_records,
-    free_masses,
-    outline_of,
-    place_particles,
-    slots_of_a_pair,
-    stacked_driven_records,
-)
-from blocksim.world.forcing import stack_loads
+from blocksim.world.bodies import Layout, body_records, layout_of, moved_records, place_particles, slots_of_a_pair
 from blocksim.world.interactions import interaction_tables
 from blocksim.world.memory import Size, refuse_if_too_large, scene_size
-from blocksim.world.step import MOST_STEPS, Bounds, bounds_of, choose_approach, choose_skin, choose_step
+from blocksim.world.step import MOST_STEPS, Bounds, Stride, bounds_of, choose_stride
 from blocksim.world.systems import acts_of
 from blocksim.world.systems.system import SystemInScene
 
@@ -67,21 +53,19 @@ MOST_BYTES = 1 << 26  # of a stack of more than one scene
 MOST_LARGE = 64  # bodies that are checked one by one, outside the grid of the broad phase
 LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
 SURFACE = "surface"  # the model without particles
+CHECK_INTERVAL = 1e-4  # s of simulated time between checks of rest, overlap and finiteness
+CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long, at most for
+LONGEST_CHECK = 1e-3  # s
+LEAST_PAIRS = 16
+PAIRS_PER_BODY = 3
+GROWTH = 1.25  # of the room for pairs, each time that it does not suffice
 Floats = NDArray[np.float64]
-
-
-class Stride(NamedTuple):
-    """Values chosen for one scene."""
-
-    step: float  # s
-    skin: float  # m
-    approach: float = 0.0  # m, up to which bodies are always listed
 
 
 class Parts(NamedTuple):
     """What m scenes of one shape consist of, whatever the scheme."""
 
-    outlines: Outlines
+    layouts: Sequence[Layout]
     bodies: Records  # (m, n + 1) BODY
     cell_radius: Floats  # (m,) m
     particles: Records | None  # (m, q) PARTICLE
@@ -95,23 +79,18 @@ class Parts(NamedTuple):
 
     def chosen(self, numbers: Sequence[int]) -> "Parts":
         """Return the parts of some of the scenes."""
-        if len(numbers) == len(self.outlines):
+        if len(numbers) == len(self.layouts):
             return self
-        return Parts(
-            [self.outlines[k] for k in numbers],
-            take_members(self.bodies, numbers),
-            self.cell_radius[list(numbers)],
-            None if self.particles is None else take_members(self.particles, numbers),
-            self.slots,
-        )
+        particles = None if self.particles is None else take_members(self.particles, numbers)
+        bodies, radii = take_members(self.bodies, numbers), self.cell_radius[list(numbers)]
+        return Parts([self.layouts[k] for k in numbers], bodies, radii, particles, self.slots)
 
 
 @dataclass(frozen=True)
 class Construction:
     """Parts of building scenes that depend on the scheme."""
 
-    choose: Callable[[Outline, Bounds], Stride]  # raises BlocksimError
-    model: Callable[[Outline], str]  # of contacts, as the scheme's arrays have it
+    choose: Callable[[Layout, Bounds], Stride]  # raises BlocksimError
     size: Callable[[Parts], Size]  # of one of these scenes
     assemble: Callable[[Parts, Sequence[Stride]], Any]
 
@@ -130,20 +109,12 @@ class Stack(NamedTuple):
     placed: list[tuple[PlacedBody, ...]]
     scenes: Any  # of the scheme's type
 
-    def numbered(self, numbers: Sequence[int]) -> "Stack":
-        """Return the same for scenarios with other numbers."""
-        return self._replace(numbers=[numbers[i] for i in self.numbers])
-
 
 class Refusal(NamedTuple):
     """A scenario that cannot be built."""
 
     number: int
     error: BlocksimError
-
-    def numbered(self, numbers: Sequence[int]) -> "Refusal":
-        """Return the same for scenarios with other numbers."""
-        return self._replace(number=numbers[self.number])
 
 
 def build_one(scenario: Scenario, construction: Construction) -> Built:
@@ -152,33 +123,32 @@ def build_one(scenario: Scenario, construction: Construction) -> Built:
     return Built(stack.placed[0], member(stack.scenes, 0))
 
 
-def build_stacks(scenarios: Sequence[Scenario], construction: Construction) -> Iterator[Stack | Refusal]:
+def build_stacks(
+    scenarios: Sequence[Scenario], construction: Construction, numbers: Sequence[int] | None = None
+) -> Iterator[Stack | Refusal]:
     """Build scenarios of one scheme; those of one shape come in as few stacks as memory allows.
 
-    A scenario whose step, skin or size is refused does not stop the others.
+    A scenario whose step, skin or size is refused does not stop the others. Stacks name them by `numbers`, by their
+    places where none are given.
     """
-    outlines = [outline_of(scenario) for scenario in scenarios]
-    for numbers in group_equal([outline.shape for outline in outlines]):
-        yield from _group(numbers, [outlines[i] for i in numbers], construction)
-
-
-def _group(numbers: Sequence[int], outlines: Outlines, construction: Construction) -> Iterator[Stack | Refusal]:
-    """Build scenes of one outline."""
-    good, strides, refusals = list[int](), list[Stride](), list[Refusal]()
-    with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
-        bodies = body_records(outlines)
-        all_bounds = bounds_of(free_masses(bodies, outlines), len(outlines[0].placed), [one.shapes for one in outlines])
-        for k, (outline, bounds) in enumerate(zip(outlines, all_bounds, strict=True)):
-            try:
-                strides.append(construction.choose(outline, bounds))
-                good.append(k)
-            except BlocksimError as error:
-                refusals.append(Refusal(numbers[k], error))
-    yield from refusals
-    if good:
-        model = construction.model(outlines[0])
-        for same, parts in _divided([outlines[k] for k in good], take_members(bodies, good), model):
-            yield from _stacks([numbers[good[k]] for k in same], parts, [strides[k] for k in same], construction)
+    names = range(len(scenarios)) if numbers is None else numbers
+    layouts = [layout_of(scenario) for scenario in scenarios]
+    for places in group_equal([layout.shape for layout in layouts]):
+        good, strides, refusals = list[int](), list[Stride](), list[Refusal]()
+        with np.errstate(all="ignore"):  # absurd sizes and stiffnesses end in a step of zero, which is refused
+            same = [layouts[i] for i in places]
+            bodies = body_records(same)
+            for k, (layout, bounds) in enumerate(zip(same, bounds_of(same, bodies), strict=True)):
+                try:
+                    strides.append(construction.choose(layout, bounds))
+                    good.append(k)
+                except BlocksimError as error:
+                    refusals.append(Refusal(names[places[k]], error))
+        yield from refusals
+        if good:
+            chosen = [names[places[k]] for k in good]
+            for some, parts in _divided([same[k] for k in good], take_members(bodies, good)):
+                yield from _stacks([chosen[k] for k in some], parts, [strides[k] for k in some], construction)
 
 
 def _stacks(
@@ -196,36 +166,35 @@ def _stacks(
             yield from (Refusal(number, error) for number in names)
         else:
             chosen = parts.chosen(places)
-            placed = [outline.placed for outline in chosen.outlines]
+            placed = [layout.placed for layout in chosen.layouts]
             yield Stack(names, placed, construction.assemble(chosen, [strides[k] for k in places]))
 
 
-def _divided(outlines: Outlines, bodies: Records, model: str) -> Iterator[tuple[list[int], Parts]]:
-    """Yield the parts of scenes of one outline, all those of one shape together, and which they are.
+def _divided(layouts: Sequence[Layout], bodies: Records) -> Iterator[tuple[list[int], Parts]]:
+    """Yield the parts of scenes of one layout, all those of one shape together, and which they are.
 
     What decides the shape by now: how many bodies are large, how many move with the support, how many particles there
     are, and how many slots a pair has: of corners those of its two bodies, at most.
     """
-    particles: list[Records | None] = [None] * len(outlines)
-    if model == SURFACE:
-        sizes = [None if one.shapes is None else one.shapes.sizes for one in outlines]
-        slots = [SLOTS if one is None else 2 * max(HALF, *one) for one in sizes]
+    contact, has_springs = layouts[0].scenario.contact, layouts[0].scenario.time.has_springs
+    particles: list[Records] = []
+    if contact.model == SURFACE or not has_springs:
+        slots = [SLOTS if one.shapes is None else 2 * max(HALF, *one.shapes.sizes) for one in layouts]
     else:
-        spacings = [outline.scenario.contact.particle_spacing for outline in outlines]
-        particles = [place_particles(one, model, spacing) for one, spacing in zip(bodies, spacings, strict=True)]
-        slots = [slots_of_a_pair(one, model) for one in bodies]
-    parts = Parts(outlines, bodies, cell_radius(bodies), None, SLOTS)
+        spacings = [layout.scenario.contact.particle_spacing for layout in layouts]
+        particles = [place_particles(one, contact.model, space) for one, space in zip(bodies, spacings, strict=True)]
+        slots = [slots_of_a_pair(one, contact.model) for one in bodies]
+    parts = Parts(layouts, bodies, cell_radius(bodies), None, SLOTS)
     counts = zip(
         np.count_nonzero(parts.is_large, axis=1),
         np.count_nonzero(bodies["is_moved"], axis=1),
         slots,
-        (None if one is None else one.size for one in particles),
+        [one.size for one in particles] or slots,
         strict=True,
     )
     for same in group_equal(list(counts)):
-        one = parts.chosen(same)._replace(slots=slots[same[0]])
-        some_particles = [found for k in same if (found := particles[k]) is not None]
-        yield same, one._replace(particles=join_records(some_particles)) if some_particles else one
+        joined = join_records([particles[k] for k in same]) if particles else None
+        yield same, parts.chosen(same)._replace(slots=slots[same[0]], particles=joined)
 
 
 def cell_radius(bodies: Records) -> Floats:
@@ -305,28 +274,14 @@ def with_parts(scene: Any, parts: list[Any]) -> Any:
     return type(scene)(*parts) if hasattr(scene, "_fields") else tuple(parts)
 
 
-CHECK_INTERVAL = 1e-4  # s of simulated time between checks of rest, overlap and finiteness
-CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long, at most for
-LONGEST_CHECK = 1e-3  # s
-LEAST_PAIRS = 16
-PAIRS_PER_BODY = 3
-GROWTH = 1.25  # of the room for pairs, each time that it does not suffice
-
-
 def build_world(scenario: Scenario) -> World:
     """Return the world at time zero: arrays as described in blocksim.kernels.common.arrays, pair lists still empty.
 
-    Raises SceneTooLargeError when there is not enough memory for it, StepTooLargeError when the scenario asks for an
+    Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
     world: World = build_one(scenario, EXPLICIT).scene
     return world
-
-
-def _choose(outline: Outline, bounds: Bounds) -> Stride:
-    step = choose_step(outline.scenario, bounds, outline.interactions)
-    skin = choose_skin(outline.scenario, bounds, outline.interactions, step)
-    return Stride(step, skin, choose_approach(outline.scenario, bounds, outline.interactions, step))
 
 
 def _size(parts: Parts) -> Size:
@@ -336,66 +291,68 @@ def _size(parts: Parts) -> Size:
 
 def _assemble(parts: Parts, strides: Sequence[Stride]) -> World:
     members, bodies = parts.bodies.shape
-    if _model(parts.outlines[0]) == "surface":
-        before = zeros((members, CONTACTS), CONTACT)
+    if parts.particles is None:
+        contacts = zeros((members, CONTACTS), CONTACT)
     else:
-        before = zeros((members, parts.slots), PARTICLE_CONTACT)
-    controls = empty_controls(parts, strides)
+        contacts = zeros((members, parts.slots), PARTICLE_CONTACT)
+    controls = run_controls(parts, strides)
     reach = np.maximum(controls["skin"], TRAVELLED * controls["skin"] + controls["approach"])
     controls["cell_width"] = 2.0 * controls["cell_radius"] + reach
-    lists = empty_lists(first_capacity(bodies), parts.slots, before)
-    return assemble_world(parts, controls, points=_points(members, parts.slots), before=before, **lists)
+    return assemble_world(parts, controls, first_capacity(bodies), parts.slots, contacts)
 
 
-def _model(outline: Outline) -> str:
-    return outline.scenario.contact.model
+EXPLICIT = Construction(choose_stride, _size, _assemble)
 
 
-EXPLICIT = Construction(_choose, _model, _size, _assemble)
+def assemble_world(
+    parts: Parts, controls: Records, capacity: int = 1, slots: int = 1, contacts: Records | None = None
+) -> World:
+    """Return stacked worlds at time zero with room for `capacity` pairs, `slots` and contacts of each.
 
-
-def assemble_world(parts: Parts, controls: Records, **arrays: Any) -> World:
-    """Return stacked worlds at time zero from their parts and the scheme's own arrays."""
+    A scheme that keeps pairs and contacts elsewhere needs none: there is room for one.
+    """
     members, count = parts.bodies.shape
-    bodies = parts.bodies
+    bodies, layouts, is_large = parts.bodies, parts.layouts, parts.is_large
     bodies["half_x"][:, -1] = math.inf  # the half-plane has one face without ends
-    loads, load_pieces = stack_loads([outline.applied for outline in parts.outlines])
-    tables = [one.shapes.table for one in parts.outlines if one.shapes is not None]  # none where all are rectangles
+    before = zeros((members, 1), CONTACT) if contacts is None else contacts
+    points = zeros((members, slots + 1), POINT)
+    points["share"] = 1.0  # as it stays in the surface model
+    blocks = count - 1
+    large = np.nonzero(is_large)[1].reshape(members, -1)
+    tables = [one.shapes.table for one in layouts if one.shapes is not None]  # none where all are rectangles
     world = World(
         bodies=bodies,
-        **arrays,
+        points=points,
+        before=before,
+        **empty_lists(capacity, slots, before),
         particles=parts.particles,
         corners=join_records(tables) if tables else None,
-        **_grid(parts),
-        interactions=interaction_tables([outline.interactions for outline in parts.outlines]),
+        heads=numbers((members, 1 << max(4, (2 * blocks - 1).bit_length())), np.uint32),
+        links=numbers((members, blocks), np.uint32),
+        large=numbers(large.shape, np.uint32),
+        neighbours=numbers((members, blocks), np.uint32),
+        interactions=interaction_tables([layout.interactions for layout in layouts]),
         ledger=zeros((members, count // GROUP + 1), LEDGER),
         action=zeros((members, 1), ACTION),
         matrices=numbers((members, 8, 3, 3), np.float64),
-        moved=stacked_driven_records(bodies, parts.outlines),
-        motion=join_records([outline.motion for outline in parts.outlines]),
+        moved=moved_records(bodies, layouts),
+        motion=join_records([layout.drives.pieces for layout in layouts]),
         controls=controls,
         clock=zeros((members, 1), CLOCK),
         shares=zeros((members, 1), SHARE),
         between=zeros((members, 1), ACTION),
         team=numbers((members, TEAM_WORDS), np.int64),
-        loads=loads,
-        load_pieces=load_pieces,
+        loads=join_records([layout.applied.loads for layout in layouts]),
+        load_pieces=join_records([layout.applied.pieces for layout in layouts]),
     )
-    world.clock["motion_piece"][:, 0] = parts.outlines[0].drives.paths.size
-    world.controls["driven"][:, 0] = parts.outlines[0].drives.driven.size
+    world.large[...] = large
+    world.clock["motion_piece"][:, 0] = layouts[0].drives.paths
+    world.controls["driven"][:, 0] = layouts[0].drives.driven.size
     speed_squared = bodies["vx"] ** 2 + bodies["vy"] ** 2
     energies = bodies["mass"] * speed_squared + bodies["inertia"] * bodies["spin"] ** 2
     # one by one, as the order of a sum affects its last digit
     world.ledger["largest_kinetic"][:, 0] = [0.5 * float(np.sum(one)) for one in energies]
     return world
-
-
-def without_lists(parts: Parts, controls: Records) -> World:
-    """Return stacked worlds at time zero for a scheme that keeps pairs and contacts elsewhere."""
-    members = len(parts.outlines)
-    before = zeros((members, 1), CONTACT)
-    lists = empty_lists(1, 1, before)
-    return assemble_world(parts, controls, points=_points(members, 1), before=before, **lists)
 
 
 def numbers(shape: tuple[int, ...], kind: type[np.generic]) -> Any:
@@ -445,65 +402,43 @@ def with_threads(world: World, threads: int) -> World:
     return world._replace(shares=zeros(threads, SHARE), between=zeros(between, ACTION))
 
 
-def _grid(parts: Parts) -> dict[str, Any]:
-    """Return the work space of the broad phase."""
-    members, blocks = parts.is_large.shape
-    large = np.nonzero(parts.is_large)[1].reshape(members, -1)
-    kept = numbers(large.shape, np.uint32)
-    kept[...] = large
-    return {
-        "heads": numbers((members, 1 << max(4, (2 * blocks - 1).bit_length())), np.uint32),
-        "links": numbers((members, blocks), np.uint32),
-        "large": kept,
-        "neighbours": numbers((members, blocks), np.uint32),
-    }
-
-
-def _points(members: int, slots: int) -> Records:
-    points = zeros((members, slots + 1), POINT)
-    points["share"] = 1.0  # as it stays in the surface model
-    return points
-
-
-def empty_controls(parts: Parts, strides: Sequence[Stride]) -> Records:
+def run_controls(parts: Parts, strides: Sequence[Stride]) -> Records:
     """Return the controls (m, 1) of runs, but for the width of a cell."""
     controls = zeros((len(strides), 1), CONTROLS)
-    rows = [_controls(outline.scenario, one) for outline, one in zip(parts.outlines, strides, strict=True)]
+    rows = []
+    for layout, (step, skin, approach) in zip(parts.layouts, strides, strict=True):
+        scenario, contact, time = layout.scenario, layout.scenario.contact, layout.scenario.time
+        motion_x, motion_y = (0.0, 0.0) if scenario.motion is None else motion_direction(scenario)
+        kernel, smoothing_length = KERNEL_CODES[contact.kernel], contact.resolved_smoothing_length
+        few = round(min(CHEAP_CHECKS, LONGEST_CHECK / step))  # of a quotient that may be infinite
+        every = max(1, few, round(min(MOST_STEPS, CHECK_INTERVAL / step)))
+        rest_checks = max(1, math.ceil(min(time.rest_hold / (every * step), MOST_STEPS))) if time.stop_at_rest else 0
+        row = {
+            "step": step,
+            "skin": skin,
+            "approach": approach,
+            "gravity_x": -scenario.gravity * math.sin(scenario.ground.tilt),
+            "gravity_y": -scenario.gravity * math.cos(scenario.ground.tilt),
+            "motion_x": motion_x,
+            "motion_y": motion_y,
+            "max_overlap": 0.0 if contact.max_overlap is None else contact.max_overlap,
+            "rest_speed": time.rest_speed,
+            "model": MODEL_CODES[contact.model],
+            "law": LAW_CODES[contact.law],
+            "sph_kernel": kernel,
+            "particle_size": contact.particle_spacing,
+            "smoothing_length": smoothing_length,
+            "support": support_radius(kernel, smoothing_length),
+            "check_every": every,
+            "rest_checks": rest_checks,
+            "push": layout.applied.push,
+            "loads_end": layout.applied.end,
+        }
+        rows.append(row)
     for name in rows[0]:
         controls[name][:, 0] = [row[name] for row in rows]
     controls["cell_radius"][:, 0] = parts.cell_radius
-    controls["push"][:, 0] = [outline.applied.push for outline in parts.outlines]
-    controls["loads_end"][:, 0] = [outline.applied.end for outline in parts.outlines]
     return controls
-
-
-def _controls(scenario: Scenario, stride: Stride) -> dict[str, float]:
-    contact, time, (step, skin, approach) = scenario.contact, scenario.time, stride
-    motion_x, motion_y = (0.0, 0.0) if scenario.motion is None else motion_direction(scenario)
-    kernel = KERNEL_CODES[contact.kernel]
-    smoothing_length = contact.resolved_smoothing_length
-    few = round(min(CHEAP_CHECKS, LONGEST_CHECK / step))  # of a quotient that may be infinite
-    every = max(1, few, round(min(MOST_STEPS, CHECK_INTERVAL / step)))
-    rest_checks = max(1, math.ceil(min(time.rest_hold / (every * step), MOST_STEPS))) if time.stop_at_rest else 0
-    return {
-        "step": step,
-        "skin": skin,
-        "approach": approach,
-        "gravity_x": -scenario.gravity * math.sin(scenario.ground.tilt),
-        "gravity_y": -scenario.gravity * math.cos(scenario.ground.tilt),
-        "motion_x": motion_x,
-        "motion_y": motion_y,
-        "max_overlap": 0.0 if contact.max_overlap is None else contact.max_overlap,
-        "rest_speed": time.rest_speed,
-        "model": MODEL_CODES[contact.model],
-        "law": LAW_CODES[contact.law],
-        "sph_kernel": kernel,
-        "particle_size": contact.particle_spacing,
-        "smoothing_length": smoothing_length,
-        "support": support_radius(kernel, smoothing_length),
-        "check_every": every,
-        "rest_checks": rest_checks,
-    }
 
 
 def couple(scenario: Scenario, world: Any, others: tuple[SystemInScene, ...]) -> Coupled:

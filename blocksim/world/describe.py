@@ -2,20 +2,19 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import GROUND, PlacedBody, Scenario, place_bodies
+from blocksim.scenario import GROUND, PlacedBody, Scenario
 from blocksim.scenario.geometry import edges_of
 from blocksim.scenario.motion import motion_peaks, motion_pieces
 from blocksim.scenario.placement import has_outlines
-from blocksim.world.bodies import Outline, division, free_masses, outline_of
+from blocksim.world.bodies import Layout, division, layout_of
 from blocksim.world.build import build_world, couple, stack_of_one
-from blocksim.world.interactions import ContactClass, contact_classes, pair_of
+from blocksim.world.interactions import pair_of
 from blocksim.world.memory import (
     PROCESS_BYTES,
-    Size,
     is_shorter_than_step,
     output_count,
     recorded_contacts,
@@ -26,7 +25,7 @@ from blocksim.world.memory import (
 from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
 from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
-from blocksim.world.step import Bounds, bounds_of, safety_of, step_of_contacts
+from blocksim.world.step import Bounds, Speeds, bounds_of, speeds_of, step_of_contacts
 from blocksim.world.systems import largest_step, others_of, warnings_of
 
 # measured on one core: a step costs about this for every body with its contacts
@@ -117,49 +116,54 @@ class Description:
 
 def describe(scenario: Scenario) -> Description:
     """Build the scene and describe it. Raises what building it raises."""
-    placed = place_bodies(scenario)
-    world, size = _built(scenario, len(placed))
+    layout, others = layout_of(scenario), others_of(scenario)
+    count, is_rigid = len(layout.placed), scenario.time.has_rigid_contacts
+    if is_rigid:
+        scene = build_nonsmooth(scenario)
+        world, size = scene.world, rigid_size(count, scene.contacts.constraints.size)
+    else:
+        world = build_world(scenario)
+        if scenario.systems:
+            couple(scenario, world, others)  # refuses pairs that are not modelled
+        slots, has_particles = world.candidates.shape[1], world.particles is not None
+        size = scene_size(count, world.pairs.size, slots, has_particles=has_particles)
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
     frames = output_count(steps, scenario.time.end, scenario.output.every) + 1
-    outline = outline_of(scenario)
-    (bounds,) = bounds_of(free_masses(stack_of_one(world.bodies), [outline]), len(placed), [outline.shapes])
-    particles = _particles(scenario, placed)
+    (bounds,) = bounds_of([layout], stack_of_one(world.bodies))
+    speeds = speeds_of(layout, bounds)
+    spacing = scenario.contact.particle_spacing
+    particles = sum(
+        number * sum(division(math.dist(a, b), spacing) for a, b, _ in edges_of(corners))
+        for corners, number in Counter(body.corners for body in layout.placed).items()
+    )
     touching = 0 if world.particles is None else particles // PARTICLES_OF_A_CONTACT
-    contacts = recorded_contacts(len(placed), touching) if scenario.output.contacts else 0
-    others = others_of(scenario)
+    contacts = recorded_contacts(count, touching) if scenario.output.contacts else 0
     more = sum(one.count * one.system.cost.memory for one in others)
     of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
+    motion = None
+    if scenario.motion is not None:
+        peaks = motion_peaks(motion_pieces(scenario), scenario.time.end)
+        values = (peaks.acceleration.value, peaks.displacement.value, peaks.velocity.value)
+        motion = MotionDescription(*values, abs(peaks.final_velocity))
     return Description(
-        bodies=placed,
-        pairs=tuple(_pairs(scenario, world, placed)),
-        motion=_motion(scenario),
+        bodies=layout.placed,
+        pairs=tuple(_pairs(layout, world)),
+        motion=motion,
         step=step,
         steps=steps,
         frames=frames,
-        seconds=steps * (_seconds_per_step(scenario, len(placed), particles) + of_systems),
-        bytes=run_bytes(len(placed), frames, contacts, others),
+        seconds=steps * (_seconds_per_step(scenario, count, particles) + of_systems),
+        bytes=run_bytes(count, frames, contacts, others),
         memory=PROCESS_BYTES + size.bytes + more,  # without frames: into a folder, they are written as they come
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
-        rigid=_rigid(outline, bounds, step) if scenario.time.has_rigid_contacts else None,
+        rigid=_rigid(layout, bounds, speeds, step) if is_rigid else None,
         systems={one.system.name: one.count for one in others},
-        limits=_limits(outline, bounds) if others else None,
+        limits=_limits(layout, bounds, speeds) if others else None,
         warnings=tuple(warnings_of(scenario)),
     )
-
-
-def _built(scenario: Scenario, count: int) -> tuple[World, Size]:
-    """Build the scene of so many bodies; return the arrays that all schemes have, and its size."""
-    if scenario.time.has_rigid_contacts:
-        scene = build_nonsmooth(scenario)
-        return scene.world, rigid_size(count, scene.contacts.constraints.size)
-    world = build_world(scenario)
-    if scenario.systems:
-        couple(scenario, world, others_of(scenario))  # refuses pairs that are not modelled
-    slots = world.candidates.shape[1]
-    return world, scene_size(count, world.pairs.size, slots, has_particles=world.particles is not None)
 
 
 def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
@@ -174,23 +178,22 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
     return OUTLINES_COST * rectangles if has_outlines(scenario) else rectangles
 
 
-def _limits(outline: Outline, bounds: Bounds) -> StepLimits | None:
-    scenario = outline.scenario
-    systems = largest_step(scenario)
-    if not scenario.time.has_springs or systems == math.inf:
+def _limits(layout: Layout, bounds: Bounds, speeds: Speeds) -> StepLimits | None:
+    systems = largest_step(layout.scenario)
+    if not layout.scenario.time.has_springs or systems == math.inf:
         return None
-    blocks = step_of_contacts(scenario, bounds, outline.interactions, safety_of(scenario))
-    return StepLimits(blocks, systems, scenario.contact.stiffness_scale * (blocks / systems) ** 2)
+    blocks = step_of_contacts(layout, bounds, speeds)
+    return StepLimits(blocks, systems, layout.scenario.contact.stiffness_scale * (blocks / systems) ** 2)
 
 
-def _rigid(outline: Outline, bounds: Bounds, step: float) -> SagDescription:
-    scenario, substeps = outline.scenario, outline.scenario.time.parts
-    sag = scene_sag(step / substeps, outline.placed, scenario.gravity)
+def _rigid(layout: Layout, bounds: Bounds, speeds: Speeds, step: float) -> SagDescription:
+    substeps = layout.scenario.time.parts
+    sag = scene_sag(step / substeps, layout.placed, layout.scenario.gravity)
     return SagDescription(
-        why=reason_of_step(outline, bounds).why,
+        why=reason_of_step(layout, bounds, speeds).why,
         substeps=substeps,
-        tolerance=velocity_tolerance(scenario, len(outline.placed)),
-        longest_step=longest_step(outline, bounds),
+        tolerance=velocity_tolerance(layout.scenario, len(layout.placed)),
+        longest_step=longest_step(layout, bounds, speeds),
         sag=sag.sag,
         block=sag.block,
         overlap=sag.overlap,
@@ -198,69 +201,42 @@ def _rigid(outline: Outline, bounds: Bounds, step: float) -> SagDescription:
     )
 
 
-def _motion(scenario: Scenario) -> MotionDescription | None:
-    if scenario.motion is None:
-        return None
-    peaks = motion_peaks(motion_pieces(scenario), scenario.time.end)
-    values = (peaks.acceleration.value, peaks.displacement.value, peaks.velocity.value)
-    return MotionDescription(*values, abs(peaks.final_velocity))
+def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
+    """Yield every pair of classes that can touch: blocks with the ground, with walls and with blocks.
 
-
-def _particles(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> int:
-    spacing = scenario.contact.particle_spacing
-    counts = Counter(body.corners for body in placed)
-    return sum(
-        count * sum(division(math.dist(a, b), spacing) for a, b, _ in edges_of(corners))
-        for corners, count in counts.items()
-    )
-
-
-def _pairs(scenario: Scenario, world: World, placed: tuple[PlacedBody, ...]) -> Iterator[PairDescription]:
-    """Yield every pair of classes that can touch: blocks with the ground, with walls and with blocks."""
-    classes = contact_classes(scenario, placed)
+    Rigid contacts have no springs in shear and no dashpots; their stiffness is that of their softest blocks.
+    """
+    scenario, classes, placed = layout.scenario, layout.classes, layout.placed
+    is_rigid = scenario.time.has_rigid_contacts
     blocks = [one.material for one in classes if not one.is_ground]
-    names = [GROUND, *(_class_name(one, blocks.count(one.material)) for one in classes[1:])]
+    names = [GROUND]
+    for one in classes[1:]:  # the depth is named where blocks of one material differ in it
+        depth = f" {1e3 * one.depth:g} mm" if blocks.count(one.material) > 1 else ""
+        names.append(f"wall of {one.material}" if one.is_wall else f"{one.material}{depth}")
     kinds = {(body.material, body.depth, body.density, body.fixed, body.corners): body for body in placed}
-    softest = {(body.material, body.depth): body for body in sorted(kinds.values(), key=inverse_mass)}
+    ordered = sorted(kinds.values(), key=lambda body: inverse_mass(body, 0.5 * body.size_x))
+    softest = {(body.material, body.depth): body for body in ordered}
     for i, block in enumerate(classes):
         for j, other in enumerate(classes):
             if not block.is_ground and (other.is_ground or j <= i):
                 pair, row = pair_of(scenario, block, other), world.interactions[i, j]
-                found = PairDescription(
+                normal_stiffness, rules = float(row.normal_stiffness), pair.rules
+                if is_rigid:
+                    substep = float(world.controls[0].step) / scenario.time.parts
+                    touching = [softest[str(one.material), one.depth] for one in (block, other) if not one.is_ground]
+                    normal_stiffness = point_stiffness(substep, touching)
+                    rules = {key: rule for key, rule in rules.items() if key in RIGID_RULES}
+                yield PairDescription(
                     pair=f"{names[i]} - {names[j]}",
                     materials=(str(block.material), names[j] if other.is_ground else str(other.material)),
                     static_friction=float(row.static_friction),
                     kinetic_friction=float(row.kinetic_friction),
                     transition_speed=float(row.transition_speed),
                     restitution=pair.restitution,
-                    normal_damping_ratio=float(row.normal_damping),
-                    shear_damping_ratio=float(row.shear_damping),
-                    normal_stiffness=float(row.normal_stiffness),
+                    normal_damping_ratio=None if is_rigid else float(row.normal_damping),
+                    shear_damping_ratio=None if is_rigid else float(row.shear_damping),
+                    normal_stiffness=normal_stiffness,
                     stiffness_unit=STIFFNESS_UNITS[scenario.contact.law],
-                    shear_stiffness_ratio=float(row.shear_ratio),
-                    rules=pair.rules,
+                    shear_stiffness_ratio=None if is_rigid else float(row.shear_ratio),
+                    rules=rules,
                 )
-                if scenario.time.has_rigid_contacts:
-                    substep = float(world.controls[0].step) / scenario.time.parts
-                    touching = [softest[str(one.material), one.depth] for one in (block, other) if not one.is_ground]
-                    found = _rigid_pair(found, substep, touching)
-                yield found
-
-
-def _rigid_pair(found: PairDescription, substep: float, touching: Sequence[PlacedBody]) -> PairDescription:
-    """Return the parameters that a pair has where contacts are rigid; `touching` are its softest blocks."""
-    return replace(
-        found,
-        normal_stiffness=point_stiffness(substep, touching),
-        normal_damping_ratio=None,
-        shear_damping_ratio=None,
-        shear_stiffness_ratio=None,
-        rules={key: rule for key, rule in found.rules.items() if key in RIGID_RULES},
-    )
-
-
-def _class_name(one: ContactClass, count: int) -> str:
-    """Return the name of a class: the material, and the depth where blocks of one material differ in it."""
-    if one.is_wall:
-        return f"wall of {one.material}"
-    return f"{one.material} {1e3 * one.depth:g} mm" if count > 1 else str(one.material)

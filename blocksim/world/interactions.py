@@ -1,8 +1,9 @@
-"""Damping ratio for a coefficient of restitution when contacts cannot pull.
+"""Contact parameters of every pair of contact classes: stiffness from elasticity, damping from restitution.
 
-Linear spring and dashpot whose force is clipped at zero: the contact ends when the force, not the overlap, returns
-to zero. Closed form of T. Schwager and T. Poeschel, "Coefficient of restitution and linear-dashpot model
-revisited", Granular Matter 9 (2007) 465-469. The textbook formula without clipping gives 0.40 where 0.30 is wanted.
+Damping. Contacts cannot pull: the force of spring and dashpot is clipped at zero, and the contact ends when the force,
+not the overlap, returns to zero. For a linear spring the closed form is that of T. Schwager and T. Poeschel,
+"Coefficient of restitution and linear-dashpot model revisited", Granular Matter 9 (2007) 465-469. The textbook formula
+without clipping gives 0.40 where 0.30 is wanted.
 
 Hertz's law with a dashpot 2 z sqrt(m k_t), k_t = 3/2 K x^(1/2) its slope, follows from the linear case exactly. With
 m = K = 1 and p = dx/dt, p dp/dx = -x^(3/2) - 2 z (3/2)^(1/2) x^(1/4) p. With w = x^(5/4), dw = 5/4 x^(1/4) dx, this is
@@ -10,8 +11,6 @@ p dp/dw = -4/5 w - 2 z' (4/5)^(1/2) p, z' = z (6/5)^(1/2): the phase plane of a 
 The force is zero where w = -2 z (3/2)^(1/2) p in both. So e(z) of Hertz is the linear e(z'), at any speed. (The map is
 that of D. Antypov and J. A. Elliott, "On an analytical solution for the damped Hertzian spring", EPL 94 (2011) 50004,
 for contacts that end at zero overlap.)
-
-Contact parameters of every pair of contact classes: stiffness from elasticity, damping from restitution.
 """
 
 import functools
@@ -114,45 +113,32 @@ def pair_of(scenario: Scenario, a: ContactClass, b: ContactClass) -> ResolvedPai
     return resolve_pair(scenario, str(block.material), str(partner), ground=other.is_ground)
 
 
-def compliance(scenario: Scenario, a: ContactClass, b: ContactClass) -> float:
-    """Return 1/E* = sum (1 - nu^2)/E (1/Pa). K. L. Johnson, Contact Mechanics (1985), eq. 4.24."""
-    pair = [scenario.materials[name] for name in _materials(a, b)]
-    return sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in pair)
-
-
-def _normal_stiffness(scenario: Scenario, a: ContactClass, b: ContactClass, pair: ResolvedPair) -> float:
-    """Return the stiffness of one corner contact.
-
-    Linear: scale E* L (N/m), L the shorter depth, or what the scenario gives instead of E* L. Hertz-Mindlin: scale
-    4/3 E* R*^(1/2) (N/m^1.5), R* the scenario's `contact_radius`.
-    """
-    contact = scenario.contact
-    if contact.law == "hertz-mindlin":
-        return contact.stiffness_scale * 4.0 / 3.0 * math.sqrt(contact.contact_radius) / compliance(scenario, a, b)
-    if pair.normal_stiffness is not None:
-        return contact.stiffness_scale * pair.normal_stiffness
-    return contact.stiffness_scale * min(a.depth, b.depth) / compliance(scenario, a, b)
-
-
-def _shear_stiffness_ratio(scenario: Scenario, a: ContactClass, b: ContactClass, given: ResolvedPair) -> float:
-    """Return shear over normal stiffness (-): as given, else Mindlin's 4 G*/E*, 1/G* = 2 sum (2 - nu)(1 + nu)/E.
-
-    For two equal materials this is 2 (1 - nu)/(2 - nu). R. D. Mindlin, J. Appl. Mech. 16 (1949) 259-268.
-    """
-    if given.shear_stiffness_ratio is not None:
-        return given.shear_stiffness_ratio
-    pair = [scenario.materials[name] for name in _materials(a, b)]
-    shear = sum(2.0 * (2.0 - m.poisson_ratio) * (1.0 + m.poisson_ratio) / m.young_modulus for m in pair)
-    return 4.0 * compliance(scenario, a, b) / shear
-
-
 def interaction(scenario: Scenario, a: ContactClass, b: ContactClass) -> Interaction:
-    """Return the parameters of one pair of classes."""
-    pair = pair_of(scenario, a, b)
-    ratio = damping_ratio(pair.restitution, scenario.contact.law)
+    """Return the parameters of one pair of classes, at least one of them blocks; those of a corner contact.
+
+    Compliance 1/E* = sum (1 - nu^2)/E (1/Pa): K. L. Johnson, Contact Mechanics (1985), eq. 4.24. Stiffness, linear:
+    scale E* L (N/m), L the shorter depth, or what the scenario gives instead of E* L. Hertz-Mindlin: scale
+    4/3 E* R*^(1/2) (N/m^1.5), R* the scenario's `contact_radius`. Shear over normal stiffness (-): as given, else
+    Mindlin's 4 G*/E*, 1/G* = 2 sum (2 - nu)(1 + nu)/E; for two equal materials this is 2 (1 - nu)/(2 - nu). R. D.
+    Mindlin, J. Appl. Mech. 16 (1949) 259-268.
+    """
+    contact, pair = scenario.contact, pair_of(scenario, a, b)
+    both = [scenario.materials[str(name)] for name in (a.material or b.material, b.material or a.material)]
+    compliance = sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in both)
+    if contact.law == "hertz-mindlin":
+        stiffness = contact.stiffness_scale * 4.0 / 3.0 * math.sqrt(contact.contact_radius) / compliance
+    elif pair.normal_stiffness is not None:
+        stiffness = contact.stiffness_scale * pair.normal_stiffness
+    else:
+        stiffness = contact.stiffness_scale * min(a.depth, b.depth) / compliance
+    shear_ratio = pair.shear_stiffness_ratio
+    if shear_ratio is None:
+        shear = sum(2.0 * (2.0 - m.poisson_ratio) * (1.0 + m.poisson_ratio) / m.young_modulus for m in both)
+        shear_ratio = 4.0 * compliance / shear
+    ratio = damping_ratio(pair.restitution, contact.law)
     return Interaction(
-        normal_stiffness=_normal_stiffness(scenario, a, b, pair),
-        shear_ratio=_shear_stiffness_ratio(scenario, a, b, pair),
+        normal_stiffness=stiffness,
+        shear_ratio=shear_ratio,
         normal_damping=ratio,
         shear_damping=ratio if pair.shear_damping_ratio is None else pair.shear_damping_ratio,
         static_friction=pair.friction.static,
@@ -180,11 +166,3 @@ def interaction_tables(members: Sequence[Interactions]) -> Records:
     for k, name in enumerate(Interaction._fields):
         tables[name] = values[..., k]
     return tables
-
-
-def _materials(a: ContactClass, b: ContactClass) -> tuple[str, str]:
-    one, other = a.material or b.material, b.material or a.material
-    if one is None or other is None:
-        message = "the ground is not in contact with itself"
-        raise ValueError(message)
-    return one, other

@@ -29,23 +29,21 @@ from blocksim.kernels.nonsmooth.groups import LONELY
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.models.stepping import Nonsmooth as Stepping
 from blocksim.scenario.placement import smallest_width
-from blocksim.world.bodies import Outline
+from blocksim.world.bodies import Layout
 from blocksim.world.build import (
     GROWTH,
-    SURFACE,
     Construction,
     Parts,
-    Stride,
+    assemble_world,
     build_one,
-    empty_controls,
     first_capacity,
     numbers,
-    without_lists,
+    run_controls,
 )
-from blocksim.world.memory import Size, refuse_if_too_large, rigid_size
-from blocksim.world.rigid_step import FEW, choose_rigid_step
+from blocksim.world.memory import refuse_if_too_large, rigid_size
+from blocksim.world.rigid_step import FEW, choose_rigid_stride
 from blocksim.world.sag import DAMPING, box_of, loads_at_rest, soft_contact
-from blocksim.world.step import Bounds, choose_skin
+from blocksim.world.step import Stride
 
 MOST_REACH = 1.5  # of a body, in skins
 WEAK_RESTITUTION = 0.5  # up to which the impacts of a substep happen all at once
@@ -71,21 +69,17 @@ def velocity_tolerance(scenario: Scenario, blocks: int) -> float:
     Gravity and friction do some 0.6 mm/s in a substep of few blocks. With a tolerance beyond that the pass ends after
     one sweep, and shear is found over many substeps: blocks slip some per cent too far, as they tilt until shear and
     normal forces agree. What is wrong of a slip goes as the tolerance over what gravity does in a substep. So a single
-    block has every substep solved, and so have fewer than CROWD on supports that move.
+    block has every substep solved, and so have fewer than CROWD where supports or any of them move as prescribed.
 
     Raises ValueError for a scenario of another scheme.
     """
     time = stepping_of(scenario)
     if time.velocity_tolerance is not None:
         return time.velocity_tolerance
-    if blocks == 1 or (blocks < CROWD and has_driven_parts(scenario)):
+    is_shaken = scenario.motion is not None or any(body.motion is not None for body in scenario.bodies)
+    if blocks == 1 or (blocks < CROWD and is_shaken):
         return FINEST
     return FINE if blocks < CROWD else COARSE
-
-
-def has_driven_parts(scenario: Scenario) -> bool:
-    """Return True if the supports move, or any body as prescribed."""
-    return scenario.motion is not None or any(body.motion is not None for body in scenario.bodies)
 
 
 def is_cut_at_impacts(scenario: Scenario, free: int) -> bool:
@@ -103,10 +97,9 @@ def has_row(placed: Sequence[PlacedBody]) -> bool:
         and min(one.top, other.top) > max(one.bottom, other.bottom) + near
         for one, other in combinations(boxes, 2)
     )
-    if not any(touching):
-        return False
-    loads = loads_at_rest(placed, 1.0)
-    return not any(load.lower is not None and not placed[load.lower].fixed for load in loads)
+    return any(touching) and not any(
+        load.lower is not None and not placed[load.lower].fixed for load in loads_at_rest(placed, 1.0)
+    )
 
 
 def has_impacts_in_rounds(
@@ -145,71 +138,63 @@ def needs_repeated_impacts(scenario: Scenario, placed: Sequence[PlacedBody] | No
 def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
     """Return a world at time zero with all that stepping it without springs needs.
 
-    Raises SceneTooLargeError when there is not enough memory for it, StepTooLongError when the scenario asks for an
+    Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
     scene: Nonsmooth = build_one(scenario, NONSMOOTH).scene
     return scene
 
 
-def _choose(outline: Outline, bounds: Bounds) -> Stride:
-    scenario = outline.scenario
-    stepping_of(scenario)
-    step = choose_rigid_step(outline, bounds)
-    return Stride(step, choose_skin(scenario, bounds, outline.interactions, step))
-
-
-def _size(parts: Parts) -> Size:
-    bodies = parts.bodies.shape[1]
-    return rigid_size(bodies, first_capacity(bodies))
-
-
 def _assemble(parts: Parts, strides: Sequence[Stride]) -> Nonsmooth:
-    controls = empty_controls(parts, strides)
+    controls = run_controls(parts, strides)
     stepping = zeros(controls.shape, STEPPING)
-    rows = [_stepping(outline, stride) for outline, stride in zip(parts.outlines, strides, strict=True)]
+    rows = [_stepping(layout, stride) for layout, stride in zip(parts.layouts, strides, strict=True)]
     for name in rows[0]:
         stepping[name][:, 0] = [row[name] for row in rows]
     controls["cell_width"] = 2.0 * (controls["cell_radius"] + stepping["most_reach"])
-    return with_lists(without_lists(parts, controls), stepping, first_capacity(parts.bodies.shape[1]))
+    return with_lists(assemble_world(parts, controls), stepping, first_capacity(parts.bodies.shape[1]))
 
 
-NONSMOOTH = Construction(_choose, lambda _: SURFACE, _size, _assemble)
+NONSMOOTH = Construction(
+    choose=choose_rigid_stride,
+    size=lambda parts: rigid_size(parts.bodies.shape[1], first_capacity(parts.bodies.shape[1])),
+    assemble=_assemble,
+)
 
 
-def _stepping(outline: Outline, stride: Stride) -> dict[str, float]:
-    time = stepping_of(outline.scenario)
+def _stepping(layout: Layout, stride: Stride) -> dict[str, float]:
+    time = stepping_of(layout.scenario)
     substep = stride.step / time.substeps
     soft = soft_contact(substep)
-    restitution = max(material.restitution for row in outline.interactions for material in row)
-    free = sum(not body.fixed for body in outline.placed)
-    rounds = has_impacts_in_rounds(outline.scenario, restitution, free, lambda: outline.placed)
+    restitution = max(material.restitution for row in layout.interactions for material in row)
+    free = sum(not body.fixed for body in layout.placed)
+    rounds = has_impacts_in_rounds(layout.scenario, restitution, free, lambda: layout.placed)
     return {
         "substep": substep,
         "length": stride.step,
         "rest_gap": time.restitution_threshold * substep,
-        "touch_gap": TOUCH * min((min(body.size_x, body.size_y) for body in outline.placed), default=0.0),
+        "touch_gap": TOUCH * min((min(body.size_x, body.size_y) for body in layout.placed), default=0.0),
         "frequency": soft.frequency,
         "damping": DAMPING,
         "closed_bias": soft.bias,
         "softness": soft.softness,
         "open_bias": 1.0 / substep,
         "threshold": time.restitution_threshold,
-        "tolerance": velocity_tolerance(outline.scenario, len(outline.placed)),
+        "tolerance": velocity_tolerance(layout.scenario, len(layout.placed)),
         "substeps": time.substeps,
         "velocity_sweeps": time.velocity_sweeps,
         "is_guarded": rounds,
-        "is_divided": rounds and is_cut_at_impacts(outline.scenario, free),
+        "is_divided": rounds and is_cut_at_impacts(layout.scenario, free),
         "least_reach": 0.5 * stride.skin,
         "most_reach": MOST_REACH * stride.skin,
-        "is_driven": outline.drives.driven.size > 0,
+        "is_driven": layout.drives.driven.size > 0,
     }
 
 
 def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1) -> Nonsmooth:
     """Return worlds (one, or a stack) with empty constraints, as many as there is room for pairs."""
     *members, bodies = world.bodies.shape
-    groups = groups_for(capacity)
+    groups = min(capacity, capacity // WIDTH + LONELY * COLOURS)  # full ones, and those in every colour that are not
     follows = bool(stepping["is_guarded"].any())
     contacts = Contacts(
         states=zeros((*members, bodies), STATE),
@@ -234,11 +219,6 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         used=numbers((*members, bodies), np.int64),
         pushes=zeros((*members, bodies if world.loads.size else 1), PUSH),
     )
-
-
-def groups_for(capacity: int) -> int:
-    """Return how many groups there is room for: full ones, and those in every colour that are not."""
-    return min(capacity, capacity // WIDTH + LONELY * COLOURS)
 
 
 def threads_of(scene: Nonsmooth) -> int:

@@ -1,21 +1,4 @@
-"""Joints of bodies as they are placed, found from their corners: where blocks touch one another and their supports.
-
-Outlines are convex, so that two bodies touch along one interval or at one point. The ends of an interval are corners
-of one of the two that lie on an edge of the other, whatever the shape: rectangles, outlines, drawn polygons,
-voussoirs, pieces of ground and walls, and the half-plane.
-
-How far the thrust of blocks at rest moves aside where rigid contacts give way like springs.
-
-A contact point at rest is a spring of w^2 / A, A = J M^-1 J^T and w = 2 pi f / h (sag.py); friction holds along the
-joint. So the displacements of a small scene at rest follow from one linear system with three unknowns per free block,
-and are proportional to h^2. Points in tension open: the worst are taken out, until none is left.
-
-Blocks that sink along the load path stay as strong as they were. What harms is displacement across it: the load above
-comes down elsewhere in the joints below. Its measure is how far a joint moves across its force, over its width, times
-that force over the greatest of the structure, and half of it in columns and walls. Limits of `ground.tilt` are too low
-by some 5 to 10 times this measure, in proportion to h^2.
-
-The time step of the non-smooth scheme: by how far a block moves while its contacts stay as they were found.
+"""The time step of the non-smooth scheme: by how far a block moves while its contacts stay as they were found.
 
 Contacts are found once a step, and what a block turns and moves meanwhile is the error of a step, first order in its
 length. So the automatic step is the usual one unless the fastest point could move farther than a tenth of the smallest
@@ -23,19 +6,28 @@ side in it. That speed is a bound, a fall of the highest corner to the lowest gr
 time; walls do not fall that fast. A manual step is therefore refused only where blocks go farther from the
 start, or in one substep at that bound.
 
-Contacts give way at rest as if they were springs, in proportion to the step squared. The step of few blocks is so short
-that this leaves their strength as it is: see rigid_step.py for arches and leaning columns, sag.py for heavy blocks on
-light ones.
-
 A block that meets something in a substep h stays there until it ends, and has not yet moved with its new velocity: it
 is behind by what the impact adds to velocity and spin times h/2 on average, and gravity changes its speed by g h
 meanwhile. Every impact passes that on to the next. Against speeds of free falls over sides L, sqrt(g L), that is h /
 sqrt(L/g). A few blocks can afford to have it small: a step is at most a share of sqrt(L/g) that grows with their
 number, so that costs are about the same, and that of a crowd is the usual one. The usual step is divided by whole
-numbers, so that outputs fall on the ends of steps. So with the way in a step at the speed of an impact. Supports
-that move count as bodies that are driven do: they come no farther towards a block in a step than blocks may move, and a
-step is a twentieth of their shortest period at most. Where few blocks rebound strongly that is not enough, as hops
-multiply errors a hundredfold: their steps are cut at impacts, see blocksim.kernels.nonsmooth.parts.
+numbers, so that outputs fall on the ends of steps. So with the way in a step at the speed of an impact. Supports that
+move count as bodies that are driven do: they come no farther towards a block in a step than blocks may move, and a step
+is a twentieth of their shortest period at most. Where few blocks rebound strongly that is not enough, as hops multiply
+errors a hundredfold: their steps are cut at impacts, see blocksim.kernels.nonsmooth.parts.
+
+Contacts give way at rest as if they were springs, in proportion to the step squared. The step of few blocks is so short
+that this leaves their strength as it is: heavy blocks on light ones sink no farther than sag.py allows, and the thrust
+of arches and leaning columns stays where it is. A contact point at rest is a spring of w^2 / A (sag.py); friction holds
+along the joint. So the displacements of a small scene follow from one linear system with three unknowns per free block.
+Points in tension open: the worst are taken out, until none is left. Blocks that sink along the load path stay as strong
+as they were. What harms is displacement across it: the load above comes down elsewhere in the joints below. Its measure
+is how far a joint moves across its force, over its width, times that force over the greatest of the structure, and half
+of it in columns and walls. Limits of `ground.tilt` are too low by some 5 to 10 times this measure.
+
+Joints are found from the corners of bodies as they are placed. Outlines are convex, so that two bodies touch along one
+interval or at one point. The ends of an interval are corners of one of the two that lie on an edge of the other,
+whatever the shape: rectangles, outlines, drawn polygons, voussoirs, pieces of ground and walls, and the half-plane.
 """
 
 import math
@@ -47,23 +39,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import LOAD_FIELD, LOAD_FORCE
-from blocksim.scenario import PlacedBody, PlacedSegment, Scenario
+from blocksim.scenario import PlacedBody, PlacedSegment
 from blocksim.scenario.geometry import box_of
 from blocksim.scenario.motion import shortest_cycle, shortest_period
 from blocksim.scenario.placement import smallest_width
-from blocksim.world.bodies import Outline
+from blocksim.world.bodies import Layout
 from blocksim.world.sag import CRUSHED_SHARE, TOUCHING, UNLIKE, WARNING_SHARE, scene_sag, soft_contact
-from blocksim.world.step import (
-    MOST_STEPS,
-    Bounds,
-    StepError,
-    UncountableStepsError,
-    given_speed,
-    greatest_speed,
-    impact_speed,
-    support_speed,
-)
+from blocksim.world.step import Bounds, Speeds, StepError, Stride, choose_skin, refuse_uncountable, speeds_of
 
+USUAL_STEP = 1e-3  # s
+SHARE = 0.1  # of the smallest side
+FEW = 13  # free blocks: fewer take shorter steps
+NATURAL = 0.02  # of sqrt(L/g): the step of so many
+CROWD = 100  # free blocks, from which on sagging does not shorten a step
+CALM = 0.9  # of the overlap or sag that is warned of
+SHIFT = 2e-5  # of the width of a joint, calibrated: limits are too low by some 0.02 %
+PERIOD_SHARE = 0.05  # of the shortest period of a prescribed motion: its velocity changes by a third in a step
+MILLI, PERCENT = 1e3, 1e2
+OTHERWISE = 'Use step = "auto", or force_step = true to override'
+HOLD = 100.0  # stiffness along a joint over that across it: rigid, and as accurate
+PASSES = 20
+ROUND_OFF = 1e-9  # of the greatest pressure: tension that is none
+WORST = 0.5  # of the greatest tension: points with more open in the same pass
+SLACK = 1e-12  # of its stiffness: what holds a block that joints do not
+LOOSE = 1e6  # over the overlap of one point that carries everything: only mechanisms move farther
+FALLS = 50.0  # over displacements with all points closed: only mechanisms move farther
+FEW_UPRIGHT = 3  # rectangles along the axes, of which a stack cannot lean far
+COURSED = 0.5  # calibrated: limits of columns and walls are off by half as much as those of arches, or less
+PARALLEL = 1e-3  # sine of the angle between normals of one direction
+Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
 
@@ -105,10 +109,17 @@ def joints_of(
 
     `level` says whether the half-plane y < 0 is one of the supports.
     """
-    blocks = [_side_of(i, body) for i, body in enumerate(placed)]
-    low, high = box_of([corner for side in blocks if side.body in free for corner in side.corners])
+    sides = []
+    for i, body in enumerate(placed):
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        corners = [(body.x + c * x - s * y, body.y + s * x + c * y) for x, y in body.corners]
+        sides.append(_Side(i, list(zip(corners, [*corners[1:], corners[0]], strict=True)), corners))
+    low, high = box_of([corner for side in sides if side.body in free for corner in side.corners])
     (left, bottom), (right, top) = (low[0] - near, low[1] - near), (high[0] + near, high[1] + near)
-    sides = [*blocks, *(_side_of_piece(len(placed) + k, one) for k, one in enumerate(segments))]
+    for one in segments:  # a piece has its solid on the right; its ends count where they are edges
+        start, end = (one.x0, one.y0), (one.x1, one.y1)
+        edges = [*([start] if one.touches_start else []), *([end] if one.touches_end else [])]
+        sides.append(_Side(len(sides), [(end, start)], edges))
     if level:
         sides.append(_Side(len(sides), [((right, 0.0), (left, 0.0))], []))
     within = [
@@ -122,18 +133,6 @@ def joints_of(
         hits[pair].append(hit)
     found = (_joint(pair, some, near) for pair, some in hits.items())
     return [joint for joint in found if joint is not None]
-
-
-def _side_of(number: int, body: PlacedBody) -> _Side:
-    c, s = math.cos(body.angle), math.sin(body.angle)
-    corners = [(body.x + c * x - s * y, body.y + s * x + c * y) for x, y in body.corners]
-    return _Side(number, list(zip(corners, [*corners[1:], corners[0]], strict=True)), corners)
-
-
-def _side_of_piece(number: int, one: PlacedSegment) -> _Side:
-    """Return the face of a piece, which has its solid on the right, and those of its ends that are edges."""
-    start, end = (one.x0, one.y0), (one.x1, one.y1)
-    return _Side(number, [(end, start)], [*([start] if one.touches_start else []), *([end] if one.touches_end else [])])
 
 
 def _hits(sides: Sequence[_Side], free: Collection[int], near: float) -> Iterator[tuple[tuple[int, int], _Hit]]:
@@ -166,31 +165,15 @@ def _joint(pair: tuple[int, int], hits: Sequence[_Hit], near: float) -> Joint | 
     width = math.dist(one, other)
     if width > 2.0 * near:
         across = (other[1] - one[1]) / width, (one[0] - other[0]) / width
-        best = max(hits, key=lambda hit: abs(_dot(hit.normal, across)))
-        way = math.copysign(1.0, _dot(best.normal, across)) * (1.0 if best.owner == pair[0] else -1.0)
+        along = [hit.normal[0] * across[0] + hit.normal[1] * across[1] for hit in hits]
+        best = max(range(len(hits)), key=lambda k: abs(along[k]))
+        way = math.copysign(1.0, along[best]) * (1.0 if hits[best].owner == pair[0] else -1.0)
         return Joint(*pair, (way * across[0], way * across[1]), (one, other))
     inside = next((hit for hit in hits if hit.is_inside), None)
     if inside is None:
         return None
     way = 1.0 if inside.owner == pair[0] else -1.0
     return Joint(*pair, (way * inside.normal[0], way * inside.normal[1]), (inside.point,))
-
-
-def _dot(a: Point, b: Point) -> float:
-    return a[0] * b[0] + a[1] * b[1]
-
-
-HOLD = 100.0  # stiffness along a joint over that across it: rigid, and as accurate
-PASSES = 20
-ROUND_OFF = 1e-9  # of the greatest pressure: tension that is none
-WORST = 0.5  # of the greatest tension: points with more open in the same pass
-SLACK = 1e-12  # of its stiffness: what holds a block that joints do not
-LOOSE = 1e6  # over the overlap of one point that carries everything: only mechanisms move farther
-FALLS = 50.0  # over displacements with all points closed: only mechanisms move farther
-FEW_UPRIGHT = 3  # rectangles along the axes, of which a stack cannot lean far
-COURSED = 0.5  # calibrated: limits of columns and walls are off by half as much as those of arches, or less
-PARALLEL = 1e-3  # sine of the angle between normals of one direction
-Floats = NDArray[np.float64]
 
 
 class _Frame(NamedTuple):
@@ -214,36 +197,22 @@ class _Frame(NamedTuple):
         return bool((np.abs(sines * cosines) < PARALLEL).all())
 
 
-class _Rest(NamedTuple):
-    """Displacements of blocks (m, m, rad; supports last), and what points carry (N)."""
-
-    moved: Floats  # (n + 1, 3)
-    pressed: Floats  # (p,)
-    sheared: Floats  # (p,)
-
-
-def thrust_shift(outline: Outline) -> float:
+def thrust_shift(layout: Layout) -> float:
     """Return the measure times w^2 (1/s2); zero where blocks carry vertical forces alone, and for walls that fall."""
-    scenario, placed = outline.scenario, outline.placed
+    scenario, placed = layout.scenario, layout.placed
     free = {i for i, body in enumerate(placed) if not body.fixed or body.freed}
-    if not free or _is_simple(outline, len(free)):
+    is_level = scenario.ground.profile is None
+    is_upright = is_level and not any(body.angle or body.is_polygon for body in placed)
+    is_vertical = scenario.ground.tilt == 0.0 and not scenario.loads
+    if not free or (is_upright and (len(free) <= FEW_UPRIGHT or is_vertical)):
         return 0.0
-    near = TOUCHING * smallest_width(placed)
-    joints = joints_of(placed, outline.segments, free, near, level=scenario.ground.profile is None)
+    joints = joints_of(placed, layout.segments, free, TOUCHING * smallest_width(placed), level=is_level)
     joints, blocks = _carried(joints, free)
     if not joints:
         return 0.0
     frame = _frame(placed, joints, blocks)
-    rest = _at_rest(frame, _forces(outline, blocks))
-    return 0.0 if rest is None else _greatest_shift(frame, rest) * (COURSED if frame.is_coursed else 1.0)
-
-
-def _is_simple(outline: Outline, free: int) -> bool:
-    """Return True for rectangles along the axes that are few, or that carry vertical forces alone."""
-    scenario = outline.scenario
-    if scenario.ground.profile is not None or any(body.angle or body.is_polygon for body in outline.placed):
-        return False
-    return free <= FEW_UPRIGHT or (scenario.ground.tilt == 0.0 and not scenario.loads)
+    rest = _at_rest(frame, _forces(layout, blocks))
+    return 0.0 if rest is None else _greatest_shift(frame, *rest) * (COURSED if frame.is_coursed else 1.0)
 
 
 def _carried(joints: Sequence[Joint], free: set[int]) -> tuple[list[Joint], list[int]]:
@@ -286,36 +255,36 @@ def _frame(placed: Sequence[PlacedBody], joints: Sequence[Joint], blocks: Sequen
     return _Frame(joints, blocks, joint, arms, places, normals, rows[0], rows[1], 1.0 / compliance)
 
 
-def _forces(outline: Outline, blocks: Sequence[int]) -> Floats:
+def _forces(layout: Layout, blocks: Sequence[int]) -> Floats:
     """Return forces (N) and moments (N m) on blocks (n + 1, 3): weight, and loads as they are at the start.
 
     Water is left out.
     """
-    tilt, gravity = outline.scenario.ground.tilt, outline.scenario.gravity
+    tilt, gravity = layout.scenario.ground.tilt, layout.scenario.gravity
     forces = np.zeros((len(blocks) + 1, 3))
-    masses = np.array([outline.placed[i].mass for i in blocks])
+    masses = np.array([layout.placed[i].mass for i in blocks])
     pull = np.array([-gravity * math.sin(tilt), -gravity * math.cos(tilt)])
     place = {body: k for k, body in enumerate(blocks)}
-    for load in outline.applied.loads:
-        value = float(outline.applied.pieces["value"][load.first_piece])
+    for load in layout.applied.loads:
+        value = float(layout.applied.pieces["value"][load.first_piece])
         if load.kind == LOAD_FIELD:
             pull += value * np.array([load.fx, load.fy])
         elif load.kind == LOAD_FORCE and load.body in place:
-            forces[place[load.body]] += value * _push(load, outline.placed[load.body])
+            angle = layout.placed[load.body].angle  # the point turns with the body
+            c, s = math.cos(angle), math.sin(angle)
+            x, y = c * load.x - s * load.y, s * load.x + c * load.y
+            fx, fy = (c * load.fx - s * load.fy, s * load.fx + c * load.fy) if load.turns else (load.fx, load.fy)
+            forces[place[load.body]] += value * np.array([fx, fy, x * fy - y * fx + load.torque])
     forces[:-1, :2] += masses[:, None] * pull
     return forces
 
 
-def _push(load: np.record, body: PlacedBody) -> Floats:
-    """Return the force (N) and the moment (N m) of a load of value one, of which the point turns with the body."""
-    c, s = math.cos(body.angle), math.sin(body.angle)
-    x, y = c * load.x - s * load.y, s * load.x + c * load.y
-    fx, fy = (c * load.fx - s * load.fy, s * load.fx + c * load.fy) if load.turns else (load.fx, load.fy)
-    return np.array([fx, fy, x * fy - y * fx + load.torque])
+def _at_rest(frame: _Frame, forces: Floats) -> tuple[Floats, Floats, Floats] | None:
+    """Return the equilibrium without tension; of what falls that of closed joints, or none where it is a wall.
 
-
-def _at_rest(frame: _Frame, forces: Floats) -> _Rest | None:
-    """Return the equilibrium without tension; of what falls that of closed joints, or none where it is a wall."""
+    It is given by the displacements of blocks (m, m, rad; (n + 1, 3), supports last), and by the forces (N, (p,)) that
+    points carry across their joints and along them.
+    """
     closed = np.ones(frame.stiffness.size, bool)
     matrix = _stiffness(frame, closed)
     matrix[np.diag_indices_from(matrix)] *= 1.0 + SLACK
@@ -338,7 +307,7 @@ def _at_rest(frame: _Frame, forces: Floats) -> _Rest | None:
             closed[:], moved = True, first
             break
     pressed = np.maximum(0.0, -frame.stiffness * (frame.across @ moved)) * closed
-    return _Rest(moved.reshape(-1, 3), pressed, -HOLD * frame.stiffness * (frame.along @ moved) * (pressed > 0.0))
+    return moved.reshape(-1, 3), pressed, -HOLD * frame.stiffness * (frame.along @ moved) * (pressed > 0.0)
 
 
 def _stiffness(frame: _Frame, chosen: NDArray[np.bool_]) -> Floats:
@@ -354,17 +323,17 @@ def _moved(matrix: Floats, forces: Floats) -> Floats:
     return np.append(np.linalg.solve(matrix, forces[:-1].ravel()), [0.0, 0.0, 0.0])
 
 
-def _greatest_shift(frame: _Frame, rest: _Rest) -> float:
+def _greatest_shift(frame: _Frame, moved: Floats, pressed: Floats, sheared: Floats) -> float:
     """Return the measure: across the force, over the width, times the share in the greatest force."""
     turned = np.column_stack([-frame.normals[:, 1], frame.normals[:, 0]])
-    point_forces = rest.pressed[:, None] * frame.normals + rest.sheared[:, None] * turned
+    point_forces = pressed[:, None] * frame.normals + sheared[:, None] * turned
     count = len(frame.joints)
     forces = np.column_stack([np.bincount(frame.joint, point_forces[:, axis], count) for axis in (0, 1)])
-    moves = rest.moved[frame.places]  # of both bodies at every point
+    moves = moved[frame.places]  # of both bodies at every point
     x = (moves[:, :, 0] - moves[:, :, 2] * frame.arms[:, :, 1]).mean(axis=1)
     y = (moves[:, :, 1] + moves[:, :, 2] * frame.arms[:, :, 0]).mean(axis=1)
-    aside = rest.pressed * (x * forces[frame.joint, 1] - y * forces[frame.joint, 0])
-    total = np.bincount(frame.joint, rest.pressed, count)
+    aside = pressed * (x * forces[frame.joint, 1] - y * forces[frame.joint, 0])
+    total = np.bincount(frame.joint, pressed, count)
     widths = np.array([joint.width for joint in frame.joints])
     most = _greatest_forces(frame, np.hypot(forces[:, 0], forces[:, 1]))
     carries = (total > 0.0) & (widths > 0.0) & (most > 0.0)
@@ -398,42 +367,6 @@ def _greatest_forces(frame: _Frame, forces: Floats) -> Floats:
     return most
 
 
-USUAL_STEP = 1e-3  # s
-SHARE = 0.1  # of the smallest side
-FEW = 13  # free blocks: fewer take shorter steps
-NATURAL = 0.02  # of sqrt(L/g): the step of so many
-CROWD = 100  # free blocks, from which on sagging does not shorten a step
-CALM = 0.9  # of the overlap or sag that is warned of
-SHIFT = 2e-5  # of the width of a joint, calibrated: limits are too low by some 0.02 %, see rigid_step.py
-PERIOD_SHARE = 0.05  # of the shortest period of a prescribed motion: its velocity changes by a third in a step
-MILLI, PERCENT = 1e3, 1e2
-
-
-class StepTooLongError(StepError):
-    """A block moves too far in a manual step that is not forced; `limit` in s."""
-
-    def __init__(self, step: float, limit: float, smallest: float) -> None:
-        """Report the limits."""
-        self.limit = limit
-        super().__init__(
-            f"{step:.4g} s is too long: blocks could move farther than a tenth of the smallest side "
-            f"({MILLI * smallest:.4g} mm) before contacts are detected again; at most {limit:.4g} s with these "
-            'substeps. Use step = "auto", or force_step = true to override'
-        )
-
-
-class CoarseStepError(StepError):
-    """A manual step that is not forced is too long for a harmonic motion or a pulse; `limit` in s."""
-
-    def __init__(self, step: float, cycle: float) -> None:
-        """Report both."""
-        self.limit = PERIOD_SHARE * cycle
-        super().__init__(
-            f"{step:.4g} s is too long for a motion with a cycle of {cycle:.4g} s: at most a twentieth of it, "
-            f'{self.limit:.4g} s. Use step = "auto", or force_step = true to override'
-        )
-
-
 class Reason(NamedTuple):
     """A step (s) that must not be exceeded, and the reason in a few words, with places for numbers.
 
@@ -450,103 +383,94 @@ class Reason(NamedTuple):
         return self.text.format(*self.numbers)
 
 
-def choose_rigid_step(outline: Outline, bounds: Bounds) -> float:
-    """Return the step (s) the run will take; raises StepError."""
-    scenario = outline.scenario
-    step, end = reason_of_step(outline, bounds).step, scenario.time.end
-    limit = longest_step(outline, bounds)
-    if not step > 0.0 or end / step > MOST_STEPS:
-        raise UncountableStepsError(end, step)
-    if step > limit and not scenario.time.force_step:
-        cycle = shortest_cycle(scenario)
+def choose_rigid_stride(layout: Layout, bounds: Bounds) -> Stride:
+    """Return step and skin of a run of the non-smooth scheme. Raises StepError and SkinTooSmallError."""
+    time, speeds = layout.scenario.time, speeds_of(layout, bounds)
+    step, limit = reason_of_step(layout, bounds, speeds).step, longest_step(layout, bounds, speeds)
+    refuse_uncountable(time.end, step)
+    if step > limit and not time.force_step:
+        cycle = shortest_cycle(layout.scenario)
         if step > PERIOD_SHARE * cycle:
-            raise CoarseStepError(step, cycle)
-        raise StepTooLongError(step, limit, bounds.smallest)
-    return step
+            limit = PERIOD_SHARE * cycle
+            message = f"a motion with a cycle of {cycle:.4g} s: at most a twentieth of it, {limit:.4g} s"
+            raise StepError(f"{step:.4g} s is too long for {message}. {OTHERWISE}", limit)
+        message = (
+            f"{step:.4g} s is too long: blocks could move farther than a tenth of the smallest side "
+            f"({MILLI * bounds.smallest:.4g} mm) before contacts are detected again; at most {limit:.4g} s with these "
+            f"substeps. {OTHERWISE}"
+        )
+        raise StepError(message, limit)
+    return Stride(step, choose_skin(layout, bounds, speeds, step))
 
 
-def reason_of_step(outline: Outline, bounds: Bounds) -> Reason:
+def reason_of_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> Reason:
     """Return the step that a scenario gives or that is chosen for it, admissible or not."""
-    scenario = outline.scenario
+    scenario = layout.scenario
     if scenario.time.step != "auto":
         return Reason(scenario.time.step, "as given")
     few = min(1.0, bounds.free / FEW) if bounds.free else 1.0
     reasons = [Reason(USUAL_STEP, "the usual step"), Reason(scenario.time.end, "the whole time")]
-    speeds = ((few, impact_speed(scenario, bounds)), (1.0, greatest_speed(scenario, bounds, outline.interactions)))
-    for share, speed in speeds:
+    for share, speed in ((few, speeds.impact), (1.0, speeds.greatest)):
         if speed > 0.0:
             way = SHARE * share * bounds.smallest
             why = "no point moves farther than {:.3g} mm in it, at most at {:.3g} m/s"
             reasons.append(Reason(way / speed, why, (MILLI * way, speed)))
-    reasons += _reasons_of_motion(scenario, bounds, few)
+    speed = speeds.given + speeds.support
+    if scenario.motion is not None and speed > 0.0:
+        way = SHARE * few * bounds.smallest
+        why = "supports move no farther than {:.3g} mm in it, at most at {:.3g} m/s with the blocks"
+        reasons.append(Reason(way / speed, why, (MILLI * way, speed)))
+    period = shortest_period(scenario)
+    if period > 0.0:
+        why = "a twentieth of {:.3g} s, the shortest period of a motion"
+        reasons.append(Reason(PERIOD_SHARE * period, why, (period,)))
     if bounds.free and scenario.gravity > 0.0:
         share = NATURAL * bounds.free / FEW
         why = "{:.2g} √(L/g) for so few blocks, L = {:.4g} mm the smallest side"
         parts = max(1, round(USUAL_STEP / (share * math.sqrt(bounds.smallest / scenario.gravity))))
         reasons.append(Reason(USUAL_STEP / parts, why, (share, MILLI * bounds.smallest)))
-        reasons += _reasons_of_sag(outline, bounds)
-        reasons += _reasons_of_thrust(outline, bounds)
+        if bounds.free < CROWD:  # which takes the usual step anyway
+            reasons += _reasons_of_sag(layout, bounds)
+            reasons += _reasons_of_thrust(layout)
     return min(reasons, key=lambda reason: reason.step)
 
 
-def _reasons_of_motion(scenario: Scenario, bounds: Bounds, few: float) -> Iterator[Reason]:
-    """Yield the steps that supports in motion admit: by their way towards a block, and by their shortest period."""
-    if scenario.motion is not None:
-        way = SHARE * few * bounds.smallest
-        speed = given_speed(scenario, bounds) + support_speed(scenario)
-        if speed > 0.0:
-            why = "supports move no farther than {:.3g} mm in it, at most at {:.3g} m/s with the blocks"
-            yield Reason(way / speed, why, (MILLI * way, speed))
-    period = shortest_period(scenario)
-    if period > 0.0:
-        yield Reason(PERIOD_SHARE * period, "a twentieth of {:.3g} s, the shortest period of a motion", (period,))
-
-
-def _reasons_of_sag(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
+def _reasons_of_sag(layout: Layout, bounds: Bounds) -> Iterator[Reason]:
     """Yield the step in which no contact at rest gives way too far, where light blocks carry heavy ones.
 
-    Most scenes are far from it, which is known from the weight of all; crowds take the usual step anyway.
+    Most scenes are far from it, which is known from the weight of all.
     """
-    scenario = outline.scenario
+    gravity, substep = layout.scenario.gravity, USUAL_STEP / layout.scenario.time.parts
     masses = [1.0 / kind.inverse_mass for kind in bounds.kinds if kind.inverse_mass > 0.0]
     crushed = CALM * CRUSHED_SHARE * bounds.smallest
     allowed = CALM * WARNING_SHARE * bounds.smallest
     least = crushed if max(masses) >= UNLIKE * min(masses) else allowed
-    substeps = _substeps(scenario)
     compliance = max(
         kind.inverse_mass + max(kind.half_x, kind.half_y) ** 2 * kind.inverse_inertia for kind in bounds.kinds
     )
-    square = soft_contact(USUAL_STEP / substeps).frequency ** 2
-    if bounds.free >= CROWD or not 2.0 * compliance * scenario.gravity * bounds.mass > square * least:
-        return
-    sag = scene_sag(USUAL_STEP / substeps, outline.placed, scenario.gravity)
-    for found, most in ((sag.crushed, crushed), (sag.overlap, allowed)):
-        if found > most:
-            why = "no contact gives way by more than {:.3g} mm where light blocks carry heavy ones"
-            yield Reason(USUAL_STEP / math.ceil(math.sqrt(found / most)), why, (MILLI * most,))
+    if 2.0 * compliance * gravity * bounds.mass > soft_contact(substep).frequency ** 2 * least:
+        sag = scene_sag(substep, layout.placed, gravity)
+        for found, most in ((sag.crushed, crushed), (sag.overlap, allowed)):
+            if found > most:
+                why = "no contact gives way by more than {:.3g} mm where light blocks carry heavy ones"
+                yield Reason(USUAL_STEP / math.ceil(math.sqrt(found / most)), why, (MILLI * most,))
 
 
-def _reasons_of_thrust(outline: Outline, bounds: Bounds) -> Iterator[Reason]:
-    """Yield the step in which contacts of few blocks give way so little that their thrust stays where it is."""
-    if bounds.free < CROWD:
-        square = soft_contact(USUAL_STEP / _substeps(outline.scenario)).frequency ** 2
-        parts = math.ceil(math.sqrt(thrust_shift(outline) / square / SHIFT))
-        if parts > 1:
-            why = (
-                "at rest joints move across their thrust by no more than {:.2g} % of their widths, "
-                "in columns and walls {:.2g} %"
-            )
-            yield Reason(USUAL_STEP / parts, why, (PERCENT * SHIFT, PERCENT * SHIFT / COURSED))
+def _reasons_of_thrust(layout: Layout) -> Iterator[Reason]:
+    """Yield the step in which contacts give way so little that their thrust stays where it is."""
+    square = soft_contact(USUAL_STEP / layout.scenario.time.parts).frequency ** 2
+    parts = math.ceil(math.sqrt(thrust_shift(layout) / square / SHIFT))
+    if parts > 1:
+        why = (
+            "at rest joints move across their thrust by no more than {:.2g} % of their widths, "
+            "in columns and walls {:.2g} %"
+        )
+        yield Reason(USUAL_STEP / parts, why, (PERCENT * SHIFT, PERCENT * SHIFT / COURSED))
 
 
-def _substeps(scenario: Scenario) -> int:
-    return scenario.time.parts
-
-
-def longest_step(outline: Outline, bounds: Bounds) -> float:
+def longest_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> float:
     """Return the longest manual step (s)."""
-    scenario = outline.scenario
-    speed = greatest_speed(scenario, bounds, outline.interactions)
-    rate = max(given_speed(scenario, bounds) + support_speed(scenario), speed / _substeps(scenario))
-    longest = SHARE * bounds.smallest / rate if rate > 0.0 else scenario.time.end
-    return min(longest, PERIOD_SHARE * shortest_cycle(scenario))
+    time = layout.scenario.time
+    rate = max(speeds.given + speeds.support, speeds.greatest / time.parts)
+    longest = SHARE * bounds.smallest / rate if rate > 0.0 else time.end
+    return min(longest, PERIOD_SHARE * shortest_cycle(layout.scenario))

@@ -1,15 +1,14 @@
-"""Loads of blocks at rest: every block passes its weight, and that of the blocks on it, to its supports.
+"""Loads of blocks at rest, and how far rigid contacts give way under them.
 
-A block stands on blocks whose upper faces are as high as its lower one, or else on the ground. Blocks are taken from
-above downwards, so that all loads on a block are known before it passes its own on. Of more than one support
-the two outermost share the load by the lever; each touches along an interval whose two ends share its part by the lever
-too. Turned blocks count as their bounding boxes.
+Every block passes its weight, and that of the blocks on it, to its supports: to blocks whose upper faces are as high as
+its lower one, or else to the ground. Blocks are taken from above downwards, so that all loads on a block are known
+before it passes its own on. Of more than one support the two outermost share the load by the lever; each touches along
+an interval whose two ends share its part by the lever too. Turned blocks count as their bounding boxes.
 
-Overlap of rigid contacts at rest: the position pass holds blocks apart like springs, stiffer for small steps.
-
-At rest s = -F A / w^2 for a contact point that carries F, A = J M^-1 J^T, w = 2 pi f / h (blocksim.kernels.nonsmooth):
-a spring of w^2 / A, proportional to 1 / h^2. Of two blocks in face contact A = sum of 1/m + r^2/I over both, with half
-a side as the lever arm r, as far as the point is from the middle.
+The position pass holds blocks apart like springs, stiffer for small steps: at rest s = -F A / w^2 for a contact point
+that carries F, A = J M^-1 J^T, w = 2 pi f / h (blocksim.kernels.nonsmooth), a spring of w^2 / A, proportional to 1 /
+h^2. Of two blocks in face contact A = sum of 1/m + r^2/I over both, with half a side as the lever arm r, as far as the
+point is from the middle.
 """
 
 import math
@@ -19,15 +18,22 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import Records
 from blocksim.kernels.nonsmooth.arrays import AWAY, NOT_STRUCK, Nonsmooth
 from blocksim.scenario import PlacedBody
 from blocksim.scenario.geometry import box_of as corners_box
 from blocksim.scenario.placement import smallest_width
 
 TOUCHING = 1e-3  # of the smallest side: faces that near to each other touch
+FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
+DAMPING = 10.0  # damping ratio of the soft contact
+WARNING_SHARE = 0.01  # of the smallest side: overlap of any contact
+CRUSHED_SHARE = 0.001  # of the smallest side: sag of what light blocks carry that is heavier by at least UNLIKE
+UNLIKE = 10.0  # ratio of masses; walls and stacks of alike blocks are far from it
+DRIFT = 25.0  # substeps: time constant of the soft contact, 2 zeta / w
+STILL = 0.1  # of an overlap, that it may change by in that time at rest
+UPRIGHT = 0.1  # cosine of the angle between a normal and the vertical, from which on one body lies on the other
+MILLI, PERCENT = 1e3, 1e2
 
 
 class Box(NamedTuple):
@@ -39,7 +45,7 @@ class Box(NamedTuple):
     top: float
 
 
-class Load(NamedTuple):
+class EndLoad(NamedTuple):
     """Load of one end of an interval of contact: `lower` is None for the ground."""
 
     upper: int
@@ -48,69 +54,63 @@ class Load(NamedTuple):
     force: float  # N
 
 
-class _Carried:
-    """Force (N) and moment (N m) about x = 0 that have come down upon a block, its own weight first."""
-
-    def __init__(self, weight: float, x: float) -> None:
-        self.force, self.moment = weight, weight * x
-
-    def add(self, force: float, x: float) -> None:
-        self.force += force
-        self.moment += force * x
-
-    @property
-    def x(self) -> float:
-        return self.moment / self.force if self.force > 0.0 else 0.0
-
-
 def box_of(body: PlacedBody) -> Box:
     """Return the bounding box of a block."""
+    c, s = math.cos(body.angle), math.sin(body.angle)
     if body.outline:
-        return _box_of_outline(body)
-    c, s = abs(math.cos(body.angle)), abs(math.sin(body.angle))
+        (left, bottom), (right, top) = corners_box([(c * x - s * y, s * x + c * y) for x, y in body.outline])
+        return Box(body.x + left, body.x + right, body.y + bottom, body.y + top)
+    c, s = abs(c), abs(s)
     half_x, half_y = 0.5 * (c * body.size_x + s * body.size_y), 0.5 * (s * body.size_x + c * body.size_y)
     return Box(body.x - half_x, body.x + half_x, body.y - half_y, body.y + half_y)
 
 
-def _box_of_outline(body: PlacedBody) -> Box:
-    c, s = math.cos(body.angle), math.sin(body.angle)
-    (left, bottom), (right, top) = corners_box([(c * x - s * y, s * x + c * y) for x, y in body.outline])
-    return Box(body.x + left, body.x + right, body.y + bottom, body.y + top)
-
-
-def loads_at_rest(placed: Sequence[PlacedBody], gravity: float) -> Iterator[Load]:
-    """Yield what the ends of all contacts below free blocks carry, from above downwards."""
+def loads_at_rest(placed: Sequence[PlacedBody], gravity: float) -> list[EndLoad]:
+    """Return what the ends of all contacts below free blocks carry, from above downwards."""
     boxes = [box_of(body) for body in placed]
-    below = _Below(boxes, TOUCHING * smallest_width(placed))
-    carried = [_Carried(body.mass * gravity, body.x) for body in placed]
+    near = TOUCHING * smallest_width(placed)
+    courses: dict[int, list[tuple[float, int]]] = defaultdict(list)  # blocks by the heights of their upper faces
+    for i, box in enumerate(boxes):
+        courses[math.floor(box.top / near)].append((box.right, i))
+    for course in courses.values():
+        course.sort()
+    forces = [body.mass * gravity for body in placed]  # N, that have come down upon a block, its own weight first
+    moments = [force * body.x for force, body in zip(forces, placed, strict=True)]  # N m, about x = 0
+    loads: list[EndLoad] = []
     for upper in sorted(range(len(placed)), key=lambda i: -boxes[i].bottom):
-        if not placed[upper].fixed:
-            for load in _handed_on(upper, boxes, below.supports(upper), carried[upper]):
-                yield load
-                if load.lower is not None:
-                    carried[load.lower].add(load.force, load.x)
+        if placed[upper].fixed:
+            continue
+        box, force = boxes[upper], forces[upper]
+        x = moments[upper] / force if force > 0.0 else 0.0
+        below = _supports(box, boxes, courses, near)
+        found = sorted((max(box.left, boxes[i].left), min(box.right, boxes[i].right), i) for i in below)
+        spans: list[tuple[float, float, int | None]] = [*found] or [(box.left, box.right, None)]
+        parts = [(spans[0], force, x)]
+        if len(spans) > 1:
+            one, two = (0.5 * (left + right) for left, right, _ in (spans[0], spans[-1]))
+            share = _lever(one, two, x)
+            parts = [(spans[0], (1.0 - share) * force, one), (spans[-1], share * force, two)]
+        for (left, right, lower), part, place in parts:
+            share = _lever(left, right, place)
+            for end, own in ((left, (1.0 - share) * part), (right, share * part)):
+                loads.append(EndLoad(upper, lower, end, own))
+                if lower is not None:
+                    forces[lower] += own
+                    moments[lower] += own * end
+    return loads
 
 
-def _handed_on(upper: int, boxes: Sequence[Box], supports: Sequence[int], carried: _Carried) -> Iterator[Load]:
-    box = boxes[upper]
-    if not supports:
-        yield from _ends(upper, None, (box.left, box.right), carried.force, carried.x)
-        return
-    spans = sorted((max(box.left, boxes[i].left), min(box.right, boxes[i].right), i) for i in supports)
-    if len(spans) == 1:
-        yield from _ends(upper, spans[0][2], spans[0][:2], carried.force, carried.x)
-        return
-    first, last = spans[0], spans[-1]
-    one, two = 0.5 * (first[0] + first[1]), 0.5 * (last[0] + last[1])
-    share = _lever(one, two, carried.x)
-    yield from _ends(upper, first[2], first[:2], (1.0 - share) * carried.force, one)
-    yield from _ends(upper, last[2], last[:2], share * carried.force, two)
-
-
-def _ends(upper: int, lower: int | None, span: tuple[float, float], force: float, x: float) -> Iterator[Load]:
-    share = _lever(*span, x)
-    yield Load(upper, lower, span[0], (1.0 - share) * force)
-    yield Load(upper, lower, span[1], share * force)
+def _supports(
+    box: Box, boxes: Sequence[Box], courses: dict[int, list[tuple[float, int]]], near: float
+) -> Iterator[int]:
+    """Yield the blocks that reach under a box; a course is sorted by right ends, and does not overlap."""
+    level = math.floor(box.bottom / near)
+    for course in (courses.get(level + k, []) for k in (-1, 0, 1)):
+        for right, i in course[bisect_left(course, (box.left + near, -1)) :]:
+            if boxes[i].left >= box.right - near:
+                break
+            if abs(boxes[i].top - box.bottom) <= near and right > box.left:
+                yield i
 
 
 def _lever(one: float, two: float, x: float) -> float:
@@ -118,43 +118,6 @@ def _lever(one: float, two: float, x: float) -> float:
     if one == two:
         return 0.5
     return min(1.0, max(0.0, (x - one) / (two - one)))
-
-
-class _Below:
-    """Blocks by the heights of their upper faces."""
-
-    def __init__(self, boxes: Sequence[Box], near: float) -> None:
-        self.boxes, self.near = boxes, near
-        self.courses: dict[int, list[tuple[float, int]]] = defaultdict(list)
-        for i, box in enumerate(boxes):
-            self.courses[math.floor(box.top / near)].append((box.right, i))
-        for course in self.courses.values():
-            course.sort()
-
-    def supports(self, upper: int) -> list[int]:
-        """Return the blocks that a block stands on."""
-        box = self.boxes[upper]
-        level = math.floor(box.bottom / self.near)
-        return [i for course in (level - 1, level, level + 1) for i in self._under(box, self.courses.get(course, []))]
-
-    def _under(self, box: Box, course: Sequence[tuple[float, int]]) -> Iterator[int]:
-        """Yield those of a course, sorted by their right ends, that reach under a box; one course does not overlap."""
-        for right, i in course[bisect_left(course, (box.left + self.near, -1)) :]:
-            if self.boxes[i].left >= box.right - self.near:
-                return
-            if abs(self.boxes[i].top - box.bottom) <= self.near and right > box.left:
-                yield i
-
-
-FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
-DAMPING = 10.0  # damping ratio of the soft contact
-WARNING_SHARE = 0.01  # of the smallest side: overlap of any contact
-CRUSHED_SHARE = 0.001  # of the smallest side: sag of what light blocks carry that is heavier by at least UNLIKE
-UNLIKE = 10.0  # ratio of masses; walls and stacks of alike blocks are far from it
-DRIFT = 25.0  # substeps: time constant of the soft contact, 2 zeta / w
-STILL = 0.1  # of an overlap, that it may change by in that time at rest
-UPRIGHT = 0.1  # cosine of the angle between a normal and the vertical, from which on one body lies on the other
-MILLI, PERCENT = 1e3, 1e2
 
 
 class SoftContact(NamedTuple):
@@ -171,15 +134,18 @@ def soft_contact(substep: float) -> SoftContact:
     return SoftContact(turn / substep / (turn + 2.0 * DAMPING), 1.0 / (turn * (turn + 2.0 * DAMPING)), turn / substep)
 
 
-def inverse_mass(body: PlacedBody) -> float:
-    """Return A (1/kg) of one block for a point at the end of its lower face, as it was made; zero where it is fixed."""
-    return 0.0 if body.fixed else 1.0 / body.mass + (0.5 * body.size_x) ** 2 / body.inertia
+def inverse_mass(body: PlacedBody, arm: float) -> float:
+    """Return A (1/kg) of one block for a force with this lever arm (m); zero where it is fixed."""
+    return 0.0 if body.fixed else 1.0 / body.mass + arm**2 / body.inertia
 
 
 def point_stiffness(substep: float, blocks: Iterable[PlacedBody]) -> float:
-    """Return the stiffness (N/m) of one contact point of one block with the ground, or of two with each other."""
-    total = sum(map(inverse_mass, blocks))
-    return soft_contact(substep).frequency ** 2 / total if total > 0.0 else float("inf")
+    """Return the stiffness (N/m) of one contact point of one block with the ground, or of two with each other.
+
+    The point is at the end of their faces, as long as the lower one of a block that is not turned.
+    """
+    total = sum(inverse_mass(body, 0.5 * body.size_x) for body in blocks)
+    return soft_contact(substep).frequency ** 2 / total if total > 0.0 else math.inf
 
 
 class Sag(NamedTuple):
@@ -192,7 +158,7 @@ class Sag(NamedTuple):
 
 
 def scene_sag(substep: float, placed: Sequence[PlacedBody], gravity: float) -> Sag:
-    """Return the sag of the blocks of a scene at rest on one another; see sag.py.
+    """Return the sag of the blocks of a scene at rest on one another.
 
     The stiffness w^2 / A of a contact goes with the smaller mass of its pair, not with what it carries. So a heavy
     block on a light one sinks by their ratio further than equal blocks.
@@ -200,7 +166,7 @@ def scene_sag(substep: float, placed: Sequence[PlacedBody], gravity: float) -> S
     square = soft_contact(substep).frequency ** 2
     sunk, crushed = [0.0] * len(placed), [0.0] * len(placed)
     most = 0.0
-    loads = list(loads_at_rest(placed, gravity))
+    loads = loads_at_rest(placed, gravity)
     total: defaultdict[int, float] = defaultdict(float)
     for load in loads:
         total[load.upper] += load.force
@@ -208,11 +174,8 @@ def scene_sag(substep: float, placed: Sequence[PlacedBody], gravity: float) -> S
     burdened = _burdened(((load.upper, load.lower) for load in loads if load.force > 0.0), masses)
     for load in reversed(loads):  # from below upwards
         if load.force > 0.0:
-            lower = None if load.lower is None else placed[load.lower]
-            compliance = _inverse_mass_at(placed[load.upper], load.x) + (
-                _inverse_mass_at(lower, load.x) if lower else 0.0
-            )
-            overlap = load.force * compliance / square
+            pair = [placed[i] for i in (load.upper, load.lower) if i is not None]
+            overlap = load.force * sum(inverse_mass(body, load.x - body.x) for body in pair) / square
             below = 0.0 if load.lower is None else sunk[load.lower]
             sunk[load.upper] += load.force / total[load.upper] * (overlap + below)
             most = max(most, overlap)
@@ -246,15 +209,21 @@ def current_crush_depth(scene: Nonsmooth) -> float:
 
     The same as `Sag.crushed`, measured: also where blocks have come to lie on others.
     """
-    bodies, controls = scene.world.bodies, scene.world.controls[0]
+    bodies, controls, stepping = scene.world.bodies, scene.world.controls[0], scene.contacts.stepping[0]
     gravity = math.hypot(controls.gravity_x, controls.gravity_y)
     inverse = bodies["inverse_mass"]
     free = inverse[inverse > 0.0]
     if not gravity > 0.0 or free.size == 0 or free.max() < UNLIKE * free.min():
         return 0.0
-    found = scene.contacts.constraints[: scene.contacts.stepping[0].constraint_count].view(np.recarray)
+    found = scene.contacts.constraints[: stepping.constraint_count].view(np.recarray)
     down = (found["nx"] * controls.gravity_x + found["ny"] * controls.gravity_y) / gravity
-    overlap = _overlaps_at_rest(scene, found)
+    # of constraints that press, not of impacts and of bodies that still move
+    one, two = (np.where(found[f"normal_{name}"] > 0.0, -found[f"gap_{name}"], 0.0) for name in ("one", "two"))
+    overlap = np.where((found["reach"] == AWAY) | (found["is_struck"] != NOT_STRUCK), 0.0, np.maximum(one, two))
+    a, b = bodies[found["a"]], bodies[found["b"]]
+    rate = np.hypot(a["vx"] - b["vx"], a["vy"] - b["vy"]) + np.abs(a["radius"] * a["spin"])
+    rate += np.abs(b["radius"] * b["spin"])
+    overlap = np.where(DRIFT * stepping.substep * rate < STILL * overlap, overlap, 0.0)
     heights = -(bodies["x"] * controls.gravity_x + bodies["y"] * controls.gravity_y) / gravity
     upper = np.where(down < 0.0, found["a"], found["b"]).astype(np.int64)
     lower = np.where(down < 0.0, found["b"], found["a"]).astype(np.int64)
@@ -266,26 +235,6 @@ def current_crush_depth(scene: Nonsmooth) -> float:
     for pair, depth in zip(reversed(pairs), overlap[chosen[::-1]].tolist(), strict=True):
         _crush(crushed, pair, depth, burdened)
     return max(crushed)
-
-
-def _overlaps_at_rest(scene: Nonsmooth, found: Records) -> NDArray[np.float64]:
-    """Return the overlaps (m) of constraints that press, zero for impacts and for bodies that still move."""
-    bodies, stepping = scene.world.bodies, scene.contacts.stepping[0]
-    one, two = (np.where(found[f"normal_{name}"] > 0.0, -found[f"gap_{name}"], 0.0) for name in ("one", "two"))
-    overlap = np.where((found["reach"] == AWAY) | (found["is_struck"] != NOT_STRUCK), 0.0, np.maximum(one, two))
-    a, b = bodies[found["a"]], bodies[found["b"]]
-    rate = (
-        np.hypot(a["vx"] - b["vx"], a["vy"] - b["vy"])
-        + np.abs(a["radius"] * a["spin"])
-        + np.abs(b["radius"] * b["spin"])
-    )
-    still: NDArray[np.float64] = np.where(DRIFT * stepping.substep * rate < STILL * overlap, overlap, 0.0)
-    return still
-
-
-def _inverse_mass_at(body: PlacedBody, x: float) -> float:
-    """Return A (1/kg) of one block for a vertical force at x (m)."""
-    return 0.0 if body.fixed else 1.0 / body.mass + (x - body.x) ** 2 / body.inertia
 
 
 def overlap_warning(overlap: float, crushed: float, smallest: float) -> str:

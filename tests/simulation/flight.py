@@ -9,10 +9,10 @@ from pydantic import Field
 from blocksim.kernels.common.arrays import REACHED, Floats, World
 from blocksim.scenario.models.stepping import Time
 from blocksim.simulation.schemes.scheme import Scheme
-from blocksim.world.bodies import Outline
-from blocksim.world.build import Construction, Parts, Stride, empty_controls, without_lists
+from blocksim.world.bodies import Layout
+from blocksim.world.build import Construction, Parts, assemble_world, run_controls
 from blocksim.world.memory import scene_size
-from blocksim.world.step import Bounds
+from blocksim.world.step import Bounds, Stride
 
 STEP = 1e-3  # s
 
@@ -32,14 +32,14 @@ class Flight(NamedTuple):
     drag: Floats  # (1,) 1/s
 
 
-def choose(outline: Outline, _: Bounds) -> Stride:
-    step = outline.scenario.time.step
+def choose(layout: Layout, _: Bounds) -> Stride:
+    step = layout.scenario.time.step
     return Stride(STEP if step == "auto" else step, 0.0)
 
 
 def assemble(parts: Parts, strides: Sequence[Stride]) -> Flight:
-    drag = np.array([[getattr(outline.scenario.time, "drag", 0.0)] for outline in parts.outlines])
-    return Flight(without_lists(parts, empty_controls(parts, strides)), drag)
+    drag = np.array([[getattr(layout.scenario.time, "drag", 0.0)] for layout in parts.layouts])
+    return Flight(assemble_world(parts, run_controls(parts, strides)), drag)
 
 
 def advance(scene: Flight, last_step: int) -> int:
@@ -69,7 +69,6 @@ FLIGHT = Scheme(
     ledger=("kinetic", "potential"),
     construction=Construction(
         choose=choose,
-        model=lambda _: "surface",
         size=lambda parts: scene_size(parts.bodies.shape[1], 1, 1),
         assemble=assemble,
     ),

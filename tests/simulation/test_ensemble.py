@@ -15,8 +15,7 @@ from blocksim.simulation.schemes import build_stacks
 from blocksim.world import build, memory
 from blocksim.world.build import Stack
 from blocksim.world.memory import SceneTooLargeError, scene_size
-from blocksim.world.rigid_step import StepTooLongError
-from blocksim.world.step import SkinTooSmallError, StepTooLargeError
+from blocksim.world.step import SkinTooSmallError, StepError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -157,14 +156,14 @@ def test_members_that_cannot_be_built_fail_in_their_place_and_the_others_go_on(m
     )
     ends = [end for batch in run_in_batches(scenarios) for end in batch]
     errors = [type(end.error) if isinstance(end, MemberFailure) else None for end in ends]
-    assert errors == [None, StepTooLargeError, SkinTooSmallError, None, StepTooLongError, None]
+    assert errors == [None, StepError, SkinTooSmallError, None, StepError, None]
     assert [end.outcome.status for end in ends] == ["failed" if error else "finished" for error in errors]
     assert "largest safe step" in ends[1].outcome.reason
     assert ends[1].outcome.exit_code == ExitCode.INVALID_INPUT
     for end, scenario in zip(ends, scenarios, strict=True):
         if isinstance(end, MemberEnd):
             assert_same(end, scenario)
-    with pytest.raises(StepTooLargeError):
+    with pytest.raises(StepError):
         run_ensemble(scenarios)
     monkeypatch.setattr(memory, "available_bytes", lambda: 1000)
     (end,) = next(run_in_batches(scenarios[:1]))

@@ -21,7 +21,7 @@ from blocksim.simulation import Progress, Result, read_result, simulate, simulat
 from blocksim.simulation.compilation import compile_kernels
 from blocksim.simulation.run import RunCallbacks, bytes_needed
 from blocksim.simulation.schemes import build_scene
-from blocksim.world.step import StepTooLargeError
+from blocksim.world.step import StepError
 from tests.simulation.sliding import sliding
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def test_ctrl_c_keeps_what_there_is(soft: Shipped, tmp_path: Path) -> None:
 
 
 def test_bad_step_leaves_no_folder(soft: Shipped, tmp_path: Path) -> None:
-    with pytest.raises(StepTooLargeError, match="largest safe step"):
+    with pytest.raises(StepError, match="largest safe step"):
         simulate_into(soft(time__step=1e-3), tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
@@ -223,7 +223,7 @@ def test_blocks_are_placed_once_from_loading_to_the_result(tmp_path: Path, monke
 def test_a_run_that_cannot_be_built_is_refused_before_it_compiles(soft: Shipped, tmp_path: Path) -> None:
     started: list[str] = []
     listener = RunCallbacks(on_start=started.append)
-    with pytest.raises(StepTooLargeError):
+    with pytest.raises(StepError):
         simulate_into(soft(time__step=1.0, time__end=2.0), tmp_path / "run", listener=listener)
     assert started == []
     assert not (tmp_path / "run").exists()

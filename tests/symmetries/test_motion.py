@@ -97,7 +97,7 @@ def test_collisions_are_the_same_in_a_moving_frame(scheme: str, examples: int) -
             start(stack, thrown(bodies, *frame), scheme, gravity=0.0).to_time(BEFORE_CHAOS)  # type: ignore[arg-type]
             for frame in ((0.0, 0.0), (vx, vy))
         ]
-        # Springs see approaches from a gap on that follows from the greatest speed of the scene (choose_approach), and
+        # Springs see approaches from a gap on that follows from the greatest speed of the scene (choose_stride), and
         # whoever is struck just before he lands, within 0.1 ms, goes by whether he was seen: frames with one gap.
         gaps = [float(end.world.controls[0]["approach"]) for end in ends]
         assume(scheme == RIGID or gaps[0] == gaps[1])

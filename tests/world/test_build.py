@@ -25,6 +25,7 @@ from blocksim.kernels.common.arrays import BODY as BODY_RECORD
 from blocksim.kernels.explicit.energy import tallied
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world import memory
+from blocksim.world.bodies import layout_of
 from blocksim.world.build import (
     GROWTH,
     LARGE_RATIO,
@@ -37,7 +38,7 @@ from blocksim.world.build import (
 )
 from blocksim.world.interactions import contact_classes, damping_ratio, interactions_of
 from blocksim.world.memory import SceneTooLargeError
-from blocksim.world.step import Load, StepTooLargeError, admissible_step, bounds_of
+from blocksim.world.step import ContactLoad, StepError, admissible_step, bounds_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -126,9 +127,9 @@ def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
 def test_automatic_step_is_the_admissible_one_and_follows_safety_and_stiffness() -> None:
     world = build_world(scenario())
     step = float(world.controls[0].step)
-    (bounds,) = bounds_of(world.bodies[np.newaxis], 1, [None])
+    (bounds,) = bounds_of([layout_of(scenario())], world.bodies[np.newaxis])
     table = interactions_of(scenario(), contact_classes(scenario(), place_bodies(scenario())))
-    assert step == admissible_step(bounds, table, 0.05, "linear", Load(0.0, 0.0))
+    assert step == admissible_step(bounds, table, 0.05, "linear", ContactLoad(0.0, 0.0))
     assert build_world(scenario(time={"safety": 0.025})).controls[0].step == pytest.approx(step / 2)
     assert build_world(scenario(contact={"stiffness_scale": 0.01})).controls[0].step == pytest.approx(10 * step)
     strong = damping_ratio(0.0)
@@ -150,7 +151,7 @@ def test_smallest_body_decides_about_the_step() -> None:
 
 def test_step_above_the_admissible_one_is_refused_with_both_numbers() -> None:
     limit = float(build_world(scenario()).controls[0].step)
-    with pytest.raises(StepTooLargeError) as refusal:
+    with pytest.raises(StepError) as refusal:
         build_world(scenario(time={"step": 1e-5}))
     assert str(refusal.value) == (
         f'1e-05 s is above the largest safe step {limit:.4g} s; use step = "auto", or force_step = true to override'

@@ -154,13 +154,6 @@ def test_given_shear_damping_replaces_the_normal_one_in_shear_only() -> None:
     assert (found.normal_damping, found.shear_damping) == (damping_ratio(0.2), 0.05)
 
 
-def test_ground_cannot_touch_itself() -> None:
-    of = scenario()
-    ground = classes(of)[0]
-    with pytest.raises(ValueError, match="is not in contact with itself"):
-        interaction(of, ground, ground)
-
-
 def row(of: Scenario, one: str, two: str | None) -> Any:
     """Return the parameters between a block type and another one, or the ground."""
     order = ["ground", "paper", "flat", "wooden"]

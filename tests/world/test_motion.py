@@ -10,8 +10,8 @@ import pytest
 
 from blocksim.kernels.common.supports import acceleration, displacement, piece_at
 from blocksim.verification.scene import scenario_of
-from blocksim.world.bodies import driven_records, motion_records
 from blocksim.world.build import build_world
+from blocksim.world.forcing import support_pieces
 
 if TYPE_CHECKING:
     from blocksim.scenario import Scenario
@@ -24,7 +24,7 @@ def scenario(**motion: object) -> Scenario:
 
 
 def displaced(of: Scenario, time: float) -> float:
-    records = motion_records(of)
+    records = support_pieces(of)
     return float(displacement(records[piece_at(records, 0, time)], time))
 
 
@@ -35,7 +35,7 @@ def direction_of(one: Scenario) -> tuple[float, float]:
 
 def test_support_without_motion_has_no_direction_and_stays() -> None:
     still = scenario_of([{"y": 0.5}])
-    records = motion_records(still)
+    records = support_pieces(still)
     assert displacement(records[0], 10.0) == 0.0
     assert [build_world(still).controls[0][name] for name in ("motion_x", "motion_y")] == [0.0, 0.0]
 
@@ -50,7 +50,7 @@ def test_direction_counts_counter_clockwise_from_plus_x() -> None:
 def test_harmonic_motion_is_a_sine_after_its_ramp(time: float) -> None:
     of, speed = scenario(), 2.0 * pi * 5.0
     assert displaced(of, time) == pytest.approx(0.01 * sin(speed * time), abs=1e-9)
-    records = motion_records(of)
+    records = support_pieces(of)
     found = acceleration(records[piece_at(records, 0, time)], time)
     assert found == pytest.approx(-0.01 * speed**2 * sin(speed * time), abs=1e-3 * 0.01 * speed**2)
 
@@ -59,13 +59,13 @@ def test_motion_rests_before_its_start_and_after_its_duration() -> None:
     of = scenario(start=0.5, duration=1.0)
     assert displaced(of, 0.4) == 0.0
     assert abs(displaced(of, 0.9)) > 0.0
-    last = motion_records(of)[-1]
+    last = support_pieces(of)[-1]
     assert last.start == pytest.approx(1.5)
     assert (last.c1, last.c2, last.c3) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
 
 
 def test_pieces_join_without_jump_of_place_or_velocity() -> None:
-    records = motion_records(scenario(duration=1.5))
+    records = support_pieces(scenario(duration=1.5))
     lengths = np.diff(records.start)
     one: Any = records[:-1]
     two: Any = records[1:]
@@ -78,9 +78,8 @@ def test_pieces_join_without_jump_of_place_or_velocity() -> None:
 def test_all_that_moves_with_the_support_is_listed_where_it_starts() -> None:
     bodies = [{"y": 0.5, "fixed": True}, {"x": 0.2, "y": 0.5}, {"x": 0.4, "y": 0.7, "fixed": True}]
     world = build_world(scenario_of(bodies, motion=SHAKING, time={"end": 2.0}))
-    for moved in (world.moved, driven_records(world.bodies)):
-        assert moved.body.tolist() == [0, 2, 3]
-        assert moved.x.tolist() == [0.0, 0.4, 0.0]
-        assert moved.y.tolist() == [0.5, 0.7, 0.0]
-        assert not moved.fx.any()
-        assert not moved.fy.any()
+    assert world.moved.body.tolist() == [0, 2, 3]
+    assert world.moved.x.tolist() == [0.0, 0.4, 0.0]
+    assert world.moved.y.tolist() == [0.5, 0.7, 0.0]
+    assert not world.moved.fx.any()
+    assert not world.moved.fy.any()

@@ -12,8 +12,8 @@ from blocksim.scenario.models.stepping import Nonsmooth
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world.describe import describe
 from blocksim.world.nonsmooth import build_nonsmooth
-from blocksim.world.rigid_step import FEW, NATURAL, SHARE, USUAL_STEP, CoarseStepError, StepTooLongError
-from blocksim.world.step import UncountableStepsError
+from blocksim.world.rigid_step import FEW, NATURAL, SHARE, USUAL_STEP
+from blocksim.world.step import StepError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -94,7 +94,7 @@ def test_step_by_hand_is_refused_where_a_fall_is_too_long_for_its_substeps(
     if is_fine:
         assert build_nonsmooth(wall).world.controls[0].step == step
         return
-    with pytest.raises(StepTooLongError, match="blocks could move farther than a tenth") as caught:
+    with pytest.raises(StepError, match="blocks could move farther than a tenth") as caught:
         build_nonsmooth(wall)
     assert caught.value.limit < step
     forced = wall.model_copy(update={"time": wall.time.model_copy(update={"force_step": True})})
@@ -104,7 +104,7 @@ def test_step_by_hand_is_refused_where_a_fall_is_too_long_for_its_substeps(
 def test_speed_at_the_start_counts_for_the_whole_step() -> None:
     thrown = {**RESTING, "velocity": [3.0, 0.0]}
     assert step_of(thrown, step=0.8e-3) == 0.8e-3
-    with pytest.raises(StepTooLongError):
+    with pytest.raises(StepError):
         step_of(thrown, step=0.9e-3)
 
 
@@ -122,7 +122,7 @@ def test_motions_are_resolved_by_automatic_steps_and_by_those_by_hand(motion: Ma
     assert shaken_step(motion) == pytest.approx(5e-4, rel=1e-2)  # at the end of the ramp it is a little faster
     assert shaken_step(motion, gravity=G) == step_of(RESTING)
     assert shaken_step(motion, step=4e-4) == 4e-4
-    with pytest.raises(CoarseStepError, match=r"a cycle of 0\.01 s: at most a twentieth of it, 0\.0005 s"):
+    with pytest.raises(StepError, match=r"a cycle of 0\.01 s: at most a twentieth of it, 0\.0005 s"):
         shaken_step(motion, step=6e-4)
     assert shaken_step(motion, step=6e-4, force_step=True) == 6e-4
 
@@ -131,11 +131,11 @@ def test_supports_in_motion_and_steep_ramps_of_it_shrink_the_automatic_step() ->
     fast = {**HARMONIC, "amplitude": "20 mm", "ramp": "1 ms"}
     assert shaken_step(fast) * 21.15 == pytest.approx(SHARE / FEW * HEIGHT, rel=1e-3)
     assert shaken_step({**HARMONIC, "ramp": "1 ms"}) < 2e-4
-    with pytest.raises(StepTooLongError):
+    with pytest.raises(StepError):
         shaken_step(fast, step=2e-4)
 
 
 @pytest.mark.parametrize("step", [1e-18])
 def test_steps_that_cannot_be_counted_are_refused(step: float) -> None:
-    with pytest.raises(UncountableStepsError):
+    with pytest.raises(StepError):
         step_of(RESTING, step=step)

@@ -12,7 +12,7 @@ from blocksim.kernels.common.arrays import ALL, OUTLINE
 from blocksim.kernels.explicit.outlines import MOST_CORNERS, UPPER, WIDEST_CONE
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.geometry import MOST, centre_outline, least_width, regular
-from blocksim.world.bodies import body_records, cone_of, corner_rows, outline_of
+from blocksim.world.bodies import body_records, cone_of, corner_rows, layout_of
 from blocksim.world.build import Stack, build_stacks, member
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
 from blocksim.world.step import bounds_of
@@ -108,8 +108,8 @@ def test_least_width_is_the_least_height_over_a_face() -> None:
 
 
 def test_steps_are_bounded_by_the_least_width_of_a_polygon() -> None:
-    outline = outline_of(scenario(sliver={"outline": [[0.0, 0.0], [1.0, 1.0], [0.98, 1.02]], "depth": 0.1}))
-    (bounds,) = bounds_of(body_records([outline]), len(outline.placed), [outline.shapes])
+    layout = layout_of(scenario(sliver={"outline": [[0.0, 0.0], [1.0, 1.0], [0.98, 1.02]], "depth": 0.1}))
+    (bounds,) = bounds_of([layout], body_records([layout]))
     assert bounds.smallest == pytest.approx(0.028, rel=0.02)
 
 

@@ -13,7 +13,7 @@ from blocksim.scenario import load_scenario, place_bodies
 from blocksim.simulation.schemes import build
 from blocksim.simulation.settling import SettleError, settle
 from blocksim.simulation.team import ALONE
-from blocksim.world.bodies import outline_of
+from blocksim.world.bodies import layout_of
 from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.rigid_step import USUAL_STEP, thrust_shift
 from tests.verification.test_arch_joints import limit_analysis
@@ -123,7 +123,7 @@ def test_tilted_column_stands_until_its_weight_leaves_the_base() -> None:
 
 
 def test_columns_and_walls_that_stand_upright_keep_their_step() -> None:
-    assert thrust_shift(outline_of(column(16))) == 0.0
+    assert thrust_shift(layout_of(column(16))) == 0.0
     assert own_step(load_scenario(SCENARIOS / "tilting_wall.toml")) == USUAL_STEP
     leaning = {"ground.tilt": "3 deg"}
     assert own_step(column(16, **leaning)) < 0.2 * own_step(column(16))
@@ -141,11 +141,11 @@ def test_constant_loads_lean_a_column_as_a_tilt_does() -> None:
 def test_what_nothing_carries_is_left_out_of_the_thrust_and_what_turns_freely_is_no_structure() -> None:
     stone = {"block": "voussoir", "outline": [[0.0, 0.2], [0.02, 0.2], [0.0, 0.22]]}
     cells = {"kind": "polygons", "block": "voussoir", "cells": [*drawn_ring(), stone], "in_place": True}
-    with_stone = thrust_shift(outline_of(ring_of(cells)))
-    assert with_stone == pytest.approx(thrust_shift(outline_of(as_cells())))
+    with_stone = thrust_shift(layout_of(ring_of(cells)))
+    assert with_stone == pytest.approx(thrust_shift(layout_of(as_cells())))
     on_its_corner = [[0.0, 0.0], [0.1, 0.15], [0.0, 0.3], [-0.1, 0.15]]
     alone = {"kind": "polygons", "block": "voussoir", "cells": [{"outline": on_its_corner}]}
-    assert thrust_shift(outline_of(ring_of(alone))) == 0.0
+    assert thrust_shift(layout_of(ring_of(alone))) == 0.0
 
 
 def own_step(scenario: Scenario) -> float:

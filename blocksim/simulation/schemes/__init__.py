@@ -70,7 +70,7 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
         if _together(some[0]) is None:
             yield from (_alone(i, scenarios[i]) for i in places)
             continue
-        yield from (one.numbered(places) for one in scenes.build_stacks(some, scheme_named(some[0]).construction))
+        yield from scenes.build_stacks(some, scheme_named(some[0]).construction, places)
 
 
 def _together(scenario: Scenario) -> str | None:
