@@ -117,8 +117,8 @@ class Description:
 def describe(scenario: Scenario) -> Description:
     """Build the scene and describe it. Raises what building it raises."""
     layout, others = layout_of(scenario), others_of(scenario)
-    count, is_rigid = len(layout.placed), scenario.time.has_rigid_contacts
-    if is_rigid:
+    count, has_rigid = len(layout.placed), scenario.time.has_rigid_contacts
+    if has_rigid:
         scene = build_nonsmooth(scenario)
         world, size = scene.world, rigid_size(count, scene.contacts.constraints.size)
     else:
@@ -159,7 +159,7 @@ def describe(scenario: Scenario) -> Description:
         frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
-        rigid=_rigid(layout, bounds, speeds, step) if is_rigid else None,
+        rigid=_rigid(layout, bounds, speeds, step) if has_rigid else None,
         systems={one.system.name: one.count for one in others},
         limits=_limits(layout, bounds, speeds) if others else None,
         warnings=tuple(warnings_of(scenario)),
@@ -207,7 +207,7 @@ def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
     Rigid contacts have no springs in shear and no dashpots; their stiffness is that of their softest blocks.
     """
     scenario, classes, placed = layout.scenario, layout.classes, layout.placed
-    is_rigid = scenario.time.has_rigid_contacts
+    has_rigid = scenario.time.has_rigid_contacts
     blocks = [one.material for one in classes if not one.is_ground]
     names = [GROUND]
     for one in classes[1:]:  # the depth is named where blocks of one material differ in it
@@ -221,7 +221,7 @@ def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
             if not block.is_ground and (other.is_ground or j <= i):
                 pair, row = pair_of(scenario, block, other), world.interactions[i, j]
                 normal_stiffness, rules = float(row.normal_stiffness), pair.rules
-                if is_rigid:
+                if has_rigid:
                     substep = float(world.controls[0].step) / scenario.time.parts
                     touching = [softest[str(one.material), one.depth] for one in (block, other) if not one.is_ground]
                     normal_stiffness = point_stiffness(substep, touching)
@@ -233,10 +233,10 @@ def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
                     kinetic_friction=float(row.kinetic_friction),
                     transition_speed=float(row.transition_speed),
                     restitution=pair.restitution,
-                    normal_damping_ratio=None if is_rigid else float(row.normal_damping),
-                    shear_damping_ratio=None if is_rigid else float(row.shear_damping),
+                    normal_damping_ratio=None if has_rigid else float(row.normal_damping),
+                    shear_damping_ratio=None if has_rigid else float(row.shear_damping),
                     normal_stiffness=normal_stiffness,
                     stiffness_unit=STIFFNESS_UNITS[scenario.contact.law],
-                    shear_stiffness_ratio=None if is_rigid else float(row.shear_ratio),
+                    shear_stiffness_ratio=None if has_rigid else float(row.shear_ratio),
                     rules=rules,
                 )

@@ -138,8 +138,7 @@ def bounds_of(layouts: Sequence[Layout], bodies: NDArray[np.record]) -> list[Bou
     blocks = bodies[:, :count]
     columns = {name: np.ascontiguousarray(blocks[name]) for name in ("radius", "half_x", "half_y", "mass")}
     sides = 2.0 * np.minimum(columns["half_x"], columns["half_y"])
-    if any(layout.shapes is not None for layout in layouts):
-        sides = np.where(blocks["faces"] == OUTLINE, blocks["least_width"], sides)
+    sides = np.where(blocks["faces"] == OUTLINE, blocks["least_width"], sides)
     speeds = np.hypot(blocks["vx"], blocks["vy"]) + columns["radius"] * np.abs(blocks["spin"])
     columns_of_kinds = zip(*(blocks[name].tolist() for name in Kind._fields), strict=True)
     kinds = [frozenset(map(Kind, *one)) for one in columns_of_kinds]
