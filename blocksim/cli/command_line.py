@@ -1,36 +1,25 @@
 """Options of commands: those that several share, and how typer gets them from the options of the library."""
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, NoReturn, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, Union, get_args, get_origin
 
 import typer
 
 from blocksim.cli import completion
-from blocksim.cli.output import answer, note, print_json
+from blocksim.cli.output import answer, note, print_json, table_lines, width_of_screen
 from blocksim.errors import ExitCode
 from blocksim.options import Option, OptionField, has_options, option_field, option_fields
 
-
-class Executor(StrEnum):
-    """What runs the cases of a study."""
-
-    ENSEMBLE = "ensemble"
-    PROCESSES = "processes"
-    DASK = "dask"
+if TYPE_CHECKING:
+    from blocksim.study.answer import Answer
 
 
-ExecutorName = Annotated[
-    Executor | None,
-    typer.Option(help="ensemble: in this process (default); processes: a case that crashes stops no other."),
-]
-Jobs = Annotated[int | None, Option("Threads or processes (default: one per core).", metavar="N", least=1)]
-Scheduler = Annotated[str | None, Option("Scheduler of a Dask cluster, such as tcp://host:8786.", metavar="ADDRESS")]
-ScenarioPath = Annotated[Path, Option("Scenario file (TOML).", metavar="SCENARIO", is_argument=True)]
 Settings = Annotated[
     list[str] | None,
     Option(
@@ -100,6 +89,18 @@ class TextScreen(Screen):
     """Where a command without JSON prints."""
 
     as_json: bool = False
+
+
+def report_of(answers: "Sequence[Answer]", data: object) -> Report:
+    """Return what studies have come to: a table of each with its title and lines below it; their notes."""
+    texts = []
+    for one in answers:
+        table, below = one.overview(), one.lines()
+        lines = table_lines(table.heads, table.texts(), left=table.left)
+        title = textwrap.wrap(one.title, width_of_screen())
+        texts.append("\n".join([*title, "", *lines, *(["", *below] if below else [])]))
+    notes = dict.fromkeys(text for one in answers for text in one.notes())
+    return Report(["\n\n".join(texts)], data, notes, code=max(one.code for one in answers))
 
 
 def _allow_outside(context: typer.Context, asked: bool) -> None:
@@ -172,8 +173,9 @@ def _parameter(field: OptionField, option: Option) -> inspect.Parameter:
         typed = list[StrEnum(name, {one: one for one in option.choices}) if option.choices else typed]  # type: ignore[misc]
     elif option.choices:
         typed = Literal[option.choices]
-    is_plain = isinstance(default, bool | int | float | str | Path) or default is inspect.Parameter.empty
-    default = (not default if option.is_negated else default) if is_plain else None
+    is_plain = isinstance(default, bool | int | float | str | Path) and not option.is_repeatable
+    if default is not inspect.Parameter.empty:
+        default = (not default if option.is_negated else default) if is_plain else None
     more: dict[str, Any] = {"help": option.help, "metavar": option.metavar, "show_default": option.show_default}
     more |= {"min": option.least, "max": option.most}
     more["autocompletion"] = getattr(completion, option.complete) if option.complete else None

@@ -6,14 +6,10 @@ import os
 import re
 import shutil
 import sys
-import textwrap
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from itertools import islice
-from typing import TYPE_CHECKING, TextIO
-
-if TYPE_CHECKING:
-    from blocksim.study.answer import Answer
+from typing import TextIO
 
 NARROW = 80
 GAP = "  "
@@ -56,23 +52,6 @@ def show(lines: Iterable[str], data: object, *, as_json: bool) -> None:
         print_json(data)
     else:
         answer("\n".join(lines))
-
-
-def show_answers(answers: Sequence["Answer"], data: object, *, as_json: bool, quiet: bool) -> None:
-    """Print what studies have come to, as a table with its title and lines below it, or as JSON; then their notes."""
-    if as_json:
-        print_json(data)
-        return
-    texts = []
-    for one in answers:
-        table = one.shown()
-        title = textwrap.wrap(one.title, width_of_screen())
-        lines = [*title, "", *table_lines(table.heads, table.texts(), left=table.left)]
-        texts.append("\n".join([*lines, *(["", *below] if (below := one.lines()) else [])]))
-    answer("\n\n".join(texts))
-    if not quiet:
-        for text in dict.fromkeys(text for one in answers for text in one.notes()):
-            note(text)
 
 
 def _finite(data: object) -> object:

@@ -40,6 +40,11 @@ def folder_kind(name: str, what: str, command: str, tables: Mapping[str, str]) -
     )
 
 
+def with_unit(number: float, unit: str, digits: int = 7) -> str:
+    """Return a number for people, with its unit if it has one."""
+    return f"{number:.{digits}g} {unit}".rstrip()
+
+
 class Table(NamedTuple):
     """A table for people: texts, and numbers with so many digits, which a screen has on the right of `left` columns."""
 
@@ -112,7 +117,7 @@ class Answer(BaseModel, frozen=True):
         """What the table for people is about."""
         raise NotImplementedError
 
-    def shown(self) -> Table:
+    def overview(self) -> Table:
         """Return the table for people, on the screen and in a report."""
         raise NotImplementedError
 

@@ -6,7 +6,7 @@ criterion, or fewer members, runs nothing again.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
 from functools import cached_property
 from pathlib import Path
@@ -19,16 +19,15 @@ from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import PURPOSE, Counts, Curve, NoCurve, fit, inflation_of
 from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.extras import load_module
+from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of
-from blocksim.silence import silent
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.observables import MOVES_ON
-from blocksim.study.answer import Answer, Table, folder_kind
+from blocksim.study.answer import Answer, Table, folder_kind, with_unit
 from blocksim.study.criterion import falls_before_zero
 from blocksim.study.executors import Execution
-from blocksim.study.fragility_plan import COLLAPSE, FragilityPlan, read_fragility
-from blocksim.study.manifest import MANIFEST, WHOLE, CaseIndex, Manifest, Shard, SweepTable, Timings
-from blocksim.study.plan import Values
+from blocksim.study.fragility_plan import FragilityOptions, FragilityPlan, read_fragility
+from blocksim.study.manifest import MANIFEST, WHOLE, CaseIndex, Manifest, SweepTable, Timings
 from blocksim.study.rows import FINISHED, Head, Row, check_experiment
 from blocksim.study.runs import Replay, folder_for
 from blocksim.study.study import Study
@@ -44,7 +43,6 @@ MEMBERS_TABLE = "members.csv"
 DIGITS = 3
 DOUBTFUL = 0.05  # probability of a larger deviance below which counts and curve do not agree
 HEADS = ("samples", "failures", "P", "95 % low", "high", "curve", "still moving", "no result")
-OnRow = Callable[[int, int, Row], None]
 
 
 class Point(BaseModel, frozen=True):
@@ -61,11 +59,6 @@ class Point(BaseModel, frozen=True):
     curve_high: float | None
     moving_on: int = Field(ge=0)  # of those that have not failed: their runs end while blocks move
     no_result: int = Field(ge=0)  # members whose runs did not finish; they count nowhere else
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """The limits of the probability."""
-        return self.low, self.high
 
 
 class FragilityAnswer(Answer, frozen=True):
@@ -113,16 +106,12 @@ class FragilityAnswer(Answer, frozen=True):
 
     @property
     def is_extrapolated(self) -> bool:
-        """Return True if the median lies beyond all intensities that have been run."""
-        return _is_beyond(self.curve, self.points)
+        """True where the median lies beyond all intensities that have been run."""
+        return bool(self.fitted.get("median_extrapolated"))
 
     def probability(self, intensity: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
         """Return the curve at intensities in the unit of the study, None where there is no curve."""
         return self.curve.probability(intensity) if isinstance(self.curve, Curve) else None
-
-    def value(self, number: float) -> str:
-        """Return an intensity for people."""
-        return f"{number:.6g} {self.unit}".rstrip()
 
     @property
     def code(self) -> ExitCode:
@@ -136,7 +125,7 @@ class FragilityAnswer(Answer, frozen=True):
         """Key and criterion."""
         return f'{self.key}: failure means "{self.fails}"'
 
-    def shown(self) -> Table:
+    def overview(self) -> Table:
         """Return the counts of every intensity, with the curve beside them; columns without news are left out."""
         rows: list[list[str | float]] = [
             [
@@ -150,18 +139,25 @@ class FragilityAnswer(Answer, frozen=True):
             for one in self.points
         ]
         heads = (self.unit or "value", *HEADS)
-        told = [
-            place for place in range(len(heads)) if place < len(heads) - 2 or any(row[place] != "0" for row in rows)
-        ]
-        return Table([heads[i] for i in told], [[row[i] for i in told] for row in rows], left=0, digits=DIGITS)
+        places = [i for i in range(len(heads)) if i < len(heads) - 2 or any(row[i] != "0" for row in rows)]
+        return Table([heads[i] for i in places], [[row[i] for i in places] for row in rows], left=0, digits=DIGITS)
 
     def lines(self) -> list[str]:
         """Return the curve in words, or why there is none and what the counts still say of the median."""
         curve = self.curve
         if isinstance(curve, NoCurve):
-            return [f"no curve: {curve.reason}", *self._median_without_a_curve(curve)]
+            low, high = (with_unit(end, self.unit, 6) for end in (curve.low, curve.high))
+            lines = [f"no curve: {curve.reason}"]
+            if curve.low > 0.0 and math.isfinite(curve.high):
+                where = f"between {low} and {high}" if curve.low < curve.high else f"near {low}"
+                lines.append(f"the median lies {where}; intensities there would show the curve")
+            elif curve.low > 0.0:
+                lines.append(f"the median lies above {low}; larger intensities would show the curve")
+            elif math.isfinite(curve.high):
+                lines.append(f"the median lies below {high}; smaller intensities would show the curve")
+            return lines
         lines = [
-            f"median      {self.value(curve.median)}, 95 % {_span(curve.median_interval, self.unit)}",
+            f"median      {with_unit(curve.median, self.unit, 6)}, 95 % {_span(curve.median_interval, self.unit)}",
             f"dispersion  {curve.dispersion:.4g}, 95 % {_span(curve.dispersion_interval)}",
         ]
         if curve.freedom > 0 and math.isfinite(curve.fits):
@@ -174,18 +170,6 @@ class FragilityAnswer(Answer, frozen=True):
             lines.append(f"intervals   {wider}: {self.records} records shared")
         return lines
 
-    def _median_without_a_curve(self, curve: NoCurve) -> list[str]:
-        low, high = curve.low, curve.high
-        match low > 0.0, math.isfinite(high):
-            case True, True:
-                where = f"between {self.value(low)} and {self.value(high)}" if low < high else f"near {self.value(low)}"
-                return [f"the median lies {where}; intensities there would show the curve"]
-            case True, False:
-                return [f"the median lies above {self.value(low)}; larger intensities would show the curve"]
-            case False, True:
-                return [f"the median lies below {self.value(high)}; smaller intensities would show the curve"]
-        return []
-
     def notes(self) -> list[str]:
         """Say what is undecided or missing, and where the runs are."""
         notes, moving = [], sum(one.moving_on for one in self.points)
@@ -194,7 +178,9 @@ class FragilityAnswer(Answer, frozen=True):
         if isinstance(self.curve, Curve) and self.is_extrapolated:
             x = [one.intensity for one in self.points if one.members]
             side, end = ("above", max(x)) if self.curve.median > max(x) else ("below", min(x))
-            notes.append(f"warning: the median lies {side} {self.value(end)}, beyond all intensities that were run")
+            notes.append(
+                f"warning: the median lies {side} {with_unit(end, self.unit, 6)}, beyond all intensities that were run"
+            )
         if self.failed:
             which = f"{self.failed} samples have no result, see {MEMBERS_TABLE}"
             notes.append(f"{which}; they count neither as failures nor as survivors")
@@ -214,7 +200,7 @@ class FragilityAnswer(Answer, frozen=True):
         if not points:
             message = f"{self.folder}: no sample of this study has a result; nothing to draw"
             raise InvalidInputError(message)
-        x, share, low, high = np.array([(one.intensity, one.share, *one.limits) for one in points], dtype=float).T
+        x, share, low, high = np.array([(one.intensity, one.share, one.low, one.high) for one in points], dtype=float).T
         at, curve = view.places(x), self.curve
         note, band = f"Failure: {self.fails}", None
         if isinstance(curve, Curve):
@@ -232,11 +218,6 @@ class FragilityAnswer(Answer, frozen=True):
         view.draw_fragility(self.picture_of(), path, title, paper)
 
 
-def _is_beyond(curve: Curve | NoCurve, points: Sequence[Point]) -> bool:
-    x = [point.intensity for point in points if point.members]
-    return isinstance(curve, Curve) and not min(x) <= curve.median <= max(x)
-
-
 def _span(ends: tuple[float, float], unit: str = "") -> str:
     low, high = ends
     if not math.isfinite(high):
@@ -244,80 +225,41 @@ def _span(ends: tuple[float, float], unit: str = "") -> str:
     return (f"{low:.5g} to {high:.5g} {unit}" if low else f"up to {high:.5g} {unit}").rstrip()
 
 
-def fragility(  # noqa: PLR0913 - one argument for each option of the command
-    scenario: Source,
-    intensity: Mapping[str, Values],
-    scatter: Mapping[str, Values] | None = None,
-    *,
-    stripes: Mapping[str, Values] | None = None,
-    members: int | None = None,
-    fails: str | Sequence[str] = COLLAPSE,
-    seed: int = 0,
-    executor: str | None = None,
-    jobs: int | None = None,
-    scheduler: str | None = None,
-    shard: Shard = WHOLE,
-    out: Path | str | None = None,
-    overwrite: bool = False,
-    retry_failed: bool = False,
-    on_row: OnRow = silent,
-) -> FragilityAnswer:
+@takes(FragilityOptions)
+def fragility(scenario: Source, options: FragilityOptions) -> FragilityAnswer:
     """Return how probable failure is at each intensity, and the lognormal curve that is most likely.
 
-    `intensity` has one key and its values, {"motion.scale": [0.5, 1.0, 1.5]} or {"from": a, "to": b, "count": n};
-    `scatter` the quantities drawn for each sample by itself: {"mean": m, "sd": s}, {"from": a, "to": b} or a list of
-    equally likely values, such as records (default: the distributions of [sweep]). `fails` says what counts as failure
-    (see `blocksim.study.criterion`), any of several. Samples are drawn independently at every intensity, so that limits
-    and intervals hold. `stripes` are records, {"motion.table": ["a.csv", "b.csv"]}, of which every intensity has each
-    equally often, by default once; several keys go together. The curve's intervals are then those of common records.
-
-    Runs are kept in `out` (default: results/NAME/fragility-HASH); the same call, also one with more samples, does only
-    what is missing. `executor`, `jobs`, `scheduler`, `shard` and `retry_failed` are those of `sweep`; after all shards
-    the call without one makes the curve. Raises ScenarioError, InvalidInputError, OutputExistsError where the
-    folder is not free, UnavailableError without scipy (extra `study`), StoppedEarlyError on Ctrl-C.
+    Samples are drawn independently at every intensity, so that limits and intervals hold. Runs are kept; the same call,
+    also one with more samples, does only what is missing. After all shards the call without one makes the curve.
+    `on_row` is called with every row, and how many there are. Raises ScenarioError, InvalidInputError,
+    OutputExistsError where the folder is not free, UnavailableError without scipy (extra `study`), StoppedEarlyError on
+    Ctrl-C.
     """
-    plan = read_fragility(
-        document_of(scenario), intensity, scatter, stripes=stripes, members=members, fails=fails, seed=seed
-    )
-    return run_fragility(
-        plan,
-        Execution(executor=executor, jobs=jobs, scheduler=scheduler),
-        shard,
-        out=out,
-        overwrite=overwrite,
-        retry_failed=retry_failed,
-        on_row=on_row,
-    )
+    return run_fragility(read_fragility(document_of(scenario), options), options)
 
 
 def run_fragility(
-    plan: FragilityPlan,
-    execution: Execution,
-    shard: Shard = WHOLE,
-    *,
-    out: Path | str | None = None,
-    overwrite: bool = False,
-    retry_failed: bool = False,
-    on_row: OnRow = silent,
+    plan: FragilityPlan, options: FragilityOptions, execution: Execution | None = None
 ) -> FragilityAnswer:
-    """Run what is planned; see `fragility`."""
+    """Run what is planned, with the executor of the options unless there is another; see `fragility`."""
     load_module("scipy.special", PURPOSE)
-    refuse_loss(shard, overwrite=overwrite)
+    shard, execution = options.shard, execution or options
+    refuse_loss(shard, overwrite=options.overwrite)
     run, setting = execution.ready()
     base = plan.document.build()
     check_experiment(base)
     cases, kind = plan.cases, FragilityAnswer.files
-    folder = folder_for(out, base, kind, plan.name)
-    prepare(folder, base, plan.name, overwrite=overwrite, kind=kind)
+    folder = folder_for(options.out, base, kind, plan.name)
+    prepare(folder, base, plan.name, overwrite=options.overwrite, kind=kind)
     compile_kernels(kernels_of(base))
     with closing(Manifest(folder / shard.file(MANIFEST), "fragility study")) as kept:
         done = CaseIndex(folder, len(cases))
-        if retry_failed:
+        if options.retry_failed:
             done.forget_failed(shard)
         before = sum(done.holds(number, settings) for number, settings in enumerate(cases.design))
         table = SweepTable(folder / shard.file(MEMBERS_TABLE), cases, done, None, shard, kind)
         timings = Timings(folder / shard.file(TIMINGS), execution.name)
-        SweepRun(cases, shard, kept, done, table, timings, on_row).run(run, setting, fail_fast=False)
+        SweepRun(cases, shard, kept, done, table, timings, options.on_row).run(run, setting, fail_fast=False)
         answer = _answer(plan, folder, done, before)
         if shard == WHOLE:
             answer.write()
@@ -334,7 +276,11 @@ def _answer(plan: FragilityPlan, folder: Path, done: CaseIndex, before: int) -> 
             if entry is not None:
                 rows[numbers[case % len(numbers)]][case // len(numbers)] = entry.row
     failed = {  # members with a result, and whether they have failed
-        number: {member: _has_failed(plan, row) for member, row in found.items() if _has_ended(row)}
+        number: {
+            member: falls_before_zero(row) or any(one.holds(row) for one in plan.fails)
+            for member, row in found.items()
+            if row["status"] == FINISHED or falls_before_zero(row)
+        }
         for number, found in rows.items()
     }
     counts = Counts.of(numbers, [sum(one.values()) for one in failed.values()], [len(one) for one in failed.values()])
@@ -364,18 +310,21 @@ def _answer(plan: FragilityPlan, folder: Path, done: CaseIndex, before: int) -> 
                 no_result=len(found) - members,
             )
         )
+    ran = [point.intensity for point in points if point.members]
+    is_beyond = isinstance(curve, Curve) and not min(ran) <= curve.median <= max(ran)
+    table = {} if plan.scatter is None else plan.scatter.as_table()
     return FragilityAnswer.model_validate(
         {
             "key": plan.head.key,
             "unit": plan.head.unit,
-            "fails": plan.failure,
+            "fails": " or ".join(one.text.strip() for one in plan.fails),
             "members": plan.members,
             "seed": plan.seed,
-            "scatter": plan.described(),
+            "scatter": {key: list(plan.stripes[key]) if key in plan.stripes else table[key] for key in plan.spread},
             "records": plan.records,
             "points": points,
             "missing": len(plan.cases) - done.count(),
-            "curve": {**_described(curve), "median_extrapolated": _is_beyond(curve, points)},
+            "curve": {**_described(curve), "median_extrapolated": is_beyond},
             "inflation": inflation,
             "folder": folder,
             "run": done.count() - before,
@@ -384,14 +333,6 @@ def _answer(plan: FragilityPlan, folder: Path, done: CaseIndex, before: int) -> 
             "plan": plan,
         }
     )
-
-
-def _has_ended(row: Row) -> bool:
-    return row["status"] == FINISHED or falls_before_zero(row)
-
-
-def _has_failed(plan: FragilityPlan, row: Row) -> bool:
-    return falls_before_zero(row) or plan.has_failed(row)
 
 
 def _by_record(
@@ -434,16 +375,18 @@ def repeat_fragility(answer: FragilityAnswer, execution: Replay, out: Path) -> F
         if not isinstance(values, list) or len(values) != answer.records:
             break
         stripes[key] = spread.pop(key)
-    plan = read_fragility(
-        Document.read(answer.folder / answer.files.plan, is_stored=True),
-        {answer.key: [f"{one.intensity!r} {answer.unit}" if answer.unit else one.intensity for one in answer.points]},
+    intensities = [f"{one.intensity!r} {answer.unit}" if answer.unit else one.intensity for one in answer.points]
+    options = FragilityOptions(
+        {answer.key: intensities},
         spread,
         stripes=stripes,
         members=answer.members,
         fails=answer.fails.split(" or "),
         seed=answer.seed,
+        out=out,
     )
-    return run_fragility(plan, execution, out=out)
+    plan = read_fragility(Document.read(answer.folder / answer.files.plan, is_stored=True), options)
+    return run_fragility(plan, options, execution)
 
 
 FRAGILITY = Study(FragilityAnswer, repeat_fragility, is_design=True)

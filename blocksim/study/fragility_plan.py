@@ -10,23 +10,27 @@ dissertation, Stanford 2003): member i has record i modulo their number. Curves 
 `blocksim.analysis.lognormal`.
 """
 
-import hashlib
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Annotated
 
 from blocksim.errors import InvalidInputError
+from blocksim.options import Option, takes
 from blocksim.scenario import Document, Sweep, scenario_hash
 from blocksim.scenario.models.study import Uniform, Variation
 from blocksim.scenario.overrides import format_key, parse_key
-from blocksim.simulation.provenance import HASH_DIGITS, code_hash
+from blocksim.silence import silent
+from blocksim.simulation.provenance import code_hash
+from blocksim.study.answer import with_unit
 from blocksim.study.criterion import Criterion, read_criterion
+from blocksim.study.executors import Execution
 from blocksim.study.limit_plan import takes_whole, typed_levels
+from blocksim.study.manifest import WHOLE, Shard
 from blocksim.study.plan import (
     MOST_CASES,
     Cases,
-    Places,
     Together,
     Values,
     Variations,
@@ -39,7 +43,9 @@ from blocksim.study.plan import (
     refuse_wrong_draws,
     table_digests,
 )
-from blocksim.study.rows import Head, heads_of, si_number
+from blocksim.study.rows import Head, Row, heads_of, si_number
+from blocksim.study.runs import short_hash
+from blocksim.study.vary import variations_option
 
 INTENSITY, SCATTER, STRIPES, FAILS = "--intensity", "--scatter", "--stripes", "--fails"
 COLLAPSE = "outcome = fell"
@@ -49,6 +55,82 @@ NO_SCATTER = (
     "no scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO, KEY=a,b,c), --stripes KEY=a,b,c, or a [sweep] table with "
     "distributions"
 )
+OnRow = Callable[[int, int, Row], None]
+
+
+@dataclass(frozen=True)
+class FragilityOptions(Execution):
+    """Intensities, what scatters at each of them, what counts as failure, and how members are run and kept."""
+
+    intensity: Annotated[
+        Mapping[str, Values],
+        variations_option(
+            "The key that is the intensity: KEY=a,b,c or KEY=FROM:TO:COUNT (:log at the end spaces them "
+            "logarithmically).",
+            "KEY=VALUES",
+            'One key and its values, {"motion.scale": [0.5, 1.0, 1.5]} or {"from": a, "to": b, "count": n}.',
+            INTENSITY,
+            is_repeatable=False,
+        ),
+    ]
+    scatter: Annotated[
+        Mapping[str, Values] | None,
+        variations_option(
+            "Quantity to sample: KEY=MEAN+-SD, KEY=FROM:TO or equally likely values, KEY=a,b,c. Repeatable. Default: "
+            "the distributions of [sweep].",
+            "KEY=MEAN+-SD",
+            'The quantities drawn for each sample by itself: {"mean": m, "sd": s}, {"from": a, "to": b} or a list of '
+            "equally likely values, such as records (default: the distributions of [sweep]).",
+            SCATTER,
+        ),
+    ] = None
+    _: KW_ONLY
+    stripes: Annotated[
+        Mapping[str, Values] | None,
+        variations_option(
+            "Records that all intensities share, each once at each of them, such as motion.table=a.csv,b.csv. "
+            "Repeatable: keys whose values go together.",
+            "KEY=a,b,c",
+            'Records, {"motion.table": ["a.csv", "b.csv"]}, of which every intensity has each equally often, by '
+            "default once; several keys go together. The curve's intervals are then those of common records.",
+            STRIPES,
+        ),
+    ] = None
+    members: Annotated[
+        int | None,
+        Option(
+            f"Samples at every intensity (default: {MEMBERS}, or one of each record of {STRIPES}).",
+            ("--samples", "--members"),
+            "N",
+            least=1,
+        ),
+    ] = None
+    fails: Annotated[
+        str | Sequence[str],
+        Option(
+            'What counts as failure, such as "moved > 50 mm" or "outcome = slid | fell". Separated by '
+            f'commas: all must hold; repeated: any one suffices (default: "{COLLAPSE}").',
+            metavar="CONDITIONS",
+            python='What counts as failure, such as "moved > 50 mm" or "outcome = slid | fell", any of several '
+            "(see `blocksim.study.criterion`).",
+            is_repeatable=True,
+        ),
+    ] = COLLAPSE
+    seed: Annotated[int, Option("Random seed.", metavar="S", least=0)] = 0
+    shard: Annotated[
+        Shard,
+        Option(
+            "Run only samples I, I + N, ... (job arrays); then once without, for the curve.",
+            metavar="I/N",
+            read=Shard.parse,
+        ),
+    ] = WHOLE
+    retry_failed: Annotated[bool, Option("Rerun samples that did not finish.")] = False
+    out: Annotated[
+        Path | str | None, Option("Folder to write (default: results/NAME/fragility-HASH).", metavar="DIR")
+    ] = None
+    overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
+    on_row: OnRow = silent
 
 
 @dataclass(frozen=True)
@@ -74,24 +156,6 @@ class FragilityPlan:
         """Everything that differs between the members of an intensity, by key."""
         return {**self.stripes, **({} if self.scatter is None else self.scatter.vary)}
 
-    def described(self) -> dict[str, object]:
-        """Return what differs between the members of an intensity as a [sweep] table has it, stripes as lists."""
-        table = {} if self.scatter is None else self.scatter.as_table()
-        return {key: list(self.stripes[key]) if key in self.stripes else table[key] for key in self.spread}
-
-    def shown(self, number: float) -> str:
-        """Return an intensity for people."""
-        return f"{number:.6g} {self.head.unit}".rstrip()
-
-    @property
-    def failure(self) -> str:
-        """What counts as failure, in words."""
-        return " or ".join(one.text.strip() for one in self.fails)
-
-    def has_failed(self, row: Mapping[str, object]) -> bool:
-        """Judge the row of a finished run."""
-        return any(one.holds(row) for one in self.fails)
-
     @property
     def name(self) -> str:
         """A hash of all that decides a member; neither their number nor what counts as failure does."""
@@ -101,9 +165,7 @@ class FragilityPlan:
         if self.stripes:
             about.append({key: list(map(str, values)) for key, values in self.stripes.items()})
         tables = table_digests(self.document, self.spread)
-        if tables:
-            about.append(tables)
-        return hashlib.sha256(json.dumps(about, default=str).encode()).hexdigest()[:HASH_DIGITS]
+        return short_hash([*about, tables] if tables else about)
 
     @cached_property
     def cases(self) -> Cases:
@@ -112,9 +174,13 @@ class FragilityPlan:
         More members come after those that are there. Raises ScenarioError where a distribution gave a value that its
         key cannot have, InvalidInputError where no case can be simulated.
         """
-        drawn_keys = {} if self.scatter is None else self.scatter.vary
-        draws = {key: self._draws(key, values) for key, values in drawn_keys.items()}
-        design = Together({self.head.key: tuple(self.levels.values()) * self.members, **self._shared(), **draws})
+        vary = {} if self.scatter is None else self.scatter.vary
+        draws = {key: self._draws(key, values) for key, values in vary.items()}
+        shared = {  # all intensities of a member have the same record
+            key: tuple(values[member % len(values)] for member in range(self.members) for _ in self.levels)
+            for key, values in self.stripes.items()
+        }
+        design = Together({self.head.key: tuple(self.levels.values()) * self.members, **shared, **draws})
         if self.scatter is not None:
             refuse_wrong_draws(self.document, self.scatter, design)
         striped = Sweep.model_validate({"mode": "list", **design.columns})
@@ -122,49 +188,46 @@ class FragilityPlan:
         cases = cases_of(self.document, striped)
         return replace(cases, heads=(self.head, *(heads[key] for key in self.spread)))
 
-    def _shared(self) -> dict[str, tuple[object, ...]]:
-        """Return the value of each stripe by case: all intensities of a member have the same record."""
-        return {
-            key: tuple(values[member % len(values)] for member in range(self.members) for _ in self.levels)
-            for key, values in self.stripes.items()
-        }
-
     def _draws(self, key: str, values: Variation) -> tuple[object, ...]:
         """Return the values of a key in the order of the cases."""
         is_whole = takes_whole(self.document, key) and not isinstance(values, tuple)
         if is_whole and isinstance(values, Uniform):
             values = replace(values, low=values.low - 0.5, high=values.high + 0.5)  # so that its ends are as likely
-        by_level = [draw_values(values, self._places(key, number)) for number in self.levels]
+        by_level = []
+        for number in self.levels:
+            level = with_unit(number, self.head.unit, 6)
+            name = f"{format_key(parse_key(key))} where {format_key(parse_key(self.head.key))} = {level}"
+            places = open_interval(generator(self.seed, name).random(self.members))
+            by_level.append(draw_values(values, places))
         together = [value for member in zip(*by_level, strict=True) for value in member]
         return tuple(round(si_number(value)) for value in together) if is_whole else tuple(together)
 
-    def _places(self, key: str, number: float) -> Places:
-        name = f"{format_key(parse_key(key))} where {format_key(parse_key(self.head.key))} = {self.shown(number)}"
-        return open_interval(generator(self.seed, name).random(self.members))
 
-
-def read_fragility(
-    document: Document,
-    intensity: Mapping[str, Values] | Variations,
-    scatter: Mapping[str, Values] | Variations | None = None,
-    *,
-    stripes: Mapping[str, Values] | Variations | None = None,
-    members: int | None = None,
-    fails: str | Sequence[str] = COLLAPSE,
-    seed: int = 0,
-) -> FragilityPlan:
+@takes(FragilityOptions)
+def read_fragility(document: Document, options: FragilityOptions) -> FragilityPlan:
     """Return the plan of a study; without `scatter`, the [sweep] table of the scenario counts if it has distributions.
 
     `members` is their number at every intensity (default: 64, or one a record of `stripes`). Raises ScenarioError for
     keys and values that the scenario cannot have, InvalidInputError for a wrong criterion, anything but one intensity,
     nothing that scatters, stripes that are not all equally often there, and too many members.
     """
+    fails, seed = options.fails, options.seed
     criteria = tuple(read_criterion(text, FAILS) for text in ([fails] if isinstance(fails, str) else fails))
     bare = document.without_sweep()
-    head, levels = _levels(bare, _variations(intensity))
-    shared = _stripes(bare, _variations(stripes or {}))
+    given = Variations.of(options.intensity)
+    if len(given.tables) != 1:
+        message = (
+            f"one key is the intensity, not {len(given.tables)}: give {INTENSITY} KEY=a,b,c or KEY=FROM:TO:COUNT once"
+        )
+        raise InvalidInputError(message)
+    head, levels = typed_levels(bare, given, INTENSITY)
+    wrong = [value for number, value in levels.items() if number <= 0.0]
+    if wrong:
+        message = f"{INTENSITY} {given.texts[head.key]}: {wrong[0]} is not above 0, as a lognormal curve needs"
+        raise InvalidInputError(message)
+    shared = _stripes(bare, Variations.of(options.stripes or {}))
     records = len(next(iter(shared.values()), ()))
-    members = (records or MEMBERS) if members is None else members
+    members = (records or MEMBERS) if options.members is None else options.members
     if members < 1 or members * len(levels) > MOST_CASES or not 0 <= seed <= MOST_SEED:
         message = (
             f"{members} samples at {len(levels)} intensities with seed {seed}: 1 to {MOST_CASES} runs are possible"
@@ -175,7 +238,7 @@ def read_fragility(
             f"{members} samples of {records} records: each must be there equally often; give a multiple of {records}"
         )
         raise InvalidInputError(message)
-    spread = _scatter(document, _variations(scatter or {}), needed=not shared)
+    spread = _scatter(document, Variations.of(options.scatter or {}), needed=not shared)
     keys = [parse_key(key) for key in (head.key, *shared, *(spread.vary if spread is not None else ()))]
     twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
     if twice == keys[0]:
@@ -185,25 +248,6 @@ def read_fragility(
         message = f"{format_key(twice)} is given as stripes; it cannot be drawn too"
         raise InvalidInputError(message)
     return FragilityPlan(bare, head, levels, spread, members, seed, criteria, shared)
-
-
-def _variations(given: Mapping[str, Values] | Variations) -> Variations:
-    return given if isinstance(given, Variations) else Variations.of(given)
-
-
-def _levels(document: Document, given: Variations) -> tuple[Head, dict[float, object]]:
-    """Return the column of the intensity, and its values by their numbers, from the smallest up."""
-    if len(given.tables) != 1:
-        message = (
-            f"one key is the intensity, not {len(given.tables)}: give {INTENSITY} KEY=a,b,c or KEY=FROM:TO:COUNT once"
-        )
-        raise InvalidInputError(message)
-    head, levels = typed_levels(document, given, INTENSITY)
-    wrong = [value for number, value in levels.items() if number <= 0.0]
-    if wrong:
-        message = f"{INTENSITY} {given.texts[head.key]}: {wrong[0]} is not above 0, as a lognormal curve needs"
-        raise InvalidInputError(message)
-    return head, levels
 
 
 def _stripes(document: Document, given: Variations) -> dict[str, tuple[object, ...]]:

@@ -15,13 +15,13 @@ from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_valid
 from blocksim.errors import ExitCode, InvalidInputError, Problem
 from blocksim.scenario.input_files import raise_problems, read_table
 from blocksim.simulation.observables import PEAK, Manner, table_columns
-from blocksim.study.answer import Answer, Table, folder_kind
+from blocksim.study.answer import Answer, Table, folder_kind, with_unit
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
 from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
 from blocksim.study.rows import Head, Row, as_cell
 from blocksim.study.stored_run import load_stored_run
-from blocksim.study.sweep_folder import FolderKind, case_folder
+from blocksim.study.sweep_folder import CASES, FolderKind, case_folder
 from blocksim.view import mechanism, studies
 from blocksim.view.run_data import support_of
 from blocksim.view.style import Paper
@@ -30,16 +30,7 @@ UNIT = r"(?: \[[^\[\]]*\])?"
 STEP = "time.step"
 HEADS = ("verdict", "outcome", "first to move", "at s", "moved mm", "turned °")
 LEAST_SAID = 1e-5  # share of a limit
-
-
-def observed_columns() -> list[str]:
-    """Return the observables that limit.csv has."""
-    return [*table_columns(), PEAK]
-
-
-def columns() -> list[str]:
-    """Return the columns of limit.csv after the value."""
-    return ["verdict", *observed_columns(), "status", "reason", "seconds", "stiffness_scale", "half_step_s"]
+LIMIT = {Verdict.STANDS, Verdict.FALLS}
 
 
 class Side(BaseModel, frozen=True, extra="allow"):
@@ -62,13 +53,9 @@ class Side(BaseModel, frozen=True, extra="allow"):
     @classmethod
     def of(cls, value: Number, verdict: Verdict, row: Row) -> Self:
         """Take what a row says."""
-        cells: dict[str, Any] = {name: row.get(name) for name in (*observed_columns(), "status", "reason")}
+        names = (*table_columns(), PEAK, "status", "reason")
+        cells: dict[str, Any] = {name: row.get(name) for name in names}
         return cls(value=value, verdict=verdict, **cells, case=None)
-
-    def kept(self, case: str, seen: Row | None) -> "Side":
-        """Return it with the folder of its run; `seen` is the row of one that was released to be seen to fall."""
-        row = {} if seen is None else {name: seen.get(name) for name in observed_columns()}
-        return self.model_copy(update={**row, "case": case})
 
     def cells(self) -> list[str | float]:
         """Return its row of a table for people."""
@@ -141,36 +128,28 @@ class Bracket(BaseModel, frozen=True):
         """What both sides came to."""
         return {self.below.verdict, self.above.verdict}
 
-    @property
-    def is_limit(self) -> bool:
-        """True between standing and falling."""
-        return self.verdicts == {Verdict.STANDS, Verdict.FALLS}
-
-    def lines(self, key_unit: str) -> list[str]:
+    def lines(self, unit: str) -> list[str]:
         """Return the answer in words, after what it is made from."""
-
-        def shown(value: float) -> str:
-            return f"{value:.7g} {key_unit}".rstrip()
-
         lines, half = [], self.half_step
         low, high = self.below.value, self.above.value
         if half is not None and (half.low, half.high) != (low, high):
             moved = (half.low + half.high) / (low + high) - 1.0
-            halved = f"{shown(half.low)} to {shown(half.high)} with half of it ({moved:+.2%}): give a shorter {STEP}"
-            lines.append(f"{shown(low)} to {shown(high)} with the step as given, {halved}")
+            halved = f"{with_unit(half.low, unit)} to {with_unit(half.high, unit)} with half of it ({moved:+.2%})"
+            given = f"{with_unit(low, unit)} to {with_unit(high, unit)} with the step as given"
+            lines.append(f"{given}, {halved}: give a shorter {STEP}")
         elif half is not None and half.problem:
             lines.append(f"warning: {half.problem}")
         if self.extrapolated:
             stiff = 0.5 * sum(self.stiff or (self.low, self.high))
             lines += [
-                f"stiffness scale {one.stiffness_scale:g}: {shown(one.low)} to {shown(one.high)} "
+                f"stiffness scale {one.stiffness_scale:g}: {with_unit(one.low, unit)} to {with_unit(one.high, unit)} "
                 f"({one.middle / stiff - 1.0:+.2%})"
                 for one in self.levels
             ]
             lines.append("stiff contacts, extrapolated with 1/stiffness:")
         width = (self.high - self.low) / max(abs(self.low), abs(self.high))
-        below = f"{self.below.verdict.value} up to {shown(self.low)}"
-        lines.append(f"{below}, {self.above.verdict.value} from {shown(self.high)} (bracket {width:.2%})")
+        below = f"{self.below.verdict.value} up to {with_unit(self.low, unit)}"
+        lines.append(f"{below}, {self.above.verdict.value} from {with_unit(self.high, unit)} (bracket {width:.2%})")
         margin = self.undecided or Margin(rest=0.0, springs=0.0)
         parts = {"rest speed": margin.rest, "stiffness": margin.springs}
         said = [f"{100 * share:.2g} % that {name} cannot decide" for name, share in parts.items() if share > LEAST_SAID]
@@ -180,10 +159,10 @@ class Bracket(BaseModel, frozen=True):
         """Yield what springs do to it, where it is not that of stiff contacts."""
         if self.problem:
             last = self.levels[-1]
-            near = f"limit near {last.middle:.7g} {unit}".rstrip()
+            near = f"limit near {with_unit(last.middle, unit)}"
             yield f"warning: {near}, stiffness scale {last.stiffness_scale:g}: {self.problem}"
-        if self.is_limit and self.give is not None and self.give.share > GIVE and not self.extrapolated:
-            turned = f"blocks have turned by {self.give.turn:.2g}° at {self.give.value:.7g} {unit}".rstrip()
+        if self.verdicts == LIMIT and self.give is not None and self.give.share > GIVE and not self.extrapolated:
+            turned = f"blocks have turned by {self.give.turn:.2g}° at {with_unit(self.give.value, unit)}"
             hint = "leave --as-given out" if is_as_given else "see --stiffer"
             yield f"warning: {turned}, as springs give way; the limit is off by some {self.give.share:.1%}; {hint}"
 
@@ -225,58 +204,42 @@ class LimitAnswer(Answer, frozen=True):
         is_as_given: bool,
     ) -> Self:
         """Make the answer of a search; `stiffer` has rows by stiffness scale, `finer` by time step (s)."""
-        contact = plan.document.build().contact
-        scale = contact.stiffness_scale if plan.has_springs else None
+        scenario = plan.scenario
+        scale = scenario.contact.stiffness_scale if scenario.time.has_springs else None
+        columns = [*table_columns(), PEAK, "status", "reason", "seconds"]
         searches = [
             (scale, None, rows),
             *((stiff, None, more) for stiff, more in stiffer.items()),
             *((scale, step, more) for step, more in finer.items()),
         ]
         cells = [
-            [
-                value,
-                plan.criterion.verdict(row).value,
-                *(as_cell(row.get(name)) for name in columns()[1:-2]),
-                stiff,
-                step,
-            ]
+            [value, plan.criterion.verdict(row).value, *(as_cell(row.get(name)) for name in columns), stiff, step]
             for stiff, step, more in searches
             for value, row in sorted(more.items())
         ]
-        span = plan.span
+        span = vars(plan.span)
         return cls.model_validate(
             {
                 "key": plan.key,
                 "unit": plan.unit,
-                "from": span.low,
-                "to": span.high,
-                "count": span.count,
-                "is_log": span.is_log,
-                "is_whole": span.is_whole,
+                "from": plan.span.low,
+                "to": plan.span.high,
+                **{name: span[name] for name in ("count", "is_log", "is_whole")},
                 "stands": plan.criterion.text,
                 "tolerance": plan.tolerance,
-                "scheme": plan.scheme,
+                "scheme": scenario.time.scheme,
                 "stiffness_scale": scale,
                 "runs": len(cells),
                 "changes": brackets,
                 "folder": folder,
                 "run": run,
                 "is_as_given": is_as_given,
-                "heads": (str(Head("value", plan.unit)), *columns()),
+                "heads": (str(Head("value", plan.unit)), "verdict", *columns, "stiffness_scale", "half_step_s"),
                 "cells": cells,
                 "plan": plan,
                 "rows": rows,
             }
         )
-
-    def with_sides(self, sides: Mapping[float, Side]) -> "LimitAnswer":
-        """Return it with other sides, by their values."""
-        brackets = [
-            one.model_copy(update={"below": sides.get(one.below.value, one.below),
-                                   "above": sides.get(one.above.value, one.above)})
-            for one in self.brackets
-        ]  # fmt: skip
-        return self.model_copy(update={"brackets": tuple(brackets)})
 
     @property
     def changes(self) -> list[Change[Verdict]]:
@@ -286,12 +249,12 @@ class LimitAnswer(Answer, frozen=True):
     @property
     def limits(self) -> list[Change[Verdict]]:
         """Those between standing and falling."""
-        return [one.change for one in self.brackets if one.is_limit]
+        return [one.change for one in self.brackets if one.verdicts == LIMIT]
 
     @property
     def limits_as_given(self) -> list[Change[Verdict]]:
         """The same for the springs and the time step of the scenario, as they were run."""
-        return [one.given for one in self.brackets if one.is_limit]
+        return [one.given for one in self.brackets if one.verdicts == LIMIT]
 
     @property
     def falls(self) -> list[Bracket]:
@@ -305,10 +268,6 @@ class LimitAnswer(Answer, frozen=True):
         sides = (side for one in self.brackets for side in (one.below, one.above))
         return {side.value: side.case for side in sides if side.case is not None}
 
-    def value(self, number: float) -> str:
-        """Return a value for people."""
-        return f"{number:.7g} {self.unit}".rstrip()
-
     @property
     def code(self) -> ExitCode:
         """1 where nothing changes."""
@@ -319,7 +278,7 @@ class LimitAnswer(Answer, frozen=True):
         """Key, contacts and criterion."""
         return f'{self.key}, {NAMES.get(self.scheme, self.scheme)}: stands means "{self.stands}"'
 
-    def shown(self) -> Table:
+    def overview(self) -> Table:
         """Return both sides of every change; where there is none, both ends of the range."""
         sides = [side for one in self.brackets for side in (one.below, one.above)]
         if not sides and self.plan is not None:
@@ -332,7 +291,7 @@ class LimitAnswer(Answer, frozen=True):
         """Return every bracket, and what it is made from."""
         if self.brackets:
             return [line for one in self.brackets for line in one.lines(self.unit)]
-        span = f"no change from {self.value(self.low)} to {self.value(self.high)}"
+        span = f"no change from {with_unit(self.low, self.unit)} to {with_unit(self.high, self.unit)}"
         if self.plan is None:
             return [span]
         verdict = next(iter(self.plan.verdicts(self.rows).values()))
@@ -348,8 +307,9 @@ class LimitAnswer(Answer, frozen=True):
         if plan is not None and Verdict.UNDECIDED in plan.verdicts(self.rows).values():
             notes.append("undecided: blocks were still moving at the end; increase time.end to decide")
         notes += self.warnings()
-        if plan is not None and not self.is_whole and (plan.has_islands or not self.brackets):
-            spacing = f"a {self.count - 1}th of the range" if self.is_log else plan.shown(plan.span.spacing)
+        if plan is not None and not self.is_whole and (plan.scenario.motion is not None or not self.brackets):
+            spacing = with_unit(plan.span.width / (self.count - 1), self.unit)
+            spacing = f"a {self.count - 1}th of the range" if self.is_log else spacing
             which = f"islands narrower than {spacing}, between values of the scan, are not seen"
             notes.append(f"{which}: --scan N for more values")
         notes.append(f"{self.runs} runs, {self.run} of them now: {self.folder / 'limit.csv'}")
@@ -359,19 +319,18 @@ class LimitAnswer(Answer, frozen=True):
 
     def summary(self) -> list[tuple[str, str]]:
         """Return key, criterion and brackets."""
-        contacts, runs = NAMES.get(self.scheme, self.scheme), str(self.runs)
-        lines = [("limit", line) for line in self.lines()] if self.brackets else []
-        return [
-            ("key", self.key),
-            ("stands means", self.stands),
-            ("contacts", contacts),
-            ("runs", runs),
-            *(lines or [("limit", "nothing changes within the range")]),
-        ]
+        lines = self.lines() if self.brackets else ["nothing changes within the range"]
+        about = {"key": self.key, "stands means": self.stands, "contacts": NAMES.get(self.scheme, self.scheme)}
+        return [*about.items(), ("runs", str(self.runs)), *(("limit", line) for line in lines)]
 
     def draw(self, path: Path, title: str, paper: Paper) -> None:
-        """Draw both sides of the brackets whose runs were kept."""
-        brackets = [pair for one in self.brackets if (pair := self._sides(one)) is not None]
+        """Draw both sides of the brackets whose runs were kept, what stands on the left."""
+        brackets = []
+        for one in self.brackets:
+            sides = [side for side in (one.below, one.above) if side.case and case_folder(self.folder, side.case)]
+            if len(sides) == 2:
+                first, second = sorted(sides, key=lambda side: side.verdict is not Verdict.STANDS)
+                brackets.append((self._picture_of(first), self._picture_of(second)))
         if not brackets:
             empty = "it holds no runs of both sides of a bracket"
             why = empty if self.brackets else "nothing changes within its range"
@@ -379,26 +338,17 @@ class LimitAnswer(Answer, frozen=True):
             raise InvalidInputError(message)
         mechanism.draw_mechanisms(brackets, path, title, paper)
 
-    def _sides(self, bracket: Bracket) -> tuple[mechanism.Side, mechanism.Side] | None:
-        """Return what is drawn of a bracket: what stands on the left; None where a run was not kept."""
-        ends = sorted((bracket.below, bracket.above), key=lambda side: side.verdict is not Verdict.STANDS)
-        first, second = (self._drawn(side) for side in ends)
-        return None if first is None or second is None else (first, second)
-
-    def _drawn(self, side: Side) -> mechanism.Side | None:
-        place = None if side.case is None else case_folder(self.folder, side.case)
-        if place is None:
-            return None
-        run = load_stored_run(place)
+    def _picture_of(self, side: Side) -> mechanism.Side:
+        """Return a side whose run was kept, as it is drawn."""
+        run = load_stored_run(self.folder / CASES / Path(str(side.case)).name)
         first = None if side.first_mover is None else str(side.first_mover)
-        head = f"{side.verdict.value} at {self.key} = {self.value(side.value)}"
+        head = f"{side.verdict.value} at {self.key} = {with_unit(side.value, self.unit)}"
         came = side.outcome or ""
         if first is not None:
             came = f"{came}; first to move: block {first} at {side.first_moved_s or 0.0:.3g} s"
         support, is_mechanism = support_of(run.scenario, run.events), side.verdict is not Verdict.STANDS
-        drawn = mechanism.Side(run.frames, support, first, head, is_mechanism=is_mechanism)
-        moment = float(run.frames.time[drawn.frame])
-        return replace(drawn, caption=f"{head}\n{came} (drawn at {moment:.3g} s)")
+        picture = mechanism.Side(run.frames, support, first, head, is_mechanism=is_mechanism)
+        return replace(picture, caption=f"{head}\n{came} (drawn at {float(run.frames.time[picture.frame]):.3g} s)")
 
 
 class CurvePoint(BaseModel, frozen=True):
@@ -413,6 +363,14 @@ class CurvePoint(BaseModel, frozen=True):
         """Take the fields of the answer, which stand beside the value."""
         is_flat = isinstance(data, dict) and "search" not in data
         return {"over": data.get("over"), "search": data} if is_flat else data
+
+    def rows(self) -> Iterator[tuple[float, float | None, float | None, str, str]]:
+        """Yield the value, ends and verdicts of every bracket; without ends where nothing changes."""
+        for one in self.search.changes:
+            yield self.over, one.low, one.high, one.below.value, one.above.value
+        if not self.search.brackets:
+            verdict = next((str(row[1]) for row in self.search.cells), "no change")
+            yield self.over, None, None, verdict, verdict
 
     @model_serializer
     def _flat(self) -> dict[str, object]:
@@ -438,13 +396,8 @@ class CurveAnswer(Answer, frozen=True):
     @classmethod
     def of(cls, over: Head, folder: Path, searches: Mapping[float, LimitAnswer]) -> Self:
         """Make the answer from those of the searches."""
-        cells: list[list[object]] = []
-        for value, search in searches.items():
-            cells += [[value, one.low, one.high, one.below.value, one.above.value] for one in search.changes]
-            if not search.brackets:
-                verdict = next(str(row[1]) for row in search.cells)
-                cells.append([value, None, None, verdict, verdict])
         one = next(iter(searches.values()))
+        points = tuple(CurvePoint(over=value, search=search) for value, search in searches.items())
         ends = (str(Head("low", one.unit)), str(Head("high", one.unit)))
         return cls(
             key=one.key,
@@ -452,11 +405,11 @@ class CurveAnswer(Answer, frozen=True):
             over=over.key,
             over_unit=over.unit,
             stands=one.stands,
-            points=tuple(CurvePoint(over=value, search=search) for value, search in searches.items()),
+            points=points,
             folder=folder,
             run=sum(search.run for search in searches.values()),
             heads=(str(Head("over", over.unit)), *ends, "below", "above"),
-            cells=cells,
+            cells=[row for point in points for row in point.rows()],
         )
 
     def places(self) -> dict[float, Path]:
@@ -478,17 +431,12 @@ class CurveAnswer(Answer, frozen=True):
         """Both keys and the criterion."""
         return f'{self.key} over {self.over}: stands means "{self.stands}"'
 
-    def shown(self) -> Table:
+    def overview(self) -> Table:
         """Return a row for every bracket, and one for a value at which nothing changes."""
         rows: list[list[str | float]] = []
-        for point in self.points:
-            search, value = point.search, f"{point.over:.6g} {self.over_unit}".rstrip()
-            rows += [
-                [value, f"{one.low:.7g}", f"{one.high:.7g}", one.below.value, one.above.value] for one in search.changes
-            ]
-            if not search.brackets:
-                verdict = next((str(row[1]) for row in search.cells), "no change")
-                rows.append([value, "–", "–", verdict, verdict])
+        for over, low, high, *verdicts in (row for point in self.points for row in point.rows()):
+            ends = ("–" if end is None else f"{end:.7g}" for end in (low, high))
+            rows.append([with_unit(over, self.over_unit, 6), *ends, *map(str, verdicts)])
         return Table((self.over, f"from {self.unit}".rstrip(), f"to {self.unit}".rstrip(), "below", "above"), rows)
 
     def notes(self) -> list[str]:
@@ -522,7 +470,7 @@ class CurveAnswer(Answer, frozen=True):
 
 def place_of(number: float, unit: str) -> str:
     """Return the name of the folder of a value of the other key, one that needs no quotes in a shell."""
-    return re.sub(r"[^A-Za-z0-9.+-]+", "-", f"{number:.6g} {unit}".rstrip())
+    return re.sub(r"[^A-Za-z0-9.+-]+", "-", with_unit(number, unit, 6))
 
 
 def read_published(path: Path, over_unit: str, unit: str) -> tuple[studies.Series, ...]:

@@ -26,8 +26,8 @@ rests within 1e-8 of gravity, and where supports move a limit is none of rest.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 from pydantic import BaseModel
@@ -40,7 +40,7 @@ from blocksim.scenario.motion import settles
 from blocksim.scenario.placement import smallest_width
 from blocksim.simulation.observables import FURTHER, MOVED_SHARE, Manner
 from blocksim.study.criterion import Verdict
-from blocksim.study.limit_plan import NAMES, Change, LimitPlan
+from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
 from blocksim.study.rows import Row
 from blocksim.world.interactions import contact_classes, interactions_of
 
@@ -142,7 +142,7 @@ def ratio_of(scenario: Scenario) -> float:
 
 def can_be_stiffer(plan: LimitPlan) -> bool:
     """Return True for springs, unless the key is one of stiffness or a system has its own, or whole numbers only."""
-    has_springs = plan.has_springs and not plan.document.build().systems
+    has_springs = plan.scenario.time.has_springs and not plan.scenario.systems
     return has_springs and not plan.span.is_whole and not any(part in plan.key for part in OF_STIFFNESS)
 
 
@@ -150,41 +150,27 @@ def refuse_without_springs(*plans: LimitPlan) -> None:
     """Raise InvalidInputError where none of the plans can be searched with stiffer springs."""
     if any(can_be_stiffer(plan) for plan in plans):
         return
-    if not any(plan.has_springs for plan in plans):
+    if not any(plan.scenario.time.has_springs for plan in plans):
         raise InvalidInputError(NO_SPRINGS)
     message = f"--stiffer: {NAMES[SPRINGS]} are not made stiffer for a limit of {plans[0].key}, or beside soil"
     raise InvalidInputError(message)
 
 
-@dataclass(frozen=True)
 class StandingSide:
-    """The end of a bracket at which nothing has fallen, and the row of its run."""
+    """The end of a bracket at which nothing has fallen."""
 
-    plan: LimitPlan
-    change: Change[Verdict]
-    row: Row
+    def __init__(self, plan: LimitPlan, change: Change[Verdict], rows: Mapping[Number, Row]) -> None:
+        """Take a change of a search and all its rows."""
+        self.plan, self.change = plan, change
+        self.value = change.high if change.below is Verdict.FALLS else change.low
+        self.scenario = plan.scenario_at(self.value)
+        self.give = self._give(rows[self.value])
 
-    @staticmethod
-    def value_of(change: Change[Verdict]) -> float:
-        """Return the value of that end."""
-        return change.high if change.below is Verdict.FALLS else change.low
-
-    @property
-    def value(self) -> float:
-        """The value of the key."""
-        return self.value_of(self.change)
-
-    @cached_property
-    def scenario(self) -> Scenario:
-        """The scenario there."""
-        return self.plan.scenario_at(self.value)
-
-    @cached_property
-    def give(self) -> Give | None:
-        """How far springs have given way; None where it is not known from what stands there."""
-        if not self.plan.has_springs or self.row.get("outcome") != Manner.STANDS.value:  # it has turned otherwise too
+    def _give(self, row: Row) -> Give | None:
+        """Return how far springs have given way; None where it is not known from what stands there."""
+        if not self.plan.scenario.time.has_springs or row.get("outcome") != Manner.STANDS.value:  # turned otherwise too
             return None
-        turn = max(abs(float(str(self.row[name]))) for name in self.row if name.endswith(ROTATION))
+        turn = max(abs(float(str(row[name]))) for name in row if name.endswith(ROTATION))
         # of the load k that topples a block by k g along the ground, atan k = a, a turn d takes away 2 d/sin(2 a) k
         slope = (float(self.scenario.ground.tilt) or math.inf) if self.plan.key == TILT else 0.5
         return Give(self.value, turn, math.radians(turn) / slope)
@@ -209,26 +195,23 @@ class StandingSide:
 
         `probed` is the share within which stiffer springs were searched; with `as_given` the limit is that of springs.
         """
-        rest = undecided_acceleration(self.scenario, self.plan.criterion.least_moved)
-        rest = rest / self.scenario.gravity / self._load() if rest else 0.0
-        if as_given or not self.plan.has_springs:
+        plan, scenario = self.plan, self.scenario
+        rest = undecided_acceleration(scenario, plan.criterion.least_moved)
+        if rest:  # over gravity it is a share of a tilt (rad), of a coefficient; of one for other keys
+            is_coefficient = any(part in plan.key for part in COEFFICIENTS) or plan.key.startswith(HORIZONTAL)
+            load = 1.0
+            if plan.key == TILT:
+                load = min(abs(float(scenario.ground.tilt)), 1.0) or 1.0
+            elif is_coefficient and not plan.unit:
+                load = min(abs(self.value), 1.0) or 1.0
+            rest = rest / scenario.gravity / load
+        if as_given or not plan.scenario.time.has_springs:
             return Margin(rest=rest, springs=0.0)
         if levels is not None:
             is_known = levels.stiff is not None or levels.problem
             return Margin(rest=rest, springs=0.0 if is_known else BEYOND * probed)
         most = self.most_shift if self.give is None else self.give.share
         return Margin(rest=rest, springs=most if math.isfinite(most) else 0.0)
-
-    def _load(self) -> float:
-        """Return what a load, over gravity, is a share of: a tilt (rad), a coefficient; one for other keys."""
-        plan = self.plan
-        if plan.key == TILT:
-            size = abs(float(self.scenario.ground.tilt))
-        elif not plan.unit and (any(part in plan.key for part in COEFFICIENTS) or plan.key.startswith(HORIZONTAL)):
-            size = abs(self.value)
-        else:
-            return 1.0
-        return min(size, 1.0) or 1.0
 
 
 def slenderness(scenario: Scenario) -> float:

@@ -12,30 +12,35 @@ Gravity that comes at once is an impact: contacts that slip or open under it shi
 it comes to rest before time zero (`start.settle`), unless the scenario says whether it does.
 """
 
-import hashlib
-import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Generic, TypeVar
+from pathlib import Path
+from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import Document, Scenario, place_bodies, place_segments, scenario_hash
-from blocksim.scenario.models.loads import AnyLoad, stretches_of
+from blocksim.options import Option, takes
+from blocksim.scenario import Document, Scenario, overrides, place_bodies, place_segments, scenario_hash
+from blocksim.scenario.models.loads import stretches_of
 from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
 from blocksim.scenario.models.study import Uniform, is_descending
 from blocksim.scenario.overlap import Outlines, penetration
-from blocksim.scenario.overrides import field_of, options
 from blocksim.scenario.placement import smallest_width
 from blocksim.scenario.units import parse_unit
-from blocksim.simulation.provenance import HASH_DIGITS, code_hash
-from blocksim.study.criterion import Criterion, Verdict, read_criterion
+from blocksim.silence import silent
+from blocksim.simulation.provenance import code_hash
+from blocksim.study import criterion
+from blocksim.study.criterion import Criterion, Verdict
+from blocksim.study.executors import Execution
 from blocksim.study.plan import Values, Variations, build_distributions, levels_of
 from blocksim.study.rows import Head, Row, heads_of
+from blocksim.study.runs import short_hash
+from blocksim.study.vary import RANGE, variations_option
 
 Kind = TypeVar("Kind")
 DIGITS = 12  # of a value that is tried: what people read is what was run
@@ -43,7 +48,124 @@ PARTS = 3
 HALVINGS = 2  # of the spacing of a scan, beside a peak
 OUTWARD = 2.0  # widths of what is known, by which a search near a value goes on beyond it
 FLOOR = 1e-6  # of the range: brackets about zero get no narrower
+NEAR = 0.01  # of the smallest side of a block: what is farther from all others is to drop
+SCANNED = 9
+MOST_SCANNED = MOST_VALUES = 1000
+TOLERANCE = 1e-3
+LEAST_TOLERANCE = 1e-9
+OPTION, OVER = "--vary", "--over"
+NAMES = {name: time.contacts for name, time in SCHEMES.items()}
+SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
+PERCENT = 100.0
 Number = float  # in the unit of the range
+OnRun = Callable[[Number, Verdict, Row], None]
+
+
+def read_share(text: str) -> float:
+    """Return a share that is written as 0.1% or 0.001. Raises ValueError."""
+    match = SHARE.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(f"{text[:40]!r} is not a share; write it as in 0.1% or 0.001")
+    try:
+        value = float(match[1])
+    except ValueError:
+        raise ValueError(f"{match[1]!r} is not a number") from None
+    return value / PERCENT if match[2] else value
+
+
+OtherKey = Annotated[
+    Mapping[str, Values] | None,
+    variations_option(
+        "Another key, KEY=a,b,c or KEY=FROM:TO:COUNT: search the limit at each of its values.",
+        "KEY=VALUES",
+        'Another key and its values, {"friction.block_block": [0.3, 0.5]}.',
+        OVER,
+        is_repeatable=False,
+    ),
+]
+
+
+@dataclass(frozen=True)
+class SearchOptions(Execution):
+    """Which limits are searched, how narrowly, and where the runs are kept."""
+
+    vary: Annotated[
+        Mapping[str, Values],
+        variations_option(
+            "The key and its range. KEY=FROM:TO:COUNT scans COUNT values first (default: those of --scan); :log "
+            "at the end spaces them logarithmically.",
+            "KEY=FROM:TO",
+            'The key and its range, {"ground.tilt": {"from": "20 deg", "to": "40 deg"}}, with the number of values '
+            "that are scanned first as `count` (default: `scan`).",
+            OPTION,
+            RANGE,
+        ),
+    ]
+    _: KW_ONLY
+    stands: Annotated[
+        str,
+        Option(
+            'What counts as standing, such as "moved < 5 mm", "turned < 10 deg" or "outcome != fell". '
+            "Separated by commas: all must hold.",
+            metavar="CONDITIONS",
+        ),
+    ] = criterion.DEFAULT
+    tolerance: Annotated[
+        float,
+        Option(
+            "Relative width of the bracket at which to stop, such as 0.1%.",
+            ("--to",),
+            "SHARE",
+            "Width of a bracket at which to stop, relative to its ends, without what rest speed and stiffness cannot "
+            "decide.",
+            read_share,
+        ),
+    ] = TOLERANCE
+    scan: Annotated[
+        int,
+        Option(
+            "How many values are scanned first. An island between two of them, in which other things happen, is not "
+            "seen.",
+            metavar="N",
+        ),
+    ] = SCANNED
+    stiffer: Annotated[
+        bool | None,
+        Option(
+            "Search once more with springs ten times as stiff and extrapolate to stiff contacts, always or never "
+            "(default: where springs shift a limit by more than 0.25 %). --as-given also leaves the time step of rigid "
+            "contacts as it is, which is halved once otherwise.",
+            ("--stiffer/--as-given",),
+            python="Search once more with springs ten times as stiff and extrapolate to stiff contacts: True always, "
+            "False never (limits are then those of the springs, and of the time step, as given), None where springs "
+            "shift them by more than 0.25 %.",
+        ),
+    ] = None
+    out: Annotated[Path | str | None, Option("Folder to write (default: results/NAME/limit-HASH).", metavar="DIR")] = (
+        None
+    )
+    overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
+
+    @property
+    def shared(self) -> dict[str, Any]:
+        """What a single search and a curve of limits have in common, by name."""
+        return {field.name: getattr(self, field.name) for field in fields(SearchOptions)}
+
+
+@dataclass(frozen=True)
+class LimitOptions(SearchOptions):
+    """The same, and what is kept and reported of a single search."""
+
+    _: KW_ONLY
+    keep_runs: bool = True
+    on_run: OnRun = silent
+
+
+@dataclass(frozen=True)
+class CurveOptions(SearchOptions):
+    """The same at each value of another key."""
+
+    over: OtherKey
 
 
 @dataclass(frozen=True)
@@ -56,44 +178,23 @@ class Span:
     is_log: bool = False
     is_whole: bool = False
 
-    def scanned(self) -> list[Number]:
+    def grid(self) -> list[Number]:
         """Return the values of the first round, ends included; whole numbers each once."""
-        return list(dict.fromkeys(self._at(i / (self.count - 1)) for i in range(self.count)))
+        values = []
+        for share in (i / (self.count - 1) for i in range(self.count)):
+            value = self.low * (self.high / self.low) ** share if self.is_log else self.low + self.width * share
+            value = {0.0: self.low, 1.0: self.high}.get(share, value)
+            values.append(float(round(value)) if self.is_whole else float(f"{value:.{DIGITS}g}"))
+        return list(dict.fromkeys(values))
 
-    def between(self, low: Number, high: Number) -> list[Number]:
+    def between(self, low: Number, high: Number, parts: int = PARTS) -> list[Number]:
         """Return the values that divide a bracket, without its ends."""
-        inner = Span(low, high, PARTS + 1, self.is_log, self.is_whole).scanned()
-        return [value for value in inner if low < value < high]
-
-    def middle(self, low: Number, high: Number) -> Number:
-        """Return the value half way between two."""
-        return Span(low, high, 3, self.is_log, self.is_whole).scanned()[1]
-
-    def is_scanned_enough(self, low: Number, high: Number) -> bool:
-        """Return True if two values are so near each other that no other is tried beside a peak."""
-        if self.is_whole and high - low <= 1.0:
-            return True
-        share = math.log(high / low) / math.log(self.high / self.low) if self.is_log else (high - low) / self.width
-        return share * (self.count - 1) < 1.5 * 0.5**HALVINGS
-
-    @property
-    def spacing(self) -> float:
-        """Distance of two values of the first round."""
-        return self.width / (self.count - 1)
+        return [value for value in replace(self, low=low, high=high, count=parts + 1).grid() if low < value < high]
 
     @property
     def width(self) -> float:
         """Length of the range."""
         return self.high - self.low
-
-    def _at(self, share: float) -> Number:
-        if share in (0.0, 1.0):
-            value = self.high if share else self.low
-        elif self.is_log:
-            value = self.low * (self.high / self.low) ** share
-        else:
-            value = self.low + (self.high - self.low) * share
-        return float(round(value)) if self.is_whole else float(f"{value:.{DIGITS}g}")
 
     def fitted(self, value: float) -> Number:
         """Return a value as it is tried, the nearest within the range."""
@@ -103,7 +204,7 @@ class Span:
         """Return True if a bracket is as narrow as wanted, relative to its ends; of whole numbers: neighbours."""
         if self.is_whole:
             return high - low <= 1.0
-        size = max(abs(low), abs(high), FLOOR * (self.high - self.low) / tolerance)
+        size = max(abs(low), abs(high), FLOOR * self.width / tolerance)
         return high - low <= tolerance * size or not self.between(low, high)
 
 
@@ -129,26 +230,27 @@ def next_values(
 ) -> list[Number]:
     """Return the values to try next; none when every change is as narrow as wanted.
 
-    `peaks` are the largest rotations at those known values at which the scan may have to be denser.
+    `peaks` are the largest rotations at those known values at which the scan may have to be denser: half way to both
+    neighbours of one that is larger than theirs, where all three come to the same.
     """
-    scan = [value for value in span.scanned() if value not in known]
-    scan = scan or _beside_peaks(span, known, peaks or {})
+    peaks = peaks or {}
+    scan = [value for value in span.grid() if value not in known]
     if scan:
         return scan
-    wide = (one for one in changes_in(known) if not span.is_narrow(one.low, one.high, tolerance))
-    return [value for one in wide for value in span.between(one.low, one.high)]
-
-
-def _beside_peaks(span: Span, known: Mapping[Number, Kind], peaks: Mapping[Number, float]) -> list[Number]:
-    """Return the values half way to both neighbours of those with a larger peak, and the same answer."""
     values = sorted(known)
-    found: list[Number] = []
     for low, here, high in zip(values, values[1:], values[2:], strict=False):
         is_alike = known[low] == known[here] == known[high] and {low, here, high} <= peaks.keys()
         if is_alike and peaks[low] < peaks[here] > peaks[high]:
-            wide = (pair for pair in ((low, here), (here, high)) if not span.is_scanned_enough(*pair))
-            found += [span.middle(*pair) for pair in wide]
-    return [value for value in dict.fromkeys(found) if value not in known]
+            for ends in ((low, here), (here, high)):
+                length = math.log(ends[1] / ends[0]) if span.is_log else ends[1] - ends[0]
+                whole = math.log(span.high / span.low) if span.is_log else span.width
+                is_near = length / whole * (span.count - 1) < 1.5 * 0.5**HALVINGS
+                if not (is_near or (span.is_whole and ends[1] - ends[0] <= 1.0)):
+                    scan += span.between(*ends, parts=2)
+    if scan:
+        return list(dict.fromkeys(scan))
+    wide = (one for one in changes_in(known) if not span.is_narrow(one.low, one.high, tolerance))
+    return [value for one in wide for value in span.between(one.low, one.high)]
 
 
 def next_near(span: Span, known: Mapping[Number, Kind], near: Change[Kind], tolerance: float) -> list[Number]:
@@ -160,38 +262,15 @@ def next_near(span: Span, known: Mapping[Number, Kind], near: Change[Kind], tole
     if not known:
         return list(dict.fromkeys(span.fitted(value) for value in (near.low, near.high)))
     changes = changes_in(known)
-    if not changes:
-        return [value for value in _beyond(span, known, near, tolerance) if value not in known]
-    (first, *others) = changes
-    if others or (first.below, first.above) != (near.below, near.above):
-        return []
-    return [] if span.is_narrow(first.low, first.high, tolerance) else span.between(first.low, first.high)
-
-
-def _beyond(span: Span, known: Mapping[Number, Kind], near: Change[Kind], tolerance: float) -> list[Number]:
-    """Return the next value outwards of values with the same answer, on the side where the other one must be."""
+    if changes:
+        (first, *others) = changes
+        if others or (first.below, first.above) != (near.below, near.above):
+            return []
+        return [] if span.is_narrow(first.low, first.high, tolerance) else span.between(first.low, first.high)
     low, high = min(known), max(known)
     width = OUTWARD * ((high - low) or tolerance * abs(high))
-    if known[low] == near.below:
-        return [span.fitted(high + width)]
-    return [span.fitted(low - width)] if known[low] == near.above else []
-
-
-NEAR = 0.01  # of the smallest side of a block: what is farther from all others is to drop
-SETTLE = "start.settle"
-
-
-def at_rest(document: Document, *scenarios: Scenario) -> Document:
-    """Return a document whose runs begin at rest, if all these scenarios of it bear sustained loads."""
-    if says_whether_it_settles(document) or not all(map(is_sustained, scenarios)):
-        return document
-    return document.with_values({SETTLE: True})
-
-
-def says_whether_it_settles(document: Document) -> bool:
-    """Return True for a document that has `start.settle`."""
-    start = document.data.get("start")
-    return isinstance(start, Mapping) and "settle" in start
+    beyond = span.fitted(high + width if known[low] == near.below else low - width)
+    return [] if known[low] not in (near.below, near.above) or beyond in known else [beyond]
 
 
 def comes_at_once(scenario: Scenario) -> bool:
@@ -200,34 +279,29 @@ def comes_at_once(scenario: Scenario) -> bool:
 
 
 def is_sustained(scenario: Scenario) -> bool:
-    """Return True where loads are the same from time zero on, nothing moves then, and no block is to drop."""
+    """Return True where loads are the same from time zero on, nothing moves then, and no block is to drop.
+
+    A free block is to drop that has no other, no wall and not the ground near it.
+    """
+    placed, segments = place_bodies(scenario), place_segments(scenario)
     if scenario.motion is not None or scenario.events or scenario.systems:
         return False
-    placed = place_bodies(scenario)
     if any(body.driven or body.vx or body.vy or body.spin for body in placed):
         return False
-    return all(_is_constant(scenario, load) for load in scenario.loads) and not _drops(scenario)
-
-
-def _is_constant(scenario: Scenario, load: AnyLoad) -> bool:
-    stretches = stretches_of(load, scenario.ground.tilt)
-    return all(stretch.rate == 0.0 and stretch.value == stretches[0].value for stretch in stretches)
-
-
-def _drops(scenario: Scenario) -> bool:
-    """Return True where some free block has no other, no wall and not the ground near it."""
-    placed, segments = place_bodies(scenario), place_segments(scenario)
+    for load in scenario.loads:
+        stretches = stretches_of(load, scenario.ground.tilt)
+        if any(stretch.rate != 0.0 or stretch.value != stretches[0].value for stretch in stretches):
+            return False
     outlines = Outlines.of(placed)
     if segments:
         outlines = outlines.and_pieces(Outlines.along(segments))
     near = NEAR * smallest_width(placed)
-    free = [number for number, body in enumerate(placed) if not body.fixed]
-    for number in free:
+    for number in (number for number, body in enumerate(placed) if not body.fixed):
         others = np.delete(np.arange(outlines.kinds.size), number)
         depth = penetration(outlines.some(np.full(others.size, number)), outlines.some(others))
         if not (depth > -near).any() and outlines.bottom[number] > near:
-            return True
-    return False
+            return False
+    return True
 
 
 def typed_levels(document: Document, given: Variations, option: str) -> tuple[Head, dict[float, object]]:
@@ -244,27 +318,15 @@ def typed_levels(document: Document, given: Variations, option: str) -> tuple[He
     (head,), (values,) = heads_of(sweep), sweep.vary.values()
     levels: dict[float, object] = {}
     for value in levels_of(values):
-        number = _number(head.cell(value))
+        cell = head.cell(value)
+        is_number = isinstance(cell, int | float) and not isinstance(cell, bool)
+        number = float(f"{cell:.12g}") if is_number else math.nan
         if not math.isfinite(number) or number in levels:
             why = "is given twice" if number in levels else "is not a number"
             message = f"{option} {text}: {value} {why}"
             raise InvalidInputError(message)
         levels[number] = value
     return head, dict(sorted(levels.items()))
-
-
-def _number(cell: object) -> float:
-    """Return a number to the digits that are typed, NaN for anything else."""
-    is_number = isinstance(cell, int | float) and not isinstance(cell, bool)
-    return float(f"{cell:.12g}") if is_number else math.nan
-
-
-SCANNED = 9
-MOST_SCANNED = MOST_VALUES = 1000
-TOLERANCE = 1e-3
-LEAST_TOLERANCE = 1e-9
-OPTION, OVER = "--vary", "--over"
-NAMES = {name: time.contacts for name, time in SCHEMES.items()}
 
 
 @dataclass(frozen=True)
@@ -279,13 +341,17 @@ class LimitPlan:
     tolerance: float  # of a bracket, relative to its ends
     apart: Mapping[str, object] = field(default_factory=dict)  # settings in which its runs differ from the document
 
-    def value(self, number: Number) -> object:
-        """Return a value of the range as a scenario takes it."""
-        if self.span.is_whole:
-            return int(number)
-        return f"{number:.12g} {self.unit}" if self.unit else number
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The scenario of the document."""
+        return self.document.build()
 
-    def shown(self, number: Number) -> str:
+    def settings(self, number: Number) -> dict[str, object]:
+        """Return what distinguishes the run of a value from the document."""
+        value = int(number) if self.span.is_whole else f"{number:.12g} {self.unit}" if self.unit else number
+        return {self.key: value, **self.apart}
+
+    def text(self, number: Number) -> str:
         """Return a value for people."""
         return f"{number:.7g} {self.unit}".rstrip()
 
@@ -293,72 +359,28 @@ class LimitPlan:
         """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
         return self.document.with_values(self.settings(number)).build()
 
-    @cached_property
-    def scheme(self) -> str:
-        """The stepping scheme of its runs."""
-        return self.document.build().time.scheme
-
-    @cached_property
-    def has_springs(self) -> bool:
-        """True where contacts are springs."""
-        return self.document.build().time.has_springs
-
     def verdicts(self, rows: Mapping[Number, Row]) -> dict[Number, Verdict]:
         """Return what runs came to, from the smallest value up."""
         return {value: self.criterion.verdict(rows[value]) for value in sorted(rows)}
 
     @property
-    def comes_at_once(self) -> bool:
-        """True where sustained loads come at once, as the scenario says that it does not begin at rest."""
-        return all(comes_at_once(self.scenario_at(number)) for number in (self.span.low, self.span.high))
-
-    @property
-    def has_islands(self) -> bool:
-        """True where a value may fall between others that stand: supports move."""
-        return self.document.build().motion is not None
-
-    def settings(self, number: Number) -> dict[str, object]:
-        """Return what distinguishes the run of a value from the document."""
-        return {self.key: self.value(number), **self.apart}
-
-    @property
     def name(self) -> str:
         """A hash of everything that decides the answer."""
         ends = [self.key, self.unit, *vars(self.span).values(), self.criterion.text, self.tolerance]
-        text = json.dumps([scenario_hash(self.document.build()), ends, code_hash()])
-        return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+        return short_hash([scenario_hash(self.scenario), ends, code_hash()])
 
 
-@dataclass(frozen=True)
-class CurvePlan:
+class CurvePlan(NamedTuple):
     """A search at each number of another key."""
 
     head: Head  # that key, and its unit
     searches: Mapping[float, LimitPlan]
 
-    @property
-    def one(self) -> LimitPlan:
-        """Any of the searches: key, unit, range and criterion are those of all."""
-        return next(iter(self.searches.values()))
 
-    @property
-    def name(self) -> str:
-        """A hash of everything that decides the answer."""
-        text = json.dumps([self.head.key, *(plan.name for plan in self.searches.values())])
-        return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
-
-
-def read_curve(
-    document: Document,
-    vary: Mapping[str, Values] | Variations,
-    over: Mapping[str, Values] | Variations,
-    *,
-    stands: str,
-    tolerance: float,
-    scan: int = SCANNED,
-) -> CurvePlan:
+@takes(CurveOptions)
+def read_curve(document: Document, options: CurveOptions) -> CurvePlan:
     """Return the plan of a curve of limits. Raises as `read_limit`, for every value of the other key."""
-    given = over if isinstance(over, Variations) else Variations.of(over)
+    given = Variations.of(options.over or {})
     if len(given.tables) != 1:
         message = f"limits are searched over one key, not {len(given.tables)}: give {OVER} KEY=a,b,c once"
         raise InvalidInputError(message)
@@ -367,29 +389,23 @@ def read_curve(
     if len(levels) > MOST_VALUES:
         message = f"{len(levels)} values are too many; at most {MOST_VALUES} are searched"
         raise InvalidInputError(message)
-    at = {number: bare.with_values({head.key: value}) for number, value in levels.items()}
-    read = {number: read_limit(one, vary, stands=stands, tolerance=tolerance, scan=scan) for number, one in at.items()}
-    return CurvePlan(head, read)
+    one = LimitOptions(**options.shared)
+    return CurvePlan(head, {at: read_limit(bare.with_values({head.key: value}), one) for at, value in levels.items()})
 
 
-def read_limit(
-    document: Document,
-    vary: Mapping[str, Values] | Variations,
-    *,
-    stands: str,
-    tolerance: float = TOLERANCE,
-    scan: int = SCANNED,
-) -> LimitPlan:
+@takes(LimitOptions)
+def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     """Return the plan of a search.
 
-    Raises ScenarioError for a key or range that the scenario cannot have, InvalidInputError for a wrong criterion or
-    tolerance, and where more or less than one key is given.
+    Its runs begin at rest where loads are sustained at both ends of the range, unless the document says whether they
+    do. Raises ScenarioError for a key or range that the scenario cannot have, InvalidInputError for a wrong criterion
+    or tolerance, and where more or less than one key is given.
     """
-    criterion = read_criterion(stands)
+    stands, tolerance = criterion.read_criterion(options.stands), options.tolerance
     if not LEAST_TOLERANCE <= tolerance < 1.0:
         message = f"a bracket of {tolerance:g} of the value cannot be reached; give {LEAST_TOLERANCE:g} up to below 1"
         raise InvalidInputError(message)
-    given = vary if isinstance(vary, Variations) else Variations.of(vary)
+    given = Variations.of(options.vary)
     if len(given.tables) != 1:
         message = f"a limit is searched along one key, not {len(given.tables)}: give {OPTION} KEY=FROM:TO once"
         raise InvalidInputError(message)
@@ -398,7 +414,7 @@ def read_limit(
     if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
-    count = table.get("count", scan)
+    count = table.get("count", options.scan)
     if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_SCANNED:
         message = f"{count} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed"
         raise InvalidInputError(message)
@@ -408,30 +424,30 @@ def read_limit(
     values = build_distributions(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
     assert isinstance(values, Uniform)  # noqa: S101 - it has two ends
     unit = values.unit or ("rad" if values.angle else "")
-    plan = LimitPlan(bare, key, unit, _span(bare, key, values, unit, ends, count), criterion, tolerance)
-    found = []
-    for number in (plan.span.low, plan.span.high):
-        try:
-            found.append(plan.scenario_at(number))
-        except BlocksimError as error:
-            message = f"{key} = {plan.shown(number)}: {str(error).splitlines()[0]}"
-            raise InvalidInputError(message) from error
-    return replace(plan, document=at_rest(bare, *found))
-
-
-def _span(document: Document, key: str, values: Uniform, unit: str, table: Mapping[str, Any], count: int) -> Span:
-    """Return the range in the typed unit; of a key that takes whole numbers only, every one of them that fits."""
     factor = float(parse_unit(unit).factor) if unit else 1.0
-    low, high = (float(f"{end / factor:.12g}") for end in (values.low, values.high))
-    is_whole = takes_whole(document, key) and all(type(table[end]) is int for end in ("from", "to"))
-    scanned = min(count, int(high - low) + 1) if is_whole else count
-    return Span(low, high, scanned, is_log=values.scale == "log", is_whole=is_whole)
+    low, high = (float(f"{end / factor:.{DIGITS}g}") for end in (values.low, values.high))
+    is_whole = takes_whole(bare, key) and all(type(ends[end]) is int for end in ("from", "to"))
+    count = min(count, int(high - low) + 1) if is_whole else count  # every whole number that fits
+    span = Span(low, high, count, is_log=values.scale == "log", is_whole=is_whole)
+    plan = LimitPlan(bare, key, unit, span, stands, tolerance)
+    at_ends = []
+    for number in (low, high):
+        try:
+            at_ends.append(plan.scenario_at(number))
+        except BlocksimError as error:
+            message = f"{key} = {plan.text(number)}: {str(error).splitlines()[0]}"
+            raise InvalidInputError(message) from error
+    start = bare.data.get("start")
+    if (isinstance(start, Mapping) and "settle" in start) or not all(map(is_sustained, at_ends)):
+        return plan
+    return replace(plan, document=bare.with_values({"start.settle": True}))
 
 
 def takes_whole(document: Document, key: str) -> bool:
     """Return True for a key whose values are whole numbers."""
-    field = field_of(key, document.build())
-    return field is not None and int in options(field.annotation) and float not in options(field.annotation)
+    field = overrides.field_of(key, document.build())
+    kinds = () if field is None else overrides.options(field.annotation)
+    return int in kinds and float not in kinds
 
 
 def variants(document: Document, *, both_laws: bool = False) -> dict[str, Document]:

@@ -1,5 +1,7 @@
 """The runs of a study: on any executor, each once, kept in a manifest, so that a study that was killed goes on."""
 
+import hashlib
+import json
 from collections.abc import Callable, Generator, Hashable, Iterator, Mapping
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
@@ -11,7 +13,7 @@ from blocksim.scenario import Document, Scenario
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.provenance import run_hash
+from blocksim.simulation.provenance import HASH_DIGITS, run_hash
 from blocksim.simulation.stopping import stop_requests
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.manifest import MANIFEST, PATTERN, Entry, Manifest, read_entries, values_hash
@@ -96,6 +98,11 @@ def runs_of(
     what = kind.what.split(" ", 1)[1]
     with closing(Manifest(folder / MANIFEST, what)) as manifest, execution.for_rounds() as run:
         yield Runs(manifest, document, run, replace(setting, peaks=peaks))
+
+
+def short_hash(data: object) -> str:
+    """Return a hash of data that can be written as JSON, to name a study."""
+    return hashlib.sha256(json.dumps(data, default=str).encode()).hexdigest()[:HASH_DIGITS]
 
 
 def folder_for(out: Path | str | None, base: Scenario, kind: FolderKind, name: str) -> Path:

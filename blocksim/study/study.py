@@ -83,7 +83,7 @@ def draw_study(
 def study_page(folder: Path, study: Study) -> StudyPage:
     """Return a study as a report shows it. Raises InputMissingError or InvalidInputError where it cannot be read."""
     answer = study.answer.read(folder)
-    scenario, table = load_stored(folder / answer.files.plan), answer.shown()
+    scenario, table = load_stored(folder / answer.files.plan), answer.overview()
     picture, problems = None, []
     with TemporaryDirectory() as place:
         path = Path(place) / "picture.png"

@@ -1,7 +1,6 @@
 """Reading KEY=VALUES, as --vary and other options of studies take it."""
 
 from collections.abc import Sequence
-from functools import partial
 
 from blocksim.errors import Problem, ScenarioError
 from blocksim.options import Option
@@ -17,10 +16,15 @@ RANGE = "KEY=from:to (also with :log at the end)"
 SPREAD = "KEY=from:to, KEY=mean+-sd or KEY=a,b,c (from:to also with :log at the end)"
 
 
-def variations_option(text: str, metavar: str, python: str, flag: str = "--vary", forms: str = FORMS) -> Option:
-    """Return an option that gives values to keys, KEY=VALUES, and may be repeated."""
-    read = partial(read_variations, option=flag, forms=forms)
-    return Option(text, (flag,), metavar, python, read, is_repeatable=True, complete="scenario_keys")
+def variations_option(
+    text: str, metavar: str, python: str, flag: str = "--vary", forms: str = FORMS, *, is_repeatable: bool = True
+) -> Option:
+    """Return an option that gives values to keys, KEY=VALUES, of which there may be several."""
+
+    def read(texts: str | Sequence[str]) -> Variations:
+        return read_variations([texts] if isinstance(texts, str) else texts, flag, forms)
+
+    return Option(text, (flag,), metavar, python, read, is_repeatable=is_repeatable, complete="scenario_keys")
 
 
 def read_variations(texts: Sequence[str], option: str = "--vary", forms: str = FORMS) -> Variations:

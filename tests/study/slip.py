@@ -40,7 +40,7 @@ class SlipAnswer(Answer, frozen=True):
         """Return the caption."""
         return self.caption
 
-    def shown(self) -> Table:
+    def overview(self) -> Table:
         """Return a row for every tilt."""
         return Table(("tilt", "outcome"), [(f"{one.tilt:g}", one.outcome) for one in self.points], left=2)
 

@@ -58,7 +58,7 @@ def test_each_member_slides_where_its_own_friction_is_less_than_the_tangent_of_t
     ]
     assert [point.failures for point in whole.points] == below
     assert [point.members for point in whole.points] == [8] * 5
-    assert [point.limits for point in whole.points] == [interval(k, 8) for k in below]
+    assert [(point.low, point.high) for point in whole.points] == [interval(k, 8) for k in below]
     assert isinstance(whole.curve, Curve)
     assert whole.curve.median_interval[0] < math.degrees(math.atan(0.38)) < whole.curve.median_interval[1]
     assert whole.curve.median == pytest.approx(whole.to_dict()["curve"]["median"])  # type: ignore[index]
@@ -236,7 +236,7 @@ def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path)
     truth = [float(norm.cdf((math.tan(math.radians(tilt)) - 0.38) / 0.06)) for tilt in (14, 17, 20, 23, 26)]
     for seed in range(studies):
         found = slides(tmp_path / str(seed), members=24, seed=seed)
-        covered += sum(point.limits[0] <= p <= point.limits[1] for point, p in zip(found.points, truth, strict=True))
+        covered += sum(point.low <= p <= point.high for point, p in zip(found.points, truth, strict=True))
         assert isinstance(found.curve, Curve)
         low, high = found.curve.median_interval
         fitted += low <= math.degrees(math.atan(0.38)) <= high

@@ -61,7 +61,7 @@ def test_whole_numbers_are_tried_as_such_and_end_as_neighbours() -> None:
 
 
 def test_logarithmic_ranges_are_divided_by_ratio() -> None:
-    assert Span(1e-3, 1e3, 7, is_log=True).scanned() == [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3]
+    assert Span(1e-3, 1e3, 7, is_log=True).grid() == [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3]
 
 
 def test_a_change_at_zero_does_not_go_on_for_ever() -> None:
@@ -80,7 +80,7 @@ def test_an_undecided_range_has_a_bracket_at_either_side() -> None:
 @pytest.mark.parametrize("answers", [["stands"] * 9, ["falls"] * 9])
 def test_nothing_is_narrowed_where_nothing_changes(answers: list[str]) -> None:
     span = Span(0.0, 1.0, 9)
-    assert next_values(span, dict(zip(span.scanned(), answers, strict=True)), 1e-3) == []
+    assert next_values(span, dict(zip(span.grid(), answers, strict=True)), 1e-3) == []
 
 
 @given(st.floats(20.01, 39.99), st.floats(20.0, 40.0), st.floats(0.01, 1.0))

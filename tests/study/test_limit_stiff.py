@@ -15,7 +15,7 @@ from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.limit import find_limit
 from blocksim.study.limit_answer import LimitAnswer
 from blocksim.study.limit_margin import Level, Levels, ratio_of
-from blocksim.study.limit_plan import read_limit
+from blocksim.study.limit_plan import LimitOptions, read_limit
 from blocksim.study.manifest import MANIFEST
 from tests.study.test_limit import block_on_a_slope
 
@@ -69,8 +69,8 @@ def on_springs(**tables: Any) -> dict[str, Any]:
 
 def found_with(execution: Execution, out: Path, data: Mapping[str, Any] | None = None, **wanted: Any) -> LimitAnswer:
     vary = {"ground.tilt": {"from": "5 deg", "to": "40 deg"}}
-    plan = read_limit(document_of(data or on_springs()), vary, stands="outcome != fell", tolerance=1e-3)
-    return find_limit(plan, execution, out=out, keep_runs=False, **wanted)
+    options = LimitOptions(vary, stands="outcome != fell", tolerance=1e-3, out=out, keep_runs=False, **wanted)
+    return find_limit(read_limit(document_of(data or on_springs()), options), options, execution)
 
 
 @pytest.mark.parametrize(("share", "scales"), [(0.06, 2), (0.006, 2), (0.2, 3)])
@@ -158,11 +158,10 @@ def test_a_search_stopped_after_any_run_goes_on_with_the_same_values_and_repeats
 
 
 def test_limits_of_stiffness_itself_are_left_as_given_and_rigid_contacts_cannot_be_stiffer(tmp_path: Path) -> None:
-    plan = read_limit(
-        document_of(on_springs()), {"contact.stiffness_scale": {"from": 0.5, "to": 2.0}}, stands="moved < 5 mm"
-    )
+    vary = {"contact.stiffness_scale": {"from": 0.5, "to": 2.0}}
+    options = LimitOptions(vary, stands="moved < 5 mm", out=tmp_path / "limit", stiffer=True)
     with pytest.raises(InvalidInputError, match=r"not made stiffer for a limit of contact\.stiffness_scale"):
-        find_limit(plan, Execution(), out=tmp_path / "limit", stiffer=True)
+        find_limit(read_limit(document_of(on_springs()), options), options)
     rigid = on_springs(time={"scheme": "nonsmooth", "end": 1.0})
     with pytest.raises(InvalidInputError, match="rigid contacts have no stiffness"):
         found_with(Execution(), tmp_path / "limit", rigid, stiffer=True)

@@ -29,7 +29,7 @@ def test_the_picture_has_the_counts_and_the_curve_of_the_result(study: Fragility
     assert study.plan is not None
     assert found.x.tolist() == list(study.plan.levels)
     assert found.share.tolist() == [point.share for point in study.points]
-    assert list(zip(found.low, found.high, strict=True)) == [point.limits for point in study.points]
+    assert list(zip(found.low, found.high, strict=True)) == [(point.low, point.high) for point in study.points]
     assert found.band is not None
     curve = study.probability(found.band.x)
     assert curve is not None
