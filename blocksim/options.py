@@ -54,7 +54,7 @@ class Option:
     is_repeatable: bool = False  # a list of texts, which `read` takes as a whole
     is_negated: bool = False  # the flag makes it False
     choices: tuple[str, ...] = ()
-    complete: str = ""  # what the shell completes, a name in cli/completion.py
+    complete: str = ""  # what the shell completes, a name in cli/command_line.py
     least: float | None = None
     most: float | None = None
     show_default: bool = True

@@ -1,17 +1,25 @@
-"""Options of commands: those that several share, and how typer gets them from the options of the library."""
+"""Options of commands: those that several share, how typer gets them from those of the library, and their completion.
+
+What the shell completes after TAB are kinds, keys of the scenario on the line, names of cases and templates. Completion
+must never fail or print: it offers nothing where something cannot be read. Nor may it offer what a shell could take for
+more than a word: zsh evaluates it at TAB, and bash runs it at Enter. A scenario may be a stranger's.
+"""
 
 import inspect
+import re
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
+from importlib import import_module
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, Union, get_args, get_origin
 
 import typer
 
-from blocksim.cli import completion
 from blocksim.cli.output import answer, note, print_json, table_lines, width_of_screen
 from blocksim.errors import ExitCode
 from blocksim.options import Option, OptionField, has_options, option_field, option_fields
@@ -178,7 +186,7 @@ def _parameter(field: OptionField, option: Option) -> inspect.Parameter:
         default = (not default if option.is_negated else default) if is_plain else None
     more: dict[str, Any] = {"help": option.help, "metavar": option.metavar, "show_default": option.show_default}
     more |= {"min": option.least, "max": option.most}
-    more["autocompletion"] = getattr(completion, option.complete) if option.complete else None
+    more["autocompletion"] = COMPLETIONS[option.complete] if option.complete else None
     if option.read and not option.is_repeatable:
         more["parser"] = _parser(option.read)
     flags = option.flags or (f"--{name.replace('_', '-')}",)
@@ -215,3 +223,62 @@ def _made(group: Any, values: dict[str, Any]) -> Any:
         return group(**given)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+
+
+WORD = re.compile(r"[A-Za-z0-9._-]+")
+Complete = Callable[[Any, str], list[str]]
+
+
+def completion_of(names: Callable[[], Iterable[str]]) -> Complete:
+    """Return a completion of some names that no shell takes for more, which are computed only when TAB is pressed."""
+
+    def complete(ctx: Any, incomplete: str) -> list[str]:  # noqa: ARG001 - typer passes both by name
+        return [name for name in names() if name.startswith(incomplete) and WORD.fullmatch(name)]
+
+    return complete
+
+
+def _kinds() -> list[str]:
+    from blocksim.view.kinds import MOTION, PROBE, RUN_KINDS, SWEEP_KINDS
+
+    return [*RUN_KINDS, MOTION, PROBE, *SWEEP_KINDS, "tornado"]
+
+
+def _cases() -> list[str]:
+    from blocksim.verification.cases import CASES
+    from blocksim.verification.soil import SOIL_CASES
+
+    return [case.id for case in (*CASES, *SOIL_CASES)]
+
+
+def _scenario_keys(ctx: Any, incomplete: str) -> list[str]:
+    """Return the dotted keys of the scenario on the line, each with its equals sign; of lists of tables by number."""
+    words = map(str, (ctx.params.get("scenario"), *ctx.args))  # after an option without value all words are args
+    place = next((word for word in words if word.endswith(".toml")), None)
+    if place is None:
+        return []
+    from blocksim.scenario import load_scenario, scenario_to_toml
+    from blocksim.scenario.overrides import format_key
+
+    def paths(entry: object, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+        if isinstance(entry, list) and entry and isinstance(entry[0], Mapping):
+            entry = dict(enumerate(entry))
+        if isinstance(entry, Mapping):
+            for key, value in entry.items():
+                yield from paths(value, (*path, key))
+        else:
+            yield path
+
+    with suppress(Exception):
+        keys = map(format_key, paths(tomllib.loads(scenario_to_toml(load_scenario(Path(place))))))
+        return [f"{key}=" for key in completion_of(lambda: dict.fromkeys(keys))(ctx, incomplete)]
+    return []
+
+
+COMPLETIONS = {
+    "kinds": completion_of(_kinds),
+    "colours": completion_of(lambda: import_module("blocksim.view.paint").COLOURS),
+    "cases": completion_of(_cases),
+    "templates": completion_of(lambda: import_module("blocksim.cli.new").templates()),
+    "scenario_keys": _scenario_keys,
+}

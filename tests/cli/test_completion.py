@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.cli import completion
+from blocksim.cli.command_line import completion_of
 
 HOSTILE = "a$(touch pwned)`touch pwned`';touch pwned;'"
 WORDS = "blocksim run x.toml --set "
@@ -81,4 +81,4 @@ def test_usual_names_are_offered_in_a_shell(shell_folder: Path, shell: str) -> N
 
 @pytest.mark.parametrize("name", ["$(x)", "`x`", "a b", "a;b", "a'b", 'a"b', "a\nb", "*", "~", "a=b", "!1", "é", ""])
 def test_only_words_are_offered(name: str) -> None:
-    assert completion.of_names(lambda: ["usual", name])(None, "") == ["usual"]
+    assert completion_of(lambda: ["usual", name])(None, "") == ["usual"]
