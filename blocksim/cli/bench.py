@@ -2,48 +2,43 @@
 
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from blocksim.bench.measurement import REPEATS, Number, Outcome, Setting, machine_lines, report, this_machine
+from blocksim.bench.measurement import REPEATS, Outcome, Setting, machine_lines, report, this_machine
 from blocksim.bench.measurements import choose
-from blocksim.cli import command_line
-from blocksim.cli.output import grouped_lines, note, show
+from blocksim.cli.command_line import Replace, Report, Screen
+from blocksim.cli.output import grouped_lines
 from blocksim.cli.prepare import announce_compilation
 from blocksim.cli.progress import one_by_one
 from blocksim.errors import OutputError
+from blocksim.options import Option
 from blocksim.simulation.atomic import write_text
 from blocksim.simulation.folder import refuse_foreign
 from blocksim.verification.case import number
 
 COLUMNS = ("quantity", "unit", "median", "smallest", "largest")
 DIGITS = 3
-LARGE = 100.0
+LARGE = 100.0  # from here on a number has all digits before the point, and else three significant ones
 
 
 def bench_command(
     *,
     names: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[NAME]...",
-            help="three-blocks, ensemble, walls, threads, nonsmooth-blocks, nonsmooth-walls, nonsmooth-threads, "
+        Option(
+            "three-blocks, ensemble, walls, threads, nonsmooth-blocks, nonsmooth-walls, nonsmooth-threads, "
             "soils, start-up.",
+            metavar="[NAME]...",
+            is_argument=True,
         ),
     ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Run reduced cases; the last lines list what was reduced.")
-    ] = False,
-    repeats: Annotated[int, typer.Option(min=1, metavar="N", help="Samples of each number.")] = REPEATS,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE", help="Write everything as JSON."),
-    ] = None,
-    overwrite: command_line.Replace = False,
-    as_json: command_line.Json = False,
-    quiet: command_line.Quiet = False,
+    quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,
+    repeats: Annotated[int, Option("Samples of each number.", metavar="N", least=1)] = REPEATS,
+    out: Annotated[Path | None, Option("Write everything as JSON.", metavar="FILE")] = None,
+    overwrite: Replace = False,
+    screen: Screen,
 ) -> None:
     """Measure speed and memory, and show the table.
 
@@ -52,7 +47,6 @@ def bench_command(
 
     Example: blocksim bench walls --out bench.json
     """
-    silent = quiet or as_json
     wanted = choose(names or [])
     if out is not None:  # checked before minutes of measuring
         if out.is_dir() or not out.absolute().parent.is_dir():
@@ -60,47 +54,42 @@ def bench_command(
             raise OutputError(message)
         refuse_foreign(out, overwrite=overwrite)
     machine = this_machine()
-    announce_compilation("surface", quiet=silent)
+    announce_compilation("surface", quiet=screen.silent)
     outcomes: list[Outcome] = []
     try:
-        told = one_by_one(wanted, lambda one: f"{one.name}: {one.title}", quiet=silent)
-        outcomes.extend(one.run(Setting(quick, repeats)) for one in told)
+        under_way = one_by_one(wanted, lambda one: f"{one.name}: {one.title}", quiet=screen.silent)
+        outcomes.extend(one.run(Setting(quick, repeats)) for one in under_way)
     finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
         if outcomes:
-            _show(machine, outcomes, out, as_json=as_json, quiet=silent)
+            data = report(machine, outcomes)
+            if out is not None:
+                write_text(out, json.dumps(data, indent=2) + "\n")
+            written = [] if out is None else [f"written: {out}"]
+            notes = [
+                *_notes(outcomes),
+                *machine_lines(machine),
+                f"{sum(one.seconds for one in outcomes):.0f} s",
+                *written,
+            ]
+            screen.print(Report(grouped_lines(COLUMNS, _groups(outcomes), left=2), data, notes))
 
 
-def _show(machine: dict[str, object], outcomes: list[Outcome], out: Path | None, *, as_json: bool, quiet: bool) -> None:
-    data = report(machine, outcomes)
-    if out is not None:
-        write_text(out, json.dumps(data, indent=2) + "\n")
-    groups = (
-        (f"{one.measurement.name}: {one.measurement.title}", [_cells(number) for number in one.findings.numbers])
-        for one in outcomes
-    )
-    show(grouped_lines(COLUMNS, groups, left=2), data, as_json=as_json)
-    if not quiet:
-        _tell_end(machine, outcomes)
-        if out is not None:
-            note(f"written: {out}")
+def _groups(outcomes: list[Outcome]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+    """Yield the name and the rows of each measurement."""
+
+    def shown(value: float) -> str:
+        return f"{value:.0f}" if LARGE <= abs(value) < math.inf else number(value, DIGITS)
+
+    for one in outcomes:
+        rows = []
+        for found in one.findings.numbers:
+            spread = (min(found.samples), max(found.samples)) if len(found.samples) > 1 else (math.nan, math.nan)
+            rows.append((f"  {found.quantity}", found.unit, *map(shown, (found.median, *spread))))
+        yield f"{one.measurement.name}: {one.measurement.title}", rows
 
 
-def _cells(one: Number) -> tuple[str, ...]:
-    spread = (min(one.samples), max(one.samples)) if len(one.samples) > 1 else (float("nan"),) * 2
-    return (f"  {one.quantity}", one.unit, *(_shown(value) for value in (one.median, *spread)))
-
-
-def _shown(value: float) -> str:
-    """Return a number with three significant digits, a large one with all digits before the point."""
-    return f"{value:.0f}" if LARGE <= abs(value) < math.inf else number(value, DIGITS)
-
-
-def _tell_end(machine: dict[str, object], outcomes: list[Outcome]) -> None:
+def _notes(outcomes: list[Outcome]) -> Iterator[str]:
     for outcome in outcomes:
-        for text in outcome.findings.notes:
-            note(f"{outcome.measurement.name}: {text}")
+        yield from (f"{outcome.measurement.name}: {text}" for text in outcome.findings.notes)
         if outcome.shortened:
-            note(f"{outcome.measurement.name} shortened: {outcome.shortened}")
-    for text in machine_lines(machine):
-        note(text)
-    note(f"{sum(outcome.seconds for outcome in outcomes):.0f} s")
+            yield f"{outcome.measurement.name} shortened: {outcome.shortened}"

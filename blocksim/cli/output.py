@@ -46,14 +46,6 @@ def print_json(data: object) -> None:
     answer(json.dumps(_finite(data), indent=2, default=str))
 
 
-def show(lines: Iterable[str], data: object, *, as_json: bool) -> None:
-    """Print the answer for people, or its data for programs."""
-    if as_json:
-        print_json(data)
-    else:
-        answer("\n".join(lines))
-
-
 def _finite(data: object) -> object:
     if isinstance(data, float):
         return data if math.isfinite(data) else None

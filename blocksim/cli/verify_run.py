@@ -1,22 +1,21 @@
 """blocksim verify-run: check bitwise reproducibility of stored results."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from blocksim.cli import command_line
-from blocksim.cli.output import note, show
+from blocksim.cli.command_line import Report, Screen
+from blocksim.cli.output import note
 from blocksim.cli.prepare import announce_compilation
 from blocksim.cli.progress import run_progress
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
+from blocksim.options import Option
 from blocksim.scenario import load_stored
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study.manifest import is_sweep
 from blocksim.study.run import Threads
-from blocksim.study.study import Study, study_in
+from blocksim.study.study import study_in
 from blocksim.study.sweep import kernels_for
 from blocksim.study.sweep_folder import read_plan
 from blocksim.study.verify_run import EntryDifference, Origin, RunVerdict, scenario_of, verify_run
@@ -27,35 +26,27 @@ MOST_CELLS = 5
 MOST_ENTRIES = 5
 LONGEST = 60  # characters of an entry of the provenance
 MOST_WORDS = 12
-UNITS = {"_mm": " mm", "_deg": "°", "_mm_s": " mm/s", "_deg_s": "°/s", "_J": " J", "_s": " s", "_m": " m", "_N": " N"}
-
-
-@dataclass(frozen=True)
-class VerificationReport:
-    """Result for one place: for people, for programs, and the exit code."""
-
-    lines: tuple[str, ...]
-    data: dict[str, object]
-    code: ExitCode
+UNITS = {  # by the ends of names of quantities; the longer of two that fit first
+    "_mm_s": " mm/s", "_deg_s": "°/s", "_mm": " mm", "_deg": "°", "_J": " J", "_s": " s", "_m": " m", "_N": " N"
+}  # fmt: skip
 
 
 def verify_run_command(
+    *,
     places: Annotated[
         list[Path],
-        typer.Argument(
+        Option(
+            "Run folder, results/NAME (its newest finished run), scenario file, or folder of a sweep, limit or "
+            "fragility study.",
             metavar="DIR",
-            help="Run folder, results/NAME (its newest finished run), scenario file, or folder of a sweep, "
-            "limit or fragility study.",
+            is_argument=True,
         ),
     ],
     threads: Threads = 1,
-    sample: Annotated[
-        int, typer.Option(min=1, metavar="N", help="Number of rows of a sweep or study to run again.")
-    ] = SAMPLE,
-    seed: Annotated[int, typer.Option(min=0, metavar="S", help="Random seed for the choice of rows.")] = 0,
-    as_json: command_line.Json = False,
-    quiet: command_line.Quiet = False,
-) -> None:
+    sample: Annotated[int, Option("Number of rows of a sweep or study to run again.", metavar="N", least=1)] = SAMPLE,
+    seed: Annotated[int, Option("Random seed for the choice of rows.", metavar="S", least=0)] = 0,
+    screen: Screen,
+) -> Report:
     """Run stored results again and check bitwise reproducibility.
 
     Of a run: checksums of all files, final state, every frame of run.h5, final.csv, and the steps, times, energies,
@@ -66,68 +57,72 @@ def verify_run_command(
 
     Example: blocksim verify-run results/three_blocks
     """
-    silent = quiet or as_json
-    verified = [_verified(place, threads, sample, seed, silent=silent) for place in places]
-    show((line for one in verified for line in one.lines), [one.data for one in verified], as_json=as_json)
-    raise typer.Exit(max(one.code for one in verified))  # of several the most severe: 65, 66 before 1 before 0
+    reports = [_verified(place, threads, sample, seed, screen) for place in places]
+    lines = [line for one in reports for line in one.lines]
+    # of several codes the most severe: 65, 66 before 1 before 0
+    return Report(lines, [one.data for one in reports], code=max(one.code for one in reports))
 
 
-def _verified(place: Path, threads: int, sample: int, seed: int, *, silent: bool) -> VerificationReport:
+def _verified(place: Path, threads: int, sample: int, seed: int, screen: Screen) -> Report:
     """Verify one place; an error in it does not stop the others."""
     try:
         study = study_in(place)
         if study is not None:
-            return _of_study(_repeat_study(place, study, sample, seed, silent=silent))
+            kernels = [kernels_of(load_stored(place / study.answer.files.plan))]
+        else:
+            kernels = [*kernels_for(read_plan(place))] if is_sweep(place) else [kernels_of(scenario_of(place))]
+        for one in kernels:
+            announce_compilation(one, quiet=screen.silent)
+        if study is not None:
+            return _of_study(verify_study(place, study, sample, seed))
         if is_sweep(place):
-            return _of_sweep(_sample_again(place, sample, seed, silent=silent))
-        return _of_run(_run_again(place, threads, silent=silent), told=not silent)
+            return _of_sweep(verify_sweep(place, sample, seed))
+        with run_progress(quiet=screen.silent) as on_progress:
+            verdict = verify_run(place, threads=threads, on_progress=on_progress)
+        if verdict.agrees and verdict.origins:
+            screen.note("\n".join(_changes(verdict.origins)))
+        return _of_run(verdict)
     except StoppedEarlyError:
         raise
     except BlocksimError as error:
         note(str(error))
         kind = "missing" if isinstance(error, InputMissingError) else "damaged"
         data = {"agrees": False, "kind": kind, "folder": str(place), "error": str(error)}
-        return VerificationReport((f"{place}: {kind}",), data, error.exit_code)
+        return Report([f"{place}: {kind}"], data, code=error.exit_code)
 
 
-def _run_again(place: Path, threads: int, *, silent: bool) -> RunVerdict:
-    announce_compilation(kernels_of(scenario_of(place)), quiet=silent)
-    with run_progress(quiet=silent) as on_progress:
-        return verify_run(place, threads=threads, on_progress=on_progress)
-
-
-def _sample_again(folder: Path, sample: int, seed: int, *, silent: bool) -> SweepVerdict:
-    for kernels in kernels_for(read_plan(folder)):
-        announce_compilation(kernels, quiet=silent)
-    return verify_sweep(folder, sample, seed)
-
-
-def _repeat_study(folder: Path, study: Study, sample: int, seed: int, *, silent: bool) -> tuple[SweepVerdict, ...]:
-    announce_compilation(kernels_of(load_stored(folder / study.answer.files.plan)), quiet=silent)
-    return verify_study(folder, study, sample, seed)
-
-
-def _of_study(verdicts: tuple[SweepVerdict, ...]) -> VerificationReport:
+def _of_study(verdicts: tuple[SweepVerdict, ...]) -> Report:
     """Report a study, of a curve of limits every search and then the curve."""
-    found = [_of_sweep(one, "runs", "table and answer follow from the runs; ") for one in verdicts]
+    reports = [_of_sweep(one, "runs", "table and answer follow from the runs; ") for one in verdicts]
     agrees = all(one.agrees for one in verdicts)
-    told: dict[str, object] = {**found[-1].data, "agrees": agrees, "kind": "study"}
-    if len(found) > 1:
-        told["searches"] = [one.data for one in found[:-1]]
+    data = {**verdicts[-1].to_dict(), "agrees": agrees, "kind": "study"}
+    if len(verdicts) > 1:
+        data["searches"] = [one.data for one in reports[:-1]]
         if verdicts[-1].agrees:
-            found[-1] = replace(found[-1], lines=(f"{verdicts[-1].folder}: table and answer follow from the searches",))
-    return VerificationReport(tuple(line for one in found for line in one.lines), told, ExitCode(not agrees))
+            follows = f"{verdicts[-1].folder}: table and answer follow from the searches"
+            reports[-1] = replace(reports[-1], lines=[follows])
+    return Report([line for one in reports for line in one.lines], data, code=ExitCode(not agrees))
 
 
-def _of_run(verdict: RunVerdict, *, told: bool) -> VerificationReport:
-    count = verdict.frames.frames[0]
-    if verdict.agrees:
-        lines = [f"{verdict.folder}: bit-identical: final state, {count} frames, final.csv"]
-        if verdict.origins and told:
-            note("\n".join(_told_origins(verdict.origins)))
-    else:
+def _of_run(verdict: RunVerdict) -> Report:
+    lines = [f"{verdict.folder}: bit-identical: final state, {verdict.frames.frames[0]} frames, final.csv"]
+    if not verdict.agrees:
         lines = [f"{verdict.folder}: differs", *(INDENT + line for line in _reasons(verdict))]
-    return VerificationReport(tuple(lines), verdict.to_dict(), ExitCode(not verdict.agrees))
+    return Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))
+
+
+def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> Report:
+    count = f"{len(verdict.checked)} of {verdict.rows} {what}"
+    if verdict.agrees:
+        kept = f", bit-identical in {len(verdict.runs)} kept runs" if verdict.runs else ""
+        lines = [f"{verdict.folder}: {study}identical numbers in {count}{kept}"]
+    else:
+        rows = {one.row for one in verdict.cells}
+        where = "" if study else f" in {len(rows)} of the {count} that were run again"
+        runs = (line for run in verdict.runs if not run.agrees for line in _of_run(run).lines)
+        reasons = (*_cells(verdict), *_entries(verdict.entries), *runs)
+        lines = [f"{verdict.folder}: differs{where}", *(INDENT + line for line in reasons)]
+    return Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))
 
 
 def _reasons(verdict: RunVerdict) -> Iterator[str]:
@@ -142,7 +137,7 @@ def _reasons(verdict: RunVerdict) -> Iterator[str]:
         yield "final.csv differs"
     yield from _entries(verdict.entries)
     yield from _parting(verdict)
-    yield from _told_origins(verdict.origins)
+    yield from _changes(verdict.origins)
 
 
 def _entries(found: Sequence[EntryDifference]) -> Iterator[str]:
@@ -164,50 +159,13 @@ def _parting(verdict: RunVerdict) -> Iterator[str]:
         yield "all frames that both have are identical" if stored != now else f"all {stored} frames are identical"
         return
     whose = "" if first.block is None else f"block {first.block}, "
-    name, unit = _named(first.quantity)
+    end = next((end for end in UNITS if first.quantity.endswith(end)), "")
+    name, unit = first.quantity.removesuffix(end), UNITS.get(end, "")
     yield (
         f"first difference: frame {first.frame} of {stored} at {first.time:.6g} s, {whose}{name}: "
         f"{first.stored!r}{unit} stored, {first.now!r}{unit} now"
     )
     yield f"largest difference: {frames.largest_mm:.3g} mm, {frames.largest_deg:.3g}°"
-
-
-def _named(quantity: str) -> tuple[str, str]:
-    """Return a quantity without its unit, and the unit."""
-    ends = (end for end in sorted(UNITS, key=len, reverse=True) if quantity.endswith(end))
-    end = next(ends, "")
-    return quantity.removesuffix(end), UNITS.get(end, "")
-
-
-def _told_origins(origins: tuple[Origin, ...]) -> list[str]:
-    """Report what has changed since the results were made."""
-    if not origins:
-        return ["code, versions and processor are unchanged"]
-    return [f"changed since: {one.name}: {_change(one)}" for one in origins]
-
-
-def _change(one: Origin) -> str:
-    """Return a change in few words; of long lists only what was removed or added."""
-    then, now = set(one.then.split()), set(one.now.split())
-    if len(then | now) > MOST_WORDS:
-        return " ".join([f"-{word}" for word in sorted(then - now)] + [f"+{word}" for word in sorted(now - then)])
-    return f"{one.then[:LONGEST]} -> {one.now[:LONGEST]}"
-
-
-def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> VerificationReport:
-    count = f"{len(verdict.checked)} of {verdict.rows} {what}"
-    if verdict.agrees:
-        kept = f", bit-identical in {len(verdict.runs)} kept runs" if verdict.runs else ""
-        lines = [f"{verdict.folder}: {study}identical numbers in {count}{kept}"]
-    else:
-        rows = {one.row for one in verdict.cells}
-        where = "" if study else f" in {len(rows)} of the {count} that were run again"
-        lines = [f"{verdict.folder}: differs{where}"]
-        lines += [INDENT + line for line in _cells(verdict)]
-        lines += [INDENT + line for line in _entries(verdict.entries)]
-        runs = [_of_run(run, told=False) for run in verdict.runs if not run.agrees]
-        lines += [INDENT + line for run in runs for line in run.lines]
-    return VerificationReport(tuple(lines), verdict.to_dict(), ExitCode(not verdict.agrees))
 
 
 def _cells(verdict: SweepVerdict) -> Iterator[str]:
@@ -219,4 +177,17 @@ def _cells(verdict: SweepVerdict) -> Iterator[str]:
         yield f"and {len(verdict.cells) - MOST_CELLS} cells more"
     if verdict.cells:
         yield f"largest difference: {verdict.largest(MM):.3g} mm, {verdict.largest(DEGREES):.3g}°"
-    yield from _told_origins(verdict.origins)
+    yield from _changes(verdict.origins)
+
+
+def _changes(origins: tuple[Origin, ...]) -> Iterator[str]:
+    """Yield what has changed since the results were made; of long lists only what was removed or added."""
+    if not origins:
+        yield "code, versions and processor are unchanged"
+    for one in origins:
+        then, now = set(one.then.split()), set(one.now.split())
+        change = f"{one.then[:LONGEST]} -> {one.now[:LONGEST]}"
+        if len(then | now) > MOST_WORDS:
+            words = [f"-{word}" for word in sorted(then - now)] + [f"+{word}" for word in sorted(now - then)]
+            change = " ".join(words)
+        yield f"changed since: {one.name}: {change}"
