@@ -4,7 +4,7 @@ import errno
 import os
 import re
 import stat
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -44,15 +44,16 @@ def open_regular(path: Path, *, links: bool = False) -> BinaryIO:
     Raises InputMissingError where there is no file or it cannot be read, InvalidInputError where it is a folder, a pipe
     or a device, or, without `links`, where its last part is a link.
     """
+    extra = getattr(os, "O_NONBLOCK", 0) | (0 if links else getattr(os, "O_NOFOLLOW", 0))
     try:
         check_regular(path, links=links)
-        file = open(path, "rb", opener=_opener(links=links))  # noqa: SIM115 - the caller closes it
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0) | extra)
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         raise read_error(path, error) from None
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):  # replaced in the meantime
-        file.close()
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):  # replaced in the meantime
+        os.close(descriptor)
         raise InvalidInputError(f"{path}: not a file")
-    return file
+    return os.fdopen(descriptor, "rb")
 
 
 def check_regular(path: Path, *, links: bool = False) -> int:
@@ -72,8 +73,7 @@ def check_regular(path: Path, *, links: bool = False) -> int:
 def read_limited(path: Path, limit: int, *, links: bool = False) -> bytes:
     """Return what a file holds, at most `limit` bytes. Raises as `open_regular`, InvalidInputError for a larger one."""
     content = read_head(path, limit + 1, links=links)
-    if len(content) > limit:
-        raise InvalidInputError(f"{path}: {_too_large(limit)}")
+    _refuse_above(limit, len(content), path)
     return content
 
 
@@ -88,8 +88,12 @@ def read_head(path: Path, count: int, *, links: bool = False) -> bytes:
 
 def refuse_large(path: Path, limit: int) -> None:
     """Check that a file that a library will open by itself is regular, and not too large. Raises as `read_limited`."""
-    if check_regular(path) > limit:
-        raise InvalidInputError(f"{path}: {_too_large(limit)}")
+    _refuse_above(limit, check_regular(path), path)
+
+
+def _refuse_above(limit: int, size: int, path: Path) -> None:
+    if size > limit:
+        raise InvalidInputError(f"{path}: larger than {limit / MEGABYTE:g} MB, the limit for this file")
 
 
 def read_error(path: Path, error: OSError | ValueError) -> InputMissingError | InvalidInputError:
@@ -103,19 +107,7 @@ def read_error(path: Path, error: OSError | ValueError) -> InputMissingError | I
     return InputMissingError(f"{path}: cannot be read: {reason}")
 
 
-def _opener(*, links: bool) -> Callable[[str, int], int]:
-    extra = getattr(os, "O_NONBLOCK", 0) | (0 if links else getattr(os, "O_NOFOLLOW", 0))
-    return lambda name, flags: os.open(name, flags | extra)
-
-
-def _too_large(limit: int) -> str:
-    return f"larger than {limit / MEGABYTE:g} MB, the limit for this file"
-
-
-WAY_OUT = "--allow-outside (in Python allow_outside=True) to override"
-
-_is_anywhere = ContextVar("_is_anywhere", default=False)
-_follows_links = ContextVar("_follows_links", default=True)
+_access = ContextVar("_access", default=(False, True))  # whether any file may be named, whether links are followed
 
 
 class UserPath(str):
@@ -130,18 +122,17 @@ class OutOfReachError(ValueError):
 
 def is_anywhere() -> bool:
     """Return True if scenarios may name any file at present."""
-    return _is_anywhere.get()
+    return _access.get()[0]
 
 
 @contextmanager
 def file_access(*, anywhere: bool, links: bool = True) -> Iterator[None]:
     """Let scenarios that are read meanwhile name any file, or only those within reach; and links or not."""
-    anywhere_before, links_before = _is_anywhere.set(anywhere), _follows_links.set(links)
+    before = _access.set((anywhere, links))
     try:
         yield
     finally:
-        _is_anywhere.reset(anywhere_before)
-        _follows_links.reset(links_before)
+        _access.reset(before)
 
 
 def user_value(key: str | Sequence[str | int], value: object) -> object:
@@ -153,7 +144,8 @@ def user_value(key: str | Sequence[str | int], value: object) -> object:
 def table_in(folder: Path | str, text: str) -> Path:
     """Return the file that a scenario in `folder` names, all links followed. Raises OutOfReachError."""
     is_by_hand = isinstance(text, UserPath)
-    if not _follows_links.get() and not is_by_hand and Path(folder, text).is_symlink():
+    is_anything_allowed, follows_links = _access.get()
+    if not follows_links and not is_by_hand and Path(folder, text).is_symlink():
         raise OutOfReachError(f"{toml(text)}: {IS_LINK}")
     try:
         table = Path(folder, text).resolve()
@@ -161,12 +153,12 @@ def table_in(folder: Path | str, text: str) -> Path:
         roots = [Path(folder).resolve()]
         if not Path.home().resolve().is_relative_to(here):  # else the current folder is the home folder, or above it
             roots.append(here)
-        if not (_is_anywhere.get() or is_by_hand or any(table.is_relative_to(root) for root in roots)):
+        if not (is_anything_allowed or is_by_hand or any(table.is_relative_to(root) for root in roots)):
             where = "leads outside the scenario's folder and the current folder"
-            raise OutOfReachError(f"{toml(text)}: {where}; {WAY_OUT}")
-        what = "" if table.is_file() else "no such file"
-        if not table.is_file() and table.exists():
-            what = "is a folder, not a table" if table.is_dir() else "is a pipe or a device, not a file"
+            raise OutOfReachError(f"{toml(text)}: {where}; --allow-outside (in Python allow_outside=True) to override")
+        what = "" if table.is_file() else "no such file" if not table.exists() else "is a pipe or a device, not a file"
+        if table.is_dir():
+            what = "is a folder, not a table"
     except (OSError, RuntimeError) as error:  # a name that is too long; links in a circle
         reason = getattr(error, "strerror", None) or str(error)
         raise OutOfReachError(f"{toml(text)}: cannot be read: {reason}") from None
@@ -202,15 +194,7 @@ class Line:
     def problem(self, message: str, key: str = "", start: int = 0, length: int | None = None) -> Problem:
         """Locate a mistake in this line; without `length` the whole line is marked."""
         shown = self.text if len(self.text) <= LONGEST_LINE else self.text[:80] + " ..."
-        return Problem(
-            where=self.where,
-            message=message,
-            key=key,
-            line_number=self.number,
-            line_text=shown,
-            caret_start=start,
-            caret_length=len(shown) if length is None else length,
-        )
+        return Problem(self.where, message, key, self.number, shown, start, len(shown) if length is None else length)
 
 
 @dataclass(frozen=True)
@@ -244,58 +228,52 @@ class Table:
     where: str
     notes: tuple[str, ...]
     header: Line
+    heads: tuple[Cell, ...]  # of the header, whose own column is empty
     rows: list[dict[str, Cell]] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
 
 
-def read_table(path: Path, columns: Sequence[str]) -> Table:
-    """Read a table that has exactly these columns, in any order.
+def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FILE) -> Table:
+    """Read a table that has exactly these columns, in any order; or any, if none are given, each with a name.
 
-    Rows of the wrong shape are left out and recorded in `problems`, and so are misspelt columns. Raises
-    InputMissingError when the file cannot be read and InvalidInputError when it is not a text file or its header is
-    wrong.
+    `limit` is the largest size in bytes. Rows of the wrong shape are left out and recorded in `problems`, and so are
+    misspelt columns. Raises InputMissingError when the file cannot be read and InvalidInputError when it is not a text
+    file or its header is wrong.
     """
-    notes, content = _content(_lines(path))
+    lines = _lines(path, limit)
+    content = [line for line in lines if line.text.strip() and not _is_comment(line.text)]
     needed = f"its first line must be {','.join(columns)}"
     if not content:
-        raise_problems([Problem(where=str(path), message=f"the table is empty, {needed}")])
+        raise_problems([Problem(str(path), "the table is empty" + (f", {needed}" if columns else ""))])
     line, heads = content[0], _header(content[0])
     names = [head.text for head in heads]
     problems = []
     for index, head in enumerate(heads):
-        if head.text in names[:index]:
-            problems.append(line.problem("column given twice", head.text, head.start, head.length))
-        elif head.text not in columns:
+        key = head.text if columns else ""
+        if head.text in names[:index] and (head.text or columns):
+            problems.append(line.problem("column given twice", key, head.start, head.length))
+        elif columns and head.text not in columns:
             message = f"unknown column, {suggestion(head.text, columns)}"
-            problems.append(line.problem(message, head.text, head.start, head.length))
+            problems.append(line.problem(message, key, head.start, head.length))
+        elif not head.text:
+            problems.append(line.problem("this column has no name", key, head.start, head.length))
     missing = [column for column in columns if column not in names]
     if missing:
         plural = "s" if len(missing) > 1 else ""
         problems.append(line.problem(f"missing column{plural} {', '.join(missing)}; {needed}"))
     meant = [name if name in columns else nearest(name, missing, most=len(name)) or name for name in names]
-    if sorted(meant) != sorted(columns):
+    if problems and sorted(meant) != sorted(columns):
         raise_problems(problems)
-    return _filled(Table(where=str(path), notes=notes, header=line, problems=problems), meant, content[1:])
-
-
-def read_open_table(path: Path, limit: int) -> tuple[tuple[Cell, ...], Table]:
-    """Read a table whose columns are its own choice: the cells of its header, and the rest as `read_table`.
-
-    `limit` is the largest size in bytes. Raises as `read_table`; a header needs names, each once.
-    """
-    notes, content = _content(_lines(path, limit))
-    if not content:
-        raise_problems([Problem(where=str(path), message="the table is empty")])
-    heads = _header(content[0])
-    names = [head.text for head in heads]
-    problems = [
-        head.problem("column given twice" if head.text else "this column has no name")
-        for index, head in enumerate(heads)
-        if not head.text or head.text in names[:index]
-    ]
-    if problems:
-        raise_problems(problems)
-    return heads, _filled(Table(where=str(path), notes=notes, header=content[0]), names, content[1:])
+    notes = tuple(line.text.strip()[1:].strip() for line in lines if _is_comment(line.text))
+    table = Table(str(path), notes, line, heads, problems=problems)
+    for row in content[1:]:
+        cells = _cells(row)
+        complaint = _shape_complaint(row, cells, len(names))
+        if complaint or cells is None:
+            table.problems.append(row.problem(complaint))
+        else:
+            table.rows.append({name: Cell(name, *place) for name, place in zip(meant, cells, strict=True)})
+    return table
 
 
 def bare_rows(content: bytes) -> list[tuple[int, list[str]]]:
@@ -303,28 +281,11 @@ def bare_rows(content: bytes) -> list[tuple[int, list[str]]]:
 
     Raises UnicodeDecodeError where the content is not UTF-8 text.
     """
-    lines = _numbered(content.decode("utf-8-sig"))
-    kept = [(number, line) for number, line in lines if line.strip() and not _is_comment(line)]
-    return [(number, [QUOTED.sub(r"\1", cell.strip()) for cell in line.split(",")]) for number, line in kept]
-
-
-def _content(lines: Sequence[Line]) -> tuple[tuple[str, ...], list[Line]]:
-    """Return the texts of the comments, and the lines that are neither comments nor empty."""
-    notes = tuple(line.text.strip()[1:].strip() for line in lines if _is_comment(line.text))
-    return notes, [line for line in lines if line.text.strip() and not _is_comment(line.text)]
-
-
-def _filled(table: Table, names: Sequence[str], lines: Sequence[Line]) -> Table:
-    """Add the rows, or the errors in their shape."""
-    for line in lines:
-        cells = _cells(line)
-        complaint = _shape_complaint(line, cells, len(names))
-        if complaint or cells is None:
-            table.problems.append(line.problem(complaint))
-        else:
-            named = zip(names, cells, strict=True)
-            table.rows.append({name: Cell(name, *place) for name, place in named})
-    return table
+    return [
+        (number, [QUOTED.sub(r"\1", cell.strip()) for cell in line.split(",")])
+        for number, line in _numbered(content.decode("utf-8-sig"))
+        if line.strip() and not _is_comment(line)
+    ]
 
 
 def raise_problems(problems: Sequence[Problem]) -> NoReturn:
@@ -336,7 +297,7 @@ def raise_problems(problems: Sequence[Problem]) -> NoReturn:
     raise InvalidInputError("\n".join(shown))
 
 
-def _lines(path: Path, limit: int = LARGEST_FILE) -> list[Line]:
+def _lines(path: Path, limit: int) -> list[Line]:
     """Return all lines; tabs and control characters, which shift a caret or steer a terminal, become blanks."""
     if is_folder(path):
         raise InputMissingError(Problem(str(path), "is a folder, not a table").render())
@@ -387,11 +348,8 @@ def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None,
         return f"the line has {len(line.text)} characters, at most {LONGEST_LINE} are read"
     if cells is None:
         return "quotes do not match"
-    if len(cells) > count:
-        return f"{len(cells)} cells where the header has {count} columns (decimals are written with a point)"
-    if len(cells) < count:
-        return f"{len(cells)} cells where the header has {count} columns"
-    return ""
+    hint = " (decimals are written with a point)" if len(cells) > count else ""
+    return f"{len(cells)} cells where the header has {count} columns{hint}" if len(cells) != count else ""
 
 
 def _header(line: Line) -> tuple[Cell, ...]:

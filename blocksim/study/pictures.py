@@ -16,7 +16,7 @@ from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, load_scenario, load_stored
 from blocksim.scenario import units as q
-from blocksim.scenario.input_files import Cell, raise_problems, read_open_table
+from blocksim.scenario.input_files import Cell, raise_problems, read_table
 from blocksim.scenario.models.study import Normal, Uniform
 from blocksim.scenario.overrides import field_of, si_unit
 from blocksim.scenario.spelling import did_you_mean_or_list
@@ -213,8 +213,8 @@ def read_indices(path: Path) -> tuple[list[Bars], tuple[str, str]]:
 
     Raises InputMissingError or InvalidInputError, with every mistake located.
     """
-    heads, table = read_open_table(path, LARGEST_FILE)
-    names = [head.text for head in heads]
+    table = read_table(path, limit=LARGEST_FILE)
+    names = [head.text for head in table.heads]
     shown = next((one for one in METHODS if {*HEAD, one.value, one.half_width} <= set(names)), None)
     if shown is None:
         message = "not the table of `blocksim sensitivity --out`: no columns output, unit, key and ST or mu*"

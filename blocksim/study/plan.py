@@ -21,7 +21,7 @@ from blocksim.extras import load_module
 from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
 from blocksim.scenario import units as q
 from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fault
-from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_open_table
+from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.record import TABLED
 from blocksim.scenario.models.study import Normal, Uniform, Variation, round_digits, toml_number
@@ -124,7 +124,8 @@ def table(sweep: Sweep) -> Design:
 
 def read_columns(path: Path) -> list[Column]:
     """Read the columns of a table. Raises InputMissingError or InvalidInputError with the lines of all mistakes."""
-    heads, rows = read_open_table(path, LARGEST_FILE)
+    rows = read_table(path, limit=LARGEST_FILE)
+    heads = rows.heads
     problems = list(rows.problems)
     if not rows.rows and not problems:
         problems.append(rows.header.problem("no row follows the header; every row is one case"))
