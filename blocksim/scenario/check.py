@@ -1,20 +1,19 @@
 """Everything that must hold before a scenario may be used, and warnings of values that are hardly meant."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 from math import ceil, dist
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple, get_args
+from typing import get_args
 
 from pydantic import ValidationError
 
 from blocksim.scenario import geometry, overrides
-from blocksim.scenario.geometry import count_across
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, mistakes_of
 from blocksim.scenario.models import base, contact, stepping, study
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.overrides import SYNONYMS, Data, UnfitOverrideError, with_value
+from blocksim.scenario.overrides import SYNONYMS, Data, KeyPath, UnfitOverrideError, with_value
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.start import impossible_starts, soil_tables, unfit_soils
 from blocksim.scenario.structures import PolygonStructure, polygons
@@ -42,7 +41,7 @@ def wrong_names(data: Data) -> Iterator[Mistake]:
     yield from _wrong_pairs(data)
 
 
-def _unknown(data: Data, path: overrides.KeyPath, group: str) -> Iterator[Mistake]:
+def _unknown(data: Data, path: KeyPath, group: str) -> Iterator[Mistake]:
     name = overrides.follow(data, path)
     known = data.get(group, {} if group == "blocks" else None)  # materials that are missing are told of by themselves
     if isinstance(name, str) and isinstance(known, Mapping) and name not in known:
@@ -89,7 +88,15 @@ def unfit_choices(scenario: Scenario) -> Iterator[Mistake]:
     if scenario.start.settle and scenario.systems:
         message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
         yield Mistake(("start", "settle"), message, relation=True)
-    why = _why_without_outlines(scenario)
+    scheme, model, why = scenario.time.scheme, scenario.contact.model, ""  # why no block can have an outline
+    if model not in scenario.time.models_of_outlines:
+        reason = ": its boundary particles lie on rectangles only" if scenario.time.has_springs else ""
+        known = ((name, one) for name, time in sorted(stepping.SCHEMES.items()) for one in time.models_of_outlines)
+        modelled = " or ".join(f"{toml(name)} and {toml(one)}" for name, one in known)
+        where = f"with time.scheme = {toml(scheme)} and contact.model = {toml(model)}"
+        why = f"outlines are not modelled {where}{reason}; use {modelled}"
+    elif scenario.systems:
+        why = f"outlines are not modelled beside {', '.join(scenario.systems)}, whose particles meet rectangles only"
     for name, block in scenario.blocks.items():
         if why and block.polygon:
             key = "outline" if block.outline is not None else "sides"
@@ -105,21 +112,7 @@ def unfit_choices(scenario: Scenario) -> Iterator[Mistake]:
             yield Mistake(("contact", key), message, relation=True)
 
 
-def _why_without_outlines(scenario: Scenario) -> str:
-    """Return why no block of a scenario can have an outline; nothing where blocks can."""
-    scheme, model = scenario.time.scheme, scenario.contact.model
-    if model not in scenario.time.models_of_outlines:
-        why = ": its boundary particles lie on rectangles only" if scenario.time.has_springs else ""
-        known = ((name, one) for name, time in sorted(stepping.SCHEMES.items()) for one in time.models_of_outlines)
-        modelled = " or ".join(f"{toml(name)} and {toml(one)}" for name, one in known)
-        where = f"with time.scheme = {toml(scheme)} and contact.model = {toml(model)}"
-        return f"outlines are not modelled {where}{why}; use {modelled}"
-    if scenario.systems:
-        return f"outlines are not modelled beside {', '.join(scenario.systems)}, whose particles meet rectangles only"
-    return ""
-
-
-def unknown_provenance(data: Data) -> Iterator[Mistake]:
+def _unknown_provenance(data: Data) -> Iterator[Mistake]:
     """Find provenance of keys that no scenario has."""
     table = data.get("provenance")
     for key, text in table.items() if isinstance(table, Mapping) else ():
@@ -141,42 +134,41 @@ MOST_EMPTY = 0.01  # of the width or height of a soil: its thrust goes with the 
 
 
 def implausible_values(scenario: Scenario) -> list[str]:
-    """Return a warning for each value that looks like one in another unit; of frictions swept ones too."""
-    return [*_bare_numbers(scenario), *_friction_angles(scenario), *_unfilled_soils(scenario)]
+    """Return a warning for each value that looks like one in another unit, of frictions swept ones too.
 
-
-def _unfilled_soils(scenario: Scenario) -> Iterator[str]:
-    """Find soils of whose width or height no whole number of particles takes all, and a finer spacing that does."""
-    for soil in soil_tables(scenario):
-        extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
-        counts = count_across(soil.corners, soil.spacing)
-        for way, extent, count in zip(("width", "height"), extents, counts, strict=True):
-            if extent - count * soil.spacing > MOST_EMPTY * extent:
-                fits = 1e3 * extent / ceil(extent / soil.spacing)
-                yield (
-                    f"{overrides.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
-                    f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
-                )
-
-
-def _bare_numbers(scenario: Scenario) -> Iterator[str]:
+    Also for soils of whose width or height no whole number of particles takes all, with a finer spacing that does.
+    """
+    warnings = []
     for name, material in scenario.materials.items():
         key = overrides.format_key(("materials", name))
         if not LIGHTEST <= material.density <= HEAVIEST:
             given = "density" if material.unit_weight is None else "unit_weight"
-            yield f"{key}.{given} makes {material.density:.4g} kg/m^3; add the intended unit"
+            warnings.append(f"{key}.{given} makes {material.density:.4g} kg/m^3; add the intended unit")
         if material.young_modulus < SOFTEST:
-            yield f"{key}.young_modulus = {material.young_modulus:.4g} Pa; add the intended unit"
+            warnings.append(f"{key}.young_modulus = {material.young_modulus:.4g} Pa; add the intended unit")
     for name, block in scenario.blocks.items():
         for side in ("width", "height", "length", "radius"):
             if (size := getattr(block, side)) is not None and size > LONGEST:
-                yield f"{overrides.format_key(('blocks', name, side))} = {size:.4g} m; add the intended unit"
+                key = overrides.format_key(("blocks", name, side))
+                warnings.append(f"{key} = {size:.4g} m; add the intended unit")
     for number, structure in enumerate(scenario.structures):
         if isinstance(structure, polygons.Polygons):
             size = median(dist(*geometry.box_of(one.outline)) for one in structure.cells_given)
             if size > LONGEST_DRAWN:
                 key = overrides.format_key(("structures", number))
-                yield f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"'
+                warnings.append(f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"')
+    warnings += _friction_angles(scenario)
+    for soil in soil_tables(scenario):
+        extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
+        counts = geometry.count_across(soil.corners, soil.spacing)
+        for way, extent, count in zip(("width", "height"), extents, counts, strict=True):
+            if extent - count * soil.spacing > MOST_EMPTY * extent:
+                fits = 1e3 * extent / ceil(extent / soil.spacing)
+                warnings.append(
+                    f"{overrides.format_key(('soils', soil.name, 'spacing'))} = {1e3 * soil.spacing:.4g} mm fills "
+                    f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
+                )
+    return warnings
 
 
 def _friction_angles(scenario: Scenario) -> Iterator[str]:
@@ -211,15 +203,9 @@ MAX_VARIED = 100
 MODES = get_args(study.Mode)
 ENDS = ("from", "mean", "to")
 """Keys of a variation that is not a list, in the order in which they are reported."""
+Trial = Callable[[KeyPath, object, KeyPath], Iterator[Mistake]]
+"""Finds the mistakes of a value at the path of a key, and puts them at a place of the sweep."""
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
-
-
-class Trial(NamedTuple):
-    """Context in which the values of a sweep are tried: data without sweep and experiment, and the mistakes in them."""
-
-    data: Data
-    folder: Path
-    before: Sequence[Mistake]
 
 
 def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
@@ -229,7 +215,7 @@ def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
     """
     scenario, findings = _validated(data, folder)
     findings += islice(wrong_names(data), MAX_MISTAKES)
-    findings += [*_sweep(data, folder), *unknown_provenance(data)]
+    findings += [*_sweep(data, folder), *_unknown_provenance(data)]
     if scenario is not None and not findings:
         findings += [*unfit_choices(scenario), *impossible_starts(scenario)]
     return (None if findings else scenario), findings
@@ -267,19 +253,15 @@ def _sweep(data: Data, folder: Path) -> Iterator[Mistake]:
             yield Mistake(("sweep", key), message, at="key")
 
 
-def _varied(trial: Trial, key: str, values: object) -> Iterator[Mistake]:
+def _varied(tried: Trial, key: str, values: object) -> Iterator[Mistake]:
     """Yield the mistakes in a swept key, then in its values as written, so that their dimension is checked too."""
     complaint = variation_fault(key)
     if complaint:
         yield Mistake(("sweep", key), complaint, at="key")
         return
-    parts: Iterable[tuple[str | int, object]] = ()
-    if isinstance(values, Mapping):
-        parts = ((end, values[end]) for end in ENDS if end in values)
-    elif isinstance(values, tuple):
-        parts = enumerate(values[:MAX_TRIED])
-    for part, value in parts:
-        yield from _tried(trial, overrides.parse_key(key), value, ("sweep", key, part))
+    parts = {end: values[end] for end in ENDS if end in values} if isinstance(values, Mapping) else {}
+    for part, value in parts.items() or enumerate(values[:MAX_TRIED] if isinstance(values, tuple) else ()):
+        yield from tried(overrides.parse_key(key), value, ("sweep", key, part))
 
 
 def variation_fault(key: str) -> str:
@@ -293,25 +275,25 @@ def variation_fault(key: str) -> str:
 
 def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list[Mistake]:
     """List the mistakes in one value of one key by itself, in data that may have a sweep."""
-    return list(_tried(_trial(data, folder), overrides.parse_key(key), value, ("sweep", key)))
+    return [*_trial(data, folder)(overrides.parse_key(key), value, ("sweep", key))]
 
 
 def _trial(data: Data, folder: Path) -> Trial:
+    """Return what finds the mistakes that setting one value adds to data, without its sweep and experiment."""
     bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
-    return Trial(bare, folder, _single_mistakes(bare, folder))
+    before = _single_mistakes(bare, folder)
 
+    def tried(path: KeyPath, value: object, place: KeyPath) -> Iterator[Mistake]:
+        try:
+            changed, _ = with_value(bare, path, value)
+        except UnfitOverrideError as error:
+            yield Mistake(place[:2], str(error), at="key")
+            return
+        for finding in _single_mistakes(changed, folder):
+            if finding not in before:
+                yield Mistake(place[:2] if finding.at == "key" else place, finding.message, at=finding.at)
 
-def _tried(trial: Trial, path: overrides.KeyPath, value: object, place: overrides.KeyPath) -> Iterator[Mistake]:
-    """Yield the mistakes that setting one value adds."""
-    try:
-        changed, _ = with_value(trial.data, path, value)
-    except UnfitOverrideError as error:
-        yield Mistake(place[:2], str(error), at="key")
-        return
-    for finding in _single_mistakes(changed, trial.folder):
-        if finding not in trial.before:
-            unknown = finding.at == "key"
-            yield Mistake(place[:2] if unknown else place, finding.message, at=finding.at)
+    return tried
 
 
 def _single_mistakes(data: Data, folder: Path) -> list[Mistake]:

@@ -235,28 +235,16 @@ def _facing(a: PlacedBody, b: PlacedBody, begin: Point, end: Point, normal: Poin
         return None
     ends = [(half * normal[0] + s * tangent[0], half * normal[1] + s * tangent[1]) for s in (first, last)]
     places = [(x + gap * normal[0], y + gap * normal[1]) for (x, y), gap in zip(ends, gaps, strict=True)]
-    of_b = [_local(b, *_placed(a, *point)) for point in places]
+    of_b = [b.own_point(*a.ground_point(*point)) for point in places]
     return min(gaps), Joint((ends[0], ends[1]), (of_b[0], of_b[1]), normal, tangent)
 
 
 def _opposite(a: PlacedBody, b: PlacedBody, normal: Point) -> tuple[Point, Point] | None:
     """Return the ends of the face of b that is parallel to one of a with this normal and faces it, in the axes of a."""
-    edges = edges_of([_local(a, *_placed(b, *corner)) for corner in b.corners])
+    edges = edges_of([a.own_point(*b.ground_point(*corner)) for corner in b.corners])
     begin, end, of_b = min(edges, key=lambda edge: _dot(edge[2], normal))
     return (begin, end) if abs(of_b[0] * normal[1] - of_b[1] * normal[0]) <= PARALLEL else None
 
 
 def _dot(one: Point, other: Point) -> float:
     return one[0] * other[0] + one[1] * other[1]
-
-
-def _placed(body: PlacedBody, x: float, y: float) -> Point:
-    """Return where a point of a body is (m), given in its own axes."""
-    cosine, sine = math.cos(body.angle), math.sin(body.angle)
-    return body.x + cosine * x - sine * y, body.y + sine * x + cosine * y
-
-
-def _local(body: PlacedBody, x: float, y: float) -> Point:
-    """Return a point (m) in the own axes of a body."""
-    cosine, sine = math.cos(body.angle), math.sin(body.angle)
-    return cosine * (x - body.x) + sine * (y - body.y), cosine * (y - body.y) - sine * (x - body.x)

@@ -5,16 +5,15 @@ import weakref
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.geometry import Corners, box_of, is_upright, least_width, middle_of, section_of
+from blocksim.scenario.geometry import Corner, Corners, box_of, is_upright, least_width, middle_of, section_of
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import KeyPath
 from blocksim.scenario.structures import PolygonStructure, Pose, Structure
-from blocksim.scenario.structures.base import Cell
 
 LENGTH_WITHOUT_BLOCKS = 0.1  # m: can be seen beside soil
 
@@ -83,6 +82,16 @@ class PlacedBody(NamedTuple):
             return max(math.hypot(x, y) for x, y in self.outline)
         return 0.5 * math.hypot(self.size_x, self.size_y)
 
+    def ground_point(self, x: float, y: float) -> Corner:
+        """Return where a point is (m) that is given in the body's own axes (m)."""
+        cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        return self.x + cosine * x - sine * y, self.y + sine * x + cosine * y
+
+    def own_point(self, x: float, y: float) -> Corner:
+        """Return a point (m) in the body's own axes."""
+        cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        return cosine * (x - self.x) + sine * (y - self.y), cosine * (y - self.y) - sine * (x - self.x)
+
 
 def smallest_width(bodies: Iterable[PlacedBody]) -> float:
     """Return the least width (m) of all bodies; infinite where there are none."""
@@ -103,7 +112,7 @@ class _Placement(NamedTuple):
 
     scenario: weakref.ref[Scenario]
     bodies: tuple[PlacedBody, ...]
-    origins: tuple[tuple[KeyPath, int], ...]  # structure or body, and how many bodies it gives
+    origins: list[KeyPath]  # of every body the structure or single body that it comes from
 
 
 _latest: list[_Placement] = []  # at most one, for as long as its scenario lives: a million bodies take seconds to place
@@ -126,62 +135,53 @@ def has_outlines(scenario: Scenario) -> bool:
 
 def origins_of(scenario: Scenario) -> list[KeyPath]:
     """Return for every placed body the path of the structure or body that it comes from."""
-    return [path for path, count in _placement(scenario).origins for _ in range(count)]
+    return _placement(scenario).origins
 
 
 def _placement(scenario: Scenario) -> _Placement:
-    known = next(iter(_latest), None)
-    if known is None or known.scenario() is not scenario:
-        known = _placed(scenario)
-        _latest[:] = [known]
-    return known
+    if not _latest or _latest[0].scenario() is not scenario:
+        _latest[:] = [_placed(scenario)]
+    return _latest[0]
 
 
 def _placed(scenario: Scenario) -> _Placement:
     freed = {name for event in scenario.events for name in event.free}
     bodies: list[PlacedBody] = []
-    origins: list[tuple[KeyPath, int]] = []
+    origins: list[KeyPath] = []
     for number, structure in enumerate(scenario.structures):
         built = _built(scenario, structure, len(bodies) + 1)
         bodies += [body._replace(freed=True) if body.fixed and body.name in freed else body for body in built]
-        origins.append((("structures", number), structure.size))
+        origins += [("structures", number)] * len(built)
     for number, spec in enumerate(scenario.bodies):
         pose = Pose(spec.x, spec.y, spec.angle, *spec.velocity, spec.spin)
         name = spec.name or str(len(bodies) + 1)
         is_driven = spec.motion is not None
-        body = _placer(scenario, spec.block)(name, pose, fixed=spec.fixed or is_driven)
+        body = _placed_block(scenario, spec.block, [(name, pose)], fixed=spec.fixed or is_driven)[0]
         bodies.append(body._replace(driven=is_driven, freed=name in freed) if is_driven or freed else body)
-        origins.append((("bodies", number), 1))
-    return _Placement(weakref.ref(scenario, _forget), tuple(bodies), tuple(origins))
-
-
-def _forget(dead: weakref.ref[Scenario]) -> None:
-    _latest[:] = [one for one in _latest if one.scenario is not dead]
+        origins.append(("bodies", number))
+    return _Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins)
 
 
 def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedBody]:
     """Return the bodies of a structure, called by their numbers from a first one on."""
     poses = structure.start(scenario.blocks[structure.block])
     if isinstance(structure, PolygonStructure):
-        return [
-            _shaped(scenario, structure.block, str(number), *one)
-            for number, one in enumerate(zip(structure.cells, structure.shapes, poses, strict=True), start=first)
-        ]
+        built = []
+        for number, (cell, outline, pose) in enumerate(
+            zip(structure.cells, structure.shapes, poses, strict=True), start=first
+        ):
+            key = cell.block or structure.block
+            block = scenario.blocks[key]
+            (left, bottom), (right, top) = box_of(outline)
+            density = scenario.materials[block.material].density
+            what = cell.name or str(number), key, block.material, right - left, top - bottom, block.depth, density
+            built.append(PlacedBody(*what, *pose, cell.fixed, outline=outline))
+        return built
     x, y = middle_of(scenario.blocks[structure.block].polygon or ((0.0, 0.0),))
     if x or y:  # structures place the middle of the bounding box, bodies are placed by their centroid
         poses = [_moved(pose, -x, -y) for pose in poses]
-    place = _placer(scenario, structure.block)
-    return [place(str(index), pose, fixed=False) for index, pose in enumerate(poses, start=first)]
-
-
-def _shaped(scenario: Scenario, usual: str, number: str, cell: Cell, outline: Corners, pose: Pose) -> PlacedBody:
-    key = cell.block or usual
-    block = scenario.blocks[key]
-    (left, bottom), (right, top) = box_of(outline)
-    sizes = right - left, top - bottom, block.depth
-    density = scenario.materials[block.material].density
-    name = cell.name or number
-    return PlacedBody(name, key, block.material, *sizes, density, *pose, cell.fixed, outline=outline)
+    named = ((str(index), pose) for index, pose in enumerate(poses, start=first))
+    return _placed_block(scenario, structure.block, named, fixed=False)
 
 
 def _moved(pose: Pose, x: float, y: float) -> Pose:
@@ -191,21 +191,11 @@ def _moved(pose: Pose, x: float, y: float) -> Pose:
     return pose._replace(x=pose.x + dx, y=pose.y + dy, vx=pose.vx - pose.spin * dy, vy=pose.vy + pose.spin * dx)
 
 
-class _Place(Protocol):
-    def __call__(self, name: str, pose: Pose, *, fixed: bool) -> PlacedBody: ...
-
-
-def _placer(scenario: Scenario, key: str) -> _Place:
-    """Return a function that places one kind of block; looking up its sides every time would be slow."""
+def _placed_block(scenario: Scenario, key: str, named: Iterable[tuple[str, Pose]], *, fixed: bool) -> list[PlacedBody]:
+    """Return bodies of one kind of block by their names and poses; looking up its sides every time would be slow."""
     block = scenario.blocks[key]
-    material = block.material
-    size_x, size_y, depth, outline = block.size_x, block.size_y, block.depth, block.polygon
-    density = scenario.materials[material].density
-
-    def place(name: str, pose: Pose, *, fixed: bool) -> PlacedBody:
-        return PlacedBody(name, key, material, size_x, size_y, depth, density, *pose, fixed, outline=outline)
-
-    return place
+    what = block.material, block.size_x, block.size_y, block.depth, scenario.materials[block.material].density
+    return [PlacedBody(name, key, *what, *pose, fixed, outline=block.polygon) for name, pose in named]
 
 
 ENDLESS = 1e5
@@ -215,7 +205,6 @@ STRAIGHT = 1e-12
 TOLERANCE = 1e-9
 """m; things at this distance touch, and ends at this distance are one."""
 
-Point = tuple[float, float]
 Floats = NDArray[np.float64]
 
 
@@ -298,7 +287,7 @@ def profile_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     )
 
 
-def _corners(points: Sequence[Point]) -> list[Point]:
+def _corners(points: Sequence[Corner]) -> list[Corner]:
     """Leave out the points where the line does not turn."""
     kept = [points[0]]
     for middle, other in pairwise(points[1:]):
@@ -307,7 +296,7 @@ def _corners(points: Sequence[Point]) -> list[Point]:
     return [*kept, points[-1]]
 
 
-def _turn(before: Point, joint: Point, after: Point) -> float:
+def _turn(before: Corner, joint: Corner, after: Corner) -> float:
     """Return the sine of the turn at a joint, positive to the left; -1 where it goes back."""
     x0, y0 = joint[0] - before[0], joint[1] - before[1]
     x1, y1 = after[0] - joint[0], after[1] - joint[1]
@@ -315,7 +304,7 @@ def _turn(before: Point, joint: Point, after: Point) -> float:
     return -1.0 if abs(sine) <= STRAIGHT and x0 * x1 + y0 * y1 < 0.0 else sine
 
 
-def _is_sharp(before: Point, joint: Point, after: Point) -> bool:
+def _is_sharp(before: Corner, joint: Corner, after: Corner) -> bool:
     """Return True at an edge with less than a right angle of solid behind it."""
     back = (joint[0] - before[0]) * (after[0] - joint[0]) + (joint[1] - before[1]) * (after[1] - joint[1]) < 0.0
     return back and _turn(before, joint, after) < 0.0
@@ -351,13 +340,13 @@ def wall_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     return tuple(pieces)
 
 
-def _neighbour(points: Floats, end: Point, number: int) -> int | None:
+def _neighbour(points: Floats, end: Corner, number: int) -> int | None:
     """Return the first other wall with an end at the same point; ends are (n, 2)."""
     near = np.flatnonzero(np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) <= TOLERANCE)
     return next((int(other) for other in near if other != number), None)
 
 
-def _touches(point: Point, starts: Floats, ends: Floats) -> bool:
+def _touches(point: Corner, starts: Floats, ends: Floats) -> bool:
     """Return True if a point is on any of these walls."""
     along, beyond = ends - starts, np.array(point) - starts
     share = np.clip(np.sum(beyond * along, axis=1) / np.sum(along * along, axis=1), 0.0, 1.0)

@@ -6,69 +6,63 @@ from itertools import chain, islice, pairwise
 from operator import attrgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
-from blocksim.scenario import events, geometry, mistakes, overlap, overrides, placement, resolved, spelling, units
+from blocksim.scenario import events, geometry, overlap, placement, resolved, spelling
+from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
+from blocksim.scenario.overrides import KeyPath
+from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.structures import MAX_BLOCKS, Polygons, PolygonStructure, UnfitError
+from blocksim.scenario.units import toml
 
 MAX_LOADS = 1000
 STRIP = 1e-3
 """Thickness of the strip before a face in which nothing else may lie, in smaller sides of the body."""
-NORMALS: Mapping[Face, tuple[float, float]] = {
-    "left": (-1.0, 0.0),
-    "right": (1.0, 0.0),
-    "top": (0.0, 1.0),
-    "bottom": (0.0, -1.0),
-}
+NORMALS: Mapping[Face, geometry.Corner] = {"left": (-1, 0), "right": (1, 0), "top": (0, 1), "bottom": (0, -1)}
 """Outward normals of faces, in the body."""
 PARALLEL = 1e-6
 """Sine of the angle between the normal of a face and the axis of an outline that it is named after, at most."""
 
 
-def unfit_loads(scenario: Scenario, bodies: Sequence[placement.PlacedBody]) -> Iterator[mistakes.Mistake]:
+def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find loads that do not fit the placed bodies, and bodies that cannot be held; all is valid otherwise."""
     loads = scenario.loads
     if len(loads) > MAX_LOADS:
-        yield mistakes.Mistake(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
+        yield Mistake(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
         return
     by_name = {body.name: body for body in bodies} if loads or scenario.start.hold else {}
     names: set[str] = set()
     turns = False
     for number, load in enumerate(loads):
         if load.name is not None and load.name in names:
-            yield mistakes.Mistake(("loads", number, "name"), f"two loads are named {units.toml(load.name)}")
+            yield Mistake(("loads", number, "name"), f"two loads are named {toml(load.name)}")
         names.add(load.name or "")
         if isinstance(load, Gravity):
             if turns:
-                yield mistakes.Mistake(("loads", number), "gravity turns already; one load of this kind is allowed")
+                yield Mistake(("loads", number), "gravity turns already; one load of this kind is allowed")
             turns = True
         elif isinstance(load, OnBody):
             yield from _on_body(scenario, number, load, by_name)
     for number, name in enumerate(scenario.start.hold):
         if name not in by_name:
             hint = spelling.did_you_mean_or_list(name, by_name)
-            yield mistakes.Mistake(("start", "hold", number), f"unknown body {units.toml(name)}, {hint}")
+            yield Mistake(("start", "hold", number), f"unknown body {toml(name)}, {hint}")
         elif by_name[name].fixed:
-            yield mistakes.Mistake(
-                ("start", "hold", number), f"body {units.toml(name)} is fixed and cannot be released"
-            )
+            yield Mistake(("start", "hold", number), f"body {toml(name)} is fixed and cannot be released")
 
 
-def _on_body(
-    scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, placement.PlacedBody]
-) -> Iterator[mistakes.Mistake]:
+def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, PlacedBody]) -> Iterator[Mistake]:
     path = ("loads", number)
     body = bodies.get(load.body)
     if body is None:
         hint = spelling.did_you_mean_or_list(load.body, bodies)
-        yield mistakes.Mistake((*path, "body"), f"unknown body {units.toml(load.body)}, {hint}")
+        yield Mistake((*path, "body"), f"unknown body {toml(load.body)}, {hint}")
     elif body.fixed:
-        yield mistakes.Mistake((*path, "body"), f"body {units.toml(load.body)} is fixed; a load has no effect on it")
+        yield Mistake((*path, "body"), f"body {toml(load.body)} is fixed; a load has no effect on it")
     elif isinstance(load, Force):
         half = (0.5 * body.size_x, 0.5 * body.size_y)
         if body.outline:
@@ -78,18 +72,18 @@ def _on_body(
         if not is_inside:
             size = f"{1e3 * body.size_x:g} x {1e3 * body.size_y:g} mm"
             about = f"an outline in a box of {size}" if body.outline else f"{size} about its centre"
-            yield mistakes.Mistake((*path, "point"), f"the point lies outside of body {units.toml(load.body)}, {about}")
+            yield Mistake((*path, "point"), f"the point lies outside of body {toml(load.body)}, {about}")
     elif isinstance(load, Pressure) and face_of(body, load.face) is None:
-        message = f"the outline of body {units.toml(load.body)} has no face whose normal points exactly that way"
-        yield mistakes.Mistake((*path, "face"), message)
+        message = f"the outline of body {toml(load.body)} has no face whose normal points exactly that way"
+        yield Mistake((*path, "face"), message)
     elif isinstance(load, Pressure):
         other = next(_covers(scenario, load, body, [*bodies.values()]), None)
         if other is not None:
-            message = f"this face of body {units.toml(load.body)} is covered by {other}; pressure needs a free face"
-            yield mistakes.Mistake((*path, "face"), message)
+            message = f"this face of body {toml(load.body)} is covered by {other}; pressure needs a free face"
+            yield Mistake((*path, "face"), message)
 
 
-def face_of(body: placement.PlacedBody, face: Face) -> tuple[geometry.Corner, geometry.Corner] | None:
+def face_of(body: PlacedBody, face: Face) -> tuple[geometry.Corner, geometry.Corner] | None:
     """Return the middle of a face and half its extents along x and y (m, in the body); None where there is none."""
     nx, ny = NORMALS[face]
     for (ax, ay), (bx, by), (x, y) in geometry.edges_of(body.corners):
@@ -98,52 +92,39 @@ def face_of(body: placement.PlacedBody, face: Face) -> tuple[geometry.Corner, ge
     return None
 
 
-def _covers(
-    scenario: Scenario, load: Pressure, body: placement.PlacedBody, bodies: Sequence[placement.PlacedBody]
-) -> Iterator[str]:
+def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequence[PlacedBody]) -> Iterator[str]:
     """Yield what lies against a part of a face that is more than a line."""
     strip = strip_before(body, load.face)
     if scenario.ground.profile is None and float(overlap.Outlines.of([strip]).bottom[0]) < -_margin(body):
         yield "the ground"
-    for _, segment, depth in overlap.crossings(
-        [strip], (*placement.profile_segments(scenario), *placement.wall_segments(scenario))
-    ):
+    segments = placement.place_segments(scenario)
+    for _, segment, depth in overlap.crossings([strip], segments):
         if depth > _margin(body):
-            yield "the ground" if segment < len(placement.profile_segments(scenario)) else "a wall"
-    boxes = overlap.Rectangles.of([strip, *bodies])
-    for one, other in chain.from_iterable(zip(*pairs, strict=True) for pairs in overlap.near_pairs(boxes)):
-        first, second = sorted((int(one), int(other)))
-        if first == 0 and bodies[second - 1] is not body:
-            depth = float(
-                overlap.penetration(overlap.Outlines.of([strip]), overlap.Outlines.of([bodies[second - 1]]))[0]
-            )
-            if depth > _margin(body):
-                yield f"body {units.toml(bodies[second - 1].name)}"
+            yield "a wall" if segment >= len(segments) - len(scenario.walls) else "the ground"
+    for pairs in overlap.near_pairs(overlap.Rectangles.of([strip, *bodies])):
+        for second in np.maximum(*pairs)[np.minimum(*pairs) == 0]:
+            other = bodies[int(second) - 1]
+            depths = overlap.penetration(overlap.Outlines.of([strip]), overlap.Outlines.of([other]))
+            if other is not body and depths[0] > _margin(body):
+                yield f"body {toml(other.name)}"
 
 
-def _margin(body: placement.PlacedBody) -> float:
+def _margin(body: PlacedBody) -> float:
     """Return how far (m) anything may reach into the strip: half of it."""
     return 0.5 * STRIP * body.least_width
 
 
-def strip_before(body: placement.PlacedBody, face: Face) -> placement.PlacedBody:
+def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
     """Return the strip before a face of a body, a little shorter than the face at both ends."""
     thickness = STRIP * body.least_width
     nx, ny = NORMALS[face]
     (x, y), (half_x, half_y) = face_of(body, face) or ((0.0, 0.0), (0.0, 0.0))
     x, y = x + 0.5 * nx * thickness, y + 0.5 * ny * thickness
     size_x, size_y = (thickness, 2.0 * (half_y - thickness)) if nx else (2.0 * (half_x - thickness), thickness)
-    cosine, sine = math.cos(body.angle), math.sin(body.angle)
-    return body._replace(
-        size_x=size_x,
-        size_y=size_y,
-        x=body.x + cosine * x - sine * y,
-        y=body.y + sine * x + cosine * y,
-        outline=(),
-    )
+    x, y = body.ground_point(x, y)
+    return body._replace(size_x=size_x, size_y=size_y, x=x, y=y, outline=())
 
 
-UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 MOST_MEETINGS = 20
 PLACES_ON_A_WALL = 33
 
@@ -155,13 +136,18 @@ def soil_tables(scenario: Scenario) -> list[SoilTable]:
 
 def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Yield the key of an outline and what it meets: ground, walls, blocks, soils before it."""
-    found = [*_boundaries(soil, scenario), *_blocks(soil.corners, scenario)]
+    found, corners = [*_boundaries(soil, scenario)], soil.corners
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for body in placement.place_bodies(scenario):
+        is_near = bool(np.all(low - body.radius < (body.x, body.y)) and np.all((body.x, body.y) < high + body.radius))
+        if is_near and geometry.overlap(corners, np.array([body.ground_point(*corner) for corner in body.corners])):
+            found.append(f"block {body.name}")
     for other in soil_tables(scenario):
         if other is soil:
             break
         if other.name == soil.name:
             found.append("another soil of this name")
-        elif geometry.overlap(soil.corners, other.corners):
+        elif geometry.overlap(corners, other.corners):
             found.append(f"soil {other.name}")
     for what in found[:MOST_MEETINGS]:
         yield key, f"soil {soil.name} meets {what}"
@@ -178,38 +164,24 @@ def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
     places = np.linspace(0.0, 1.0, PLACES_ON_A_WALL)[1:-1, None]
     for number, piece in enumerate(segments, start=1 - (len(segments) - len(scenario.walls))):
         begin, end = np.array([piece.x0, piece.y0]), np.array([piece.x1, piece.y1])
-        back = np.array([piece.y1 - piece.y0, piece.x0 - piece.x1]) / piece.length
+        back = np.array([piece.y1 - piece.y0, piece.x0 - piece.x1]) / piece.length * 0.5 * soil.spacing
         if geometry.cuts(begin, end, corners):
             yield f"wall {number}" if number > 0 else f"the ground near x = {piece.x1:.6g} m"
-        elif (
-            number > 0 and geometry.is_inside(begin + places * (end - begin) + 0.5 * soil.spacing * back, corners).any()
-        ):
+        elif number > 0 and geometry.is_inside(begin + places * (end - begin) + back, corners).any():
             # nothing would hold soil that lies against the back of a wall
             yield f"the solid side of wall {number}, right of the way from its `from` to its `to`: exchange the two"
 
 
-def _blocks(corners: NDArray[np.float64], scenario: Scenario) -> Iterator[str]:
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    for body in placement.place_bodies(scenario):
-        reach = 0.5 * float(np.hypot(body.size_x, body.size_y))
-        if low[0] - reach < body.x < high[0] + reach and low[1] - reach < body.y < high[1] + reach:
-            u, v = (UNIT_CORNERS * (body.size_x, body.size_y)).T
-            cosine, sine = np.cos(body.angle), np.sin(body.angle)
-            rectangle = np.stack([body.x + cosine * u - sine * v, body.y + sine * u + cosine * v], axis=1)
-            if geometry.overlap(corners, rectangle):
-                yield f"block {body.name}"
-
-
-def unfit_soils(scenario: Scenario) -> Iterator[mistakes.Mistake]:
+def unfit_soils(scenario: Scenario) -> Iterator[Mistake]:
     """Find blocks of soil, and a contact model that soil does not go with."""
     for name, block in scenario.blocks.items():
         material = scenario.materials.get(block.material)
         if material is not None and material.is_soil:
-            message = f"{units.toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
-            yield mistakes.Mistake(("blocks", name, "material"), message, relation=True)
+            message = f"{toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
+            yield Mistake(("blocks", name, "material"), message, relation=True)
     if scenario.systems.get("soils") and scenario.contact.model != "surface":
-        message = f'{units.toml(scenario.contact.model)} does not go with soil; use model = "surface"'
-        yield mistakes.Mistake(("contact", "model"), message, relation=True)
+        message = f'{toml(scenario.contact.model)} does not go with soil; use model = "surface"'
+        yield Mistake(("contact", "model"), message, relation=True)
 
 
 MAX_SEGMENTS = 1000
@@ -233,7 +205,7 @@ ROUND_OFFS = 100
 distances are differences of a few rounded places."""
 
 
-def impossible_starts(scenario: Scenario) -> Iterator[mistakes.Mistake]:
+def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
     """Place everything and find impossible starts; the scenario is valid otherwise."""
     unplaceable = [*_too_many(scenario)] or [*_shapeless(scenario)]
     if unplaceable:
@@ -243,7 +215,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     if scenario.contact.law != "linear":
         for one, partners in scenario.pairs.items():
             for other in (name for name, pair in partners.items() if pair.normal_stiffness is not None):
-                yield mistakes.Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
+                yield Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
     yield from _impossible_masses(scenario)
     try:
         bodies, origins = placement.place_bodies(scenario), placement.origins_of(scenario)
@@ -252,34 +224,32 @@ def impossible_starts(scenario: Scenario) -> Iterator[mistakes.Mistake]:
             try:
                 structure.start(scenario.blocks[structure.block])
             except UnfitError as error:
-                yield mistakes.Mistake(("structures", number, error.key), str(error))
+                yield Mistake(("structures", number, error.key), str(error))
         return
     endless = [*_endless(origins, bodies)]
     if endless:
         yield from endless
         return
     smallest = placement.smallest_width({(body.size_x, body.size_y, body.outline): body for body in bodies}.values())
-    yield from _unfit_particles(scenario, smallest)
-    yield from _unfit_skin(scenario, smallest, max((max(abs(b.x), abs(b.y)) for b in bodies), default=0.0))
-    yield from _short_segments(scenario, SHORTEST_SHARE * smallest if bodies else 0.0)
+    yield from _unfit_lengths(scenario, smallest, max((max(abs(b.x), abs(b.y)) for b in bodies), default=0.0))
     seen: set[str] = set()
     for origin, body in zip(origins, bodies, strict=True):
         if body.name in seen:
-            message = f"two bodies are named {units.toml(body.name)}; a body without a name is called by its number"
-            yield mistakes.Mistake((*origin, "name"), message)
+            message = f"two bodies are named {toml(body.name)}; a body without a name is called by its number"
+            yield Mistake((*origin, "name"), message)
         seen.add(body.name)
     yield from _overlaps(scenario, origins, bodies)
     yield from unfit_loads(scenario, bodies)
     for name, tables in scenario.systems.items():
         for number, table in enumerate(tables):
-            yield from (mistakes.Mistake((name, number, key), message) for key, message in table.impossible(scenario))
+            yield from (Mistake((name, number, key), message) for key, message in table.impossible(scenario))
     yield from events.unfit_probes(scenario, bodies)
     yield from events.impossible_events(scenario, bodies)
 
 
-def _too_many(scenario: Scenario) -> Iterator[mistakes.Mistake]:
+def _too_many(scenario: Scenario) -> Iterator[Mistake]:
     bodies = sum(structure.size for structure in scenario.structures) + len(scenario.bodies)
-    counts: tuple[tuple[overrides.KeyPath, int, str, int], ...] = (
+    counts: tuple[tuple[KeyPath, int, str, int], ...] = (
         (("structures",), bodies, "bodies", MAX_BLOCKS),
         (("walls",), len(scenario.walls), "walls", MAX_SEGMENTS),
         (("ground", "profile"), len(scenario.ground.profile or ()), "points", MAX_SEGMENTS),
@@ -288,14 +258,13 @@ def _too_many(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     for path, count, what, most in counts:
         if count > most:
             cure = " (output.contacts = true keeps the forces of all contacts)" if what == "probes" else ""
-            yield mistakes.Mistake(path, f"{count} {what} are too many; at most {most} are allowed{cure}")
+            yield Mistake(path, f"{count} {what} are too many; at most {most} are allowed{cure}")
 
 
-def _shapeless(scenario: Scenario) -> Iterator[mistakes.Mistake]:
+def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
     """Find blocks without a shape where one is needed, and drawn blocks that do not exist."""
-    needing: list[tuple[overrides.KeyPath, str]] = [
-        (("bodies", number, "block"), spec.block) for number, spec in enumerate(scenario.bodies)
-    ]
+    needing: list[tuple[KeyPath, str]]
+    needing = [(("bodies", number, "block"), spec.block) for number, spec in enumerate(scenario.bodies)]
     for number, structure in enumerate(scenario.structures):
         if not isinstance(structure, PolygonStructure):
             needing.append((("structures", number, "block"), structure.block))
@@ -303,27 +272,27 @@ def _shapeless(scenario: Scenario) -> Iterator[mistakes.Mistake]:
             if cell.block is not None and cell.block not in scenario.blocks:
                 hint = spelling.did_you_mean_or_list(cell.block, scenario.blocks)
                 where = ("structures", number, "cells", place, "block")
-                yield mistakes.Mistake(where, f"unknown block {units.toml(cell.block)}, {hint}")
+                yield Mistake(where, f"unknown block {toml(cell.block)}, {hint}")
     for path, block in needing:
         if not scenario.blocks[block].is_shaped:
-            yield mistakes.Mistake(path, f"block {units.toml(block)} has no shape; {SHAPES}")
+            yield Mistake(path, f"block {toml(block)} has no shape; {SHAPES}")
 
 
-def _endless_motion(scenario: Scenario) -> Iterator[mistakes.Mistake]:
+def _endless_motion(scenario: Scenario) -> Iterator[Mistake]:
     """Find vibrations of too many cycles, and too many tables."""
-    motions: list[tuple[overrides.KeyPath, object]] = [((), scenario.motion)]
+    motions: list[tuple[KeyPath, object]] = [((), scenario.motion)]
     motions += [(("bodies", number), body.motion) for number, body in enumerate(scenario.bodies)]
     for path, motion in motions:
         pieces = sum(count for *_, count in motion.sections(scenario.time.end)) if isinstance(motion, Harmonic) else 0
         if pieces > MAX_PIECES:
             message = f"{pieces / PIECES_PER_CYCLE:.6g} cycles are too many; at most {MAX_PIECES // PIECES_PER_CYCLE}"
-            yield mistakes.Mistake((*path, "motion", "frequency"), f"{message} are allowed")
+            yield Mistake((*path, "motion", "frequency"), f"{message} are allowed")
     if len(tables := resolved.body_table_contents(scenario)) > MOST_BODY_TABLES:
         message = f"{len(tables)} different tables of motion of bodies are too many; at most {MOST_BODY_TABLES}"
-        yield mistakes.Mistake(("bodies",), f"{message} are allowed")
+        yield Mistake(("bodies",), f"{message} are allowed")
 
 
-def _impossible_masses(scenario: Scenario) -> Iterator[mistakes.Mistake]:
+def _impossible_masses(scenario: Scenario) -> Iterator[Mistake]:
     """Find blocks with valid sizes but an invalid mass or inertia."""
     for name, block in scenario.blocks.items():
         if not block.is_shaped:
@@ -333,21 +302,16 @@ def _impossible_masses(scenario: Scenario) -> Iterator[mistakes.Mistake]:
         inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0
         if block.polygon:
             mass, inertia = (density * block.depth * moment for moment in geometry.section_of(block.polygon))
-        if not _is_possible(mass, inertia):
-            yield mistakes.Mistake(("blocks", name), f"{_unsimulated(mass, inertia)}; check its sides and density")
+        if why := _why_impossible(mass, inertia):
+            yield Mistake(("blocks", name), f"{why}; check its sides and density")
 
 
-def _is_possible(mass: float, inertia: float) -> bool:
-    return 0.0 < inertia < math.inf and 0.0 < mass < math.inf
+def _why_impossible(mass: float, inertia: float) -> str:
+    is_possible = 0.0 < inertia < math.inf and 0.0 < mass < math.inf
+    return "" if is_possible else f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
 
 
-def _unsimulated(mass: float, inertia: float) -> str:
-    return f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
-
-
-def _endless(
-    origins: Sequence[overrides.KeyPath], bodies: Sequence[placement.PlacedBody]
-) -> Iterator[mistakes.Mistake]:
+def _endless(origins: Sequence[KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find bodies with places or velocities beyond all numbers, or else outlines with such masses; one an origin."""
     numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
     values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
@@ -357,78 +321,64 @@ def _endless(
             f"body {body.name} would be at ({body.x:g}, {body.y:g}) m with a velocity of "
             f"({body.vx:g}, {body.vy:g}) m/s and a spin of {body.spin:g} rad/s; check the keys of its structure"
         )
-        yield mistakes.Mistake(origin, message)
-    told: set[overrides.KeyPath] = set()
+        yield Mistake(origin, message)
+    told: set[KeyPath] = set()
     for origin, body in () if lost else zip(origins, bodies, strict=True):
-        if body.outline and origin not in told and not _is_possible(body.mass, body.inertia):
+        if body.outline and origin not in told and (why := _why_impossible(body.mass, body.inertia)):
             told.add(origin)
-            yield mistakes.Mistake(origin, f"body {body.name}: {_unsimulated(body.mass, body.inertia)}")
+            yield Mistake(origin, f"body {body.name}: {why}")
 
 
-def _unfit_particles(scenario: Scenario, smallest: float) -> Iterator[mistakes.Mistake]:
-    """Find particles too far apart for the smallest side (m), kernels that reach through it, and too many particles."""
-    contact = scenario.contact
-    if contact.model == "surface":
-        return
-    spacing, side = contact.particle_spacing, f"the smallest side of a block, {_mm(smallest)}"
-    if spacing > 0.5 * smallest:
-        message = f"{_mm(spacing)} is more than half of {side}"
-        yield mistakes.Mistake(("contact", "particle_spacing"), message, relation=True)
-    elif contact.model == "kernel" and contact.support_radius >= smallest:
-        key = "particle_spacing" if contact.smoothing_length is None else "smoothing_length"
-        length = _mm(contact.resolved_smoothing_length)
-        message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)}"
-        yield mistakes.Mistake(("contact", key), f"{message}, through {side}", relation=True)
-    sides = [length / spacing for block in scenario.blocks.values() for length in (block.size_x, block.size_y)]
-    if max(sides) > MAX_INTERVALS or 2.0 * sum(sides) > MAX_PARTICLES:
-        message = f"{_mm(spacing)} is too small: the longest side would have {max(sides):.6g} particles"
-        most = f"at most {MAX_INTERVALS} on a side and {MAX_PARTICLES} around one block of each kind are allowed"
-        yield mistakes.Mistake(("contact", "particle_spacing"), f"{message}; {most}", relation=True)
+def _unfit_lengths(scenario: Scenario, smallest: float, farthest: float) -> Iterator[Mistake]:
+    """Find lengths that do not suit the smallest side (m) of the blocks and their farthest coordinate (m).
 
-
-def _unfit_skin(scenario: Scenario, smallest: float, farthest: float) -> Iterator[mistakes.Mistake]:
-    """Find a skin that does not suit the smallest side (m) of the blocks and their farthest coordinate (m)."""
-    skin = scenario.contact.skin
-    if skin is None:
-        return
+    Particles too far apart or too many, kernels that reach through a block, a skin, and segments of boundary so short
+    that a corner could miss them.
+    """
+    contact, spacing, skin = scenario.contact, scenario.contact.particle_spacing, scenario.contact.skin
+    side = f"the smallest side of a block, {_mm(smallest)}"
+    if contact.model != "surface":
+        if spacing > 0.5 * smallest:
+            message = f"{_mm(spacing)} is more than half of {side}"
+            yield Mistake(("contact", "particle_spacing"), message, relation=True)
+        elif contact.model == "kernel" and contact.support_radius >= smallest:
+            key = "particle_spacing" if contact.smoothing_length is None else "smoothing_length"
+            length = _mm(contact.resolved_smoothing_length)
+            message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)}"
+            yield Mistake(("contact", key), f"{message}, through {side}", relation=True)
+        sides = [length / spacing for block in scenario.blocks.values() for length in (block.size_x, block.size_y)]
+        if max(sides) > MAX_INTERVALS or 2.0 * sum(sides) > MAX_PARTICLES:
+            message = f"{_mm(spacing)} is too small: the longest side would have {max(sides):.6g} particles"
+            most = f"at most {MAX_INTERVALS} on a side and {MAX_PARTICLES} around one block of each kind are allowed"
+            yield Mistake(("contact", "particle_spacing"), f"{message}; {most}", relation=True)
     least, why = max(
         (LEAST_SKIN * smallest, f"{100 * LEAST_SKIN:g} % of the smallest side of a block"),
         (ROUND_OFFS * math.ulp(farthest), f"{ROUND_OFFS} times the round-off of positions {farthest:g} m away"),
     )
-    if skin > smallest:
-        message = f"{_mm(skin)} is more than the smallest side of a block, {_mm(smallest)}"
-        yield mistakes.Mistake(
-            ("contact", "skin"), f"{message}; distant blocks would be listed as neighbours", relation=True
-        )
-    elif skin < least:
+    if skin is not None and skin > smallest:
+        message = f"{_mm(skin)} is more than {side}; distant blocks would be listed as neighbours"
+        yield Mistake(("contact", "skin"), message, relation=True)
+    elif skin is not None and skin < least:
         message = f"{_mm(skin)} is too small; at least {_mm(least)} is needed, {why}"
-        yield mistakes.Mistake(("contact", "skin"), message, relation=True)
-
-
-def _short_segments(scenario: Scenario, least: float) -> Iterator[mistakes.Mistake]:
-    """Find segments of boundary shorter than `least` (m): a corner could miss them."""
-    pieces: list[tuple[overrides.KeyPath, float]] = [
-        (("ground", "profile", number), math.dist(*ends))
-        for number, ends in enumerate(pairwise(scenario.ground.profile or ()), start=1)
-    ]
+        yield Mistake(("contact", "skin"), message, relation=True)
+    points = scenario.ground.profile or ()
+    pieces: list[tuple[KeyPath, float]]
+    pieces = [(("ground", "profile", number), math.dist(*two)) for number, two in enumerate(pairwise(points), start=1)]
     pieces += [(("walls", number), math.dist(wall.start, wall.end)) for number, wall in enumerate(scenario.walls)]
-    for path, length in pieces:
-        if length < least:
-            why = f"at least {_mm(least)} is needed, {100 * SHORTEST_SHARE:g} % of the smallest side of a block"
-            yield mistakes.Mistake(path, f"this segment is only {_mm(length)} long; {why}", relation=True)
+    for path, size in pieces:
+        if math.isfinite(smallest) and size < SHORTEST_SHARE * smallest:
+            needed = f"at least {_mm(SHORTEST_SHARE * smallest)} is needed, {100 * SHORTEST_SHARE:g} %"
+            message = f"this segment is only {_mm(size)} long; {needed} of the smallest side of a block"
+            yield Mistake(path, message, relation=True)
 
 
-def _overlaps(
-    scenario: Scenario, origins: Sequence[overrides.KeyPath], bodies: Sequence[placement.PlacedBody]
-) -> Iterator[mistakes.Mistake]:
+def _overlaps(scenario: Scenario, origins: Sequence[KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find bodies in the ground, each with its largest depth, bodies in walls, and bodies in one another."""
     if scenario.ground.profile is None:
         bottom = overlap.Outlines.of(bodies).bottom
-        for index in np.flatnonzero(bottom < -placement.TOLERANCE)[: mistakes.MAX_MISTAKES]:
+        for index in np.flatnonzero(bottom < -placement.TOLERANCE)[:MAX_MISTAKES]:
             depth = _mm(-float(bottom[index]))
-            yield mistakes.Mistake(
-                origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)"
-            )
+            yield Mistake(origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)")
     else:
         depths: dict[int, float] = {}
         for index, _, sunk in overlap.crossings(bodies, placement.profile_segments(scenario)):
@@ -436,21 +386,19 @@ def _overlaps(
         surface = placement.surface_heights(scenario, np.array([body.x for body in bodies]))
         for index, (origin, body) in enumerate(zip(origins, bodies, strict=True)):
             if index in depths:
-                yield mistakes.Mistake(
-                    origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile"
-                )
+                yield Mistake(origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile")
             elif body.y < surface[index]:
-                yield mistakes.Mistake(origin, f"body {body.name} lies below the ground's profile")
+                yield Mistake(origin, f"body {body.name} lies below the ground's profile")
     for index, wall, sunk in islice(overlap.crossings(bodies, placement.wall_segments(scenario)), MAX_OVERLAPS):
         message = f"body {bodies[index].name} and walls.{wall} overlap by {_mm(sunk)}; they may only touch"
-        yield mistakes.Mistake(origins[index], message)
+        yield Mistake(origins[index], message)
     for first, second, sunk in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):
         one, other, origin = bodies[first], bodies[second], origins[second]
         is_drawn = origin[0] == "structures" and scenario.structures[int(origin[1])].kind == "polygons"
         is_small = sunk <= ROUNDING * placement.smallest_width((one, other))
         cure = f'; shrink = "{_mm(sunk)}" of its structure parts them' if is_drawn and is_small else ""
         message = f"bodies {one.name} and {other.name} overlap by {_mm(sunk)}; they may only touch{cure}"
-        yield mistakes.Mistake(origin, message)
+        yield Mistake(origin, message)
 
 
 def _mm(length: float) -> str:
