@@ -5,10 +5,10 @@ import difflib
 import functools
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Self, cast
+from typing import NamedTuple, Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
 from blocksim.scenario.check import examine
@@ -26,7 +26,7 @@ from blocksim.scenario.overrides import (
     freeze,
     parse_override,
     read_key,
-    skip_blank,
+    skip,
     with_value,
 )
 from blocksim.scenario.resolved import scenario_to_toml
@@ -48,17 +48,17 @@ _CLEARER = {
     "Expected newline or end of document after a statement": "this cannot follow here; strings need quotes",
 }
 _SPACE = re.compile(r"(?:[ \t\n]|#[^\n]*)*")
-_SCALAR = re.compile(r"[^,\]}#\n]*")
-_STRINGS = (
-    re.compile(r'"""(?:[^\\"]|\\.|"{1,2}(?!"))*"{3,5}', re.DOTALL),
-    re.compile(r"'''(?:[^']|'{1,2}(?!'))*'{3,5}"),
-    re.compile(r'"(?:[^"\\\n]|\\.)*"'),
-    re.compile(r"'[^'\n]*'"),
+_VALUE = re.compile(
+    r'"""(?:[^\\"]|\\[\s\S]|"{1,2}(?!"))*"{3,5}'
+    r"|'''(?:[^']|'{1,2}(?!'))*'{3,5}"
+    r'|"(?:[^"\\\n]|\\.)*"'
+    r"|'[^'\n]*'"
+    r"|[^,\]}#\n]*[^,\]}#\s]"
 )
+"""A string, or else anything up to what separates values."""
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
+class Span(NamedTuple):
     """Part of one line: line from 1, column from 0, length in characters."""
 
     line: int
@@ -66,8 +66,7 @@ class Span:
     length: int
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(NamedTuple):
     """Positions of a key and its value; for a [table] both are the name in its header."""
 
     key: Span
@@ -93,18 +92,13 @@ class ScenarioText:
 
     def problem(self, path: KeyPath, message: str, at: str) -> Problem:
         """Show a mistake at its key or value, or at the nearest table around it."""
-        prefix = next((path[:size] for size in range(len(path), 0, -1) if path[:size] in self.places), ())
-        key = format_key(path)
-        if not prefix:
-            first = Span(1, 0, len(self.lines[0])) if self.text else None
-            return self.shown(message, key, first)
-        place = self.places[prefix]
-        return self.shown(message, key, place.key if at == "key" else place.value)
-
-    def span_at(self, index: int) -> Span:
-        """Return the place of one character of the text."""
-        before = self.text[:index]
-        return Span(before.count("\n") + 1, index - (before.rfind("\n") + 1), 1)
+        around = (self.places.get(path[:size]) for size in range(len(path), 0, -1))
+        place, span = next((one for one in around if one), None), None
+        if place is not None:
+            span = place.key if at == "key" else place.value
+        elif self.text:
+            span = Span(1, 0, len(self.lines[0]))
+        return self.shown(message, format_key(path), span)
 
     def shown(self, message: str, key: str, span: Span | None) -> Problem:
         """Make the problem with its line."""
@@ -133,7 +127,11 @@ class ScenarioText:
 
 def override_problem(override: Override, path: KeyPath, message: str, at: str) -> Problem:
     """Show a mistake in a value that was set from outside."""
-    text, end = override.text, override.key_length
+    text = override.text
+    try:
+        end = read_key(text)[1]
+    except ValueError:
+        end = max(1, len(text.partition("=")[0]))
     equals = text.find("=", end)
     value = len(text) - len(text[equals + 1 :].lstrip())
     in_key = equals < 0 or (at == "key" and len(path) <= len(override.path))
@@ -163,13 +161,13 @@ def locate(text: str) -> dict[KeyPath, Place]:
     """Map every path of a valid TOML text (lines end with a line feed) to its place; the first one of a table."""
     scanner = _Scanner(text)
     table: KeyPath = ()
-    at = scanner.skip(0)
+    at = skip(text, 0, _SPACE)
     while at < len(text):
         if text[at] == "[":
             table, at = scanner.header(at)
         else:
             at = scanner.pair(table, at)
-        at = scanner.skip(at)
+        at = skip(text, at, _SPACE)
     return scanner.places
 
 
@@ -179,19 +177,13 @@ class _Scanner:
     def __init__(self, text: str) -> None:
         self.text = text
         self.line_starts = [0, *(match.end() for match in re.finditer("\n", text))]
-        self.after = 0
         self.places: dict[KeyPath, Place] = {}
         self.list_sizes: dict[KeyPath, int] = {}
-
-    def skip(self, at: int) -> int:
-        """Pass white space, line ends and comments."""
-        found = _SPACE.match(self.text, at)
-        return at if found is None else found.end()
 
     def header(self, at: int) -> tuple[KeyPath, int]:
         """Read [a.b] or [[a.b]]: the path of the table that starts here, and the end of the header."""
         brackets = 2 if self.text.startswith("[[", at) else 1
-        start = skip_blank(self.text, at + brackets)
+        start = skip(self.text, at + brackets)
         parts, end = read_key(self.text, start)
         span = self.span(start, end)
         path: KeyPath = ()
@@ -204,7 +196,7 @@ class _Scanner:
             self.list_sizes[path] = self.list_sizes.get(path, 0) + 1
             path = self.latest(path)
             self.places[path] = Place(span, span)
-        return path, skip_blank(self.text, end) + brackets
+        return path, skip(self.text, end) + brackets
 
     def latest(self, path: KeyPath) -> KeyPath:
         """Step into the newest element where the path is an array of tables."""
@@ -214,11 +206,10 @@ class _Scanner:
     def pair(self, table: KeyPath, at: int) -> int:
         """Read key = value below a table."""
         parts, end = read_key(self.text, at)
-        key = self.span(at, end)
-        start = skip_blank(self.text, skip_blank(self.text, end) + 1)
+        start = skip(self.text, skip(self.text, end) + 1)
         path = (*table, *parts)
         after = self.value(path, start)
-        place = Place(key, self.span(start, after))
+        place = Place(self.span(at, end), self.span(start, after))
         for size in range(len(table) + 1, len(path)):
             self.places.setdefault(path[:size], place)
         self.places[path] = place
@@ -226,33 +217,23 @@ class _Scanner:
 
     def value(self, path: KeyPath, at: int) -> int:
         """Pass one value and record what is inside it; return its end."""
-        opening = self.text[at : at + 1]
-        if opening == "[":
-            for index, start in enumerate(self.elements(at, "]")):
-                element = (*path, index)
-                self.after = self.value(element, start)
-                span = self.span(start, self.after)
-                self.places[element] = Place(span, span)
-            return self.after
-        if opening == "{":
-            for start in self.elements(at, "}"):
-                self.after = self.pair(path, start)
-            return self.after
-        found = next((m for p in _STRINGS if (m := p.match(self.text, at))), None)
-        if found is not None:
-            return found.end()
-        scalar = _SCALAR.match(self.text, at)
-        return at if scalar is None else at + len(scalar[0].rstrip())
-
-    def elements(self, at: int, closing: str) -> Iterator[int]:
-        """Yield the start of each element; the caller sets `after` to its end, and finally to that of the list."""
-        at = self.skip(at + 1)
+        opening, number = self.text[at : at + 1], 0
+        if opening not in ("[", "{"):
+            return skip(self.text, at, _VALUE)
+        closing = "]" if opening == "[" else "}"
+        at = skip(self.text, at + 1, _SPACE)
         while at < len(self.text) and self.text[at] != closing:
-            yield at
-            at = self.skip(self.after)
+            if opening == "{":
+                at = self.pair(path, at)
+            else:
+                start, at = at, self.value((*path, number), at)
+                span = self.span(start, at)
+                self.places[*path, number] = Place(span, span)
+                number += 1
+            at = skip(self.text, at, _SPACE)
             if self.text.startswith(",", at):
-                at = self.skip(at + 1)
-        self.after = at + 1
+                at = skip(self.text, at + 1, _SPACE)
+        return at + 1
 
     def span(self, start: int, end: int) -> Span:
         """Return line and column of a part, cut at the end of its first line."""
@@ -312,7 +293,9 @@ class Document:
         source = ScenarioText(where, text.replace("\r\n", "\n"))
         endless = ENDLESS_KEY.search(source.text)
         if endless is not None:
-            raise ScenarioError([source.shown(TOO_DEEP, "", source.span_at(endless.start()))])
+            before = source.text[: endless.start()]
+            span = Span(before.count("\n") + 1, len(before) - (before.rfind("\n") + 1), 1)
+            raise ScenarioError([source.shown(TOO_DEEP, "", span)])
         try:
             data = cast("Data", freeze(tomllib.loads(source.text)))
         except tomllib.TOMLDecodeError as error:
@@ -421,9 +404,9 @@ def load_scenario(
     """
     document = document_of(source)
     document = replace(document, allow_outside=allow_outside or document.allow_outside)
-    if isinstance(overrides, Mapping):
-        return document.with_values({key: user_value(key, value) for key, value in overrides.items()}).build()
-    return document.with_settings(overrides).build()
+    if not isinstance(overrides, Mapping):
+        return document.with_settings(overrides).build()
+    return document.with_values({key: user_value(key, value) for key, value in overrides.items()}).build()
 
 
 def scenario_from_mapping(
@@ -443,7 +426,7 @@ def replace_values(scenario: Scenario, changes: Mapping[str, object]) -> Scenari
     `changes` are dotted keys with Python values or strings with a unit: {"ground.tilt": "10 deg"}. The given
     scenario is unchanged. Raises ScenarioError with all mistakes together.
     """
-    return document_of(scenario).with_values({key: user_value(key, value) for key, value in changes.items()}).build()
+    return load_scenario(scenario, changes)
 
 
 def document_of(source: Source) -> Document:

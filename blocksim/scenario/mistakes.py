@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from blocksim.scenario.models import base, loads, motion, record, scenario, stepping
-from blocksim.scenario.overrides import MISSING, NAMED, KeyPath, field_at, follow, keys_of, marks_of, table_at
+from blocksim.scenario.overrides import MISSING, NAMED, KeyPath, field_at, fields_of, follow, marks_of, table_at
 from blocksim.scenario.spelling import did_you_mean, meant_word, nearest
 from blocksim.scenario.structures import KINDS
 from blocksim.scenario.units import toml
@@ -111,7 +111,7 @@ def _missing(path: KeyPath, data: object) -> Mistake:
 
 
 def _unknown_key(path: KeyPath, data: object) -> Mistake:
-    schemes = [word for word, table in stepping.SCHEMES.items() if path[0] == "time" and path[-1] in keys_of(table)]
+    schemes = [word for word, table in stepping.SCHEMES.items() if path[0] == "time" and path[-1] in fields_of(table)]
     if schemes:
         present = stepping.scheme_of(follow(data, path[:-1]))
         return Mistake(
@@ -122,16 +122,16 @@ def _unknown_key(path: KeyPath, data: object) -> Mistake:
         if path[0] == "time"
         else table_at(path[:-1], data)
     )
-    known = keys_of(table) if table is not None else ()
+    known = fields_of(table) if table is not None else {}
     meant = meant_word(str(path[-1]), known)
     is_typing_error = nearest(str(path[-1]), known, most=1) is not None
     if not meant or (len(path) == 1 and not is_typing_error):
-        singles = (name for name in keys_of(scenario.Scenario) if name not in NAMED and name not in base.SYSTEMS)
+        singles = (name for name in fields_of(scenario.Scenario) if name not in NAMED and name not in base.SYSTEMS)
         tables = ((name, table_at((name,), {})) for name in singles)
-        having = [name for name, one in tables if one is not None and path[-1] in keys_of(one)]
+        having = [name for name, one in tables if one is not None and path[-1] in fields_of(one)]
         if len(having) == 1:
             return Mistake(path, f"unknown key, did you mean {f'{having[0]}.{path[-1]}'!r}?", at="key")
-    if len(path) > 1 and not is_typing_error and path[-1] in keys_of(scenario.Scenario):
+    if len(path) > 1 and not is_typing_error and path[-1] in fields_of(scenario.Scenario):
         return Mistake(path, f"unknown key, {path[-1]} belongs at the top of the file", at="key")
     hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
     return Mistake(path, f"unknown key, {hint}", at="key", meant=(*path[:-1], meant) if meant else ())

@@ -56,23 +56,23 @@ def read_key(text: str, start: int = 0) -> tuple[tuple[str, ...], int]:
     """
     parts: list[str] = []
     while len(parts) < MAX_PARTS:
-        start = skip_blank(text, start)
+        start = skip(text, start)
         found = next((m for p in (_BASIC, _LITERAL, _BARE) if (m := p.match(text, start))), None)
         if found is None:
             raise ValueError("not a key")
         part = found[0]
         literal = part[1:-1] if part[0] == "'" else part
         parts.append(str(tomllib.loads(f"v = {part}")["v"]) if part[0] == '"' else literal)
-        after = skip_blank(text, found.end())
+        after = skip(text, found.end())
         if not text.startswith(".", after):
             return tuple(parts), found.end()
         start = after + 1
     raise ValueError("too many parts")
 
 
-def skip_blank(text: str, start: int) -> int:
-    """Return the index of the first character from `start` that is neither space nor tab."""
-    found = _BLANK.match(text, start)
+def skip(text: str, start: int, what: re.Pattern[str] = _BLANK) -> int:
+    """Return where something ends that may be at an index: spaces and tabs, or another pattern."""
+    found = what.match(text, start)
     return start if found is None else found.end()
 
 
@@ -80,19 +80,19 @@ def skip_blank(text: str, start: int) -> int:
 def parse_key(text: str) -> tuple[str, ...]:
     """Read a whole text as one dotted key; raises ValueError."""
     parts, end = read_key(text)
-    if skip_blank(text, end) != len(text):
+    if skip(text, end) != len(text):
         raise ValueError("not a key")
     return parts
 
 
 def format_key(path: Sequence[str | int]) -> str:
     """Write a path as a dotted key, with quotes where TOML wants them."""
-    return ".".join(part if _BARE.fullmatch(part) else _quoted(part) for part in map(str, path))
-
-
-def _quoted(part: str) -> str:
-    escaped = part.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    parts = []
+    for part in map(str, path):
+        escaped = part.replace("\\", "\\\\").replace('"', '\\"')
+        quoted = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped)
+        parts.append(part if _BARE.fullmatch(part) else f'"{quoted}"')
+    return ".".join(parts)
 
 
 def follow(data: object, path: Sequence[str | int]) -> object:
@@ -115,7 +115,7 @@ def table_at(path: Sequence[str | int], data: object) -> type[Table] | None:
         entries = [(get_origin(option), get_args(option)) for option in options(annotation)]
         inner = [arguments[1] for origin, arguments in entries if origin is dict]
         inner += [arguments[0] for origin, arguments in entries if origin is tuple and isinstance(part, int)]
-        field = None if table is None else _fields(table).get(part)
+        field = None if table is None else fields_of(table).get(str(part))
         annotation = inner[0] if inner else None if field is None else field.annotation
     return _table(annotation, follow(data, path))
 
@@ -123,7 +123,7 @@ def table_at(path: Sequence[str | int], data: object) -> type[Table] | None:
 def field_at(path: Sequence[str | int], data: object) -> FieldInfo | None:
     """Return the model field at a path, or None where the models know no such key."""
     table = table_at(path[:-1], data) if path else None
-    return None if table is None else _fields(table).get(path[-1])
+    return None if table is None else fields_of(table).get(str(path[-1]))
 
 
 def field_of(key: str, scenario: Scenario) -> FieldInfo | None:
@@ -152,14 +152,9 @@ def is_known(path: Sequence[str | int], data: object) -> bool:
     )
 
 
-def keys_of(table: type[Table]) -> tuple[str, ...]:
-    """Return the keys that a table may have, as written in the file."""
-    return tuple(str(key) for key in _fields(table))
-
-
-def _fields(table: type[Table]) -> dict[str | int, FieldInfo]:
-    """Return the fields of a table by their keys; of a scenario those of the tables of all systems too."""
-    systems: dict[str | int, FieldInfo] = {
+def fields_of(table: type[Table]) -> dict[str, FieldInfo]:
+    """Return the fields of a table by their keys in the file; of a scenario those of the tables of all systems too."""
+    systems = {
         name: FieldInfo(annotation=tuple[entry, ...], default=(), description=entry.__doc__)  # type: ignore[valid-type]
         for name, entry in (SYSTEMS.items() if table is Scenario else ())
     }
@@ -167,7 +162,7 @@ def _fields(table: type[Table]) -> dict[str | int, FieldInfo]:
 
 
 @functools.cache
-def _own_fields(table: type[Table]) -> dict[str | int, FieldInfo]:
+def _own_fields(table: type[Table]) -> dict[str, FieldInfo]:
     return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != HELD}
 
 
@@ -176,21 +171,13 @@ def _table(annotation: object, node: object) -> type[Table] | None:
     if len(tables) > 1:
         tables = [*SCHEMES.values()] if issubclass(tables[0], Time) else tables
         for table in tables:
-            tag = _tag(table)  # the key whose word distinguishes the alternatives, here or by default
+            tag = next(tag for tag in TAGS if tag in table.model_fields)  # the key that tells, here or by default
             word = node.get(tag, MISSING) if isinstance(node, Mapping) else MISSING
-            if (table.model_fields[tag].default if word is MISSING else word) in kinds_of(table):
+            field = table.model_fields[tag]
+            if (field.default if word is MISSING else word) in get_args(field.annotation):
                 return table
         return None
     return tables[0] if tables else None
-
-
-def _tag(table: type[Table]) -> str:
-    return next(tag for tag in TAGS if tag in table.model_fields)
-
-
-def kinds_of(table: type[Table]) -> tuple[str, ...]:
-    """Return the words that distinguish this table from its alternatives."""
-    return get_args(table.model_fields[_tag(table)].annotation)
 
 
 def si_unit(info: FieldInfo) -> str:
@@ -242,14 +229,6 @@ class Override:
     text: str
     path: KeyPath
 
-    @property
-    def key_length(self) -> int:
-        """Length of the key in `text`."""
-        try:
-            return read_key(self.text)[1]
-        except ValueError:
-            return max(1, len(self.text.partition("=")[0]))
-
 
 class TooDeepError(ValueError):
     """Tables or lists are nested deeper than any scenario needs."""
@@ -275,7 +254,7 @@ def parse_override(text: str) -> tuple[tuple[str, ...], object]:
         path, end = read_key(text)
     except ValueError:
         raise UnfitOverrideError("write KEY=VALUE with a dotted key, such as contact.stiffness_scale=0.1") from None
-    equals = skip_blank(text, end)
+    equals = skip(text, end)
     value = text[equals + 1 :].strip()
     if text[equals : equals + 1] != "=" or not value:
         raise UnfitOverrideError("write KEY=VALUE, such as contact.stiffness_scale=0.1")
