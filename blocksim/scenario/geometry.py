@@ -2,42 +2,35 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Corner = tuple[float, float]
+Corners = tuple[Corner, ...]
+"""Corners (m) counter-clockwise."""
 ROUND_OFF = 1e-9
 """m; polygons that overlap by less touch."""
 DISC_SHARE = 0.5 * (1.0 - 1e-6)
 """Radius of a particle in spacings, less what round-off may take."""
 
 
-def corners_of(points: Sequence[tuple[float, float]]) -> Floats:
+def corners_of(points: Sequence[Corner]) -> Floats:
     """Return corners (m) as an array (k, 2), counter-clockwise."""
     corners = np.array(points, dtype=np.float64).reshape(-1, 2)
-    return corners if signed_area(corners) >= 0.0 else corners[::-1]
-
-
-def signed_area(corners: Floats) -> float:
-    """Return the area (m2) of a polygon (k, 2), positive where it is counter-clockwise."""
-    x, y = corners.T
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-
-
-def edge_ends(corners: Floats) -> tuple[Floats, Floats]:
-    """Return where the edges of a polygon begin and end, (k, 2) each."""
-    return corners, np.roll(corners, -1, axis=0)
+    return corners if area_of(points) >= 0.0 else corners[::-1]
 
 
 def is_inside(points: Floats, corners: Floats) -> Flags:
     """Return for points (n, 2) whether they lie in a polygon; on an edge either."""
     found = np.zeros(len(points), dtype=bool)
     x, y = points.T
-    for (x0, y0), (x1, y1) in zip(*edge_ends(corners), strict=True):
+    for (x0, y0), (x1, y1) in _edges(corners):
         if y0 != y1:
             crosses = (y0 > y) != (y1 > y)
             found ^= crosses & (x < x0 + (y - y0) * (x1 - x0) / (y1 - y0))
@@ -47,30 +40,26 @@ def is_inside(points: Floats, corners: Floats) -> Flags:
 def edge_distance(points: Floats, corners: Floats) -> Floats:
     """Return the distances (m) of points (n, 2) from the nearest edge."""
     nearest = np.full(len(points), np.inf)
-    for begin, end in zip(*edge_ends(corners), strict=True):
+    for begin, end in _edges(corners):
         along, beyond = end - begin, points - begin
         share = np.clip(beyond @ along / float(along @ along), 0.0, 1.0)
         nearest = np.minimum(nearest, np.hypot(*(beyond - np.outer(share, along)).T))
     return nearest
 
 
-def is_deep_inside(points: Floats, corners: Floats) -> Flags:
-    """Return for points (n, 2) whether they lie in a polygon and not on its edge."""
-    return is_inside(points, corners) & (edge_distance(points, corners) > ROUND_OFF)
-
-
 def cuts(begin: Floats, end: Floats, corners: Floats) -> bool:
     """Return True if a straight line (m) has a part inside a polygon."""
     along = end - begin
     shares = [0.0, 1.0]
-    for e0, e1 in zip(*edge_ends(corners), strict=True):
+    for e0, e1 in _edges(corners):
         edge, beyond = e1 - e0, e0 - begin
         across = along[0] * edge[1] - along[1] * edge[0]
         if across != 0.0:
             shares.append(float((beyond[0] * edge[1] - beyond[1] * edge[0]) / across))
     ordered = np.unique(np.clip(shares, 0.0, 1.0))
     middles = 0.5 * (ordered[1:] + ordered[:-1])
-    return bool(is_deep_inside(begin + np.outer(middles, along), corners).any())
+    points = begin + np.outer(middles, along)
+    return bool(np.any(is_inside(points, corners) & (edge_distance(points, corners) > ROUND_OFF)))
 
 
 def overlap(one: Floats, other: Floats) -> bool:
@@ -79,18 +68,19 @@ def overlap(one: Floats, other: Floats) -> bool:
     if np.any(np.maximum(*lows) >= np.minimum(*highs) - ROUND_OFF):
         return False
     for a, b in ((one, other), (other, one)):
-        if any(cuts(begin, end, b) for begin, end in zip(*edge_ends(a), strict=True)):
+        if any(cuts(begin, end, b) for begin, end in _edges(a)):
             return True
     heights = np.unique(one[:, 1])  # neither cuts the other: a point in one of them tells whether one is in the other
     y = 0.5 * (heights[0] + heights[1])
     low, high = crossings_below(one, np.array([y]), axis=1)[0][:2]
-    return bool(is_deep_inside(np.array([[0.5 * (low + high), y]]), other).any())
+    point = np.array([[0.5 * (low + high), y]])
+    return bool(is_inside(point, other)[0] and edge_distance(point, other)[0] > ROUND_OFF)
 
 
 def crossings_below(corners: Floats, places: Floats, axis: int) -> list[Floats]:
     """Return where lines at these places (m) along an axis cross the edges of a polygon, sorted, for each place."""
     other = 1 - axis
-    begins, ends = edge_ends(corners)
+    begins, ends = corners, np.roll(corners, -1, axis=0)
     found = []
     for place in places:
         is_crossed = (begins[:, axis] > place) != (ends[:, axis] > place)
@@ -119,13 +109,11 @@ def self_crossings(corners: Floats) -> Iterator[tuple[int, int]]:
     def side(p: Floats, q: Floats, r: Floats) -> float:
         return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
 
-    edges = list(zip(*edge_ends(corners), strict=True))
+    edges = [*_edges(corners)]
     for i, (a0, a1) in enumerate(edges):
         for j, (b0, b1) in enumerate(edges[i + 2 :], start=i + 2):
-            low, high = (
-                np.maximum(np.minimum(a0, a1), np.minimum(b0, b1)),
-                np.minimum(np.maximum(a0, a1), np.maximum(b0, b1)),
-            )
+            low = np.maximum(np.minimum(a0, a1), np.minimum(b0, b1))
+            high = np.minimum(np.maximum(a0, a1), np.maximum(b0, b1))
             crosses = side(a0, a1, b0) * side(a0, a1, b1) <= 0.0 and side(b0, b1, a0) * side(b0, b1, a1) <= 0.0
             if (j + 1) % len(edges) != i and crosses and bool((low <= high).all()):
                 yield i, j
@@ -145,10 +133,6 @@ def fill_lattice(corners: Floats, spacing: float) -> Floats:
     kept = is_inside(places, corners) & (edge_distance(places, corners) >= DISC_SHARE * spacing)
     return places[kept]
 
-
-Corner = tuple[float, float]
-Corners = tuple[Corner, ...]
-"""Corners (m) counter-clockwise."""
 
 FEWEST, MOST = 3, 16
 RECTANGLE = 4
@@ -253,8 +237,9 @@ def shrink_outline(points: Sequence[Corner], way: float) -> list[Corner]:
     A corner moves along (n + m) / (1 + n·m), n and m the inward normals of its edges: to where the moved edges meet.
     """
     sense = math.copysign(1.0, area_of(points))
-    ways = [(b[0] - a[0], b[1] - a[1], math.dist(a, b)) for a, b in _edges(points)]
-    normals = [(-sense * y / length, sense * x / length) for x, y, length in ways]
+    normals = [
+        (-sense * (b[1] - a[1]) / math.dist(a, b), sense * (b[0] - a[0]) / math.dist(a, b)) for a, b in _edges(points)
+    ]
     moved = []
     for (x, y), n, m in zip(points, (normals[-1], *normals), normals, strict=False):
         share = way / (1.0 + _dot(n, m))
@@ -308,8 +293,10 @@ def faults(points: Sequence[Corner]) -> Iterator[tuple[int | None, str]]:
             yield number, f"the outline is nearly straight here ({180.0 - math.degrees(turn):.6g} deg); leave it out"
 
 
-def _edges(corners: Sequence[Corner]) -> Iterator[tuple[Corner, Corner]]:
-    return zip(corners, (*corners[1:], corners[0]), strict=True)
+def _edges(corners: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
+    """Yield both ends of every edge, of corners as tuples or as an array (k, 2)."""
+    begins = [*corners]
+    return zip(begins, begins[1:] + begins[:1], strict=True)
 
 
 def _minus(a: Corner, b: Corner) -> Corner:
@@ -332,8 +319,7 @@ def voronoi(points: Sequence[Corner], region: Sequence[Corner]) -> list[list[Cor
     """Return the cell (m) of each point, counter-clockwise; so are the corners of the convex region."""
     places = np.array(points)
     cells = []
-    for number in range(len(points)):
-        x, y = (float(one) for one in places[number])
+    for number, (x, y) in enumerate(places.tolist()):
         cell = [(u - x, v - y) for u, v in region]
         for dx, dy in _around(number, places):
             reach = max(u * u + v * v for u, v in cell)
@@ -393,12 +379,11 @@ def clean_cell(cell: Sequence[Corner], least: float) -> list[Corner]:
         needless, losses = [], []
         for number, here in enumerate(corners):
             before, after = corners[number - 1], corners[(number + 1) % len(corners)]
-            one, other = (here[0] - before[0], here[1] - before[1]), (after[0] - here[0], after[1] - here[1])
-            turn = math.atan2(one[0] * other[1] - one[1] * other[0], one[0] * other[0] + one[1] * other[1])
+            one, other = _minus(here, before), _minus(after, here)
+            turn = math.atan2(_cross(one, other), _dot(one, other))
             is_short = min(math.dist(before, here), math.dist(here, after)) < shortest
             needless += [number] if is_short or turn < 2.0 * STRAIGHT else []
-            wide, far = (after[0] - before[0], after[1] - before[1])
-            losses.append(one[0] * far - one[1] * wide)
+            losses.append(_cross(one, _minus(after, before)))
         if not needless and len(corners) <= MOST:
             break
         corners.pop(min(needless or range(len(corners)), key=losses.__getitem__))

@@ -26,97 +26,79 @@ POLYGONS_AT_ONCE = 10_000
 """Pairs with a polygon that are examined together; each takes up to 2 kB."""
 
 
-class Rectangles(NamedTuple):
-    """Centres, half extents and directions of rectangles, each (n,)."""
+class Outlines(NamedTuple):
+    """Outlines of n bodies or straight pieces: rectangles, and polygons in boxes along their own axes."""
 
-    x: Floats
+    x: Floats  # (n,) middles, half extents and directions of the rectangles or boxes, SI
     y: Floats
     half_x: Floats
     half_y: Floats
     cosine: Floats
     sine: Floats
-
-    @classmethod
-    def of(cls, bodies: Sequence[PlacedBody]) -> Self:
-        """Take the boxes along the own axes of placed bodies; of rectangles that is the body."""
-        names = ("x", "y", "size_x", "size_y")
-        x, y, size_x, size_y = (np.fromiter(map(attrgetter(one), bodies), np.float64, len(bodies)) for one in names)
-        # math, as numpy's functions may differ in the last digit
-        cosine, sine = (np.fromiter((of(body.angle) for body in bodies), np.float64) for of in (math.cos, math.sin))
-        for index in (number for number, body in enumerate(bodies) if body.outline):
-            middle_x, middle_y = middle_of(bodies[index].outline)
-            x[index] += cosine[index] * middle_x - sine[index] * middle_y
-            y[index] += sine[index] * middle_x + cosine[index] * middle_y
-        return cls(x, y, 0.5 * size_x, 0.5 * size_y, cosine, sine)
-
-    @classmethod
-    def along(cls, segments: Sequence[PlacedSegment]) -> Self:
-        """Take straight pieces as rectangles without height."""
-        ends = np.array([(s.x0, s.y0, s.x1, s.y1, s.length) for s in segments], dtype=np.float64).reshape(-1, 5)
-        x0, y0, x1, y1, length = ends.T
-        return cls(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * length, 0.0 * length, (x1 - x0) / length, (y1 - y0) / length)
-
-    def some(self, indices: Integers) -> Self:
-        """Take some of them, in this order."""
-        return type(self)(*(values[indices] for values in self))
-
-    def half_extent(self, axis_x: Floats | float, axis_y: Floats | float) -> Floats:
-        """Half of the extents along unit vectors."""
-        along = np.abs(axis_x * self.cosine + axis_y * self.sine)
-        across = np.abs(axis_y * self.cosine - axis_x * self.sine)
-        return self.half_x * along + self.half_y * across
-
-
-class Outlines(NamedTuple):
-    """Outlines of n bodies or straight pieces: rectangles, and polygons in boxes along their own axes."""
-
-    boxes: Rectangles
     kinds: Integers  # (n,) number of the polygon, RECTANGLE for none
     polygons: Floats  # (s, k, 2) corners (m) along these axes from the middle of the box, the last one repeated
 
     @classmethod
     def of(cls, bodies: Sequence[PlacedBody]) -> Self:
         """Take those of placed bodies."""
+        names = ("x", "y", "size_x", "size_y")
+        x, y, size_x, size_y = (np.fromiter(map(attrgetter(one), bodies), np.float64, len(bodies)) for one in names)
+        # math, as numpy's functions may differ in the last digit
+        cosine, sine = (np.fromiter((of(body.angle) for body in bodies), np.float64) for of in (math.cos, math.sin))
         numbers: dict[Corners, int] = {(): RECTANGLE}
-        kinds = (numbers.setdefault(body.outline, len(numbers) - 1) for body in bodies)
-        kind = np.fromiter(kinds, np.int64, len(bodies))
-        return cls(Rectangles.of(bodies), kind, _table([*numbers][1:]))
+        kind_of = (numbers.setdefault(body.outline, len(numbers) - 1) for body in bodies)
+        kinds = np.fromiter(kind_of, np.int64, len(bodies))
+        for index in np.flatnonzero(kinds != RECTANGLE).tolist():
+            middle_x, middle_y = middle_of(bodies[index].outline)
+            x[index] += cosine[index] * middle_x - sine[index] * middle_y
+            y[index] += sine[index] * middle_x + cosine[index] * middle_y
+        return cls(x, y, 0.5 * size_x, 0.5 * size_y, cosine, sine, kinds, _table([*numbers][1:]))
 
     @classmethod
     def along(cls, segments: Sequence[PlacedSegment]) -> Self:
         """Take straight pieces as rectangles without height."""
-        return cls.rectangles(Rectangles.along(segments))
+        ends = np.array([(s.x0, s.y0, s.x1, s.y1, s.length) for s in segments], dtype=np.float64).reshape(-1, 5)
+        x0, y0, x1, y1, length = ends.T
+        middles, halves = (0.5 * (x0 + x1), 0.5 * (y0 + y1)), (0.5 * length, 0.0 * length)
+        return cls.rectangles(*middles, *halves, (x1 - x0) / length, (y1 - y0) / length)
 
     @classmethod
-    def rectangles(cls, boxes: Rectangles) -> Self:
-        """Take rectangles alone."""
-        return cls(boxes, np.full(boxes.x.size, RECTANGLE), _table([]))
+    def rectangles(cls, *boxes: Floats) -> Self:
+        """Take rectangles alone: their middles, half extents, cosines and sines."""
+        x, y, half_x, half_y, cosine, sine = boxes
+        return cls(x, y, half_x, half_y, cosine, sine, np.full(x.size, RECTANGLE), _table([]))
+
+    def half_extent(self, axis_x: Floats | float, axis_y: Floats | float) -> Floats:
+        """Half of the extents of the boxes along unit vectors."""
+        along = np.abs(axis_x * self.cosine + axis_y * self.sine)
+        across = np.abs(axis_y * self.cosine - axis_x * self.sine)
+        return self.half_x * along + self.half_y * across
 
     def and_pieces(self, pieces: "Outlines") -> "Outlines":
         """Return these and rectangles after them."""
-        both = (np.concatenate(values) for values in zip(self.boxes, pieces.boxes, strict=True))
-        return Outlines(Rectangles(*both), np.concatenate([self.kinds, pieces.kinds]), self.polygons)
+        both = {name: np.concatenate([getattr(self, name), getattr(pieces, name)]) for name in self._fields[:-1]}
+        return self._replace(**both)
 
     def some(self, indices: Integers) -> "Outlines":
         """Take some of them, in this order."""
-        return Outlines(self.boxes.some(indices), self.kinds[indices], self.polygons)
+        return self._replace(**{name: getattr(self, name)[indices] for name in self._fields[:-1]})
 
     def corners(self) -> Floats:
         """Return all corners (m), counter-clockwise, the last one repeated, (n, k, 2) with k of at least 4."""
-        boxes, count = self.boxes, max(4, self.polygons.shape[1])
+        count = max(4, self.polygons.shape[1])
         signs = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), *[(-1.0, 1.0)] * (count - 3)])
-        local = signs * np.stack([boxes.half_x, boxes.half_y], axis=-1)[:, None]
+        local = signs * np.stack([self.half_x, self.half_y], axis=-1)[:, None]
         polygon = self.kinds != RECTANGLE
         local[polygon] = self.polygons[self.kinds[polygon]]
-        cosine, sine = boxes.cosine[:, None], boxes.sine[:, None]
-        x = boxes.x[:, None] + cosine * local[..., 0] - sine * local[..., 1]
-        y = boxes.y[:, None] + sine * local[..., 0] + cosine * local[..., 1]
+        cosine, sine = self.cosine[:, None], self.sine[:, None]
+        x = self.x[:, None] + cosine * local[..., 0] - sine * local[..., 1]
+        y = self.y[:, None] + sine * local[..., 0] + cosine * local[..., 1]
         return np.stack([x, y], axis=-1)
 
     @property
     def bottom(self) -> Floats:
         """Heights of the lowest corners."""
-        lowest = self.boxes.y - self.boxes.half_extent(0.0, 1.0)
+        lowest = self.y - self.half_extent(0.0, 1.0)
         polygon = np.flatnonzero(self.kinds != RECTANGLE)
         for some in _portions(polygon):
             lowest[some] = self.some(some).corners()[..., 1].min(axis=1)
@@ -140,12 +122,10 @@ def _portions(indices: Integers) -> Iterator[Integers]:
 
 def penetration(ones: Outlines, others: Outlines) -> Floats:
     """Return the penetration depths (m) of pairs of outlines; zero or negative where they are apart."""
-    one, other = ones.boxes, others.boxes
-    x, y = other.x - one.x, other.y - one.y
-    axes = [axis for r in (one, other) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
-    depth: Floats = np.min(
-        [one.half_extent(*axis) + other.half_extent(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes], axis=0
-    )
+    x, y = others.x - ones.x, others.y - ones.y
+    axes = [axis for r in (ones, others) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
+    reaches = (ones.half_extent(*axis) + others.half_extent(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes)
+    depth: Floats = np.min([*reaches], axis=0)
     polygon = (ones.kinds != RECTANGLE) | (others.kinds != RECTANGLE)
     for some in _portions(np.flatnonzero(polygon & (depth > 0.0))):
         corners, behind = ones.some(some).corners(), others.some(some).corners()
@@ -181,7 +161,7 @@ def crossings(bodies: Sequence[PlacedBody], segments: Sequence[PlacedSegment]) -
 
 def _penetrating(outlines: Outlines, bodies: int, *, within: bool) -> Iterator[tuple[int, int, float]]:
     """Yield the pairs among the first `bodies` outlines, or of one of them and one of the others, that penetrate."""
-    for one, other in near_pairs(outlines.boxes):
+    for one, other in near_pairs(outlines):
         first, second = np.minimum(one, other), np.maximum(one, other)
         wanted = second < bodies if within else (first < bodies) & (second >= bodies)
         first, second = first[wanted], second[wanted]
@@ -190,50 +170,41 @@ def _penetrating(outlines: Outlines, bodies: int, *, within: bool) -> Iterator[t
         yield from zip(first[deep].tolist(), second[deep].tolist(), depth[deep].tolist(), strict=True)
 
 
-class _Boxes(NamedTuple):
-    """Axis-parallel boxes, each (n,)."""
-
-    low_x: Floats
-    low_y: Floats
-    high_x: Floats
-    high_y: Floats
-
-
-def near_pairs(rectangles: Rectangles) -> Iterator[Pairs]:
+def near_pairs(outlines: Outlines) -> Iterator[Pairs]:
     """Yield the indices of all pairs whose axis-parallel boxes meet, each pair once, many at a time.
 
     Sorted into cells as large as the largest box, a box reaches over four cells at most. Boxes of very different sizes
     would share one cell, so every size (from one power of two to the next) has cells of its own, in which the boxes of
     that size meet one another and all smaller ones.
     """
-    extent_x, extent_y = rectangles.half_extent(1.0, 0.0), rectangles.half_extent(0.0, 1.0)
-    x, y = rectangles.x, rectangles.y
-    boxes = _Boxes(x - extent_x, y - extent_y, x + extent_x, y + extent_y)
-    if x.size <= FEW:
-        one, other = np.triu_indices(x.size, 1)
-        near = _intersect(boxes, one, other)
+    extents = np.stack([outlines.half_extent(1.0, 0.0), outlines.half_extent(0.0, 1.0)], axis=1)
+    middles = np.stack([outlines.x, outlines.y], axis=1)
+    low, high = middles - extents, middles + extents
+    if len(middles) <= FEW:
+        one, other = np.triu_indices(len(middles), 1)
+        near = _meet(low, high, one, other)
         yield one[near], other[near]
         return
-    level = np.frexp(np.maximum(extent_x, extent_y))[1]
+    level = np.frexp(extents.max(axis=1))[1]
     for size in np.unique(level):
         members = np.flatnonzero(level <= size)
-        is_small = level[members] < size
-        cell = (_cell(extent_x[members]), _cell(extent_y[members]))
-        for one, other in _in_cells(_Boxes(*(side[members] for side in boxes)), is_small, cell):
+        cell = 2.0 * ROOM * extents[members].max(axis=0)  # m: a little more than the largest box, which touches two
+        cell[cell == 0.0] = 1.0
+        for one, other in _in_cells(low[members], high[members], level[members] < size, cell):
             yield members[one], members[other]
 
 
-def _cell(half_extent: Floats) -> float:
-    """Return the side (m) of cells of which no box touches three: a little more than the largest box."""
-    return 2.0 * ROOM * float(half_extent.max()) or 1.0
-
-
-def _in_cells(boxes: _Boxes, is_small: NDArray[np.bool_], cell: tuple[float, float]) -> Iterator[Pairs]:
+def _in_cells(low: Floats, high: Floats, is_small: NDArray[np.bool_], cell: Floats) -> Iterator[Pairs]:
     """Yield pairs of boxes that meet, at least one of each not small; no box is larger than a cell (m, m)."""
     with np.errstate(over="ignore"):  # places beyond the last number share a cell
-        low = np.floor(boxes.low_x / cell[0]), np.floor(boxes.low_y / cell[1])
-        high = np.floor(boxes.high_x / cell[0]), np.floor(boxes.high_y / cell[1])
-    box, column, row = _entries(low, high)
+        first, last = np.floor(low / cell), np.floor(high / cell)
+    wide, tall = (last != first).T
+    box = np.concatenate([np.flatnonzero(one) for one in (np.ones_like(wide), tall, wide, wide & tall)])
+    column, row = first[box].T
+    alone, of_tall, of_wide = len(first), int(tall.sum()), int(wide.sum())  # each box in each cell that it reaches into
+    column[alone + of_tall :] = last[box[alone + of_tall :], 0]
+    row[alone : alone + of_tall] = last[box[alone : alone + of_tall], 1]
+    row[alone + of_tall + of_wide :] = last[box[alone + of_tall + of_wide :], 1]
     order = np.lexsort((is_small[box], row, column))
     box, column, row = box[order], column[order], row[order]
     is_new = (column[1:] != column[:-1]) | (row[1:] != row[:-1])
@@ -243,28 +214,15 @@ def _in_cells(boxes: _Boxes, is_small: NDArray[np.bool_], cell: tuple[float, flo
     for one, other in _expanded(partners):
         i, j = box[one], box[other]
         # a pair may meet in several cells; it counts in that of the lower left corner of what it has in common
-        is_first = (np.maximum(low[0][i], low[0][j]) == column[one]) & (np.maximum(low[1][i], low[1][j]) == row[one])
-        near = is_first & _intersect(boxes, i, j)
+        corner = np.maximum(first[i], first[j])
+        near = (corner[:, 0] == column[one]) & (corner[:, 1] == row[one]) & _meet(low, high, i, j)
         yield i[near], j[near]
 
 
-def _intersect(boxes: _Boxes, i: Integers, j: Integers) -> NDArray[np.bool_]:
+def _meet(low: Floats, high: Floats, i: Integers, j: Integers) -> NDArray[np.bool_]:
     """Return for each two boxes whether they touch or overlap."""
-    along = (boxes.low_x[i] <= boxes.high_x[j]) & (boxes.low_x[j] <= boxes.high_x[i])
-    across = (boxes.low_y[i] <= boxes.high_y[j]) & (boxes.low_y[j] <= boxes.high_y[i])
-    return along & across
-
-
-def _entries(low: tuple[Floats, Floats], high: tuple[Floats, Floats]) -> tuple[Integers, Floats, Floats]:
-    """Return box, column and row of every cell that a box reaches into."""
-    everyone = np.arange(low[0].size)
-    found = []
-    for columns in (low[0], high[0]):
-        for rows in (low[1], high[1]):
-            is_new = ((columns is low[0]) | (high[0] != low[0])) & ((rows is low[1]) | (high[1] != low[1]))
-            found.append((everyone[is_new], columns[is_new], rows[is_new]))
-    box, column, row = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return box, column, row
+    is_near: NDArray[np.bool_] = np.all((low[i] <= high[j]) & (low[j] <= high[i]), axis=1)
+    return is_near
 
 
 def _expanded(partners: Integers) -> Iterator[Pairs]:

@@ -101,7 +101,7 @@ def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequen
     for _, segment, depth in overlap.crossings([strip], segments):
         if depth > _margin(body):
             yield "a wall" if segment >= len(segments) - len(scenario.walls) else "the ground"
-    for pairs in overlap.near_pairs(overlap.Rectangles.of([strip, *bodies])):
+    for pairs in overlap.near_pairs(overlap.Outlines.of([strip, *bodies])):
         for second in np.maximum(*pairs)[np.minimum(*pairs) == 0]:
             other = bodies[int(second) - 1]
             depths = overlap.penetration(overlap.Outlines.of([strip]), overlap.Outlines.of([other]))

@@ -33,7 +33,7 @@ from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
 from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
-from blocksim.scenario.overlap import Outlines, Rectangles, penetration
+from blocksim.scenario.overlap import Outlines, penetration
 from blocksim.scenario.placement import smallest_width
 from blocksim.simulation.result import NOT_AT_REST, RestState
 from blocksim.simulation.schemes import AnyScene, scheme_of
@@ -325,7 +325,7 @@ class _Settlement:
         now = outlines_of(self.scene.world)
         now = now.some(np.arange(now.kinds.size - 1))  # without the half-plane
         later = _at(now, self._places() + change)
-        one, other = _near(later.boxes, self.is_free)
+        one, other = _near(later, self.is_free)
         most = ARC * share**2 * self.smallest
         deeper = penetration(later.some(one), later.some(other)) - np.maximum(
             penetration(now.some(one), now.some(other)), 0.0
@@ -368,7 +368,7 @@ class _Settlement:
         )
 
 
-def _near(boxes: Rectangles, is_free: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _near(boxes: Outlines, is_free: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the pairs of free boxes, the first of which may be, with all others.
 
     Without those whose circles do not meet.
@@ -384,13 +384,13 @@ def _near(boxes: Rectangles, is_free: NDArray[np.bool_]) -> tuple[NDArray[np.int
 
 def _at(outlines: Outlines, places: Floats) -> Outlines:
     """Return the outlines with the first of them at other places (3, b), x, y (m) and angle (rad)."""
-    boxes, count = outlines.boxes, places.shape[1]
+    count = places.shape[1]
     values = (places[0], places[1], np.cos(places[2]), np.sin(places[2]))
     moved = {
-        name: np.concatenate([value, getattr(boxes, name)[count:]])
+        name: np.concatenate([value, getattr(outlines, name)[count:]])
         for name, value in zip(("x", "y", "cosine", "sine"), values, strict=True)
     }
-    return outlines._replace(boxes=boxes._replace(**moved))
+    return outlines._replace(**moved)
 
 
 def _restore(scene: AnyScene, kept: Sequence[NDArray[Any]]) -> None:

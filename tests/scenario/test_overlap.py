@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.scenario.geometry import Corner, centre_outline
-from blocksim.scenario.overlap import Outlines, Rectangles, crossings, near_pairs, overlapping_pairs, penetration
+from blocksim.scenario.overlap import Outlines, crossings, near_pairs, overlapping_pairs, penetration
 from blocksim.scenario.placement import PlacedBody, PlacedSegment
 
 
@@ -157,7 +157,7 @@ def test_overlaps_are_found_in_portions(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def pairs_compared(bodies: list[PlacedBody]) -> int:
-    return sum(one.size for one, _ in near_pairs(Rectangles.of(bodies)))
+    return sum(one.size for one, _ in near_pairs(Outlines.of(bodies)))
 
 
 @pytest.mark.parametrize("columns", [2500, 1, 50])

@@ -15,8 +15,8 @@ def moved(x: float, y: float) -> geometry.Floats:
 
 
 def test_corners_run_counter_clockwise_however_they_are_given() -> None:
-    assert geometry.signed_area(geometry.corners_of([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])) == 1.0
-    assert geometry.signed_area(ELL) == 3.0
+    assert geometry.area_of(geometry.corners_of([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])) == 1.0
+    assert geometry.area_of(ELL) == 3.0
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ class SoilTable(SystemTable):
             raise q.invalid("two corners are the same", "outline")
         for one, other in geometry.self_crossings(np.array(self.outline)):
             raise q.invalid(f"edges {one + 1} and {other + 1} of the outline meet", "outline")
-        if abs(geometry.signed_area(np.array(self.outline))) <= geometry.ROUND_OFF**2:
+        if abs(geometry.area_of(self.outline)) <= geometry.ROUND_OFF**2:
             raise q.invalid("the outline has no area", "outline")
 
     @property

@@ -15,7 +15,7 @@ from blocksim.kernels.common.arrays import ALL, OUTLINE, Records, World
 from blocksim.kernels.common.systems import Coupled
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario
-from blocksim.scenario.overlap import Outlines, Rectangles
+from blocksim.scenario.overlap import Outlines
 from blocksim.simulation.frames import Rows, empty_rows
 from blocksim.world.build import Construction
 
@@ -57,8 +57,7 @@ SHORT_STEPS = SettlingSteps()
 def outlines_of(world: World) -> Outlines:
     """Return the outlines of all bodies, those of polygons in boxes about their centroids."""
     bodies = world.bodies
-    boxes = Rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))
-    outlines = Outlines.rectangles(boxes)
+    outlines = Outlines.rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))
     polygons = np.flatnonzero(bodies["faces"] == OUTLINE)
     if not polygons.size:
         return outlines
