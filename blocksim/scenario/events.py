@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.scenario import overrides
-from blocksim.scenario.geometry import edges_of
+from blocksim.scenario.geometry import Corner, edges_of
 from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
@@ -37,12 +36,10 @@ def in_order(events: Sequence[Event]) -> list[int]:
 
 def impossible_events(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find events that cannot happen: in themselves, or after others."""
-    if not scenario.events:
-        return
     if len(scenario.events) > MAX_EVENTS:
         yield Mistake(("events",), f"{len(scenario.events)} events are too many; at most {MAX_EVENTS} are allowed")
         return
-    if scenario.systems:
+    if scenario.events and scenario.systems:
         yield Mistake(("events",), f"events are not available beside {', '.join(scenario.systems)}", at="key")
     found = [*_wrong_moments_and_names(scenario, [body.name for body in bodies]), *_wrong_unloads(scenario)]
     yield from found
@@ -86,7 +83,7 @@ def _wrong_unloads(scenario: Scenario) -> Iterator[Mistake]:
             ends.setdefault(name, number)
 
 
-def _names(event: Event, path: overrides.KeyPath) -> Iterator[tuple[overrides.KeyPath, str]]:
+def _names(event: Event, path: KeyPath) -> Iterator[tuple[KeyPath, str]]:
     """Yield all names in an event with their places."""
     for group in GROUPS:
         yield from (((*path, group, place), name) for place, name in enumerate(getattr(event, group)))
@@ -100,44 +97,30 @@ def _in_turn(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mista
     Nobody knows whether a rest comes before or after a time: of what events of both kinds name, only that it goes once
     is checked.
     """
-    start = {body.name: DRIVEN if body.driven else FIXED if body.fixed else FREE for body in bodies}
-    start |= dict.fromkeys(wall_names(scenario), FIXED)
+    states: dict[str, tuple[str, int | None]]
+    states = {body.name: (DRIVEN if body.driven else FIXED if body.fixed else FREE, None) for body in bodies}
+    states |= dict.fromkeys(wall_names(scenario), (FIXED, None))
+    moments = [f"rest ({i})" if one.at is None else f"{one.at:g} s" for i, one in enumerate(scenario.events)]
     timed, untimed = (
         {name for event in scenario.events if (event.at is not None) == is_timed for _, name in _names(event, ())}
         for is_timed in (True, False)
     )
-    states: dict[str, tuple[str, int | None]] = {name: (state, None) for name, state in start.items()}
     for number in in_order(scenario.events):
         for place, name in _names(scenario.events[number], ("events", number)):
-            message = _conflict(
-                scenario, str(place[2]), name, states[name], number, is_sure=name not in timed & untimed
-            )
+            action, (state, cause), is_sure = place[2], states[name], name not in timed & untimed
+            since = "" if cause is None else f" since {moments[cause]}, by events.{cause}"
+            message = ""
+            if cause is not None and moments[cause] == moments[number] and (action, state) != ("velocity", FREE):
+                message = f"{toml(name)} is {state} at the same moment, by events.{cause}"
+            elif state == GONE:
+                message = f"{toml(name)} is removed{since}" if is_sure or action == "remove" else ""
+            elif is_sure and RESULTS.get(str(action)) == state:
+                message = f"{toml(name)} is {state} already{since}"
+            elif is_sure and action == "velocity" and state != FREE:
+                message = f"{toml(name)} is {state}{since}: free it first"
             if message:
                 yield Mistake(place, message)
-            states[name] = (RESULTS.get(str(place[2]), states[name][0]), number)
-
-
-def _conflict(
-    scenario: Scenario, action: str, name: str, present: tuple[str, int | None], number: int, *, is_sure: bool
-) -> str:
-    """Return why an event cannot do something to a body in a state, which another (None: the start) brought about."""
-    state, cause = present
-    is_new_velocity = action == "velocity" and state == FREE
-    if cause is not None and _moment(scenario, cause) == _moment(scenario, number) and not is_new_velocity:
-        return f"{toml(name)} is {state} at the same moment, by events.{cause}"
-    since = "" if cause is None else f" since {_moment(scenario, cause)}, by events.{cause}"
-    if state == GONE:
-        return f"{toml(name)} is removed{since}" if is_sure or action == "remove" else ""
-    if is_sure and RESULTS.get(action) == state:
-        return f"{toml(name)} is {state} already{since}"
-    if is_sure and action == "velocity" and state != FREE:
-        return f"{toml(name)} is {state}{since}: free it first"
-    return ""
-
-
-def _moment(scenario: Scenario, number: int) -> str:
-    event = scenario.events[number]
-    return f"rest ({number})" if event.at is None else f"{event.at:g} s"
+            states[name] = (RESULTS.get(str(action), state), number)
 
 
 GROUND, WALL, WALLS, SUPPORTS = "ground", "wall", "walls", "supports"
@@ -146,7 +129,6 @@ PARALLEL = math.sin(math.radians(LEAST_ANGLE))
 """Sine of the angle between two faces up to which they make a joint: corners of drawings are rounded."""
 LEAST_SHARE = 1e-6
 """Of the smallest width of both: what faces share at least, and by how much they may overlap across."""
-Point = tuple[float, float]
 
 
 def probe_names(scenario: Scenario) -> list[str]:
@@ -203,10 +185,10 @@ class Joint(NamedTuple):
     first end is the one farther back along the tangent.
     """
 
-    ends_of_a: tuple[Point, Point]
-    ends_of_b: tuple[Point, Point]
-    normal: Point
-    tangent: Point
+    ends_of_a: tuple[Corner, Corner]
+    ends_of_b: tuple[Corner, Corner]
+    normal: Corner
+    tangent: Corner
 
 
 def joint_between(a: PlacedBody, b: PlacedBody) -> Joint | None:
@@ -215,14 +197,15 @@ def joint_between(a: PlacedBody, b: PlacedBody) -> Joint | None:
     The faces are parallel but for `PARALLEL`, and overlap along each other. Of several such pairs that with the widest
     gap is the joint.
     """
-    found = [one for one in (_facing(a, b, *edge) for edge in edges_of(a.corners)) if one is not None]
-    return max(found, key=lambda one: one[0])[1] if found else None
+    joints = (_facing(a, b, *edge) for edge in edges_of(a.corners))
+    return max((one for one in joints if one is not None), key=lambda one: one[0], default=(0.0, None))[1]
 
 
-def _facing(a: PlacedBody, b: PlacedBody, begin: Point, end: Point, normal: Point) -> tuple[float, Joint] | None:
+def _facing(a: PlacedBody, b: PlacedBody, begin: Corner, end: Corner, normal: Corner) -> tuple[float, Joint] | None:
     """Return the least gap (m) and the joint between a face of a and the face of b opposite it."""
-    opposite = _opposite(a, b, normal)
-    if opposite is None:
+    faces = edges_of([a.own_point(*b.ground_point(*corner)) for corner in b.corners])
+    *opposite, (nx, ny) = min(faces, key=lambda edge: _dot(edge[2], normal))
+    if abs(nx * normal[1] - ny * normal[0]) > PARALLEL:
         return None
     tangent = (normal[1], -normal[0])
     across, along = np.array(opposite) @ np.array(normal), np.array(opposite) @ np.array(tangent)
@@ -239,12 +222,5 @@ def _facing(a: PlacedBody, b: PlacedBody, begin: Point, end: Point, normal: Poin
     return min(gaps), Joint((ends[0], ends[1]), (of_b[0], of_b[1]), normal, tangent)
 
 
-def _opposite(a: PlacedBody, b: PlacedBody, normal: Point) -> tuple[Point, Point] | None:
-    """Return the ends of the face of b that is parallel to one of a with this normal and faces it, in the axes of a."""
-    edges = edges_of([a.own_point(*b.ground_point(*corner)) for corner in b.corners])
-    begin, end, of_b = min(edges, key=lambda edge: _dot(edge[2], normal))
-    return (begin, end) if abs(of_b[0] * normal[1] - of_b[1] * normal[0]) <= PARALLEL else None
-
-
-def _dot(one: Point, other: Point) -> float:
+def _dot(one: Corner, other: Corner) -> float:
     return one[0] * other[0] + one[1] * other[1]

@@ -144,7 +144,7 @@ STRAIGHT = math.radians(0.1)
 LEAST = 1e-6  # m; a thousand times the distance at which things touch
 
 
-def area_of(corners: Sequence[Corner]) -> float:
+def area_of(corners: Sequence[Corner] | Floats) -> float:
     """Return the area (m²), positive where corners run counter-clockwise."""
     x0, y0 = corners[0]
     local = [(x - x0, y - y0) for x, y in corners]  # no digits are lost far from the origin
@@ -237,9 +237,8 @@ def shrink_outline(points: Sequence[Corner], way: float) -> list[Corner]:
     A corner moves along (n + m) / (1 + n·m), n and m the inward normals of its edges: to where the moved edges meet.
     """
     sense = math.copysign(1.0, area_of(points))
-    normals = [
-        (-sense * (b[1] - a[1]) / math.dist(a, b), sense * (b[0] - a[0]) / math.dist(a, b)) for a, b in _edges(points)
-    ]
+    ways = [(_minus(b, a), math.dist(a, b)) for a, b in _edges(points)]
+    normals = [(-sense * y / length, sense * x / length) for (x, y), length in ways]
     moved = []
     for (x, y), n, m in zip(points, (normals[-1], *normals), normals, strict=False):
         share = way / (1.0 + _dot(n, m))
