@@ -13,7 +13,7 @@ from blocksim.options import Option
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.simulation.compilation import kernel_set
 from blocksim.verification.case import Outcome, Setting, run_case
-from blocksim.verification.cases import SettingError, choose_cases, excluded_cases, refuse_springs
+from blocksim.verification.cases import choose_cases, excluded_cases
 
 COLUMNS = ("quantity", "expected", "measured", "error", "tolerance", "verdict")
 
@@ -39,10 +39,7 @@ def verify_command(
     Example: blocksim verify V3 V7 --law hertz-mindlin
     """
     setting = Setting(model, law, quick, scheme)
-    refuse_springs(setting)
-    if soil and (not setting.has_springs or setting != replace(Setting(), quick=quick)):
-        raise SettingError("--soil has one setting: the surface model, linear springs, the explicit scheme")
-    wanted = choose_cases(cases or [], setting.scheme, soil=soil)
+    wanted = choose_cases(cases or [], setting, soil=soil)
     announce_compilation(kernel_set(setting.scheme, setting.model), quiet=screen.silent)
     outcomes: list[Outcome] = []
     try:

@@ -10,6 +10,7 @@ from blocksim.kernels.common.arrays import World
 from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
 from blocksim.verification.scene import Scene, Simulation
 
+NUMBERS = ("quantity", "unit", "expected", "measured", "error", "tolerance")  # of a row, for programs
 VELOCITY_TOLERANCE = 1e-6
 """Of the non-smooth scheme (m/s) at steps given by hand: studies of the step know no unsolved impulses."""
 
@@ -177,12 +178,7 @@ class Outcome:
                 "scheme": self.setting.scheme,
                 "shortened": self.case.quick if self.setting.quick else "",
                 "remark": self.remark,
-                "quantity": row.quantity,
-                "unit": row.unit,
-                "expected": row.expected,
-                "measured": row.measured,
-                "error": row.error,
-                "tolerance": row.tolerance,
+                **{name: getattr(row, name) for name in NUMBERS},
                 "tolerance_kind": "at least" if row.at_least else "relative" if row.relative else "absolute",
                 "verdict": row.texts["verdict"],
                 "seconds": round(self.seconds, 2),

@@ -1,7 +1,9 @@
 """All verification cases: one entry each, in the order of the table, with the reasons for what is not inside."""
 
+from collections.abc import Sequence
+
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
-from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
+from blocksim.scenario.models.stepping import IMPULSES
 from blocksim.verification import collapse, energy, impacts, resting, toppling
 from blocksim.verification.case import Case, Setting
 from blocksim.verification.soil import SOIL_CASES
@@ -136,19 +138,17 @@ class SettingError(BlocksimError):
     exit_code = ExitCode.USAGE
 
 
-def refuse_springs(setting: Setting) -> None:
-    """Raise SettingError for a model or law that the scheme does not have."""
-    usual = Setting()
-    if not setting.has_springs and (setting.model, setting.law) != (usual.model, usual.law):
-        wrong = f"--law {setting.law}" if setting.model == usual.model else f"--model {setting.model}"
-        raise SettingError(f"{wrong} needs springs; contacts of --scheme {setting.scheme} are rigid")
-
-
-def choose_cases(ids: list[str], scheme: str = SPRINGS, *, soil: bool = False) -> tuple[Case, ...]:
+def choose_cases(ids: Sequence[str], setting: Setting, *, soil: bool = False) -> tuple[Case, ...]:
     """Return the cases of some ids (upper or lower case), in the order of the table; without ids all of the scheme.
 
-    Raises UnknownCaseError, and SettingError for a case that does not apply to the scheme.
+    Raises UnknownCaseError, and SettingError for a model, law or case that the scheme does not have.
     """
+    usual, scheme = Setting(quick=setting.quick), setting.scheme
+    if not setting.has_springs and (setting.model, setting.law) != (usual.model, usual.law):
+        wrong = f"--law {setting.law}" if setting.model == usual.model else f"--model {setting.model}"
+        raise SettingError(f"{wrong} needs springs; contacts of --scheme {scheme} are rigid")
+    if soil and setting != usual:
+        raise SettingError("--soil has one setting: the surface model, linear springs, the explicit scheme")
     table, wanted = SOIL_CASES if soil else CASES, {name.upper() for name in ids}
     unknown = sorted(wanted - {case.id for case in table})
     if unknown:

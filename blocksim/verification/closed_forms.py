@@ -1,7 +1,8 @@
 """Closed forms for checking the simulation, derived from Newton's laws; SI, angles in radians.
 
-Equation numbers are those of the paper (Tran and Nguyen 2020). Restitution `e` is the ratio of the normal
-velocities after and before an impact (Eq. 11).
+Equation numbers are those of the paper (Tran and Nguyen 2020). Restitution `e` is the ratio of the normal velocities
+after and before an impact (Eq. 11). Impacts are those of one corner on the ground, normal along y, tangent along x.
+Rocking of a block on its base is after G. W. Housner 1963, Bull. Seismol. Soc. Am. 53, 403-417.
 """
 
 from dataclasses import dataclass
@@ -11,9 +12,6 @@ import numpy as np
 
 GRAVITY = 9.81  # m/s^2, the scenarios' default
 QUADRATURE_POINTS = 64  # rocking_quarter_time: round-off is reached with about 20
-
-
-# Falling and rebounding
 
 
 def fall_distance(time: float, gravity: float = GRAVITY) -> float:
@@ -45,9 +43,6 @@ def apex_height(height: float, restitution: float, impacts: int) -> float:
 def flight_time(height: float, restitution: float, impacts: int, gravity: float = GRAVITY) -> float:
     """Return the time (s) from impact number `impacts` to the next: t_p = 2 e^p sqrt(2 h0/g), Eq. 12."""
     return 2.0 * restitution**impacts * sqrt(2.0 * height / gravity)
-
-
-# Sliding
 
 
 def sliding_speed(time: float, speed: float, friction: float, gravity: float = GRAVITY) -> float:
@@ -103,9 +98,6 @@ def ladder_friction(slope: float, slenderness: float) -> float:
     return 0.5 * (1.0 / tan(slope) - slenderness)
 
 
-# Resting
-
-
 def static_overlap(mass: float, face_stiffness: float, gravity: float = GRAVITY) -> float:
     """Return the overlap (m) of a block resting on a linear face contact of `face_stiffness` (N/m): m g/K."""
     return mass * gravity / face_stiffness
@@ -126,9 +118,6 @@ def harmonic_offsets(count: int, width: float) -> tuple[float, ...]:
     overhang.
     """
     return tuple(width / (2.0 * index) for index in range(1, count + 1))
-
-
-# Impacts of one corner on the ground (normal along y, tangent along x)
 
 
 @dataclass(frozen=True)
@@ -177,9 +166,6 @@ def sticking_impact(
     wanted = np.array([0.0, -restitution * corner[1]])
     along, up = (float(part) for part in np.linalg.solve(inverse_mass, wanted - corner))
     return Motion(before.vx + along / mass, before.vy + up / mass, before.spin + (x * up - y * along) / inertia)
-
-
-# Rocking of a block on its base (G. W. Housner 1963, Bull. Seismol. Soc. Am. 53, 403-417)
 
 
 def rocking_quarter_time(width: float, height: float, tilt: float, gravity: float = GRAVITY) -> float:

@@ -97,16 +97,11 @@ def restitution(setting: Setting) -> Iterator[Row]:
         yield absolute(f"{landing}, e = 0, rebound", "", 0.0, farthest(0.0, errors[0.0]), 0.01)
 
 
-def first_look(setting: Setting) -> int:
-    """Return after how many steps an impact is over at the earliest, before another corner comes down."""
-    return POLL if setting.has_springs else 1
-
-
 def frictionless_corner(setting: Setting) -> Iterator[Row]:
     """Turn a fall into spin: impulse through one corner, without friction."""
     block, arm = PaperBlock(), forms.lowest_corner(WIDTH, HEIGHT, TILT)
     for e in (0.0, 0.5):
-        body = Thrower(setting, e).throw(Throw(TILT), first_look(setting))
+        body = Thrower(setting, e).throw(Throw(TILT), POLL if setting.has_springs else 1)
         expected = forms.frictionless_impact(block.mass, block.inertia, arm, FALLING, e)
         yield absolute(f"v_y at e = {e:g}", "m/s", expected.vy, body.vy, 0.01 if setting.has_springs else EXACT)
         yield absolute(f"spin at e = {e:g}", "rad/s", expected.spin, body.spin, 0.5 if setting.has_springs else EXACT)
@@ -115,7 +110,7 @@ def frictionless_corner(setting: Setting) -> Iterator[Row]:
 def sticking_corner(setting: Setting) -> Iterator[Row]:
     """Let a corner stop by friction, so that the block turns about it."""
     block, arm = PaperBlock(), forms.lowest_corner(WIDTH, HEIGHT, TILT)
-    body = Thrower(setting, 0.0).throw(Throw(TILT, friction=STICKING), first_look(setting))
+    body = Thrower(setting, 0.0).throw(Throw(TILT, friction=STICKING), POLL if setting.has_springs else 1)
     expected = forms.sticking_impact(block.mass, block.inertia, arm, FALLING, 0.0)
     yield relative("spin", "rad/s", expected.spin, body.spin, 0.02)
 

@@ -186,12 +186,6 @@ def centres_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
     return f"{_table(heads, places)}\n\n{said}\n\n{turned}"
 
 
-def bounces_table(bounces: Sequence[Bounce]) -> str:
-    """Return apexes and flight times with those of Eq. 12."""
-    heads = ("impact p", "h_p by Eq. 12, mm", "simulated, mm", "t_p by Eq. 12, ms", "simulated, ms")
-    return _table(heads, [(str(number), *(f"{value:.3f}" for value in values)) for number, *values in bounces])
-
-
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table; the minus sign of numbers is a proper one."""
     return markdown(heads, [[f"−{cell[1:]}" if cell.startswith("-") else cell for cell in row] for row in rows])
@@ -280,7 +274,10 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
             "The second form of Eq. 10 as printed gives the remaining rise, largest at the impact and zero at the "
             f"apex; the height is h_p of Eq. 12 less that. Largest difference: {height.largest:.3g} mm."
         ),
-        bounces_table(bounces(bounce)),
+        _table(
+            ("impact p", "h_p by Eq. 12, mm", "simulated, mm", "t_p by Eq. 12, ms", "simulated, ms"),
+            [(str(number), *(f"{value:.3f}" for value in values)) for number, *values in bounces(bounce)],
+        ),
         "## Equation 13: a slide",
         "![Speed over time, simulated and by Eq. 13, and the difference](equation13.png)",
         f"V = V0 − μgt until the block stops. Largest difference: {speed.largest:.3g} mm/s.",

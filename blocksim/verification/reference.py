@@ -9,14 +9,15 @@ import json
 import re
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from blocksim.scenario.key_table import with_part
 from blocksim.scenario.models.stepping import IMPULSES
 from blocksim.simulation.atomic import write_text
-from blocksim.verification import cases, soil
 from blocksim.verification.case import Case, Row, Setting, run_case
+from blocksim.verification.cases import CASES, choose_cases, excluded_cases
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"
@@ -32,13 +33,12 @@ COLUMNS = {  # head of the column: how it is measured
 RIGID = IMPULSES  # head of the second table's column
 SOIL = "soil"  # the cases of soil, in a table of their own
 SETTINGS = {**COLUMNS, RIGID: Setting(scheme=IMPULSES), SOIL: Setting()}
-FIELDS = ("quantity", "unit", "expected", "measured", "tolerance", "relative", "at_least")
 Stored = dict[str, dict[str, list[dict[str, Any]]]]  # head of the column, case id, rows
 
 
 def cases_of(head: str) -> tuple[Case, ...]:
     """Return the cases of a column."""
-    return soil.SOIL_CASES if head == SOIL else cases.choose_cases([], SETTINGS[head].scheme)
+    return choose_cases([], SETTINGS[head], soil=head == SOIL)
 
 
 def stored_rows(stored: Stored, head: str, case: Case) -> list[Row]:
@@ -56,7 +56,7 @@ def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def table(stored: Stored) -> str:
     """Return the tables of blocks as Markdown, with the reasons for misses of models and for cases left out."""
     rows = []
-    for case in cases.CASES:
+    for case in CASES:
         columns = [{row.quantity: row for row in stored_rows(stored, head, case)} for head in COLUMNS]
         name = f"{case.id} {case.title}"
         for quantity, row in columns[0].items():
@@ -74,7 +74,7 @@ def table(stored: Stored) -> str:
         "",
         markdown((*heads, "measured"), list(_rows(stored, RIGID))),
         "",
-        f"Left out: {'; '.join(cases.excluded_cases(scheme))}.",
+        f"Left out: {'; '.join(excluded_cases(scheme))}.",
     ]
     return "\n".join([markdown((*heads, *COLUMNS), rows), *reasons, "", *rigid])
 
@@ -133,7 +133,7 @@ def measure(store: Path, heads: Sequence[str]) -> None:
             outcome = run_case(case, setting)
             name = f"{setting.scheme} {setting.model} {setting.law} {case.id}"
             print(f"{name}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
-            column[case.id] = [{name: getattr(row, name) for name in FIELDS} for row in outcome.rows]
+            column[case.id] = [asdict(row) for row in outcome.rows]
         stored = {**(read_store(store) if store.is_file() else {}), head: column}
         finite = json.loads(
             json.dumps({name: stored[name] for name in SETTINGS if name in stored}), parse_constant=lambda _: None

@@ -10,7 +10,6 @@ of sqrt(h/g), angles from the vertical.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from math import asin, cos, degrees, hypot, radians, sin, sqrt
 
 import numpy as np
@@ -179,22 +178,14 @@ POLL = 2e-4  # s
 LONGEST_WAVE = 2.0  # s
 
 
-@dataclass(frozen=True)
 class Dominoes:
     """A row of dominoes, in units of their height."""
 
-    thickness: float
-    gap: float
-
-    @property
-    def inertia(self) -> float:
-        """Moment of inertia about the lower edge, per mass."""
-        return (1.0 + self.thickness**2) / 3.0
-
-    @property
-    def strike(self) -> float:
-        """Angle (rad) at which a domino strikes the next, still upright one."""
-        return asin(self.gap)
+    def __init__(self, thickness: float, gap: float) -> None:
+        """Take their thickness and the free gap between two."""
+        self.thickness, self.gap = thickness, gap
+        self.inertia = (1.0 + thickness**2) / 3.0  # about the lower edge, per mass
+        self.strike = asin(gap)  # rad: angle at which a domino strikes the next, still upright one
 
     def leaning(self, foremost: float, count: int) -> tuple[Floats, Floats]:
         """Return angles of `count` dominoes that lean on one another, foremost first, and d angle/d foremost.

@@ -35,7 +35,7 @@ HEADS = [
 
 
 def outcome(case_id: str, law: str, *, quick: bool) -> Outcome:
-    (case,) = choose_cases([case_id])
+    (case,) = choose_cases([case_id], Setting())
     return run_case(case, Setting(law=law, quick=quick))
 
 

@@ -19,7 +19,7 @@ LONG = {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23"}  # seconds
 SETTING = Setting(scheme="nonsmooth")
 CASES = [
     pytest.param(case, id=case.id, marks=[pytest.mark.long] if case.id in LONG else [])
-    for case in choose_cases([], SETTING.scheme)
+    for case in choose_cases([], SETTING)
 ]
 
 
@@ -41,8 +41,8 @@ def test_rectangles_given_as_outlines_have_the_same_answers(case: Case, monkeypa
 def test_rectangles_given_as_outlines_have_the_same_answers_with_springs(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (case,) = choose_cases([name], "explicit")
     setting = Setting(quick=True)
+    (case,) = choose_cases([name], setting)
     plain = run_case(case, setting)
     monkeypatch.setattr(bodies, "place_bodies", as_outlines)
     for was, now in zip(plain.rows, run_case(case, setting).rows, strict=True):

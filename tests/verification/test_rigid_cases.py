@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 SETTING = Setting(scheme="nonsmooth")
-APPLY = choose_cases([], SETTING.scheme)
+APPLY = choose_cases([], SETTING)
 SLOW = {"V18", "V23"}  # seconds; ledgers of tests/kernels/nonsmooth and tests/simulation are there always
 
 
@@ -91,7 +91,7 @@ def test_what_is_about_springs_is_left_out_and_says_why() -> None:
     assert all(len(reason) > 20 for reason in excluded_cases(SETTING.scheme))
     assert excluded_cases("explicit") == ()
     with pytest.raises(SettingError, match=r"V20 \(.*springs"):
-        choose_cases(["V1", "v20"], SETTING.scheme)
+        choose_cases(["V1", "v20"], SETTING)
 
 
 def test_settings_of_rigid_contacts_do_not_reach_scenes_of_springs() -> None:
@@ -115,7 +115,7 @@ class Wrong(Setting):
 
 
 def rows_missed(wrong: Wrong, case_id: str) -> list[Row]:
-    (case,) = choose_cases([case_id], wrong.scheme)
+    (case,) = choose_cases([case_id], SETTING)
     return missed(run_case(case, wrong))
 
 
