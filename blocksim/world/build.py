@@ -355,7 +355,7 @@ def assemble_world(
     return world
 
 
-def numbers(shape: tuple[int, ...], kind: type[np.generic]) -> Any:
+def numbers(shape: int | tuple[int, ...], kind: type[np.generic]) -> Any:
     """Return zeros that start on a cache line."""
     plain: Any = np.dtype(kind)
     return zeros(shape, plain).view(np.ndarray)

@@ -1,11 +1,12 @@
-"""Blocks: rigid rectangles and convex polygons that stand in the world of every scheme.
+"""Blocks and their supports, which stand in the world of every scheme.
 
-Supports: the ground, its profile, walls and their prescribed motion, which holds for fixed blocks as well.
-
-Where they are follows from the scenario at any time, so that frames and files keep nothing of them.
+Blocks are rigid rectangles and convex polygons. Supports are the ground, its profile, walls and their prescribed
+motion, which holds for fixed blocks as well; where they are follows from the scenario at any time, so that frames and
+files keep nothing of them.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -42,11 +43,6 @@ CONSTANTS = (
     Quantity("inertia", "kg m2"),
 )
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-
-
-def rotation(track: Track) -> Floats:
-    """Return the angles turned since the start (rad)."""
-    return np.asarray(track["angle"] - track.at_start("angle"))
 
 
 def kinetic_energy(track: Track) -> Floats:
@@ -125,17 +121,6 @@ def outlines_of(placed: Sequence[PlacedBody]) -> Floats | None:
     return np.array(full, dtype=np.float64)
 
 
-def elements_of(placed: Sequence[PlacedBody]) -> Elements:
-    """Return what blocks are that were placed so."""
-    constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
-    start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
-    return Elements(tuple(body.name for body in placed), constants, start, outlines_of(placed))
-
-
-def _elements(scenario: Scenario) -> Elements:
-    return elements_of(place_bodies(scenario))
-
-
 def motion_of(bodies: Any) -> Floats:
     """Return the quantities (..., 6, b) of bodies (..., b): a removed one is where it was and has no velocity: NaN."""
     from blocksim.kernels.common.arrays import REMOVED  # noqa: PLC0415 - kernels, not for readers
@@ -153,10 +138,6 @@ def are_removed(vx: Floats) -> Any:
     return np.isnan(vx)
 
 
-def _state(world: Any, count: int) -> Floats:
-    return motion_of(world.bodies[:count])
-
-
 BLOCKS = System(
     name="blocks",
     element="block",
@@ -170,7 +151,7 @@ BLOCKS = System(
             "rad",
             "angle turned since the start, counter-clockwise positive, not wrapped",
             "rotation_deg",
-            rotation,
+            lambda track: track["angle"] - track.at_start("angle"),
             DEGREES,
         ),
         Output("vx", "m/s", "velocity along the ground", "vx_mm_s", quantity_as_stored("vx"), MILLI),
@@ -178,15 +159,17 @@ BLOCKS = System(
         Output("spin", "rad/s", "angular velocity", "spin_deg_s", quantity_as_stored("spin"), DEGREES),
         Output("kinetic_energy", "J", "kinetic energy", "kinetic_energy_J", kinetic_energy),
     ),
-    elements=_elements,
-    state=_state,
+    elements=lambda scenario: blocks_placed(place_bodies(scenario)).elements,
+    state=lambda world, count: motion_of(world.bodies[:count]),
     outlines=corners,
 )
 
 
 def blocks_placed(placed: Sequence[PlacedBody]) -> SystemInScene:
     """Return the blocks of a scene that were placed so."""
-    return SystemInScene(BLOCKS, elements_of(placed))
+    constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
+    start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
+    return SystemInScene(BLOCKS, Elements(tuple(body.name for body in placed), constants, start, outlines_of(placed)))
 
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks
@@ -200,13 +183,6 @@ def _moved(track: Track, chosen: Indices) -> Floats:
     at_rest = track.present.elements.constants.T.reshape(-1, 4, 2)
     offset = np.stack([track["dx"][chosen], track["dy"][chosen]], axis=-1)
     return np.asarray(at_rest + offset[:, :, None])
-
-
-def _pieces(scenario: Scenario, blocks: Track) -> Elements:
-    quads = support_quads(scenario, blocks)
-    walls = len(wall_segments(scenario))
-    names = (*("ground" for _ in range(len(quads) - walls)), *(f"wall {k}" for k in range(1, walls + 1)))
-    return Elements(names, quads.reshape(-1, 8).T, np.zeros((len(SUPPORT_QUANTITIES), len(quads))))
 
 
 SUPPORTS = System(
@@ -223,23 +199,37 @@ SUPPORTS = System(
 
 def supports_track(scenario: Scenario, blocks: Track, times: Floats) -> Track:
     """Return the supports of a run at these times (s), as far as its blocks reach."""
-    elements = _pieces(scenario, blocks)
+    quads, walls = support_quads(scenario, blocks), len(wall_segments(scenario))
+    names = (*["ground"] * (len(quads) - walls), *(f"wall {k}" for k in range(1, walls + 1)))
+    elements = Elements(names, quads.reshape(-1, 8).T, np.zeros((len(SUPPORT_QUANTITIES), len(quads))))
     motion = np.concatenate(support_motion(scenario, times), axis=1)
-    values = np.repeat(motion[:, :, None], len(elements.names), axis=2)
+    values = np.repeat(motion[:, :, None], len(names), axis=2)
     return Track(SystemInScene(SUPPORTS, elements), values)
 
 
 def support_quads(scenario: Scenario, blocks: Track) -> Floats:
     """Return the corners (m, (q, 4, 2), counter-clockwise) of ground and walls at rest, in the frames' axes.
 
-    Every straight piece of the ground is filled down to a common depth; a wall has a thickness behind its face.
+    Every straight piece of the ground is filled down to a common depth, and it reaches beyond all places where blocks
+    have been, or beyond the ends of walls without any; a wall has a thickness behind its face.
     """
+    walls = wall_segments(scenario)
     thick = THICKNESS * length_beside(np.minimum(blocks["size_x"], blocks["size_y"]).min(initial=np.inf))
-    line = _ground(scenario, blocks)
+    beyond = BEYOND * length_beside(np.hypot(blocks["size_x"], blocks["size_y"]).max(initial=-np.inf))
+    profile = np.array(scenario.ground.profile or ()).reshape(-1, 2)
+    places = blocks["x"][np.isfinite(blocks["x"])]
+    if not places.size:
+        places = np.array([x for wall in walls for x in (wall.x0, wall.x1)] or [0.0])
+    x = np.concatenate([profile[:, 0], places])
+    first, last = (profile[0, 1], profile[-1, 1]) if len(profile) else (0.0, 0.0)
+    line = np.concatenate([[[float(x.min()) - beyond, first]], profile, [[float(x.max()) + beyond, last]]])
     floor = float(line[:, 1].min()) - thick
-    pieces = [(line[i], line[i + 1]) for i in range(len(line) - 1) if line[i + 1, 0] > line[i, 0]]
-    ground = [[[x0, floor], [x1, floor], [x1, y1], [x0, y0]] for (x0, y0), (x1, y1) in pieces]
-    return np.array([*ground, *_walls(scenario, thick)]).reshape(-1, 4, 2)
+    quads = [[[x0, floor], [x1, floor], [x1, y1], [x0, y0]] for (x0, y0), (x1, y1) in pairwise(line) if x1 > x0]
+    for wall in walls:
+        start, end = np.array([wall.x0, wall.y0]), np.array([wall.x1, wall.y1])
+        back = thick / wall.length * np.array([end[1] - start[1], start[0] - end[0]])  # the solid is on the right hand
+        quads.append([one.tolist() for one in (start + back, end + back, end, start)])
+    return np.array(quads).reshape(-1, 4, 2)
 
 
 def support_motion(scenario: Scenario, times: Floats) -> tuple[Floats, Floats]:
@@ -249,29 +239,3 @@ def support_motion(scenario: Scenario, times: Floats) -> tuple[Floats, Floats]:
     along = motion_direction(scenario)
     displacement, velocity = displacement_and_velocity(motion_pieces(scenario), times)
     return np.multiply.outer(displacement, along), np.multiply.outer(velocity, along)
-
-
-def _ground(scenario: Scenario, blocks: Track) -> Floats:
-    """Return the line of the ground (m, (k, 2)) from left to right, beyond all blocks."""
-    profile = np.array(scenario.ground.profile or ()).reshape(-1, 2)
-    beyond = BEYOND * length_beside(np.hypot(blocks["size_x"], blocks["size_y"]).max(initial=-np.inf))
-    x = np.concatenate([profile[:, 0], _places(scenario, blocks)])
-    first, last = (profile[0, 1], profile[-1, 1]) if len(profile) else (0.0, 0.0)
-    return np.concatenate([[[float(x.min()) - beyond, first]], profile, [[float(x.max()) + beyond, last]]])
-
-
-def _places(scenario: Scenario, blocks: Track) -> Floats:
-    """Return where (m) along x blocks have been, or where walls end if there are none."""
-    found: Floats = blocks["x"][np.isfinite(blocks["x"])]
-    if found.size:
-        return found
-    return np.array([x for wall in wall_segments(scenario) for x in (wall.x0, wall.x1)] or [0.0])
-
-
-def _walls(scenario: Scenario, thick: float) -> list[Floats]:
-    quads = []
-    for wall in wall_segments(scenario):
-        start, end = np.array([wall.x0, wall.y0]), np.array([wall.x1, wall.y1])
-        back = thick / wall.length * np.array([end[1] - start[1], start[0] - end[0]])  # the solid is on the right hand
-        quads.append(np.array([start + back, end + back, end, start]))
-    return quads

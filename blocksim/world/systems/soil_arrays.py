@@ -15,20 +15,9 @@ from blocksim.kernels.sph.wendland_c2 import SUPPORT
 from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.start import soil_tables
+from blocksim.world.build import numbers
 from blocksim.world.interactions import contact_classes
-from blocksim.world.systems.soil_materials import (
-    DAMPING_RATIO,
-    RAMP,
-    SHEAR_RATIO,
-    SMOOTHING,
-    damping_at_start,
-    depth_of_scene,
-    friction_with,
-    lame_constants,
-    wave_speed,
-    yield_surface,
-)
-from blocksim.world.systems.soils import QUANTITIES, elements_of_soils, places_of
+from blocksim.world.systems import soils
 
 STAGES = Stages(start, finish, survey, measure)
 ACTS = {"soils": flow, "blocks": touch_blocks, "supports": touch_supports}
@@ -42,11 +31,11 @@ FEW_TOUCHES = 128
 
 def build_soils(scenario: Scenario) -> Soils:
     """Return the arrays of the soils of a scenario at time zero."""
-    tables, places = soil_tables(scenario), places_of(scenario)
-    start = elements_of_soils(scenario).start
+    tables, places = soil_tables(scenario), soils.places_of(scenario)
+    start = soils.elements_of(scenario).start
     n = start.shape[1]
     points, states = zeros(n, POINT), zeros(n, STATE)
-    for number, quantity in enumerate(QUANTITIES):
+    for number, quantity in enumerate(soils.QUANTITIES):
         holder = points if number < 4 else states
         holder[quantity.name] = start[number]
     states["number"] = np.arange(n)
@@ -54,62 +43,51 @@ def build_soils(scenario: Scenario) -> Soils:
     groups = math.ceil(n / GROUP)
     room = n + FEW_TOUCHES
     bodies = len(place_bodies(scenario)) + len(place_segments(scenario)) + 1
+    spacing, controls = tables[0].spacing, zeros(1, CONTROLS)
+    one = controls[0]
+    one.area = spacing**2
+    one.smoothing = soils.SMOOTHING * spacing
+    one.reach = SUPPORT * one.smoothing
+    one.skin = SKIN * spacing
+    one.radius = 0.5 * spacing
+    one.viscosity = VISCOSITY
+    one.ramp = soils.RAMP if any(table.start == "ramp" for table in tables) else 0.0
+    one.blocks = len(place_bodies(scenario))
+    one.is_uniform = len(tables) == 1
     return Soils(
         points=points,
         states=states,
         kinds=kind_records(scenario, tables),
         interactions=interactions_with(scenario, tables),
-        order=_words(n),
-        starts=_words(3 * n // 2 + 3),
-        lists=_words((groups, GROUP * NEIGHBOURS)),
-        lengths=_words(n),
+        order=numbers(n, np.uint32),
+        starts=numbers(3 * n // 2 + 3, np.uint32),
+        lists=numbers((groups, GROUP * NEIGHBOURS), np.uint32),
+        lengths=numbers(n, np.uint32),
         touches=zeros(room, TOUCH),
         kept=zeros(room, HISTORY),
-        by_body=_words(room),
-        begins=_words(bodies + 1),
+        by_body=numbers(room, np.uint32),
+        begins=numbers(bodies + 1, np.uint32),
         tallies=zeros(groups, TALLY),
         spare_point=zeros(1, POINT),
         spare_state=zeros(1, STATE),
-        controls=_controls(scenario, tables),
+        controls=controls,
     )
-
-
-def _controls(scenario: Scenario, tables: list[SoilTable]) -> Any:
-    spacing = tables[0].spacing
-    controls = zeros(1, CONTROLS)
-    one = controls[0]
-    one.area = spacing**2
-    one.smoothing = SMOOTHING * spacing
-    one.reach = SUPPORT * one.smoothing
-    one.skin = SKIN * spacing
-    one.radius = 0.5 * spacing
-    one.viscosity = VISCOSITY
-    one.ramp = RAMP if any(table.start == "ramp" for table in tables) else 0.0
-    one.blocks = len(place_bodies(scenario))
-    one.is_uniform = len(tables) == 1
-    return controls
-
-
-def _words(count: int | tuple[int, int]) -> Any:
-    """Return zeros that start on a cache line."""
-    plain: Any = np.dtype(np.uint32)
-    return zeros(count, plain).view(np.ndarray)
 
 
 def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
     """Return one KIND for each soil."""
     records = zeros(len(tables), KIND)
-    depth = depth_of_scene(scenario)
+    depth = soils.depth_of_scene(scenario)
     for record, table in zip(records, tables, strict=True):
         material = scenario.materials[table.material]
-        lame, shear = lame_constants(material)
+        lame, shear = soils.lame_constants(material)
         record.density = material.density
         record.volume = table.spacing**2 * depth
         record.mass = material.density * record.volume
         record.lame, record.shear, record.bulk = lame, shear, lame + 2.0 * shear / 3.0
-        record.slope, record.cohesion = yield_surface(material)
-        record.impedance = material.density * wave_speed(material)
-        record.settling, record.settled = damping_at_start(scenario, table)
+        record.slope, record.cohesion = soils.yield_surface(material)
+        record.impedance = material.density * soils.wave_speed(material)
+        record.settling, record.settled = soils.damping_at_start(scenario, table)
         record.is_corrected = table.gradient == "corrected"
     return records
 
@@ -118,15 +96,15 @@ def interactions_with(scenario: Scenario, tables: list[SoilTable]) -> Any:
     """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
     classes = contact_classes(scenario, place_bodies(scenario))
     records = zeros((len(tables), len(classes)), INTERACTION)
-    depth = depth_of_scene(scenario)
+    depth = soils.depth_of_scene(scenario)
     for row, table in zip(records, tables, strict=True):
         young = scenario.materials[table.material].young_modulus
         for record, partner in zip(row, classes, strict=True):
             name = partner.material if partner.is_wall or not partner.is_ground else GROUND
-            friction = friction_with(scenario, table.material, str(name), ground=partner.is_ground)
+            friction = soils.friction_with(scenario, table.material, str(name), ground=partner.is_ground)
             record.normal_stiffness = young * min(depth, partner.depth)
-            record.shear_ratio = SHEAR_RATIO
-            record.normal_damping = record.shear_damping = DAMPING_RATIO
+            record.shear_ratio = soils.SHEAR_RATIO
+            record.normal_damping = record.shear_damping = soils.DAMPING_RATIO
             record.static_friction, record.kinetic_friction = friction.static, friction.kinetic
             record.transition_speed = friction.transition_speed
     return records

@@ -1,18 +1,26 @@
-"""What is shown of soils: where they press against bodies, how far they have come, their surface, smoothed pressure.
+"""Soils: elasto-plastic bodies of particles; see blocksim/kernels/soil and the tables [[soils]] of scenarios.
 
-Soils: elasto-plastic bodies of particles; see blocksim/kernels/soil and the tables [[soils]] of scenarios.
+Elasticity, yield surface and stresses at time zero, how particles touch bodies, and what is shown of them: where they
+press against bodies, how far they have come, their surface, smoothed pressure.
+
+On a rough base the lowest rows of particles do not press: the active thrust on blocks that yield is that of a lower
+pile, the less the more rows there are, and less with raw gradients than with corrected ones. On a smooth base neither
+lacks anything from 8 rows on. Soil at rest presses as it should.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import Scenario, geometry
+from blocksim.scenario import GROUND, Material, Scenario, geometry, overrides, place_bodies, resolve_pair
+from blocksim.scenario.models.contact import PairFriction
+from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.models.stepping import Explicit
 from blocksim.scenario.start import soil_tables
-from blocksim.world.systems.soil_materials import SMOOTHING, depth_of_scene, geostatic_stress, wave_speed, weak_thrusts
+from blocksim.world.systems.blocks import placed_points
 from blocksim.world.systems.system import (
     BodyContacts,
     Cost,
@@ -34,6 +42,159 @@ GAP = 2.0  # spacings without a particle that end the connected part
 COLUMN = 2.0  # spacings, of the surface
 BACK = 2.0  # spacings from the end in which the height at the back is taken
 SMOOTHED = 2  # times that pressure is averaged over neighbouring cells of one spacing
+SHEAR_RATIO = 0.8  # shear over normal stiffness of a contact
+# The most that leaves a particle between two bodies, with twice the stiffness and dashpot, no more than critical. What
+# strikes a body leaves with exp(-pi/2) = 0.21 of its speed: soil is no ball.
+DAMPING_RATIO = math.sqrt(0.5)
+RAMP = 0.1  # s, in which gravity grows
+SETTLING = 5e-3  # damping meanwhile, in (E / (rho h^2))^(1/2)
+# Stresses of a geostatic start are not quite in equilibrium: in corners between faces, along inclined ones
+# (kernels/soil/stress.py), and below slopes. For the time that a wave takes for that many smoothing lengths that shock
+# is damped, in wave speeds over smoothing length; later it would have made the soil flow.
+SHOCK_TIME, SHOCK_DAMPING = 60.0, 0.1
+SMOOTHING = 1.5  # smoothing length in spacings
+USUAL_DEPTH = 1.0  # m, out of the plane, where there are no blocks
+TOLERATED = 0.03  # of the thrust
+LACK = {
+    "raw": (2.2, 0.0),
+    "corrected": (1.0, 0.035),
+}  # calibrated with a smooth wall drawn back from 8 to 40 rows: a, b of the share a/rows - b
+COURANT = 0.4  # step in smoothing lengths that a wave passes
+# J, as kernels/soil/energy.py measures them; the last six are losses
+ENERGIES = (
+    "kinetic",
+    "potential",
+    "elastic",
+    "contact",
+    "plastic",
+    "viscosity",
+    "dashpot",
+    "friction",
+    "settling",
+    "ramp",
+)
+COST = Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
+GRADIENT_COST = {"raw": 1.0, "corrected": 1.5}  # time of a step over that, measured
+QUANTITIES = (
+    Quantity("x", "m"),
+    Quantity("y", "m"),
+    Quantity("vx", "m/s"),
+    Quantity("vy", "m/s"),
+    Quantity("sxx", "Pa"),  # tension positive
+    Quantity("syy", "Pa"),
+    Quantity("szz", "Pa"),
+    Quantity("sxy", "Pa"),
+    Quantity("plastic", "1"),  # accumulated plastic shear strain
+)
+CONSTANTS = (Quantity("mass", "kg"), Quantity("spacing", "m"))
+
+
+def lame_constants(material: Material) -> tuple[float, float]:
+    """Return Lame's first parameter and the shear modulus (Pa)."""
+    young, poisson = material.young_modulus, material.poisson_ratio
+    return young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), young / (2.0 * (1.0 + poisson))
+
+
+def wave_speed(material: Material) -> float:
+    """Return the speed (m/s) of pressure waves."""
+    lame, shear = lame_constants(material)
+    return math.sqrt((lame + 2.0 * shear) / material.density)
+
+
+def yield_surface(material: Material) -> tuple[float, float]:
+    """Return a (-) and k (Pa) of the surface (J2)^(1/2) + a I1 = k.
+
+    mohr-coulomb: a = sin(phi)/3 and k = c cos(phi), which fails as Mohr and Coulomb say where the flow has no dilation
+    (kernels/soil/stress.py). plane-strain-associated: tan(phi)/(9 + 12 tan(phi)^2)^(1/2) and 3 c over the same root,
+    which does so for an associated flow, and is weaker without dilation: sin(phi) becomes 3 a.
+    """
+    angle, cohesion = material.friction_angle or 0.0, material.cohesion or 0.0
+    if material.yield_surface == "plane-strain-associated":
+        root = math.sqrt(9.0 + 12.0 * math.tan(angle) ** 2)
+        return math.tan(angle) / root, 3.0 * cohesion / root
+    return math.sin(angle) / 3.0, cohesion * math.cos(angle)
+
+
+def earth_pressure_at_rest(material: Material) -> float:
+    """Return horizontal over vertical stress: of elasticity, or the least one within the yield surface."""
+    poisson = material.poisson_ratio
+    slope = math.sqrt(3.0) * yield_surface(material)[0]
+    return max(poisson / (1.0 - poisson), (1.0 - slope) / (1.0 + 2.0 * slope))
+
+
+def depth_of_scene(scenario: Scenario) -> float:
+    """Return the extent (m) of all soil out of the plane: that of the deepest block."""
+    return max((body.depth for body in place_bodies(scenario)), default=USUAL_DEPTH)
+
+
+def damping_at_start(scenario: Scenario, table: SoilTable) -> tuple[float, float]:
+    """Return the rate (1/s) of damping at the start, and the time (s) when it ends; none where nothing has weight."""
+    if scenario.gravity == 0.0:
+        return 0.0, 0.0
+    material = scenario.materials[table.material]
+    smoothing, speed = SMOOTHING * table.spacing, wave_speed(material)
+    if table.start == "ramp":
+        return SETTLING * math.sqrt(material.young_modulus / material.density) / smoothing, RAMP
+    return SHOCK_DAMPING * speed / smoothing, SHOCK_TIME * smoothing / speed
+
+
+def friction_with(scenario: Scenario, soil: str, partner: str, *, ground: bool) -> PairFriction:
+    """Return the friction of a soil's material with another one; `ground` for the ground (GROUND) and walls.
+
+    As [pairs] has it, else that of the soil itself, as on a rough face: [friction] is about blocks.
+    """
+    pair = resolve_pair(scenario, soil, partner, ground=ground)
+    if pair.rules["friction"].startswith("pairs."):
+        return pair.friction
+    return PairFriction(static=math.tan(scenario.materials[soil].friction_angle or 0.0))
+
+
+def geostatic_stress(scenario: Scenario, table: SoilTable, places: Floats) -> Floats:
+    """Return xx, yy, zz and xy (Pa, tension positive, (4, n)) at places (m, (n, 2)) of a soil; zero with a ramp.
+
+    The vertical stress is the weight of all soil straight above, the horizontal ones K0 times that.
+    """
+    stress = np.zeros((4, len(places)))
+    if table.start == "ramp":
+        return stress
+    weight = np.zeros(len(places))
+    gravity = scenario.gravity * math.cos(scenario.ground.tilt)
+    for other in soil_tables(scenario):
+        density = scenario.materials[other.material].density
+        weight += density * gravity * geometry.height_above(other.corners, places)
+    at_rest = earth_pressure_at_rest(scenario.materials[table.material])
+    stress[0] = stress[2] = -at_rest * weight
+    stress[1] = -weight
+    return stress
+
+
+def weak_thrusts(scenario: Scenario) -> Iterator[str]:
+    """Yield a warning for each soil beside blocks that may yield, whose thrust on them is known to be too small."""
+    for soil in soil_tables(scenario):
+        rows = geometry.count_across(soil.corners, soil.spacing)[1]
+        per_row, less = LACK[soil.gradient]
+        share = per_row / rows - less
+        is_rough = friction_with(scenario, soil.material, GROUND, ground=True).static > 0.0
+        if share > TOLERATED and is_rough and _is_beside_a_block(scenario, soil):
+            is_corrected = soil.gradient == "corrected"
+            key = overrides.format_key(("soils", soil.name, "spacing" if is_corrected else "gradient"))
+            cure = f"{math.ceil(per_row / (less + TOLERATED))} rows" if is_corrected else '"corrected"'
+            yield (
+                f"{key}: with {soil.gradient} gradients and {rows} rows of particles on a rough base the active thrust "
+                f"on blocks is some {share:.0%} too small; {cure} would do"
+            )
+
+
+def _is_beside_a_block(scenario: Scenario, soil: SoilTable) -> bool:
+    """Return True if a block that may move is less than a spacing to the left or right of a soil."""
+    moved = [soil.corners + np.array([way, 0.0]) for way in (-soil.spacing, soil.spacing)]
+    for body in place_bodies(scenario):
+        if body.driven or not body.fixed:
+            place = (np.array([value]) for value in (body.x, body.y, body.angle))
+            corners = placed_points(np.array([body.corners]), *place)[0]
+            if any(geometry.overlap(one, corners) for one in moved):
+                return True
+    return False
 
 
 def body_contacts(soils: Any, world: Any) -> BodyContacts:
@@ -51,11 +212,6 @@ def body_contacts(soils: Any, world: Any) -> BodyContacts:
     return BodyContacts(
         body.astype(np.intp), kind.astype(np.intp), centre - apart[:, None] * normal, -normal, push, -rub, friction
     )
-
-
-def part_names(scenario: Scenario) -> tuple[str, ...]:
-    """Return the names of the soils."""
-    return tuple(table.name for table in soil_tables(scenario))
 
 
 def parts_of(track: Track) -> dict[str, Indices]:
@@ -83,45 +239,40 @@ def final_table(scenario: Scenario, track: Track) -> Table:
     At rest is what is slower than time.rest_speed.
     """
     names = ("soil", "left_mm", "right_mm", "first_mm", "last_mm", "back", "back_height_mm", "at_rest")
-    rows = [_ending_of(track, own, scenario) for own in parts_of(track).values()]
-    columns = [list(parts_of(track)), *(list(column) for column in zip(*rows, strict=True))]
-    return dict(zip(names, columns, strict=True))
-
-
-def _ending_of(track: Track, own: Indices, scenario: Scenario) -> tuple[Any, ...]:
-    spacing = float(track["spacing"][own[0]])
-    half = 0.5 * spacing
-    x, y, vx, vy = (track[name][-1, own] for name in ("x", "y", "vx", "vy"))
-    left, right = connected_span(x, GAP * spacing)
-    is_left = _is_left_back(track, own, scenario, (left, right))
-    near = x <= left + BACK * spacing if is_left else x >= right - BACK * spacing
-    near &= (x >= left) & (x <= right)
-    ends = (left - half, right + half, x.min() - half, x.max() + half)
-    height = MILLI * float(y[near].max() + half)
-    rests = float(np.mean(np.hypot(vx, vy) < scenario.time.rest_speed))
-    return (*(MILLI * float(end) for end in ends), "left" if is_left else "right", height, rests)
+    rows = []
+    for name, own in parts_of(track).items():
+        spacing = float(track["spacing"][own[0]])
+        half = 0.5 * spacing
+        x, y, vx, vy = (track[name][-1, own] for name in ("x", "y", "vx", "vy"))
+        left, right = connected_span(x, GAP * spacing)
+        is_left = _is_left_back(track, own, scenario, (left, right))
+        near = x <= left + BACK * spacing if is_left else x >= right - BACK * spacing
+        near &= (x >= left) & (x <= right)
+        ends = (left - half, right + half, x.min() - half, x.max() + half)
+        height = MILLI * float(y[near].max() + half)
+        rests = float(np.mean(np.hypot(vx, vy) < scenario.time.rest_speed))
+        rows.append((name, *(MILLI * float(end) for end in ends), "left" if is_left else "right", height, rests))
+    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
 
 
 def _is_left_back(track: Track, own: Indices, scenario: Scenario, ends: tuple[float, float]) -> bool:
     """Return True if the left end of a soil is its back; `ends` are where it ends now (m)."""
-    spacing = float(track["spacing"][own[0]])
+    near = GAP * float(track["spacing"][own[0]])
     x, y = track.at_start("x")[own], track.at_start("y")[own]
-    left, right = float(x.min()), float(x.max())
-    at_left, at_right = (_is_at_wall(end, (float(y.min()), float(y.max())), spacing, scenario) for end in (left, right))
+    left, right, bottom, top = float(x.min()), float(x.max()), float(y.min()), float(y.max())
+
+    def is_at_wall(end: float) -> bool:
+        """Return True if a wall steeper than 45 degrees stands near an end, at some of these heights."""
+        for (x0, y0), (x1, y1) in ((wall.start, wall.end) for wall in scenario.walls):
+            is_near = min(x0, x1) <= end + near and max(x0, x1) >= end - near
+            if abs(y1 - y0) > abs(x1 - x0) and is_near and min(y0, y1) < top and max(y0, y1) > bottom:
+                return True
+        return False
+
+    at_left, at_right = is_at_wall(left), is_at_wall(right)
     if at_left != at_right:
         return at_left
-    return abs(ends[0] - left) <= abs(ends[1] - right) + spacing
-
-
-def _is_at_wall(end: float, heights: tuple[float, float], spacing: float, scenario: Scenario) -> bool:
-    """Return True if a wall steeper than 45 degrees stands within GAP spacings of an end at some of these heights."""
-    for wall in scenario.walls:
-        (x0, y0), (x1, y1) = wall.start, wall.end
-        is_steep = abs(y1 - y0) > abs(x1 - x0)
-        is_near = min(x0, x1) <= end + GAP * spacing and max(x0, x1) >= end - GAP * spacing
-        if is_steep and is_near and min(y0, y1) < heights[1] and max(y0, y1) > heights[0]:
-            return True
-    return False
+    return abs(ends[0] - left) <= abs(ends[1] - right) + float(track["spacing"][own[0]])
 
 
 def surface(track: Track, frame: int) -> list[Floats]:
@@ -129,30 +280,24 @@ def surface(track: Track, frame: int) -> list[Floats]:
 
     Columns in which there is no particle interrupt the line.
     """
-    return [line for own in parts_of(track).values() for line in _surface_of(track, frame, own)]
-
-
-def _surface_of(track: Track, frame: int, own: Indices) -> list[Floats]:
-    spacing = float(track["spacing"][own[0]])
-    x, y = track["x"][frame, own], track["y"][frame, own]
-    width = COLUMN * spacing
-    first = int(np.floor(x.min() / width))
-    column = np.floor(x / width).astype(np.intp) - first
-    tops = np.full(int(column.max()) + 1, -np.inf)
-    np.maximum.at(tops, column, y)
-    there = np.flatnonzero(np.isfinite(tops))
-    line = np.stack([width * (first + there + 0.5), tops[there] + 0.5 * spacing], axis=-1)
-    return np.split(line, np.flatnonzero(np.diff(there) > 1) + 1)
+    lines: list[Floats] = []
+    for own in parts_of(track).values():
+        spacing = float(track["spacing"][own[0]])
+        x, y = track["x"][frame, own], track["y"][frame, own]
+        width = COLUMN * spacing
+        first = int(np.floor(x.min() / width))
+        column = np.floor(x / width).astype(np.intp) - first
+        tops = np.full(int(column.max()) + 1, -np.inf)
+        np.maximum.at(tops, column, y)
+        there = np.flatnonzero(np.isfinite(tops))
+        line = np.stack([width * (first + there + 0.5), tops[there] + 0.5 * spacing], axis=-1)
+        lines += np.split(line, np.flatnonzero(np.diff(there) > 1) + 1)
+    return lines
 
 
 def displacement(track: Track) -> Floats:
     """Return how far (m) particles are from where they began."""
     return np.asarray(np.hypot(track["x"] - track.at_start("x"), track["y"] - track.at_start("y")))
-
-
-def speed(track: Track) -> Floats:
-    """Return speeds (m/s)."""
-    return np.asarray(np.hypot(track["vx"], track["vy"]))
 
 
 def pressure(track: Track) -> Floats:
@@ -198,40 +343,10 @@ def _shared(cells: Any, count: Floats, total: Floats) -> tuple[Floats, Floats]:
 
 SHADES = (
     Shade("displacement", "displacement (mm)", lambda track: MILLI * displacement(track)),
-    Shade("speed", "speed (mm/s)", lambda track: MILLI * speed(track)),
+    Shade("speed", "speed (mm/s)", lambda track: MILLI * np.hypot(track["vx"], track["vy"])),
     Shade("plastic", "plastic shear strain", lambda track: track["plastic"]),
     Shade("pressure", "mean pressure (kPa), smoothed", lambda track: KILO * pressure(track)),
 )
-
-
-COURANT = 0.4  # step in smoothing lengths that a wave passes
-# J, as kernels/soil/energy.py measures them; the last six are losses
-ENERGIES = (
-    "kinetic",
-    "potential",
-    "elastic",
-    "contact",
-    "plastic",
-    "viscosity",
-    "dashpot",
-    "friction",
-    "settling",
-    "ramp",
-)
-COST = Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
-CORRECTED = 1.5  # time of a step with corrected gradients over that, measured
-QUANTITIES = (
-    Quantity("x", "m"),
-    Quantity("y", "m"),
-    Quantity("vx", "m/s"),
-    Quantity("vy", "m/s"),
-    Quantity("sxx", "Pa"),  # tension positive
-    Quantity("syy", "Pa"),
-    Quantity("szz", "Pa"),
-    Quantity("sxy", "Pa"),
-    Quantity("plastic", "1"),  # accumulated plastic shear strain
-)
-CONSTANTS = (Quantity("mass", "kg"), Quantity("spacing", "m"))
 
 
 def places_of(scenario: Scenario) -> list[Floats]:
@@ -239,7 +354,7 @@ def places_of(scenario: Scenario) -> list[Floats]:
     return [geometry.fill_lattice(table.corners, table.spacing) for table in soil_tables(scenario)]
 
 
-def elements_of_soils(scenario: Scenario) -> Elements:
+def elements_of(scenario: Scenario) -> Elements:
     """Return the particles of all soils of a scenario."""
     tables, places = soil_tables(scenario), places_of(scenario)
     names = tuple(
@@ -276,10 +391,6 @@ def _largest_step(scenario: Scenario) -> float:
     return min(courant * SMOOTHING * table.spacing / wave_speed(scenario.materials[table.material]) for table in tables)
 
 
-def _dearer(scenario: Scenario) -> float:
-    return CORRECTED if any(table.gradient == "corrected" for table in soil_tables(scenario)) else 1.0
-
-
 def _arrays(name: str) -> Any:
     """Return what is called so in soil_arrays.py: readers of stored runs compile nothing."""
     return getattr(import_module("blocksim.world.systems.soil_arrays"), name)
@@ -312,7 +423,7 @@ SOILS = System(
         Output("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", pressure),
         Output("plastic", "1", "accumulated plastic shear strain", "plastic_strain", quantity_as_stored("plastic")),
     ),
-    elements=elements_of_soils,
+    elements=elements_of,
     state=_state,
     outlines=lambda track, chosen: discs(track, chosen, 0.5 * track["spacing"]),
     energies=ENERGIES,
@@ -320,8 +431,8 @@ SOILS = System(
     largest_step=_largest_step,
     stages=lambda: _arrays("STAGES"),
     cost=COST,
-    dearer=_dearer,
-    parts=part_names,
+    dearer=lambda scenario: max(GRADIENT_COST[table.gradient] for table in soil_tables(scenario)),
+    parts=lambda scenario: tuple(table.name for table in soil_tables(scenario)),
     touching=body_contacts,
     shades=SHADES,
     ending=final_table,

@@ -9,7 +9,7 @@ import pytest
 from blocksim.kernels.soil.stress import DECAY, ROWS, part_of_kernel, share_of_row
 from blocksim.kernels.sph.wendland_c2 import slope
 from blocksim.scenario import Scenario
-from blocksim.world.systems.soil_materials import SMOOTHING, earth_pressure_at_rest
+from blocksim.world.systems.soils import SMOOTHING, earth_pressure_at_rest
 from tests.soils import BLOCKS, DEPTH, FAR, LEFT, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, Soil, column, right, scene
 
 SPACING = 0.005

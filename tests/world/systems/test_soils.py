@@ -18,8 +18,7 @@ from blocksim.world.describe import describe
 from blocksim.world.interactions import contact_classes
 from blocksim.world.systems import INTERACTIONS
 from blocksim.world.systems.soil_arrays import interactions_with
-from blocksim.world.systems.soil_materials import earth_pressure_at_rest, friction_with, yield_surface
-from blocksim.world.systems.soils import SOILS
+from blocksim.world.systems.soils import SOILS, earth_pressure_at_rest, friction_with, yield_surface
 from tests.soils import DEPTH, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, column, right, scene
 
 ANGLE = math.radians(21.9)
