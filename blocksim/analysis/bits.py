@@ -1,13 +1,13 @@
 """Bitwise comparison of two recordings of the same run."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.simulation.frames import CONTACT_ROW, UNITS, Contacts, Floats, Frames, Rows
+from blocksim.simulation.frames import CONTACT_ROW, UNITS, Contacts, Floats, Frames
 
 MILLI = 1e3
 MOTION = {  # quantity of a frame: its name in tables, and SI -> that unit
@@ -55,85 +55,72 @@ def differences(stored: Frames, now: Frames) -> Differences:
     where a state is not finite.
     """
     counts = (len(stored), len(now))
-    first = min(_firsts(stored, now, min(counts)), key=lambda one: one.frame, default=None)
+    first = min(_first_of_each(stored, now, min(counts)), key=lambda one: one.frame, default=None)
     if first is None:
         return Differences(counts)
-    places = [_largest(stored, now, min(counts), names) for names in (("x", "y"), ("angle",))]
-    return Differences(counts, first, MILLI * places[0], float(np.degrees(places[1])))
+    with np.errstate(invalid="ignore"):  # infinity minus infinity
+        x, y, angle = (
+            float(np.max(np.abs(getattr(stored, name)[: min(counts)] - getattr(now, name)[: min(counts)])))
+            for name in ("x", "y", "angle")
+        )
+    return Differences(counts, first, MILLI * max(x, y), float(np.degrees(angle)))
 
 
-def _firsts(stored: Frames, now: Frames, count: int) -> list[FirstDifference]:
-    """Return the first difference in each quantity of the first `count` frames."""
+def _first_of_each(stored: Frames, now: Frames, count: int) -> Iterator[FirstDifference]:
+    """Yield the first difference in each quantity of the first `count` frames."""
     lacking = np.full(count, np.nan)
-    found = [
-        _first(stored, count, label, getattr(stored, name), getattr(now, name), stored.names, factor)
+    quantities: list[tuple[str, Floats, Floats, Sequence[str], float]] = [
+        (label, getattr(stored, name), getattr(now, name), stored.names, factor)
         for name, (label, factor) in MOTION.items()
     ]
-    scene = [
+    scene = (
         ("step", stored.step.astype(np.float64), now.step.astype(np.float64)),
         ("time_s", stored.time, now.time),
         *((f"{name}_J", values, now.energy.get(name, lacking)) for name, values in stored.energy.items()),
         ("contact_count", stored.contact_count, now.contact_count),
         ("largest_overlap_mm", MILLI * stored.largest_overlap, MILLI * now.largest_overlap),
-    ]
-    found += [_first(stored, count, *one) for one in scene]
+    )
+    quantities += [(*one, (), 1.0) for one in scene]
     for old, new in zip(stored.others, now.others, strict=True):
         for one in old.system.quantities:
             label = f"{old.system.name} {one.name} ({one.unit})"
-            found.append(_first(stored, count, label, old[one.name], new[one.name], old.names))
-    found.append(_first_in_contacts(stored, now, count))
-    return [one for one in found if one is not None]
+            quantities.append((label, old[one.name], new[one.name], old.names, 1.0))
+    for label, before, after, names, factor in quantities:  # of the scene (n,), or of elements with names (n, b)
+        where = np.argwhere(_is_other(before[:count], after[:count]))
+        if where.size:
+            frame, *element = where[0].tolist()
+            values = (factor * float(one[frame, *element]) for one in (before, after))
+            name = names[element[0]] if element else None
+            yield FirstDifference(frame, float(stored.time[frame]), name, label, *values)
+    found = _first_in_contacts(stored.contacts, now.contacts, count)
+    if found is not None:
+        frame, label, *ends = found
+        yield FirstDifference(frame, float(stored.time[frame]), None, label, *map(float, ends))
 
 
-def _first(
-    stored: Frames, count: int, label: str, old: Floats, new: Floats, names: Sequence[str] = (), factor: float = 1.0
-) -> FirstDifference | None:
-    """Return the first difference of a quantity: of the scene (n,), or of elements with names (n, b)."""
-    where = np.argwhere(_is_other(old[:count], new[:count]))
-    if not where.size:
-        return None
-    frame, *element = where[0].tolist()
-    values = (factor * float(one[frame, *element]) for one in (old, new))
-    name = names[element[0]] if element else None
-    return FirstDifference(frame, float(stored.time[frame]), name, label, *values)
+def _first_in_contacts(
+    stored: Contacts | None, now: Contacts | None, count: int
+) -> tuple[int, str, float, float] | None:
+    """Return the first frame whose recorded contacts differ, in what, and both values.
 
-
-def _first_in_contacts(stored: Frames, now: Frames, count: int) -> FirstDifference | None:
-    """Return the first frame whose recorded contacts differ; the first one if one recording has none."""
-    old, new = stored.contacts, now.contacts
-    if old is None or new is None:
-        return None if old is new else _in_frame(stored, 0, "recorded_contacts", *map(_number_in_all, (old, new)))
+    The first one if one recording has none.
+    """
+    if stored is None or now is None:
+        before, after = (math.nan if one is None else len(one.rows) for one in (stored, now))
+        return None if stored is now else (0, "recorded_contacts", before, after)
     for frame in range(count):
-        tables = (old.at(frame), new.at(frame))
-        if len(tables[0]) != len(tables[1]):
-            return _in_frame(stored, frame, "recorded_contacts", *map(len, tables))
-        if tables[0].tobytes() != tables[1].tobytes():
-            return _first_in_tables(stored, frame, *tables)
+        old, new = stored.at(frame), now.at(frame)
+        if len(old) != len(new):
+            return frame, "recorded_contacts", len(old), len(new)
+        if old.tobytes() != new.tobytes():
+            columns = {name: (old[name].astype(float), new[name].astype(float)) for name in CONTACT_ROW.names or ()}
+            others = {name: _is_other(*ends) for name, ends in columns.items()}
+            row, name = min((int(np.argmax(other)), name) for name, other in others.items() if other.any())
+            label = f"contact {row + 1}, {name}{CONTACT_ENDS.get(name, '')}"
+            return frame, label, columns[name][0][row], columns[name][1][row]
     return None
-
-
-def _first_in_tables(stored: Frames, frame: int, old: Rows, new: Rows) -> FirstDifference:
-    """Return where two tables of contacts, of as many rows but with other bytes, differ first."""
-    names = CONTACT_ROW.names or ()
-    columns = {name: (old[name].astype(float), new[name].astype(float)) for name in names}
-    row, name = min((int(np.argmax(other)), name) for name in names if (other := _is_other(*columns[name])).any())
-    values = (float(one[row]) for one in columns[name])
-    return _in_frame(stored, frame, f"contact {row + 1}, {name}{CONTACT_ENDS.get(name, '')}", *values)
-
-
-def _number_in_all(contacts: Contacts | None) -> float:
-    return math.nan if contacts is None else len(contacts.rows)
-
-
-def _in_frame(stored: Frames, frame: int, quantity: str, old: float, new: float) -> FirstDifference:
-    return FirstDifference(frame, float(stored.time[frame]), None, quantity, float(old), float(new))
 
 
 def _is_other(old: Floats, new: Floats) -> NDArray[np.bool_]:
     """Return where the bits of two arrays differ."""
     return np.not_equal(*(np.ascontiguousarray(one).view(np.uint64) for one in (old, new)), dtype=np.bool_)
-
-
-def _largest(stored: Frames, now: Frames, count: int, names: tuple[str, ...]) -> float:
-    with np.errstate(invalid="ignore"):  # infinity minus infinity
-        return max(float(np.max(np.abs(getattr(stored, name)[:count] - getattr(now, name)[:count]))) for name in names)

@@ -1,10 +1,4 @@
-"""What intervals are made of: quantiles of Student's t distribution, and exact limits of a probability from k of n.
-
-The limits, after Clopper and Pearson (Biometrika 26, 1934), hold at least the stated confidence whatever the
-probability is. Each is the probability at which k, or more (fewer), of n has just the remaining chance; a quantile of a
-beta distribution solves that equation. The quantiles need no scipy: every run that is compared asks for them.
-
-Comparison of the final positions of one run with the repeats of an experiment.
+"""Comparison of the final positions of one run with the repeats of an experiment, and the intervals it takes.
 
 The rules, in the order in which they are tried:
 
@@ -17,7 +11,12 @@ The rules, in the order in which they are tried:
 
 The verdict comes with the numbers of a validation after ASME V&V 20: the error E = S - D, the
 standard uncertainty of the measured mean u_D = sqrt(s^2/n + reading^2), and the half-width of the 95 %
-prediction interval for the next test, t_(n-1, 0.975) s sqrt(1 + 1/n).
+prediction interval for the next test, t_(n-1, 0.975) s sqrt(1 + 1/n). Quantiles of Student's t need no scipy: every run
+that is compared asks for them.
+
+Limits of a probability from k of n, after Clopper and Pearson (Biometrika 26, 1934), hold at least the stated
+confidence whatever the probability is. Each is the probability at which k, or more (fewer), of n has just the remaining
+chance; a quantile of a beta distribution solves that equation.
 """
 
 from collections import Counter
@@ -44,35 +43,27 @@ BISECTIONS = 100  # each halves the bracket; 100 exhaust double precision
 def quantile(probability: float, degrees: int) -> float:
     """Return t with P(T <= t) = `probability`, for `degrees` >= 1 and 0 < `probability` < 1.
 
-    The series is inverted by bisection in theta = arctan(t/sqrt(degrees)), which is bounded. Raises
-    ValueError outside these limits.
+    P(|T| <= sqrt(degrees) tan(theta)) is the finite series of Abramowitz & Stegun, 26.7.3 and 26.7.4: odd powers of
+    cos(theta) for odd degrees of freedom, even powers for even ones. It is inverted by bisection in theta, which is
+    bounded. Raises ValueError outside these limits.
     """
     if degrees < 1 or not 0.0 < probability < 1.0:
         message = "needs at least one degree of freedom and a probability between 0 and 1"
         raise ValueError(message)
-    wanted = abs(2.0 * probability - 1.0)
+    is_odd = degrees % 2 == 1
     low, high = 0.0, pi / 2
     for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _series(middle, degrees) < wanted else (low, middle)
+        theta = 0.5 * (low + high)
+        total = term = cos(theta) if is_odd else 1.0
+        for index in range(3 if is_odd else 2, degrees - 1, 2):
+            term *= cos(theta) ** 2 * (index - 1) / index
+            total += term
+        part = sin(theta) * total
+        if is_odd:
+            part = 2.0 * theta / pi if degrees == 1 else 2.0 / pi * (theta + part)
+        low, high = (theta, high) if part < abs(2.0 * probability - 1.0) else (low, theta)
     size = sqrt(degrees) * tan(low)
     return size if probability >= 0.5 else -size  # noqa: PLR2004 - the median
-
-
-def _series(theta: float, degrees: int) -> float:
-    """Return P(|T| <= sqrt(degrees) tan(theta)): the finite series of Abramowitz & Stegun, 26.7.3 and 26.7.4.
-
-    It sums odd powers of cos(theta) for odd degrees of freedom, even powers for even ones.
-    """
-    odd = degrees % 2 == 1
-    if degrees == 1:
-        return 2.0 * theta / pi
-    term = cos(theta) if odd else 1.0
-    total = term
-    for index in range(3 if odd else 2, degrees - 1, 2):
-        term *= cos(theta) ** 2 * (index - 1) / index
-        total += term
-    return 2.0 / pi * (theta + sin(theta) * total) if odd else sin(theta) * total
 
 
 def interval(count: int, total: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -179,15 +170,25 @@ def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: Ex
     Raises InvalidInputError when the final table lacks a measured block or quantity, or names a block twice.
     A block that was not measured has rows with the verdict "no data"; a message names all of them.
     """
-    simulated = _simulated(final, table)
+    columns = {quantity: QUANTITIES[quantity].final_column for quantity in table.quantities}
+    missing = [column for column in ["block", *columns.values()] if column not in final]
+    if missing:
+        message = f"the final table has no column {', '.join(missing)}, which {table.source} is compared with"
+        raise InvalidInputError(message)
+    names = [str(name) for name in final["block"]]
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        message = f"the final table has more than one row for block {quote_names(twice)}"
+        raise InvalidInputError(message)
+    table.refuse_unknown(names, "the run")
     measured = {(row.block, row.quantity): row for row in table.summaries()}
+    values = {quantity: [float(value) for value in final[column]] for quantity, column in columns.items()}
     rows = [
-        _row(block, quantity, value, measured.get((block, quantity)))
-        for block, values in simulated.items()
-        for quantity, value in values.items()
+        _row(name, quantity, values[quantity][i], measured.get((name, quantity)))
+        for i, name in enumerate(names)
+        for quantity in columns
     ]
-    messages = (*table.messages, *table.unmeasured(list(simulated)))
-    return Comparison(rows=tuple(rows), source=table.source, messages=messages)
+    return Comparison(tuple(rows), table.source, (*table.messages, *table.unmeasured(names)))
 
 
 def limits(quantity: str, mean: float, minimum: float, maximum: float) -> tuple[float, float]:
@@ -209,25 +210,6 @@ def prediction_half_width(s: float, n: int) -> float:
     if n < 2:
         return nan
     return quantile(0.5 * (1.0 + CONFIDENCE), n - 1) * s * sqrt(1.0 + 1.0 / n)
-
-
-def _simulated(
-    final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: ExperimentTable
-) -> dict[str, dict[str, float]]:
-    """Return the measured quantities of the final table by block name, in the run's order."""
-    columns = {quantity: QUANTITIES[quantity].final_column for quantity in table.quantities}
-    missing = [column for column in ["block", *columns.values()] if column not in final]
-    if missing:
-        message = f"the final table has no column {', '.join(missing)}, which {table.source} is compared with"
-        raise InvalidInputError(message)
-    names = [str(name) for name in final["block"]]
-    twice = [name for name, count in Counter(names).items() if count > 1]
-    if twice:
-        message = f"the final table has more than one row for block {quote_names(twice)}"
-        raise InvalidInputError(message)
-    table.refuse_unknown(names, "the run")
-    values = {quantity: [float(value) for value in final[column]] for quantity, column in columns.items()}
-    return {name: {quantity: values[quantity][i] for quantity in columns} for i, name in enumerate(names)}
 
 
 def _row(block: str, quantity: str, value: float, measured: Statistics | None) -> ComparisonRow:

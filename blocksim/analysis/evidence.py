@@ -88,18 +88,14 @@ class Members:
 
         Raises InvalidInputError where the table has no such column, or a text in it.
         """
+        import pandas as pd
+
         name = _column(block, quantity)
         if name not in self.table:
             message = (
                 f"{self.source}: no column {name}, which the measured {quantity} of block '{block}' is compared with"
             )
             raise InvalidInputError(message)
-        values = np.where(self.finished, self._numbers(name), np.nan)
-        return np.where(np.isfinite(values), values, np.nan)
-
-    def _numbers(self, name: str) -> "NDArray[np.float64]":
-        import pandas as pd
-
         column = self.table[name]
         numbers = pd.to_numeric(column, errors="coerce")
         texts = np.flatnonzero(numbers.isna() & column.notna())
@@ -107,7 +103,8 @@ class Members:
             row = int(texts[0])
             message = f"{self.source}: {name}: '{column.iloc[row]}' in row {row + 1} is not a number"
             raise InvalidInputError(message)
-        return numbers.to_numpy(dtype=float, na_value=np.nan)
+        values = np.where(self.finished, numbers.to_numpy(dtype=float, na_value=np.nan), np.nan)
+        return np.where(np.isfinite(values), values, np.nan)
 
 
 def _column(block: str, quantity: str) -> str:
@@ -147,11 +144,6 @@ class Pair:
     measured: Statistics
     repeats: dict[int, float]  # by replicate, ascending
     values: Floats = field(repr=False)
-
-    @property
-    def is_length(self) -> bool:
-        """Whether it is a position in mm, not an angle."""
-        return self.measured.unit == "mm"
 
     @property
     def scatters(self) -> bool:
@@ -207,8 +199,8 @@ class Evidence:
 
     @property
     def lengths(self) -> list[Pair]:
-        """Those of positions."""
-        return [pair for pair in self.pairs if pair.is_length]
+        """Those of positions in mm, not of angles."""
+        return [pair for pair in self.pairs if pair.measured.unit == "mm"]
 
     @property
     def inside(self) -> NDArray[np.bool_]:
@@ -247,6 +239,5 @@ def complete_repeats(pairs: Sequence[Pair]) -> tuple[Floats, str]:
     every = sorted({replicate for pair in pairs for replicate in pair.repeats})
     complete = [replicate for replicate in every if all(replicate in pair.repeats for pair in pairs)]
     rows = [[pair.repeats[replicate] for pair in pairs] for replicate in complete]
-    return np.array(rows, dtype=float).reshape(len(rows), len(pairs)), list_names(
-        sorted(set(every) - set(complete)), MOST_NAMES
-    )
+    others = list_names(sorted(set(every) - set(complete)), MOST_NAMES)
+    return np.array(rows, dtype=float).reshape(len(rows), len(pairs)), others

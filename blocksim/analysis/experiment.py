@@ -1,7 +1,4 @@
-"""Measured tables: the repeats of a laboratory experiment, as a tidy table and as statistics.
-
-Tables of measured properties: sizes and materials of the blocks of an experiment, in SI.
-"""
+"""Measured tables: the repeats of a laboratory experiment, and sizes and materials of its blocks."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from blocksim.errors import InvalidInputError
+from blocksim.errors import InvalidInputError, Problem
 from blocksim.scenario.input_files import Cell, Table, raise_problems, read_table
 from blocksim.scenario.spelling import list_names, suggestion
 from blocksim.scenario.units import unit_factor
@@ -148,7 +145,12 @@ class ExperimentTable:
         repeats: dict[tuple[str, str, str], list[float]] = {}
         for one in self.measurements:
             repeats.setdefault((one.block, one.quantity, one.unit), []).append(one.value)
-        return tuple(_statistics(*pair, values) for pair, values in repeats.items())
+        rows = []
+        for pair, values in repeats.items():
+            n, mean = len(values), fsum(values) / len(values)
+            s = sqrt(fsum((value - mean) ** 2 for value in values) / (n - 1)) if n > 1 else nan
+            rows.append(Statistics(*pair, mean, s, n, min(values), max(values)))
+        return tuple(rows)
 
 
 def quote_names(names: Sequence[str]) -> str:
@@ -163,12 +165,6 @@ def _frame(rows: Iterable[Any]) -> "pd.DataFrame":
     return pd.DataFrame(list(rows))
 
 
-def _statistics(block: str, quantity: str, unit: str, values: list[float]) -> Statistics:
-    n, mean = len(values), fsum(values) / len(values)
-    s = sqrt(fsum((value - mean) ** 2 for value in values) / (n - 1)) if n > 1 else nan
-    return Statistics(block, quantity, unit, mean, s, n, min(values), max(values))
-
-
 def load_table(path: Path | str) -> ExperimentTable:
     """Read a measured table (`block,quantity,unit,replicate,value`, `#` starts a comment line).
 
@@ -180,12 +176,22 @@ def load_table(path: Path | str) -> ExperimentTable:
     rows = []
     first_lines: dict[tuple[str, str, int], int] = {}
     for row in table.rows:
-        measurement = _measurement(row, table)
-        if measurement is not None:
-            _note_repetition(measurement, row["replicate"], first_lines, table)
-            rows.append((measurement, row))
+        one = _measurement(row, table.problems)
+        if one is not None:
+            rows.append((one, row))
+            cell = row["replicate"]
+            first = first_lines.setdefault((one.block, one.quantity, one.replicate), cell.line.number)
+            if first != cell.line.number:
+                what = f"block '{one.block}', {one.quantity}, replicate {one.replicate}"
+                table.problems.append(cell.problem(f"{what} is already given in line {first}"))
+    _refuse_empty(table)
     measured = tuple(one for one, _ in rows if isfinite(one.value))
-    _note_emptiness(rows, measured, table)
+    known = {(one.block, one.quantity) for one in measured}
+    for one, row in rows:
+        if (one.block, one.quantity) not in known:
+            known.add((one.block, one.quantity))
+            message = f"block '{one.block}', {one.quantity} has no value in any replicate"
+            table.problems.append(row["value"].problem(message))
     if table.problems:
         raise_problems(table.problems)
     missing = tuple(one for one, _ in rows if not isfinite(one.value))
@@ -193,94 +199,49 @@ def load_table(path: Path | str) -> ExperimentTable:
     return ExperimentTable(measured, str(path), table.notes, missing, places)
 
 
-def _note_emptiness(
-    rows: Sequence[tuple[Measurement, dict[str, Cell]]], measured: Sequence[Measurement], table: Table
-) -> None:
-    """Record a problem if there is no row, and for every quantity of a block without a value in any repeat."""
+def _refuse_empty(table: Table) -> None:
+    """Record a problem if there is no row, and no other problem that says why."""
     if not table.rows and not table.problems:
         table.problems.append(table.header.problem("the table has a header and no rows"))
-    known = {(one.block, one.quantity) for one in measured}
-    for one, row in rows:
-        if (one.block, one.quantity) not in known:
-            known.add((one.block, one.quantity))
-            message = f"block '{one.block}', {one.quantity} has no value in any replicate"
-            table.problems.append(row["value"].problem(message))
 
 
-def _measurement(row: dict[str, Cell], table: Table) -> Measurement | None:
-    """Check one row; None after recording its problems."""
-    before = len(table.problems)
-    name = row["quantity"].text
-    quantity = QUANTITIES.get(name)
-    _check_name(row["block"], table)
+def _measurement(row: dict[str, Cell], problems: list[Problem]) -> Measurement | None:
+    """Check one row; None after recording its problems. The value is NaN for an empty cell."""
+    before = len(problems)
+    block, number, unit, cell = (row[name] for name in ("block", "replicate", "unit", "value"))
+    quantity = QUANTITIES.get(row["quantity"].text)
+    if not block.text:
+        problems.append(block.problem("the block has no name"))
+    elif len(block.text) > LONGEST_NAME:
+        problems.append(block.problem(f"the name has {len(block.text)} characters, at most {LONGEST_NAME}"))
     if quantity is None:
-        complaint = f"unknown quantity '{name}', {suggestion(name, tuple(QUANTITIES))}"
-        table.problems.append(row["quantity"].problem(complaint))
-    replicate = _replicate(row["replicate"], table)
-    factor = 1.0 if quantity is None else _factor(row["unit"], quantity, table)
-    value = _value(row["value"], factor, table)
-    if quantity is None or len(table.problems) > before:
-        return None
-    return Measurement(row["block"].text, name, quantity.unit, replicate, value)
-
-
-def _note_repetition(
-    measurement: Measurement, cell: Cell, first_lines: dict[tuple[str, str, int], int], table: Table
-) -> None:
-    """Record a problem when the same repeat of the same quantity was read before."""
-    key = (measurement.block, measurement.quantity, measurement.replicate)
-    first = first_lines.setdefault(key, cell.line.number)
-    if first != cell.line.number:
-        what = f"block '{key[0]}', {key[1]}, replicate {key[2]}"
-        table.problems.append(cell.problem(f"{what} is already given in line {first}"))
-
-
-def _check_name(cell: Cell, table: Table) -> None:
-    if not cell.text:
-        table.problems.append(cell.problem("the block has no name"))
-    elif len(cell.text) > LONGEST_NAME:
-        table.problems.append(cell.problem(f"the name has {len(cell.text)} characters, at most {LONGEST_NAME}"))
-
-
-def _replicate(cell: Cell, table: Table) -> int:
-    """Return the number of the repeat; 0 after recording a problem."""
-    is_number = cell.text.isascii() and cell.text.isdigit() and len(cell.text) <= len(str(LARGEST_REPLICATE))
-    if is_number and 1 <= int(cell.text) <= LARGEST_REPLICATE:
-        return int(cell.text)
-    table.problems.append(cell.problem(f"'{cell.text}' is not a repeat number; count repeats as 1, 2, 3, ..."))
-    return 0
-
-
-def _factor(cell: Cell, quantity: Quantity, table: Table) -> float:
-    """Return the factor to mm or deg; 1 after recording a problem."""
-    factor = unit_factor(cell.text, quantity.unit)
-    if factor is not None:
-        return factor
-    kind, allowed = ("an angle", "deg or rad") if quantity.unit == "deg" else ("a length", "mm, cm or m")
-    found = f"'{cell.text}' is not the unit of {kind}" if cell.text else "no unit"
-    table.problems.append(cell.problem(f"{found}; write {allowed}"))
-    return 1.0
-
-
-def _value(cell: Cell, factor: float, table: Table) -> float:
-    """Return the value in mm or deg; NaN for an empty cell, 0 after recording a problem."""
-    if cell.text.lower() in MISSING:
-        return nan
-    try:
-        value = cell.number() * factor
-    except ValueError as error:
-        table.problems.append(cell.problem(str(error)))
-        return 0.0
+        complaint = f"unknown quantity '{row['quantity'].text}', {suggestion(row['quantity'].text, tuple(QUANTITIES))}"
+        problems.append(row["quantity"].problem(complaint))
+    is_number = number.text.isascii() and number.text.isdigit() and len(number.text) <= len(str(LARGEST_REPLICATE))
+    if not is_number or not 1 <= int(number.text) <= LARGEST_REPLICATE:
+        problems.append(number.problem(f"'{number.text}' is not a repeat number; count repeats as 1, 2, 3, ..."))
+    factor = 1.0 if quantity is None else unit_factor(unit.text, quantity.unit)
+    if quantity is not None and factor is None:
+        kind, allowed = ("an angle", "deg or rad") if quantity.unit == "deg" else ("a length", "mm, cm or m")
+        found = f"'{unit.text}' is not the unit of {kind}" if unit.text else "no unit"
+        problems.append(unit.problem(f"{found}; write {allowed}"))
+    value = nan
+    if cell.text.lower() not in MISSING:
+        try:
+            value = cell.number() * (factor or 1.0)
+        except ValueError as error:
+            problems.append(cell.problem(str(error)))
     if abs(value) > LARGEST_VALUE:
-        table.problems.append(cell.problem(f"'{cell.text}' is too large, at most {LARGEST_VALUE:g} mm or degrees"))
-    return value
+        problems.append(cell.problem(f"'{cell.text}' is too large, at most {LARGEST_VALUE:g} mm or degrees"))
+    if quantity is None or len(problems) > before:
+        return None
+    return Measurement(block.text, row["quantity"].text, quantity.unit, int(number.text), value)
 
 
 PROPERTY_COLUMNS = ("property", "unit", "value")
 
 
-@dataclass(frozen=True)
-class Bounds:
+class Interval(NamedTuple):
     """The SI unit of a property and the open interval its value lies in."""
 
     unit: str
@@ -289,17 +250,17 @@ class Bounds:
 
 
 PROPERTIES = {
-    "width": Bounds("m", 0.0),
-    "height": Bounds("m", 0.0),
-    "length": Bounds("m", 0.0),
-    "overlap": Bounds("m", 0.0),
-    "unit_weight": Bounds("N/m^3", 0.0),
-    "density": Bounds("kg/m^3", 0.0),
-    "young_modulus": Bounds("Pa", 0.0),
-    "poisson_ratio": Bounds("1", -1.0, 0.5),
-    "friction_block_block": Bounds("1", 0.0),
-    "friction_block_ground": Bounds("1", 0.0),
-    "ground_friction_angle": Bounds("rad", 0.0, pi / 2),
+    "width": Interval("m", 0.0),
+    "height": Interval("m", 0.0),
+    "length": Interval("m", 0.0),
+    "overlap": Interval("m", 0.0),
+    "unit_weight": Interval("N/m^3", 0.0),
+    "density": Interval("kg/m^3", 0.0),
+    "young_modulus": Interval("Pa", 0.0),
+    "poisson_ratio": Interval("1", -1.0, 0.5),
+    "friction_block_block": Interval("1", 0.0),
+    "friction_block_ground": Interval("1", 0.0),
+    "ground_friction_angle": Interval("rad", 0.0, pi / 2),
 }
 
 
@@ -320,40 +281,35 @@ def load_properties(path: Path | str) -> PropertyTable:
     table = read_table(Path(path), PROPERTY_COLUMNS)
     values: dict[str, float] = {}
     for row in table.rows:
-        _read_property(row, values, table)
-    if not table.rows and not table.problems:
-        table.problems.append(table.header.problem("the table has a header and no rows"))
+        cell, unit = row["property"], row["unit"]
+        name = cell.text
+        if name not in PROPERTIES:
+            complaint = f"unknown property '{name}', {suggestion(name, tuple(PROPERTIES))}"
+            table.problems.append(cell.problem(complaint))
+            continue
+        if name in values:
+            table.problems.append(cell.problem(f"'{name}' is given twice"))
+        interval = PROPERTIES[name]
+        factor = unit_factor(unit.text, interval.unit)
+        if factor is None:
+            found = f"'{unit.text}'" if unit.text else "nothing"
+            table.problems.append(unit.problem(f"{found} is not a unit of {name}, write for example {interval.unit}"))
+            continue
+        try:
+            values[name] = _within(row["value"].number() * factor, interval)
+        except ValueError as error:
+            table.problems.append(row["value"].problem(str(error)))
+    _refuse_empty(table)
     if table.problems:
         raise_problems(table.problems)
     return PropertyTable(values=MappingProxyType(values), source=str(path), notes=table.notes)
 
 
-def _read_property(row: dict[str, Cell], values: dict[str, float], table: Table) -> None:
-    """Check one row and store its value in SI, or record its error."""
-    name = row["property"].text
-    bounds = PROPERTIES.get(name)
-    if bounds is None:
-        complaint = f"unknown property '{name}', {suggestion(name, tuple(PROPERTIES))}"
-        table.problems.append(row["property"].problem(complaint))
-        return
-    if name in values:
-        table.problems.append(row["property"].problem(f"'{name}' is given twice"))
-    factor = unit_factor(row["unit"].text, bounds.unit)
-    if factor is None:
-        found = f"'{row['unit'].text}'" if row["unit"].text else "nothing"
-        table.problems.append(row["unit"].problem(f"{found} is not a unit of {name}, write for example {bounds.unit}"))
-        return
-    try:
-        values[name] = _within(row["value"].number() * factor, bounds)
-    except ValueError as error:
-        table.problems.append(row["value"].problem(str(error)))
-
-
-def _within(value: float, bounds: Bounds) -> float:
+def _within(value: float, interval: Interval) -> float:
     """Return the value; raises ValueError when it lies outside its interval."""
-    if bounds.above < value < bounds.below:
+    if interval.above < value < interval.below:
         return value
-    unit = "" if bounds.unit == "1" else f" {bounds.unit}"
-    limit = "" if bounds.below == inf else f" and below {bounds.below:g}{unit}"
-    message = f"{value:g}{unit} is impossible, it must be above {bounds.above:g}{unit}{limit}"
+    unit = "" if interval.unit == "1" else f" {interval.unit}"
+    limit = "" if interval.below == inf else f" and below {interval.below:g}{unit}"
+    message = f"{value:g}{unit} is impossible, it must be above {interval.above:g}{unit}{limit}"
     raise ValueError(message)

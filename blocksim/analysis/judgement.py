@@ -109,7 +109,12 @@ def judge(
     """
     settings = settings or Settings()
     table.refuse_unknown(members.blocks, "the sweep")
-    evidence = Evidence(members, table, settings.u_num)
+    evidence, finished = Evidence(members, table, settings.u_num), int(members.finished.sum())
+    incomplete = (  # measured quantities of which finished samples have no value
+        f"{finished - pair.known.size} finished samples have no {pair.name}: they count as outside"
+        for pair in evidence.pairs
+        if pair.known.size < finished
+    )
     return Judgement(
         sweep=members.source,
         source=table.source,
@@ -118,15 +123,5 @@ def judge(
         failures=members.failures,
         settings=settings,
         findings={name: metric.find(evidence) for name, metric in METRICS.items()},
-        messages=(*messages, *table.messages, *table.unmeasured(members.blocks), *_incomplete(evidence)),
+        messages=(*messages, *table.messages, *table.unmeasured(members.blocks), *incomplete),
     )
-
-
-def _incomplete(evidence: Evidence) -> list[str]:
-    """Report measured quantities of which finished samples have no value."""
-    finished = int(evidence.members.finished.sum())
-    return [
-        f"{finished - pair.known.size} finished samples have no {pair.name}: they count as outside"
-        for pair in evidence.pairs
-        if pair.known.size < finished
-    ]

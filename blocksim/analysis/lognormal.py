@@ -134,7 +134,7 @@ def inflation_of(counts: Counts, failed: Floats, members: Floats) -> float:
         return 1.0
     centred = _Probit(counts, np.log(counts.x) - float(np.log(counts.x).mean()))
     a, b = centred.maximum()
-    eta = a + b * centred.t
+    eta = centred.eta(a, b)
     scores = failed * _hazard(eta) - (members - failed) * _hazard(-eta)
     sums = np.column_stack([scores.sum(axis=1), scores @ centred.t])
     covariance = sums.T @ sums * len(failed) / (len(failed) - 1)
@@ -146,14 +146,21 @@ def _special() -> Any:
 
 
 def _refusal(counts: Counts, confidence: float) -> NoCurve | None:
-    """Return why there is no finite maximum, None where there is one."""
+    """Return why there is no finite maximum, None where there is one.
+
+    Where all samples do the same, the median lies beyond an intensity, as the exact limits of the counts there have it.
+    """
     if len(counts.x) < FEWEST:
         return NoCurve("a curve needs samples at two intensities or more")
     failing, standing = counts.x[counts.failed > 0], counts.x[counts.failed < counts.members]
-    if not failing.size:
-        return NoCurve("no sample fails at any intensity", low=_beyond(counts, confidence, failing=False))
-    if not standing.size:
-        return NoCurve("all samples fail at all intensities", high=_beyond(counts, confidence, failing=True))
+    if not failing.size or not standing.size:
+        ends = [interval(int(k), int(n), confidence) for k, n in zip(counts.failed, counts.members, strict=True)]
+        places = list(zip(counts.x.tolist(), ends, strict=True))
+        if standing.size:
+            low = max((x for x, (_, high) in places if high < HALF), default=0.0)
+            return NoCurve("no sample fails at any intensity", low=low)
+        high = min((x for x, (low, _) in places if low > HALF), default=math.inf)
+        return NoCurve("all samples fail at all intensities", high=high)
     if standing.max() <= failing.min():
         low, high = float(standing.max()), float(failing.min())
         where = (
@@ -163,17 +170,6 @@ def _refusal(counts: Counts, confidence: float) -> NoCurve | None:
     if failing.max() <= standing.min():
         return NoCurve("failures do not become more frequent with the intensity")
     return None
-
-
-def _beyond(counts: Counts, confidence: float, *, failing: bool) -> float:
-    """Return the intensity beyond which the median lies, as the exact limits of all counts have it.
-
-    0 or infinite where members are too few to say so.
-    """
-    limits = [interval(int(k), int(n), confidence) for k, n in zip(counts.failed, counts.members, strict=True)]
-    if failing:
-        return min((float(x) for x, (low, _) in zip(counts.x, limits, strict=True) if low > HALF), default=math.inf)
-    return max((float(x) for x, (_, high) in zip(counts.x, limits, strict=True) if high < HALF), default=0.0)
 
 
 def _medians(a: Floats, b: Floats, middle: float) -> tuple[float, float]:
@@ -198,22 +194,23 @@ class _Probit:
     counts: Counts
     t: Floats
 
-    def at(self, a: Floats, b: Floats) -> Floats:
-        """Return the logarithmic likelihood; of shape (r,) as a and b have it."""
-        eta = a[:, None] + b[:, None] * self.t
-        log_ndtr, k, n = _special().log_ndtr, self.counts.failed, self.counts.members
-        total: Floats = (k * log_ndtr(eta) + (n - k) * log_ndtr(-eta)).sum(axis=1)
-        return total
+    def eta(self, a: Floats | float, b: Floats | float) -> Floats:
+        """Return a + b t, of the shape of a and b and one dimension more."""
+        return np.asarray(np.asarray(a)[..., np.newaxis] + np.multiply.outer(b, self.t))
 
-    def slopes(self, a: Floats, b: Floats) -> Floats:
-        """Return its derivatives with respect to eta at every place, (r, n)."""
-        eta = a[:, None] + b[:, None] * self.t
-        k, n = self.counts.failed, self.counts.members
+    def at(self, a: Floats | float, b: Floats | float) -> Floats:
+        """Return the logarithmic likelihood."""
+        eta, log_ndtr, k, n = self.eta(a, b), _special().log_ndtr, self.counts.failed, self.counts.members
+        return np.asarray((k * log_ndtr(eta) + (n - k) * log_ndtr(-eta)).sum(axis=-1))
+
+    def slopes(self, a: Floats | float, b: Floats | float) -> Floats:
+        """Return its derivatives with respect to eta at every place."""
+        eta, k, n = self.eta(a, b), self.counts.failed, self.counts.members
         return np.asarray(k * _hazard(eta) - (n - k) * _hazard(-eta))
 
     def information(self, a: float, b: float) -> Floats:
         """Return Fisher's information matrix."""
-        eta = a + b * self.t
+        eta = self.eta(a, b)
         weight = self.counts.members * _hazard(eta) * _hazard(-eta)
         return np.array([[weight.sum(), weight @ self.t], [weight @ self.t, weight @ self.t**2]])
 
@@ -221,11 +218,11 @@ class _Probit:
         """Return (a, b) where the likelihood is largest, by Fisher's scoring with steps halved until they climb."""
         share = self.counts.failed.sum() / self.counts.members.sum()
         place = np.array([float(_special().ndtri(share)), 0.0])
-        known = self.at(place[:1], place[1:])[0]
+        known = self.at(*place)
         for _ in range(STEPS):
-            slopes = self.slopes(place[:1], place[1:])[0]
+            slopes = self.slopes(*place)
             step = np.linalg.solve(self.information(*place), [slopes.sum(), slopes @ self.t])
-            while (higher := self.at((place + step)[:1], (place + step)[1:])[0]) < known and np.abs(step).max() > CLOSE:
+            while (higher := self.at(*(place + step))) < known and np.abs(step).max() > CLOSE:
                 step *= HALF
             place, known = place + step, higher
             if np.abs(step).max() <= CLOSE:
@@ -240,7 +237,7 @@ class _Probit:
         angles = 2.0 * math.pi * np.arange(RAYS) / RAYS
         whitened = np.linalg.inv(np.linalg.cholesky(self.information(*best))).T
         along_a, along_b = whitened @ np.array([np.cos(angles), np.sin(angles)])
-        target = self.at(np.array(best[:1]), np.array(best[1:]))[0] - drop
+        target = self.at(*best) - drop
         reach = np.full(RAYS, math.sqrt(2.0 * drop))
         while (inside := self.at(best[0] + reach * along_a, best[1] + reach * along_b) > target).any():
             reach = np.where(inside, 2.0 * reach, reach)
@@ -255,10 +252,9 @@ class _Probit:
 
     def deviance(self, best: tuple[float, float]) -> float:
         """Return twice what the likelihood lacks to that of the observed shares."""
-        k, n = self.counts.failed, self.counts.members
-        xlogy = _special().xlogy
+        k, n, xlogy = self.counts.failed, self.counts.members, _special().xlogy
         saturated = float((xlogy(k, k / n) + xlogy(n - k, (n - k) / n)).sum())
-        return max(0.0, 2.0 * (saturated - float(self.at(np.array(best[:1]), np.array(best[1:]))[0])))
+        return max(0.0, 2.0 * (saturated - float(self.at(*best))))
 
 
 def _hazard(eta: Floats) -> Floats:

@@ -26,7 +26,6 @@ from blocksim.analysis.evidence import (
     Form,
     Interval,
     Metric,
-    Pair,
     Row,
     complete_repeats,
 )
@@ -36,6 +35,18 @@ QUARTER = 90.0  # deg
 ROTATION = "rotation"
 UNKNOWN = "?"
 FAILED = "did not finish"
+ALL = "all"
+COVERAGE = 2.0  # factor k of the expanded uncertainty, about 95 %
+ENOUGH = 2  # values that a standard deviation needs
+RESAMPLES = 2000
+SEED = 0
+FEWEST = 4  # values of a sample that is worth resampling
+SMALLEST_EIGENVALUE = 1e-9  # of the correlation matrix: below it, one position follows from the others
+Places = NDArray[np.int64]
+SHARE = (
+    Column("share", "share", Form.SHARE, "inside / of", 1),
+    Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+)
 
 
 def outcome(rotations: Sequence[float]) -> str:
@@ -44,7 +55,7 @@ def outcome(rotations: Sequence[float]) -> str:
     return ", ".join(turns)
 
 
-def _find(evidence: Evidence) -> Findings:
+def _find_outcome(evidence: Evidence) -> Findings:
     measured = [pair for pair in evidence.pairs if pair.measured.quantity == ROTATION]
     members = evidence.members
     blocks = [pair.measured.block for pair in measured] or [
@@ -57,26 +68,24 @@ def _find(evidence: Evidence) -> Findings:
     ends = zip(rotations.tolist(), members.finished, strict=True)
     found = Counter(outcome(row) if has_ended else FAILED for row, has_ended in ends)
     seen = Counter(map(outcome, repeats.tolist()))
-    order = sorted({*found, *seen}, key=lambda name: (-found[name], -seen[name], name))
+    rows: list[Row] = []
+    for name in sorted({*found, *seen}, key=lambda name: (-found[name], -seen[name], name)):
+        row: Row = {"outcome": name, "members": found[name], "of": found.total(), **_share(found[name], found.total())}
+        row |= dict.fromkeys(("measured", "repeats", "lower_bound"), None)
+        if seen[name]:
+            bound = lower_bound(seen[name], seen.total())
+            row |= {"measured": seen[name], "repeats": seen.total(), "lower_bound": bound}
+        rows.append(row)
     messages = ["blocks: " + ", ".join(blocks)]
     if incomplete:
         messages.append(f"left out, as not all rotations were measured: replicate {incomplete}")
     if seen:
         messages.append("at least: one-sided 95 % limit of the measured share")
-    return Findings(tuple(_row(name, found, seen) for name in order), tuple(messages))
+    return Findings(tuple(rows), tuple(messages))
 
 
-def _row(name: str, found: Counter[str], seen: Counter[str]) -> Row:
-    count, total, repeats = found[name], found.total(), seen.total()
-    measured: Row = {"measured": seen[name], "repeats": repeats, "lower_bound": lower_bound(seen[name], repeats)}
-    return {
-        "outcome": name,
-        "members": count,
-        "of": total,
-        "share": count / total,
-        "interval": interval(count, total),
-        **(measured if seen[name] else dict.fromkeys(measured, None)),
-    }
+def _share(count: int, total: int) -> Row:
+    return {"share": count / total, "interval": interval(count, total)}
 
 
 OUTCOME = Metric(
@@ -92,11 +101,8 @@ OUTCOME = Metric(
         Column("repeats", "of", Form.COUNT, "all repeats"),
         Column("lower_bound", "at least", Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) if all n agree", 1),
     ),
-    _find,
+    _find_outcome,
 )
-
-
-ALL = "all"
 
 
 def repeat_passes(n: int) -> float:
@@ -115,51 +121,33 @@ def repeat_passes_all(counts: list[int]) -> Interval | float | None:
 
 def _find_inside(evidence: Evidence) -> Findings:
     total = evidence.members.count
-    passes = [repeat_passes(pair.measured.n) if _has_range(pair) else None for pair in evidence.pairs]
-    rows: list[Row] = [
-        {
-            **pair.head,
-            "limits": pair.limits,
-            **_share(int(pair.inside.sum()), total),
-            "repeat_passes": chance,
-        }
-        for pair, chance in zip(evidence.pairs, passes, strict=True)
-    ]
-    ranged = [pair.measured.n for pair in evidence.pairs if _has_range(pair)]
-    everything: Row = {"block": ALL, "quantity": "", "unit": "", "limits": None}
-    share = _share(int(evidence.inside.sum()), total)
-    last: Row = {**everything, **share, "repeat_passes": repeat_passes_all(ranged)}
-    failed = total - int(evidence.members.finished.sum())
+    rows: list[Row] = []
+    ranged = []  # repeats of those whose limits are those of the repeats, and no tolerance about them
+    for pair in evidence.pairs:
+        n, count = pair.measured.n, int(pair.inside.sum())
+        has_range = pair.limits == (pair.measured.minimum, pair.measured.maximum)
+        ranged += [n] if has_range else []
+        row: Row = {**pair.head, "limits": pair.limits, "inside": count, "of": total, **_share(count, total)}
+        rows.append({**row, "repeat_passes": repeat_passes(n) if has_range else None})
+    count, failed = int(evidence.inside.sum()), total - int(evidence.members.finished.sum())
+    last: Row = {"block": ALL, "quantity": "", "unit": "", "limits": None, "inside": count, "of": total}
+    rows.append({**last, **_share(count, total), "repeat_passes": repeat_passes_all(ranged)})
     text = f"shares are of all {total} samples" + (f"; {failed} did not finish and count as outside" if failed else "")
-    return Findings((*rows, last), (text,))
-
-
-def _share(count: int, total: int) -> Row:
-    return {"inside": count, "of": total, "share": count / total, "interval": interval(count, total)}
-
-
-def _has_range(pair: Pair) -> bool:
-    """Return True if the limits are those of the repeats, and no tolerance about them."""
-    return pair.limits == (pair.measured.minimum, pair.measured.maximum)
+    return Findings(tuple(rows), (text,))
 
 
 def _find_predicted(evidence: Evidence) -> Findings:
-    lengths = evidence.lengths
-    rows = tuple(_predicted(pair, evidence.members.count) for pair in lengths if pair.scatters)
-    without = [f"{pair.name}: repeats without scatter predict nothing" for pair in lengths if not pair.scatters]
-    return Findings(rows, tuple(without))
+    total = evidence.members.count
+    rows: list[Row] = []
+    for pair in (pair for pair in evidence.lengths if pair.scatters):
+        half = prediction_half_width(pair.measured.s, pair.measured.n)
+        ends = (pair.measured.mean - half, pair.measured.mean + half)
+        count = int(pair.between(ends).sum())
+        rows.append({**pair.head, "prediction": ends, "inside": count, "of": total, **_share(count, total)})
+    without = (pair.name for pair in evidence.lengths if not pair.scatters)
+    return Findings(tuple(rows), tuple(f"{name}: repeats without scatter predict nothing" for name in without))
 
 
-def _predicted(pair: Pair, total: int) -> Row:
-    half = prediction_half_width(pair.measured.s, pair.measured.n)
-    ends = (pair.measured.mean - half, pair.measured.mean + half)
-    return {**pair.head, "prediction": ends, **_share(int(pair.between(ends).sum()), total)}
-
-
-SHARE = (
-    Column("share", "share", Form.SHARE, "inside / of", 1),
-    Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
-)
 INSIDE = Metric(
     "inside",
     "samples inside the measured limits, by the rules for single runs",
@@ -187,40 +175,26 @@ PREDICTION = Metric(
 )
 
 
-COVERAGE = 2.0  # factor k of the expanded uncertainty, about 95 %
-ENOUGH = 2  # values that a standard deviation needs
-
-
 def _find_validation(evidence: Evidence) -> Findings:
-    lengths = evidence.lengths
-    rows = tuple(_row_validation(pair, evidence.u_num) for pair in lengths)
-    messages = [f"u_num = {evidence.u_num:g} mm"] if rows else ["no length was measured"]
+    lengths, u_num = evidence.lengths, evidence.u_num
+    rows: list[Row] = []
+    for pair in lengths:
+        values, measured = pair.known, pair.measured
+        simulated = float(np.mean(values)) if values.size else nan
+        error = simulated - measured.mean
+        u_input = float(np.std(values, ddof=1)) if values.size >= ENOUGH else nan
+        u_data = data_uncertainty(measured.s, measured.n)
+        u_val = hypot(u_num, u_input, u_data)
+        row: Row = {**pair.head, "members": int(values.size), "S": simulated, "D": measured.mean, "E": error}
+        row |= {"u_num": u_num, "u_input": u_input, "u_D": u_data, "u_val": u_val}
+        is_known = isfinite(u_val) and isfinite(error)
+        rows.append({**row, "within": abs(error) <= COVERAGE * u_val if is_known else None})
+    messages = [f"u_num = {u_num:g} mm"] if rows else ["no length was measured"]
     if any(pair.known.size < ENOUGH for pair in lengths):
         messages.append("u_input needs two samples with a value")
     if any(pair.measured.n < ENOUGH for pair in lengths):
         messages.append("u_D needs two repeats")
-    return Findings(rows, tuple(messages))
-
-
-def _row_validation(pair: Pair, u_num: float) -> Row:
-    values, measured = pair.known, pair.measured
-    simulated = float(np.mean(values)) if values.size else nan
-    error = simulated - measured.mean
-    u_input = float(np.std(values, ddof=1)) if values.size >= ENOUGH else nan
-    u_data = data_uncertainty(measured.s, measured.n)
-    u_val = hypot(u_num, u_input, u_data)
-    return {
-        **pair.head,
-        "members": int(values.size),
-        "S": simulated,
-        "D": measured.mean,
-        "E": error,
-        "u_num": u_num,
-        "u_input": u_input,
-        "u_D": u_data,
-        "u_val": u_val,
-        "within": abs(error) <= COVERAGE * u_val if isfinite(u_val) and isfinite(error) else None,
-    }
+    return Findings(tuple(rows), tuple(messages))
 
 
 VALIDATION = Metric(
@@ -242,80 +216,58 @@ VALIDATION = Metric(
 )
 
 
-Counts = NDArray[np.int64]
-RESAMPLES = 2000
-SEED = 0
-FEWEST = 4  # values of a sample that is worth resampling
+def _on_grid(one: Floats, other: Floats) -> tuple[Floats, Places, Places]:
+    """Return the distances of the values of two samples in order, and which values each sample has."""
+    grid, places = np.unique(np.concatenate([one, other]), return_inverse=True)
+    return np.diff(grid), places[: one.size], places[one.size :]
 
 
-class Steps:
-    """Two samples on their common grid of values, for the area between their distributions as counts change."""
-
-    def __init__(self, one: Floats, other: Floats) -> None:
-        """Take samples of any length, at least one value each."""
-        grid, places = np.unique(np.concatenate([one, other]), return_inverse=True)
-        self.widths = np.diff(grid)
-        self.one, self.other = places[: one.size], places[one.size :]
-
-    def area(self, one: Counts, other: Counts) -> float:
-        """Return the area between two samples, given as the places of their values on the grid."""
-        gap = self._distribution(one) - self._distribution(other)
-        return float(np.sum(np.abs(gap) * self.widths))  # not by BLAS, whose threads hinder one another here
-
-    def _distribution(self, places: Counts) -> Floats:
-        """Return the share of values up to each place of the grid but the last."""
-        counts = np.bincount(places, minlength=self.widths.size + 1)
-        return np.cumsum(counts)[:-1] / places.size
+def _area(widths: Floats, one: Places, other: Places) -> float:
+    """Return the area between the distributions of two samples on a common grid."""
+    shares = (np.cumsum(np.bincount(sample, minlength=widths.size + 1))[:-1] / sample.size for sample in (one, other))
+    return float(np.sum(np.abs(np.subtract(*shares)) * widths))  # not by BLAS, whose threads hinder one another here
 
 
 def area_between(one: Floats, other: Floats) -> float:
-    """Return the area between the distributions of two samples, in their unit."""
-    steps = Steps(one, other)
-    return steps.area(steps.one, steps.other)
+    """Return the area between the distributions of two samples, at least one value each, in their unit."""
+    return _area(*_on_grid(one, other))
 
 
 def area_interval(members: Floats, repeats: Floats, resamples: int = RESAMPLES, seed: int = SEED) -> Interval:
-    """Return the 95 % interval of the area, see above; NaN where a sample is too small for one."""
+    """Return the 95 % interval of the area by bootstrap; NaN where a sample is too small for one.
+
+    Percentiles are widened for the smaller sample as Student's t widens those of the normal distribution.
+    """
     smaller = min(members.size, repeats.size)
     if smaller < FEWEST:
         return nan, nan
     random = np.random.default_rng(seed)
-    steps = Steps(members, repeats)
-    areas = [steps.area(_resampled(steps.one, random), _resampled(steps.other, random)) for _ in range(resamples)]
-    area = steps.area(steps.one, steps.other)
+    widths, *both = _on_grid(members, repeats)
+    samples = ([places[random.integers(0, places.size, places.size)] for places in both] for _ in range(resamples))
+    areas = [_area(widths, *sample) for sample in samples]
+    area = _area(widths, *both)
     widened = NormalDist().cdf(quantile(0.5 * (1.0 + CONFIDENCE), smaller - 1) * sqrt(smaller / (smaller - 1)))
     half = max(float(np.quantile(areas, widened)) - area, 0.0)
     return max(area - half, 0.0), area + half
 
 
-def _resampled(places: Counts, random: np.random.Generator) -> Counts:
-    return places[random.integers(0, places.size, places.size)]
-
-
 def _find_area(evidence: Evidence) -> Findings:
-    lengths = evidence.lengths
-    rows = tuple(_row_area(pair) for pair in lengths)
-    messages = [f"{pair.name}: no interval, {why}" for pair in lengths if (why := _complaint(pair))]
-    if len(messages) < len(lengths):
+    rows: list[Row] = []
+    messages = []
+    for pair in evidence.lengths:
+        members, repeats = pair.known, np.array(list(pair.repeats.values()))
+        why = "" if pair.scatters else "as the repeats do not scatter"
+        if not why and min(members.size, repeats.size) < FEWEST:
+            why = f"which needs {FEWEST} samples and {FEWEST} repeats"
+        if why:
+            messages.append(f"{pair.name}: no interval, {why}")
+        row: Row = {**pair.head, "members": int(members.size), "repeats": int(repeats.size)}
+        area = area_between(members, repeats) if members.size else None
+        row |= {"area": area, "interval": None if why or area is None else area_interval(members, repeats)}
+        rows.append(row)
+    if len(messages) < len(rows):
         messages.append(f"bootstrap of {RESAMPLES} resamples, seed {SEED}")
-    return Findings(rows, tuple(messages))
-
-
-def _complaint(pair: Pair) -> str:
-    """Return why there is no interval, or nothing."""
-    if not pair.scatters:
-        return "as the repeats do not scatter"
-    few = min(pair.known.size, len(pair.repeats)) < FEWEST
-    return f"which needs {FEWEST} samples and {FEWEST} repeats" if few else ""
-
-
-def _row_area(pair: Pair) -> Row:
-    members, repeats = pair.known, np.array(list(pair.repeats.values()))
-    head: Row = {**pair.head, "members": int(members.size), "repeats": int(repeats.size)}
-    if not members.size:
-        return {**head, "area": None, "interval": None}
-    interval = None if _complaint(pair) else area_interval(members, repeats)
-    return {**head, "area": area_between(members, repeats), "interval": interval}
+    return Findings(tuple(rows), tuple(messages))
 
 
 AREA = Metric(
@@ -330,9 +282,6 @@ AREA = Metric(
     ),
     _find_area,
 )
-
-
-SMALLEST_EIGENVALUE = 1e-9  # of the correlation matrix: below it, one position follows from the others
 
 
 class Hotelling(NamedTuple):
@@ -369,9 +318,7 @@ def hotelling(repeats: Floats, members: Floats) -> Hotelling | None:
 def _covariance_of_mean(sample: Floats) -> Floats:
     """Return the sample covariance of p columns by the number of rows; zero for a single row."""
     n, p = sample.shape
-    if n == 1:
-        return np.zeros((p, p))
-    covariance: Floats = np.cov(sample, rowvar=False).reshape(p, p) / n
+    covariance: Floats = np.zeros((p, p)) if n == 1 else np.cov(sample, rowvar=False).reshape(p, p) / n
     return covariance
 
 
@@ -396,7 +343,9 @@ def _find_joint(evidence: Evidence) -> Findings:
     found = None if complaint else hotelling(repeats, members)
     if found is None:
         return Findings((), (*messages, f"not computed: {complaint or 'too few samples for their scatter'}"))
-    return Findings((_row_joint(chosen, repeats, members, found),), tuple(messages))
+    positions = ", ".join(f"{pair.measured.block} {pair.measured.quantity}" for pair in chosen)
+    row: Row = {"positions": positions, "repeats": len(repeats), "members": len(members)}
+    return Findings(({**row, **found._asdict(), "within": found.critical >= found.T2},), tuple(messages))
 
 
 def _complaint_joint(repeats: Floats, members: Floats) -> str:
@@ -412,16 +361,6 @@ def _complaint_joint(repeats: Floats, members: Floats) -> str:
     if np.linalg.eigvalsh(correlation)[0] < SMALLEST_EIGENVALUE:
         return "a position follows from the others (their covariance is singular)"
     return ""
-
-
-def _row_joint(pairs: Sequence[Pair], repeats: Floats, members: Floats, found: Hotelling) -> Row:
-    return {
-        "positions": ", ".join(f"{pair.measured.block} {pair.measured.quantity}" for pair in pairs),
-        "repeats": len(repeats),
-        "members": len(members),
-        **found._asdict(),
-        "within": found.critical >= found.T2,
-    }
 
 
 JOINT = Metric(
