@@ -29,8 +29,7 @@ from blocksim.study.converge import (
 from blocksim.study.pictures import draw_convergence
 from blocksim.study.rows import Row
 from blocksim.view.levels import refuse_small_page
-from blocksim.view.page_size import PageOptions
-from blocksim.view.style import picture_suffix
+from blocksim.view.style import PageOptions, picture_path
 
 MOST_BLOCKS = 3
 LONGEST_NAME = 10
@@ -67,7 +66,7 @@ def converge_command(
     paper = page.paper
     with source.built() as ready:
         path = out or RESULTS / ready.name / "converge.png"
-        picture_suffix(path)
+        picture_path(path)
         if picture:
             refuse_small_page(len(refinements_of(ready, options.studies)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture

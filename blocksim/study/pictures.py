@@ -32,16 +32,15 @@ from blocksim.study.stored_run import Place, find_run, folder_of, load_stored_ru
 from blocksim.study.study import draw_study, study_in
 from blocksim.study.sweep_folder import PLAN
 from blocksim.view.animation import Look, Pace, draw_animation, writer_of
-from blocksim.view.history import draw_probes, draw_support_motion
+from blocksim.view.history import Choice
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
 from blocksim.view.levels import Panel, draw_levels
-from blocksim.view.page_size import PageOptions
 from blocksim.view.paint import COLOURS, paint_named
 from blocksim.view.run_data import support_of
 from blocksim.view.studies import Bars, draw_tornado
-from blocksim.view.style import OWN, Paper, picture_suffix
+from blocksim.view.style import OWN, PageOptions, Paper, picture_path
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
-from blocksim.view.time_panels import Choice
+from blocksim.view.time_panels import draw_probes, draw_support_motion
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -551,7 +550,7 @@ def draw_sweep(
     if kind is not None and (reason := chosen.refusal(found)):
         raise InvalidInputError(f"{folder}: {reason}")
     path = path or Path(f"{load_stored(folder / PLAN).name}.png")
-    picture_suffix(path)
+    picture_path(path)
     ready(path)
     chosen.draw(found, path, paper)
     return path

@@ -15,7 +15,7 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import load_stored
 from blocksim.study.answer import Answer
 from blocksim.view.report.subjects import StudyPage
-from blocksim.view.style import OWN, Paper, picture_suffix
+from blocksim.view.style import OWN, Paper, picture_path
 
 if TYPE_CHECKING:
     from blocksim.study.runs import Replay
@@ -73,7 +73,7 @@ def draw_study(
         raise InvalidInputError(message)
     scenario = load_stored(folder / kind.files.plan)
     path = path or Path(f"{scenario.name}_{kind.picture}.png")
-    picture_suffix(path)
+    picture_path(path)
     ready(path)
     answer = kind.read(folder).model_copy(update={"beside": published})
     answer.draw(path, scenario.description or scenario.name, paper)

@@ -1,17 +1,17 @@
 """Arrows of a picture: contact forces on a scale that is printed, loads, moments and velocities of driven bodies."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.models.loads import Force, Gravity, Horizontal, Moment, Pressure
 from blocksim.scenario.start import NORMALS
-from blocksim.simulation.frames import Contacts, Rows, forces_on_a
+from blocksim.simulation.frames import Contacts, Frames, Rows, forces_on_a
 from blocksim.view import style
-from blocksim.view.run_data import MILLIMETRES, ActingLoad, Extent, Floats, FramesLike, Indices, Support, rotate_points
+from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices, Support, rotate_points
 from blocksim.view.scene import Canvas
 from blocksim.world.systems.blocks import are_removed
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 USUAL = 0.9  # share of all recorded forces that are no larger than the one the scale is made for
 USUAL_LENGTH = 0.6  # of the mean side of the blocks: length of the arrow of that force
 LONGEST = 2.0  # of that length; longer arrows are cut
-_HEAD = 4.0, 1.7  # points: length and half width of a head
+HEAD = 4.0, 1.7  # points: length and half width of a head
 LEAST = 0.5  # points; shorter arrows are left out
 WIDTH, HALO = 1.1, 2.6  # points: of a shaft, and of the light line below it
 WHOLE = 24.0  # points: where the longest arrow is shorter, all of that is smaller in proportion
@@ -32,15 +32,6 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 MISSING = (
     "this run has stored no contacts, so their forces cannot be shown; run it again with --set output.contacts=true"
 )
-
-
-class WithContacts(FramesLike, Protocol):
-    """Frames that may have contacts."""
-
-    @property
-    def contacts(self) -> Contacts | None:
-        """Contacts of all frames, where they were recorded."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -63,14 +54,14 @@ class ForceScale:
         return f"{force:g} N is {force * self.mm_per_newton:.3g} mm"
 
 
-def contacts_of(frames: WithContacts) -> Contacts:
+def contacts_of(frames: Frames) -> Contacts:
     """Return the contacts of a run. Raises InvalidInputError, with advice, where none were stored."""
     if frames.contacts is None:
         raise InvalidInputError(MISSING)
     return frames.contacts
 
 
-def force_scale(frames: WithContacts) -> ForceScale:
+def force_scale(frames: Frames) -> ForceScale:
     """Return the scale for all frames of a run. Raises InvalidInputError where no contacts were stored."""
     force = np.hypot(*forces_on_a(contacts_of(frames).rows).T)
     force = force[np.isfinite(force) & (force > 0.0)]
@@ -103,23 +94,17 @@ def arrows(rows: Rows, scale: ForceScale, tilt: float) -> Floats:
     return np.stack([starts, starts + ways], axis=1)
 
 
-def draw_forces(canvas: Canvas, frames: WithContacts, frame: int, scale: ForceScale) -> None:
+def draw_forces(canvas: Canvas, frames: Frames, frame: int, scale: ForceScale) -> None:
     """Draw the forces of all contacts of one frame."""
-    found = arrows(contacts_of(frames).at(frame), scale, canvas.extent.tilt)
-    size = min(1.0, scale.longest * canvas.points_per_mm / WHOLE)
-    if size < 1.0:
-        _draw_veil(canvas)
-    for part in arrow_parts(found, canvas, size):
-        canvas.axes.add_collection(part)
-
-
-def _draw_veil(canvas: Canvas) -> None:
-    """Make everything above the ground paler."""
     from matplotlib.patches import Rectangle
 
-    extent = canvas.extent
-    place = (extent.left, extent.lowest), extent.width, extent.top - extent.lowest
-    canvas.axes.add_artist(Rectangle(*place, facecolor="#FFFFFF", alpha=VEIL_ALPHA, linewidth=0.0, zorder=VEIL))
+    found, extent = arrows(contacts_of(frames).at(frame), scale, canvas.extent.tilt), canvas.extent
+    size = min(1.0, scale.longest * canvas.points_per_mm / WHOLE)
+    if size < 1.0:  # make everything above the ground paler
+        place = (extent.left, extent.lowest), extent.width, extent.top - extent.lowest
+        canvas.axes.add_artist(Rectangle(*place, facecolor="#FFFFFF", alpha=VEIL_ALPHA, linewidth=0.0, zorder=VEIL))
+    for part in arrow_parts(found, canvas, size):
+        canvas.axes.add_collection(part)
 
 
 def arrow_parts(found: Floats, canvas: Canvas, size: float, colour: str = style.INK) -> "list[Collection]":
@@ -133,19 +118,19 @@ def arrow_parts(found: Floats, canvas: Canvas, size: float, colour: str = style.
     lengths = np.hypot(*ways.T)
     found, ways, lengths = (one[lengths * canvas.points_per_mm >= LEAST] for one in (found, ways, lengths))
     along = ways / lengths[:, None]
-    head = np.minimum(size * _HEAD[0] / canvas.points_per_mm, lengths)
+    head = np.minimum(size * HEAD[0] / canvas.points_per_mm, lengths)
     necks = found[:, 1] - head[:, None] * along
-    across = np.stack([-along[:, 1], along[:, 0]], axis=-1) * (head * _HEAD[1] / _HEAD[0])[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=-1) * (head * HEAD[1] / HEAD[0])[:, None]
     heads = list(np.stack([found[:, 1], necks + across, necks - across], axis=1))
     shafts = list(np.stack([found[:, 0], necks], axis=1))
-    at: dict[str, Any] = {"transform": canvas.scene}
+    light: dict[str, Any] = {"zorder": BELOW, "transform": canvas.scene}
+    dark = {**light, "zorder": FORCES}
+    edge = size * (HALO - WIDTH)
     return [
-        LineCollection(shafts, colors="#FFFFFF", linewidths=size * HALO, zorder=BELOW, **at),
-        PolyCollection(
-            heads, facecolors="#FFFFFF", edgecolors="#FFFFFF", linewidths=size * (HALO - WIDTH), zorder=BELOW, **at
-        ),
-        LineCollection(shafts, colors=colour, linewidths=size * WIDTH, zorder=FORCES, **at),
-        PolyCollection(heads, facecolors=colour, linewidths=0.0, zorder=FORCES, **at),
+        LineCollection(shafts, colors="#FFFFFF", linewidths=size * HALO, **light),
+        PolyCollection(heads, facecolors="#FFFFFF", edgecolors="#FFFFFF", linewidths=edge, **light),
+        LineCollection(shafts, colors=colour, linewidths=size * WIDTH, **dark),
+        PolyCollection(heads, facecolors=colour, linewidths=0.0, **dark),
     ]
 
 
@@ -227,19 +212,27 @@ class Outside:
         return self.largest.get(kind, 0.0) > 0.0
 
 
-def outside(frames: FramesLike, chosen: Indices, support: Support) -> Outside:
+def outside(frames: Frames, chosen: Indices, support: Support) -> Outside:
     """Return what acts from outside in the chosen frames."""
-    poses = _Poses.of(frames, chosen)
-    raw = [*_forces(poses, support.loads), *_pressures(poses, support), *_speeds(frames, chosen, support)]
-    sizes = [float(np.hypot(one.way[..., 0], one.way[..., 1]).max(initial=0.0)) for one in raw]
-    turns, moment = _moments(frames, poses, support.loads)
-    largest = {
-        kind: max(sizes[number] for number, one in enumerate(raw) if one.kind == kind)
-        for kind in {one.kind for one in raw}
-    }
-    scaled = [replace(one, way=one.way / (largest[one.kind] or 1.0)) for one in raw]
-    marks = _marks(frames.time[chosen], support)
-    return Outside(tuple(scaled), turns, marks, {**largest, MOMENT: moment})
+    poses = _Poses(frames, chosen)
+    raw = [*_forces(poses, support), *_speeds(poses, support)]
+    largest: dict[str, float] = {}
+    for one in raw:
+        size = float(np.hypot(one.way[..., 0], one.way[..., 1]).max(initial=0.0))
+        largest[one.kind] = max(size, largest.get(one.kind, 0.0))
+    scaled = tuple(replace(one, way=one.way / (largest[one.kind] or 1.0)) for one in raw)
+    found = [
+        (one.body, one.load.magnitude * one.values(poses.time) * poses.is_there[:, one.body])
+        for one in support.loads
+        if isinstance(one.load, Moment)
+    ]
+    turns, moments = None, np.stack([values for _, values in found], axis=1) if found else np.zeros((len(chosen), 0))
+    largest[MOMENT] = float(np.abs(moments).max(initial=0.0))
+    if found:
+        bodies = [body for body, _ in found]
+        radius = MILLIMETRES * RADIUS * np.minimum(frames.size_x, frames.size_y)[bodies]
+        turns = Turns(MILLIMETRES * poses.places[:, bodies], radius, SWEEP * moments / (largest[MOMENT] or 1.0))
+    return Outside(scaled, turns, _marks(poses.time, support), largest)
 
 
 def in_words(value: float, unit: str) -> str:
@@ -269,23 +262,15 @@ def with_room(extent: Extent, found: Outside, length: float) -> Extent:
     )
 
 
-@dataclass(frozen=True)
 class _Poses:
     """Times (s, (f,)) of frames, and of all bodies places (m, (f, b, 2)), angles, sides and whether they are there."""
 
-    time: Floats
-    places: Floats
-    angle: Floats
-    sides: Floats  # (b, 2)
-    is_there: Floats  # (f, b) 1 or 0
-
-    @classmethod
-    def of(cls, frames: FramesLike, chosen: Indices) -> "_Poses":
-        places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
-        vx = getattr(frames, "vx", None)
-        there = np.ones(places.shape[:2]) if vx is None else 1.0 - are_removed(vx[chosen])
-        sides = np.stack([frames.size_x, frames.size_y], axis=-1)
-        return cls(frames.time[chosen], places, frames.angle[chosen], sides, there)
+    def __init__(self, frames: Frames, chosen: Indices) -> None:
+        self.time, self.angle = frames.time[chosen], frames.angle[chosen]
+        self.places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
+        self.velocities = np.stack([frames.vx[chosen], frames.vy[chosen]], axis=-1)
+        self.sides = np.stack([frames.size_x, frames.size_y], axis=-1)  # (b, 2)
+        self.is_there = 1.0 - are_removed(frames.vx[chosen])  # (f, b) 1 or 0
 
     def turned(self, body: int, vectors: Floats) -> Floats:
         """Return vectors (k, 2) of a body's own axes in those of the scene, (f, k, 2)."""
@@ -300,71 +285,41 @@ class _Poses:
         return Arrows(kind, MILLIMETRES * (self.places[:, body, None] + arms), ways, pushes.astype(float))
 
 
-def _forces(poses: _Poses, loads: Sequence[ActingLoad]) -> Iterator[Arrows]:
-    for one in loads:
-        if isinstance(one.load, Force):
-            load = one.load
+def _forces(poses: _Poses, support: Support) -> Iterator[Arrows]:
+    """Yield forces (N) and pressures (Pa); water is deep below its level, against gravity."""
+    for one in support.loads:
+        load, factor = one.load, one.values(poses.time)[:, None]
+        if isinstance(load, Force):
             way = np.array([[np.cos(load.direction), np.sin(load.direction)]])
             ways = poses.turned(one.body, way) if load.axes == "body" else way[None]
-            sizes = (load.magnitude * one.values(poses.time))[:, None, None]
-            yield poses.arrows(FORCE, one.body, poses.turned(one.body, np.array([load.point])), sizes * ways)
-
-
-def _pressures(poses: _Poses, support: Support) -> Iterator[Arrows]:
-    for one in support.loads:
-        if isinstance(one.load, Pressure):
-            normal, half = np.array(NORMALS[one.load.face]), 0.5 * poses.sides[one.body]
-            count = UNIFORM if one.load.water_level is None else DEEP
-            along = (np.arange(count) + 0.5) / count if one.load.water_level is None else np.linspace(0.0, 1.0, count)
-            points = half * (normal + np.outer(2.0 * along - 1.0, np.abs(normal[::-1])))
-            arms = poses.turned(one.body, points)
+            arms = poses.turned(one.body, np.array([load.point]))
+            yield poses.arrows(FORCE, one.body, arms, (load.magnitude * factor)[..., None] * ways)
+        elif isinstance(load, Pressure):
+            is_water = load.water_level is not None
+            normal, half = np.array(NORMALS[load.face]), 0.5 * poses.sides[one.body]
+            along = np.linspace(0.0, 1.0, DEEP) if is_water else (np.arange(UNIFORM) + 0.5) / UNIFORM
+            arms = poses.turned(one.body, half * (normal + np.outer(2.0 * along - 1.0, np.abs(normal[::-1]))))
+            up = np.array([np.sin(support.tilt), np.cos(support.tilt)])
+            heights = (poses.places[:, one.body, None] + arms) @ up
+            size = np.broadcast_to(factor * (load.magnitude or 0.0), heights.shape)
+            if load.water_level is not None:
+                size = load.unit_weight * np.maximum(load.water_level * factor - heights, 0.0)
             inwards = poses.turned(one.body, -normal[None])
-            yield poses.arrows(PRESSURE, one.body, arms, _pressure(poses, one, arms, support.tilt)[..., None] * inwards)
+            yield poses.arrows(PRESSURE, one.body, arms, size[..., None] * inwards)
 
 
-def _pressure(poses: _Poses, one: ActingLoad, arms: Floats, tilt: float) -> Floats:
-    """Return the pressures (Pa, (f, k)) at points of a face; water is deep below its level, against gravity."""
-    load, factor = one.load, one.values(poses.time)[:, None]
-    assert isinstance(load, Pressure)  # noqa: S101 - for the type checker
-    if load.water_level is None:
-        return np.broadcast_to(factor * (load.magnitude or 0.0), arms.shape[:2])
-    heights = (poses.places[:, one.body, None] + arms) @ np.array([np.sin(tilt), np.cos(tilt)])
-    return np.asarray(load.unit_weight * np.maximum(load.water_level * factor - heights, 0.0))
-
-
-def _speeds(frames: FramesLike, chosen: Indices, support: Support) -> Iterator[Arrows]:
-    """Yield the velocities of driven bodies, where frames know any."""
-    vx, vy = getattr(frames, "vx", None), getattr(frames, "vy", None)
+def _speeds(poses: _Poses, support: Support) -> Iterator[Arrows]:
+    """Yield the velocities (m/s) of driven bodies, each from where it leaves its block."""
     driven = np.flatnonzero(support.driven)
-    if vx is None or vy is None or not len(driven):
+    if not len(driven):
         return
-    pick = np.ix_(chosen, driven)
-    ways = np.nan_to_num(np.stack([vx[pick], vy[pick]], axis=-1))
-    places = np.stack([frames.x[pick], frames.y[pick]], axis=-1)
-    at = places + _to_edge(ways, frames.angle[pick], 0.5 * frames.size_x[driven], 0.5 * frames.size_y[driven])
-    yield Arrows(SPEED, MILLIMETRES * at, ways, np.zeros(at.shape[:2]))
-
-
-def _to_edge(ways: Floats, angle: Floats, half_x: Floats, half_y: Floats) -> Floats:
-    """Return what leads from the centre of a block to its edge in some directions; nothing where there is none."""
+    ways, half = np.nan_to_num(poses.velocities[:, driven]), 0.5 * poses.sides[driven]
     size = np.hypot(ways[..., 0], ways[..., 1])
-    direction = np.arctan2(ways[..., 1], ways[..., 0]) - angle
+    direction = np.arctan2(ways[..., 1], ways[..., 0]) - poses.angle[:, driven]
     with np.errstate(divide="ignore"):
-        reach = np.minimum(half_x / np.abs(np.cos(direction)), half_y / np.abs(np.sin(direction)))
-    return np.asarray(ways * (reach / np.where(size > 0.0, size, np.inf))[..., None])
-
-
-def _moments(frames: FramesLike, poses: _Poses, loads: Sequence[ActingLoad]) -> tuple[Turns | None, float]:
-    """Return round arrows, and the largest moment (N m)."""
-    found = [(one, one.load) for one in loads if isinstance(one.load, Moment)]
-    if not found:
-        return None, 0.0
-    bodies = [one.body for one, _ in found]
-    sizes = [load.magnitude * one.values(poses.time) * poses.is_there[:, one.body] for one, load in found]
-    moments = np.stack(sizes, axis=1)
-    largest = float(np.abs(moments).max(initial=0.0))
-    radius = MILLIMETRES * RADIUS * np.minimum(frames.size_x, frames.size_y)[bodies]
-    return Turns(MILLIMETRES * poses.places[:, bodies], radius, SWEEP * moments / (largest or 1.0)), largest
+        reach = np.minimum(half[:, 0] / np.abs(np.cos(direction)), half[:, 1] / np.abs(np.sin(direction)))
+    at = poses.places[:, driven] + ways * (reach / np.where(size > 0.0, size, np.inf))[..., None]
+    yield Arrows(SPEED, MILLIMETRES * at, ways, np.zeros(at.shape[:2]))
 
 
 def _marks(times: Floats, support: Support) -> tuple[tuple[Mark, ...], ...]:
@@ -386,7 +341,7 @@ def _marks(times: Floats, support: Support) -> tuple[tuple[Mark, ...], ...]:
 
 COLOUR = "#A50026"
 ARC_POINTS = 24
-_HEAD_LOAD_ARROWS = 4.0  # points, of round arrows
+ROUND_HEAD = 4.0  # points, of round arrows
 LEAST_SWEEP = 0.02  # rad
 MARK, MARK_SIDE = 9.0, 12.0  # points: length of the arrow of a mark, and room for it
 MARK_LETTER = 5.0  # points
@@ -400,33 +355,26 @@ def draw_outside(canvas: Canvas, found: Outside, index: int, length: float) -> N
         seen = np.hypot(*(lines[:, 1] - lines[:, 0]).T) * canvas.points_per_mm >= LEAST
         for part in arrow_parts(lines[seen], canvas, 1.0, style.INK if one.kind == SPEED else COLOUR):
             canvas.axes.add_collection(part)
-    if found.turns is not None:
-        turns = found.turns
-        for centre, radius, sweep in zip(turns.at[index], turns.radius, turns.sweep[index], strict=True):
-            if abs(sweep) >= LEAST_SWEEP:
-                _draw_turn(canvas, arc(centre, float(radius), float(sweep)))
+    turns = found.turns
+    for number in range(0 if turns is None else len(turns.radius)):
+        if turns is not None and abs(turns.sweep[index, number]) >= LEAST_SWEEP:
+            _draw_turn(canvas, turns.at[index, number], float(turns.radius[number]), float(turns.sweep[index, number]))
 
 
-def arc(centre: Floats, radius: float, sweep: float) -> Floats:
-    """Return points (mm) of a round arrow, which is open at the right, from its start to its tip."""
-    angle = (0.25 * np.pi if sweep > 0.0 else -0.25 * np.pi) + np.linspace(0.0, sweep, ARC_POINTS)
-    return np.asarray(centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
-
-
-def _draw_turn(canvas: Canvas, points: Floats) -> None:
+def _draw_turn(canvas: Canvas, centre: Floats, radius: float, sweep: float) -> None:
+    """Draw a round arrow (mm, rad), which is open at the right."""
     from matplotlib.collections import LineCollection, PolyCollection
 
-    way = points[-1] - points[-2]
-    way /= np.hypot(*way)
-    head = min(
-        _HEAD_LOAD_ARROWS / canvas.points_per_mm, float(np.hypot(*(points[-1] - points[0]))) or _HEAD_LOAD_ARROWS
-    )
-    across = 0.5 * head * np.array([-way[1], way[0]])
-    tip = np.stack([points[-1] + 0.5 * head * way, points[-1] - 0.5 * head * way + across])
-    outline = np.stack([*tip, points[-1] - 0.5 * head * way - across])
+    angle = (0.25 * np.pi if sweep > 0.0 else -0.25 * np.pi) + np.linspace(0.0, sweep, ARC_POINTS)
+    points = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    way = (points[-1] - points[-2]) / np.hypot(*(points[-1] - points[-2]))
+    chord = float(np.hypot(*(points[-1] - points[0])))
+    head = 0.5 * min(ROUND_HEAD / canvas.points_per_mm, chord or ROUND_HEAD)
+    across = head * np.array([-way[1], way[0]])
+    outline = points[-1] + np.stack([head * way, across - head * way, -across - head * way])
     at: dict[str, Any] = {"transform": canvas.scene, "zorder": FORCES}
-    canvas.axes.add_collection(LineCollection([points], colors="#FFFFFF", linewidths=2.5 * WIDTH, **at))
-    canvas.axes.add_collection(LineCollection([points], colors=COLOUR, linewidths=WIDTH, **at))
+    for colour, width in (("#FFFFFF", 2.5 * WIDTH), (COLOUR, WIDTH)):
+        canvas.axes.add_collection(LineCollection([points], colors=colour, linewidths=width, **at))
     canvas.axes.add_collection(PolyCollection([outline], facecolors=COLOUR, linewidths=0.0, **at))
 
 
@@ -435,30 +383,14 @@ def draw_marks(canvas: Canvas, marks: tuple[Mark, ...], offset: float = 0.0, *, 
 
     Both are in points.
     """
+    arrow: dict[str, Any] = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 6.0}
+    arrow |= {"linewidth": WIDTH, "color": COLOUR}
+    point = 1.0 / canvas.points_per_mm
     for mark in marks:
-        _draw_mark(canvas, mark, offset, up)
+        left, top, way = canvas.extent.left + offset * point, canvas.extent.top, 0.5 * MARK * point * np.array(mark.way)
+        if way.any():
+            centre = np.array([left + 0.5 * MARK * point, top + (up + 5.0) * point])
+            ends = {"xy": tuple(centre + way), "xytext": tuple(centre - way)}
+            canvas.axes.annotate("", **ends, annotation_clip=False, arrowprops=arrow)
+        canvas.axes.text(left + MARK_SIDE * point, top + up * point, mark.text, va="bottom", color=COLOUR)
         offset += MARK_SIDE + MARK_LETTER * len(mark.text) + MARK_GAP
-
-
-def _draw_mark(canvas: Canvas, mark: Mark, offset: float, up: float) -> None:
-    scale = canvas.points_per_mm
-    left, middle = canvas.extent.left + offset / scale, canvas.extent.top + (up + 5.0) / scale
-    way = 0.5 * MARK / scale * np.array(mark.way)
-    centre = np.array([left + 0.5 * MARK / scale, middle])
-    if way.any():
-        canvas.axes.annotate(
-            "",
-            xy=tuple(centre + way),
-            xytext=tuple(centre - way),
-            annotation_clip=False,
-            arrowprops={
-                "arrowstyle": "-|>",
-                "shrinkA": 0.0,
-                "shrinkB": 0.0,
-                "mutation_scale": 6.0,
-                "linewidth": WIDTH,
-                "color": COLOUR,
-            },
-        )
-    place = left + MARK_SIDE / scale, canvas.extent.top + up / scale
-    canvas.axes.text(*place, mark.text, va="bottom", color=COLOUR)

@@ -1,141 +1,174 @@
-"""Pictures over time: histories of a run, its probes, and the motion of its supports."""
+"""A run over time: motions of blocks, energies, contacts, support force and ground, a panel each."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.motion import Peak, acceleration_ends, displacement_and_velocity, motion_peaks
-from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.scenario.units import STANDARD_GRAVITY
-from blocksim.simulation import probes
-from blocksim.simulation.frames import Contacts
-from blocksim.simulation.probes import JOINT, POINT, ProbeSeries
+from blocksim.scenario.spelling import nearest
+from blocksim.simulation.frames import Frames, force_on_supports
 from blocksim.view import style
 from blocksim.view.arrows import contacts_of
 from blocksim.view.final import MeasuredTable
 from blocksim.view.paint import Paint, by_block
-from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support, drawable_frames
-from blocksim.view.style import OWN, Paper, plain_numbers, write_heading, write_text
+from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support, drawable_frames, is_fixed
+from blocksim.view.style import OWN, Paper
 from blocksim.view.time_panels import (
-    BESIDE,
-    CONTACTS,
-    ENERGY,
-    FORCE,
-    GROUND,
-    MOTIONS,
-    USUAL,
-    WIDTH,
-    Choice,
-    Entries,
-    FramesInView,
-    HistoryFrames,
-    Motion,
+    GAP,
+    PANEL,
     TimePanel,
-    blocks_named,
-    draw_contacts,
-    draw_energies,
-    draw_force,
-    draw_ground,
-    draw_time_panels,
+    draw_time_panel,
     drawn_energies,
-    farthest_blocks,
     limits_of,
-    panels_named,
-    stacked,
-    support_force,
-    time_panels_png,
+    open_time_panels,
     unit_for,
 )
+from blocksim.world.systems.blocks import BLOCKS
+from blocksim.world.systems.system import Output
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-LEFT, RIGHT, HEAD, FOOT = 0.80, 1.60, 0.36, 0.62  # inches; the legends stand on the right
-PANEL, GAP = 1.25, 0.14  # inches
-LOWEST = 0.55  # inches, of a panel on a page whose size was asked for
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own, unless they are chosen
 MOST_POINTS = 2000  # of a line
 MOST_PATHS = 50  # grey lines in an SVG or PDF; more of them are stored as an image
-_LETTERS = 16  # of a name
-LETTERS_AN_INCH = 14.5  # in a line below the panels
-NAME_ROOM = 1.2  # inches, for a name at the right of the panels
-LINE = 0.155  # inches, of each further line below the panels or beside them
 LEGEND = 0.25  # inches, of the head of a legend and the gap below it
-PALE = 0.7  # brightness from which a line is drawn on a darker one
+LATER = 1.04  # length of the axis of time over that of the run, so that measured ranges stand at its end
 DASHES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2)), (0, (2, 3)))
-
-
-class HistoryLike(HistoryFrames, Protocol):
-    """Frames with what was measured of the whole scene."""
-
-    @property
-    def contacts(self) -> Contacts | None:
-        """Contacts of all frames, where they were recorded."""
-        ...
-
-    @property
-    def energy(self) -> Entries:
-        """Energies (J) by name, (n,) each."""
-        ...
-
-    @property
-    def contact_count(self) -> Floats:
-        """Number of contacts, (n,)."""
-        ...
+ENERGY, CONTACTS, FORCE, GROUND = "energy", "contacts", "force", "ground"
+GROUPS = {"displacement": ("dx", "dy"), "velocity": ("vx", "vy")}
+USUAL = ("x", "y", "rotation", ENERGY, CONTACTS)
+SCENE = (ENERGY, CONTACTS, FORCE, GROUND)
+MOST_SLIPS = 2
+MOST_CHOSEN = 12  # blocks; more names have no room beside the panels
+MOST_WEIGHTS = 3.0  # of all blocks: forces of supports beyond that are cut, those of impacts are far beyond
+ENERGY_LOOKS: dict[str, tuple[str, Any]] = {  # the same in every picture; dashes distinguish them in grey
+    "kinetic": ("#0072B2", "-"),
+    "potential": ("#E69F00", "-"),
+    "stored in contacts": ("#CC79A7", (0, (1, 1))),
+    "lost to friction": ("#009E73", (0, (5, 1.5))),
+    "lost in impacts": ("#222222", (0, (3, 1, 1, 1))),
+    "given to support": ("#56B4E9", (0, (2, 1))),
+    "given to loads": ("#D55E00", (0, (4, 1, 1, 1))),
+}
+OTHER_ENERGY: tuple[str, Any] = ("#999999", "-")
+INK: dict[str, Any] = {"color": style.INK, "linewidth": 0.8}
 
 
 @dataclass(frozen=True)
-class _Drawing:
-    """What is drawn: n chosen frames, the blocks with lines of their own, and how those look."""
+class Choice:
+    """Panels by name (none: the default ones) and blocks by name (none: those that move farthest).
 
-    frames: HistoryLike
+    With `relative`, positions and velocities are relative to the moving ground.
+    """
+
+    panels: tuple[str, ...] = ()
+    blocks: tuple[str, ...] = ()
+    relative: bool = False
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One quantity of all blocks: n values of b blocks, and the column of the measured table that goes with it."""
+
+    label: str
+    values: Floats
+    quantity: str = ""
+
+
+@dataclass(frozen=True)
+class FramesInView:
+    """Chosen frames as seen from where the ground was at the start, or from the moving ground."""
+
+    frames: Frames
     chosen: Indices
     support: Support
-    shown: list[int]
-    looks: dict[int, dict[str, Any]]
-    others: bool  # whether all other blocks are drawn in grey
-    relative: bool
+    relative: bool = False
 
     @property
     def time(self) -> Floats:
         """Times (s), (n,)."""
         return self.frames.time[self.chosen]
 
-    def motion(self, name: str) -> Motion:
-        """Return one quantity of all blocks."""
-        return MOTIONS[name](FramesInView(self.frames, self.chosen, self.support, self.relative))
+    @property
+    def from_ground(self) -> str:
+        """Suffix of the labels of positions and velocities."""
+        return " − ground" if self.relative and self.support.motion is not None else ""
+
+    def place(self, axis: int) -> Floats:
+        """Return centres (mm) along x (0) or y (1)."""
+        places = (self.frames.x, self.frames.y)[axis][self.chosen]
+        carried = self.support.offset(self.time) * bool(self.from_ground)
+        return np.asarray(MILLIMETRES * (places - carried[:, axis, None]))
+
+    def displacement(self, axis: int) -> Floats:
+        """Return displacements (mm) from the first frame of the run."""
+        return np.asarray(self.place(axis) - MILLIMETRES * (self.frames.x, self.frames.y)[axis][0])
+
+    def velocity(self, axis: int) -> Floats:
+        """Return velocities (mm/s) along x (0) or y (1)."""
+        velocities = (self.frames.vx, self.frames.vy)[axis][self.chosen]
+        carried = np.multiply.outer(self.support.velocity(self.time), self.support.direction)
+        return np.asarray(MILLIMETRES * (velocities - carried[:, axis, None] * bool(self.from_ground)))
+
+
+MOTIONS: dict[str, Callable[[FramesInView], Motion]] = {
+    "x": lambda seen: Motion(f"x{seen.from_ground} (mm)", seen.place(0), "" if seen.from_ground else "x"),
+    "y": lambda seen: Motion(f"y{seen.from_ground} (mm)", seen.place(1), "" if seen.from_ground else "y"),
+    "dx": lambda seen: Motion(f"Δx{seen.from_ground} (mm)", seen.displacement(0)),
+    "dy": lambda seen: Motion(f"Δy{seen.from_ground} (mm)", seen.displacement(1)),
+    "rotation": lambda seen: Motion("rotation (°)", np.degrees(seen.frames.rotation[seen.chosen]), "rotation"),
+    "vx": lambda seen: Motion(f"vx{seen.from_ground} (mm/s)", seen.velocity(0)),
+    "vy": lambda seen: Motion(f"vy{seen.from_ground} (mm/s)", seen.velocity(1)),
+    "speed": lambda seen: Motion(
+        f"{'relative ' if seen.from_ground else ''}speed (mm/s)", np.hypot(seen.velocity(0), seen.velocity(1))
+    ),
+    "spin": lambda seen: Motion("spin (°/s)", np.degrees(seen.frames.spin[seen.chosen])),
+}
+
+
+def _shown(output: Output) -> Callable[[FramesInView], Motion]:
+    """Return the panel of what blocks show beside their motion."""
+
+    def motion(seen: FramesInView) -> Motion:
+        values = output.of(seen.frames.tracks[0].some(seen.chosen))
+        factor, unit = unit_for(float(np.abs(values).max(initial=0.0)), output.unit)
+        return Motion(f"{output.meaning} ({unit})", factor * values)
+
+    return motion
+
+
+MOTIONS |= {one.name: _shown(one) for one in BLOCKS.outputs if one.name not in MOTIONS}
+PANELS = (*MOTIONS, *SCENE, *GROUPS)
 
 
 def draw_history(
-    frames: HistoryLike,
+    frames: Frames,
     path: Path | str,
     title: str | None = None,
     measured: MeasuredTable | None = None,
     support: Support | None = None,
     **asked: Any,
 ) -> None:
-    """Draw a history as `drawn_history` has it and write PNG, SVG or PDF; the same input gives the same bytes.
+    """Draw a history as `draw_history_page` gives it and write PNG, SVG or PDF; the same input gives the same bytes.
 
     Raises as that does, InvalidInputError for an unknown picture format, and OutputError when the file cannot be
     written.
     """
-    path = Path(path)
-    style.picture_suffix(path)
+    path = style.picture_path(path)
     with draw_history_page(frames, title, measured, support, **asked) as (figure, _):
         style.save_figure(figure, path)
 
 
 @contextmanager
 def draw_history_page(
-    frames: HistoryLike,
+    frames: Frames,
     title: str | None = None,
     measured: MeasuredTable | None = None,
     support: Support | None = None,
@@ -153,20 +186,42 @@ def draw_history_page(
     InvalidInputError for unknown panels or blocks, forces that were not stored, a page that is too small or nothing to
     draw.
     """
-    choice, support = choice or Choice(), support or Support()
-    drawing = _drawing(frames, support, choice, paint or by_block(frames))
-    names = _panel_names(drawing, choice, forces=forces)
-    legend = _legend(drawing, names, is_measured=measured is not None)
-    notes = wrap(legend, int(LETTERS_AN_INCH * paper.width(WIDTH)))
-    sides = LEFT, RIGHT, HEAD, FOOT + (len(notes) - 1) * LINE
-    heights = _panel_height(names, len(drawing.shown)), LOWEST
-    with stacked(len(names), sides, GAP, heights, paper) as (figure, axes):
-        panels = dict(zip(names, axes, strict=True))
-        for name in names:
-            _draw_panel(panels[name], drawing, name, measured)
-        _finish(panels, drawing)
-        write_heading(figure, title, 0.12, 0.08)
-        write_text(figure, 0.12, 0.06, "\n".join(notes), color=style.FAINT_INK, va="bottom")
+    choice, support, paint = choice or Choice(), support or Support(), paint or by_block(frames)
+    if not paint.is_lasting:
+        raise InvalidInputError("a history is coloured by block or material; speed and rotation are separate panels")
+    if not frames.names:
+        raise InvalidInputError("no block to draw: a history is that of blocks, and a probe shows the thrust of soil")
+    chosen = drawable_frames(frames)
+    if len(chosen) > MOST_POINTS:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, MOST_POINTS).round().astype(np.intp)]
+    seen = FramesInView(frames, chosen, support, choice.relative)
+    blocks = _blocks_named(frames, choice.blocks)
+    shown = blocks or _farthest_blocks(seen)
+    looks = {frames.names[block]: look for block, look in line_looks(paint.fills(0), shown).items()}
+    names = _panel_names(seen, choice, forces=forces)
+    notes = _notes(seen, names, len(shown), is_measured=measured is not None, is_chosen=bool(blocks))
+    span = float(seen.time[0]), float(seen.time[0] + LATER * (seen.time[-1] - seen.time[0]))
+    own = _panel_height(names, len(shown))
+    first = next((name for name in names if name in MOTIONS), None)
+    with open_time_panels(len(names), span, title, notes, paper, own) as (figure, rows):
+        panels = dict(zip(names, rows, strict=True))
+        for name, axes in panels.items():
+            if name not in MOTIONS:
+                draw_time_panel(axes, SCENE_PANELS[name](seen))
+                continue
+            motion = MOTIONS[name](seen)
+            drawn = motion.values[:, shown] if blocks else motion.values
+            lines = {frames.names[block]: (seen.time, motion.values[:, block]) for block in shown}
+            legend = "block" if shown and name == first else None
+            limits = limits_of(drawn)
+            draw_time_panel(axes, TimePanel(motion.label, lines, limits=limits, looks=looks, legend=legend))
+            if not blocks:
+                _draw_others(axes, seen.time, np.delete(motion.values, shown, axis=1))
+            if measured is not None and motion.quantity:
+                names_shown = [frames.names[block] for block in shown]
+                _draw_measured(axes, seen, Motion(motion.label, drawn, motion.quantity), measured, names_shown)
+        if CONTACTS in panels:
+            panels[CONTACTS].locator_params("y", integer=True)
         yield figure, panels
 
 
@@ -177,301 +232,155 @@ def line_looks(fills: Sequence[str], shown: Sequence[int]) -> dict[int, dict[str
     for block in shown:
         number = drawn.get(fills[block], 0)
         drawn[fills[block]] = number + 1
-        looks[block] = {"color": fills[block], "linestyle": DASHES[number % len(DASHES)]}
+        looks[block] = {"color": fills[block], "linestyle": DASHES[number % len(DASHES)], "linewidth": 1.2}
     return looks
 
 
-def _drawing(frames: HistoryLike, support: Support, choice: Choice, paint: Paint) -> _Drawing:
-    """Choose frames and blocks. Raises InvalidInputError for unknown blocks."""
-    if not paint.is_lasting:
-        message = "a history is coloured by block or material; speed and rotation are separate panels"
+def _blocks_named(frames: Frames, names: Sequence[str]) -> list[int]:
+    """Return the numbers (from 0) of blocks with these names. Raises InvalidInputError for unknown ones or too many."""
+    known = {name: number for number, name in enumerate(frames.names)}
+    for name in names:
+        if name not in known:
+            first = ", ".join(frames.names[:MOST_CHOSEN]) + (", …" if len(frames.names) > MOST_CHOSEN else "")
+            message = f"--block {name}: no such block in this run, its {len(known)} blocks are {first}"
+            raise InvalidInputError(message)
+    if len(names) > MOST_CHOSEN:
+        message = f"--block: {len(names)} blocks are too many for one picture, at most {MOST_CHOSEN}"
         raise InvalidInputError(message)
-    if not frames.names:
-        message = "no block to draw: a history is that of blocks, and a probe shows the thrust of soil"
-        raise InvalidInputError(message)
-    chosen = drawable_frames(frames)
-    if len(chosen) > MOST_POINTS:
-        chosen = chosen[np.linspace(0, len(chosen) - 1, MOST_POINTS).round().astype(np.intp)]
-    named = blocks_named(frames, choice.blocks)
-    shown = named or farthest_blocks(frames, chosen, support, MOST_BLOCKS)
-    looks = line_looks(paint.fills(0), shown)
-    return _Drawing(frames, chosen, support, shown, looks, others=not named, relative=choice.relative)
+    return list(dict.fromkeys(known[name] for name in names))
 
 
-def _panel_names(drawing: _Drawing, choice: Choice, *, forces: bool) -> tuple[str, ...]:
-    """Return the panels from top to bottom; force and ground in addition to the default ones where available."""
-    if choice.panels:
-        names = panels_named(choice.panels)
-    else:
-        has_ground = drawing.support.motion is not None
-        has_force = drawing.frames.contacts is not None and drawing.support.weight > 0.0
-        names = (*USUAL, *((FORCE,) if has_force else ()), *((GROUND,) if has_ground else ()))
+def _farthest_blocks(seen: FramesInView) -> list[int]:
+    """Return the blocks to colour, in their order: free ones; of many, those that end farthest from their start."""
+    frames, last = seen.frames, seen.chosen[-1]
+    away = np.hypot(frames.x[last] - frames.x[0], frames.y[last] - frames.y[0])
+    fixed = is_fixed(frames, seen.support)
+    ordered = [int(block) for block in np.argsort(-away, kind="stable") if not fixed[block]]
+    return sorted(ordered[:MOST_BLOCKS])
+
+
+def _panel_names(seen: FramesInView, choice: Choice, *, forces: bool) -> tuple[str, ...]:
+    """Return the panels from top to bottom; force and ground in addition to the default ones where available.
+
+    Raises InvalidInputError for an unknown one, and for forces that were not stored.
+    """
+    for name in choice.panels:
+        if name not in PANELS:
+            meant = nearest(name, PANELS, MOST_SLIPS)
+            hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join(PANELS)}"
+            raise InvalidInputError(f"--panels {name}: unknown panel, {hint}")
+    names = [one for name in choice.panels for one in GROUPS.get(name, (name,))] or [*USUAL]
+    if not choice.panels and seen.frames.contacts is not None and seen.support.weight > 0.0:
+        names.append(FORCE)
+    if not choice.panels and seen.support.motion is not None:
+        names.append(GROUND)
     if FORCE in names or forces:
-        contacts_of(drawing.frames)  # has advice where none were stored
-    return names if not forces or FORCE in names else (*names, FORCE)
+        contacts_of(seen.frames)  # has advice where none were stored
+    return tuple(dict.fromkeys([*names, *([FORCE] if forces else [])]))
 
 
 def _panel_height(names: Sequence[str], blocks: int) -> float:
     """Return the height of a panel (inches); names of many blocks need room before the next text at the side."""
-    legend = LEGEND + blocks * LINE
+    legend = LEGEND + blocks * style.LINE
     first = next((row for row, name in enumerate(names) if name in MOTIONS), 0)
     end = next((row for row, name in enumerate(names) if row > first and name not in {*MOTIONS, CONTACTS}), len(names))
     return max(PANEL, (legend + GAP) / (end - first) - GAP)
 
 
-def _draw_panel(axes: "Axes", drawing: _Drawing, name: str, measured: MeasuredTable | None) -> None:
-    if name in MOTIONS:
-        motion = drawing.motion(name)
-        _draw_motion(axes, drawing, motion)
-        _draw_measured(axes, drawing, motion, measured)
-    elif name == ENERGY:
-        draw_energies(axes, drawing.time, drawn_energies(drawing.frames.energy, drawing.chosen))
-    elif name == CONTACTS:
-        draw_contacts(axes, drawing.time, drawing.frames.contact_count[drawing.chosen])
-    elif name == FORCE:
-        force = support_force(drawing.frames, drawing.chosen, drawing.support)
-        draw_force(axes, drawing.time, force, drawing.support.weight)
-    else:
-        draw_ground(axes, drawing.time, drawing.support)
-
-
-def _draw_motion(axes: "Axes", drawing: _Drawing, motion: Motion) -> None:
+def _draw_others(axes: "Axes", time: Floats, values: Floats) -> None:
+    """Draw the blocks that have no line of their own in grey, (n, k)."""
     from matplotlib.collections import LineCollection
-    from matplotlib.patheffects import Normal, Stroke
 
-    others = (
-        np.setdiff1d(np.arange(motion.values.shape[1]), drawing.shown) if drawing.others else np.zeros(0, dtype=int)
-    )
-    lines = [np.stack([drawing.time, motion.values[:, block]], axis=-1) for block in others]
+    lines = [np.stack([time, one], axis=-1) for one in values.T]
     faint = min(0.35, max(0.12, 30.0 / max(len(lines), 1)))
     look: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": 0.4, "alpha": faint}
     axes.add_collection(LineCollection(lines, **look, rasterized=len(lines) > MOST_PATHS))
-    edge = [Stroke(linewidth=2.0, foreground=style.FAINT_INK), Normal()]
-    for block in drawing.shown:
-        line, *_ = axes.plot(drawing.time, motion.values[:, block], linewidth=1.2, **drawing.looks[block])
-        if style.brightness(drawing.looks[block]["color"]) > PALE:
-            line.set_path_effects(edge)
-    axes.set_ylim(*limits_of(motion.values if drawing.others else motion.values[:, drawing.shown]))
-    axes.set_ylabel(motion.label)
 
 
-def _draw_measured(axes: "Axes", drawing: _Drawing, motion: Motion, measured: MeasuredTable | None) -> None:
-    """Draw mean and range of the repeats at the end of the lines of coloured blocks."""
-    if measured is None or not motion.quantity:
-        return
+def _draw_measured(
+    axes: "Axes", seen: FramesInView, motion: Motion, measured: MeasuredTable, names: Sequence[str]
+) -> None:
+    """Draw mean and range of the repeats at the end of the lines of blocks."""
     statistics = measured.statistics()
-    names = [drawing.frames.names[block] for block in drawing.shown]
-    lines = statistics[(statistics["quantity"] == motion.quantity) & statistics["block"].isin(names)]
-    x = float(drawing.frames.time[-1]) * 1.02
+    rows = statistics[(statistics["quantity"] == motion.quantity) & statistics["block"].isin(names)]
+    x = float(seen.frames.time[-1]) * 1.02
     line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "linewidth": 1.2, "zorder": 4.0}
-    known = [motion.values if drawing.others else motion.values[:, drawing.shown]]
-    for item in lines.itertuples():
-        mean, low, high = (float(getattr(item, key)) for key in ("mean", "minimum", "maximum"))
+    known = [motion.values.ravel()]
+    for mean, low, high in rows[["mean", "minimum", "maximum"]].to_numpy(dtype=float):
         axes.plot([x, x], [low, high], marker="_", markersize=4.0, **line)
         axes.plot(x, mean, marker="o", markersize=3.2, **line)
         known.append(np.array([low, high]))
-    axes.set_ylim(*limits_of(np.concatenate([values.ravel() for values in known])))
+    axes.set_ylim(*limits_of(np.concatenate(known)))
 
 
-def _finish(panels: dict[str, "Axes"], drawing: _Drawing) -> None:
-    """Name the coloured blocks at their first panel, write plain numbers, give all panels one axis of time."""
-    from matplotlib.lines import Line2D
-    from matplotlib.ticker import MaxNLocator
-
-    first = next((axes for name, axes in panels.items() if name in MOTIONS), None)
-    if drawing.shown and first is not None:
-        room = NAME_ROOM * style.POINTS_PER_INCH
-        handles = [Line2D([], [], **drawing.looks[block]) for block in drawing.shown]
-        names = [style.shortened(drawing.frames.names[block], _LETTERS) for block in drawing.shown]
-        cut = [style.cut_to(name, room, style.FONT_SIZE) for name in names]
-        first.legend(handles, cut, **BESIDE, title="block", alignment="left")
-    start, end = float(drawing.frames.time[0]), float(drawing.frames.time[-1])
-    for name, axes in panels.items():
-        axes.set_xlim(start, start + 1.04 * max(end - start, 1e-9))
-        axes.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10], integer=name == CONTACTS))
-        plain_numbers(axes.yaxis)
-
-
-def _legend(drawing: _Drawing, names: Sequence[str], *, is_measured: bool) -> str:
-    texts = ["Potential energy relative to its minimum."] if ENERGY in names else []
-    if {"dx", "dy"} & set(names):
-        texts.append("Δx, Δy: displacement from the start.")
-    if drawing.relative and drawing.support.motion is not None and set(names) & set(MOTIONS):
-        texts.append("Places and velocities relative to the moving ground.")
-    if is_measured and {"x", "y", "rotation"} & set(names):
-        texts.append("At the end: measured mean and range.")
-    shown, all_blocks = len(drawing.shown), len(drawing.frames.names)
-    if shown < all_blocks and drawing.others:
-        texts.append(f"Coloured: {shown} of {all_blocks} blocks, those that end farthest from their start.")
-    elif shown < all_blocks:
-        texts.append(f"{shown} of {all_blocks} blocks.")
-    return " ".join(texts) or " "
-
-
-MOST_PANELS = 12
-_LETTERS_PROBES = 24  # of a line beside a panel
-PERCENT = 98.0  # of the samples of a force that are not those of an impact
-MOST_USUAL, CUT = 3.0, 1.5  # times what they hardly exceed: forces beyond are cut, there
-
-
-def draw_probes(
-    probes: Mapping[str, ProbeSeries],
-    path: Path,
-    title: str | None = None,
-    names: Sequence[str] = (),
-    paper: Paper = OWN,
-) -> None:
-    """Draw probes, all or those of these names.
-
-    Raises InvalidInputError for a run without probes, unknown names, too many panels, an unknown picture format or too
-    small a page, and OutputError when the file cannot be written.
-    """
-    unknown = next((name for name in names if name not in probes), None)
-    if unknown is not None:
-        message = f"--probe {unknown}: no such probe in this run, {did_you_mean_or_list(unknown, probes)}"
-        raise InvalidInputError(message)
-    panels = [panel for name in names or probes for panel in panels_of(probes[name])]
-    if not panels:
-        message = "this run has no samples of probes; [[probes]] in the scenario records them"
-        raise InvalidInputError(message)
-    if len(panels) > MOST_PANELS:
-        message = f"{len(panels)} panels are too many for one picture, at most {MOST_PANELS}; choose with --probe"
-        raise InvalidInputError(message)
-    draw_time_panels(panels, path, title, paper=paper)
-
-
-def probe_picture(probe: ProbeSeries) -> bytes:
-    """Return the picture (PNG) of one probe, for a report."""
-    return time_panels_png(panels_of(probe))
-
-
-def panels_of(probe: ProbeSeries) -> list[TimePanel]:
-    """Return the panels of a probe; none of one without samples."""
-    return _PANELS[probe.kind](probe) if len(probe) else []
-
-
-def _panel(probe: ProbeSeries, quantity: str, unit: str, factor: float, columns: Mapping[str, Floats]) -> TimePanel:
-    lines = {name: (probe.time, factor * values) for name, values in columns.items()}
-    several = "" if len(lines) > 1 else f"\n{next(iter(lines))}"
+def _energies(seen: FramesInView) -> TimePanel:
+    """Return energies (J) by name, each in its own colour and dashes."""
+    energies = drawn_energies(seen.frames.energy, seen.chosen)
+    factor, unit = unit_for(max((float(np.abs(values).max()) for values in energies.values()), default=0.0), "J")
+    looks = {name: ENERGY_LOOKS.get(name, OTHER_ENERGY) for name in energies}
     return TimePanel(
-        f"{quantity} ({unit})" if unit else quantity, lines, f"probe {probe.name}"[:_LETTERS_PROBES] + several
+        f"energy ({unit})",
+        {name: (seen.time, factor * values) for name, values in energies.items()},
+        looks={
+            name: {"color": colour, "linestyle": dashes, "linewidth": 1.1} for name, (colour, dashes) in looks.items()
+        },
+        legend="" if energies else None,
     )
 
 
-def _largest(columns: Mapping[str, Floats]) -> float:
-    return max((float(np.nanmax(np.abs(values), initial=0.0)) for values in columns.values()), default=0.0)
+def _contacts(seen: FramesInView) -> TimePanel:
+    line = {"": (seen.time, seen.frames.contact_count[seen.chosen])}
+    return TimePanel("contacts", line, limits=(0.0, None), looks={"": {**INK, "drawstyle": "steps-post"}})
 
 
-def _some(probe: ProbeSeries, *names: str) -> dict[str, Floats]:
-    return {name.replace("_", " "): probe[name] for name in names}
+def _support_force(seen: FramesInView) -> TimePanel:
+    """Return the upward force (N) of the supports on all free blocks, with the weight; where it is cut, its largest.
 
-
-def _force(probe: ProbeSeries) -> list[TimePanel]:
-    forces = _some(probe, "fx", "fy")
-    largest = _largest(forces)
-    usual = max(float(np.percentile(np.abs(values), PERCENT)) for values in forces.values())  # hardly exceeded
-    is_cut = usual > 0.0 and largest > MOST_USUAL * usual
-    factor, unit = unit_for(usual if is_cut else largest, "N")
-    panel = _panel(probe, "force", unit, factor, forces)
-    if is_cut:
-        low, high = (
-            sign * min(max(float((sign * one).max()) for one in forces.values()), CUT * usual) for sign in (-1, 1)
-        )
-        room = 0.08 * (high - low)
-        note = f"{panel.note}\nlargest: {factor * largest:.3g} {unit}"
-        panel = replace(panel, note=note, limits=(factor * (low - room), factor * (high + room)))
-    panels = [panel]
-    if np.isfinite(probe["mobilised"]).any():
-        panels.append(_panel(probe, "share of friction", "", 1.0, {"mobilised": probe["mobilised"]}))
-    return panels
-
-
-def _point(probe: ProbeSeries) -> list[TimePanel]:
-    moves = not np.array_equal(probe["dx"], probe["relative_dx"]) or not np.array_equal(
-        probe["dy"], probe["relative_dy"]
+    Raises InvalidInputError where contacts were not stored.
+    """
+    support = seen.support
+    up = float(np.sin(support.tilt)), float(np.cos(support.tilt))
+    force = force_on_supports(contacts_of(seen.frames), up, support.fixed)[seen.chosen]
+    largest, reference = float(force.max(initial=0.0)), support.weight or float(np.median(force)) or 1.0
+    factor, unit = unit_for(reference, "N")
+    note = f"upwards, from ground,\nwalls and fixed bodies\ndashed: weight {factor * support.weight:.3g} {unit}"
+    if largest > MOST_WEIGHTS * reference:
+        note += f"\nlargest: {factor * largest:.3g} {unit}"
+    return TimePanel(
+        f"support force ({unit})",
+        {"": (seen.time, factor * force)},
+        note,
+        limits=(0.0, factor * min(max(1.1 * largest, 1.5 * reference), MOST_WEIGHTS * reference)),
+        looks={"": INK},
+        level=factor * support.weight,
     )
-    relative = "relative_" if moves else ""
-    places, velocities = (_some(probe, f"{relative}{one}x", f"{relative}{one}y") for one in "dv")
-    rotation = {"rotation": np.degrees(probe["rotation"])}
-    return [
-        _panel(probe, "displacement", "mm", MILLIMETRES, places),
-        _panel(probe, "velocity", "mm/s", MILLIMETRES, velocities),
-        _panel(probe, "rotation", "°", 1.0, rotation),
-    ]
 
 
-def _joint(probe: ProbeSeries) -> list[TimePanel]:
-    return [_panel(probe, "joint", "mm", MILLIMETRES, _some(probe, "opening_first", "opening_last", "slip"))]
+def _ground(seen: FramesInView) -> TimePanel:
+    """Return the displacement of ground, walls and fixed bodies."""
+    moved = MILLIMETRES * seen.support.displacement(seen.time)
+    note = f"displacement of\nthe ground {seen.support.way}" if seen.support.motion is not None else "at rest"
+    return TimePanel("ground (mm)", {"": (seen.time, moved)}, note, limits=limits_of(moved), looks={"": INK})
 
 
-def _energy(probe: ProbeSeries) -> list[TimePanel]:
-    energies = drawn_energies(probe.columns, np.arange(len(probe)))
-    factor, unit = unit_for(_largest(energies), "J")
-    return [_panel(probe, "energy", unit, factor, energies)] if energies else []
-
-
-_PANELS: dict[str, Callable[[ProbeSeries], list[TimePanel]]] = {
-    probes.FORCE: _force,
-    POINT: _point,
-    JOINT: _joint,
-    probes.ENERGY: _energy,
+SCENE_PANELS: dict[str, Callable[[FramesInView], TimePanel]] = {
+    ENERGY: _energies,
+    CONTACTS: _contacts,
+    FORCE: _support_force,
+    GROUND: _ground,
 }
 
 
-BETWEEN = 4
-"""Points of velocity and displacement a piece of the motion."""
-ROUND_OFF = 1e-9
-
-
-def draw_support_motion(support: Support, end: float, path: Path, title: str | None = None, paper: Paper = OWN) -> None:
-    """Draw the motion of the supports along its direction from 0 to `end` (s).
-
-    Raises InvalidInputError for supports that rest, an unknown picture format or too small a page, and OutputError when
-    the file cannot be written.
-    """
-    pieces = support.motion
-    if pieces is None:
-        message = "the supports of this scenario do not move: it has no table [motion]"
-        raise InvalidInputError(message)
-    peaks = motion_peaks(pieces, end)
-    ends, acceleration = acceleration_ends(pieces)
-    ends, acceleration = _until(ends, acceleration, end)
-    count = len(pieces.times) - 1
-    times = np.interp(np.linspace(0.0, count, BETWEEN * count + 1), np.arange(count + 1), pieces.times)
-    times = np.append(times[times < end], end)
-    displacement, velocity = displacement_and_velocity(pieces, times)
-    in_g = peaks.acceleration.value / STANDARD_GRAVITY
-    panels = [
-        _panel_motion("acceleration (m/s²)", 1.0, (ends, acceleration), peaks.acceleration, "PGA", f"= {in_g:.4g} g\n"),
-        _panel_motion("velocity (mm/s)", MILLIMETRES, (times, velocity), peaks.velocity, "PGV"),
-        _panel_motion("displacement (mm)", MILLIMETRES, (times, displacement), peaks.displacement, "PGD"),
-    ]
-    final = _left(peaks.final_velocity, peaks.velocity), _left(float(displacement[-1]), peaks.displacement)
-    left = f"At the end: {final[0]:.4g} mm/s, {final[1]:.4g} mm.".replace("-", "−")
-    note = f"Ground, walls and fixed bodies, {support.way}. {left}"
-    draw_time_panels(panels, path, title, note, paper)
-
-
-def _panel_motion(
-    label: str, factor: float, line: tuple[Floats, Floats], peak: Peak, name: str, more: str = ""
-) -> TimePanel:
-    times, values = line
-    near = int(np.argmin(np.abs(times - peak.time) - 1e-9 * np.abs(values)))
-    unit = label.partition("(")[2].rstrip(")")
-    note = f"{name} {factor * peak.value:.4g} {unit}\n{more}at {peak.time:.4g} s"
-    sign = -1.0 if values[near] < 0.0 else 1.0
-    return TimePanel(label, {name: (times, factor * values)}, note, [(peak.time, sign * factor * peak.value)])
-
-
-def _left(value: float, peak: Peak) -> float:
-    """Return a value in mm or mm/s, zero where it is round-off beside the peak."""
-    return MILLIMETRES * value if abs(value) > ROUND_OFF * peak.value else 0.0
-
-
-def _until(times: Floats, values: Floats, end: float) -> tuple[Floats, Floats]:
-    """Cut a line of straight pieces at `end` (s)."""
-    kept = times < end
-    last = int(np.count_nonzero(kept))
-    share = (end - times[last - 1]) / max(times[last] - times[last - 1], 1e-300)
-    value = values[last - 1] + share * (values[last] - values[last - 1])
-    return np.append(times[:last], end), np.append(values[:last], value)
+def _notes(seen: FramesInView, names: Sequence[str], shown: int, *, is_measured: bool, is_chosen: bool) -> str:
+    texts = ["Potential energy relative to its minimum."] if ENERGY in names else []
+    if {"dx", "dy"} & set(names):
+        texts.append("Δx, Δy: displacement from the start.")
+    if seen.from_ground and set(names) & set(MOTIONS):
+        texts.append("Places and velocities relative to the moving ground.")
+    if is_measured and {"x", "y", "rotation"} & set(names):
+        texts.append("At the end: measured mean and range.")
+    blocks = len(seen.frames.names)
+    if shown < blocks:
+        which = f"{shown} of {blocks} blocks"
+        texts.append(f"{which}." if is_chosen else f"Coloured: {which}, those that end farthest from their start.")
+    return " ".join(texts)

@@ -48,7 +48,7 @@ class Kind:
 
         Raises InvalidInputError for an unknown picture format or too small a page, OutputError.
         """
-        style.picture_suffix(path)
+        path = style.picture_path(path)
         with self.drawn(sweep, paper) as figure:
             style.save_figure(figure, path)
 
@@ -72,8 +72,7 @@ def run_kind(name: str) -> Callable[..., None]:
     if name not in RUN_KINDS:
         meant = nearest(name, [*RUN_KINDS, MOTION, PROBE], MOST_SLIPS)
         hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join([*RUN_KINDS, MOTION, PROBE])}"
-        message = f"--kind {name}: unknown kind for a run, {hint}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"--kind {name}: unknown kind for a run, {hint}")
     return RUN_KINDS[name]
 
 

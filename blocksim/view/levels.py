@@ -1,6 +1,7 @@
 """Distance of coarser levels of a numerical setting from the finest: a panel for each setting, finer to the right."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,18 +10,15 @@ import numpy as np
 
 from blocksim.view import style
 from blocksim.view.run_data import Floats
-from blocksim.view.style import OWN, PanelPage, Paper, write_heading
+from blocksim.view.style import LINE, OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
+    from matplotlib.figure import Figure
 
-PANEL_WIDTH, PANEL_HEIGHT = 3.3, 2.7  # inches
-LEFT, RIGHT, HEAD, FOOT, GAP = 0.72, 1.05, 0.80, 0.50, 0.35  # inches
-NARROWEST, LOWEST = 1.7, 0.8  # inches, of a panel on a page whose size was asked for
-LINE = 0.14  # inches, of one row of text above a panel
-LEGEND_ROW, LEGEND_ENTRY = 0.18, 1.55  # inches: height of a row of the legend, width of an entry
-LEGEND_NAME = 0.42  # inches, for the name of a block in an entry
+SIDES, GAP = (0.72, 1.05, 0.52, 0.46), 0.35  # inches, around panels and between them
+PANEL, LEAST = (3.3, 2.7), (1.7, 0.8)  # inches, of a panel, and on a page whose size was asked for
+LEGEND_ENTRY, LEGEND_NAME = 1.55, 0.42  # inches: width of an entry of the legend, and of a block's name in it
 DEPTH = 1e-3  # of the tolerance, or of the farthest level where that is less: what is closer is drawn there
 MARKERS = "osD^vP"
 MOST_BLOCKS = 4
@@ -57,43 +55,48 @@ def draw_levels(
     `measured` gives the width of the measured range (mm) of some blocks. Raises InvalidInputError for an unknown
     picture format or too small a page, and OutputError when the file cannot be written.
     """
-    path = Path(path)
-    style.picture_suffix(path)
-    widths = dict(measured or {})
+    path, widths, names = style.picture_path(path), dict(measured or {}), panels[0].blocks
     shown = chosen_blocks(panels)
-    repeats = [widths[panels[0].blocks[block]] for block in shown if widths.get(panels[0].blocks[block], 0.0) > 0.0]
+    repeats = [widths[names[block]] for block in shown if widths.get(names[block], 0.0) > 0.0]
     least = min(repeats, default=None)
     low, high = limits_of(panels, [] if least is None else [least])
-    page = _page(len(panels), len(shown), paper)
-    with style.styled_figure(page.width, page.height, paper.dots) as figure:
-        size = page.panel / page.width, page.row / page.height
-        for index, panel in enumerate(panels):
-            left = LEFT + index * (page.panel + GAP)
-            axes = figure.add_axes((left / page.width, page.foot / page.height, *size))
+    with _opened(len(panels), names, shown, title, paper) as (figure, row):
+        width, height = style.size_of(row[0])
+        for panel, axes in zip(panels, row, strict=True):
             axes.set_yscale("log")
             axes.set_ylim(low, high)
-            _draw_panel(axes, panel, shown, page.panel)
-            _draw_limits(axes, panel.tolerance_mm, least, named=index == len(panels) - 1)
-            axes.tick_params(axis="y", which="both", labelleft=index == 0)
-        has_room = style.width_of(DISTANCE, style.FONT_SIZE) <= page.row * style.POINTS_PER_INCH
-        figure.axes[0].set_ylabel(DISTANCE if has_room else SHORT_DISTANCE)
-        write_heading(figure, title, 0.12)
-        figure.legend(handles=_legend(panels[0].blocks, shown), loc="lower left", ncols=page.columns, frameon=False)
+            _draw_panel(axes, panel, shown, width)
+            _draw_limits(axes, panel.tolerance_mm, least, named=axes is row[-1])
+            axes.tick_params(axis="y", which="both", labelleft=axes is row[0])
+        has_room = style.width_of(DISTANCE, style.FONT_SIZE) <= height * style.POINTS_PER_INCH
+        row[0].set_ylabel(DISTANCE if has_room else SHORT_DISTANCE)
         style.save_figure(figure, path)
 
 
 def refuse_small_page(panels: int, paper: Paper) -> None:
     """Raise InvalidInputError where so many panels have no room, whatever their blocks."""
-    _page(panels, MOST_BLOCKS, paper)
+    with _opened(panels, [""] * MOST_BLOCKS, range(MOST_BLOCKS), None, paper):
+        pass
 
 
-def _page(panels: int, blocks: int, paper: Paper) -> PanelPage:
-    sides = LEFT + (panels - 1) * GAP + RIGHT
-    width = paper.width(sides + panels * PANEL_WIDTH, sides + panels * NARROWEST)
-    columns = int(width / LEGEND_ENTRY)
-    foot = FOOT + LEGEND_ROW * -(-(blocks + 1) // columns)
-    row = paper.panel(PANEL_HEIGHT, 1, HEAD + foot, LOWEST)
-    return PanelPage(width, paper.height(HEAD + row + foot), (width - sides) / panels, row, foot, columns)
+@contextmanager
+def _opened(
+    panels: int, blocks: Sequence[str], shown: Sequence[int], title: str | None, paper: Paper
+) -> Iterator[tuple["Figure", list["Axes"]]]:
+    """Give panels side by side, and a legend that names the lines of some blocks."""
+    from matplotlib.lines import Line2D
+
+    room, width = LEGEND_NAME * style.POINTS_PER_INCH, SIDES[0] + SIDES[1] + panels * PANEL[0] + (panels - 1) * GAP
+    names = [style.cut_to(blocks[block], room, style.FONT_SIZE) for block in shown]
+    handles = [
+        Line2D([], [], **_look(shown, block), label=f"x of block {name}")
+        for block, name in zip(shown, names, strict=True)
+    ]
+    handles.append(Line2D([], [], **LARGEST, label="largest, with turns"))
+    more: dict[str, Any] = {"handles": handles, "columns": max(1, int(paper.width(width) / LEGEND_ENTRY))}
+    with style.open_panels(paper, (1, panels), PANEL, LEAST, SIDES, (GAP, 0.0), title=title, **more) as opened:
+        figure, (row,) = opened
+        yield figure, row
 
 
 def limits_of(panels: Sequence[Panel], others: Sequence[float]) -> tuple[float, float]:
@@ -127,6 +130,8 @@ def _look(shown: Sequence[int], block: int) -> dict[str, Any]:
 
 
 def _draw_panel(axes: "Axes", panel: Panel, shown: Sequence[int], width: float) -> None:
+    from matplotlib.ticker import FuncFormatter, NullLocator
+
     low, _ = axes.get_ylim()
     coarser = panel.values[:-1]  # the finest level is what the others are measured from
     axes.set_xscale("log")
@@ -134,29 +139,27 @@ def _draw_panel(axes: "Axes", panel: Panel, shown: Sequence[int], width: float) 
     for block in shown:
         off = np.maximum(panel.off_mm[:-1, block], low)
         axes.plot(coarser, off, **_look(shown, block), clip_on=False, zorder=3)
-    _mark_values(axes, panel)
-    _number_axes(axes, panel, int(width / NUMBER_ROOM))
+    marks = [(panel.own, "own", 1), *([] if panel.recommended is None else [(panel.recommended, "recommended", 0)])]
+    for value, text, row in marks:  # above the panel, in a row of text each
+        axes.axvline(value, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (1, 2)), zorder=1)
+        side = {panel.values[0]: "left", panel.values[-1]: "right"}.get(value, "center")
+        place = (value, 1.0), (0.0, 2.0 + row * LINE * style.POINTS_PER_INCH), ("data", "axes fraction")
+        axes.annotate(text, *place, "offset points", color=style.FAINT_INK, ha=side)
+    # numbers below every n-th level where they are many, always below the scenario's own
+    margin = (float(panel.values[-1]) / float(panel.values[0])) ** 0.04
+    axes.set_xlim(float(panel.values[0]) / margin, float(panel.values[-1]) * margin)
+    apart = -(-len(panel.values) // int(width / NUMBER_ROOM))
+    start = int(np.argmin(np.abs(panel.values - panel.own))) % apart
+    axes.set_xticks(panel.values[start::apart], [f"{value:.3g}" for value in panel.values[start::apart]])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.spines[["right", "top"]].set_visible(False)
     room = width * style.POINTS_PER_INCH
     label = f"{panel.key}, finer to the right"
     has_room = style.width_of(label, style.FONT_SIZE) <= style.SURE * room
     axes.set_xlabel(label if has_room else style.cut_to(panel.key, room, style.FONT_SIZE), labelpad=2.0)
-    title = style.cut_to(f"{panel.title}: {panel.verdict}", room, style.FONT_SIZE)
-    axes.set_title(title, loc="left", pad=4.0 + 2.0 * LINE * style.POINTS_PER_INCH)
-
-
-def _number_axes(axes: "Axes", panel: Panel, most: int) -> None:
-    """Write numbers below the levels, below every n-th one where they are many, always below the scenario's own."""
-    from matplotlib.ticker import FuncFormatter, NullLocator
-
-    first, last = float(panel.values[0]), float(panel.values[-1])
-    margin = (last / first) ** 0.04
-    axes.set_xlim(first / margin, last * margin)
-    apart = -(-len(panel.values) // most)
-    start = int(np.argmin(np.abs(panel.values - panel.own))) % apart
-    axes.set_xticks(panel.values[start::apart], [f"{value:.3g}" for value in panel.values[start::apart]])
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    heading = style.cut_to(f"{panel.title}: {panel.verdict}", room, style.FONT_SIZE)
+    axes.set_title(heading, loc="left", pad=4.0 + 2.0 * LINE * style.POINTS_PER_INCH)
 
 
 def _draw_limits(axes: "Axes", tolerance: float, repeats: float | None, *, named: bool) -> None:
@@ -170,35 +173,3 @@ def _draw_limits(axes: "Axes", tolerance: float, repeats: float | None, *, named
         if named:
             va = "bottom" if y == highest else "top"
             axes.annotate(text, (1.0, y), (4.0, 0.0), ("axes fraction", "data"), "offset points", color=colour, va=va)
-
-
-def _mark_values(axes: "Axes", panel: Panel) -> None:
-    """Mark the scenario's own value and the recommended one above the panel, in a row of text each."""
-    marks = [(panel.own, "own", 1)]
-    if panel.recommended is not None:
-        marks.append((panel.recommended, "recommended", 0))
-    for value, text, row in marks:
-        axes.axvline(value, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (1, 2)), zorder=1)
-        at_edge = {panel.values[0]: "left", panel.values[-1]: "right"}
-        axes.annotate(
-            text,
-            (value, 1.0),
-            (0.0, 2.0 + row * LINE * style.POINTS_PER_INCH),
-            ("data", "axes fraction"),
-            "offset points",
-            color=style.FAINT_INK,
-            ha=at_edge.get(value, "center"),
-        )
-
-
-def _legend(blocks: Sequence[str], shown: Sequence[int]) -> "list[Line2D]":
-    """Name the lines."""
-    from matplotlib.lines import Line2D
-
-    room = LEGEND_NAME * style.POINTS_PER_INCH
-    names = [style.cut_to(blocks[block], room, style.FONT_SIZE) for block in shown]
-    lines = [
-        Line2D([], [], **_look(shown, block), label=f"x of block {name}")
-        for block, name in zip(shown, names, strict=True)
-    ]
-    return [*lines, Line2D([], [], **LARGEST, label="largest, with turns")]

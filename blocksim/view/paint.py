@@ -5,16 +5,15 @@ A block has the same colour in every picture: strip, final state, history, anima
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
+from blocksim.simulation.frames import Frames
 from blocksim.view import style
-from blocksim.view.run_data import Floats, FramesLike, Support, drawable_frames, others_of
-from blocksim.view.style import write_legend
-from blocksim.world.systems.system import Shade
+from blocksim.view.run_data import Floats, Support, drawable_frames
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,20 +31,6 @@ METRE = 1e4  # mm, from which on displacements are in metres
 LETTERS = 24  # of a material's name
 
 Fills = Callable[[int], Sequence[str]]
-
-
-class MovingFrames(FramesLike, Protocol):
-    """Frames with velocities."""
-
-    @property
-    def vx(self) -> Floats:
-        """Velocities along the ground (m/s), (n, b)."""
-        ...
-
-    @property
-    def vy(self) -> Floats:
-        """Velocities normal to it (m/s), (n, b)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -85,7 +70,7 @@ class Paint:
         return self.scale is None or any(self.elements)
 
 
-def by_block(frames: FramesLike) -> Paint:
+def by_block(frames: Frames) -> Paint:
     """Return the default: blocks take turns in six colours."""
     fills = [style.block_colour(index) for index in range(len(frames.names))]
     return Paint(lambda _: fills)
@@ -100,51 +85,43 @@ def by_material(_: object, scenario: Scenario) -> Paint:
     return Paint(lambda _: fills, tuple((style.shortened(name, LETTERS), colours[name]) for name in materials))
 
 
-def by_speed(frames: MovingFrames) -> Paint:
+def by_speed(frames: Frames) -> Paint:
     """Return a scale from rest to the largest speed; to that of all but the rarest where a few are far beyond."""
-    chosen = drawable_frames(frames)
     speeds = np.hypot(frames.vx, frames.vy)
-    known = speeds[chosen]
-    largest = float(known.max()) or 1.0
-    usual = float(np.quantile(known[known > 0.0], RARE)) if (known > 0.0).any() else largest
-    is_cut = largest > PEAK * usual
-    factor, unit = (1.0, "m/s") if largest >= 1.0 else (1e3, "mm/s")
-    high = factor * (usual if is_cut else largest)
-    scale = Scale(f"speed ({unit})", SPEED_COLOURS, 0.0, high, "max" if is_cut else "neither")
-    return _scaled(factor * speeds, scale)
+    known = speeds[drawable_frames(frames)]
+    factor, unit = (1.0, "m/s") if (float(known.max()) or 1.0) >= 1.0 else (1e3, "mm/s")
+    moving = known[known > 0.0] if known.any() else np.ones(1)
+    return _scaled(factor * speeds, capped_scale(f"speed ({unit})", factor * moving, SPEED_COLOURS))
 
 
-def shade_scale(shade: Shade, values: Floats) -> Scale:
-    """Return the scale of a shade; values beyond all but the rarest are cut, as of speeds."""
+def capped_scale(label: str, values: Floats, colours: str = ELEMENT_COLOURS) -> Scale:
+    """Return a scale from 0 to the largest value; where a few are far beyond all others, these lie beyond its end."""
     usual, largest = (float(np.quantile(values, share)) for share in (RARE, 1.0))
     is_cut = largest > PEAK * usual > 0.0
     high = (usual if is_cut else largest) or 1.0
-    return Scale(shade.label, ELEMENT_COLOURS, 0.0, high, "max" if is_cut else "neither")
+    return Scale(label, colours, 0.0, high, "max" if is_cut else "neither")
 
 
-def with_shade(paint: Paint, frames: Any, name: str) -> Paint:
+def with_shade(paint: Paint, frames: Frames, name: str) -> Paint:
     """Return a paint of blocks that also colours the elements of other systems, by a shade of this name."""
-    chosen = drawable_frames(frames)
-    tracks = others_of(frames)
-    found = [next((one for one in track.system.shades if one.name == name), None) for track in tracks]
-    values = [None if shade is None else shade.of(track) for shade, track in zip(found, tracks, strict=True)]
-    known = np.concatenate([one[chosen].ravel() for one in values if one is not None])
-    scale = shade_scale(next(shade for shade in found if shade is not None), known)
+    found = [next((one for one in track.system.shades if one.name == name), None) for track in frames.others]
+    values = [None if shade is None else shade.of(track) for shade, track in zip(found, frames.others, strict=True)]
+    known = np.concatenate([one[drawable_frames(frames)].ravel() for one in values if one is not None])
+    scale = capped_scale(next(shade.label for shade in found if shade is not None), known)
     fills = tuple(None if one is None else _scaled(one, scale).fills for one in values)
     return replace(paint, entries=(), scale=scale, elements=fills)
 
 
-def by_turn(frames: FramesLike) -> Paint:
+def by_turn(frames: Frames) -> Paint:
     """Return a scale of the angle turned since the blocks were placed, the same to both sides."""
     turns = np.degrees(frames.rotation)
     farthest = float(np.abs(turns[drawable_frames(frames)]).max())
     most = min(max(farthest, LEAST_TURN), HALF_TURN)
-    return _scaled(
-        turns, Scale("rotation (°)", TURN_COLOURS, -most, most, "both" if farthest > most * 1.001 else "neither")
-    )
+    extend = "both" if farthest > most * 1.001 else "neither"
+    return _scaled(turns, Scale("rotation (°)", TURN_COLOURS, -most, most, extend))
 
 
-def displacements(frames: FramesLike, support: Support) -> Floats:
+def displacements(frames: Frames, support: Support) -> Floats:
     """Return how far the centres of all blocks are from where they began (m), relative to the support, (n, b)."""
     carried = support.offset(frames.time)
     dx = frames.x - frames.x[0] - (carried[:, :1] - carried[0, 0])
@@ -152,14 +129,12 @@ def displacements(frames: FramesLike, support: Support) -> Floats:
     return np.asarray(np.hypot(dx, dy))
 
 
-def by_displacement(frames: FramesLike, support: Support, most: float) -> Paint:
+def by_displacement(frames: Frames, support: Support, most: float) -> Paint:
     """Return a scale of the displacement since the start, from none to `most` (m)."""
     high = 1e3 * most or 1.0
     factor, unit = (1.0, "mm") if high < METRE else (1e-3, "m")
-    return _scaled(
-        factor * 1e3 * displacements(frames, support),
-        Scale(f"displacement ({unit})", SPEED_COLOURS, 0.0, factor * high),
-    )
+    scale = Scale(f"displacement ({unit})", SPEED_COLOURS, 0.0, factor * high)
+    return _scaled(factor * 1e3 * displacements(frames, support), scale)
 
 
 # Each takes the frames and the scenario; another way to colour is one function and one line here.
@@ -176,29 +151,20 @@ SHADES = ("displacement", "speed", "plastic", "pressure")
 COLOURS = tuple(dict.fromkeys((*PAINTS, *SHADES)))
 
 
-def paint_named(name: str, frames: Any, scenario: Scenario) -> Paint:
+def paint_named(name: str, frames: Frames, scenario: Scenario) -> Paint:
     """Return the colours of a run by their meaning. Raises InvalidInputError for a meaning that this run does not have.
 
     Elements of other systems have their first shade, unless the meaning is one of theirs: then blocks keep their own
     colours, and the scale is that of the elements.
     """
-    shades = [shade.name for track in others_of(frames) for shade in track.system.shades]
+    shades = [shade.name for track in frames.others for shade in track.system.shades]
     known = tuple(dict.fromkeys((*PAINTS, *shades)))
     if name not in known:
-        message = f"unknown colour {name!r} in this run; choose {', '.join(known)}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"unknown colour {name!r} in this run; choose {', '.join(known)}")
     if name in shades:
         return with_shade(by_block(frames), frames, name)
     paint = PAINTS[name](frames, scenario)
     return with_shade(paint, frames, shades[0]) if shades and paint.scale is None else paint
-
-
-def draw_key(figure: "Figure", paint: Paint, left: float, bottom: float) -> None:
-    """Draw what explains the colours, its lower left corner at a place given in inches."""
-    if paint.scale is not None:
-        _draw_scale(figure, paint.scale, left, bottom)
-    elif paint.entries:
-        _draw_entries(figure, paint.entries, left, bottom)
 
 
 def _scaled(values: Floats, scale: Scale) -> Paint:
@@ -214,26 +180,26 @@ def _scaled(values: Floats, scale: Scale) -> Paint:
     return Paint(fills, scale=scale)
 
 
-def _draw_scale(figure: "Figure", scale: Scale, left: float, bottom: float) -> None:
+def draw_key(figure: "Figure", paint: Paint, left: float, bottom: float) -> None:
+    """Draw what explains the colours, its lower left corner at a place given in inches."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
+    from matplotlib.patches import Patch
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    across, up = (float(size) for size in figure.get_size_inches())
-    width = min(0.4 * across, 3.0)
-    place = figure.add_axes((left / across + 0.06, (bottom + 0.34) / up, width / across, BAR / up))
-    colours = ScalarMappable(Normalize(scale.low, scale.high), scale.colours)
-    bar = figure.colorbar(colours, cax=place, orientation="horizontal", extend=scale.extend)
-    bar.outline.set_linewidth(style.LINE_WIDTH)
-    bar.locator = MaxNLocator(nbins=5, steps=[1, 2, 3, 4.5, 5, 9, 10])
-    bar.formatter = FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−"))
-    bar.update_ticks()
-    figure.text(left / across + 0.06 + (width + 0.15) / across, (bottom + 0.39) / up, scale.label, va="center")
-
-
-def _draw_entries(figure: "Figure", entries: Sequence[tuple[str, str]], left: float, bottom: float) -> None:
-    from matplotlib.patches import Patch
-
-    handles = [Patch(facecolor=colour, edgecolor=style.INK, linewidth=0.5, label=name) for name, colour in entries]
-    columns = max(1, min(len(handles), int(float(figure.get_figwidth()) / 1.6)))
-    write_legend(figure, handles, left, bottom, ncols=columns, handlelength=1.2)
+    across = float(figure.get_figwidth())
+    if paint.scale is not None:
+        scale, width, left = paint.scale, min(0.4 * across, 3.0), left + 0.06 * across
+        colours = ScalarMappable(Normalize(scale.low, scale.high), scale.colours)
+        place = style.add_axes(figure, left, bottom + 0.34, width, BAR)
+        bar = figure.colorbar(colours, cax=place, orientation="horizontal", extend=scale.extend)
+        bar.outline.set_linewidth(style.LINE_WIDTH)
+        bar.locator = MaxNLocator(nbins=5, steps=[1, 2, 3, 4.5, 5, 9, 10])
+        bar.formatter = FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−"))
+        bar.update_ticks()
+        style.write_text(figure, left + width + 0.15, bottom + 0.39, scale.label, va="center")
+    elif paint.entries:
+        handles = [
+            Patch(facecolor=fill, edgecolor=style.INK, linewidth=0.5, label=name) for name, fill in paint.entries
+        ]
+        style.write_legend(figure, handles, left, bottom, ncols=max(1, min(len(handles), int(across / 1.6))))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,16 @@ from blocksim.scenario.events import wall_names
 from blocksim.scenario.models.loads import AnyLoad, OnBody, Stretch, stretches_of
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.scenario.placement import ENDLESS, wall_segments
+from blocksim.simulation.frames import Frames
 from blocksim.simulation.result import EventRecord
-from blocksim.world.systems.blocks import boxes_around, least_widths, local_corners, placed_points, radii
-from blocksim.world.systems.system import Track
+from blocksim.world.systems.blocks import boxes_around, least_widths, radii
 
-_Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+PRINTED_DIGITS = 3  # of a time in s
+PRINTED = 0.000501  # s; half of the last digit of a printed time, and round-off
+LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
 
 
 class ActingLoad(NamedTuple):
@@ -29,130 +34,42 @@ class ActingLoad(NamedTuple):
     stretches: tuple[Stretch, ...]
     end: float
 
-    def values(self, times: _Floats) -> _Floats:
+    def values(self, times: Floats) -> Floats:
         """Return its factor, or the tilt (rad) of gravity, at these times (s)."""
         starts, values, rates = np.array(self.stretches).T
         piece = (np.searchsorted(starts, times, side="right") - 1).clip(min=0)
         return np.where(times < self.end, values[piece] + rates[piece] * (times - starts[piece]), 0.0)
 
 
-def acting_loads(scenario: Scenario, event_times: Sequence[float]) -> tuple[ActingLoad, ...]:
-    """Return the loads of a scenario whose events happen at these times (s)."""
-    numbers = {body.name: number for number, body in enumerate(place_bodies(scenario))} if scenario.loads else {}
-    tilt = scenario.ground.tilt
-    found = []
-    for load in scenario.loads:
-        stretches = stretches_of(load, tilt)
-        ends = (at for event, at in zip(scenario.events, event_times, strict=True) if load.name in event.unload)
-        body = numbers[load.body] if isinstance(load, OnBody) else -1
-        found.append(ActingLoad(load, body, stretches, min(ends, default=math.inf)))
-    return tuple(found)
-
-
-PRINTED_DIGITS = 3  # of a time in s
-PRINTED = 0.000501  # s; half of the last digit of a printed time, and round-off
-LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-
-
-class FramesLike(Protocol):
-    """The part of a run's frames that pictures need: n frames of b blocks, SI, counter-clockwise positive."""
-
-    @property
-    def time(self) -> Floats:
-        """Time of each frame (s), (n,)."""
-        ...
-
-    @property
-    def x(self) -> Floats:
-        """Centres along the ground (m), (n, b)."""
-        ...
-
-    @property
-    def y(self) -> Floats:
-        """Centres above the ground (m), (n, b)."""
-        ...
-
-    @property
-    def angle(self) -> Floats:
-        """Angles of the blocks' own axes (rad), (n, b)."""
-        ...
-
-    @property
-    def rotation(self) -> Floats:
-        """Angles turned since the blocks were placed (rad), (n, b), as in the final table."""
-        ...
-
-    @property
-    def size_x(self) -> Floats:
-        """Sizes along the blocks' own x axis (m), (b,)."""
-        ...
-
-    @property
-    def size_y(self) -> Floats:
-        """Sizes along the blocks' own y axis (m), (b,)."""
-        ...
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the blocks."""
-        ...
-
-    @property
-    def outlines(self) -> Floats | None:
-        """Corners (m) along the blocks' own axes, the last repeated, (b, k, 2); None where all are rectangles."""
-        ...
-
-
-def corners_of(frames: FramesLike, chosen: Indices) -> Floats:
-    """Return the corners (m) of all blocks in some frames, counter-clockwise, (f, b, k, 2)."""
-    local = local_corners(frames.size_x, frames.size_y, frames.outlines)
-    return placed_points(local, frames.x[chosen], frames.y[chosen], frames.angle[chosen])
-
-
-def shortest_sides(frames: FramesLike) -> Floats:
+def shortest_sides(frames: Frames) -> Floats:
     """Return the smaller sides (m) of blocks, of polygons their least widths, (b,)."""
     return least_widths(frames.size_x, frames.size_y, frames.outlines)
-
-
-def others_of(frames: FramesLike) -> tuple[Track, ...]:
-    """Return the systems beside the blocks over time; frames that know none have none."""
-    found: tuple[Track, ...] = getattr(frames, "others", ())
-    return found
-
-
-def outlines_of(track: Track, chosen: Indices) -> Floats:
-    """Return the outlines (m) of all elements of a system in some frames, (f, b, k, 2)."""
-    return track.system.outlines(track, chosen)
 
 
 BEYOND_REACH = 1e34
 """Metres or radians: ten thousand times the largest simulated value, and finite as 32-bit millimetres."""
 
 
-def drawable_frames(frames: FramesLike) -> Indices:
+def drawable_frames(frames: Frames) -> Indices:
     """Return the indices of the frames in which every number is finite (a failed run may end in others).
 
     Values beyond all reach, as in a damaged file, do not count: millimetres and areas would overflow.
     Raises InvalidInputError when there is none, or nothing in it.
     """
-    if len(frames.names) == 0 and not others_of(frames):
-        message = "nothing to draw"
-        raise InvalidInputError(message)
+    if len(frames.names) == 0 and not frames.others:
+        raise InvalidInputError("nothing to draw")
     finite = np.isfinite(frames.time)
     for field in (frames.x, frames.y, frames.angle):
         finite &= (np.abs(field) < BEYOND_REACH).all(axis=1)  # false for what is not finite
-    for track in others_of(frames):
+    for track in frames.others:
         finite &= (np.abs(track.values) < BEYOND_REACH).all(axis=(1, 2))
     indices = np.flatnonzero(finite)
     if len(indices) == 0:
-        message = "no frame to draw"
-        raise InvalidInputError(message)
+        raise InvalidInputError("no frame to draw")
     return indices
 
 
-def path_travelled(frames: FramesLike, chosen: Indices, carried: Floats | None = None) -> Floats:
+def path_travelled(frames: Frames, chosen: Indices, carried: Floats | None = None) -> Floats:
     """Return the path (m) up to each chosen frame, summed over the blocks; (len(chosen),), never falling.
 
     A turn counts as the way of a corner: the angle times half the diagonal. `carried` is how far the support has moved
@@ -166,13 +83,13 @@ def path_travelled(frames: FramesLike, chosen: Indices, carried: Floats | None =
     moved = np.hypot(*np.moveaxis(np.diff(places, axis=0), -1, 0))
     turned = radius * np.abs(np.diff(frames.angle[chosen], axis=0))
     way = (moved + turned).sum(axis=1)
-    for track in others_of(frames):
+    for track in frames.others:
         steps = np.hypot(*(np.diff(track[name][chosen], axis=0) for name in ("x", "y")))
         way += max(1, len(frames.names)) * steps.mean(axis=1)
     return np.concatenate([[0.0], np.cumsum(way)])
 
 
-def moments_by_motion(frames: FramesLike, chosen: Indices, count: int, carried: Floats | None = None) -> Indices:
+def moments_by_motion(frames: Frames, chosen: Indices, count: int, carried: Floats | None = None) -> Indices:
     """Return at most `count` of the chosen frames, even in the path travelled, first and last included.
 
     Even spacing in time would show the release and the rest several times and the impacts hardly. Where
@@ -185,7 +102,7 @@ def moments_by_motion(frames: FramesLike, chosen: Indices, count: int, carried: 
     return chosen[np.unique(np.concatenate([[0], between, [last]]).astype(np.intp))]
 
 
-def moments_at(frames: FramesLike, chosen: Indices, times: Sequence[float]) -> Indices:
+def moments_at(frames: Frames, chosen: Indices, times: Sequence[float]) -> Indices:
     """Return, for every time (s), the chosen frame nearest to it.
 
     The last frame's time as pictures print it, rounded to milliseconds, means the last frame, though it may lie outside
@@ -196,11 +113,9 @@ def moments_at(frames: FramesLike, chosen: Indices, times: Sequence[float]) -> I
     first, last = float(recorded[0]), float(recorded[-1])
     outside = [time for time in times if not first - PRINTED <= time <= last + PRINTED]
     if outside:
-        message = f"time {outside[0]:g} s lies outside the recorded span, {first:g} to {last:g} s"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"time {outside[0]:g} s lies outside the recorded span, {first:g} to {last:g} s")
     if len(times) == 0:
-        message = "no times to draw were given"
-        raise InvalidInputError(message)
+        raise InvalidInputError("no times to draw were given")
     wanted = [last if time == round(last, PRINTED_DIGITS) else time for time in times]
     return chosen[[int(np.argmin(np.abs(recorded - time))) for time in wanted]]
 
@@ -231,11 +146,6 @@ class Support:
         """The direction of motion in words."""
         turn = float(np.degrees(np.arctan2(*self.direction[::-1])))
         return "along x" if abs(turn) < LEAST_ANGLE else f"at {turn:.3g}° to x".replace("-", "−")
-
-    @property
-    def is_still(self) -> bool:
-        """Whether ground and walls are the same at all times."""
-        return self.motion is None and not np.isfinite(self.gone).any()
 
     def at(self, time: float) -> "Support":
         """Return the support with the walls that are there at a time (s)."""
@@ -275,44 +185,50 @@ class Support:
         return np.asarray(line[1:-1][turns])
 
 
-def event_times(scenario: Scenario, happened: Sequence[EventRecord] = ()) -> list[float]:
-    """Return when (s) each event of a scenario has happened in a run, or will; infinite where nobody knows.
-
-    Of events that wait for rest only a run knows the time.
-    """
-    times = [np.inf if event.at is None else event.at for event in scenario.events]
-    for one in happened:
-        times[one.event] = one.time_s
-    return times
+def is_fixed(frames: Frames, support: Support) -> Flags:
+    """Return for every block whether it moves with the support or by a motion of its own, (b,)."""
+    return np.array(support.fixed or (False,) * len(frames.names), dtype=bool)
 
 
 def support_of(scenario: Scenario, happened: Sequence[EventRecord] = ()) -> Support:
-    """Return the support of a scenario's runs, or of one in which these events have happened."""
-    placed, times = place_bodies(scenario), event_times(scenario, happened)
+    """Return the support of a scenario's runs, or of one in which these events have happened.
+
+    Of events that wait for rest only a run knows the time: until then it is infinite.
+    """
+    placed = place_bodies(scenario)
+    times = [np.inf if event.at is None else event.at for event in scenario.events]
+    for one in happened:
+        times[one.event] = one.time_s
+    events = list(zip(scenario.events, times, strict=True))
+    numbers = {body.name: number for number, body in enumerate(placed)}
+    loads = tuple(
+        ActingLoad(
+            load,
+            numbers[load.body] if isinstance(load, OnBody) else -1,
+            stretches_of(load, scenario.ground.tilt),
+            min((at for event, at in events if load.name in event.unload), default=math.inf),
+        )
+        for load in scenario.loads
+    )
     return Support(
         profile=scenario.ground.profile or Support.profile,
         walls=wall_segments(scenario),
         fixed=tuple(body.fixed and not body.freed for body in placed),
         driven=tuple(body.driven for body in placed) if any(body.driven for body in placed) else (),
         gone=tuple(
-            min((at for event, at in zip(scenario.events, times, strict=True) if name in event.remove), default=np.inf)
-            for name in wall_names(scenario)
+            min((at for event, at in events if name in event.remove), default=np.inf) for name in wall_names(scenario)
         ),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),
         motion=None if scenario.motion is None else motion_pieces(scenario),
-        loads=acting_loads(scenario, times),
+        loads=loads,
         weight=scenario.gravity * sum(body.mass for body in placed if not body.fixed or body.freed),
     )
 
 
-Flags = NDArray[np.bool_]
 MILLIMETRES = 1e3  # per metre
 MARGIN = 0.04  # of the larger side, around everything
-FEW_LEFT_OUT, MANY = (
-    0.05,
-    20,
-)  # share of the blocks that may be left out of an animation's window; number of many blocks
+FEW_LEFT_OUT, MANY = 0.05, 20  # share of blocks that may be left out of an animation's window; number of many blocks
 GAP, WIDE_GAP = 0.2, 1.5  # over the reach of all others: how far off a block has to be, of many and of few
 LEAST_TOGETHER = 3  # blocks, of which one can be far from the others
 NEAR = 0.15  # of a side: what of the support is this near is shown as well; at least the largest block's diagonal
@@ -346,46 +262,51 @@ class Extent:
     @property
     def lowest(self) -> float:
         """Where a line along the ground through `base` is lowest in the picture (mm)."""
-        return self.base / float(np.cos(self.tilt)) + min(self.left * self._slope, self.right * self._slope)
+        slope = float(np.tan(self.tilt))
+        return self.base / float(np.cos(self.tilt)) + min(self.left * slope, self.right * slope)
 
     def span(self, y: float) -> tuple[float, float]:
         """Return from which to which x a line along the ground at height y can be seen (mm, scene)."""
         cosine, shift = float(np.cos(self.tilt)), float(np.sin(self.tilt)) * y
         return (self.left + shift) / cosine, (self.right + shift) / cosine
 
-    @property
-    def _slope(self) -> float:
-        return float(np.tan(self.tilt))
 
-
-def extent_of(
-    frames: FramesLike, chosen: Indices, support: Support | None = None, blocks: Flags | None = None
-) -> Extent:
+def extent_of(frames: Frames, chosen: Indices, support: Support | None = None, blocks: Flags | None = None) -> Extent:
     """Return the extent in which no block, and no other system, is cut in any chosen frame, with a small margin.
 
     The ground below every block is shown, and the corners of the ground and the walls that are near. `blocks` (b,)
     selects the blocks that count, by default all.
     """
     support = support or Support()
-    reached = _reached(frames, chosen, support)
+    tilt, reached = support.tilt, _reached(frames, chosen, support)
     if blocks is not None:
         reached = reached[:, blocks]
-    others = [rotate_points(outlines_of(one, chosen), support.tilt).reshape(-1, 2) for one in others_of(frames)]
+    others = [rotate_points(one.system.outlines(one, chosen), tilt).reshape(-1, 2) for one in frames.others]
     reached = np.concatenate([reached.reshape(-1, 2), *others])
     low, high = reached.min(axis=0), reached.max(axis=0)
-    shifts = _extreme_offsets(frames, chosen, support)
+    displacement = support.displacement(frames.time[chosen])
+    farthest = np.unique([0.0, displacement.min(), displacement.max()])  # of the support: at its start, to either side
+    shifts = np.multiply.outer(farthest, support.direction)
     diagonal = float(np.hypot(frames.size_x, frames.size_y).max(initial=0.0))
     reach = np.maximum(diagonal, NEAR * (high - low))
-    points = np.concatenate([[low, high], _near(support, shifts, low - reach, high + reach)])
-    low, high = points.min(axis=0), points.max(axis=0)
+    near_low, near_high, points = low - reach, high + reach, [np.array([low, high])]
+    for shift in shifts:
+        corners = rotate_points(support.corners() + shift, tilt)
+        points.append(corners[((near_low <= corners) & (corners <= near_high)).all(axis=1)])
+        for wall in support.walls:
+            line = rotate_points(np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) + shift, tilt)
+            points.append(parts_within(line, near_low, near_high).reshape(-1, 2))
+    low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
     margin = MARGIN * float((high - low).max())
     low, high = low - margin, high + margin
+    line = support.line(ENDLESS)
+    ground = np.concatenate([parts_within(rotate_points(line + shift, tilt), low, high) for shift in shifts])
+    base = MILLIMETRES * float(rotate_points(ground, -tilt)[..., 1].min())
     (left, bottom), (right, top) = MILLIMETRES * low, MILLIMETRES * high
-    extent = Extent(float(left), float(right), float(bottom), float(top), tilt=support.tilt)
-    return replace(extent, base=MILLIMETRES * _lowest_ground(support, shifts, low, high))
+    return Extent(float(left), float(right), float(bottom), float(top), base, tilt)
 
 
-def together(frames: FramesLike, chosen: Indices, support: Support | None = None) -> Flags:
+def together(frames: Frames, chosen: Indices, support: Support | None = None) -> Flags:
     """Return True for every block that stays with the others, (b,); those that fly far off would make a window vast.
 
     Far off is what leaves a gap to the reach of all others, to a side or upwards, of a fifth of their width or height;
@@ -409,7 +330,7 @@ def together(frames: FramesLike, chosen: Indices, support: Support | None = None
             if reach[far[0]] - reach[near].max() > share * float(reach[near].max() - other[near].min()):
                 stays[far] = False
                 break
-    return np.asarray(stays | np.array(support.fixed or (False,) * count, dtype=bool))
+    return np.asarray(stays | is_fixed(frames, support))
 
 
 def rotate_points(points: Floats, angle: float) -> Floats:
@@ -429,7 +350,7 @@ def parts_within(line: Floats, low: Floats, high: Floats) -> Floats:
     return np.asarray(ends[enter <= leave])
 
 
-def _reached(frames: FramesLike, chosen: Indices, support: Support) -> Floats:
+def _reached(frames: Frames, chosen: Indices, support: Support) -> Floats:
     """Return points (m, picture) around all that each block and the ground below it take up, (3 n, b, 2)."""
     x = frames.x[chosen]
     centres = np.stack([x, frames.y[chosen]], axis=-1)
@@ -444,29 +365,3 @@ def _reached(frames: FramesLike, chosen: Indices, support: Support) -> Floats:
     tall = sine * frames.size_x + cosine * frames.size_y
     half = 0.5 * np.stack([wide, tall], axis=-1)
     return np.concatenate([centres - half, centres + half, below])
-
-
-def _extreme_offsets(frames: FramesLike, chosen: Indices, support: Support) -> Floats:
-    """Return the support's places (m) at its start and farthest to either side, (k, 2)."""
-    displacement = support.displacement(frames.time[chosen])
-    farthest = np.unique([0.0, displacement.min(), displacement.max()])
-    return np.asarray(np.multiply.outer(farthest, support.direction))
-
-
-def _near(support: Support, shifts: Floats, low: Floats, high: Floats) -> Floats:
-    """Return the corners of the ground and the ends of the walls' parts (m, picture) that lie within a box."""
-    found = [np.zeros((0, 2))]
-    for shift in shifts:
-        corners = rotate_points(support.corners() + shift, support.tilt)
-        found.append(corners[((low <= corners) & (corners <= high)).all(axis=1)])
-        for wall in support.walls:
-            line = rotate_points(np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) + shift, support.tilt)
-            found.append(parts_within(line, low, high).reshape(-1, 2))
-    return np.concatenate(found)
-
-
-def _lowest_ground(support: Support, shifts: Floats, low: Floats, high: Floats) -> float:
-    """Return the least height (m, scene) of the ground within a box of the picture."""
-    line = support.line(ENDLESS)
-    parts = [parts_within(rotate_points(line + shift, support.tilt), low, high).reshape(-1, 2) for shift in shifts]
-    return float(rotate_points(np.concatenate(parts), -support.tilt)[:, 1].min())

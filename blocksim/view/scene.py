@@ -6,30 +6,28 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedSegment
 from blocksim.scenario.placement import TOLERANCE
+from blocksim.simulation.frames import Frames
 from blocksim.view import style
 from blocksim.view.paint import Paint
 from blocksim.view.run_data import (
     MILLIMETRES,
     Extent,
+    Flags,
     Floats,
-    FramesLike,
     Support,
-    corners_of,
-    others_of,
-    outlines_of,
+    is_fixed,
     parts_within,
     rotate_points,
     shortest_sides,
 )
-from blocksim.world.systems.blocks import are_removed, placed_points
-from blocksim.world.systems.system import Track
+from blocksim.world.systems.blocks import are_removed, local_corners, placed_points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.transforms import Transform
 
 
@@ -56,6 +54,12 @@ class Canvas:
         from matplotlib.transforms import Affine2D
 
         return Affine2D().rotate(self.extent.tilt) + self.axes.transData
+
+    @property
+    def along(self) -> dict[str, Any]:
+        """What makes text run along the ground."""
+        turn = float(np.degrees(self.extent.tilt))
+        return {"rotation": turn, "rotation_mode": "anchor", "transform": self.scene}
 
     @property
     def floor(self) -> float:
@@ -88,27 +92,31 @@ class Page:
         """Width of the panel."""
         return self.width - 2.0 * self.side
 
-    @property
-    def place(self) -> tuple[float, float, float, float]:
-        """Return left, bottom, width, height of the panel as parts of the page."""
-        across, up = self.width, self.height
-        return self.side / across, self.foot / up, self.panel_width / across, self.panel_height / up
+    def canvas(self, figure: "Figure", left: float | None = None, bottom: float | None = None) -> Canvas:
+        """Return the panel in a figure; `left` and `bottom` are its lower left corner where it is not the page's."""
+        place = self.side if left is None else left, self.foot if bottom is None else bottom
+        axes = style.add_axes(figure, *place, self.panel_width, self.panel_height)
+        return Canvas(axes, self.extent, self.points_per_mm)
 
 
-def page_for(extent: Extent, width: float, tallest: float, margins: tuple[float, float, float]) -> Page:
+def page_for(extent: Extent, width: float, tallest: float, margins: tuple[float, float, float], rows: int = 0) -> Page:
     """Return a page of this width for an extent, which is widened where the panel would be higher than `tallest`.
 
-    `margins` are those at the sides, above and below the panel. All in inches.
+    `margins` are those at the sides, above and below the panel; `rows` of measured ranges lie in it. All in inches.
     """
     side, head, foot = margins
     across = width - 2.0 * side
     missing = max(extent.height * across / tallest - extent.width, 0.0)
     extent = replace(extent, left=extent.left - 0.5 * missing, right=extent.right + 0.5 * missing)
     scale = across / extent.width  # inches per mm
-    below = max((extent.lowest - extent.bottom) * scale, room_below(extent, 0) / style.POINTS_PER_INCH)
-    panel_height = (extent.top - extent.lowest) * scale + below
-    height = head + panel_height + foot
-    return Page(width, height, panel_height, side, foot, scale * style.POINTS_PER_INCH, extent)
+    height = panel_height(extent, scale, rows)
+    return Page(width, head + height + foot, height, side, foot, scale * style.POINTS_PER_INCH, extent)
+
+
+def panel_height(extent: Extent, scale: float, rows: int) -> float:
+    """Return the height (inches) of a panel at a scale (inches per mm), with room for what stands below the ground."""
+    below = max((extent.lowest - extent.bottom) * scale, room_below(extent, rows) / style.POINTS_PER_INCH)
+    return (extent.top - extent.lowest) * scale + below
 
 
 def depth_of(rows: int) -> float:
@@ -122,21 +130,24 @@ def room_below(extent: Extent, rows: int) -> float:
     return (depth + RULER_HEIGHT) / float(np.cos(extent.tilt)) if extent.tilt else depth
 
 
-def finish_panel(canvas: Canvas, size: tuple[float, float], *, labelled: bool) -> None:
-    """Fix the scale of a panel of this size (inches) and leave only its x axis; tilted ground has its own ruler."""
+def finish_panel(canvas: Canvas, *, labelled: bool, is_numbered: bool = True, rows: int = 0) -> None:
+    """Fix the scale of a panel and leave only its x axis; on tilted ground a ruler below `rows` of measured ranges."""
     from matplotlib.ticker import MaxNLocator
 
     axes, extent = canvas.axes, canvas.extent
+    width, height = style.size_of(axes)
     axes.set_xlim(extent.left, extent.right)
-    axes.set_ylim(extent.top - size[1] * style.POINTS_PER_INCH / canvas.points_per_mm, extent.top)
+    axes.set_ylim(extent.top - height * style.POINTS_PER_INCH / canvas.points_per_mm, extent.top)
     axes.spines[["left", "right", "top"]].set_visible(False)
     axes.yaxis.set_visible(False)
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=max(2, int(size[0] / TICK_ROOM)), steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=max(2, int(width / TICK_ROOM)), steps=[1, 2, 5, 10]))
     axes.tick_params(axis="x", length=2.5, pad=1.5)
-    axes.xaxis.set_visible(not extent.tilt)
+    axes.xaxis.set_visible(is_numbered and not extent.tilt)
     axes.spines["bottom"].set_visible(not extent.tilt)
     if labelled:
         axes.set_xlabel("x (mm)", labelpad=1.0)
+    if is_numbered and extent.tilt:
+        draw_ruler(canvas, depth_of(rows))
 
 
 def draw_ruler(canvas: Canvas, depth: float) -> None:
@@ -145,30 +156,16 @@ def draw_ruler(canvas: Canvas, depth: float) -> None:
 
     y = canvas.extent.base - depth / canvas.points_per_mm
     low, high = canvas.extent.span(y)
-    edge = RULER_EDGE / canvas.points_per_mm
+    edge, tick = RULER_EDGE / canvas.points_per_mm, TICK_LENGTH / canvas.points_per_mm
     room = (high - low) * canvas.points_per_mm
     locator = MaxNLocator(nbins=max(2, int(room / TICK_SPACING)), steps=[1, 2, 5, 10])
-    tick = TICK_LENGTH / canvas.points_per_mm
-    canvas.axes.plot([low, high], [y, y], color=style.FAINT_INK, linewidth=style.LINE_WIDTH, transform=canvas.scene)
+    line: dict[str, Any] = {"color": style.FAINT_INK, "linewidth": style.LINE_WIDTH, "transform": canvas.scene}
+    canvas.axes.plot([low, high], [y, y], **line)
     ticks = [float(x) for x in locator.tick_values(low, high) if low + edge <= x <= high - edge]
     for x in ticks:
-        colour, width = style.FAINT_INK, style.LINE_WIDTH
-        canvas.axes.plot([x, x], [y - tick, y], color=colour, linewidth=width, transform=canvas.scene)
-        _write_number(canvas, x, y - 1.6 * tick, " mm" if x == ticks[-1] else "")
-
-
-def _write_number(canvas: Canvas, x: float, y: float, unit: str) -> None:
-    """Write a number, with its unit if any, below (x, y), along the ground."""
-    canvas.axes.text(
-        x,
-        y,
-        f"{x:g}{unit}".replace("-", "−"),
-        rotation=float(np.degrees(canvas.extent.tilt)),
-        rotation_mode="anchor",
-        ha="center",
-        va="top",
-        transform=canvas.scene,
-    )
+        canvas.axes.plot([x, x], [y - tick, y], **line)
+        text = f"{x:g}{' mm' if x == ticks[-1] else ''}".replace("-", "−")
+        canvas.axes.text(x, y - 1.6 * tick, text, ha="center", va="top", **canvas.along)
 
 
 WALL_THICKNESS = 4.0  # points; less than the ground, which covers the feet of walls
@@ -180,21 +177,23 @@ MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a
 
 
 def draw_support(canvas: Canvas, support: Support, offset: Floats) -> None:
-    """Draw ground and walls, displaced by `offset` (mm) along x and y."""
+    """Draw the part of ground and walls that can be seen, displaced by `offset` (mm) along x and y."""
     from matplotlib.collections import LineCollection
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+    from matplotlib.transforms import Bbox
 
     low, high = canvas.box()
-    deep = [ground_line(support, canvas)[[-1, 0]] * [1.0, 0.0] + [0.0, low[1] - canvas.extent.height]]
-    solid = np.concatenate([ground_line(support, canvas) + offset, *deep])
-    for outline in wall_outlines(support.walls, WALL_THICKNESS / canvas.points_per_mm):
-        _fill(canvas, outline + offset, zorder=WALLS)
-    _fill(canvas, solid, zorder=GROUND)
-    lines = [parts_within(line + offset, low, high) for line in _faces(support, canvas)]
-    canvas.axes.add_collection(
-        LineCollection(
-            list(np.concatenate(lines)), colors=style.INK, linewidths=style.LINE_WIDTH, transform=canvas.scene
-        )
-    )
+    ground, *faces = _faces(support, canvas)
+    deep = ground[[-1, 0]] * [1.0, 0.0] + [0.0, low[1] - canvas.extent.height]
+    walls = [(WALLS, one + offset) for one in wall_outlines(support.walls, WALL_THICKNESS / canvas.points_per_mm)]
+    for zorder, outline in (*walls, (GROUND, np.concatenate([ground + offset, deep]))):
+        seen = Path(np.concatenate([outline, outline[:1]]), closed=True).clip_to_bbox(Bbox([low, high]))
+        patch = PathPatch(seen, facecolor=style.GROUND_COLOUR, linewidth=0.0, zorder=zorder, transform=canvas.scene)
+        canvas.axes.add_artist(patch)
+    lines = np.concatenate([parts_within(line + offset, low, high) for line in (ground, *faces)])
+    look: dict[str, Any] = {"colors": style.INK, "linewidths": style.LINE_WIDTH}
+    canvas.axes.add_collection(LineCollection(list(lines), **look, transform=canvas.scene))
 
 
 def draw_start(canvas: Canvas, support: Support, offset: Floats, outlines: Floats) -> None:
@@ -212,8 +211,8 @@ def draw_start(canvas: Canvas, support: Support, offset: Floats, outlines: Float
     ways = parts[:, 1] - parts[:, 0]
     apart = np.abs(ways[:, 0] * offset[1] - ways[:, 1] * offset[0]) > least * np.hypot(*ways.T)
     closed = [np.concatenate([outline, outline[:1]]) - offset for outline in outlines]
-    lines = LineCollection([*parts[apart], *closed], **START_LINE, zorder=START, transform=canvas.scene)
-    canvas.axes.add_collection(lines)
+    lines = [*parts[apart], *closed]
+    canvas.axes.add_collection(LineCollection(lines, **START_LINE, zorder=START, transform=canvas.scene))
 
 
 def draw_shift(canvas: Canvas, support: Support, offset: Floats, x: float) -> None:
@@ -233,14 +232,14 @@ def draw_shift(canvas: Canvas, support: Support, offset: Floats, x: float) -> No
     )
 
 
-def ground_line(support: Support, canvas: Canvas) -> Floats:
-    """Return the ground at rest (mm), with level ends beyond all that can be seen, (k, 2)."""
+def _faces(support: Support, canvas: Canvas) -> list[Floats]:
+    """Return the lines (mm) of ground, with level ends beyond all that can be seen, and of walls at rest, (k, 2)."""
     low, high = canvas.box()
     line = MILLIMETRES * support.line(0.0)
     shown = np.abs(np.concatenate([low, high, line[0], line[-1]])).max() + canvas.extent.width
     line[0, 0] -= 2.0 * shown
     line[-1, 0] += 2.0 * shown
-    return line
+    return [line, *(MILLIMETRES * np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) for wall in support.walls)]
 
 
 def wall_outlines(walls: tuple[PlacedSegment, ...], thickness: float) -> list[Floats]:
@@ -248,51 +247,19 @@ def wall_outlines(walls: tuple[PlacedSegment, ...], thickness: float) -> list[Fl
     faces = MILLIMETRES * np.array([[[wall.x0, wall.y0], [wall.x1, wall.y1]] for wall in walls]).reshape(-1, 2, 2)
     ways = np.diff(faces, axis=1)[:, 0]
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    rights = np.stack([ways[:, 1], -ways[:, 0]], axis=-1)
     outlines = []
-    for wall, face, way in zip(walls, faces, ways, strict=True):
-        before = [other for other, (_, end) in zip(ways, faces, strict=True) if _is_one(end, face[0])]
-        after = [other for other, (start, _) in zip(ways, faces, strict=True) if _is_one(start, face[1])]
-        first = face[0] + thickness * _depth(way, before, -way * wall.extends_start)
-        last = face[1] + thickness * _depth(way, after, way * wall.extends_end)
-        outlines.append(np.stack([face[0], face[1], last, first]))
+    for number, (wall, face) in enumerate(zip(walls, faces, strict=True)):
+        backs = []  # the way from each end to the wall's back, for a thickness of 1
+        for end, beyond in ((0, -ways[number] * wall.extends_start), (1, ways[number] * wall.extends_end)):
+            others = rights[np.hypot(*(faces[:, 1 - end] - face[end]).T) <= MILLIMETRES * TOLERANCE]
+            is_mitred = len(others) and float(rights[number] @ others[0]) > MOST_ALIGNED
+            back = rights[number] + (others[0] if is_mitred else beyond)
+            backs.append(back / (1.0 + rights[number] @ others[0]) if is_mitred else back)
+        outlines.append(np.stack([*face, face[1] + thickness * backs[1], face[0] + thickness * backs[0]]))
     return outlines
 
 
-def _depth(way: Floats, others: list[Floats], beyond: Floats) -> Floats:
-    """Return the way to a wall's back at one end, for a thickness of 1: the mitre, or square and `beyond` the end."""
-    right = _right(way)
-    if others and float(right @ _right(others[0])) > MOST_ALIGNED:
-        other = _right(others[0])
-        return np.asarray((right + other) / (1.0 + right @ other))
-    return right + beyond
-
-
-def _is_one(point: Floats, other: Floats) -> bool:
-    return bool(np.hypot(*(point - other)) <= MILLIMETRES * TOLERANCE)
-
-
-def _right(way: Floats) -> Floats:
-    return np.array([way[1], -way[0]])
-
-
-def _faces(support: Support, canvas: Canvas) -> list[Floats]:
-    """Return the lines (mm) of ground and walls at rest, (k, 2) each."""
-    walls = [MILLIMETRES * np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) for wall in support.walls]
-    return [ground_line(support, canvas), *walls]
-
-
-def _fill(canvas: Canvas, outline: Floats, zorder: float) -> None:
-    """Fill the part of an outline (mm, scene) that can be seen."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-    from matplotlib.transforms import Bbox
-
-    seen = Path(np.concatenate([outline, outline[:1]]), closed=True).clip_to_bbox(Bbox(np.stack(canvas.box())))
-    patch = PathPatch(seen, facecolor=style.GROUND_COLOUR, linewidth=0.0, zorder=zorder, transform=canvas.scene)
-    canvas.axes.add_artist(patch)
-
-
-Flags = NDArray[np.bool_]
 EDGE_INSET = 0.86  # where the mark of the upper side runs, as a part of half the height
 TOP = "Thick line inside a block: top face at the start."
 NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
@@ -315,13 +282,13 @@ class MeasuredRange:
     row: int
 
 
-def corners(frames: FramesLike, frame: int) -> Floats:
+def corners(frames: Frames, frame: int) -> Floats:
     """Return the corners (mm) of every block in one frame, (b, k, 2), counter-clockwise, the last one repeated."""
-    (found,) = corners_of(frames, np.array([frame]))
-    return np.asarray(MILLIMETRES * found)
+    local = local_corners(frames.size_x, frames.size_y, frames.outlines)
+    return np.asarray(MILLIMETRES * placed_points(local, frames.x[frame], frames.y[frame], frames.angle[frame]))
 
 
-def readable_scale(frames: FramesLike) -> float:
+def readable_scale(frames: Frames) -> float:
     """Return the least scale (points a mm) at which the name of every block fits into it."""
     wide, tall = (letter * style.SMALLEST_FONT / room for letter, room in zip(style.LETTER, NAME_ROOM, strict=True))
     sizes = MILLIMETRES * shortest_sides(frames)
@@ -336,16 +303,11 @@ class Scene:
     `with_tops` marks the top face that each free block had at the start, `with_others` draws the systems beside them.
     """
 
-    frames: FramesLike
+    frames: Frames
     support: Support
     paint: Paint
     with_tops: bool = True
     with_others: bool = True
-
-    @property
-    def fixed(self) -> Flags:
-        """Whether each block is fixed or driven, (b,)."""
-        return np.array(self.support.fixed or (False,) * len(self.frames.names), dtype=bool)
 
 
 def draw_scene(canvas: Canvas, scene: Scene, frame: int) -> None:
@@ -356,100 +318,76 @@ def draw_scene(canvas: Canvas, scene: Scene, frame: int) -> None:
 
 def draw_standing(canvas: Canvas, scene: Scene, frame: int) -> None:
     """Draw ground and walls at the time of one frame, and where they were at the start."""
-    frames = scene.frames
+    frames, fixed = scene.frames, is_fixed(scene.frames, scene.support)
     offset = MILLIMETRES * scene.support.offset(frames.time[frame : frame + 1])[0]
     support = scene.support.at(float(frames.time[frame]))
     draw_support(canvas, support, offset)
-    carried = scene.fixed & ~np.array(support.driven or (False,) * len(frames.names), dtype=bool)
-    draw_start(canvas, support, offset, corners(frames, frame)[carried & are_there(frames, frame)])
+    carried = fixed & ~np.array(support.driven or (False,) * len(frames.names), dtype=bool)
+    draw_start(canvas, support, offset, corners(frames, frame)[carried & ~are_removed(frames.vx[frame])])
     draw_shift(canvas, support, offset, MILLIMETRES * (float(frames.x[0].mean()) if frames.names else 0.0))
 
 
 def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
     """Draw the blocks of one frame with their names, free ones each in its colour, fixed ones hatched in the ground's.
 
-    Other systems lie below the blocks, each in one colour, or each element in that of the paint.
+    Other systems lie below the blocks, each in one colour, or each element and its edge in that of the paint.
     """
     from matplotlib.collections import LineCollection, PolyCollection
 
-    frames, paint, fixed, there = scene.frames, scene.paint, scene.fixed, are_there(scene.frames, frame)
-    for number, track in enumerate(others_of(frames) if scene.with_others else ()):
-        of_elements = paint.elements[number] if number < len(paint.elements) else None
-        _draw_system(
-            canvas, track, frame, style.block_colour(number + 1) if of_elements is None else of_elements(frame)
-        )
-    fills = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, paint.fills(frame), strict=True)]
+    frames, paint = scene.frames, scene.paint
+    for number, track in enumerate(frames.others if scene.with_others else ()):
+        fills = paint.elements[number] if number < len(paint.elements) else None
+        (shapes,) = MILLIMETRES * track.system.outlines(track, np.array([frame]))
+        size = canvas.points_per_mm * float(np.ptp(shapes[:, :, 0], axis=1).min(initial=1.0))
+        thin = min(style.LINE_WIDTH, 0.05 * size)
+        if fills is not None and size < SMALL:  # gaps between small discs make a pattern that is none of the soil
+            thin = CLOSED * size
+        colours: dict[str, Any] = {"facecolors": style.block_colour(number + 1), "edgecolors": style.INK}
+        colours = colours if fills is None else {"facecolors": fills(frame), "edgecolors": "face"}
+        canvas.axes.add_collection(PolyCollection(list(shapes), **colours, linewidths=thin, transform=canvas.scene))
+    there, fixed = ~are_removed(frames.vx[frame]), is_fixed(frames, scene.support)
+    held, free = fixed & there, ~fixed & there
+    own = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, paint.fills(frame), strict=True)]
     outlines = corners(frames, frame)
     smallest = MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min(initial=np.inf))
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     edge: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
     hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
-    colours = [fill for fill, is_free in zip(fills, ~fixed & there, strict=True) if is_free]
-    held = PolyCollection(list(outlines[fixed & there]), facecolors=style.GROUND_COLOUR, hatch=hatch, **edge)
-    canvas.axes.add_collection(held)
-    canvas.axes.add_collection(PolyCollection(list(outlines[~fixed & there]), facecolors=colours, **edge))
+    for kind, lines in ((held, hatch), (free, None)):
+        shown = [own[block] for block in np.flatnonzero(kind)]
+        canvas.axes.add_collection(PolyCollection(list(outlines[kind]), facecolors=shown, hatch=lines, **edge))
     if scene.with_tops:
-        lines = placed_points(upper_sides(frames), frames.x[frame], frames.y[frame], frames.angle[frame])
-        shown = list(MILLIMETRES * lines[~fixed & there])
-        tops = LineCollection(shown, colors=style.INK, linewidths=2.0 * thin, transform=canvas.scene)
-        canvas.axes.add_collection(tops)
-    for kind in (fixed & there, ~fixed & there):
-        _draw_names(canvas, frames, frame, kind, fills)
+        tops = placed_points(upper_sides(frames), frames.x[frame], frames.y[frame], frames.angle[frame])
+        line: dict[str, Any] = {"colors": style.INK, "linewidths": 2.0 * thin, "transform": canvas.scene}
+        canvas.axes.add_collection(LineCollection(list(MILLIMETRES * tops[free]), **line))
+    for kind in (held, free):
+        _draw_names(canvas, frames, frame, kind, own)
 
 
-def _draw_system(canvas: Canvas, track: Track, frame: int, colours: str | Sequence[str]) -> None:
-    """Draw the elements of a system in one frame; where each has a colour of its own, edges have it too."""
-    from matplotlib.collections import PolyCollection
-
-    (outlines,) = MILLIMETRES * outlines_of(track, np.array([frame]))
-    size = canvas.points_per_mm * float(np.ptp(outlines[:, :, 0], axis=1).min(initial=1.0))
-    thin = min(style.LINE_WIDTH, 0.05 * size)
-    edges = style.INK if isinstance(colours, str) else "face"
-    if edges == "face" and size < SMALL:  # gaps between small discs make a pattern that is none of the soil
-        thin = CLOSED * size
-    drawn = PolyCollection(list(outlines), facecolors=colours, edgecolors=edges, linewidths=thin)
-    drawn.set_transform(canvas.scene)
-    canvas.axes.add_collection(drawn)
-
-
-def are_there(frames: FramesLike, frame: int) -> Flags:
-    """Return for every block whether it has not been removed by a frame, (b,): what is not there has no velocity."""
-    vx = getattr(frames, "vx", None)
-    return np.ones(len(frames.names), dtype=bool) if vx is None else np.asarray(~are_removed(vx[frame]))
-
-
-def draw_centres(canvas: Canvas, frames: FramesLike, frame: int) -> None:
+def draw_centres(canvas: Canvas, frames: Frames, frame: int) -> None:
     """Mark the centre of every block by a line through the ground below it."""
-    for x in MILLIMETRES * frames.x[frame, are_there(frames, frame)]:
-        ends = [canvas.floor, canvas.extent.base]
+    ends = [canvas.floor, canvas.extent.base]
+    for x in MILLIMETRES * frames.x[frame, ~are_removed(frames.vx[frame])]:
         canvas.axes.plot([x, x], ends, color=style.INK, linewidth=1.2, transform=canvas.scene)
 
 
 def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: float) -> None:
     """Draw measured mean and range of each block in rows of `row_height` (points) below the ground."""
-    line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "transform": canvas.scene}
+    line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "linewidth": 1.2, "transform": canvas.scene}
+    point = 1.0 / canvas.points_per_mm
     for item in measured:
-        y = canvas.floor - (item.row + 0.6) * row_height / canvas.points_per_mm
-        cap = 2.2 / canvas.points_per_mm
-        canvas.axes.plot([item.minimum, item.maximum], [y, y], linewidth=1.2, **line)
+        y = canvas.floor - (item.row + 0.6) * row_height * point
+        canvas.axes.plot([item.minimum, item.maximum], [y, y], **line)
         for end in (item.minimum, item.maximum):
-            canvas.axes.plot([end, end], [y - cap, y + cap], linewidth=1.2, **line)
+            canvas.axes.plot([end, end], [y - 2.2 * point, y + 2.2 * point], **line)
         canvas.axes.plot(item.mean, y, marker="o", markersize=3.2, **line)
         font = style.fitting_font(item.block, (30.0, row_height), 6.0)
         if font:
-            canvas.axes.text(
-                item.maximum + 3.0 / canvas.points_per_mm,
-                y,
-                style.shortened(item.block, LETTERS),
-                fontsize=font,
-                rotation=float(np.degrees(canvas.extent.tilt)),
-                rotation_mode="anchor",
-                va="center",
-                **line,
-            )
+            look = canvas.along | {"fontsize": font, "color": style.MEASURED_COLOUR, "va": "center"}
+            canvas.axes.text(item.maximum + 3.0 * point, y, style.shortened(item.block, LETTERS), **look)
 
 
-def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, chosen: Flags, fills: Sequence[str]) -> None:
+def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: Flags, fills: Sequence[str]) -> None:
     """Write the names of some blocks at their middles, of polygons their centroids, where there is room for all.
 
     Names on some blocks only would look like a difference between the blocks.
@@ -466,25 +404,16 @@ def _draw_names(canvas: Canvas, frames: FramesLike, frame: int, chosen: Flags, f
     places = MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
     if frames.outlines is None:
         places = corners(frames, frame).mean(axis=1)
+    at: dict[str, Any] = {"ha": "center", "va": "center_baseline", "clip_on": True, "transform": canvas.scene}
     for index, font in fonts.items():
-        canvas.axes.text(
-            float(places[index, 0]),
-            float(places[index, 1]),
-            style.shortened(frames.names[index], LETTERS),
-            fontsize=font,
-            color=style.text_colour(fills[index]),
-            ha="center",
-            va="center_baseline",
-            clip_on=True,
-            transform=canvas.scene,
-            path_effects=[withStroke(linewidth=HALO, foreground=fills[index])],
-            bbox={"facecolor": fills[index], "linewidth": 0.0, "pad": 0.8}
-            if fills[index] == style.GROUND_COLOUR
-            else None,
-        )
+        fill, name = fills[index], style.shortened(frames.names[index], LETTERS)
+        box = {"facecolor": fill, "linewidth": 0.0, "pad": 0.8} if fill == style.GROUND_COLOUR else None
+        halo = [withStroke(linewidth=HALO, foreground=fill)]
+        look: dict[str, Any] = {"fontsize": font, "color": style.text_colour(fill), "path_effects": halo, "bbox": box}
+        canvas.axes.text(float(places[index, 0]), float(places[index, 1]), name, **look, **at)
 
 
-def upper_sides(frames: FramesLike) -> Floats:
+def upper_sides(frames: Frames) -> Floats:
     """Return a line inside each block along its upper side, which shows turns, in its own axes (m, (b, 2, 2))."""
     if frames.outlines is not None:
         return _upper_sides_of_polygons(frames.outlines, 0.5 * (1.0 - EDGE_INSET) * shortest_sides(frames))

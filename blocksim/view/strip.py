@@ -3,64 +3,28 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from textwrap import wrap
 
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.view import style
-from blocksim.view.arrows import (
-    ForceScale,
-    WithContacts,
-    draw_forces,
-    draw_marks,
-    draw_outside,
-    force_scale,
-    length_in,
-    outside,
-    with_room,
-)
+from blocksim.simulation.frames import Frames
+from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.final import MeasuredTable, measured_ranges, rows_of, widened
 from blocksim.view.paint import Paint, by_block, draw_key
-from blocksim.view.run_data import (
-    MILLIMETRES,
-    Extent,
-    FramesLike,
-    Support,
-    drawable_frames,
-    extent_of,
-    moments_at,
-    moments_by_motion,
-    others_of,
-)
-from blocksim.view.scene import (
-    ROW_HEIGHT,
-    TOP,
-    Canvas,
-    MeasuredRange,
-    Scene,
-    depth_of,
-    draw_centres,
-    draw_measured,
-    draw_ruler,
-    draw_scene,
-    finish_panel,
-    page_for,
-    readable_scale,
-    room_below,
-)
-from blocksim.view.style import OWN, Paper, write_heading, write_text
+from blocksim.view.run_data import MILLIMETRES, Extent, Support
+from blocksim.view.style import OWN, Paper
 
 WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
-_HEAD, TITLE, FOOT = 0.22, 0.30, 0.52  # inches: time above a panel, title of the strip, axis and legend below
-LINE = 0.155  # inches, of each further line of text above a panel or below the strip
+HEAD, TITLE, FOOT = 0.22, 0.30, 0.28  # inches: time above a panel, title of the strip, axis below
+LINE = 0.155  # inches, of each further line of text above a panel
 LEAST_WIDTH, NARROWEST_PANEL, LOWEST_PANEL = 1.75, 1.25, 0.25  # inches, on a page whose size was asked for
-POINTS = style.POINTS_PER_INCH
-TICKS = 0.26  # inches, for the numbers under a row of panels
+TICKS = 0.26  # inches, for the numbers under a row of panels; tilted panels have theirs inside
 TALLEST_PANEL = 4.0  # inches
 WIDEST_IN_FOURS, WIDEST_IN_PAIRS = 2.5, 6.0  # width over height, so that a panel stays about an inch tall
 LOW_ENOUGH = 1.6  # width over height from which four rows of pairs fit on a page
+CAPTION = 3.0  # points, from a panel to the text above it
+LEAST_MOVED = 0.005  # mm; less is zero in two decimals
 
 
 @dataclass(frozen=True)
@@ -79,27 +43,17 @@ class Layout:
 
     columns: int
     rows: int
-    panel_width: float
-    panel_height: float
+    panel: tuple[float, float]
     points_per_mm: float
-    height: float
+    size: tuple[float, float]  # of the page
     extent: Extent
-    head: float = _HEAD
-    foot: float = FOOT
-    width: float = WIDTH
-
-    @property
-    def ticks(self) -> float:
-        """Height of the numbers under a row of panels; tilted panels have theirs inside."""
-        return 0.0 if self.extent.tilt else TICKS
+    step: float  # from a row of panels to the next
+    foot: float
 
     def place(self, index: int) -> tuple[float, float, float, float]:
-        """Return left, bottom, width, height of a panel as parts of the figure."""
+        """Return left, bottom, width, height of a panel."""
         row, column = divmod(index, self.columns)
-        used = self.columns * self.panel_width + (self.columns - 1) * GAP
-        left = 0.5 * (self.width - used) + column * (self.panel_width + GAP)
-        bottom = self.foot + (self.rows - 1 - row) * (self.panel_height + self.head + self.ticks)
-        return left / self.width, bottom / self.height, self.panel_width / self.width, self.panel_height / self.height
+        return SIDE + column * (self.panel[0] + GAP), self.foot + (self.rows - 1 - row) * self.step, *self.panel
 
 
 def arrangement(extent: Extent, readable: float = 0.0) -> tuple[int, int]:
@@ -109,7 +63,7 @@ def arrangement(extent: Extent, readable: float = 0.0) -> tuple[int, int]:
     """
     aspect = extent.width / extent.height
     if aspect <= WIDEST_IN_FOURS:
-        fours, pairs = (style.POINTS_PER_INCH * _panel_width(columns) / extent.width for columns in (4, 2))
+        fours, pairs = (style.POINTS_PER_INCH * _panel_width(columns, WIDTH) / extent.width for columns in (4, 2))
         return (2, 8) if aspect >= LOW_ENOUGH and fours < readable <= pairs else (4, 8)
     return (2, 8) if aspect <= WIDEST_IN_PAIRS else (1, 6)
 
@@ -120,69 +74,42 @@ def plan(paper: Paper, extent: Extent, columns: int, panels: int, lines: Lines) 
     Raises InvalidInputError for a page that is too small.
     """
     width = paper.width(WIDTH, LEAST_WIDTH)
-    if paper.size is None:
-        columns = min(columns, panels)
-        scale = min(_panel_width(columns, width) / extent.width, TALLEST_PANEL / extent.height)  # inches per mm
-        return _laid_out(extent, columns, panels, lines, (width, scale))
-    most = max(1, min(panels, int((width - 2.0 * SIDE + GAP) / (NARROWEST_PANEL + GAP))))
-    scale, columns = max((_scale_on(paper, extent, columns, panels, lines), columns) for columns in range(1, most + 1))
-    rows = -(-panels // columns)
-    paper.panel(0.0, rows, _others(extent, columns, panels, lines), LOWEST_PANEL)  # refuses a page that is too small
-    narrow = 0.5 * max(NARROWEST_PANEL / scale - extent.width, 0.0)  # so that captions do not run into each other
-    extent = replace(extent, left=extent.left - narrow, right=extent.right + narrow)
-    layout = _laid_out(extent, columns, panels, lines, (width, scale))
-    spare = paper.size[1] - layout.height
-    return replace(layout, height=paper.size[1], head=layout.head + spare / layout.rows)
-
-
-def _scale_on(paper: Paper, extent: Extent, columns: int, panels: int, lines: Lines) -> float:
-    """Return the largest scale (inches per mm) at which so many columns fit into a page of a given size; 0 if none."""
-    rows = -(-panels // columns)
-    below = room_below(extent, lines.measured_rows) / style.POINTS_PER_INCH
-    height = (paper.height(0.0) - _others(extent, columns, panels, lines)) / rows
-    if height < LOWEST_PANEL:
-        return 0.0
-    tallest = min(height / (extent.top - extent.lowest), (height + below) / (extent.top - extent.bottom))
-    return min(_panel_width(columns, paper.width(WIDTH)) / extent.width, tallest)
-
-
-def _others(extent: Extent, columns: int, panels: int, lines: Lines) -> float:
-    """Return the height (inches) of everything but the part of panels above the lowest ground."""
-    rows = -(-panels // columns)
-    ticks, head, foot = _heights(extent, lines)
-    below = room_below(extent, lines.measured_rows) / style.POINTS_PER_INCH
-    return TITLE + rows * (head + below) + (rows - 1) * ticks + foot
-
-
-def _laid_out(extent: Extent, columns: int, panels: int, lines: Lines, page: tuple[float, float]) -> Layout:
-    """Return the layout for a width (inches) and a scale (inches per mm)."""
-    width, scale = page
-    rows = -(-panels // columns)
-    below = max((extent.lowest - extent.bottom) * scale, room_below(extent, lines.measured_rows) / POINTS)
-    panel_height = (extent.top - extent.lowest) * scale + below
-    ticks, head, foot = _heights(extent, lines)
-    height = TITLE + rows * (panel_height + head) + (rows - 1) * ticks + foot
-    return Layout(columns, rows, extent.width * scale, panel_height, scale * POINTS, height, extent, head, foot, width)
-
-
-def _heights(extent: Extent, lines: Lines) -> tuple[float, float, float]:
-    """Return the heights (inches) of the numbers below a panel, the text above it, and all below the strip."""
     ticks = 0.0 if extent.tilt else TICKS
-    return ticks, _HEAD + (lines.captions - 1) * LINE, FOOT - TICKS + ticks + (lines.notes - 1) * LINE + lines.key
+    head = HEAD + (lines.captions - 1) * LINE
+    foot = FOOT + ticks + lines.notes * style.LINE + lines.key
+    below = scene.room_below(extent, lines.measured_rows) / style.POINTS_PER_INCH
+
+    def others(rows: int) -> float:
+        return TITLE + rows * head + (rows - 1) * ticks + foot
+
+    def scale_in(columns: int) -> float:
+        """Return the largest scale (inches per mm) of so many columns; not above 0 where none fits."""
+        rows = -(-panels // columns)
+        tallest = TALLEST_PANEL if paper.size is None else (paper.size[1] - others(rows)) / rows
+        high = min((tallest - below) / (extent.top - extent.lowest), tallest / extent.height)
+        return min(_panel_width(columns, width) / extent.width, high)
+
+    most = max(1, min(panels, int((width - 2.0 * SIDE + GAP) / (NARROWEST_PANEL + GAP))))
+    possible = [min(columns, panels)] if paper.size is None else range(1, most + 1)
+    scale, columns = max((scale_in(count), count) for count in possible)
+    rows, across = -(-panels // columns), _panel_width(columns, width)
+    paper.panel(0.0, rows, others(rows) + rows * below, LOWEST_PANEL)  # refuses a page that is too small
+    wide = 0.5 * max(across / scale - extent.width, 0.0)
+    extent = replace(extent, left=extent.left - wide, right=extent.right + wide)
+    height = scene.panel_height(extent, scale, lines.measured_rows)
+    total = others(rows) + rows * height
+    step = height + head + ticks + (paper.height(total) - total) / rows
+    size = width, paper.height(total)
+    return Layout(columns, rows, (across, height), scale * style.POINTS_PER_INCH, size, extent, step, foot)
 
 
-def _panel_width(columns: int, width: float = WIDTH) -> float:
-    """Return the width that a panel may have (inches)."""
+def _panel_width(columns: int, width: float) -> float:
+    """Return the width of a panel (inches)."""
     return (width - 2.0 * SIDE - (columns - 1) * GAP) / columns
 
 
-LETTERS_AN_INCH = 15.0  # in a line below the strip
-CAPTION = 3.0  # points, from a panel to the text above it
-LEAST_MOVED = 0.005  # mm; less is zero in two decimals
-
-
 def draw_strip(
-    frames: WithContacts,
+    frames: Frames,
     path: Path | str,
     times: Sequence[float] | None = None,
     title: str | None = None,
@@ -202,56 +129,50 @@ def draw_strip(
     bytes. Raises InvalidInputError for an unknown picture format, a time that was not recorded, forces that were not, a
     page that is too small or nothing to draw, and OutputError when the file cannot be written.
     """
-    path = Path(path)
-    style.picture_suffix(path)
+    path = style.picture_path(path)
     support, paint = support or Support(), paint or by_block(frames)
-    drawable = drawable_frames(frames)
-    scale = force_scale(frames) if forces else None
-    extent = extent_of(frames, drawable, support)
-    length = length_in(extent)
-    extent = with_room(extent, outside(frames, drawable, support), length)
+    drawable = run_data.drawable_frames(frames)
+    scale = arrows.force_scale(frames) if forces else None
+    extent = run_data.extent_of(frames, drawable, support)
+    length = arrows.length_in(extent)
+    extent = arrows.with_room(extent, arrows.outside(frames, drawable, support), length)
     ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
     extent = widened(extent, ranges)
-    columns, usual = arrangement(extent, readable_scale(frames))
+    columns, usual = arrangement(extent, scene.readable_scale(frames))
     if times is None:
         carried = support.offset(frames.time[drawable])
-        chosen = moments_by_motion(frames, drawable, count or usual, carried)
+        chosen = run_data.moments_by_motion(frames, drawable, count or usual, carried)
     else:
-        chosen = moments_at(frames, drawable, times)
+        chosen = run_data.moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
-    acts = outside(frames, chosen, support)
-    upper = [TOP] if frames.names else []
-    told = [*upper, _legend(ranges, support, scale), acts.explanation]
-    notes = wrap(" ".join(filter(None, told)), int(LETTERS_AN_INCH * paper.width(WIDTH, LEAST_WIDTH)))
+    rows = rows_of(ranges)
+    acts = arrows.outside(frames, chosen, support)
+    texts = [*([scene.TOP] if frames.names else []), _notes(support, is_measured=bool(ranges))]
+    texts += ["" if scale is None else scale.explanation, acts.explanation]
+    notes = style.broken(" ".join(filter(None, texts)), paper.width(WIDTH, LEAST_WIDTH) - 2.0 * SIDE)
     captions = 1 + (support.motion is not None) + any(acts.marks)
-    lines = Lines(captions, len(notes), rows_of(ranges), paint.height)
-    layout = plan(paper, extent, columns, len(chosen), lines)
-    scene = Scene(frames, support, paint)
-    with style.styled_figure(layout.width, layout.height, paper.dots) as figure:
+    layout = plan(paper, extent, columns, len(chosen), Lines(captions, len(notes), rows, paint.height))
+    with style.styled_figure(*layout.size, paper.dots) as figure:
         for index, frame in enumerate(chosen.tolist()):
-            is_last = index == len(chosen) - 1
-            canvas = Canvas(figure.add_axes(layout.place(index)), layout.extent, layout.points_per_mm)
-            draw_scene(canvas, scene, frame)
-            if is_last and ranges:
-                draw_centres(canvas, frames, frame)
-                draw_measured(canvas, ranges, ROW_HEIGHT)
-            is_lowest = index + layout.columns >= len(chosen)
-            finish_panel(canvas, (layout.panel_width, layout.panel_height), labelled=is_lowest)
-            if layout.extent.tilt:
-                draw_ruler(canvas, depth_of(rows_of(ranges)))
-            draw_outside(canvas, acts, index, length)
-            draw_marks(canvas, acts.marks[index], up=2.0)
-            pad = CAPTION + (LINE * POINTS if acts.marks[index] else 0.0)  # marks stand below the time
+            canvas = scene.Canvas(style.add_axes(figure, *layout.place(index)), layout.extent, layout.points_per_mm)
+            scene.draw_scene(canvas, scene.Scene(frames, support, paint), frame)
+            if index == len(chosen) - 1 and ranges:
+                scene.draw_centres(canvas, frames, frame)
+                scene.draw_measured(canvas, ranges, scene.ROW_HEIGHT)
+            scene.finish_panel(canvas, labelled=index + layout.columns >= len(chosen), rows=rows)
+            arrows.draw_outside(canvas, acts, index, length)
+            arrows.draw_marks(canvas, acts.marks[index], up=2.0)
+            pad = CAPTION + (LINE * style.POINTS_PER_INCH if acts.marks[index] else 0.0)  # marks stand below the time
             canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=pad)
             if scale is not None:
-                draw_forces(canvas, frames, frame, scale)
-        write_heading(figure, title, SIDE)
-        write_text(figure, SIDE, 0.05, "\n".join(notes), color=style.FAINT_INK, va="bottom")
-        draw_key(figure, paint, SIDE, 0.05 + len(notes) * LINE)
+                arrows.draw_forces(canvas, frames, frame, scale)
+        style.write_heading(figure, title, SIDE)
+        style.write_text(figure, SIDE, 0.05, "\n".join(notes), color=style.FAINT_INK, va="bottom")
+        draw_key(figure, paint, SIDE, 0.05 + len(notes) * style.LINE)
         style.save_figure(figure, path)
 
 
-def _caption(frames: FramesLike, frame: int, support: Support) -> str:
+def _caption(frames: Frames, frame: int, support: Support) -> str:
     """Return the time of a frame and the displacement of the support; the two ends of a run are named."""
     time = f"{float(frames.time[frame]):.3f} s"
     if frame == 0:
@@ -265,24 +186,20 @@ def _caption(frames: FramesLike, frame: int, support: Support) -> str:
     return f"{time}\nsupport {shown} mm"
 
 
-def _legend(ranges: Sequence[MeasuredRange], support: Support, scale: ForceScale | None) -> str:
-    texts = []
-    if any(support.fixed):
-        texts.append("Grey: fixed.")
+def _notes(support: Support, *, is_measured: bool) -> str:
+    texts = ["Grey: fixed."] if any(support.fixed) else []
     if support.motion is not None:
         texts.append(f"The support moves {support.way}; dashes and arrow: from where it was at the start.")
     if support.tilt:
         angle = f"{float(np.degrees(support.tilt)):.3g}°".replace("-", "−")
         texts.append(f"The ground is tilted by {angle}, gravity points down; x along the ground in mm.")
-    if ranges:
+    if is_measured:
         texts.append("Last panel: simulated centres marked on the ground, measured mean and range below it.")
-    if scale is not None:
-        texts.append(scale.explanation)
     return " ".join(texts)
 
 
-_WIDTH, _LEAST_WIDTH, TALLEST = 7.2, 2.0, 6.0  # inches
-_SIDE, _HEAD_PROFILE, AXIS = 0.25, 0.40, 0.42  # inches
+PROFILE_WIDTH, PROFILE_LEAST, PROFILE_TALLEST = 7.2, 2.0, 6.0  # inches
+PROFILE_MARGINS = 0.25, 0.40, 0.42  # inches: at the sides, above and below the panel
 LINES = 6  # by default
 COLOURS = "viridis"
 PALE = "#e8e8e8"
@@ -290,7 +207,7 @@ THICK = 1.4  # points
 
 
 def draw_profile(
-    frames: WithContacts,
+    frames: Frames,
     path: Path | str,
     title: str | None = None,
     measured: MeasuredTable | None = None,  # noqa: ARG001 - of blocks
@@ -309,40 +226,29 @@ def draw_profile(
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    path = Path(path)
-    style.picture_suffix(path)
-    support = support or Support()
-    drawable = drawable_frames(frames)
-    chosen = moments_by_motion(frames, drawable, LINES) if times is None else moments_at(frames, drawable, times)
-    chosen = np.unique(chosen)
-    soils = [track for track in others_of(frames) if track.system.profile is not None]
-    lines = [
-        [line for one in soils if one.system.profile for line in one.system.profile(one, frame)]
-        for frame in chosen.tolist()
-    ]
+    path = style.picture_path(path)
+    support, drawable = support or Support(), run_data.drawable_frames(frames)
+    if times is None:
+        chosen = np.unique(run_data.moments_by_motion(frames, drawable, LINES))
+    else:
+        chosen = np.unique(run_data.moments_at(frames, drawable, times))
+    surfaces = [(track, track.system.profile) for track in frames.others if track.system.profile is not None]
+    lines = [[line for track, profile in surfaces for line in profile(track, frame)] for frame in chosen.tolist()]
     if not any(lines):
-        message = "no soil in this run: --kind profile draws its surface"
-        raise InvalidInputError(message)
+        raise InvalidInputError("no soil in this run: --kind profile draws its surface")
     shades = [to_hex(colour) for colour in colormaps[COLOURS](np.linspace(0.0, 0.85, len(chosen)))]  # dark to light
     named = tuple((f"{float(frames.time[frame]):.3f} s", shade) for frame, shade in zip(chosen, shades, strict=True))
     key = Paint(lambda _: [PALE] * len(frames.names), named)
-    page = page_for(
-        extent_of(frames, drawable, support),
-        paper.width(_WIDTH, _LEAST_WIDTH),
-        TALLEST,
-        (_SIDE, _HEAD_PROFILE, AXIS + key.height),
-    )
+    side, head, foot = PROFILE_MARGINS
+    extent, width = run_data.extent_of(frames, drawable, support), paper.width(PROFILE_WIDTH, PROFILE_LEAST)
+    page = scene.page_for(extent, width, PROFILE_TALLEST, (side, head, foot + key.height))
     with style.styled_figure(page.width, paper.height(page.height), paper.dots) as figure:
-        canvas = Canvas(figure.add_axes(page.place), page.extent, page.points_per_mm)
-        draw_scene(canvas, Scene(frames, support, key, with_others=False), int(chosen[-1]))
+        canvas = page.canvas(figure)
+        scene.draw_scene(canvas, scene.Scene(frames, support, key, with_others=False), int(chosen[-1]))
         for shade, of_frame in zip(shades, lines, strict=True):
             for line in of_frame:
                 canvas.axes.plot(*(MILLIMETRES * line).T, color=shade, linewidth=THICK, transform=canvas.scene)
-        finish_panel(canvas, (page.panel_width, page.panel_height), labelled=True)
-        if page.extent.tilt:
-            draw_ruler(canvas, depth_of(0))
-        draw_key(figure, key, _SIDE, 0.06)
-        if title:
-            shown = style.cut_to(f"{title}: surface", page.panel_width * style.POINTS_PER_INCH, style.TITLE_SIZE)
-            figure.text(_SIDE / page.width, 1.0 - 0.08 / page.height, shown, va="top", fontsize=style.TITLE_SIZE)
+        scene.finish_panel(canvas, labelled=True)
+        draw_key(figure, key, side, 0.06)
+        style.write_heading(figure, title and f"{title}: surface", side)
         style.save_figure(figure, path)

@@ -11,18 +11,7 @@ import numpy as np
 
 from blocksim.view import style
 from blocksim.view.run_data import Floats
-from blocksim.view.style import (
-    EDGE,
-    LINE,
-    OWN,
-    Paper,
-    add_axes,
-    number_axis,
-    plain_numbers,
-    wrapped,
-    write_heading,
-    write_text,
-)
+from blocksim.view.style import OWN, Paper
 from blocksim.view.sweeps.data import short_names
 from blocksim.view.time_panels import limits_of
 
@@ -30,39 +19,27 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_WIDTH, PANEL_HEIGHT = 5.2, 3.0  # inches
-_RIGHT, _HEAD, _FOOT = 0.15, 0.38, 0.48  # inches
-_NARROWEST, _LOWEST = 1.8, 1.0  # inches, of the panel on a page whose size was asked for
+PANEL, LEAST = (4.4, 3.0), (1.8, 1.0)  # inches, of the panel, and on a page whose size was asked for
+SIDES = 0.65, 0.15, 0.11, 0.42  # inches
 
 
 @contextmanager
-def open_study_figure(
-    path: Path | str, title: str | None, notes: Sequence[str], paper: Paper, left: float
-) -> "Iterator[Axes]":
-    """Give the panel, `left` inches from the edge; then write the picture as PNG, SVG or PDF.
+def open_study_figure(path: Path | str, title: str | None, notes: Sequence[str], paper: Paper) -> "Iterator[Axes]":
+    """Give the panel; then write the picture as PNG, SVG or PDF.
 
     The same input gives the same bytes. Raises InvalidInputError for an unknown picture format or too small a page,
     before the panel is given, and OutputError when the file cannot be written.
     """
-    path = Path(path)
-    style.picture_suffix(path)
-    width = paper.width(_WIDTH, left + _RIGHT + _NARROWEST)
-    lines = wrapped(list(notes), width - left - EDGE)
-    foot = _FOOT + LINE * len(lines)
-    row = paper.panel(PANEL_HEIGHT, 1, _HEAD + foot, _LOWEST)
-    with style.styled_figure(width, paper.height(_HEAD + row + foot), paper.dots) as figure:
-        axes = add_axes(figure, left, foot, width - left - _RIGHT, row)
+    path = style.picture_path(path)
+    with style.open_panels(paper, (1, 1), PANEL, LEAST, SIDES, title=title, notes=" ".join(notes)) as opened:
+        figure, ((axes,),) = opened
         axes.spines[["right", "top"]].set_visible(False)
         yield axes
-        for number, line in enumerate(reversed(lines)):
-            write_text(figure, left, EDGE + LINE * number, line, color=style.FAINT_INK)
-        write_heading(figure, title, EDGE)
         style.save_figure(figure, path)
 
 
-_WIDTH_LAW, UPPER, LOWER = 7.2, 2.4, 1.0  # inches
-_LEFT, _RIGHT_LAW, _HEAD_LAW, _FOOT_LAW, _GAP = 0.75, 0.15, 0.38, 0.42, 0.16  # inches
-_LOWEST_LAW = 0.5  # inches, of the lower panel on a page whose size was asked for
+LAW_SIDES, LAW_GAP = (0.75, 0.15, 0.11, 0.36), 0.16  # inches
+LAW_PANEL, LAW_LEAST = (6.3, 1.7), (1.0, 0.5)  # inches, of each panel, and on a page whose size was asked for
 SIMULATED: dict[str, Any] = {"color": "#0072B2", "linewidth": 3.0, "alpha": 0.55, "solid_capstyle": "butt"}
 EXPECTED: dict[str, Any] = {"color": style.INK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
 
@@ -83,62 +60,43 @@ class Law:
     marks: Sequence[float] = ()
 
     @property
-    def difference(self) -> Floats:
-        """Simulated − expected, (n,)."""
-        return self.simulated - self.expected
-
-    @property
     def largest(self) -> float:
         """The largest difference, without sign."""
-        return float(np.nanmax(np.abs(self.difference)))
+        return float(np.nanmax(np.abs(self.simulated - self.expected)))
 
 
 def draw_law(law: Law, path: Path | str, title: str, paper: Paper = OWN) -> None:
-    """Draw the quantity and the difference and write PNG, SVG or PDF; the same input gives the same bytes.
+    """Draw the quantity, and its difference to the formula, and write PNG, SVG or PDF; the same input, the same bytes.
 
     Raises InvalidInputError for an unknown picture format or a page that is too small, and OutputError when the file
     cannot be written.
     """
-    path = Path(path)
-    style.picture_suffix(path)
-    width = paper.width(_WIDTH_LAW, _LEFT + _RIGHT_LAW + 1.0)
-    lower = paper.panel(LOWER, 1, _HEAD_LAW + UPPER + _GAP + _FOOT_LAW, _LOWEST_LAW)
-    lower = lower if paper.size is None else min(lower, LOWER)
-    height = paper.height(_HEAD_LAW + UPPER + _GAP + lower + _FOOT_LAW)
-    upper = height - _HEAD_LAW - _GAP - lower - _FOOT_LAW
-    with style.styled_figure(width, height, paper.dots) as figure:
-        inside = (width - _LEFT - _RIGHT_LAW) / width
-        above = figure.add_axes((_LEFT / width, (_FOOT_LAW + lower + _GAP) / height, inside, upper / height))
-        below = figure.add_axes((_LEFT / width, _FOOT_LAW / height, inside, lower / height))
+    path = style.picture_path(path)
+    difference, is_known = law.simulated - law.expected, np.isfinite(law.expected)
+    with style.open_panels(paper, (2, 1), LAW_PANEL, LAW_LEAST, LAW_SIDES, (0.0, LAW_GAP), title=title) as opened:
+        figure, ((above,), (below,)) = opened
         above.plot(law.time, law.simulated, label="simulated", **SIMULATED)
         above.plot(law.time, law.expected, label=law.formula, **EXPECTED)
         above.legend(loc="upper right", frameon=False)
-        below.plot(law.time, law.difference, color=SIMULATED["color"], linewidth=1.0)
-        known = np.concatenate([law.simulated, law.expected[np.isfinite(law.expected)]])
-        _finish(above, law, f"{law.quantity} ({law.unit})", known, inside * width)
-        _finish(below, law, f"difference ({law.unit})", law.difference[np.isfinite(law.difference)], inside * width)
+        below.plot(law.time, difference, color=SIMULATED["color"], linewidth=1.0)
+        known = np.concatenate([law.simulated, law.expected[is_known]])
+        panels = ((above, law.quantity, known), (below, "difference", difference[is_known]))
+        for axes, label, values in panels:
+            for mark in law.marks:
+                axes.axvline(mark, color=style.FAINT_INK, linewidth=0.5, zorder=0)
+            axes.spines[["right", "top"]].set_visible(False)
+            axes.set_xlim(float(law.time[0]), float(law.time[-1]))
+            axes.set_ylim(*limits_of(values))
+            axes.set_ylabel(f"{label} ({law.unit})")
+            style.number_axis(axes.yaxis)
+        figure.align_ylabels()
         above.tick_params(labelbottom=False)
         below.set_xlabel("time (s)", labelpad=2.0)
-        write_heading(figure, title, 0.12, 0.08)
         style.save_figure(figure, path)
 
 
-def _finish(axes: "Axes", law: Law, label: str, values: Floats, inside: float) -> None:
-    """Set limits and texts of a panel, `inside` inches wide."""
-    for mark in law.marks:
-        axes.axvline(mark, color=style.FAINT_INK, linewidth=0.5, zorder=0)
-    axes.spines[["right", "top"]].set_visible(False)
-    axes.set_xlim(float(law.time[0]), float(law.time[-1]))
-    low, high = limits_of(values)
-    axes.set_ylim(low, high)
-    axes.yaxis.set_label_coords(-0.52 / inside, 0.5)
-    axes.set_ylabel(label)
-    plain_numbers(axes.yaxis)
-
-
-_LEFT_LIMIT_CURVE = 0.62  # inches
-_MARGIN = 0.06  # of an axis
-_MOST_NUMBERS = 6
+MARGIN = 0.06  # of an axis
+MOST_NUMBERS = 6
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")  # by the kind of the change
 LINE_COLOUR = "#777777"
 OTHERS = ("#D55E00", "#000000", "#56B4E9", "#777777")  # of what others found
@@ -153,6 +111,11 @@ class Bracket(NamedTuple):
     high: float
     below: str
     above: str
+
+    @property
+    def middle(self) -> float:
+        """The middle of the bracket."""
+        return 0.5 * (self.low + self.high)
 
 
 class Series(NamedTuple):
@@ -178,53 +141,40 @@ def join_brackets(curve: LimitCurve) -> list[tuple[tuple[float, float], tuple[fl
     lines = []
     for (left, here), (right, there) in pairwise(curve.points):
         if [one[2:] for one in here] == [one[2:] for one in there]:
-            lines += [((left, _middle(a)), (right, _middle(b))) for a, b in zip(here, there, strict=True)]
+            lines += [((left, a.middle), (right, b.middle)) for a, b in zip(here, there, strict=True)]
     return lines
 
 
-def _middle(one: Bracket) -> float:
-    return 0.5 * (one.low + one.high)
-
-
 def draw_limit_curve(curve: LimitCurve, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
-    """Draw the picture and write it; raises as `sheet`."""
-    with open_study_figure(path, title, curve.notes, paper, _LEFT_LIMIT_CURVE) as axes:
+    """Draw the picture and write it; raises as `open_study_figure`.
+
+    Brackets of a kind have one colour. Of what others found, long series are lines and short ones marks, which no line
+    between few points would do justice.
+    """
+    with open_study_figure(path, title, curve.notes, paper) as axes:
         for start, end in join_brackets(curve):
             axes.plot(*zip(start, end, strict=True), color=LINE_COLOUR, linewidth=1.0, zorder=2)
-        _draw_others(axes, curve.beside)
-        _draw_brackets(axes, [(x, one) for x, found in curve.points for one in found])
-        axes.margins(_MARGIN)
+        for number, series in enumerate(curve.beside):
+            look: dict[str, Any] = {"color": OTHERS[number % len(OTHERS)], "linewidth": 1.4, "zorder": 1.5}
+            if len(series.points) <= MOST_MARKS:
+                look |= {"linestyle": "none", "marker": MARKS[number % len(MARKS)], "markersize": 6.0, "zorder": 3.0}
+                look |= {"markerfacecolor": "none"}
+            axes.plot(*zip(*series.points, strict=True), label=series.name, **look)
+        brackets = [(x, one) for x, found in curve.points for one in found]
+        for number, kind in enumerate(dict.fromkeys((one.below, one.above) for _, one in brackets)):
+            own = [(x, one.middle, 0.5 * (one.high - one.low)) for x, one in brackets if one[2:] == kind]
+            x, middles, reach = zip(*own, strict=True)
+            look = {"color": COLOURS[number % len(COLOURS)], "markersize": 4.5, "linewidth": 0.0, "elinewidth": 1.0}
+            label = f"{kind[0]} below, {kind[1]} above"
+            axes.errorbar(x, middles, yerr=reach, fmt="o", capsize=2.5, label=label, **look)
+        axes.margins(MARGIN)
         for axis in (axes.xaxis, axes.yaxis):
-            number_axis(axis, _MOST_NUMBERS)
+            style.number_axis(axis, MOST_NUMBERS)
         axes.set_xlabel(curve.across, labelpad=2.0)
         axes.set_ylabel(curve.up, labelpad=2.0)
         axes.legend(loc="best", frameon=False)
 
 
-def _draw_brackets(axes: "Axes", brackets: Sequence[tuple[float, Bracket]]) -> None:
-    """Draw brackets at their places, those of a kind in one colour."""
-    for number, kind in enumerate(dict.fromkeys((one.below, one.above) for _, one in brackets)):
-        own = [(x, one) for x, one in brackets if one[2:] == kind]
-        middles = [_middle(one) for _, one in own]
-        reach = [0.5 * (one.high - one.low) for _, one in own]
-        places = [x for x, _ in own]
-        look: dict[str, Any] = {"color": COLOURS[number % len(COLOURS)], "markersize": 4.5, "linewidth": 0.0}
-        label = f"{kind[0]} below, {kind[1]} above"
-        axes.errorbar(places, middles, yerr=reach, fmt="o", elinewidth=1.0, capsize=2.5, label=label, **look)
-
-
-def _draw_others(axes: "Axes", beside: Sequence[Series]) -> None:
-    """Draw long series as lines and short ones as marks, which no line between few points would do justice."""
-    for number, one in enumerate(beside):
-        colour = OTHERS[number % len(OTHERS)]
-        look: dict[str, Any] = {"color": colour, "linewidth": 1.4, "zorder": 1.5}
-        if len(one.points) <= MOST_MARKS:
-            mark = MARKS[number % len(MARKS)]
-            look |= {"linestyle": "none", "marker": mark, "markersize": 6.0, "markerfacecolor": "none", "zorder": 3.0}
-        axes.plot(*zip(*one.points, strict=True), label=one.name, **look)
-
-
-_LEFT_FRAGILITY = 0.55  # inches
 WIDE = 8.0  # ratio of the largest to the smallest intensity from which on the axis is logarithmic
 CURVE_COLOUR = "#0072B2"
 POINTS = 200
@@ -258,9 +208,9 @@ def axis_of(x: Floats) -> tuple[float, float, bool]:
     """Return the ends of the axis of intensities, and whether it is logarithmic."""
     low, high = float(x.min()), float(x.max())
     if high > WIDE * low:
-        margin = (high / low) ** _MARGIN
+        margin = (high / low) ** MARGIN
         return low / margin, high * margin, True
-    margin = _MARGIN * (high - low) or _MARGIN * high
+    margin = MARGIN * (high - low) or MARGIN * high
     return max(low - margin, 0.5 * low), high + margin, False
 
 
@@ -271,41 +221,31 @@ def places(x: Floats) -> Floats:
 
 
 def draw_fragility(found: Fragility, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
-    """Draw the picture and write it; raises as `sheet`."""
-    with open_study_figure(path, title, found.notes, paper, _LEFT_FRAGILITY) as axes:
+    """Draw the picture and write it; raises as `open_study_figure`."""
+    with open_study_figure(path, title, found.notes, paper) as axes:
         band = found.band
         if band is not None:
             axes.fill_between(band.x, band.low, band.high, color=CURVE_COLOUR, alpha=0.18, linewidth=0.0)
             axes.plot(band.x, band.probability, color=CURVE_COLOUR, linewidth=1.4, label="lognormal curve, 95 % band")
         reach = np.maximum([found.share - found.low, found.high - found.share], 0.0)
-        axes.errorbar(
-            found.x,
-            found.share,
-            yerr=reach,
-            fmt="o",
-            color=style.INK,
-            markersize=4.0,
-            linewidth=style.LINE_WIDTH,
-            capsize=2.5,
-            label="share of samples, 95 % limits",
-            clip_on=False,
-            zorder=3,
-        )
+        look: dict[str, Any] = {"fmt": "o", "color": style.INK, "markersize": 4.0, "linewidth": style.LINE_WIDTH}
+        look |= {"capsize": 2.5, "label": "share of samples, 95 % limits", "clip_on": False, "zorder": 3}
+        axes.errorbar(found.x, found.share, yerr=reach, **look)
         low, high, is_log = axis_of(found.x)
         axes.set_xscale("log" if is_log else "linear")
         axes.set_xlim(low, high)
         axes.set_ylim(0.0, 1.0)
-        number_axis(axes.xaxis, _MOST_NUMBERS, is_log=is_log)
+        style.number_axis(axes.xaxis, MOST_NUMBERS, is_log=is_log)
         axes.set_xlabel(f"{found.key} ({found.unit})" if found.unit else found.key, labelpad=2.0)
         axes.set_ylabel("probability of failure")
         handles, labels = axes.get_legend_handles_labels()
         axes.legend(handles[::-1], labels[::-1], loc="best", frameon=False)
 
 
-BAR, _GAP_TORNADO, _FOOT_TORNADO = 0.15, 0.46, 0.34  # inches: height of a bar, between panels, below them
+BAR, BAR_GAP, BAR_FOOT = 0.15, 0.46, 0.34  # inches: height of a bar, between panels, below them
 LEAST_ROOM, MOST_ROOM = 0.5, 1.75  # inches, for the name of a key; longer ones take several lines
 BROKEN = 0.95  # of the height of a bar, for each line of keys
-_NARROWEST_TORNADO, LEAST_BAR = 0.8, 0.12  # inches, on a page whose size was asked for
+NARROWEST, LEAST_BAR = 0.7, 0.12  # inches, on a page whose size was asked for
 MOST_KEYS, MOST_PANELS = 10, 8
 MOST_INTERVAL = 0.6  # of the longest bar, that an axis makes room for
 BEYOND: dict[str, Any] = {"linestyle": "", "marker": ">", "markersize": 3.0, "color": style.INK, "clip_on": False}
@@ -331,31 +271,31 @@ def draw_tornado(
     Raises InvalidInputError for an unknown picture format or a page that is too small, and OutputError when the file
     cannot be written.
     """
-    path = Path(path)
-    style.picture_suffix(path)
+    from matplotlib.patches import Patch
+
+    path = style.picture_path(path)
     varying = [panel for panel in panels if np.any(panel.values)] or list(panels)
-    panels = [replace(panel, keys=tuple(map(broken, short_names(panel.keys)))) for panel in varying[:MOST_PANELS]]
-    left = _room_for_keys(panels)
-    width = paper.width(style.COLUMN_WIDTH, left + _NARROWEST_TORNADO)
-    titles = ["\n".join(style.broken(panel.title, width - 2.0 * style.EDGE)) for panel in panels]
-    rows = [min(len(panel.keys), MOST_KEYS) + 0.6 for panel in panels]
-    foot = _FOOT_TORNADO + style.LINE * (2 if labels[1] else 1) + style.EDGE
-    head = style.title_height(title, width) + 0.2
-    gaps = _GAP_TORNADO * (len(panels) - 1) + style.LINE * sum(one.count("\n") for one in titles)
-    lines = max(key.count("\n") + 1 for panel in panels for key in panel.keys)
-    bar = paper.panel(BAR * (1.0 if lines == 1 else BROKEN * lines), 1, head + gaps + foot, LEAST_BAR * sum(rows))
-    bar = bar if paper.size is None else bar / sum(rows)
-    height = paper.height(head + bar * sum(rows) + gaps + foot)
-    with style.styled_figure(width, height, paper.dots) as figure:
-        style.write_title(figure, title)
-        bottom = height - head
-        for panel, heading, count in zip(panels, titles, rows, strict=True):
-            bottom -= bar * count + style.LINE * heading.count("\n")
-            axes = style.add_axes(figure, left, bottom, width - left - 2.0 * style.EDGE, bar * count)
+    panels = [replace(panel, keys=tuple(map(_in_lines, short_names(panel.keys)))) for panel in varying[:MOST_PANELS]]
+    keys = [key for panel in panels for key in panel.keys]
+    widest = max(style.width_of(line, style.FONT_SIZE) for key in keys for line in key.split("\n"))
+    left, right = max(widest / style.POINTS_PER_INCH, LEAST_ROOM) + 0.2, 2.0 * style.EDGE
+    width = paper.width(style.COLUMN_WIDTH, left + right + NARROWEST)
+    titles = [style.broken(panel.title, width - right) for panel in panels]
+    most, lines = max(map(len, titles)), max(key.count("\n") + 1 for key in keys)
+    rows = max(min(len(panel.keys), MOST_KEYS) for panel in panels) + 0.6
+    bar = BAR * (1.0 if lines == 1 else BROKEN * lines)
+    own, least = (width - left - right, bar * rows), (NARROWEST, LEAST_BAR * rows)
+    sides, gaps = (left, right, 0.08 + style.LINE * most, BAR_FOOT), (0.0, BAR_GAP + style.LINE * (most - 1))
+    pairs = zip((MAIN_COLOUR, FIRST_COLOUR), labels, strict=True)
+    handles = [Patch(color=colour, label=label) for colour, label in pairs if label]
+    shape = len(panels), 1
+    with style.open_panels(paper, shape, own, least, sides, gaps, title=title, handles=handles) as (figure, drawn):
+        up = float(figure.get_figheight())
+        for panel, heading, (axes,) in zip(panels, titles, drawn, strict=True):
+            place = axes.get_position()
+            bar = style.size_of(axes)[1] / rows
             _draw_bars(axes, panel, min(style.FONT_SIZE, bar * style.POINTS_PER_INCH / (style.LETTER[1] * lines)))
-            style.write_text(figure, style.EDGE, bottom + bar * count + 0.05, heading)
-            bottom -= _GAP_TORNADO
-        style.write_legend(figure, _entries(labels), style.EDGE, style.EDGE, labelspacing=0.25)
+            style.write_text(figure, style.EDGE, place.y1 * up + 0.05, "\n".join(heading), va="bottom")
         style.save_figure(figure, path)
 
 
@@ -364,16 +304,9 @@ def order_of(values: Floats) -> list[int]:
     return [int(key) for key in np.argsort(-np.abs(values), kind="stable")[:MOST_KEYS]]
 
 
-def broken(name: str) -> str:
+def _in_lines(name: str) -> str:
     """Return a key in as many lines as it needs at the left of the bars."""
     return "\n".join(style.broken(name, MOST_ROOM))
-
-
-def _room_for_keys(panels: Sequence[Bars]) -> float:
-    """Return the width (inches) of the widest key, and a gap."""
-    lines = [line for panel in panels for key in panel.keys for line in key.split("\n")]
-    widest = max(style.width_of(line, style.FONT_SIZE) for line in lines) / style.POINTS_PER_INCH
-    return max(widest, LEAST_ROOM) + 0.2
 
 
 def _draw_bars(axes: "Axes", panel: Bars, font: float) -> None:
@@ -404,10 +337,3 @@ def span_of_bars(panel: Bars) -> tuple[float, float]:
     low = float(min(ends.min(), 0.0, np.min(panel.values - reach)))
     high = float(max(ends.max(), 0.0, np.max(panel.values + reach)))
     return low - 0.02 * largest, high + 0.02 * largest
-
-
-def _entries(labels: tuple[str, str]) -> list[Any]:
-    from matplotlib.patches import Patch
-
-    pairs = zip((MAIN_COLOUR, FIRST_COLOUR), labels, strict=True)
-    return [Patch(color=colour, label=label) for colour, label in pairs if label]

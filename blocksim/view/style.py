@@ -1,18 +1,19 @@
-"""Colours, fonts and pages: places in inches, titles, legends, plain numbers, and writing of picture files."""
+"""Colours, fonts and pages: sizes that people ask for, panels with title, notes and legend, picture files."""
 
 import re
 import warnings
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 from unicodedata import east_asian_width
 
 from blocksim.errors import InvalidInputError
+from blocksim.options import Option
 from blocksim.simulation.atomic import write_bytes
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ MEASURED_COLOUR = "#D55E00"
 INK = "#222222"
 FAINT_INK = "#777777"
 GROUND_COLOUR = "#D9D9D9"
+BRIGHT = 0.4  # from which dark text reads better than white
 
 POINTS_PER_INCH = 72.0
 DOTS_PER_INCH = 150
@@ -43,7 +45,7 @@ FONT = ["DejaVu Sans"]
 NARROWEST = 0.25  # width of the narrowest letters over the font size
 PARTS = re.compile(r"(?:[^. ]|\.(?=\d))+(?: +|\.|$)|[. ]+")  # what a name is broken into; numbers stay whole
 PIECES = re.compile(r"[^_-]*[_-]+|[^_-]+")  # what a part that is too wide is broken into
-MOST_LETTERS = 200  # of a name in lines
+MOST_LETTERS = 600  # of a text in lines
 SURE = 0.98  # letters are put on whole pixels
 
 # A fixed salt and no dates: the same picture is the same file.
@@ -77,8 +79,7 @@ def block_colour(index: int) -> str:
 
 def text_colour(fill: str) -> str:
     """Return black or white, whichever reads better on `fill` (#rrggbb)."""
-    bright = 0.4
-    return INK if brightness(fill) > bright else "#FFFFFF"
+    return INK if brightness(fill) > BRIGHT else "#FFFFFF"
 
 
 def brightness(fill: str) -> float:
@@ -87,13 +88,12 @@ def brightness(fill: str) -> float:
     return 0.299 * red + 0.587 * green + 0.114 * blue
 
 
-def picture_suffix(path: Path) -> str:
-    """Return the suffix in lower case; raises InvalidInputError for a format that is not written."""
-    suffix = path.suffix.lower()
-    if suffix not in METADATA:
-        message = f"{path}: '{path.suffix}' unsupported picture format; use {', '.join(METADATA)}"
-        raise InvalidInputError(message)
-    return suffix
+def picture_path(path: Path | str) -> Path:
+    """Return the path of a picture; raises InvalidInputError for a format that is not written."""
+    path = Path(path)
+    if path.suffix.lower() not in METADATA:
+        raise InvalidInputError(f"{path}: '{path.suffix}' unsupported picture format; use {', '.join(METADATA)}")
+    return path
 
 
 @contextmanager
@@ -122,7 +122,7 @@ def in_style(dots: float | None = None) -> Iterator[None]:
 
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write the figure as PNG, SVG or PDF after its suffix; raises OutputError when it cannot be written."""
-    write_bytes(path, figure_bytes(figure, picture_suffix(path)))
+    write_bytes(path, figure_bytes(figure, picture_path(path).suffix.lower()))
 
 
 def figure_bytes(figure: "Figure", suffix: str) -> bytes:
@@ -171,7 +171,7 @@ def cut_to(text: str, room: float, size: float, *, bold: bool = False) -> str:
 
 
 def broken(text: str, room: float, size: float = FONT_SIZE, *, bold: bool = False) -> list[str]:
-    """Return a name in lines no wider than `room` (inches), broken after dots and spaces.
+    """Return a text in lines no wider than `room` (inches), broken after spaces and the dots of names.
 
     A part that is too wide by itself is broken after hyphens and underscores; what is still too wide is cut.
     """
@@ -198,10 +198,14 @@ def fitting_font(text: str, room: tuple[float, float], largest: float = FONT_SIZ
 MILLIMETRES_PER_INCH = 25.4
 COLUMN_WIDTH, PAGE_WIDTH = 3.54, 7.2  # inches: one column of a journal's page, and both
 EDGE = 0.08  # inches, between text and the figure's edge
-TITLE_LINE, TITLE_GAP = 0.19, 0.12  # inches
-WIDE_LETTER = 0.56  # of the font size, a mean of letters
+LINE, TITLE_LINE = 0.15, 0.19  # inches, of a row of text or of a legend, and of the title
 MANY = 5  # numbers along an axis
-LINE = 0.145  # inches, of a row of text
+SIZE = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*[x×]\s*([0-9]+(?:\.[0-9]*)?)\s*(mm|cm|in|px)?")
+INCHES = {"mm": 1.0 / MILLIMETRES_PER_INCH, "cm": 10.0 / MILLIMETRES_PER_INCH, "in": 1.0}
+LEAST_SIDE, MOST_SIDE = 20.0 / 25.4 - 1e-9, 2000.0 / 25.4 + 1e-9  # inches
+SPARE_PIXEL = 0.25  # so that no round-off removes a whole one
+MOST_PIXELS = 1e8
+MOST_SHOWN = 40  # letters of a value in a message
 
 
 @dataclass(frozen=True)
@@ -248,21 +252,77 @@ OWN = Paper()
 
 
 @dataclass(frozen=True)
-class PanelPage:
-    """A page with panels side by side and a legend below, in inches."""
+class PageSize:
+    """Width and height of a picture in a unit."""
 
     width: float
     height: float
-    panel: float  # width of a panel
-    row: float  # its height
-    foot: float
-    columns: int  # of the legend
+    unit: str
+
+    @classmethod
+    def read(cls, text: str) -> "PageSize":
+        """Read WxH with mm, cm, in or px. Raises ValueError, also for sides that no page has."""
+        match = SIZE.fullmatch(text.strip())
+        if match is None:
+            raise ValueError(f"{text[:MOST_SHOWN]!r} is not a picture size; write it as in 180x120mm or 1600x900px")
+        size = cls(float(match[1]), float(match[2]), match[3] or "mm")
+        if not all(LEAST_SIDE <= side <= MOST_SIDE for side in size.inches(150.0)):
+            raise ValueError("each side of a picture must be 20 to 2000 mm (about 120 to 12 000 px)")
+        return size
+
+    def inches(self, dots: float) -> tuple[float, float]:
+        """Return width and height in inches; pixels are those of a PNG with so many dots per inch."""
+        if self.unit == "px":
+            return (self.width + SPARE_PIXEL) / dots, (self.height + SPARE_PIXEL) / dots
+        return self.width * INCHES[self.unit], self.height * INCHES[self.unit]
+
+
+@dataclass(frozen=True)
+class PageOptions:
+    """Size and resolution of a picture."""
+
+    _: KW_ONLY
+    size: Annotated[
+        tuple[float, float] | PageSize | None,
+        Option(
+            "Size of the picture: 180x120mm, 7x5in or 1600x900px.",
+            python="Width and height of the picture in mm.",
+            metavar="WxH",
+            read=PageSize.read,
+        ),
+    ] = None
+    dpi: Annotated[
+        float | None, Option("Dots per inch of a PNG (default: 150).", metavar="N", least=20.0, most=1200.0)
+    ] = None
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for more than MOST_PIXELS."""
+        if isinstance(self.size, PageSize):
+            dots = self.dpi or DOTS_PER_INCH
+            width, height = self.size.inches(dots)
+            if width * height * dots**2 > MOST_PIXELS:
+                raise ValueError(f"--size and --dpi make more than {MOST_PIXELS / 1e6:.0f} million pixels")
+
+    @property
+    def paper(self) -> Paper:
+        """The page that these ask for."""
+        if isinstance(self.size, PageSize):
+            return Paper(self.size.inches(self.dpi or DOTS_PER_INCH), self.dpi)
+        size = self.size
+        return Paper(size and (size[0] / MILLIMETRES_PER_INCH, size[1] / MILLIMETRES_PER_INCH), self.dpi)
 
 
 def add_axes(figure: "Figure", left: float, bottom: float, width: float, height: float) -> "Axes":
     """Return axes at a place given in inches."""
     across, up = (float(size) for size in figure.get_size_inches())
     return figure.add_axes((left / across, bottom / up, width / across, height / up))
+
+
+def size_of(axes: "Axes") -> tuple[float, float]:
+    """Return width and height of a panel (inches)."""
+    figure: Any = axes.get_figure(root=True)
+    width, height = axes.get_position().size * figure.get_size_inches()
+    return float(width), float(height)
 
 
 def write_text(figure: "Figure", left: float, bottom: float, text: str, **look: object) -> None:
@@ -275,28 +335,80 @@ def write_legend(figure: "Figure", handles: "Sequence[Artist]", left: float, bot
     """Draw a legend without a frame, its lower left corner at a place given in inches."""
     across, up = (float(size) for size in figure.get_size_inches())
     own: dict[str, Any] = {"loc": "lower left", "frameon": False, "borderpad": 0.0, "borderaxespad": 0.0}
+    own |= {"labelspacing": 0.25, "handlelength": 1.4, "columnspacing": 1.2}
     figure.legend(handles=handles, bbox_to_anchor=(left / across, bottom / up), **{**own, **look})
 
 
-def title_height(title: str, width: float) -> float:
-    """Return the height (inches) that a title takes with the gap below it."""
-    return EDGE + TITLE_LINE * len(wrapped([title], width - 2.0 * EDGE, TITLE_SIZE)) + TITLE_GAP
+Sides = tuple[float, float, float, float]
+"""Inches at left, right, top and bottom of all panels, for numbers, names of axes and headings."""
 
 
-def write_title(figure: "Figure", title: str) -> None:
-    """Write the title at the top, in as many lines as it needs."""
+@contextmanager
+def open_panels(
+    paper: Paper,
+    shape: tuple[int, int],
+    panel: tuple[float, float],
+    least: tuple[float, float],
+    sides: Sides,
+    gaps: tuple[float, float] = (0.0, 0.0),
+    *,
+    title: str | None = None,
+    notes: str = "",
+    handles: "Sequence[Artist]" = (),
+    columns: int = 1,
+) -> Iterator[tuple["Figure", list[list["Axes"]]]]:
+    """Give a figure with rows and columns of panels, a title above them, a legend and notes below them.
+
+    `panel` is the width and height of one, `least` that on a page whose size was asked for, `gaps` those between
+    columns and rows, `columns` those of the legend. All in inches. Raises InvalidInputError for too small a page.
+    """
+    (rows, across), (left, right, head, foot) = shape, sides
+    beside = left + right + (across - 1) * gaps[0]
+    width = paper.width(beside + across * panel[0], beside + across * least[0])
+    inside = SURE * (width - 2.0 * EDGE)
+    heading = broken(title, inside, TITLE_SIZE) if title else []
+    lines = broken(notes, inside) if notes else []
+    head, foot = head + EDGE, foot + EDGE + LINE * (len(lines) - (-len(handles) // columns))
+    others = head + foot + (rows - 1) * gaps[1]
+    if paper.size is not None and heading:  # no more lines than leave room for the panels
+        most = max(1, int((paper.size[1] - others - rows * least[1]) / TITLE_LINE))
+        rest = cut_to(" ".join(heading[most - 1 :]), inside * POINTS_PER_INCH, TITLE_SIZE)
+        heading = [*heading[: most - 1], rest]
+    head, others = head + TITLE_LINE * len(heading), others + TITLE_LINE * len(heading)
+    row = paper.panel(panel[1], rows, others, least[1])
+    column, height = (width - beside) / across, paper.height(others + rows * row)
+    with styled_figure(width, height, paper.dots) as figure:
+        panels = [
+            [
+                add_axes(figure, left + k * (column + gaps[0]), height - head - row - n * (row + gaps[1]), column, row)
+                for k in range(across)
+            ]
+            for n in range(rows)
+        ]
+        write_text(figure, EDGE, height - EDGE, "\n".join(heading), va="top", fontsize=TITLE_SIZE)
+        write_text(figure, EDGE, EDGE, "\n".join(lines), va="bottom", color=FAINT_INK)
+        if handles:
+            write_legend(figure, handles, EDGE, EDGE + LINE * len(lines), ncols=columns)
+        yield figure, panels
+
+
+def name_axes(figure: "Figure", panels: list[list["Axes"]], x: str, y: str, depth: float) -> None:
+    """Write the names of both axes once: `depth` inches below all panels, and at the left edge of the figure."""
     across, up = (float(size) for size in figure.get_size_inches())
-    lines = wrapped([title], across - 2.0 * EDGE, TITLE_SIZE)
-    for number, line in enumerate(lines):
-        write_text(figure, EDGE, up - EDGE - number * TITLE_LINE, line, va="top", fontsize=TITLE_SIZE)
+    first, last = panels[0][0].get_position(), panels[-1][-1].get_position()
+    lines = "\n".join(broken(x, across * (1.0 - first.x0)))
+    write_text(figure, 0.5 * across * (first.x0 + last.x1), up * last.y0 - depth, lines, ha="center", va="top")
+    lines = "\n".join(broken(y, up * (first.y1 - last.y0)))
+    write_text(figure, EDGE, 0.5 * up * (first.y1 + last.y0), lines, va="center", rotation=90.0)
 
 
-def write_heading(figure: "Figure", title: str | None, side: float, top: float = 0.06) -> None:
-    """Write a title in one line, cut where it is too long, `side` and `top` inches from the edges of the figure."""
+def write_heading(figure: "Figure", title: str | None, left: float, right: float | None = None) -> None:
+    """Write a title in one line at the top, cut where it would come nearer to the sides than `left` and `right`."""
     if title:
         across, up = (float(size) for size in figure.get_size_inches())
-        shown = cut_to(title, (across - 2.0 * side) * POINTS_PER_INCH, TITLE_SIZE)
-        figure.text(side / across, 1.0 - top / up, shown, va="top", fontsize=TITLE_SIZE)
+        room = across - left - (left if right is None else right)
+        shown = cut_to(title, room * POINTS_PER_INCH, TITLE_SIZE)
+        write_text(figure, left, up - EDGE, shown, va="top", fontsize=TITLE_SIZE)
 
 
 def plain_numbers(side: "Axis") -> None:
@@ -314,14 +426,3 @@ def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None
     side.set_minor_formatter(NullFormatter())
     if not is_log:
         side.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]))
-
-
-def wrapped(texts: list[str], width: float, font: float = FONT_SIZE) -> list[str]:
-    """Fill lines of `width` inches with sentences, words kept whole."""
-    letters = int(width * POINTS_PER_INCH / (WIDE_LETTER * font))
-    lines = [""]
-    for word in " ".join(texts).split():
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > letters:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return [line for line in lines if line]

@@ -1,23 +1,22 @@
-"""Panels over one axis of time: named lines, motions of blocks, energies, contacts and forces."""
+"""Panels over one axis of time: named lines beside their names and notes; probes, and the motion of supports."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.spelling import nearest
-from blocksim.simulation.frames import force_on_supports
+from blocksim.scenario.motion import Peak, acceleration_ends, displacement_and_velocity, motion_peaks
+from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario.units import STANDARD_GRAVITY
+from blocksim.simulation import probes
+from blocksim.simulation.probes import ProbeSeries
 from blocksim.view import style
-from blocksim.view.arrows import WithContacts, contacts_of
-from blocksim.view.paint import MovingFrames
-from blocksim.view.run_data import MILLIMETRES, Floats, FramesLike, Indices, Support
-from blocksim.view.style import OWN, Paper, add_axes, number_axis, write_heading, write_text
-from blocksim.world.systems.blocks import BLOCKS
-from blocksim.world.systems.system import Output, Track
+from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support
+from blocksim.view.style import OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,15 +24,30 @@ if TYPE_CHECKING:
 
 
 WIDTH = 7.2  # inches
-LEFT, RIGHT, HEAD, FOOT = 0.78, 1.75, 0.40, 0.42  # inches; texts stand on the right
+SIDES = 0.78, 1.70, 0.12, 0.36  # inches, around the panels; texts stand on the right
 LABEL = 0.16  # inches, from the edge of the page to the right of the name of an axis
-PANEL, GAP = 1.3, 0.16  # inches
-LOWEST, NARROWEST = 0.6, 1.0  # inches, of a panel on a page whose size was asked for
-_BESIDE = 0.1  # inches, from a panel to its text
-LINE = 0.155  # inches, of a line of text
+PANEL, GAP = 1.25, 0.15  # inches
+LOWEST, NARROWEST = 0.55, 1.0  # inches, of a panel on a page whose size was asked for
+NAME_ROOM = 1.2  # inches, for the name of a line
+LETTERS = 24  # of a name
 MOST_POINTS = 4000  # of a line; each that stands for many shows their range
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)))
+PALE = 0.7  # brightness from which a line is drawn on a darker one
+LEAST_SPAN = 0.05  # mm, degrees, mm/s, degrees/s: an axis never shows less, so that round-off looks flat
+LEAST_SHARE = 4e-4  # of the largest value: nor less than that, so that numbers along it differ in five digits
+BESIDE: dict[str, Any] = {"loc": "upper left", "frameon": False, "borderaxespad": 0.0, "handlelength": 2.0}
+SMALL_SHARE = 1e-3  # of the largest energy; what stays below is not drawn
+ENERGIES = {  # how entries of the ledger are drawn together
+    "kinetic": ("kinetic",),
+    "potential": ("potential",),
+    "stored in contacts": ("stored_normal", "stored_shear"),
+    "lost to friction": ("friction",),
+    "lost in impacts": ("dashpot", "broken", "impacts", "correction"),
+    "given to support": ("to_support",),
+    "given to loads": ("to_loads",),
+}
+Entries = dict[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -42,113 +56,75 @@ class TimePanel:
 
     label: str
     lines: Mapping[str, tuple[Floats, Floats]]
-    note: str = ""  # beside the panel, below the names of the lines
-    marks: Sequence[tuple[float, float]] = field(default=())  # points (s, value) that are marked
-    limits: tuple[float, float] | None = None  # of the values, where the panel does not show all of them
-
-
-def draw_time_panels(
-    panels: Sequence[TimePanel], path: Path, title: str | None, note: str = "", paper: Paper = OWN
-) -> None:
-    """Draw panels one below the other; names of lines are written where a panel has more than one.
-
-    Raises InvalidInputError for an unknown picture format or too small a page, OutputError when the file cannot be
-    written.
-    """
-    style.picture_suffix(path)
-    with _drawn(panels, title, note, paper) as figure:
-        style.save_figure(figure, path)
-
-
-def time_panels_png(panels: Sequence[TimePanel], paper: Paper = OWN) -> bytes:
-    """Return such a picture without a title as PNG."""
-    with _drawn(panels, None, "", paper) as figure:
-        return style.figure_bytes(figure, ".png")
+    note: str = ""  # beside the panel, above the names of the lines
+    marks: Sequence[tuple[float, float]] = ()  # points (s, value) that are marked
+    limits: tuple[float, float | None] | None = None  # of the values, where the panel does not show all of them
+    looks: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # of lines that have one of their own
+    level: float | None = None  # a value worth a dashed line
+    legend: str | None = None  # above the names of the lines; None for no names
 
 
 @contextmanager
-def _drawn(panels: Sequence[TimePanel], title: str | None, note: str, paper: Paper) -> Iterator["Figure"]:
-    head, foot = HEAD if title else GAP, FOOT + (LINE if note else 0.0)
-    own = max(PANEL, *(LINE * (_rows(panel) + 1) for panel in panels))
-    with stacked(len(panels), (LEFT, RIGHT, head, foot), GAP, (own, LOWEST), paper) as (figure, drawn):
-        span = _span(panels)
-        across, up = (float(size) for size in figure.get_size_inches())
-        for axes, panel in zip(drawn, panels, strict=True):
-            _draw(axes, panel, span)
-            _write_beside(figure, panel, across - RIGHT + _BESIDE, axes.get_position().y1 * up)
-        write_heading(figure, title, 0.12, 0.08)
-        write_text(figure, 0.12, 0.05, note, color=style.FAINT_INK, va="bottom")
-        yield figure
-
-
-@contextmanager
-def stacked(
-    count: int,
-    sides: tuple[float, float, float, float],
-    gap: float,
-    heights: tuple[float, float],
-    paper: Paper,
+def open_time_panels(
+    count: int, span: tuple[float, float], title: str | None, notes: str, paper: Paper, own: float = PANEL
 ) -> Iterator[tuple["Figure", list["Axes"]]]:
-    """Give so many panels over one axis of time, one below the other, with room at left, right, top and bottom.
+    """Give so many panels, each `own` inches high, one below the other over an axis of time (s).
 
-    `heights` are those of a panel: its own, and the least on a page whose size was asked for. All in inches. Raises
-    InvalidInputError for too small a page.
+    Raises InvalidInputError for too small a page.
     """
-    left, right, head, foot = sides
-    width = paper.width(WIDTH, left + right + NARROWEST)
-    others = head + foot + (count - 1) * gap
-    height = paper.panel(heights[0], count, others, heights[1])
-    total = paper.height(others + count * height)
-    with style.styled_figure(width, total, paper.dots) as figure:
-        panels = []
-        for row in range(count):
-            bottom = foot + (count - 1 - row) * (height + gap)
-            axes = add_axes(figure, left, bottom, width - left - right, height)
+    panel, least = (WIDTH - sum(SIDES[:2]), own), (NARROWEST, LOWEST)
+    with style.open_panels(paper, (count, 1), panel, least, SIDES, (0.0, GAP), title=title, notes=notes) as opened:
+        figure, rows = opened
+        for (axes,) in rows:
             axes.spines[["right", "top"]].set_visible(False)
-            axes.tick_params(axis="x", labelbottom=row == count - 1)
-            axes.yaxis.set_label_coords((LABEL - left) / (width - left - right), 0.5)
-            panels.append(axes)
-        panels[-1].set_xlabel("time (s)", labelpad=2.0)
-        yield figure, panels
+            axes.tick_params(axis="x", labelbottom=axes is rows[-1][0])
+            axes.yaxis.set_label_coords((LABEL - SIDES[0]) / style.size_of(axes)[0], 0.5)
+            axes.set_xlim(span[0], span[0] + max(span[1] - span[0], 1e-9))
+        rows[-1][0].set_xlabel("time (s)", labelpad=2.0)
+        yield figure, [axes for (axes,) in rows]
 
 
-def _rows(panel: TimePanel) -> int:
-    return (len(panel.lines) if len(panel.lines) > 1 else 0) + (panel.note.count("\n") + 1 if panel.note else 0)
+def draw_time_panel(axes: "Axes", panel: TimePanel) -> None:
+    """Draw the lines of a panel, and write what belongs to them at its right."""
+    from matplotlib.patheffects import Normal, Stroke
 
-
-def _span(panels: Sequence[TimePanel]) -> tuple[float, float]:
-    times = [time for panel in panels for time, _ in panel.lines.values() if len(time)]
-    first, last = min(float(time[0]) for time in times), max(float(time[-1]) for time in times)
-    return first, first + max(last - first, 1e-9)
-
-
-def _look(number: int) -> dict[str, Any]:
-    colour, dashes = COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
-    return {"color": colour, "linestyle": dashes, "linewidth": 1.0}
-
-
-def _draw(axes: "Axes", panel: TimePanel, span: tuple[float, float]) -> None:
-    axes.axhline(0.0, color=style.FAINT_INK, linewidth=0.4)
-    for number, (time, values) in enumerate(panel.lines.values()):
-        axes.plot(*thinned(time, values), **_look(number))
+    handles = []
+    for number, (name, (time, values)) in enumerate(panel.lines.items()):
+        dashes = DASHES[number // len(COLOURS) % len(DASHES)]
+        look: dict[str, Any] = {"color": COLOURS[number % len(COLOURS)], "linestyle": dashes, "linewidth": 1.0}
+        look |= panel.looks.get(name, {})
+        handles += axes.plot(*thinned(time, values), **look, label=name)
+        if style.brightness(look["color"]) > PALE:
+            handles[-1].set_path_effects([Stroke(linewidth=2.0, foreground=style.FAINT_INK), Normal()])
     for moment, value in panel.marks:
         axes.plot(moment, value, marker="o", markersize=3.5, color=style.MEASURED_COLOUR, clip_on=False)
-    axes.set_xlim(span)
+    if panel.level is not None:
+        axes.axhline(panel.level, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (4, 3)))
     axes.margins(y=0.08)
     if panel.limits is not None:
         axes.set_ylim(*panel.limits)
     axes.set_ylabel(panel.label)
-    number_axis(axes.yaxis)
-    number_axis(axes.xaxis, 8)
+    style.number_axis(axes.yaxis)
+    style.number_axis(axes.xaxis, 8)
+    axes.text(1.04, 1.0, panel.note, transform=axes.transAxes, va="top")
+    if panel.legend is not None:
+        below = style.LINE * (panel.note.count("\n") + 1 if panel.note else 0) / style.size_of(axes)[1]
+        room, names = NAME_ROOM * style.POINTS_PER_INCH, [style.shortened(name, LETTERS) for name in panel.lines]
+        names = [style.cut_to(name, room, style.FONT_SIZE) for name in names]
+        place: dict[str, Any] = {**BESIDE, "bbox_to_anchor": (1.04, 1.0 - below)}
+        axes.legend(handles, names, **place, title=panel.legend, alignment="left")
 
 
-def _write_beside(figure: "Figure", panel: TimePanel, left: float, top: float) -> None:
-    room = (RIGHT - 2.0 * _BESIDE) * style.POINTS_PER_INCH
-    names = [*panel.lines] if len(panel.lines) > 1 else []
-    for number, name in enumerate(names):
-        cut = style.cut_to(name, room, style.FONT_SIZE)
-        write_text(figure, left, top - number * LINE, cut, va="top", color=_look(number)["color"])
-    write_text(figure, left, top - len(names) * LINE, panel.note, va="top")
+@contextmanager
+def _opened(panels: Sequence[TimePanel], title: str | None, note: str, paper: Paper) -> Iterator["Figure"]:
+    times = [time for panel in panels for time, _ in panel.lines.values() if len(time)]
+    span = min(float(time[0]) for time in times), max(float(time[-1]) for time in times)
+    texts = (panel.note.count("\n") + 2 + len(panel.lines) * (panel.legend is not None) for panel in panels)
+    own = max(PANEL, style.LINE * max(texts))
+    with open_time_panels(len(panels), span, title, note, paper, own) as (figure, rows):
+        for axes, panel in zip(rows, panels, strict=True):
+            draw_time_panel(axes, panel)
+        yield figure
 
 
 def thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -162,175 +138,6 @@ def thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
         kept |= {first, after - 1, first + int(np.argmin(part)), first + int(np.argmax(part))}
     places = np.array(sorted(kept), dtype=np.intp)
     return time[places], values[places]
-
-
-ENERGY, CONTACTS, FORCE, GROUND = "energy", "contacts", "force", "ground"
-GROUPS = {"displacement": ("dx", "dy"), "velocity": ("vx", "vy")}
-USUAL = ("x", "y", "rotation", ENERGY, CONTACTS)
-SCENE = (ENERGY, CONTACTS, FORCE, GROUND)
-MOST_SLIPS = 2
-MOST_CHOSEN = 12  # blocks; more names have no room beside the panels
-LEAST_SPAN = 0.05  # mm, degrees, mm/s, degrees/s: an axis never shows less, so that round-off looks flat
-LEAST_SHARE = 4e-4  # of the largest value: nor less than that, so that numbers along it differ in five digits
-
-MOST_WEIGHTS = 3.0  # of all blocks: forces of supports beyond that are cut, those of impacts are far beyond
-SMALL_SHARE = 1e-3  # of the largest energy; what stays below is not drawn
-ENERGIES = {  # how entries of the ledger are drawn together
-    "kinetic": ("kinetic",),
-    "potential": ("potential",),
-    "stored in contacts": ("stored_normal", "stored_shear"),
-    "lost to friction": ("friction",),
-    "lost in impacts": ("dashpot", "broken", "impacts", "correction"),
-    "given to support": ("to_support",),
-    "given to loads": ("to_loads",),
-}
-ENERGY_LOOKS: dict[str, tuple[str, Any]] = {  # the same in every picture; dashes distinguish them in grey
-    "kinetic": ("#0072B2", "-"),
-    "potential": ("#E69F00", "-"),
-    "stored in contacts": ("#CC79A7", (0, (1, 1))),
-    "lost to friction": ("#009E73", (0, (5, 1.5))),
-    "lost in impacts": ("#222222", (0, (3, 1, 1, 1))),
-    "given to support": ("#56B4E9", (0, (2, 1))),
-    "given to loads": ("#D55E00", (0, (4, 1, 1, 1))),
-}
-OTHER_ENERGY: tuple[str, Any] = ("#999999", "-")
-BESIDE: dict[str, Any] = {
-    "loc": "upper left",
-    "bbox_to_anchor": (1.04, 1.0),
-    "frameon": False,
-    "borderaxespad": 0.0,
-    "handlelength": 2.0,
-}
-Entries = dict[str, Floats]
-
-
-class HistoryFrames(MovingFrames, Protocol):
-    """Frames with velocities and spins."""
-
-    @property
-    def spin(self) -> Floats:
-        """Angular velocities (rad/s), (n, b)."""
-        ...
-
-    @property
-    def tracks(self) -> tuple[Track, ...]:
-        """Every system over time, blocks first."""
-        ...
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Panels by name (none: the default ones) and blocks by name (none: those that move farthest).
-
-    With `relative`, positions and velocities are relative to the moving ground.
-    """
-
-    panels: tuple[str, ...] = ()
-    blocks: tuple[str, ...] = ()
-    relative: bool = False
-
-
-@dataclass(frozen=True)
-class Motion:
-    """One quantity of all blocks: n values of b blocks, and the column of the measured table that goes with it."""
-
-    label: str
-    values: Floats
-    quantity: str = ""
-
-
-@dataclass(frozen=True)
-class FramesInView:
-    """Chosen frames as seen from where the ground was at the start, or from the moving ground."""
-
-    frames: HistoryFrames
-    chosen: Indices
-    support: Support
-    relative: bool = False
-
-    @property
-    def from_ground(self) -> str:
-        """Suffix of the labels of positions and velocities."""
-        return " − ground" if self.relative and self.support.motion is not None else ""
-
-    def place(self, axis: int) -> Floats:
-        """Return centres (mm) along x (0) or y (1)."""
-        places = (self.frames.x, self.frames.y)[axis][self.chosen]
-        carried = self.support.offset(self.frames.time[self.chosen]) * bool(self.from_ground)
-        return np.asarray(MILLIMETRES * (places - carried[:, axis, None]))
-
-    def displacement(self, axis: int) -> Floats:
-        """Return displacements (mm) from the first frame of the run."""
-        return np.asarray(self.place(axis) - MILLIMETRES * (self.frames.x, self.frames.y)[axis][0])
-
-    def velocity(self, axis: int) -> Floats:
-        """Return velocities (mm/s) along x (0) or y (1)."""
-        velocities = (self.frames.vx, self.frames.vy)[axis][self.chosen]
-        carried = np.multiply.outer(self.support.velocity(self.frames.time[self.chosen]), self.support.direction)
-        return np.asarray(MILLIMETRES * (velocities - carried[:, axis, None] * bool(self.from_ground)))
-
-
-MOTIONS: dict[str, Callable[[FramesInView], Motion]] = {
-    "x": lambda seen: Motion(f"x{seen.from_ground} (mm)", seen.place(0), "" if seen.from_ground else "x"),
-    "y": lambda seen: Motion(f"y{seen.from_ground} (mm)", seen.place(1), "" if seen.from_ground else "y"),
-    "dx": lambda seen: Motion(f"Δx{seen.from_ground} (mm)", seen.displacement(0)),
-    "dy": lambda seen: Motion(f"Δy{seen.from_ground} (mm)", seen.displacement(1)),
-    "rotation": lambda seen: Motion("rotation (°)", np.degrees(seen.frames.rotation[seen.chosen]), "rotation"),
-    "vx": lambda seen: Motion(f"vx{seen.from_ground} (mm/s)", seen.velocity(0)),
-    "vy": lambda seen: Motion(f"vy{seen.from_ground} (mm/s)", seen.velocity(1)),
-    "speed": lambda seen: Motion(
-        f"{'relative ' if seen.from_ground else ''}speed (mm/s)", np.hypot(seen.velocity(0), seen.velocity(1))
-    ),
-    "spin": lambda seen: Motion("spin (°/s)", np.degrees(seen.frames.spin[seen.chosen])),
-}
-
-
-def _shown(output: Output) -> Callable[[FramesInView], Motion]:
-    """Return the panel of what blocks show beside their motion."""
-
-    def motion(seen: FramesInView) -> Motion:
-        values = output.of(seen.frames.tracks[0].some(seen.chosen))
-        factor, unit = unit_for(float(np.abs(values).max(initial=0.0)), output.unit)
-        return Motion(f"{output.meaning} ({unit})", factor * values)
-
-    return motion
-
-
-MOTIONS |= {one.name: _shown(one) for one in BLOCKS.outputs if one.name not in MOTIONS}
-PANELS = (*MOTIONS, *SCENE, *GROUPS)
-
-
-def panels_named(names: Sequence[str]) -> tuple[str, ...]:
-    """Return panels in the given order, groups as their members. Raises InvalidInputError for an unknown name."""
-    for name in names:
-        if name not in PANELS:
-            meant = nearest(name, PANELS, MOST_SLIPS)
-            hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join(PANELS)}"
-            message = f"--panels {name}: unknown panel, {hint}"
-            raise InvalidInputError(message)
-    return tuple(dict.fromkeys(one for name in names for one in GROUPS.get(name, (name,))))
-
-
-def blocks_named(frames: FramesLike, names: Sequence[str]) -> list[int]:
-    """Return the numbers (from 0) of blocks with these names. Raises InvalidInputError for unknown ones or too many."""
-    known = {name: number for number, name in enumerate(frames.names)}
-    for name in names:
-        if name not in known:
-            first = ", ".join(frames.names[:MOST_CHOSEN]) + (", …" if len(frames.names) > MOST_CHOSEN else "")
-            message = f"--block {name}: no such block in this run, its {len(known)} blocks are {first}"
-            raise InvalidInputError(message)
-    if len(names) > MOST_CHOSEN:
-        message = f"--block: {len(names)} blocks are too many for one picture, at most {MOST_CHOSEN}"
-        raise InvalidInputError(message)
-    return list(dict.fromkeys(known[name] for name in names))
-
-
-def farthest_blocks(frames: FramesLike, chosen: Indices, support: Support, most: int) -> list[int]:
-    """Return the blocks to colour, in their order: free ones; of many, those that end farthest from their start."""
-    away = np.hypot(frames.x[chosen[-1]] - frames.x[0], frames.y[chosen[-1]] - frames.y[0])
-    free = ~np.array(support.fixed or (False,) * len(away), dtype=bool)
-    ordered = [int(block) for block in np.argsort(-away, kind="stable") if free[block]]
-    return sorted(ordered[:most])
 
 
 def limits_of(values: Floats) -> tuple[float, float]:
@@ -356,15 +163,6 @@ def drawn_energies(energy: Entries, chosen: Indices) -> Entries:
     return {label: values for label, values in sums.items() if float(np.abs(values).max()) > SMALL_SHARE * most}
 
 
-def support_force(frames: WithContacts, chosen: Indices, support: Support) -> Floats:
-    """Return the upward force (N) of the supports on all free blocks, (n,).
-
-    Raises InvalidInputError where contacts were not stored.
-    """
-    up = float(np.sin(support.tilt)), float(np.cos(support.tilt))
-    return force_on_supports(contacts_of(frames), up, support.fixed)[chosen]
-
-
 def unit_for(most: float, unit: str) -> tuple[float, str]:
     """Return factor and unit in which values up to this one (J, N) are best read."""
     for factor, prefix in ((1e-3, "k"), (1.0, ""), (1e3, "m")):
@@ -373,42 +171,138 @@ def unit_for(most: float, unit: str) -> tuple[float, str]:
     return 1e6, f"µ{unit}"
 
 
-def draw_energies(axes: "Axes", time: Floats, energies: Entries) -> None:
-    """Draw energies (J) by name, each in its own colour and dashes."""
-    factor, unit = unit_for(max((float(np.abs(values).max()) for values in energies.values()), default=0.0), "J")
-    for label, values in energies.items():
-        colour, dashes = ENERGY_LOOKS.get(label, OTHER_ENERGY)
-        axes.plot(time, factor * values, color=colour, linestyle=dashes, linewidth=1.1, label=label)
-    axes.set_ylabel(f"energy ({unit})")
-    if energies:
-        axes.legend(**BESIDE)
+MOST_PANELS = 12
+PERCENT = 98.0  # of the samples of a force that are not those of an impact
+MOST_USUAL, CUT = 3.0, 1.5  # times what they hardly exceed: forces beyond are cut, there
 
 
-def draw_contacts(axes: "Axes", time: Floats, count: Floats) -> None:
-    """Draw the number of contacts."""
-    axes.plot(time, count, color=style.INK, linewidth=0.8, drawstyle="steps-post")
-    axes.set_ylabel("contacts")
-    axes.set_ylim(bottom=0.0)
+def draw_probes(
+    series: Mapping[str, ProbeSeries],
+    path: Path,
+    title: str | None = None,
+    names: Sequence[str] = (),
+    paper: Paper = OWN,
+) -> None:
+    """Draw probes, all or those of these names.
+
+    Raises InvalidInputError for a run without probes, unknown names, too many panels, an unknown picture format or too
+    small a page, and OutputError when the file cannot be written.
+    """
+    unknown = next((name for name in names if name not in series), None)
+    if unknown is not None:
+        hint = did_you_mean_or_list(unknown, series)
+        raise InvalidInputError(f"--probe {unknown}: no such probe in this run, {hint}")
+    panels = [panel for name in names or series for panel in panels_of(series[name])]
+    if not panels:
+        raise InvalidInputError("this run has no samples of probes; [[probes]] in the scenario records them")
+    if len(panels) > MOST_PANELS:
+        message = f"{len(panels)} panels are too many for one picture, at most {MOST_PANELS}; choose with --probe"
+        raise InvalidInputError(message)
+    path = style.picture_path(path)
+    with _opened(panels, title, "", paper) as figure:
+        style.save_figure(figure, path)
 
 
-def draw_force(axes: "Axes", time: Floats, force: Floats, weight: float) -> None:
-    """Draw the support force with the weight (N); where it is cut, its largest value is printed."""
-    largest, reference = float(force.max(initial=0.0)), weight or float(np.median(force)) or 1.0
-    factor, unit = unit_for(reference, "N")
-    axes.plot(time, factor * force, color=style.INK, linewidth=0.8)
-    axes.axhline(factor * weight, color=style.FAINT_INK, linewidth=style.LINE_WIDTH, linestyle=(0, (4, 3)))
-    axes.set_ylabel(f"support force ({unit})")
-    axes.set_ylim(0.0, factor * min(max(1.1 * largest, 1.5 * reference), MOST_WEIGHTS * reference))
-    text = f"upwards, from ground,\nwalls and fixed bodies\ndashed: weight {factor * weight:.3g} {unit}"
-    more = f"\nlargest: {factor * largest:.3g} {unit}" if largest > MOST_WEIGHTS * reference else ""
-    axes.text(1.04, 1.0, text + more, transform=axes.transAxes, va="top")
+def probe_picture(probe: ProbeSeries) -> bytes:
+    """Return the picture (PNG) of one probe, for a report; nothing of one without samples."""
+    panels = panels_of(probe)
+    if not panels:
+        return b""
+    with _opened(panels, None, "", OWN) as figure:
+        return style.figure_bytes(figure, ".png")
 
 
-def draw_ground(axes: "Axes", time: Floats, support: Support) -> None:
-    """Draw the displacement of ground, walls and fixed bodies."""
-    moved = MILLIMETRES * support.displacement(time)
-    axes.plot(time, moved, color=style.INK, linewidth=1.0)
-    axes.set_ylim(*limits_of(moved))
-    axes.set_ylabel("ground (mm)")
-    text = f"displacement of\nthe ground {support.way}" if support.motion is not None else "at rest"
-    axes.text(1.04, 1.0, text, transform=axes.transAxes, va="top")
+def panels_of(probe: ProbeSeries) -> list[TimePanel]:
+    """Return the panels of a probe; none of one without samples."""
+
+    def panel(quantity: str, unit: str, factor: float, columns: Mapping[str, Floats]) -> TimePanel:
+        lines = {name.replace("_", " "): (probe.time, factor * values) for name, values in columns.items()}
+        note = f"probe {probe.name}"[:LETTERS] + ("" if len(lines) > 1 else f"\n{next(iter(lines))}")
+        label = f"{quantity} ({unit})" if unit else quantity
+        return TimePanel(label, lines, note, level=0.0, legend="" if len(lines) > 1 else None)
+
+    def columns(*names: str) -> dict[str, Floats]:
+        return {name: probe[name] for name in names}
+
+    if not len(probe):
+        return []
+    if probe.kind == probes.JOINT:
+        return [panel("joint", "mm", MILLIMETRES, columns("opening_first", "opening_last", "slip"))]
+    if probe.kind == probes.ENERGY:
+        energies = drawn_energies(probe.columns, np.arange(len(probe)))
+        factor, unit = unit_for(max((_largest(one) for one in energies.values()), default=0.0), "J")
+        return [panel("energy", unit, factor, energies)] if energies else []
+    if probe.kind == probes.POINT:
+        moves = any(not np.array_equal(probe[one], probe[f"relative_{one}"]) for one in ("dx", "dy"))
+        places, velocities = (columns(*(f"{'relative_' * moves}{one}{axis}" for axis in "xy")) for one in "dv")
+        return [
+            panel("displacement", "mm", MILLIMETRES, places),
+            panel("velocity", "mm/s", MILLIMETRES, velocities),
+            panel("rotation", "°", 1.0, {"rotation": np.degrees(probe["rotation"])}),
+        ]
+    forces = columns("fx", "fy")
+    largest = max(map(_largest, forces.values()))
+    usual = max(float(np.percentile(np.abs(values), PERCENT)) for values in forces.values())  # hardly exceeded
+    is_cut = usual > 0.0 and largest > MOST_USUAL * usual
+    factor, unit = unit_for(usual if is_cut else largest, "N")
+    force = panel("force", unit, factor, forces)
+    if is_cut:
+        low, high = (
+            sign * min(max(float((sign * one).max()) for one in forces.values()), CUT * usual) for sign in (-1, 1)
+        )
+        room = 0.08 * (high - low)
+        note = f"{force.note}\nlargest: {factor * largest:.3g} {unit}"
+        force = replace(force, note=note, limits=(factor * (low - room), factor * (high + room)))
+    mobilised = columns("mobilised")
+    is_known = np.isfinite(probe["mobilised"]).any()
+    return [force, *([panel("share of friction", "", 1.0, mobilised)] if is_known else [])]
+
+
+def _largest(values: Floats) -> float:
+    return float(np.nanmax(np.abs(values), initial=0.0))
+
+
+BETWEEN = 4
+"""Points of velocity and displacement a piece of the motion."""
+ROUND_OFF = 1e-9
+
+
+def draw_support_motion(support: Support, end: float, path: Path, title: str | None = None, paper: Paper = OWN) -> None:
+    """Draw the motion of the supports along its direction from 0 to `end` (s).
+
+    Raises InvalidInputError for supports that rest, an unknown picture format or too small a page, and OutputError when
+    the file cannot be written.
+    """
+    pieces = support.motion
+    if pieces is None:
+        raise InvalidInputError("the supports of this scenario do not move: it has no table [motion]")
+    peaks = motion_peaks(pieces, end)
+    ends, acceleration = acceleration_ends(pieces)
+    last = int(np.count_nonzero(ends < end))  # the line of straight pieces is cut at the end
+    share = (end - ends[last - 1]) / max(ends[last] - ends[last - 1], 1e-300)
+    value = acceleration[last - 1] + share * (acceleration[last] - acceleration[last - 1])
+    ends, acceleration = np.append(ends[:last], end), np.append(acceleration[:last], value)
+    count = len(pieces.times) - 1
+    times = np.interp(np.linspace(0.0, count, BETWEEN * count + 1), np.arange(count + 1), pieces.times)
+    times = np.append(times[times < end], end)
+    displacement, velocity = displacement_and_velocity(pieces, times)
+
+    def panel(name: str, quantity: str, unit: str, factor: float, line: tuple[Floats, Floats], peak: Peak) -> TimePanel:
+        at, values = line
+        near = int(np.argmin(np.abs(at - peak.time) - 1e-9 * np.abs(values)))
+        in_g = f"= {peak.value / STANDARD_GRAVITY:.4g} g\n" if name == "PGA" else ""
+        note = f"{name} {factor * peak.value:.4g} {unit}\n{in_g}at {peak.time:.4g} s"
+        mark = peak.time, (-factor if values[near] < 0.0 else factor) * peak.value
+        return TimePanel(f"{quantity} ({unit})", {name: (at, factor * values)}, note, [mark], level=0.0)
+
+    panels = [
+        panel("PGA", "acceleration", "m/s²", 1.0, (ends, acceleration), peaks.acceleration),
+        panel("PGV", "velocity", "mm/s", MILLIMETRES, (times, velocity), peaks.velocity),
+        panel("PGD", "displacement", "mm", MILLIMETRES, (times, displacement), peaks.displacement),
+    ]
+    final = ((peaks.final_velocity, peaks.velocity), (float(displacement[-1]), peaks.displacement))
+    speed, place = (MILLIMETRES * one if abs(one) > ROUND_OFF * peak.value else 0.0 for one, peak in final)
+    left = f"At the end: {speed:.4g} mm/s, {place:.4g} mm.".replace("-", "−")
+    path = style.picture_path(path)
+    with _opened(panels, title, f"Ground, walls and fixed bodies, {support.way}. {left}", paper) as figure:
+        style.save_figure(figure, path)

@@ -107,7 +107,7 @@ def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> N
     assert blocksim("plot", "elsewhere", "--out", "strip.svg", "--times", "0,0.05").code == 0
     texts = Path("strip.svg").read_text(encoding="utf-8")
     assert "The support moves along x" in texts
-    assert "gravity points down" in texts
+    assert "The ground is tilted by 3°" in texts
     assert "<!-- support 0.00 mm -->" in texts
 
 

@@ -268,7 +268,7 @@ def test_the_player_gets_all_corners_of_elements_that_grow(monkeypatch: pytest.M
         corners = discs(track, chosen, np.full(len(track.names), RADIUS))
         return corners * (1.0 + np.asarray(chosen)[:, None, None, None])
 
-    monkeypatch.setattr(player, "outlines_of", growing)
+    monkeypatch.setattr(player, "_outlines", lambda track, frame: 1e3 * growing(track, np.array([frame]))[0])
     (packed,) = pack_frames(frames).data["systems"]
     assert packed["shape"] is None
     wanted = 1e3 * growing(frames.others[0], np.arange(len(frames)))

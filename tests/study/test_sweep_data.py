@@ -100,7 +100,6 @@ def test_table_that_was_cut_off_in_a_finished_case_is_refused(nominal: Document,
 def test_repeats_come_with_their_range_and_prediction_interval(nominal: Document, tmp_path: Path) -> None:
     known = stored(nominal, tmp_path, {"gravity": [1.0]}, [f"1.0,{ended(74.0, 130.0)}"]).measured
     assert known.x_mm["2"].tolist() == [71.69, 76.57, 72.70, 73.22, 73.73, 78.53]
-    assert known.range_of("2") == (71.69, 78.53)
     assert known.prediction_mm["2"] == pytest.approx((67.18, 81.63), abs=0.01)
     assert "1" not in known.prediction_mm  # repeats that are all equal predict nothing
     assert known.outcome == (0, -90, -90)

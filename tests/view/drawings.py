@@ -14,7 +14,7 @@ from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, 
 from blocksim.scenario.motion import MotionPieces
 from blocksim.view import style
 from blocksim.view.final import draw_final
-from blocksim.view.history import draw_history
+from blocksim.view.history import Choice, draw_history
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import by_speed, by_turn
@@ -22,7 +22,6 @@ from blocksim.view.run_data import ActingLoad, Support
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, draw_tornado
 from blocksim.view.sweeps.lines import Series, draw_series
-from blocksim.view.time_panels import Choice
 from tests.bench.peers.work_precision import Curve, draw_work_precision
 from tests.bench.peers.work_precision import Panel as Work
 from tests.view.made_up import HOSTILE, pressed, stacked, toppling

@@ -1,7 +1,6 @@
 """Animations: frames chosen by time, the last one held, blocks where they were recorded, and clear refusals."""
 
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -140,34 +139,6 @@ def test_mp4_can_be_read_back(tmp_path: Path) -> None:
     found = pixel_of(animation, last, *near_the_centre(frames, -1, 1))
     assert np.abs(np.subtract(found, colour(1))).max() < 16  # as lossy as MP4 is
     assert [one.name for one in tmp_path.iterdir()] == ["film.mp4"]
-
-
-class Stopping:
-    """Stands for imageio-ffmpeg on a disk that becomes full: in the middle, or only when the animation is closed."""
-
-    def __init__(self, *, in_the_middle: bool) -> None:
-        self.in_the_middle = in_the_middle
-
-    def get_ffmpeg_exe(self) -> str:
-        return "ffmpeg"
-
-    def write_frames(self, *_: object, **__: object) -> Iterator[None]:
-        for _number in range(1 if self.in_the_middle else 1000):
-            yield
-        raise OSError("Broken pipe\n\nFFMPEG COMMAND")
-
-    def count_frames_and_secs(self, _: str) -> tuple[int, float]:
-        return 3, 0.1
-
-
-@pytest.mark.parametrize("in_the_middle", [True, False])
-def test_a_film_that_is_not_whole_is_not_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_the_middle: bool
-) -> None:
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", Stopping(in_the_middle=in_the_middle))
-    with pytest.raises(OutputError, match=r"film\.mp4: cannot be written: ffmpeg stopped before the end"):
-        draw_animation(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_system_s_ffmpeg_writes_mp4_where_the_package_is_missing(

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.frames import force_on_supports
 from blocksim.view import style
-from blocksim.view.history import draw_history, line_looks
+from blocksim.view.history import ENERGY_LOOKS, Choice, draw_history, line_looks
 from blocksim.view.paint import by_speed
 from blocksim.view.run_data import Support
-from blocksim.view.time_panels import ENERGY_LOOKS, LEAST_SPAN, Choice, drawn_energies, unit_for
+from blocksim.view.time_panels import LEAST_SPAN, drawn_energies, unit_for
 from tests.golden import Golden
 from tests.view.drawings import MOVING
 from tests.view.made_up import overlapping, pressed, toppling

@@ -7,9 +7,8 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.motion import motion_pieces
-from blocksim.view.history import draw_support_motion
 from blocksim.view.run_data import Support
-from blocksim.view.time_panels import MOST_POINTS, thinned
+from blocksim.view.time_panels import MOST_POINTS, draw_support_motion, thinned
 from tests.scenario.test_motion import END, scenario
 
 PULSE = {"kind": "pulse", "shape": "rectangular", "amplitude": "0.5 g", "duration": 0.1, "start": 0.2}

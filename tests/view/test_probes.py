@@ -8,9 +8,9 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.simulation import simulate_into
 from blocksim.simulation.probes import COLUMNS, ProbeSeries, columns_of, series_of
-from blocksim.view.history import draw_probes, panels_of
 from blocksim.view.report.page import page_text
 from blocksim.view.report.subjects import read_stored, run_subject
+from blocksim.view.time_panels import draw_probes, panels_of
 from tests.simulation.test_probes import scene
 
 LEDGER = ("kinetic", "potential", "friction")

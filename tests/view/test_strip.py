@@ -49,18 +49,19 @@ def test_long_scenes_and_small_names_get_fewer_columns(
 @pytest.mark.parametrize("extent", [Extent(0, 160, -5, 150), Extent(0, 900, -2, 50), Extent(-200, 300, -5, 2000)])
 def test_panels_share_one_scale_and_do_not_overlap(extent: Extent) -> None:
     layout = plan(OWN, extent, *arrangement(extent), Lines(measured_rows=2))
-    assert layout.panel_width * 72 / extent.width == pytest.approx(layout.points_per_mm)
+    assert layout.panel[0] * 72 / layout.extent.width == pytest.approx(layout.points_per_mm)
     boxes = [layout.place(index) for index in range(layout.rows * layout.columns)]
     for index, (left, bottom, width, height) in enumerate(boxes):
         assert min(left, bottom) > 0.0
-        assert max(left + width, bottom + height) < 1.0
+        assert left + width < layout.size[0]
+        assert bottom + height < layout.size[1]
         for other_left, other_bottom, *_ in boxes[index + 1 :]:
             assert other_left >= left + width or other_bottom + height <= bottom
 
 
 def test_tilted_panels_have_room_for_the_numbers_along_the_ground() -> None:
     level, tilted = (plan(OWN, Extent(0, 400, 0, 300, tilt=tilt), 4, 8, Lines(measured_rows=1)) for tilt in (0.0, 0.3))
-    below = [one.panel_height * 72 - (300 - one.extent.lowest) * one.points_per_mm for one in (level, tilted)]
+    below = [one.panel[1] * 72 - (300 - one.extent.lowest) * one.points_per_mm for one in (level, tilted)]
     assert below[1] - below[0] > 12.0
 
 

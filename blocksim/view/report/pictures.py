@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from blocksim.simulation.frames import Frames
 from blocksim.view import style
-from blocksim.view.history import HistoryLike, draw_history_page
+from blocksim.view.history import draw_history_page
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.run_data import Support
 from blocksim.view.style import OWN
@@ -48,7 +49,7 @@ def embedded(figure: "Figure") -> str:
     return f"data:image/svg+xml;base64,{b64encode(short.encode()).decode()}"
 
 
-def history_of(frames: HistoryLike, support: Support, measured: Repeats | None) -> tuple[str, list[dict[str, Any]]]:
+def history_of(frames: Frames, support: Support, measured: Repeats | None) -> tuple[str, list[dict[str, Any]]]:
     """Return the histories of a run, and of each panel its name, place and the ends of its axes."""
     with draw_history_page(frames, None, measured, support) as (figure, panels):
         places = [

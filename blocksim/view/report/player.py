@@ -13,7 +13,7 @@ from blocksim.simulation.frames import Frames
 from blocksim.simulation.result import EventRecord
 from blocksim.view import style
 from blocksim.view.arrows import SPEED, Arrows, Mark, Turns, force_scale, length_in, outside, pushing_up, with_room
-from blocksim.view.paint import ELEMENT_COLOURS, shade_scale
+from blocksim.view.paint import ELEMENT_COLOURS, capped_scale
 from blocksim.view.run_data import (
     MILLIMETRES,
     Extent,
@@ -22,8 +22,6 @@ from blocksim.view.run_data import (
     Support,
     drawable_frames,
     extent_of,
-    others_of,
-    outlines_of,
     rotate_points,
     shortest_sides,
     support_of,
@@ -74,7 +72,7 @@ SAME_SHAPE = 1e-6  # of its size, by which corners of an outline that only moves
 def element_bytes(frames: Frames, drawable: Indices) -> int:
     """Return about how many bytes the elements of all systems take in one frame."""
     ends = drawable[[0, -1]]
-    tracks = others_of(frames)
+    tracks = frames.others
     return sum(SHORT_BYTES * (_numbers(track, ends) + len(track.system.shades)) * len(track.names) for track in tracks)
 
 
@@ -86,7 +84,7 @@ def _numbers(track: Track, ends: Indices) -> int:
 
 def _outlines(track: Track, frame: int) -> Floats:
     """Return the outlines (mm) in one frame, (b, k, 2)."""
-    return np.asarray(MILLIMETRES * outlines_of(track, np.array([frame]))[0])
+    return np.asarray(MILLIMETRES * track.system.outlines(track, np.array([frame]))[0])
 
 
 def _only_move(outlines: Floats) -> bool:
@@ -109,13 +107,13 @@ def pack_systems(frames: Frames, kept: Indices) -> list[dict[str, Any]]:
             "colour": style.block_colour(number),
             **_packed(track, kept),
             "shades": [
-                {"label": shade.label, "high": shade_scale(shade, values).high, "values": pack(values)[0]}
+                {"label": shade.label, "high": capped_scale(shade.label, values).high, "values": pack(values)[0]}
                 for shade in track.system.shades
                 for values in [shade.of(track.some(kept))]
             ],
             "palette": palette() if track.system.shades else [],
         }
-        for number, track in enumerate(others_of(frames), start=1)
+        for number, track in enumerate(frames.others, start=1)
     ]
 
 

@@ -18,10 +18,10 @@ from blocksim.simulation.observables import OBSERVABLES
 from blocksim.simulation.probes import ProbeSeries
 from blocksim.simulation.result import Summary, read_summary
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
-from blocksim.view.history import panels_of, probe_picture
 from blocksim.view.report.pictures import Repeats, history_of
 from blocksim.view.report.player import MOST_BYTES, frame_indices, pack_forces, pack_frames, pack_loads, scene_data
 from blocksim.view.run_data import support_of
+from blocksim.view.time_panels import probe_picture
 
 ROOT = r"(?:/|[A-Za-z]:[\\/])"
 ABSOLUTE = re.compile(rf"'(?P<quoted>{ROOT}[^']+)'|(?<![^\s=,(\"])(?P<bare>{ROOT}[^\s'\",:;()]+)")
@@ -262,7 +262,7 @@ def _ledger(run: PartialRun) -> list[tuple[str, str]]:
 
 def _probe(probe: ProbeSeries) -> dict[str, str]:
     """Return a line about a probe, and its picture (PNG, base64)."""
-    picture = b64encode(probe_picture(probe)).decode() if panels_of(probe) else ""
+    picture = b64encode(probe_picture(probe)).decode()
     text = f"{probe.name}: {probe.kind}, {len(probe)} samples to {probe.time[-1]:.4g} s, in probe-{probe.name}.csv"
     return {"text": text, "picture": picture}
 

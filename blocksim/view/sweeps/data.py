@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from blocksim.view.run_data import Flags, Floats
+
 QUARTER = 90.0  # deg
 RARE = 5.0  # percent of run-outs at either end that do not make a block worth drawing
 MOST_ROWS, MOST_COLUMNS = 4, 4
@@ -65,11 +64,6 @@ class Measurements:
     prediction_mm: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     outcome: tuple[int, ...] | None = None  # rotations of all blocks in degrees, rounded to quarter turns
 
-    def range_of(self, block: str) -> tuple[float, float] | None:
-        """Return the smallest and largest repeat (mm), None where there is none."""
-        repeats = self.x_mm.get(block)
-        return None if repeats is None else (float(repeats.min()), float(repeats.max()))
-
 
 @dataclass(frozen=True, eq=False)
 class SweepData:
@@ -112,7 +106,11 @@ class SweepData:
 
 def short_names(keys: Sequence[str]) -> list[str]:
     """Return the keys with the shortest ends that distinguish them and name what they are of: "time.end", not "end"."""
-    ends = [_ends(key) for key in keys]
+    ends = []
+    for key in keys:  # the ends of two parts at least, none that begins with a number, the whole last
+        parts = key.split(".")
+        mine = [".".join(parts[start:]) for start in reversed(range(len(parts))) if not parts[start].isdigit()]
+        ends.append(mine[1:] or [key])
     return [next(end for end in mine if sum(end in others for others in ends) == 1 or end == mine[-1]) for mine in ends]
 
 
@@ -121,13 +119,6 @@ def outcome_label(outcome: tuple[int, ...], most: int = 6) -> str:
     if len(outcome) <= most:
         return "/".join(f"{turn}°".replace("-", "−") for turn in outcome)
     return f"{sum(turn != 0 for turn in outcome)} of {len(outcome)} turned"
-
-
-def _ends(key: str) -> list[str]:
-    """Return the ends of a key, of two parts at least and none that begins with a number, the whole last."""
-    parts = key.split(".")
-    ends = [".".join(parts[start:]) for start in reversed(range(len(parts))) if not parts[start].isdigit()]
-    return ends[1:] or [key]
 
 
 def percent(share: float) -> str:
@@ -173,9 +164,8 @@ def value_axis(
         other, around = scale_of(abs(middle), unit, typed)
         is_readable = typed is not None and half / typed.worth >= LEAST_READABLE
         factor, shown = scale_of(half, unit, typed if is_readable else None)
-        return ValueAxis(
-            f"{key} − {middle * other:.9g}{_spaced(around)}{_bracketed(shown)}", middle, factor, is_log=False
-        )
+        name = f"{key} − {middle * other:.9g} {around}".rstrip()
+        return ValueAxis(f"{name}{_bracketed(shown)}", middle, factor, is_log=False)
     return ValueAxis(f"{key}{_bracketed(shown)}", 0.0, factor, is_log=False)
 
 
@@ -192,10 +182,6 @@ def scale_of(size: float, unit: str, typed: InputUnit | None = None) -> tuple[fl
     if power in {-3, 0, 3}:
         return 1.0, unit
     return 10.0**-power, f"10^{power} {unit}".strip()
-
-
-def _spaced(unit: str) -> str:
-    return f" {unit}" if unit else ""
 
 
 def _bracketed(unit: str) -> str:

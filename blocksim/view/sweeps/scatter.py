@@ -8,28 +8,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.view import style
+from blocksim.view.run_data import Floats
 from blocksim.view.style import OWN, Paper
-from blocksim.view.sweeps.data import Flags, Floats, Input, SweepData, ValueAxis, percent, short_names, value_axis
+from blocksim.view.sweeps.data import Input, SweepData, ValueAxis, percent, short_names, value_axis
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 
-_LEFT, _FOOT = 0.46, 0.34  # inches; more where names of levels stand there
-_GAP = 0.05  # inches, between panels
-LARGEST_PANEL, _LOWEST = 1.1, 0.35  # inches
+LEFT, HEAD, FOOT = 0.46, 0.12, 0.34  # inches; more where names of levels stand at the left and below
+GAP = 0.05  # inches, between panels
+LARGEST, LOWEST = 1.1, 0.35  # inches, of a panel
 SMALL_FONT, NAME_FONT = 6.0, style.FONT_SIZE - 1.0  # points
-_NAME_ROOM = 1.5  # inches, of a line of a name; longer ones take several
+NAME_ROOM = 1.5  # inches, of a line of a name; longer ones take several
 LONGEST_LEVEL = 1.0  # inches
 FITTINGS = 4  # smaller panels leave less room for names beside them
 CROWDED = 0.08  # of an axis; a number this near to its start runs into the last one of the panel before
-MOST_INPUTS, _MOST_BLOCKS = 9, 3
-_BINS = 16
-_RARE = 0.5  # percent of run-outs at either end that may lie beyond an axis
+MOST_INPUTS, MOST_BLOCKS = 9, 3
+BINS = 16
+RARE = 0.5  # percent of run-outs at either end that may lie beyond an axis
 MARGIN = 0.04
 SCATTER = 0.5  # of the distance between levels, over which their dots are spread
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # multiples of it, cut to their fractions, are evenly spread
@@ -55,81 +54,66 @@ class Variable:
 
 def variables_of(sweep: SweepData) -> list[Variable]:
     """Return the first inputs and the blocks that move, in this order."""
-    inputs = sweep.inputs[:MOST_INPUTS]
-    named = zip(inputs, short_names([one.key for one in sweep.inputs])[: len(inputs)], strict=True)
-    return [
-        *(_of_input(one, name) for one, name in named),
-        *(_of_block(sweep, block) for block in sweep.moving[-_MOST_BLOCKS:]),
-    ]
+    names = short_names([one.key for one in sweep.inputs])
+    variables = [_of_input(one, name) for one, name in zip(sweep.inputs, names, strict=True)][:MOST_INPUTS]
+    for block in sweep.moving[-MOST_BLOCKS:]:
+        x, name = sweep.x_mm[:, block], sweep.blocks[block]
+        repeats = sweep.measured.x_mm.get(name)
+        ends = np.nanpercentile(x, [RARE, 100.0 - RARE])
+        known = ends if repeats is None else np.concatenate([ends, repeats])
+        variables.append(Variable(_in_lines(f"x of {name} (mm)"), x, _around(known, None), repeats=repeats))
+    return variables
 
 
 @contextmanager
 def draw_matrix(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
-    """Give the lower half of the matrix, with histograms on its diagonal."""
+    """Give the lower half of the matrix, with histograms on its diagonal and names beside that."""
     variables = variables_of(sweep)
-    count, legend = len(variables), _entries(sweep)
-    sides = _sides_of(variables)
-    foot = sides.foot + style.LINE + 2.0 * style.EDGE
-    size = _panel_size(variables, sides, paper)
-    across = paper.width(max(sides.left + _right_of(variables, size) + _grid(count, size), style.COLUMN_WIDTH))
-    head = style.title_height(sweep.title, across)
-    if paper.size is not None:
-        size = min(size, paper.panel(0.0, count, head + foot + (count - 1) * _GAP, _LOWEST))
-    height = paper.height(head + _grid(count, size) + foot)
-    with style.styled_figure(across, height, paper.dots) as figure:
-        style.write_title(figure, sweep.title)
-        for row in range(count):
-            bottom = foot + (count - 1 - row) * (size + _GAP)
-            for column in range(row + 1):
-                axes = style.add_axes(figure, sides.left + column * (size + _GAP), bottom, size, size)
-                _draw_panel(axes, sweep, variables[row], variables[column])
-                _finish(axes, variables[row], variables[column], is_left=column == 0 < row, is_last=row == count - 1)
-            place = (sides.left + row * (size + _GAP) + size + 0.04, bottom + 0.5 * size)
-            style.write_text(figure, *place, variables[row].name, va="center", fontsize=NAME_FONT)
-        look: dict[str, Any] = {"ncols": 4, "handletextpad": 0.3, "columnspacing": 1.2}
-        style.write_legend(figure, legend, style.EDGE, style.EDGE, **look)
+    count, levels = len(variables), [level for one in variables for level in one.levels]
+    widest = max((style.width_of(level, SMALL_FONT) for level in levels), default=0.0) / style.POINTS_PER_INCH + 0.12
+    left, foot = max(LEFT, widest), max(FOOT, widest if levels else 0.0)
+    width = paper.width(style.PAGE_WIDTH, left + _right_of(variables, LOWEST) + _grid(count, LOWEST))
+    size = LARGEST
+    for _ in range(FITTINGS):
+        size = min(size, (width - left - _right_of(variables, size) - (count - 1) * GAP) / count)
+    size = max(size, LOWEST)
+    room = style.COLUMN_WIDTH if paper.size is None else width
+    right = max(_right_of(variables, size), room - left - _grid(count, size))
+    opened = style.open_panels(
+        paper,
+        (count, count),
+        (size, size),
+        (LOWEST, LOWEST),
+        (left, right, HEAD, foot),
+        (GAP, GAP),
+        title=sweep.title,
+        handles=_entries(sweep),
+        columns=4,
+    )
+    with opened as (figure, panels):
+        for row, (up, axes_of_row) in enumerate(zip(variables, panels, strict=True)):
+            for axes in axes_of_row[row + 1 :]:
+                axes.remove()
+            for column, (across, axes) in enumerate(zip(variables, axes_of_row[: row + 1], strict=False)):
+                _draw_panel(axes, sweep, up, across)
+                _finish(axes, up, across, is_left=column == 0 < row, is_last=row == count - 1)
+            beside: dict[str, Any] = {"transform": axes_of_row[row].transAxes, "va": "center", "fontsize": NAME_FONT}
+            axes_of_row[row].text(1.0 + 0.04 / size, 0.5, up.name, **beside)
         yield figure
 
 
-@dataclass(frozen=True)
-class _Sides:
-    """Inches to the left of the panels and below them."""
-
-    left: float
-    foot: float
-
-
-def _sides_of(variables: Sequence[Variable]) -> _Sides:
-    """Return the room that numbers and names of levels need."""
-    levels = [level for one in variables for level in one.levels]
-    if not levels:
-        return _Sides(_LEFT, _FOOT)
-    widest = max(style.width_of(level, SMALL_FONT) for level in levels) / style.POINTS_PER_INCH + 0.12
-    return _Sides(max(_LEFT, widest), max(_FOOT, widest))
-
-
 def _grid(count: int, size: float) -> float:
-    return count * size + (count - 1) * _GAP
+    return count * size + (count - 1) * GAP
 
 
 def _right_of(variables: Sequence[Variable], size: float) -> float:
     """Return the room (inches) to the right of the panels that the names beside the diagonal need."""
-    lines = [(row, line) for row, one in enumerate(variables) for line in one.name.split("\n")]
     widths = [
-        style.width_of(line, NAME_FONT) / style.POINTS_PER_INCH - (len(variables) - 1 - row) * (size + _GAP)
-        for row, line in lines
+        style.width_of(line, NAME_FONT) / style.POINTS_PER_INCH - (len(variables) - 1 - row) * (size + GAP)
+        for row, one in enumerate(variables)
+        for line in one.name.split("\n")
     ]
     return max(*widths, 0.0) + 0.04 + style.EDGE
-
-
-def _panel_size(variables: Sequence[Variable], sides: _Sides, paper: Paper) -> float:
-    """Return the side of a panel (inches) so that the matrix fills the width of the page. Raises InvalidInputError."""
-    count, size = len(variables), LARGEST_PANEL
-    least = sides.left + _right_of(variables, _LOWEST) + _grid(count, _LOWEST)
-    width = paper.width(style.PAGE_WIDTH, least)
-    for _ in range(FITTINGS):
-        size = min(size, (width - sides.left - _right_of(variables, size) - (count - 1) * _GAP) / count)
-    return max(size, _LOWEST)
 
 
 def _of_input(one: Input, name: str) -> Variable:
@@ -144,15 +128,7 @@ def _of_input(one: Input, name: str) -> Variable:
 
 
 def _in_lines(name: str) -> str:
-    return "\n".join(style.broken(name, _NAME_ROOM, NAME_FONT))
-
-
-def _of_block(sweep: SweepData, block: int) -> Variable:
-    x, name = sweep.x_mm[:, block], sweep.blocks[block]
-    repeats = sweep.measured.x_mm.get(name)
-    ends = np.nanpercentile(x, [_RARE, 100.0 - _RARE])
-    known = ends if repeats is None else np.concatenate([ends, repeats])
-    return Variable(_in_lines(f"x of {name} (mm)"), x, _around(known, None), repeats=repeats)
+    return "\n".join(style.broken(name, NAME_ROOM, NAME_FONT))
 
 
 def _around(values: Floats, axis: ValueAxis | None) -> tuple[float, float]:
@@ -166,6 +142,7 @@ def _around(values: Floats, axis: ValueAxis | None) -> tuple[float, float]:
 
 
 def _draw_panel(axes: "Axes", sweep: SweepData, up: Variable, across: Variable) -> None:
+    """Draw repeats as dots where both variables are measured together, else as lines over their range."""
     if up is across:
         _draw_histogram(axes, sweep, up)
         return
@@ -173,11 +150,6 @@ def _draw_panel(axes: "Axes", sweep: SweepData, up: Variable, across: Variable) 
     outside = sweep.finished & ~inside
     for cases, look in ((outside, OUTSIDE), (~sweep.finished, FAILED), (inside, INSIDE)):
         axes.scatter(across.values[cases], up.values[cases], **look)
-    _draw_repeats(axes, up, across)
-
-
-def _draw_repeats(axes: "Axes", up: Variable, across: Variable) -> None:
-    """Draw repeats as dots where both are measured together, else as lines over their range."""
     if up.repeats is not None and across.repeats is not None and len(up.repeats) == len(across.repeats):
         axes.scatter(across.repeats, up.repeats, **REPEAT)
         return
@@ -191,7 +163,7 @@ def _draw_repeats(axes: "Axes", up: Variable, across: Variable) -> None:
 def _draw_histogram(axes: "Axes", sweep: SweepData, one: Variable) -> None:
     """Draw how many cases have which value, and the same of those that agree, both to the height of the panel."""
     spread = np.geomspace if one.is_log else np.linspace
-    edges = spread(*one.limits, _BINS + 1)
+    edges = spread(*one.limits, BINS + 1)
     drawn = [(sweep.finished, OUTSIDE["color"], True)]
     if sweep.inside is not None:
         drawn.append((sweep.inside, INSIDE["color"], False))
@@ -221,25 +193,23 @@ def _finish(axes: "Axes", up: Variable, across: Variable, *, is_left: bool, is_l
 
 
 def _number(side: "Axis", one: Variable) -> None:
-    style.number_axis(side, 2, is_log=one.is_log)
-    if side is side.axes.xaxis and not one.levels:
-        side.set_ticks(_clear_of_the_start(*one.limits, is_log=one.is_log))
-    if one.levels:
-        side.set_ticks(range(len(one.levels)), list(one.levels))
-    if side is side.axes.xaxis:
-        for label in side.get_ticklabels():
-            label.set(rotation=90.0 if one.levels else 45.0, rotation_mode="default" if one.levels else "anchor")
-            label.set_horizontalalignment("center" if one.levels else "right")
-
-
-def _clear_of_the_start(low: float, high: float, *, is_log: bool) -> list[float]:
-    """Return two numbers for an axis, none so near to its start that it runs into the last one of the panel before."""
+    """Write two numbers along an axis, below none so near to its start that it runs into the panel before."""
     from matplotlib.ticker import LogLocator, MaxNLocator
 
-    locator = LogLocator() if is_log else MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10])
-    first = low * (high / low) ** CROWDED if is_log else low + CROWDED * (high - low)
-    clear = [float(tick) for tick in locator.tick_values(low, high) if first < tick <= high]
-    return sorted({clear[0], clear[-1]}) if clear else [high]
+    style.number_axis(side, 2, is_log=one.is_log)
+    if one.levels:
+        side.set_ticks(range(len(one.levels)), list(one.levels))
+    if side is not side.axes.xaxis:
+        return
+    if not one.levels:
+        low, high = one.limits
+        locator = LogLocator() if one.is_log else MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10])
+        first = low * (high / low) ** CROWDED if one.is_log else low + CROWDED * (high - low)
+        clear = [float(tick) for tick in locator.tick_values(low, high) if first < tick <= high]
+        side.set_ticks(sorted({clear[0], clear[-1]}) if clear else [high])
+    for label in side.get_ticklabels():
+        label.set(rotation=90.0 if one.levels else 45.0, rotation_mode="default" if one.levels else "anchor")
+        label.set_horizontalalignment("center" if one.levels else "right")
 
 
 def _entries(sweep: SweepData) -> list[Any]:
@@ -264,15 +234,13 @@ def _entries(sweep: SweepData) -> list[Any]:
     return entries
 
 
-_LEFT_HISTOGRAM, RIGHT, _FOOT_HISTOGRAM = 0.55, 0.2, 0.42  # inches
-PANEL_HEIGHT, _GAP_HISTOGRAM, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
-NARROWEST, _LOWEST_HISTOGRAM = 2.6, 0.6  # inches, of a page and a panel where a size was asked for
-_NAME_ROOM_HISTOGRAM = 1.2  # inches, for the name of a block
-CAPTION = 0.2  # inches, of the text above a panel
-LINE = 0.145  # inches, of a row of text
-_MOST_BLOCKS_HISTOGRAM = 4
-_BINS_HISTOGRAM = 40
-_RARE_HISTOGRAM = 1.0  # percent at either end that may lie beyond the axis
+SIDES = 0.55, 0.2, 0.32, 0.42  # inches, around the panels of a histogram
+PANEL_HEIGHT, ROW_GAP, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
+LEAST_PANEL = 1.85, 0.6  # inches, of a panel where a size was asked for
+BLOCK_ROOM = 1.2  # inches, for the name of a block
+MOST_HISTOGRAMS = 4
+MANY_BINS = 40
+RARE_RUN_OUTS = 1.0  # percent at either end that may lie beyond the axis
 LEAST_BIN_MM = 0.01
 ALL_COLOUR, INSIDE_COLOUR = "#B5D6EA", "#0072B2"
 _MARK: dict[str, Any] = {"marker": "|", "color": style.MEASURED_COLOUR, "zorder": 4}
@@ -283,68 +251,56 @@ _INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 @contextmanager
 def draw_histogram(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
     """Give a panel for each block that moves."""
-    blocks = sweep.moving[-_MOST_BLOCKS_HISTOGRAM:]
-    legend = _entries_histogram(sweep)
-    foot = _FOOT_HISTOGRAM + LINE * -(-len(legend) // 2) + 2.0 * style.EDGE
-    width = paper.width(style.COLUMN_WIDTH, NARROWEST)
-    head = style.title_height(sweep.title, width) + CAPTION
-    others = head + (len(blocks) - 1) * _GAP_HISTOGRAM + foot
-    panel = paper.panel(PANEL_HEIGHT, len(blocks), others, _LOWEST_HISTOGRAM)
-    height = paper.height(others + len(blocks) * panel)
-    with style.styled_figure(width, height, paper.dots) as figure:
-        style.write_title(figure, sweep.title)
-        for row, block in enumerate(blocks):
-            bottom = foot + (len(blocks) - 1 - row) * (panel + _GAP_HISTOGRAM)
-            axes = style.add_axes(figure, _LEFT_HISTOGRAM, bottom, width - _LEFT_HISTOGRAM - RIGHT, panel)
-            _draw_block(axes, sweep, block, ROOM / (panel - ROOM))
-        look: dict[str, Any] = {"ncols": 2, "labelspacing": 0.25, "columnspacing": 1.0}
-        style.write_legend(figure, legend, style.EDGE, style.EDGE, **look)
+    blocks = sweep.moving[-MOST_HISTOGRAMS:]
+    own = style.COLUMN_WIDTH - sum(SIDES[:2]), PANEL_HEIGHT
+    more: dict[str, Any] = {"title": sweep.title, "handles": _entries_histogram(sweep), "columns": 2}
+    with style.open_panels(paper, (len(blocks), 1), own, LEAST_PANEL, SIDES, (0.0, ROW_GAP), **more) as opened:
+        figure, rows = opened
+        for block, (axes,) in zip(blocks, rows, strict=True):
+            _draw_block(axes, sweep, block, ROOM / (style.size_of(axes)[1] - ROOM))
         yield figure
 
 
 def limits_of(x_mm: Floats, others: Floats) -> tuple[float, float]:
     """Return the ends of an axis (mm) around all but the rarest run-outs and everything measured."""
-    ends = np.concatenate([np.percentile(x_mm, [_RARE_HISTOGRAM, 100.0 - _RARE_HISTOGRAM]), others])
+    ends = np.concatenate([np.percentile(x_mm, [RARE_RUN_OUTS, 100.0 - RARE_RUN_OUTS]), others])
     low, high = float(ends.min()), float(ends.max())
-    margin = max(0.04 * (high - low), 0.5 * _BINS_HISTOGRAM * LEAST_BIN_MM)
+    margin = max(0.04 * (high - low), 0.5 * MANY_BINS * LEAST_BIN_MM)
     return low - margin, high + margin
 
 
 def _draw_block(axes: "Axes", sweep: SweepData, block: int, room: float) -> None:
-    """Draw a panel; `room` is that above the bars, over their height."""
-    name = sweep.blocks[block]
+    """Draw the shares of all cases (%) over final x; `room` is that above the bars, over their height."""
+    name, count = sweep.blocks[block], len(sweep.finished)
     x = sweep.x_mm[sweep.finished, block]
-    inside = None if sweep.inside is None else sweep.inside[sweep.finished]
     repeats = sweep.measured.x_mm.get(name, np.empty(0))
     interval = np.array(sweep.measured.prediction_mm.get(name, ()))
-    limits = limits_of(x, np.concatenate([repeats, interval]))
-    top = _draw_bars(axes, x, inside, len(sweep.finished), limits)
+    low, high = limits_of(x, np.concatenate([repeats, interval]))
+    edges = np.linspace(low, high, MANY_BINS + 1)
+    shares = 100.0 * np.histogram(x, edges)[0] / count
+    axes.stairs(shares, edges, fill=True, color=ALL_COLOUR)
+    if sweep.inside is not None:
+        inside = x[sweep.inside[sweep.finished]]
+        axes.stairs(100.0 * np.histogram(inside, edges)[0] / count, edges, fill=True, color=INSIDE_COLOUR)
+    top = float(shares.max())
     if repeats.size:
         axes.axvspan(repeats.min(), repeats.max(), color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
         axes.plot(repeats, np.full(len(repeats), 1.2 * top), **_REPEATS)
     if interval.size:
         axes.plot(interval, [1.08 * top] * 2, **_INTERVAL)
-    axes.set_xlim(*limits)
+    axes.set_xlim(low, high)
     axes.set_ylim(0.0, top * (1.0 + room))
     axes.spines[["right", "top"]].set_visible(False)
     for side in (axes.xaxis, axes.yaxis):
         style.number_axis(side)
     axes.set_yticks([tick for tick in axes.get_yticks() if tick <= top])
     axes.set_ylabel("cases (%)")
-    shown = style.cut_to(name, _NAME_ROOM_HISTOGRAM * style.POINTS_PER_INCH, style.FONT_SIZE)
+    shown = style.cut_to(name, BLOCK_ROOM * style.POINTS_PER_INCH, style.FONT_SIZE)
     axes.set_xlabel(f"final x of block {shown} (mm)", labelpad=2.0)
-    axes.set_title(_caption(x, limits), loc="left", pad=4.0)
-
-
-def _draw_bars(axes: "Axes", x: Floats, inside: Flags | None, count: int, limits: tuple[float, float]) -> float:
-    """Draw shares of all cases (%) and return the largest."""
-    edges = np.linspace(*limits, _BINS_HISTOGRAM + 1)
-    shares, _ = np.histogram(x, edges)
-    axes.stairs(100.0 * shares / count, edges, fill=True, color=ALL_COLOUR)
-    if inside is not None:
-        hits, _ = np.histogram(x[inside], edges)
-        axes.stairs(100.0 * hits / count, edges, fill=True, color=INSIDE_COLOUR)
-    return float(100.0 * shares.max() / count)
+    beyond = int(((x < low) | (x > high)).sum())
+    axes.set_title(
+        f"median {np.median(x):.1f} mm{f', {beyond} beyond the axis' if beyond else ''}", loc="left", pad=4.0
+    )
 
 
 def _entries_histogram(sweep: SweepData) -> list[Any]:
@@ -362,9 +318,3 @@ def _entries_histogram(sweep: SweepData) -> list[Any]:
     if sweep.measured.prediction_mm:
         entries.append(Line2D([], [], **_INTERVAL, label="next test (95 %)"))
     return entries
-
-
-def _caption(x: Floats, limits: tuple[float, float]) -> str:
-    beyond = int(((x < limits[0]) | (x > limits[1])).sum())
-    rest = f", {beyond} beyond the axis" if beyond else ""
-    return f"median {np.median(x):.1f} mm{rest}"

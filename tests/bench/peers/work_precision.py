@@ -1,6 +1,7 @@
 """Accuracy over computing time: a panel for each scene, a line for each method."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,14 +11,14 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from blocksim.view import style
 from blocksim.view.run_data import Floats
-from blocksim.view.style import OWN, PanelPage, Paper, write_heading
+from blocksim.view.style import OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-PANEL_WIDTH, PANEL_HEIGHT = 3.6, 2.9  # inches
-LEFT, RIGHT, HEAD, FOOT, GAP = 0.62, 0.15, 0.62, 0.48, 0.72  # inches
-NARROWEST, LOWEST = 1.9, 0.9  # inches, of a panel on a page whose size was asked for
+PANEL, LEAST = (3.6, 2.9), (1.9, 0.9)  # inches, of a panel, and on a page whose size was asked for
+LEFT, RIGHT, HEAD, FOOT, GAP = 0.62, 0.15, 0.32, 0.40, 0.72  # inches
 LEGEND_ROW, LEGEND_ENTRY = 0.17, 1.8  # inches: height of a row of the legend, width of an entry
 MOST_CURVES = 9  # for which a page is refused before anything is measured
 MARKERS = "os^D"
@@ -58,36 +59,32 @@ def draw_work_precision(
     Raises InvalidInputError for an unknown picture format or too small a page, and OutputError when the file cannot be
     written.
     """
-    path = Path(path)
-    style.picture_suffix(path)
+    path = style.picture_path(path)
     groups = tuple(dict.fromkeys(curve.group for panel in panels for curve in panel.curves))
-    page = _page(len(panels), max(len(panel.curves) for panel in panels), paper)
-    with style.styled_figure(page.width, page.height, paper.dots) as figure:
-        size = page.panel / page.width, page.row / page.height
-        for index, panel in enumerate(panels):
-            left = LEFT + index * (page.panel + GAP)
-            axes = figure.add_axes((left / page.width, page.foot / page.height, *size))
+    with _opened(len(panels), max(len(panel.curves) for panel in panels), title, paper) as (figure, row, columns):
+        for axes, panel in zip(row, panels, strict=True):
             _draw_panel(axes, panel, groups)
-            anchor = (left / page.width, 0.04 / page.height)
-            handles = axes.get_legend_handles_labels()
-            figure.legend(*handles, loc="lower left", bbox_to_anchor=anchor, ncols=page.columns, frameon=False)
-        write_heading(figure, title, 0.12)
+            handles, _ = axes.get_legend_handles_labels()
+            left = axes.get_position().x0 * float(figure.get_figwidth())
+            style.write_legend(figure, handles, left, style.EDGE, ncols=columns)
         style.save_figure(figure, path)
 
 
 def refuse_small_page(panels: int, paper: Paper) -> None:
     """Raise InvalidInputError where so many panels have no room for their curves."""
-    _page(panels, MOST_CURVES, paper)
+    with _opened(panels, MOST_CURVES, None, paper):
+        pass
 
 
-def _page(panels: int, curves: int, paper: Paper) -> PanelPage:
-    sides = LEFT + (panels - 1) * GAP + RIGHT
-    width = paper.width(sides + panels * PANEL_WIDTH, sides + panels * NARROWEST)
-    panel = (width - sides) / panels
-    columns = int((panel + GAP) / LEGEND_ENTRY)
-    foot = FOOT + LEGEND_ROW * -(-curves // columns)
-    row = paper.panel(PANEL_HEIGHT, 1, HEAD + foot, LOWEST)
-    return PanelPage(width, paper.height(HEAD + row + foot), panel, row, foot, columns)
+@contextmanager
+def _opened(panels: int, curves: int, title: str | None, paper: Paper) -> Iterator[tuple["Figure", list["Axes"], int]]:
+    """Give panels side by side with room below each for its legend, and the columns of that."""
+    beside = LEFT + RIGHT + (panels - 1) * GAP
+    width = paper.width(beside + panels * PANEL[0], beside + panels * LEAST[0])
+    columns = int(((width - beside) / panels + GAP) / LEGEND_ENTRY)
+    sides = LEFT, RIGHT, HEAD, FOOT + LEGEND_ROW * -(-curves // columns)
+    with style.open_panels(paper, (1, panels), PANEL, LEAST, sides, (GAP, 0.0), title=title) as (figure, (row,)):
+        yield figure, row, columns
 
 
 def floor_of(panel: Panel) -> float:

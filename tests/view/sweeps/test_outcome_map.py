@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blocksim.view.style import OWN
 from blocksim.view.sweeps.data import Input, SweepData, percent
 from blocksim.view.sweeps.outcome_map import (
     CLASS_COLOURS,
@@ -23,7 +22,7 @@ from tests.view.sweeps.made_up import grid, made_up
 
 def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
     sweep = made_up(grid())
-    found = map_of(sweep, OWN)
+    found = map_of(sweep)
     x, y, table = on_grid(found.plane(np.ones(35, dtype=bool)), sweep.x_mm[:, 1])
     assert x.tolist() == pytest.approx(np.linspace(0.2, 0.4, 7).tolist())
     assert y.tolist() == pytest.approx(np.geomspace(1e-3, 1e-1, 5).tolist())
@@ -34,7 +33,7 @@ def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
 def test_cells_that_were_not_run_stay_empty() -> None:
     friction, scale = grid()
     cut = tuple(Input(one.key, one.unit, one.values[:-1]) for one in (friction, scale))
-    found = map_of(made_up(cut), OWN)
+    found = map_of(made_up(cut))
     _, _, table = on_grid(found.plane(np.ones(34, dtype=bool)), np.ones(34))
     assert np.argwhere(np.isnan(table)).tolist() == [[4, 6]]
 

@@ -12,8 +12,8 @@ import blocksim
 from blocksim.simulation import Result
 from blocksim.simulation.frames import data_set, tidy_table
 from blocksim.simulation.stores.exports import write_frames_csv, write_vtkhdf
+from blocksim.view.history import MOTIONS, FramesInView
 from blocksim.view.run_data import Support, drawable_frames
-from blocksim.view.time_panels import MOTIONS, FramesInView
 from blocksim.world.systems.blocks import placed_points
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
