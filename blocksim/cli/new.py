@@ -71,11 +71,9 @@ def _write(path: Path, text: str) -> None:
     try:
         file = path.open("x", encoding="utf-8")
     except FileExistsError:
-        message = f"{path}: already exists; choose another name"
-        raise OutputExistsError(message) from None
+        raise OutputExistsError(f"{path}: already exists; choose another name") from None
     except OSError as error:
-        message = f"{path}: cannot be created: {error.strerror}"
-        raise OutputExistsError(message) from error
+        raise OutputExistsError(f"{path}: cannot be created: {error.strerror}") from error
     file.close()
     try:
         write_text(path, text)

@@ -440,15 +440,13 @@ def open_journal(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]"
                 study.set_user_attr(PLAN, dict(plan))
             differing = [name for name, value in plan.items() if known is not None and known.get(name) != value]
             if differing:
-                message = (
+                raise OutputExistsError(
                     f"{journal}: holds trials of another calibration ({', '.join(differing)} differ); "
                     "--overwrite starts again, --out FILE writes elsewhere"
                 )
-                raise OutputExistsError(message)
             yield study
     except OSError as error:
-        message = f"{journal}: cannot be written: {error.strerror}"
-        raise OutputError(message) from error
+        raise OutputError(f"{journal}: cannot be written: {error.strerror}") from error
 
 
 def _study_in(journal: Path) -> "Study":
@@ -462,8 +460,7 @@ def _study_in(journal: Path) -> "Study":
         if STUDY in optuna.get_all_study_names(storage):
             return cast("Study", optuna.load_study(study_name=STUDY, storage=storage))
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        message = f"{journal}: not the journal of a calibration: {error}"
-        raise InvalidInputError(message) from None
+        raise InvalidInputError(f"{journal}: not the journal of a calibration: {error}") from None
     return cast("Study", optuna.create_study(study_name=STUDY, storage=storage, direction="maximize"))
 
 
@@ -481,5 +478,4 @@ def refuse_other_file(journal: Path) -> None:
     """Raise InvalidInputError for a file that is no journal; one that is empty, or torn, may be."""
     content = read_head(journal, len(BEGINNING))
     if not BEGINNING.startswith(content):
-        message = f"{journal}: not the journal of a calibration; choose another file with --out"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{journal}: not the journal of a calibration; choose another file with --out")

@@ -343,8 +343,7 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     if not tolerance_mm > 0.0 or levels < FEWEST_LEVELS:
-        message = f"the tolerance must be above 0 mm and levels {FEWEST_LEVELS} or more"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"the tolerance must be above 0 mm and levels {FEWEST_LEVELS} or more")
     scenario = scenario.model_copy(update={"sweep": None})
     check_experiment(scenario)
     build_scene(scenario)
@@ -382,8 +381,7 @@ class _Runs:
                     for task, row in zip(batch.tasks, batch.rows, strict=True):
                         self._keep(task.name, row, labels[task.name])
         except KeyboardInterrupt:
-            message = f"stopped after {len(self.rows)} runs; rerun the command to finish"
-            raise StoppedEarlyError(message) from None
+            raise StoppedEarlyError(f"stopped after {len(self.rows)} runs; rerun the command to finish") from None
 
     def _batches(self, tasks: list[Task]) -> Generator[Batch, None, None]:
         jobs = min(self.jobs, len(tasks))
@@ -481,8 +479,7 @@ def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> 
     asked = REFINEMENTS if studies is None else tuple(studies)
     unknown = [name for name in asked if name not in REFINEMENTS]
     if unknown:
-        message = f"'{unknown[0]}' unknown convergence study; choose {', '.join(REFINEMENTS)}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"'{unknown[0]}' unknown convergence study; choose {', '.join(REFINEMENTS)}")
     chosen = tuple(one for one in _possible(scenario) if one.study in asked)
     if studies is None:
         chosen = tuple(one for one in chosen if one.key != SOIL_SPACING)

@@ -135,8 +135,7 @@ class Manifest:
             try:
                 self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, PERMISSIONS)
             except OSError as error:
-                message = f"{path}: cannot be written: {error.strerror}"
-                raise OutputError(message) from error
+                raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
             is_free = takes_lock(self._file)
         if not is_free:
             os.close(self._file)
@@ -160,8 +159,7 @@ class Manifest:
                 left = left[os.write(self._file, left) :]
             os.fsync(self._file)
         except OSError as error:
-            message = f"{self.path}: cannot be written: {error.strerror}"
-            raise OutputError(message) from error
+            raise OutputError(f"{self.path}: cannot be written: {error.strerror}") from error
         self.size += len(content)
 
     def close(self) -> None:
@@ -265,8 +263,7 @@ class Timings:
                 writer.writerows((name, self.executor, share, as_cell(host)) for name in names)
                 file.write(text.getvalue().encode())
         except OSError as error:
-            message = f"{self.path}: cannot be written: {error.strerror}"
-            raise OutputError(message) from error
+            raise OutputError(f"{self.path}: cannot be written: {error.strerror}") from error
 
 
 TEXT_COLUMNS = {"case": str, "status": str, "reason": str, "first_mover": str}

@@ -163,8 +163,7 @@ def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Colum
 def _value(cell: Cell, unit: str | None) -> object:
     """Return a cell as a scenario takes it; raises ValueError with a message for the user."""
     if not cell.text:
-        message = "this cell is empty"
-        raise ValueError(message)
+        raise ValueError("this cell is empty")
     if unit is not None:
         cell.number()
         return f"{cell.text} {unit}"
@@ -413,15 +412,13 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
     """
     design = design_of(sweep)
     if len(design) > MOST_CASES:
-        message = f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are allowed"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are allowed")
     refuse_wrong_draws(document, sweep, design)
     cases = Cases(_for_cases(document), design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
     if all(case.scenario is None for case in islice(cases, looked_at)):
         which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"
-        message = f"{which} can be simulated; the first: {cases[0].problem}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{which} can be simulated; the first: {cases[0].problem}")
     return cases
 
 
@@ -534,8 +531,7 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
 
     base = document.build()
     if base.sweep is None:
-        message = "nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario"
-        raise InvalidInputError(message)
+        raise InvalidInputError("nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario")
     check_experiment(base)
     cases = cases_of(document, base.sweep)
     if len(cases) > LOOKED_AT:  # a random choice: evenly spaced ones may meet one value of a key only

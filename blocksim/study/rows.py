@@ -217,8 +217,7 @@ class Ranges:
         """Return which rows of a table are inside. Raises InvalidInputError for no such block, or no numbers."""
         missing = [name for name in self.limits if name not in table]
         if missing:
-            message = f"{self.source} measures {missing[0]}, but the sweep has no such column"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{self.source} measures {missing[0]}, but the sweep has no such column")
         texts = [name for name in self.limits if table[name].dtype.kind not in NUMBERS and table[name].notna().any()]
         if texts:
             raise InvalidInputError(f"the column {texts[0]} of the sweep does not hold numbers only")

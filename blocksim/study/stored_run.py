@@ -53,8 +53,7 @@ def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Pat
     """
     place = Path(place)
     if not place.exists():
-        message = f"{place}: no such run folder or scenario file"
-        raise InputMissingError(message)
+        raise InputMissingError(f"{place}: no such run folder or scenario file")
     if place.is_dir():
         return _run_in(place, needed)
     if place.suffix.lower() == ".csv":

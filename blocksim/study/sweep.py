@@ -148,11 +148,9 @@ def refuse_loss(shard: Shard, *, overwrite: bool) -> None:
 def _plan_of(base: Scenario) -> Sweep:
     """Return what is varied. Raises InvalidInputError where that is nothing, and for a table that does not fit."""
     if base.sweep is None:
-        message = "nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario"
-        raise InvalidInputError(message)
+        raise InvalidInputError("nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario")
     if MEASURED in base.sweep.vary:
-        message = f"{MEASURED} cannot be varied; compare --experiment uses another table"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{MEASURED} cannot be varied; compare --experiment uses another table")
     check_experiment(base)
     return base.sweep
 
@@ -219,8 +217,7 @@ class SweepRun:
             raise
         self.table.write()
         if stopped and self.done.count(self.shard) < self.count:
-            message = f"stopped with {self.done.count(self.shard)} of {self.count} cases done; {AGAIN}"
-            raise StoppedEarlyError(message)
+            raise StoppedEarlyError(f"stopped with {self.done.count(self.shard)} of {self.count} cases done; {AGAIN}")
 
     def _run(self, executor: Run, setting: Setting, *, fail_fast: bool) -> None:
         # closed here and now: left to the garbage collector, workers would continue
@@ -282,8 +279,7 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
     cases = cases_in(document)
     done = CaseIndex(folder, len(cases))
     if not done.paths:
-        message = f"{folder}: no case of this sweep has run yet"
-        raise InputMissingError(message)
+        raise InputMissingError(f"{folder}: no case of this sweep has run yet")
     for number, settings in enumerate(cases.design):
         done.holds(number, settings)
     count = len(cases)

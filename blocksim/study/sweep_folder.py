@@ -125,8 +125,7 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: F
         try:
             _make_free(folder, head.encode(), tables, kind, overwrite=overwrite)
         except OSError as error:
-            message = f"{folder}: cannot be created: {error.strerror}"
-            raise OutputExistsError(message) from error
+            raise OutputExistsError(f"{folder}: cannot be created: {error.strerror}") from error
         keep_scenario(base, tables, folder, kind.plan, head)
         known = read_origin(folder, kind)  # whoever continues with a study did not begin it
         if known is None or known.sha256 != sums:
@@ -149,8 +148,7 @@ def read_origin(folder: Path, kind: FolderKind = SWEEP) -> Origin | None:
     except InputMissingError:
         return None
     except ValidationError as error:
-        message = f"{path}: not the plan of {kind.what}: {str(error).splitlines()[0]}"
-        raise InvalidInputError(message) from None
+        raise InvalidInputError(f"{path}: not the plan of {kind.what}: {str(error).splitlines()[0]}") from None
 
 
 def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: FolderKind, *, overwrite: bool) -> None:
@@ -159,13 +157,11 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
     if not present:
         return
     if not is_resolved(folder / kind.plan) or read_head(folder / kind.plan, len(kind.head)) != kind.head:
-        message = f"{folder}: holds files that are not {kind.what}; choose another folder with --out"
-        raise OutputExistsError(message)
+        raise OutputExistsError(f"{folder}: holds files that are not {kind.what}; choose another folder with --out")
     is_same = read_head(folder / kind.plan, len(head)) == head
     if not (overwrite or is_same):
         which = kind.what.replace("a ", "another ", 1)
-        message = f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere"
-        raise OutputExistsError(message)
+        raise OutputExistsError(f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere")
     if overwrite and any(path.suffix == ".jsonl" and kind.is_ours(path) and _is_in_use(path) for path in present):
         message = f"{folder}: {kind.what} is running here; wait for it, or write elsewhere with --out DIR"
         raise OutputExistsError(message)
@@ -206,8 +202,7 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
         text = f"{path}: changed since {whose} wrote it{which}; "
         if not overwrite or added is None:
             again = "" if added is None else "--overwrite replaces it, or "
-            message = f"{text}{again}move it away, or write elsewhere with --out DIR"
-            raise OutputExistsError(message)
+            raise OutputExistsError(f"{text}{again}move it away, or write elsewhere with --out DIR")
         told.append(f"{text}it is replaced")
     for text in told:
         log.warning("%s", text)
@@ -265,6 +260,5 @@ def case_folder(sweep: Path, case: str) -> Path | None:
 def read_plan(folder: Path) -> Document:
     """Return the plan of a sweep. Raises InputMissingError where the folder holds none."""
     if not (folder / PLAN).exists():
-        message = f"{folder}: not a sweep folder (no {PLAN})"
-        raise InputMissingError(message)
+        raise InputMissingError(f"{folder}: not a sweep folder (no {PLAN})")
     return Document.read(folder / PLAN, is_stored=True)

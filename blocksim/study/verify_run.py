@@ -119,11 +119,9 @@ def _read_entries(path: Path) -> dict[str, Any]:
     try:
         entries = json.loads(read_limited(path, MOST_BYTES))
     except (ValueError, RecursionError) as error:
-        message = f"{path}: not the entries of a run: {error}"
-        raise InvalidInputError(message) from error
+        raise InvalidInputError(f"{path}: not the entries of a run: {error}") from error
     if not isinstance(entries, dict):
-        message = f"{path}: not the entries of a run"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: not the entries of a run")
     return entries
 
 
@@ -172,8 +170,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     stored = _read(folder, changed)
     again = simulate(_as_far(stored.scenario, summary), threads=threads, on_progress=on_progress)
     if again.status == INTERRUPTED:
-        message = f"{folder}: stopped before the new run was complete"
-        raise StoppedEarlyError(message)
+        raise StoppedEarlyError(f"{folder}: stopped before the new run was complete")
     now = origins(summary, stored.scenario)
     return RunVerdict(
         folder,

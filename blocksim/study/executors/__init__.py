@@ -106,8 +106,7 @@ def take(tasks: Iterator[Task], count: int, is_stopped: Callable[[], bool]) -> t
 def executor_named(name: str) -> Executor:
     """Return an executor. Raises InvalidInputError."""
     if name not in EXECUTORS:
-        message = f"unknown executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"unknown executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}")
     module = import_module(EXECUTORS[name])
     check = getattr(module, "check", lambda _: None)  # where it may be missing
     for_rounds = getattr(module, "for_rounds", lambda: nullcontext(module.run_tasks))

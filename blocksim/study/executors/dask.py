@@ -47,10 +47,9 @@ def dask_client(address: str) -> Iterator[Any]:
         try:
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
         except Exception as error:  # noqa: BLE001 - whatever answers there, or does not, is no scheduler
-            message = (
+            raise UnavailableError(
                 f"no Dask scheduler answers at {address} ({type(error).__name__}); start one or correct --scheduler"
-            )
-            raise UnavailableError(message) from None
+            ) from None
         try:
             yield client
         finally:
@@ -142,5 +141,4 @@ class Submission:
             yield Batch(tasks, rows, seconds, host)
 
     def _scheduler_has_gone(self) -> NoReturn:
-        message = f"the Dask scheduler at {self.setting.scheduler} is gone; rerun the command to finish"
-        raise UnavailableError(message)
+        raise UnavailableError(f"the Dask scheduler at {self.setting.scheduler} is gone; rerun the command to finish")

@@ -168,11 +168,10 @@ class BatchResult(NamedTuple):
 def run_batch(payload: Payload, code: str, *, peaks: bool = False) -> BatchResult:
     """Run scenarios on one thread, by the same code as whoever asks. Raises InvalidInputError where it is another."""
     if code != code_hash():
-        message = (
+        raise InvalidInputError(
             f"the worker on {platform.node()} has another version of blocksim (code {code_hash()[:HASH_DIGITS]}, "
             f"here {code[:HASH_DIGITS]}); install the same one"
         )
-        raise InvalidInputError(message)
     began = time.perf_counter()
     if any(folder is not None for _, folder in payload):
         rows = [_kept(scenario, folder) for scenario, folder in payload if folder is not None]
