@@ -2,8 +2,7 @@
 
 import json
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -11,33 +10,13 @@ from pydantic import BaseModel, Field, ValidationError
 
 from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.scenario.input_files import MEGABYTE, read_limited
-from blocksim.simulation.folder import append_only_kind, prefix_kind
-from blocksim.study.sweep_folder import MANIFESTS, ORIGINS, SHARD, FolderKind, write_answer
+from blocksim.study.sweep_folder import FolderKind, write_answer
 from blocksim.view.style import Paper
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MOST_BYTES = 50 * MEGABYTE
-
-
-def folder_kind(name: str, what: str, command: str, tables: Mapping[str, str]) -> FolderKind:
-    """Return what distinguishes the folders of a study; `tables` has names of tables and the forms of their heads."""
-    names = "|".join(tables)
-    return FolderKind(
-        what=what,
-        command=f"blocksim {command} FILE",
-        plan=f"{name}.toml",
-        head=f"# {name.capitalize()} ".encode(),
-        results={
-            **{table: prefix_kind(form.encode()) for table, form in tables.items()},
-            rf"{name}\.json": ORIGINS,
-            rf"timings{SHARD}\.csv": append_only_kind(b"case,executor,seconds,host\n"),
-            **MANIFESTS,
-        },
-        leftover=re.compile(rf"\.({names}|{name}\.json|{name}\.toml)\..*"),
-        tables=re.compile(names),
-    )
 
 
 def with_unit(number: float, unit: str, digits: int = 7) -> str:

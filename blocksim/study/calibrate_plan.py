@@ -213,13 +213,13 @@ def calibration_plan(
     InvalidInputError where the table does not go with the blocks, nothing is fitted, or nothing scatters though there
     is more than one member.
     """
-    if not fit.tables:
+    if not fit:
         raise InvalidInputError(NO_FIT)
     if experiment is not None:
         load_table(experiment)  # so that its mistakes are reported of the option
         document = document.with_values({TABLE: user_value(TABLE, str(experiment.absolute()))})
     fits = build_distributions(document, fit, FIT, MODE)
-    if scatter is not None and scatter.tables:
+    if scatter is not None and scatter:
         scattered: Sweep | None = build_distributions(document, scatter, SCATTER, MODE)
     else:
         own = document.build().sweep
@@ -236,7 +236,7 @@ def calibration_plan(
     priors = []
     for key, values in fits.vary.items():
         assert isinstance(values, Uniform)  # noqa: S101 - all others have been refused
-        table = fit.tables[key]
+        table = fit[key]
         priors.append(prior_of(key, values, table["from"] if isinstance(table, Mapping) else None))
     return CalibrationPlan(
         document, bare, base, tuple(priors), Scatter(scattered), load_table(base.experiment.table), members, seed
@@ -255,7 +255,7 @@ def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter
             for other in _related(key, fits.vary)
         ]
     fitted = {parse_key(key): values for key, values in fits.vary.items()}
-    texts = scatter.texts if scatter is not None and scatter.tables else {}
+    texts = scatter.texts if scatter is not None and scatter else {}
     for key, values in scattered.vary.items() if scattered is not None else ():
         where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
         prior = fitted.get(parse_key(key))

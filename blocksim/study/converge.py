@@ -15,7 +15,7 @@ two outcomes is no error of discretisation: it has no order, and that it shrinks
 """
 
 import os
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -38,7 +38,7 @@ from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.result import read_summary
 from blocksim.simulation.schemes import build_scene
 from blocksim.simulation.stopping import interruptible
-from blocksim.study.executors import Batch, Setting, Task
+from blocksim.study.executors import Setting, Task
 from blocksim.study.executors.processes import DEAD, run_here, run_tasks
 from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance
@@ -49,6 +49,7 @@ ROUND_OFF_MM = 1e-6  # a smaller change says nothing about the order
 SHRINKING = 0.75  # a change is at most this part of the one before it where changes shrink
 MILLI = 1e3
 ANOTHER_FACE_DEG = 45.0  # turned by more, a block ends on another of its sides
+COORDINATES = ("x_mm", "y_mm", "rotation_deg")
 NO_COORDINATES = np.zeros(0)
 Floats = NDArray[np.float64]
 
@@ -67,10 +68,6 @@ class Refinement:
     def value(self, level: int) -> float:
         """Return the value at a level, the scenario's own to the last bit."""
         return self.own if level == 0 else float(f"{self.own * self.factor**level:.{DIGITS}g}")
-
-    def at(self, scenario: Scenario, level: int) -> Scenario:
-        """Return the scenario at a level, everything else as it was."""
-        return with_setting(scenario, self.key, self.value(level))
 
 
 def with_setting(scenario: Scenario, key: str, value: float) -> Scenario:
@@ -190,30 +187,28 @@ class Coordinates:
         placed = place_bodies(scenario)
         self.blocks = tuple(body.name for body in placed)
         self._reach = np.array([MILLI * body.radius for body in placed])
-        sides = MILLI * np.array([(body.size_x, body.size_y) for body in placed])
-        self._longest, self._shortest = sides.max(axis=1), np.array([MILLI * body.least_width for body in placed])
+        self._longest = MILLI * np.array([(body.size_x, body.size_y) for body in placed]).max(axis=1)
+        self._shortest = np.array([MILLI * body.least_width for body in placed])
 
-    def read(self, row: Row) -> tuple[Floats, Floats]:
-        """Return final x (mm) and rotation (degrees) of every block, of no block where the run did not finish."""
+    def end(self, row: Row) -> tuple[Floats, Floats, Floats] | None:
+        """Return final x, y (mm) and rotation (degrees) of every block, None where the run did not finish."""
         if row["status"] != FINISHED:
-            return NO_COORDINATES, NO_COORDINATES
-        return self._column(row, "x_mm"), self._column(row, "rotation_deg")
-
-    def _column(self, row: Row, column: str) -> Floats:
-        return np.array([row[f"{name}.{column}"] for name in self.blocks], dtype=float)
+            return None
+        table = np.array([[row[f"{block}.{name}"] for block in self.blocks] for name in COORDINATES], dtype=float)
+        return table[0], table[1], table[2]
 
     def point(self, row: Row) -> Floats:
         """Return the coordinates (mm), empty where the run did not finish."""
-        x, rotation = self.read(row)
-        return np.concatenate([x, np.radians(rotation) * self._reach[: len(rotation)]])
+        if (end := self.end(row)) is None:
+            return NO_COORDINATES
+        return np.concatenate([end[0], np.radians(end[2]) * self._reach])
 
     def flipped(self, before: Row, row: Row) -> tuple[str, ...]:
         """Return the blocks whose outcome differs between two runs; none where one of them did not finish."""
-        if {before["status"], row["status"]} != {FINISHED}:
+        ends = self.end(before), self.end(row)
+        if ends[0] is None or ends[1] is None:
             return ()
-        x, y, turn = (
-            np.abs(self._column(row, name) - self._column(before, name)) for name in ("x_mm", "y_mm", "rotation_deg")
-        )
+        x, y, turn = np.abs(np.subtract(ends[1], ends[0]))
         elsewhere = (np.hypot(x, y) > self._longest) | (y > 0.5 * self._shortest)
         return tuple(self.blocks[i] for i in np.flatnonzero(elsewhere | (turn > ANOTHER_FACE_DEG)))
 
@@ -244,48 +239,38 @@ def judge(
     finest = next((point for point in reversed(points) if point.size), NO_COORDINATES)
     levels = []
     for i, number in enumerate(order):
-        x, rotation = coordinates.read(rows[number])
+        row, end = rows[number], coordinates.end(rows[number])
         levels.append(
             Level(
                 value=refinement.value(number),
                 is_own=number == 0,
-                status=str(rows[number]["status"]),
-                reason=str(rows[number]["reason"]),
-                seconds=float(str(rows[number]["seconds"])),
-                x_mm=tuple(x.tolist()),
-                rotation_deg=tuple(rotation.tolist()),
+                status=str(row["status"]),
+                reason=str(row["reason"]),
+                seconds=float(str(row["seconds"])),
+                x_mm=() if end is None else tuple(end[0].tolist()),
+                rotation_deg=() if end is None else tuple(end[2].tolist()),
                 change_mm=distance(points[i - 1], points[i]) if i else nan,
                 order=observed_order(points[i - 2 : i + 1], refinement.factor) if i > 1 else nan,
                 to_finest_mm=distance(points[i], finest),
-                flipped=coordinates.flipped(rows[order[i - 1]], rows[number]) if i else (),
+                flipped=coordinates.flipped(rows[order[i - 1]], row) if i else (),
             )
         )
-    flips = any(level.flipped for level in levels[-2:])
-    verdict = verdict_of([level.change_mm for level in levels[1:]], tolerance_mm, flips=flips)
-    return RefinementStudy(
-        refinement.study,
-        refinement.title,
-        refinement.key,
-        refinement.factor,
-        tolerance_mm,
-        tuple(levels),
-        verdict,
-    )
+    verdict = verdict_of(levels, tolerance_mm)
+    one = refinement
+    return RefinementStudy(one.study, one.title, one.key, one.factor, tolerance_mm, tuple(levels), verdict)
 
 
-def verdict_of(changes_mm: Sequence[float], tolerance_mm: float, *, flips: bool) -> ConvergenceVerdict:
-    """Judge the changes from level to level, from coarse to fine; NaN is a change to or from a failed level.
-
-    `flips` says that an outcome changes in one of the last two refinements.
-    """
-    last = changes_mm[-2:]
+def verdict_of(levels: Sequence[Level], tolerance_mm: float) -> ConvergenceVerdict:
+    """Judge the changes from level to level, from coarse to fine; NaN is a change to or from a failed level."""
+    changes = [level.change_mm for level in levels[1:]]
+    last = changes[-2:]
     if len(last) < 2 or not all(map(isfinite, last)):
         return ConvergenceVerdict.FAILED
-    if flips:
+    if any(level.flipped for level in levels[-2:]):
         return ConvergenceVerdict.FLIPS
     if max(last) < tolerance_mm:
         return ConvergenceVerdict.CONVERGED
-    before = next((change for change in reversed(changes_mm[:-2]) if isfinite(change)), inf)
+    before = next((change for change in reversed(changes[:-2]) if isfinite(change)), inf)
     shrinks = all(after <= SHRINKING * before for before, after in pairwise([before, *last]))
     return ConvergenceVerdict.NOT_YET if shrinks else ConvergenceVerdict.SCATTERED
 
@@ -350,7 +335,7 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     refinements = refinements_of(scenario, studies)
     compile_kernels(kernels_of(scenario))
     folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / FOLDER
-    runs = _Runs(folder, options.jobs or os.cpu_count() or 1, options.on_run)
+    runs = LevelRuns(folder, options.jobs or os.cpu_count() or 1, options.on_run)
     found = _refine(scenario, refinements, runs, tolerance_mm, levels)
     return Convergence(
         name=scenario.name,
@@ -362,62 +347,51 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     )
 
 
-class _Runs:
-    """All runs so far, by the hash of their scenario."""
+class LevelRuns:
+    """All runs so far, by the hash of their scenario, each in a folder of this name."""
 
     def __init__(self, folder: Path, jobs: int, on_run: OnRun) -> None:
+        """Run nothing yet."""
         self.folder, self.jobs, self.on_run = folder, jobs, on_run
         self.rows: dict[str, Row] = {}
 
-    def run(self, scenarios: dict[str, Scenario]) -> None:
-        """Run what has not run yet; the keys are labels for people."""
-        labels = {run_hash(scenario): label for label, scenario in reversed(scenarios.items())}
-        wanted = {run_hash(scenario): scenario for scenario in scenarios.values()}
-        missing = [(name, scenario) for name, scenario in wanted.items() if name not in self.rows]
-        tasks = [Task(number, name, {}, scenario) for number, (name, scenario) in enumerate(missing)]
-        try:
-            with interruptible(), closing(self._batches(tasks)) as batches:
-                for batch in batches:
-                    for task, row in zip(batch.tasks, batch.rows, strict=True):
-                        self._keep(task.name, row, labels[task.name])
-        except KeyboardInterrupt:
-            raise StoppedEarlyError(f"stopped after {len(self.rows)} runs; rerun the command to finish") from None
-
-    def _batches(self, tasks: list[Task]) -> Generator[Batch, None, None]:
+    def run(self, scenarios: dict[str, Scenario]) -> list[Row]:
+        """Return the rows of scenarios, after running what has not run yet; the keys are labels for people."""
+        names = [run_hash(scenario) for scenario in scenarios.values()]
+        named = dict(zip(reversed(names), reversed(scenarios.items()), strict=True))  # the first label of each
+        missing = [name for name in dict.fromkeys(names) if name not in self.rows]
+        tasks = [Task(number, name, {}, named[name][1]) for number, name in enumerate(missing)]
         jobs = min(self.jobs, len(tasks))
         run = run_tasks if jobs > 1 else run_here
-        return run(iter(tasks), Setting(jobs, folder=self.folder))
-
-    def _keep(self, name: str, row: Row, label: str) -> None:
-        kept = {**row, "reason": DIED} if row == DEAD else {**row, "seconds": _solver_seconds(self.folder / name, row)}
-        self.rows[name] = kept
-        self.on_run(label, kept)
-
-    def row(self, scenario: Scenario) -> Row:
-        """Return the row of a scenario that has run."""
-        return self.rows[run_hash(scenario)]
-
-
-def _solver_seconds(place: Path, row: Row) -> object:
-    """Return what the setting decides: the time in compiled code, without that for writing files."""
-    with suppress(BlocksimError):
-        return read_summary(place / files.SUMMARY).solver_seconds
-    return row["seconds"]
+        try:
+            with interruptible(), closing(run(iter(tasks), Setting(jobs, folder=self.folder))) as batches:
+                for task, row in (pair for batch in batches for pair in zip(batch.tasks, batch.rows, strict=True)):
+                    kept = {**row, "reason": DIED} if row == DEAD else row.copy()
+                    with suppress(BlocksimError):  # what the setting decides: time in compiled code, without files
+                        if row != DEAD:
+                            kept["seconds"] = read_summary(self.folder / task.name / files.SUMMARY).solver_seconds
+                    self.rows[task.name] = kept
+                    self.on_run(named[task.name][0], kept)
+        except KeyboardInterrupt:
+            raise StoppedEarlyError(f"stopped after {len(self.rows)} runs; rerun the command to finish") from None
+        return [self.rows[name] for name in names]
 
 
 def _refine(
-    scenario: Scenario, refinements: tuple[Refinement, ...], runs: _Runs, tolerance_mm: float, levels: int
+    scenario: Scenario, refinements: tuple[Refinement, ...], runs: LevelRuns, tolerance_mm: float, levels: int
 ) -> tuple[RefinementStudy, ...]:
     """Run all coarser levels and two finer ones of every study, then one finer at a time where it is needed."""
     finest = {one.study: FEWEST_LEVELS for one in refinements}
     coordinates = Coordinates(scenario)
     while True:
-        wanted = [
-            (one, {n: one.at(scenario, n) for n in range(-one.coarser, finest[one.study] + 1)}) for one in refinements
-        ]
-        runs.run({f"{one.key} = {one.value(n):g}": level for one, at in wanted for n, level in at.items()})
+        wanted = [(one, n) for one in refinements for n in range(-one.coarser, finest[one.study] + 1)]
+        scenarios = {
+            f"{one.key} = {one.value(n):g}": with_setting(scenario, one.key, one.value(n)) for one, n in wanted
+        }
+        rows = dict(zip(wanted, runs.run(scenarios), strict=True))
         found = tuple(
-            judge({n: runs.row(level) for n, level in at.items()}, one, coordinates, tolerance_mm) for one, at in wanted
+            judge({n: row for (of, n), row in rows.items() if of is one}, one, coordinates, tolerance_mm)
+            for one in refinements
         )
         again = [study.study for study in found if study.verdict in UNFINISHED and finest[study.study] < levels]
         if not again:
@@ -427,7 +401,7 @@ def _refine(
 
 
 def _recommended(
-    scenario: Scenario, studies: tuple[RefinementStudy, ...], runs: _Runs, tolerance_mm: float
+    scenario: Scenario, studies: tuple[RefinementStudy, ...], runs: LevelRuns, tolerance_mm: float
 ) -> Recommendation | None:
     """Try all recommended values together, then each alone, the cheapest first; None where none holds the tolerance."""
     if any(study.verdict in UNRELIABLE for study in studies) or not studies[0].own.is_finished:
@@ -440,24 +414,24 @@ def _recommended(
 
 
 def _joint(
-    scenario: Scenario, settings: dict[str, float], studies: tuple[RefinementStudy, ...], runs: _Runs
+    scenario: Scenario, settings: dict[str, float], studies: tuple[RefinementStudy, ...], runs: LevelRuns
 ) -> Recommendation:
     """Run the scenario with some settings and compare it with the finest level of every study."""
     changed = scenario
     for key, value in settings.items():
         changed = with_setting(changed, key, value)
-    runs.run({"recommended settings together": changed})
-    row, coordinates = runs.row(changed), Coordinates(scenario)
-    finest = [runs.row(with_setting(scenario, study.key, study.levels[-1].value)) for study in studies]
+    finest = {study.key: with_setting(scenario, study.key, study.levels[-1].value) for study in studies}
+    row, *others = runs.run({"recommended settings together": changed, **finest})
+    point = Coordinates(scenario).point
     return Recommendation(
         settings=settings,
         seconds=float(str(row["seconds"])),
         own_seconds=studies[0].own.seconds,
-        to_finest_mm=max(distance(coordinates.point(row), coordinates.point(one)) for one in finest),
+        to_finest_mm=max(distance(point(row), point(one)) for one in others),
     )
 
 
-def _notes(scenario: Scenario, runs: _Runs, studies: Iterable[str] | None) -> tuple[str, ...]:
+def _notes(scenario: Scenario, runs: LevelRuns, studies: Iterable[str] | None) -> tuple[str, ...]:
     """Say what was not studied, and what the numbers cannot mean."""
     notes = []
     if soil_tables(scenario):
@@ -533,16 +507,12 @@ def effects_note(scenario: Scenario, asked: Iterable[str]) -> str:
 
 
 def _halved(scenario: Scenario, key: str, own: float) -> Refinement:
+    """Return the time step, by halves and up to two coarser ones that are admissible."""
     halved = Refinement(STEP, "time step", key, own, 0.5, 0)
-    coarser = next((n for n in (2, 1) if _is_safe(halved.at(scenario, -n))), 0)
-    return replace(halved, coarser=coarser)
-
-
-def _is_safe(scenario: Scenario) -> bool:
-    """Return True if a scenario's step is admissible."""
-    try:
-        type(scenario.time).model_validate(scenario.time.model_dump())
-        build_scene(scenario)
-    except (ValueError, InvalidInputError):
-        return False
-    return True
+    for coarser in (2, 1):
+        changed = with_setting(scenario, key, halved.value(-coarser))
+        with suppress(ValueError, InvalidInputError):
+            type(changed.time).model_validate(changed.time.model_dump())
+            build_scene(changed)
+            return replace(halved, coarser=coarser)
+    return halved

@@ -23,15 +23,15 @@ from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of
 from blocksim.simulation.compilation import compile_kernels, kernels_of
 from blocksim.simulation.observables import MOVES_ON
-from blocksim.study.answer import Answer, Table, folder_kind, with_unit
+from blocksim.study.answer import Answer, Table, with_unit
 from blocksim.study.criterion import falls_before_zero
 from blocksim.study.executors import Execution
 from blocksim.study.fragility_plan import FragilityOptions, FragilityPlan, read_fragility
-from blocksim.study.manifest import MANIFEST, WHOLE, CaseIndex, Manifest, SweepTable, Timings
+from blocksim.study.manifest import MANIFEST, WHOLE, Manifest
 from blocksim.study.rows import FINISHED, Head, Row, check_experiment
 from blocksim.study.runs import Replay, folder_for
 from blocksim.study.study import Study
-from blocksim.study.sweep import TIMINGS, SweepRun, refuse_loss
+from blocksim.study.sweep import SweepRun, refuse_loss
 from blocksim.study.sweep_folder import SHARD, FolderKind, prepare
 from blocksim.view import studies as view
 from blocksim.view.style import Paper
@@ -64,7 +64,7 @@ class Point(BaseModel, frozen=True):
 class FragilityAnswer(Answer, frozen=True):
     """Counts at every intensity, and the curve through them."""
 
-    files: ClassVar[FolderKind] = folder_kind(
+    files: ClassVar[FolderKind] = FolderKind(
         "fragility",
         "a fragility study",
         "fragility",
@@ -253,28 +253,22 @@ def run_fragility(
     prepare(folder, base, plan.name, overwrite=options.overwrite, kind=kind)
     compile_kernels(kernels_of(base))
     with closing(Manifest(folder / shard.file(MANIFEST), "fragility study")) as kept:
-        done = CaseIndex(folder, len(cases))
+        share = SweepRun(cases, shard, kept, options.on_row, kind=kind, table=MEMBERS_TABLE)
         if options.retry_failed:
-            done.forget_failed(shard)
-        before = sum(done.holds(number, settings) for number, settings in enumerate(cases.design))
-        table = SweepTable(folder / shard.file(MEMBERS_TABLE), cases, done, None, shard, kind)
-        timings = Timings(folder / shard.file(TIMINGS), execution.name)
-        SweepRun(cases, shard, kept, done, table, timings, options.on_row).run(run, setting, fail_fast=False)
-        answer = _answer(plan, folder, done, before)
+            share.forget_failed()
+        share.run(run, setting)
+        answer = _answer(plan, folder, share)
         if shard == WHOLE:
             answer.write()
     return answer
 
 
-def _answer(plan: FragilityPlan, folder: Path, done: CaseIndex, before: int) -> FragilityAnswer:
+def _answer(plan: FragilityPlan, folder: Path, share: SweepRun) -> FragilityAnswer:
     """Make the answer of all rows that there are."""
     numbers = list(plan.levels)
     rows: dict[float, dict[int, Row]] = {number: {} for number in numbers}  # by intensity and number of the member
-    with done.reader() as entry_of:
-        for case, settings in enumerate(plan.cases.design):
-            entry = entry_of(case) if done.holds(case, settings) else None
-            if entry is not None:
-                rows[numbers[case % len(numbers)]][case // len(numbers)] = entry.row
+    for case, _, entry in share.done.entries(share.cases):
+        rows[numbers[case % len(numbers)]][case // len(numbers)] = entry.row
     failed = {  # members with a result, and whether they have failed
         number: {
             member: falls_before_zero(row) or any(one.holds(row) for one in plan.fails)
@@ -323,11 +317,11 @@ def _answer(plan: FragilityPlan, folder: Path, done: CaseIndex, before: int) -> 
             "scatter": {key: list(plan.stripes[key]) if key in plan.stripes else table[key] for key in plan.spread},
             "records": plan.records,
             "points": points,
-            "missing": len(plan.cases) - done.count(),
+            "missing": len(plan.cases) - share.done.count(),
             "curve": {**_described(curve), "median_extrapolated": is_beyond},
             "inflation": inflation,
             "folder": folder,
-            "run": done.count() - before,
+            "run": share.new,
             "heads": (str(Head("intensity", plan.head.unit)), *list(Point.model_fields)[1:]),
             "cells": [list(dict(point).values()) for point in points],
             "plan": plan,

@@ -31,7 +31,7 @@ from blocksim.study.manifest import WHOLE, Shard
 from blocksim.study.plan import (
     MOST_CASES,
     Cases,
-    Together,
+    Design,
     Values,
     Variations,
     build_distributions,
@@ -180,7 +180,7 @@ class FragilityPlan:
             key: tuple(values[member % len(values)] for member in range(self.members) for _ in self.levels)
             for key, values in self.stripes.items()
         }
-        design = Together({self.head.key: tuple(self.levels.values()) * self.members, **shared, **draws})
+        design = Design({self.head.key: tuple(self.levels.values()) * self.members, **shared, **draws})
         if self.scatter is not None:
             refuse_wrong_draws(self.document, self.scatter, design)
         striped = Sweep.model_validate({"mode": "list", **design.columns})
@@ -215,10 +215,8 @@ def read_fragility(document: Document, options: FragilityOptions) -> FragilityPl
     criteria = tuple(read_criterion(text, FAILS) for text in ([fails] if isinstance(fails, str) else fails))
     bare = document.without_sweep()
     given = Variations.of(options.intensity)
-    if len(given.tables) != 1:
-        message = (
-            f"one key is the intensity, not {len(given.tables)}: give {INTENSITY} KEY=a,b,c or KEY=FROM:TO:COUNT once"
-        )
+    if len(given) != 1:
+        message = f"one key is the intensity, not {len(given)}: give {INTENSITY} KEY=a,b,c or KEY=FROM:TO:COUNT once"
         raise InvalidInputError(message)
     head, levels = typed_levels(bare, given, INTENSITY)
     wrong = [value for number, value in levels.items() if number <= 0.0]
@@ -252,7 +250,7 @@ def read_fragility(document: Document, options: FragilityOptions) -> FragilityPl
 
 def _stripes(document: Document, given: Variations) -> dict[str, tuple[object, ...]]:
     """Return the values of each key by record."""
-    if not given.tables:
+    if not given:
         return {}
     shared = {
         key: levels_of(values) for key, values in build_distributions(document, given, STRIPES, "list").vary.items()
@@ -266,7 +264,7 @@ def _stripes(document: Document, given: Variations) -> dict[str, tuple[object, .
 
 
 def _scatter(document: Document, given: Variations, *, needed: bool) -> Sweep | None:
-    if given.tables:
+    if given:
         spread = build_distributions(document.without_sweep(), given, SCATTER, "normal")
         constant = next(
             (key for key, values in spread.vary.items() if len(set(map(str, levels_of(values)))) == 1), None

@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_valid
 from blocksim.errors import ExitCode, InvalidInputError, Problem
 from blocksim.scenario.input_files import raise_problems, read_table
 from blocksim.simulation.observables import PEAK, Manner, table_columns
-from blocksim.study.answer import Answer, Table, folder_kind, with_unit
+from blocksim.study.answer import Answer, Table, with_unit
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
 from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
@@ -170,7 +170,7 @@ class Bracket(BaseModel, frozen=True):
 class LimitAnswer(Answer, frozen=True):
     """The brackets of a search, from the smallest value up; none where nothing changes."""
 
-    files: ClassVar[FolderKind] = folder_kind("limit", "a limit", "limit", {r"limit\.csv": rf"value{UNIT},verdict,.*"})
+    files: ClassVar[FolderKind] = FolderKind("limit", "a limit", "limit", {r"limit\.csv": rf"value{UNIT},verdict,.*"})
     picture: ClassVar[str] = "mechanism"
     caption: ClassVar[str] = "Both sides of every bracket"
     key: str
@@ -380,7 +380,7 @@ class CurvePoint(BaseModel, frozen=True):
 class CurveAnswer(Answer, frozen=True):
     """The limits at the values of another key, from the smallest up."""
 
-    files: ClassVar[FolderKind] = folder_kind(
+    files: ClassVar[FolderKind] = FolderKind(
         "limits", "a curve of limits", "limit", {r"limits\.csv": rf"over{UNIT},low.*,high.*"}
     )
     picture: ClassVar[str] = "limits"

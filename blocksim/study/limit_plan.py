@@ -310,7 +310,7 @@ def typed_levels(document: Document, given: Variations, option: str) -> tuple[He
     Raises ScenarioError for values that the scenario cannot have, InvalidInputError for a range without a count, values
     that are not numbers, and one that is given twice.
     """
-    text, table = next((given.texts[key], table) for key, table in given.tables.items())
+    text, table = next((given.texts[key], table) for key, table in given.items())
     if isinstance(table, Mapping) and "count" not in table:
         message = f"{option} {text}: single values are needed, as in KEY=a,b,c or KEY=FROM:TO:COUNT"
         raise InvalidInputError(message)
@@ -381,8 +381,8 @@ class CurvePlan(NamedTuple):
 def read_curve(document: Document, options: CurveOptions) -> CurvePlan:
     """Return the plan of a curve of limits. Raises as `read_limit`, for every value of the other key."""
     given = Variations.of(options.over or {})
-    if len(given.tables) != 1:
-        message = f"limits are searched over one key, not {len(given.tables)}: give {OVER} KEY=a,b,c once"
+    if len(given) != 1:
+        message = f"limits are searched over one key, not {len(given)}: give {OVER} KEY=a,b,c once"
         raise InvalidInputError(message)
     bare = document.without_sweep()
     head, levels = typed_levels(bare, given, OVER)
@@ -406,10 +406,10 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
         message = f"a bracket of {tolerance:g} of the value cannot be reached; give {LEAST_TOLERANCE:g} up to below 1"
         raise InvalidInputError(message)
     given = Variations.of(options.vary)
-    if len(given.tables) != 1:
-        message = f"a limit is searched along one key, not {len(given.tables)}: give {OPTION} KEY=FROM:TO once"
+    if len(given) != 1:
+        message = f"a limit is searched along one key, not {len(given)}: give {OPTION} KEY=FROM:TO once"
         raise InvalidInputError(message)
-    key, table = next(iter(given.tables.items()))
+    key, table = next(iter(given.items()))
     bare = document.without_sweep()
     if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"

@@ -8,11 +8,10 @@ import json
 import math
 import os
 import re
-import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path, PurePath
@@ -22,12 +21,11 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
-from blocksim.simulation.atomic import PERMISSIONS, atomic_path, sync_file
+from blocksim.simulation.atomic import PERMISSIONS
 from blocksim.simulation.folder import brief_lock, takes_lock
 from blocksim.simulation.observables import table_columns
-from blocksim.study.plan import Cases
+from blocksim.study.plan import Cases, Settings
 from blocksim.study.rows import FINISHED, KEPT, TABLE, Ranges, Row, as_cell, blocks_in, varied_cells
-from blocksim.study.sweep_folder import SWEEP, FolderKind, note_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -207,11 +205,6 @@ class CaseIndex:
         blocks = blocks_in(entry.row)
         self.blocks[blocks] = min(number, self.blocks.get(blocks, number))
 
-    def forget_failed(self, shard: Shard) -> None:
-        """Have those cases of a shard run again that did not end well."""
-        state = self.state[shard.slice]
-        state[state == ENDED_BADLY] = MISSING
-
     def holds(self, number: int, settings: dict[str, object]) -> bool:
         """Return True if a case has a row, and that with these values: other code may have numbered the cases again."""
         if self.state[number] != MISSING and self.values[number] != int(values_hash(settings), 16):
@@ -222,48 +215,38 @@ class CaseIndex:
         """Return how many cases of a shard have a row."""
         return int(np.count_nonzero(self.state[shard.slice]))
 
-    def all_blocks(self) -> tuple[str, ...]:
-        """Return the blocks of all rows, in the order of the cases in which they first appear."""
-        first = sorted(self.blocks, key=self.blocks.__getitem__)
-        return tuple(dict.fromkeys(block for blocks in first for block in blocks))
-
-    @contextmanager
-    def reader(self) -> Iterator[Callable[[int], Entry | None]]:
-        """Give what reads the entry of a case that has a row; it gives None where the file has changed since."""
+    def entries(self, cases: Cases, shard: Shard = WHOLE) -> Iterator[tuple[int, Settings, Entry]]:
+        """Yield number, values and entry of every case that has a row; not where the file has changed since."""
         with ExitStack() as files:
             opened = [files.enter_context(open_regular(path)) for path in self.paths]
+            for number in shard.numbers(len(cases)):
+                settings = cases.design[number]
+                if self.holds(number, settings):
+                    file = opened[int(self.sources[number])]
+                    file.seek(int(self.starts[number]))
+                    if (entry := Entry.from_line(file.readline())) is not None:
+                        yield number, settings, entry
 
-            def entry(number: int) -> Entry | None:
-                file = opened[int(self.sources[number])]
-                file.seek(int(self.starts[number]))
-                return Entry.from_line(file.readline())
 
-            yield entry
+def note_timings(path: Path, executor: str, cases: Iterable[str], seconds: float, host: str) -> None:
+    """Add a line a case to a table: its share (s) of the wall time of the batch that it was run in.
 
-
-class Timings:
-    """A table that grows by a line a case: its share (s) of the wall time of the batch that it was run in."""
-
-    def __init__(self, path: Path, executor: str) -> None:
-        """Begin, or continue with, a table."""
-        self.path, self.executor = path, executor
-
-    def append(self, cases: Iterable[str], seconds: float, host: str) -> None:
-        """Add the cases of a batch that took so long (s). Raises OutputError."""
-        names = list(cases)
-        try:
-            with self.path.open("a+b") as file:
-                size, text = file.seek(0, os.SEEK_END), io.StringIO()
-                if size:  # a last line that was torn by a kill must not take the next one with it
-                    file.seek(size - 1)
-                    text.write("" if file.read() == NEWLINE else "\n")
-                writer = csv.writer(text, lineterminator="\n")
-                writer.writerows([] if size else [TIMING_COLUMNS])
-                share = f"{seconds / max(len(names), 1):.6f}"
-                writer.writerows((name, self.executor, share, as_cell(host)) for name in names)
-                file.write(text.getvalue().encode())
-        except OSError as error:
-            raise OutputError(f"{self.path}: cannot be written: {error.strerror}") from error
+    Raises OutputError.
+    """
+    names = list(cases)
+    try:
+        with path.open("a+b") as file:
+            size, text = file.seek(0, os.SEEK_END), io.StringIO()
+            if size:  # a last line that was torn by a kill must not take the next one with it
+                file.seek(size - 1)
+                text.write("" if file.read() == NEWLINE else "\n")
+            writer = csv.writer(text, lineterminator="\n")
+            writer.writerows([] if size else [TIMING_COLUMNS])
+            share = f"{seconds / max(len(names), 1):.6f}"
+            writer.writerows((name, executor, share, as_cell(host)) for name in names)
+            file.write(text.getvalue().encode())
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 TEXT_COLUMNS = {"case": str, "status": str, "reason": str, "first_mover": str}
@@ -272,56 +255,23 @@ MOST_BYTES = 2000 * MEGABYTE
 OUTCOME = ("status", "reason", "seconds")
 NEEDED = {"case", "status"}
 NO_TABLE, NO_COLUMNS = "not the table of a sweep", "no columns case and status"
-SOONEST = 2.0  # s between two tables while the sweep runs
 MOST_ROWS = 20  # that a notebook shows
-SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
 
 
-@dataclass
-class SweepTable:
-    """The table of a sweep, to be written whenever it is worth it."""
-
-    path: Path
-    cases: Cases
-    done: CaseIndex
-    ranges: Ranges | None
-    shard: Shard = WHOLE
-    kind: FolderKind = SWEEP
-    next_at: float = field(default_factory=lambda: time.monotonic() + SOONEST)
-
-    def write_now_and_then(self) -> None:
-        """Write the table unless it was written a short while ago; the more rows, the longer the while."""
-        if time.monotonic() >= self.next_at:
-            with suppress(OutputExistsError):  # somebody has changed it: the sweep goes on, and says so at its end
-                self.write()
-
-    def write(self) -> None:
-        """Write all rows so far, one after the other: none is kept. Raises as `note_table`."""
-        began = time.monotonic()
-        self.next_at = began + SOONEST
-        with atomic_path(self.path) as temporary:
-            with temporary.open("w", encoding="utf-8", newline="") as file:
-                csv.writer(file, lineterminator="\n").writerows(self._lines())
-            sync_file(temporary)
-            note_table(self.path, temporary, self.kind)
-        ended = time.monotonic()
-        self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
-
-    def _lines(self) -> Iterator[list[object]]:
-        verdict = [] if self.ranges is None else ["inside"]
-        ends = table_columns() + [f"{block}.{name}" for block in self.done.all_blocks() for name in KEPT]
-        yield ["case", *map(str, self.cases.heads), *OUTCOME, *verdict, *ends]
-        with self.done.reader() as entry_of:
-            for number in self.shard.numbers(len(self.cases)):
-                settings = self.cases.design[number]
-                entry = entry_of(number) if self.done.holds(number, settings) else None
-                if entry is None:
-                    continue
-                row = entry.row
-                if self.ranges is not None:  # judged here and not when the case ended: the measured table may be mended
-                    row = {**row, "inside": self.ranges.hold(row) if row.get("status") == FINISHED else None}
-                values = varied_cells(self.cases.heads, settings).values()
-                yield list(map(as_cell, [entry.case, *values, *map(row.get, (*OUTCOME, *verdict, *ends))]))
+def table_rows(
+    cases: Cases, done: CaseIndex, ranges: Ranges | None, shard: Shard = WHOLE
+) -> Iterator[Sequence[object]]:
+    """Yield the heads and all rows so far, one after the other: none is kept."""
+    verdict = [] if ranges is None else ["inside"]
+    blocks = dict.fromkeys(block for names in sorted(done.blocks, key=done.blocks.__getitem__) for block in names)
+    ends = table_columns() + [f"{block}.{name}" for block in blocks for name in KEPT]
+    yield ["case", *map(str, cases.heads), *OUTCOME, *verdict, *ends]
+    for _, settings, entry in done.entries(cases, shard):
+        row = entry.row
+        if ranges is not None:  # judged here and not when the case ended: the measured table may be mended
+            row = {**row, "inside": ranges.hold(row) if row.get("status") == FINISHED else None}
+        values = varied_cells(cases.heads, settings).values()
+        yield list(map(as_cell, [entry.case, *values, *map(row.get, (*OUTCOME, *verdict, *ends))]))
 
 
 @dataclass(frozen=True, repr=False)
@@ -335,7 +285,17 @@ class SweepResult:
     @cached_property
     def table(self) -> "pd.DataFrame":
         """The rows of the table (pandas 3 reads every bit). Raises InputMissingError or InvalidInputError."""
-        return _read(self.folder / self.name)
+        import pandas as pd
+
+        path = self.folder / self.name
+        try:
+            refuse_large(path, MOST_BYTES)
+            table = pd.read_csv(path, dtype=TEXT_COLUMNS)
+        except (OSError, ValueError) as error:
+            raise InvalidInputError(f"{path}: {NO_TABLE}: {str(error).strip()}") from error
+        if not set(table.columns) >= NEEDED or table.columns[0] != "case":
+            raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
+        return table
 
     def to_frame(self) -> "pd.DataFrame":
         """Return the table, one row per case."""
@@ -371,7 +331,7 @@ class SweepResult:
         """Share of all cases that lie inside all measured ranges; None without an experiment."""
         if "inside" not in self.table or self.table["inside"].isna().all():
             return None
-        return float((self.table["inside"] == True).mean())  # noqa: E712 - the column has True, False and missing values
+        return float(self.table["inside"].isin([True]).mean())  # the column has True, False and missing values
 
     def share_inside_of(self, experiment: Path | str) -> float:
         """Share of all cases that lie inside all ranges of another table. Raises what reading it raises."""
@@ -397,16 +357,3 @@ def lines_in(path: Path, most_bytes: int = MOST_BYTES) -> list[list[str]]:
         return list(csv.reader(io.StringIO(read_limited(path, most_bytes).decode(), newline="")))
     except (ValueError, csv.Error) as error:
         raise InvalidInputError(f"{path}: {NO_TABLE}: {error}") from error
-
-
-def _read(path: Path) -> "pd.DataFrame":
-    import pandas as pd
-
-    try:
-        refuse_large(path, MOST_BYTES)
-        table = pd.read_csv(path, dtype=TEXT_COLUMNS)
-    except (OSError, ValueError) as error:
-        raise InvalidInputError(f"{path}: {NO_TABLE}: {str(error).strip()}") from error
-    if not set(table.columns) >= NEEDED or table.columns[0] != "case":
-        raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
-    return table

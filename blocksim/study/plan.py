@@ -5,13 +5,13 @@ import hashlib
 import math
 import re
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from statistics import fmean
-from typing import Any, TypeVar, overload
+from typing import TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,35 +59,25 @@ class LazySequence(Sequence[T_co]):
 
 @dataclass(frozen=True)
 class Design(LazySequence[Settings]):
-    """The settings of cases, made from one column of values a key."""
+    """The settings of cases, made from one column of values a key.
+
+    The k-th case has the k-th value of every key, or, in a grid, every value comes with all values of the others; the
+    last key changes fastest.
+    """
 
     columns: Mapping[str, Sequence[object]]
-
-
-class Together(Design):
-    """The k-th case has the k-th value of every key; all columns are equally long."""
+    is_grid: bool = False
 
     def __len__(self) -> int:
-        """Return the length of any column."""
-        return len(next(iter(self.columns.values())))
+        """Return the number of cases; where these are no combinations, all columns are equally long."""
+        lengths = [len(column) for column in self.columns.values()]
+        return math.prod(lengths) if self.is_grid else lengths[0]
 
     def row(self, number: int) -> Settings:
-        """Return the values of one row."""
-        return {key: column[number] for key, column in self.columns.items()}
-
-
-class Combinations(Design):
-    """Every value of every key with all values of the others; the last key changes fastest."""
-
-    def __len__(self) -> int:
-        """Return the product of the lengths."""
-        return math.prod(len(column) for column in self.columns.values())
-
-    def row(self, number: int) -> Settings:
-        """Return one combination, from the digits of its number."""
+        """Return the values of one case."""
         settings: Settings = {}
         for key, column in reversed(list(self.columns.items())):
-            number, place = divmod(number, len(column))
+            number, place = divmod(number, len(column)) if self.is_grid else (number, number)
             settings[key] = column[place]
         return {key: settings[key] for key in self.columns}
 
@@ -95,16 +85,6 @@ class Combinations(Design):
 def levels_of(values: Variation) -> tuple[object, ...]:
     """Return the values of a list; a distribution, which no mode without samples accepts, has none to list."""
     return values if isinstance(values, tuple) else ()
-
-
-def grid(sweep: Sweep) -> Design:
-    """Return all combinations; the last key changes fastest."""
-    return Combinations({key: levels_of(values) for key, values in sweep.vary.items()})
-
-
-def list_design(sweep: Sweep) -> Design:
-    """Return one case for every place in the lists, which are equally long."""
-    return Together({key: levels_of(values) for key, values in sweep.vary.items()})
 
 
 @dataclass(frozen=True)
@@ -115,11 +95,6 @@ class Column:
     head: Cell
     cells: Sequence[Cell]
     values: Sequence[object]
-
-
-def table(sweep: Sweep) -> Design:
-    """Return one case a row. Raises InputMissingError or InvalidInputError with the lines of all mistakes."""
-    return Together({column.key: column.values for column in read_columns(sweep.table or Path())})
 
 
 def read_columns(path: Path) -> list[Column]:
@@ -219,30 +194,21 @@ def draw_values(values: Variation, places: Places) -> Sequence[object]:
     if isinstance(values, tuple):  # equally likely levels
         return [values[index] for index in np.minimum(places * len(values), len(values) - 1).astype(int).tolist()]
     low, high = values.low, values.high
-    numbers = (min(max(round_digits(number), low), high) for number in QUANTILES[type(values)](values, places).tolist())
+    numbers = (min(max(round_digits(number), low), high) for number in quantile(values, places).tolist())
     return [toml_number(number, angle=values.angle) for number in numbers]
 
 
-def uniform_quantile(values: Uniform, places: Places) -> Places:
-    """Invert the uniform distribution of the values, or of their logarithms."""
-    if values.scale == "log":
-        return np.asarray(values.low * np.exp(places * np.log(values.high / values.low)))
-    return values.low + places * (values.high - values.low)
-
-
-def normal_quantile(values: Normal, places: Places) -> Places:
-    """Invert the normal distribution, cut at its bounds (scipy.stats.truncnorm)."""
+def quantile(values: Uniform | Normal, places: Places) -> Places:
+    """Invert a distribution: uniform in the values or their logarithms, or normal and cut at its bounds."""
+    if isinstance(values, Uniform):
+        if values.scale == "log":
+            return np.asarray(values.low * np.exp(places * np.log(values.high / values.low)))
+        return values.low + places * (values.high - values.low)
     stats = load_module("scipy.stats", "sampled sweeps")
     low, high = ((bound - values.mean) / values.sd for bound in (values.low, values.high))
     if np.isinf(low) and np.isinf(high):
         return np.asarray(stats.norm.ppf(places, values.mean, values.sd))
     return np.asarray(stats.truncnorm.ppf(places, low, high, values.mean, values.sd))
-
-
-QUANTILES: dict[type, Callable[[Any, Places], Places]] = {
-    Uniform: uniform_quantile,
-    Normal: normal_quantile,
-}
 
 
 def generator(seed: int, text: str) -> np.random.Generator:
@@ -257,35 +223,25 @@ def open_interval(places: Places) -> Places:
     return np.clip(places, LEAST, 1.0 - 2.0 * LEAST)
 
 
-def _streams(sweep: Sweep) -> list[np.random.Generator]:
-    """Return the stream of every key, however its quotes are set."""
-    return [generator(sweep.seed, format_key(parse_key(key))) for key in sweep.vary]
+def places_of(sweep: Sweep) -> Places:
+    """Return a place of every case in the unit cube for every key, shape (keys, samples).
 
-
-def lhs(sweep: Sweep) -> Places:
-    """Return a place in each of equally likely intervals, in random order, for every key."""
+    "lhs": one in each of equally likely intervals, in random order; "normal": independent ones; "sobol": the first
+    points of the sequence, in the middles of the finest cells of the net.
+    """
+    if sweep.mode == "sobol":
+        sequence = load_module("scipy.stats.qmc", "sampled sweeps").Sobol(
+            DIMENSIONS, scramble=True, bits=BITS, seed=generator(sweep.seed, "sobol")
+        )
+        size = min(CHUNK, 1 << (sweep.samples - 1).bit_length())
+        chunks = [sequence.random(size)[:, : len(sweep.vary)].copy() for _ in range(0, sweep.samples, size)]
+        return np.asarray(np.concatenate(chunks)[: sweep.samples].T + 0.5 ** (BITS + 1))
+    # a stream for every key, however its quotes are set
+    streams = [generator(sweep.seed, format_key(parse_key(key))) for key in sweep.vary]
+    if sweep.mode == "normal":
+        return np.stack([stream.random(sweep.samples) for stream in streams])
     hypercube = load_module("scipy.stats.qmc", "sampled sweeps").LatinHypercube
-    return np.stack([hypercube(1, seed=stream).random(sweep.samples)[:, 0] for stream in _streams(sweep)])
-
-
-def normal(sweep: Sweep) -> Places:
-    """Return independent places."""
-    return np.stack([stream.random(sweep.samples) for stream in _streams(sweep)])
-
-
-def sobol(sweep: Sweep) -> Places:
-    """Return the first points of the sequence, in the middles of the finest cells of the net."""
-    sequence = load_module("scipy.stats.qmc", "sampled sweeps").Sobol(
-        DIMENSIONS, scramble=True, bits=BITS, seed=generator(sweep.seed, "sobol")
-    )
-    size = min(CHUNK, 1 << (sweep.samples - 1).bit_length())
-    chunks = [sequence.random(size)[:, : len(sweep.vary)].copy() for _ in range(0, sweep.samples, size)]
-    return np.asarray(np.concatenate(chunks)[: sweep.samples].T + 0.5 ** (BITS + 1))
-
-
-LISTED_MODES: dict[str, Callable[[Sweep], Design]] = {"grid": grid, "list": list_design, "table": table}
-SAMPLED_MODES: dict[str, Callable[[Sweep], Places]] = {"lhs": lhs, "sobol": sobol, "normal": normal}
-"""Modes of sweeps; those that draw give places of the unit cube, shape (keys, samples)."""
+    return np.stack([hypercube(1, seed=stream).random(sweep.samples)[:, 0] for stream in streams])
 
 
 def design_of(sweep: Sweep) -> Design:
@@ -293,10 +249,12 @@ def design_of(sweep: Sweep) -> Design:
 
     Raises what reading a table raises, UnavailableError where a sampled mode has no scipy.
     """
-    if sweep.mode in LISTED_MODES:
-        return LISTED_MODES[sweep.mode](sweep)
-    places = open_interval(SAMPLED_MODES[sweep.mode](sweep))
-    return Together(
+    if sweep.mode == "table":
+        return Design({column.key: column.values for column in read_columns(sweep.table or Path())})
+    if not sweep.is_sampled:
+        return Design({key: levels_of(values) for key, values in sweep.vary.items()}, is_grid=sweep.mode == "grid")
+    places = open_interval(places_of(sweep))
+    return Design(
         {key: draw_values(values, column) for (key, values), column in zip(sweep.vary.items(), places, strict=True)}
     )
 
@@ -310,6 +268,7 @@ def remarks(sweep: Sweep) -> list[str]:
 
 
 MOST_CASES = 1_000_000
+MEASURED = "experiment.table"
 TABLE = "table"  # last part of keys that name a file
 MOST_LOOKED_AT = 1_000
 """Cases that are built in search of one that can be simulated, before anything runs."""
@@ -354,9 +313,14 @@ class Cases(LazySequence[Case]):
         return Case(values, scenario, name=run_hash(scenario))
 
 
-def _plain(value: object) -> object:
-    """Return a number of numpy's as Python has it."""
-    return value.item() if hasattr(value, "item") else value
+def plan_of(base: Scenario) -> Sweep:
+    """Return what is varied. Raises InvalidInputError where that is nothing, and for a table that does not fit."""
+    if base.sweep is None:
+        raise InvalidInputError("nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario")
+    if MEASURED in base.sweep.vary:
+        raise InvalidInputError(f"{MEASURED} cannot be varied; compare --experiment uses another table")
+    check_experiment(base)
+    return base.sweep
 
 
 def with_sweep(
@@ -376,7 +340,10 @@ def with_sweep(
     table = dict(present) if isinstance(present, Mapping) and not vary else {}
     overrides = list(document.overrides)
     for key, values in (vary or {}).items():
-        table[key] = freeze(values) if isinstance(values, Mapping) else tuple(map(_plain, values))
+        if isinstance(values, Mapping):
+            table[key] = freeze(values)
+        else:  # numbers of numpy as Python has them
+            table[key] = tuple(one.item() if hasattr(one, "item") else one for one in values)
         text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={toml(table[key])}"
         label = f"--vary {text}" if isinstance(vary, Variations) else "vary"
         overrides.append(Override(label, text, ("sweep", key)))
@@ -387,13 +354,8 @@ def with_sweep(
             label = f"--{name}" if isinstance(vary, Variations) else name
             overrides.append(Override(label, f"{name}={value}", ("sweep", name)))
     data = {**document.data, "sweep": table} if table else document.data
-    return _with_table_read(replace(document, data=data, overrides=tuple(overrides)))
-
-
-def _with_table_read(document: Document) -> Document:
-    """Put the columns of a table of cases into the document, as lists."""
-    present = document.data.get("sweep")
-    if not isinstance(present, Mapping) or present.get("mode") != "table":
+    document = replace(document, data=data, overrides=tuple(overrides))
+    if not table or table.get("mode") != "table":
         return document
     sweep = document.build().sweep
     if sweep is None or sweep.table is None:
@@ -414,23 +376,18 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
     if len(design) > MOST_CASES:
         raise InvalidInputError(f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are allowed")
     refuse_wrong_draws(document, sweep, design)
-    cases = Cases(_for_cases(document), design, heads_of(sweep))
+    # what cases are made from has no sweep, and tables that are found, or read, once for all of them
+    scenario, data = document.build(), document.without_sweep().data
+    if scenario.experiment is not None:
+        data = {**data, "experiment": {"table": scenario.experiment.table}}
+    if isinstance(scenario.motion, TABLED):
+        data, _ = with_value(data, ("motion", "table"), scenario.motion.table)
+    cases = Cases(replace(document, data=data), design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
     if all(case.scenario is None for case in islice(cases, looked_at)):
         which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"
         raise InvalidInputError(f"{which} can be simulated; the first: {cases[0].problem}")
     return cases
-
-
-def _for_cases(document: Document) -> Document:
-    """Return the document that cases are made from: no sweep, and tables found, or read, once for all of them."""
-    scenario = document.build()
-    data = document.without_sweep().data
-    if scenario.experiment is not None:
-        data = {**data, "experiment": {"table": scenario.experiment.table}}
-    if isinstance(scenario.motion, TABLED):
-        data, _ = with_value(data, ("motion", "table"), scenario.motion.table)
-    return replace(document, data=data)
 
 
 def refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None:
@@ -465,12 +422,13 @@ def table_digests(document: Document, vary: Mapping[str, Variation]) -> dict[str
     return digests
 
 
-@dataclass(frozen=True)
-class Variations(Mapping[str, Values]):
+class Variations(dict[str, Values]):
     """What is said of each key, as a [sweep] table has it, and the text in which a person said it."""
 
-    tables: Mapping[str, Values]
-    texts: Mapping[str, str]
+    def __init__(self, tables: Mapping[str, Values], texts: Mapping[str, str]) -> None:
+        """Take both, by key."""
+        super().__init__(tables)
+        self.texts = texts
 
     @classmethod
     def of(cls, tables: Mapping[str, Values]) -> "Variations":
@@ -478,18 +436,6 @@ class Variations(Mapping[str, Values]):
         if isinstance(tables, cls):
             return tables
         return cls(tables, {key: f"{key}={values}" for key, values in tables.items()})
-
-    def __getitem__(self, key: str) -> Values:
-        """Return what is said of a key."""
-        return self.tables[key]
-
-    def __iter__(self) -> Iterator[str]:
-        """Yield the keys."""
-        return iter(self.tables)
-
-    def __len__(self) -> int:
-        """Return the number of keys."""
-        return len(self.tables)
 
 
 def build_distributions(document: Document, given: Variations, option: str, mode: str) -> Sweep:
@@ -529,11 +475,8 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
     """
     from blocksim.world.describe import describe  # noqa: PLC0415 - the solver, which reading a sweep does not need
 
-    base = document.build()
-    if base.sweep is None:
-        raise InvalidInputError("nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario")
-    check_experiment(base)
-    cases = cases_of(document, base.sweep)
+    plan = plan_of(document.build())
+    cases = cases_of(document, plan)
     if len(cases) > LOOKED_AT:  # a random choice: evenly spaced ones may meet one value of a key only
         drawn = np.random.default_rng(0).choice(len(cases), LOOKED_AT, replace=False)
         chosen = [cases[number] for number in sorted(drawn.tolist())]
@@ -552,5 +495,5 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
         bytes=round(share * len(cases) * fmean(rows or [0.0])),
         memory=max((one.memory for one in described), default=0),
         stop_at_rest=sum(case.scenario.time.stop_at_rest for case in chosen if case.scenario is not None),
-        remarks=tuple(remarks(base.sweep)),
+        remarks=tuple(remarks(plan)),
     )

@@ -129,7 +129,7 @@ class Replay(Execution):
         self.tasks.clear()
         return self
 
-    def ready(self) -> tuple[Run, Setting]:
+    def ready(self, _: Path | None = None, /) -> tuple[Run, Setting]:
         """Return what gives the rows."""
         return self._run, Setting(1)
 

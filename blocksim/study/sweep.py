@@ -6,15 +6,15 @@ table is written from the manifest: it depends neither on the executor nor on th
 
 import hashlib
 import json
-import os
 import re
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
-from dataclasses import KW_ONLY, dataclass, field, replace
+from contextlib import closing, suppress
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.errors import InputMissingError, InvalidInputError, StoppedEarlyError, UnavailableError
+from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError, UnavailableError
 from blocksim.options import Option, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
@@ -23,28 +23,30 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.compilation import compile_kernels, kernel_set, kernels_of
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash
 from blocksim.simulation.stopping import stop_requests
-from blocksim.study.executors import Batch, Execution, Run, Setting, Task, chosen_executor, executor_named
+from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.manifest import (
+    ENDED_BADLY,
     MANIFEST,
+    MISSING,
     WHOLE,
     CaseIndex,
     Entry,
     Manifest,
     Shard,
     SweepResult,
-    SweepTable,
-    Timings,
+    note_timings,
+    table_rows,
     values_hash,
 )
-from blocksim.study.plan import Cases, Settings, Values, cases_of, levels_of, table_digests, with_sweep
-from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, check_experiment, invalid_row
-from blocksim.study.sweep_folder import CASES, prepare, read_plan
+from blocksim.study.plan import Cases, Settings, Values, cases_of, levels_of, plan_of, table_digests, with_sweep
+from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, invalid_row
+from blocksim.study.sweep_folder import CASES, SWEEP, FolderKind, prepare, read_plan, write_table
 from blocksim.study.vary import variations_option
 
 TIMINGS = "timings.csv"
-MEASURED = "experiment.table"
 MOST_INVALID = 500  # kept in memory before they are written
-AGAIN = "rerun the command to finish"
+SOONEST = 2.0  # s between two tables while the sweep runs
+SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
 OnRow = Callable[[int, int, Row], None]
 SHARDED = re.compile(r"manifest-\d+-of-(\d+)\.jsonl")
 MOST_SHARDS = 20
@@ -113,30 +115,23 @@ def sweep(scenario: Source, options: SweepOptions) -> SweepResult:
 
 def run_sweep(document: Document, options: SweepOptions) -> SweepResult:
     """Run the cases of a document that has its [sweep] table; see `sweep`."""
-    executor = chosen_executor(options.executor, options.scheduler, keep_cases=options.keep_cases)
     shard = options.shard
     refuse_loss(shard, overwrite=options.overwrite)
-    runner = executor_named(executor)
     base = document.build()
-    plan = _plan_of(base)
+    plan = plan_of(base)
     cases = cases_of(document, plan)
     name = sweep_hash(base, plan, table_digests(document, plan.vary))
     folder = Path(options.out) if options.out is not None else files.RESULTS / base.name / f"sweep-{name}"
-    cases_folder = folder / CASES if options.keep_cases else None
-    setting = Setting(options.jobs or os.cpu_count() or 1, scheduler=options.scheduler, folder=cases_folder)
-    runner.check(setting)
+    run, setting = options.ready(folder / CASES if options.keep_cases else None)
     prepare(folder, base, name, overwrite=options.overwrite)
     for kernels in kernels_for(document):
         compile_kernels(kernels)
-    with closing(Manifest(folder / shard.file(MANIFEST))) as kept:
-        done = CaseIndex(folder, len(cases))
+    with closing(Manifest(folder / shard.file(MANIFEST))) as manifest:
+        share = SweepRun(cases, shard, manifest, options.on_row, measured_ranges(base))
         if options.retry_failed:
-            done.forget_failed(shard)
-        table = SweepTable(folder / shard.file(TABLE), cases, done, measured_ranges(base), shard)
-        timings = Timings(folder / shard.file(TIMINGS), executor)
-        share = SweepRun(cases, shard, kept, done, table, timings, options.on_row)
-        share.run(runner.run, setting, fail_fast=options.fail_fast)
-    return SweepResult(folder, shard.file(TABLE), len(done.state[shard.slice]))
+            share.forget_failed()
+        share.run(run, setting, fail_fast=options.fail_fast)
+    return SweepResult(folder, shard.file(TABLE), share.count)
 
 
 def refuse_loss(shard: Shard, *, overwrite: bool) -> None:
@@ -145,19 +140,9 @@ def refuse_loss(shard: Shard, *, overwrite: bool) -> None:
         raise InvalidInputError("a shard cannot overwrite what other shards have done; remove the folder first")
 
 
-def _plan_of(base: Scenario) -> Sweep:
-    """Return what is varied. Raises InvalidInputError where that is nothing, and for a table that does not fit."""
-    if base.sweep is None:
-        raise InvalidInputError("nothing to vary: give --vary KEY=VALUES, or a [sweep] table in the scenario")
-    if MEASURED in base.sweep.vary:
-        raise InvalidInputError(f"{MEASURED} cannot be varied; compare --experiment uses another table")
-    check_experiment(base)
-    return base.sweep
-
-
 def cases_in(document: Document) -> Cases:
     """Return the cases of a document that has a sweep. Raises InvalidInputError where it has none."""
-    return cases_of(document, _plan_of(document.build()))
+    return cases_of(document, plan_of(document.build()))
 
 
 def measured_ranges(base: Scenario) -> Ranges | None:
@@ -184,50 +169,68 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     return tuple(dict.fromkeys((kernels_of(base), *sets)))
 
 
-@dataclass
 class SweepRun:
-    """One process's share of a sweep."""
+    """One process's share of the cases of a study, and what it keeps of them beside its manifest."""
 
-    cases: Cases
-    shard: Shard
-    manifest: Manifest
-    done: CaseIndex
-    table: SweepTable
-    timings: Timings
-    on_row: OnRow
-    invalid: list[tuple[Entry, Settings]] = field(
-        default_factory=list
-    )  # cases that cannot be run, until they are written
+    def __init__(
+        self,
+        cases: Cases,
+        shard: Shard,
+        manifest: Manifest,
+        on_row: OnRow,
+        ranges: Ranges | None = None,
+        kind: FolderKind = SWEEP,
+        table: str = TABLE,
+    ) -> None:
+        """Take what is in the folder already; rows go into `table`, judged by `ranges` where these are given."""
+        self.cases, self.shard, self.manifest, self.on_row = cases, shard, manifest, on_row
+        self.ranges, self.kind, self.folder = ranges, kind, manifest.path.parent
+        self.table = self.folder / shard.file(table)
+        self.done = CaseIndex(self.folder, len(cases))
+        self.count = len(self.done.state[shard.slice])  # cases of this share
+        self.new = 0  # rows of this call
+        self.invalid: list[tuple[Entry, Settings]] = []  # cases that cannot be run, until they are written
+        self.next_at = time.monotonic() + SOONEST
 
-    @property
-    def count(self) -> int:
-        """How many cases there are in this share."""
-        return len(self.done.state[self.shard.slice])
+    def forget_failed(self) -> None:
+        """Have those cases run again that did not end well."""
+        state = self.done.state[self.shard.slice]
+        state[state == ENDED_BADLY] = MISSING
 
-    def run(self, executor: Run, setting: Setting, *, fail_fast: bool) -> None:
+    def run(self, executor: Run, setting: Setting, *, fail_fast: bool = False) -> None:
         """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
         try:
             with stop_requests() as is_stopped:
-                self._run(executor, replace(setting, is_stopped=is_stopped), fail_fast=fail_fast)
+                setting = replace(setting, is_stopped=is_stopped)
+                # closed here and now: left to the garbage collector, workers would continue
+                with closing(executor(self._tasks(), setting)) as batches:
+                    for batch in batches:
+                        has_failed = self._keep_batch(batch, setting.executor)
+                        if time.monotonic() >= self.next_at:
+                            with suppress(OutputExistsError):  # somebody has changed it: said at the end
+                                self._write()
+                        if fail_fast and has_failed:
+                            break
+                    else:
+                        self._keep()
                 stopped = is_stopped()
         except KeyboardInterrupt:
             stopped = True
         except UnavailableError:
-            self.table.write()
+            self._write()
             raise
-        self.table.write()
+        self._write()
         if stopped and self.done.count(self.shard) < self.count:
-            raise StoppedEarlyError(f"stopped with {self.done.count(self.shard)} of {self.count} cases done; {AGAIN}")
+            done = f"{self.done.count(self.shard)} of {self.count} cases done"
+            raise StoppedEarlyError(f"stopped with {done}; rerun the command to finish")
 
-    def _run(self, executor: Run, setting: Setting, *, fail_fast: bool) -> None:
-        # closed here and now: left to the garbage collector, workers would continue
-        with closing(executor(self._tasks(), setting)) as batches:
-            for batch in batches:
-                has_failed = self._keep_batch(batch)
-                self.table.write_now_and_then()
-                if fail_fast and has_failed:
-                    return
-        self._keep()
+    def _write(self) -> None:
+        """Write the table; the more rows, the longer the while until it is worth it again."""
+        began = time.monotonic()
+        self.next_at = began + SOONEST
+        write_table(self.table, self.kind, table_rows(self.cases, self.done, self.ranges, self.shard))
+        ended = time.monotonic()
+        self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
 
     def _tasks(self) -> Iterator[Task]:
         """Make one task after the other; cases that cannot be run get their rows on the way."""
@@ -243,7 +246,7 @@ class SweepRun:
             if len(self.invalid) >= MOST_INVALID:
                 self._keep()
 
-    def _keep_batch(self, batch: Batch) -> bool:
+    def _keep_batch(self, batch: Batch, executor: str) -> bool:
         """Keep rows, and return whether one of them is of a case that failed."""
         ended = [
             (Entry(task.number, task.name, values_hash(task.settings), row), task.settings)
@@ -251,7 +254,8 @@ class SweepRun:
         ]
         has_failed = bool(self.invalid) or any(row["status"] != FINISHED for row in batch.rows)
         self._keep(ended)
-        self.timings.append((task.name for task in batch.tasks), batch.seconds, batch.host)
+        names = [task.name for task in batch.tasks]
+        note_timings(self.folder / self.shard.file(TIMINGS), executor, names, batch.seconds, batch.host)
         return has_failed
 
     def _keep(self, ended: Sequence[tuple[Entry, Settings]] = ()) -> None:
@@ -262,6 +266,7 @@ class SweepRun:
         entries = [entry for entry, _ in ended]
         for start, entry in zip(self.manifest.append(entries), entries, strict=True):
             self.done.note(self.manifest.path, start, entry)
+        self.new += len(ended)
         before = self.done.count(self.shard) - len(ended)
         for position, (entry, settings) in enumerate(ended, start=1):
             self.on_row(before + position, self.count, {"case": entry.case, **settings, **entry.row})
@@ -293,5 +298,5 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
         if of > 1 and len(missing) > MOST_SHARDS:
             lines.append(f"  and {len(missing) - MOST_SHARDS} more shards")
         raise InvalidInputError("\n".join(lines))
-    SweepTable(folder / TABLE, cases, done, measured_ranges(base)).write()
+    write_table(folder / TABLE, SWEEP, table_rows(cases, done, measured_ranges(base)))
     return SweepResult(folder, planned=len(cases))

@@ -2,13 +2,11 @@
 
 import csv
 import hashlib
-import io
 import json
 import logging
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_head, read_limited
+from blocksim.scenario.spelling import list_names
 from blocksim.simulation.atomic import atomic_path, sync_file, write_text
 from blocksim.simulation.folder import (
     Kind,
@@ -31,7 +30,6 @@ from blocksim.simulation.folder import (
     is_written,
     keep_scenario,
     make_folder,
-    origin_of,
     prefix_kind,
     read_tables,
     refuse_foreign_copies,
@@ -47,60 +45,53 @@ CASES = "cases"
 SHARD = r"(?:-\d+-of-\d+)?"
 
 
-@dataclass(frozen=True, eq=False)
+MANIFEST_KIND, TIMINGS_KIND = append_only_kind(b'{"number":'), append_only_kind(b"case,executor,seconds,host\n")
+
+
 class FolderKind:
-    """What distinguishes the folders of one kind of study."""
+    """What distinguishes the folders of one kind of study: its plan NAME.toml, its summary NAME.json and its tables."""
 
-    what: str  # a sweep
-    command: str
-    plan: str  # resolved scenario with what is varied, written first
-    head: bytes  # of the plan
-    results: Mapping[str, Kind]  # kinds of content by the patterns of their names
-    leftover: re.Pattern[str]  # names of what is left of them when their writer was killed
-    tables: re.Pattern[str]  # names of those results whose checksums are kept; the others grow by lines
-
-    def is_table(self, name: str) -> bool:
-        """Return True for the name of a table that is written anew each time."""
-        return self.tables.fullmatch(name) is not None
-
-    @property
-    def origin(self) -> str:
-        """Name of the file that says what the study came from."""
-        return origin_of(self.plan)
+    def __init__(self, name: str, what: str, command: str, tables: Mapping[str, str]) -> None:
+        """Take what a study is called ("a sweep"), and the names of its tables with the forms of their first lines."""
+        self.what, self.command = what, f"blocksim {command} FILE"
+        self.plan, self.origin = f"{name}.toml", f"{name}.json"
+        self.head = f"# {name.capitalize()} ".encode()  # of the plan, a resolved scenario that is written first
+        names = "|".join(tables)
+        self.tables = re.compile(names)  # their checksums are kept; the other results grow by lines
+        self.leftover = re.compile(rf"\.({names}|{name}\.json|{name}\.toml)\..*")  # of a writer that was killed
+        self.results = {
+            **{table: prefix_kind(form.encode()) for table, form in tables.items()},
+            rf"manifest{SHARD}\.jsonl": MANIFEST_KIND,
+            rf"timings{SHARD}\.csv": TIMINGS_KIND,
+            rf"{name}\.json": has_keys("began_at"),
+        }
 
     def kind_of(self, name: str) -> Kind | None:
         """Return the kind of content that a file of this name has, None for a file that is no result."""
         return next((kind for pattern, kind in self.results.items() if re.fullmatch(pattern, name)), None)
 
+    def records_of(self, path: Path) -> tuple[TableRecord, ...] | None:
+        """Return what the summary says of a table; None for anything else, and where the study is older than that."""
+        if not self.tables.fullmatch(path.name) or not path.is_file() or path.is_symlink():
+            return None
+        try:
+            origin = read_origin(path.parent, self)
+        except BlocksimError:
+            return None
+        return None if origin is None or origin.tables is None else origin.tables.get(path.name, ())
+
     def is_ours(self, path: Path) -> bool:
         """Return True for a file that a study has written, or left half written when it was killed."""
-        kind = self.kind_of(path.name)
-        if self.is_table(path.name) and path.is_file() and not path.is_symlink():
-            records = _records_of(path, self)
-            if records is not None:
-                return is_own(path, records)
-        if kind is not None:
+        if (records := self.records_of(path)) is not None:
+            return is_own(path, records)
+        if (kind := self.kind_of(path.name)) is not None:
             return is_written(path, {path.name: kind}, self.plan)
         named = self.leftover.fullmatch(path.name)
         return named is not None and is_leftover(path.name, (named[1],)) and path.is_file()
 
 
-MANIFESTS: Mapping[str, Kind] = {rf"manifest{SHARD}\.jsonl": append_only_kind(b'{"number":')}
-ORIGINS = has_keys("began_at")
-OF_CASES = prefix_kind(rb"case,(?:.*,)?status,reason,seconds(?:,.*)?")
-SWEEP = FolderKind(
-    what="a sweep",
-    command="blocksim sweep FILE",
-    plan=PLAN,
-    head=b"# Sweep ",
-    results={  # shards have files of their own
-        rf"sweep{SHARD}\.csv": OF_CASES,
-        **MANIFESTS,
-        rf"timings{SHARD}\.csv": append_only_kind(b"case,executor,seconds,host\n"),
-        r"sweep\.json": ORIGINS,
-    },
-    leftover=re.compile(r"\.(sweep[-\w]*\.csv|sweep\.json|sweep\.toml)\..*"),
-    tables=re.compile(rf"sweep{SHARD}\.csv"),
+SWEEP = FolderKind(  # shards have tables of their own
+    "sweep", "a sweep", "sweep", {rf"sweep{SHARD}\.csv": "case,(?:.*,)?status,reason,seconds(?:,.*)?"}
 )
 
 
@@ -162,9 +153,12 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
     if not (overwrite or is_same):
         which = kind.what.replace("a ", "another ", 1)
         raise OutputExistsError(f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere")
-    if overwrite and any(path.suffix == ".jsonl" and kind.is_ours(path) and _is_in_use(path) for path in present):
-        message = f"{folder}: {kind.what} is running here; wait for it, or write elsewhere with --out DIR"
-        raise OutputExistsError(message)
+    for path in present if overwrite else ():
+        if path.suffix == ".jsonl" and kind.is_ours(path):
+            with open_regular(path) as file:
+                if not takes_lock(file.fileno()):
+                    how = "wait for it, or write elsewhere with --out DIR"
+                    raise OutputExistsError(f"{folder}: {kind.what} is running here; {how}")
     refuse_foreign_copies(tables, folder, kind.plan)
     changed = _refuse_foreign(present, kind, overwrite=overwrite)
     if overwrite:  # whatever else lies there stays
@@ -178,12 +172,6 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
                 cases.rmdir()
 
 
-def _is_in_use(manifest: Path) -> bool:
-    """Return True if another process appends to a manifest."""
-    with open_regular(manifest) as file:
-        return not takes_lock(file.fileno())
-
-
 def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: bool = False) -> list[Path]:
     """Raise OutputExistsError where a file of somebody else has the name of a result, or somebody has changed one.
 
@@ -193,12 +181,9 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
     changed = [path for path in present if kind.kind_of(path.name) and not kind.is_ours(path)]
     told = []
     for path in changed:
-        added = None  # of what is no table of the study any more
-        if kind.is_table(path.name) and path.is_file() and not path.is_symlink():
-            added = columns_added(path, _records_of(path, kind) or ())
-        shown = [repr(name[:LONGEST_NAME]) for name in (added or ())[:MOST_SHOWN]]
-        more = f" and {len(added) - MOST_SHOWN} more" if added and len(added) > MOST_SHOWN else ""
-        which = f" (columns added: {', '.join(shown)}{more})" if added else ""
+        added = columns_added(path, kind.records_of(path) or ())  # None: it is no table of the study any more
+        shown = list_names([repr(name[:LONGEST_NAME]) for name in added or ()], MOST_SHOWN)
+        which = f" (columns added: {shown})" if added else ""
         text = f"{path}: changed since {whose} wrote it{which}; "
         if not overwrite or added is None:
             again = "" if added is None else "--overwrite replaces it, or "
@@ -207,15 +192,6 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
     for text in told:
         log.warning("%s", text)
     return changed
-
-
-def _records_of(path: Path, kind: FolderKind) -> tuple[TableRecord, ...] | None:
-    """Return what the summary beside a table says of it; None where the study is older than such records."""
-    try:
-        origin = read_origin(path.parent, kind)
-    except BlocksimError:
-        return None
-    return None if origin is None or origin.tables is None else origin.tables.get(path.name, ())
 
 
 def note_table(path: Path, written: Path, kind: FolderKind) -> None:
@@ -237,14 +213,18 @@ def note_table(path: Path, written: Path, kind: FolderKind) -> None:
         write_text(path.parent / kind.origin, json.dumps(data, indent=2) + "\n")
 
 
-def write_answer(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]], answer: Mapping[str, object]) -> None:
-    """Write the table of a study (heads first), and its answer into the summary. Raises OutputError."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+def write_table(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]]) -> None:
+    """Write a table of a study, heads first, one row after the other. Raises as `note_table`."""
     with atomic_path(path) as temporary:
-        temporary.write_bytes(text.getvalue().encode())
+        with temporary.open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows(rows)
         sync_file(temporary)
         note_table(path, temporary, kind)
+
+
+def write_answer(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]], answer: Mapping[str, object]) -> None:
+    """Write the table of a study (heads first), and its answer into the summary. Raises OutputError."""
+    write_table(path, kind, rows)
     origin = read_origin(path.parent, kind)
     begun = {} if origin is None else origin.model_dump(mode="json", exclude_none=True)
     write_text(path.parent / kind.origin, json.dumps({**begun, **answer}, indent=2) + "\n")

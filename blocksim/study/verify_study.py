@@ -139,7 +139,7 @@ def verify_study(folder: Path, study: Study, sample: int = SAMPLE, seed: int = 0
     with TemporaryDirectory() as place:
         again = study.repeat(stored, replay, Path(place) / "study")
         entries = tuple(apart(kind.origin, "", stored.comparable(), again.comparable()))
-        tables = [path for path in sorted(again.folder.glob("*.csv")) if kind.is_table(path.name)]
+        tables = [path for path in sorted(again.folder.glob("*.csv")) if kind.tables.fullmatch(path.name)]
         cells = [one for path in tables for one in _cells_apart(folder / path.name, lines_in(path))]
     origins, is_same_code = _origins(folder, kind)
     tasks = replay.tasks

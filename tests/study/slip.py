@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from blocksim.scenario import Document
 from blocksim.silence import silent
-from blocksim.study.answer import Answer, Table, folder_kind
+from blocksim.study.answer import Answer, Table
 from blocksim.study.executors import Execution
 from blocksim.study.rows import Row
 from blocksim.study.runs import Replay, runs_of
@@ -28,9 +28,7 @@ class Point(BaseModel, frozen=True):
 class SlipAnswer(Answer, frozen=True):
     """All tilts."""
 
-    files: ClassVar[FolderKind] = folder_kind(
-        "slip", "a study of slip", "slip", {r"slip\.csv": r"tilt \[deg\],outcome"}
-    )
+    files: ClassVar[FolderKind] = FolderKind("slip", "a study of slip", "slip", {r"slip\.csv": r"tilt \[deg\],outcome"})
     picture: ClassVar[str] = "steps"
     caption: ClassVar[str] = "What every tilt came to"
     points: tuple[Point, ...]

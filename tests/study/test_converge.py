@@ -182,7 +182,7 @@ def test_the_spacing_of_soil_is_halved_where_that_is_asked_for() -> None:
     assert {one.study for one in refinements_of(soil)} == {"step", "stiffness"}
     (spacing,) = refinements_of(soil, ["spacing"])
     assert (spacing.key, levels(spacing, 2)) == ("soils.spacing", [0.005, 0.0025, 0.00125])
-    (table,) = soil_tables(spacing.at(soil, 1))
+    (table,) = soil_tables(with_setting(soil, spacing.key, spacing.value(1)))
     assert table.spacing == pytest.approx(0.0025)
 
 
@@ -272,7 +272,8 @@ def test_step_and_tolerance_of_rigid_contacts_are_refined_from_what_the_run_take
     assert step.own == pytest.approx(1e-3 / 13)  # what "auto" takes for a single block of 25 mm
     assert (tolerance.key, tolerance.own) == ("time.velocity_tolerance", 1e-6)  # of a single block
     assert [tolerance.value(level) for level in (-2, 0, 2)] == pytest.approx([1e-5, 1e-6, 1e-7])
-    assert tolerance.at(rigid("slide"), 2).time.velocity_tolerance == pytest.approx(1e-7)  # type: ignore[union-attr]
+    finer = with_setting(rigid("slide"), tolerance.key, tolerance.value(2))
+    assert finer.time.velocity_tolerance == pytest.approx(1e-7)  # type: ignore[union-attr]
     step, tolerance = refinements_of(rigid("wall", time__step=5e-4))  # a crowd has a tolerance of its own
     assert (step.own, tolerance.own) == (5e-4, 0.1)
     assert refinements_of(rigid("three_blocks_nominal", time__step=6e-3))[0].coarser == 0  # 12 ms would be refused

@@ -54,6 +54,7 @@ class Setting:
     """How tasks are to be run; `is_stopped` returns True once the user wants to stop."""
 
     jobs: int  # threads or processes
+    executor: str = DEFAULT
     is_stopped: Callable[[], bool] = lambda: False
     scheduler: str | None = None  # address of a Dask cluster
     folder: Path | None = None  # where folders of runs are kept
@@ -130,21 +131,20 @@ class Execution:
         str | None, Option("Scheduler of a Dask cluster, such as tcp://host:8786.", metavar="ADDRESS")
     ] = None
 
-    @property
-    def name(self) -> str:
-        """The executor that these ask for. Raises InvalidInputError."""
-        return chosen_executor(self.executor, self.scheduler)
+    def ready(self, folder: Path | None = None, /) -> tuple[Run, Setting]:
+        """Return what runs tasks, into folders where one for all is given, and its setting.
 
-    def ready(self) -> tuple[Run, Setting]:
-        """Return what runs tasks, and its setting. Raises InvalidInputError, UnavailableError."""
-        runner = executor_named(self.name)
-        setting = Setting(self.jobs or os.cpu_count() or 1, scheduler=self.scheduler)
+        Raises InvalidInputError, UnavailableError.
+        """
+        name = chosen_executor(self.executor, self.scheduler, keep_cases=folder is not None)
+        runner = executor_named(name)
+        setting = Setting(self.jobs or os.cpu_count() or 1, name, scheduler=self.scheduler, folder=folder)
         runner.check(setting)
         return runner.run, setting
 
     def for_rounds(self) -> AbstractContextManager[Run]:
         """Give what runs the tasks of one round after the other, on the same processes. Raises InvalidInputError."""
-        return executor_named(self.name).for_rounds()
+        return executor_named(chosen_executor(self.executor, self.scheduler)).for_rounds()
 
 
 def chosen_executor(executor: str | None, scheduler: str | None, *, keep_cases: bool = False) -> str:
