@@ -13,8 +13,8 @@ import tomli_w
 from blocksim.errors import BlocksimError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.extras import load_module
 from blocksim.options import Option, takes
-from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash, scenario_to_toml
-from blocksim.scenario.document import Span, locate
+from blocksim.scenario import Document, Source, document_of, scenario_hash, scenario_to_toml
+from blocksim.scenario.document import locate
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import KeyPath, follow, format_key, with_value
 from blocksim.silence import silent
@@ -24,6 +24,7 @@ from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.stopping import interruptible
 from blocksim.study.calibrate_plan import (
     FIT,
+    FRESH,
     PURPOSE,
     SCATTER,
     CalibrationPlan,
@@ -45,7 +46,6 @@ from blocksim.study.plan import Values, Variations
 from blocksim.study.vary import RANGE, SPREAD, variations_option
 
 TABLES: tuple[KeyPath, ...] = (("experiment", "table"), ("motion", "table"), ("sweep", "table"))
-"""Keys whose values are paths, relative to the scenario's folder."""
 NOTE = "calibrated, see [provenance]"
 GAP = "  "
 _COMMENT = re.compile(r"""([^#"']*?)(\s*)(?:#\s*(.*?)\s*)?""")
@@ -67,71 +67,70 @@ def fitted_text(
     """
     changed = document.with_values(values)
     changed = changed.with_values({format_key(("provenance", key)): text for key, text in provenance.items()})
-    scenario = changed.build()
-    moved = _moved(changed, folder)
-    with suppress(BlocksimError):  # no scenario any more, half-way through
-        text = f"# {head}\n{_with_values(document.source.text, moved, len(document.overrides), note)}"
-        if _says(text, scenario, folder):
-            return text
-    return f"# {head}\n{_resolved(scenario, moved)}"
-
-
-def _with_values(text: str, wanted: Document, settings: int, note: str) -> str:
-    """Return the text with all values that were set over it; the first so many are settings, the others are fitted."""
-    fitted = {override.path for override in wanted.overrides[settings:] if override.path[0] != "provenance"}
-    for path in dict.fromkeys([*(override.path for override in wanted.overrides), *_tables(wanted)]):
-        if follow(wanted.data, path) != follow(Document.parse(text).data if text else {}, path):
-            text = _edited(text, path, wanted, note if path in fitted else "")
-    return text
-
-
-def _tables(document: Document) -> tuple[KeyPath, ...]:
-    """Return the keys of a scenario that may name a table."""
-    bodies = document.data.get("bodies", ())
+    scenario, data = changed.build(), changed.data
+    # keys that may name a table, by a path relative to the scenario's folder
+    bodies = data.get("bodies", ())
     count = len(bodies) if isinstance(bodies, tuple) else 0
-    return (*TABLES, *(("bodies", number, "motion", "table") for number in range(count)))
-
-
-def _moved(document: Document, folder: Path) -> Document:
-    """Return the document with its paths as seen from another folder."""
-    data = document.data
-    for path in _tables(document):
+    tables = [*TABLES, *(("bodies", number, "motion", "table") for number in range(count))]
+    for path in tables:
         named = follow(data, path)
         if isinstance(named, str):
-            target = (document.folder / named).resolve()
+            target = (changed.folder / named).resolve()
             data, _ = with_value(data, path, Path(os.path.relpath(target, folder.resolve())).as_posix())
-    return replace(document, data=data, folder=folder)
+    with suppress(BlocksimError):  # no scenario any more, half-way through
+        text = document.source.text
+        fitted = {override.path for override in changed.overrides[len(document.overrides) :]}
+        for path in dict.fromkeys([*(override.path for override in changed.overrides), *tables]):
+            if follow(data, path) != follow(Document.parse(text).data if text else {}, path):
+                text = _edited(text, path, data, note if path in fitted and path[0] != "provenance" else "")
+        text = f"# {head}\n{text}"
+        found = replace(Document.parse(text, folder=folder), allow_outside=True).build()
+        one, other = (
+            each.model_copy(update={"motion": None}) for each in (found, scenario)
+        )  # the hash has its content
+        if scenario_hash(found) == scenario_hash(scenario) and one == other:
+            return text
+    experiment, motion = (follow(data, path) for path in TABLES[:2])
+    resolved = scenario_to_toml(
+        scenario,
+        experiment_table=experiment if isinstance(experiment, str) else None,
+        motion_table=motion if isinstance(motion, str) else None,
+        body_tables={
+            body.motion.table.digest: str(follow(data, ("bodies", number, "motion", "table")))
+            for number, body in enumerate(scenario.bodies)
+            if isinstance(body.motion, FromTable)
+        },
+    )
+    return f"# {head}\n{resolved}"
 
 
-def _edited(text: str, path: KeyPath, wanted: Document, note: str) -> str:
-    """Return the text with the value at a path set, as the wanted document has it, and a note behind it."""
+def _edited(text: str, path: KeyPath, data: Mapping[str, object], note: str) -> str:
+    """Return the text with the value at a path set, as it is in the data, and a note behind it.
+
+    A comment behind the value that stood there was about that one, which is said.
+    """
     places = locate(text)
     known = next((path[:size] for size in range(len(path), 0, -1) if path[:size] in places), ())
-    lines = text.split("\n")
+    value = toml_value(follow(data, path))
     if not known:  # in a table of its own at the end, or before all tables where it stands in none
-        value = toml_value(follow(wanted.data, path))
         if len(path) == 1:
             return f"{format_key(path)} = {value}\n{text}"
         return f"{text.rstrip()}\n\n[{format_key(path[:1])}]\n{format_key(path[1:])} = {value}\n"
-    place = places[known]
-    is_header = lines[place.key.line - 1].lstrip().startswith("[") and place.key == place.value
-    if not is_header:
-        told = f"{path[-1]} {note}" if note and known != path else note
-        return _replaced(lines, place.value, toml_value(follow(wanted.data, known)), told)
-    line = f"{format_key(path[len(known) :])} = {toml_value(follow(wanted.data, path))}"
-    return "\n".join([*lines[: place.key.line], line, *lines[place.key.line :]])
-
-
-def _replaced(lines: list[str], span: Span, value: str, note: str) -> str:
-    """Put a value where one stood; a comment behind it was about that one, which is said."""
+    lines, place, span = text.split("\n"), places[known], places[known].value
+    if lines[place.key.line - 1].lstrip().startswith("[") and place.key == span:  # the head of its table
+        lines.insert(place.key.line, f"{format_key(path[len(known) :])} = {value}")
+        return "\n".join(lines)
+    value = toml_value(follow(data, known))
     line = lines[span.line - 1]
     rest = line[span.column + span.length :]
     comment = _COMMENT.fullmatch(rest)
     if note and comment is not None:
+        told = note if known == path else f"{path[-1]} {note}"
         before = f"; before: {comment[3]}" if comment[3] else ""
         gap = " " * max(len(GAP), span.length + len(comment[2]) - len(value))  # the comment stays in its column
-        rest = f"{comment[1]}{gap}# {note}{before}"
-    return "\n".join([*lines[: span.line - 1], line[: span.column] + value + rest, *lines[span.line :]])
+        rest = f"{comment[1]}{gap}# {told}{before}"
+    lines[span.line - 1] = line[: span.column] + value + rest
+    return "\n".join(lines)
 
 
 def toml_value(value: object) -> str:
@@ -141,31 +140,6 @@ def toml_value(value: object) -> str:
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(toml_value, value)) + "]"
     return tomli_w.dumps({"v": value}).removeprefix("v = ").rstrip("\n")
-
-
-def _says(text: str, scenario: Scenario, folder: Path) -> bool:
-    """Return True if a text, read in a folder, gives exactly this scenario."""
-    with suppress(BlocksimError):
-        found = replace(Document.parse(text, folder=folder), allow_outside=True).build()
-        beside = [one.model_copy(update={"motion": None}) for one in (found, scenario)]  # the hash has its content
-        return scenario_hash(found) == scenario_hash(scenario) and beside[0] == beside[1]
-    return False
-
-
-def _resolved(scenario: Scenario, moved: Document) -> str:
-    experiment, motion = (follow(moved.data, path) for path in TABLES[:2])
-    motions = ((number, body.motion) for number, body in enumerate(scenario.bodies))
-    of_bodies = {
-        one.table.digest: str(follow(moved.data, ("bodies", number, "motion", "table")))
-        for number, one in motions
-        if isinstance(one, FromTable)
-    }
-    return scenario_to_toml(
-        scenario,
-        experiment_table=experiment if isinstance(experiment, str) else None,
-        motion_table=motion if isinstance(motion, str) else None,
-        body_tables=of_bodies,
-    )
 
 
 WRITTEN = "scenario.toml"
@@ -322,15 +296,18 @@ def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
     journal = path.parent / (path.stem + JOURNAL)
     for package in NEEDED:
         load_module(package, PURPOSE)
-    prepare(path, journal, resume=resume, overwrite=overwrite)
+    _make_room(path, journal, resume=resume, overwrite=overwrite)
     kept = path if path.exists() and not overwrite else None
-    best, ties = _searched(plan, journal, options.trials, options.on_trial, kept)
-    fresh = plan.scatter.fresh_members(best.values, options.fresh_members if plan.scatter.plan else 1, plan.seed)
+    best, ties = _searched(plan, journal, options, kept)
+    fresh = plan.scatter.members(best.values, options.fresh_members if plan.scatter.plan else 1, plan.seed, FRESH)
     members = list(run_members(plan.bare, fresh))
     score = score_of(members, plan.ranges)
     fit = Fit(plan, best, score, options.trials, path, hits_of(members, plan.ranges), ties)
     note = f"one of {len(ties)} equally good, see [provenance]" if fit.is_one_of_many else NOTE
-    text = fitted_text(plan.document, best.values, _provenance(fit), path.parent, _head(fit), note)
+    which = f"one of {len(ties)} equally good trials: " if fit.is_one_of_many else ""
+    shown = ", ".join(f"{key} = {value}" for key, value in best.values.items())
+    head = f"{Path(plan.document.source.where).name} calibrated by blocksim: {which}{shown}"
+    text = fitted_text(plan.document, best.values, _provenance(fit), path.parent, head, note)
     if kept is None:
         write_text(path, text)
     elif kept.read_bytes() != text.encode():
@@ -338,7 +315,7 @@ def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
     return fit
 
 
-def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None:
+def _make_room(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None:
     """Make the folder, and room in it. Raises OutputExistsError for files that must not go."""
     if path.is_dir():
         raise OutputExistsError(f"{path}: this is a folder; a file name is needed")
@@ -346,8 +323,9 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
     if path.exists() and not overwrite and not (resume and has_trials):
         raise OutputExistsError(TAKEN.format(path))
     if has_trials and not (resume or overwrite):
-        message = f"{journal}: has trials of a calibration; --resume continues them, --overwrite starts again"
-        raise OutputExistsError(message)
+        raise OutputExistsError(
+            f"{journal}: has trials of a calibration; --resume continues them, --overwrite starts again"
+        )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if overwrite and not resume and journal.exists():
@@ -358,11 +336,11 @@ def prepare(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None
 
 
 def _searched(
-    plan: CalibrationPlan, journal: Path, trials: int, on_trial: OnTrial, kept: Path | None
+    plan: CalibrationPlan, journal: Path, options: CalibrateOptions, kept: Path | None
 ) -> tuple[Trial, tuple[Trial, ...]]:
     """Return the best trial, the first of equally good ones, and all that tie with it, the best among them."""
-    best: Trial | None = None
     tried: list[Trial] = []
+    trials = options.trials
 
     def evaluate(values: Mapping[str, object]) -> Score:
         return score_of(run_members(plan.bare, plan.scatter.members(values, plan.members, plan.seed)), plan.ranges)
@@ -374,14 +352,14 @@ def _searched(
         try:
             for trial in search(plan.priors, evaluate, study, trials=trials, seed=plan.seed):
                 tried.append(trial)
-                best = trial if best is None or trial.score.value > best.score.value else best
                 if trial.number > done:
-                    on_trial(trial, best, trials)
+                    options.on_trial(trial, max(tried, key=lambda one: one.score.value), trials)
         except KeyboardInterrupt:
             message = f"stopped after {len(finished_trials(study))} of {trials} trials; --resume runs the rest"
             raise StoppedEarlyError(message) from None
-    if best is None:
+    if not tried:
         raise InvalidInputError("at least one trial is needed")
+    best = max(tried, key=lambda one: one.score.value)
     return best, tuple(trial for trial in tried if trial.score.ties_with(best.score))
 
 
@@ -406,10 +384,3 @@ def _provenance(fit: Fit) -> dict[str, str]:
         among = f", one of {len(fit.ties)} equally good trials ({span})" if fit.is_one_of_many else ""
         texts[prior.key] = f"{verb}{among}, prior {prior}, {found}"
     return texts
-
-
-def _head(fit: Fit) -> str:
-    name = Path(fit.plan.document.source.where).name
-    which = f"one of {len(fit.ties)} equally good trials: " if fit.is_one_of_many else ""
-    values = ", ".join(f"{key} = {value}" for key, value in fit.best.values.items())
-    return f"{name} calibrated by blocksim: {which}{values}"

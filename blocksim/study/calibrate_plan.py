@@ -10,7 +10,8 @@ from math import ceil, exp, isfinite, log, log10, nan, sqrt
 from operator import eq
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, cast
+from threading import RLock
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -110,15 +111,13 @@ class Scatter:
 
     plan: Sweep | None
 
-    def members(self, fitted: Mapping[str, object], count: int, seed: int) -> Iterator[dict[str, object]]:
-        """Yield the values of the members of a trial: the same points of the unit cube for every trial."""
-        return self._drawn(fitted, SAME, count, seed)
+    def members(
+        self, fitted: Mapping[str, object], count: int, seed: int, mode: str = SAME
+    ) -> Iterator[dict[str, object]]:
+        """Yield the values of the members of a trial: the same points of the unit cube for every trial.
 
-    def fresh_members(self, fitted: Mapping[str, object], count: int, seed: int) -> Iterator[dict[str, object]]:
-        """Yield the values of members drawn independently, from random numbers that no trial has seen."""
-        return self._drawn(fitted, FRESH, count, seed)
-
-    def _drawn(self, fitted: Mapping[str, object], mode: str, count: int, seed: int) -> Iterator[dict[str, object]]:
+        In mode FRESH they are drawn independently, from random numbers that no trial has seen.
+        """
         if self.plan is None:
             yield from (dict(fitted) for _ in range(count))
             return
@@ -353,7 +352,9 @@ def score_of(members: Iterable[Member], ranges: Sequence[Range]) -> Score:
 
 def miss_of(values: Sequence[float], ranges: Sequence[Range]) -> float:
     """Return how far a member is from being inside (above 0) or from the nearest limit (at most 0)."""
-    off = [one.off_centre(value) for one, value in zip(ranges, values, strict=True)]
+    middles = [(0.5 * (one.lower + one.upper), 0.5 * (one.upper - one.lower)) for one in ranges]
+    # distances from the middle in half-widths: at most 1 inside
+    off = [abs(value - middle) / half for value, (middle, half) in zip(values, middles, strict=True)]
     if are_inside(values, ranges):
         return min(max(off) - 1.0, 0.0)
     # above 0 also where rounding hides by how much
@@ -425,7 +426,8 @@ def open_journal(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]"
     """
     if journal.exists():
         refuse_other_file(journal)  # also before a pipe is opened, which would wait
-    load_module("optuna", PURPOSE).logging.set_verbosity(logging.ERROR)
+    optuna = load_module("optuna", PURPOSE)
+    optuna.logging.set_verbosity(logging.ERROR)
     try:
         with journal.open("ab") as file:
             if not takes_lock(file.fileno()):
@@ -434,7 +436,16 @@ def open_journal(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]"
             refuse_other_file(journal)
             content = journal.read_bytes()
             file.truncate(content.rfind(b"\n") + 1)  # without a last line that was torn when the power failed
-            study = _study_in(journal)
+            storage = load_module("optuna.storages.journal", PURPOSE)
+            backend = storage.JournalFileBackend(str(journal), lock_obj=RLock())  # the file is locked as a whole
+            try:
+                storage = optuna.storages.JournalStorage(backend)
+                is_new = STUDY not in optuna.get_all_study_names(storage)
+                study = None if is_new else optuna.load_study(study_name=STUDY, storage=storage)
+            except (ValueError, KeyError, TypeError, AttributeError) as error:
+                raise InvalidInputError(f"{journal}: not the journal of a calibration: {error}") from None
+            if study is None:
+                study = optuna.create_study(study_name=STUDY, storage=storage, direction="maximize")
             known = study.user_attrs.get(PLAN)
             if known is None:
                 study.set_user_attr(PLAN, dict(plan))
@@ -447,31 +458,6 @@ def open_journal(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]"
             yield study
     except OSError as error:
         raise OutputError(f"{journal}: cannot be written: {error.strerror}") from error
-
-
-def _study_in(journal: Path) -> "Study":
-    """Return the study in a journal, or a new one."""
-    optuna = load_module("optuna", PURPOSE)
-    backend = load_module("optuna.storages.journal", PURPOSE).JournalFileBackend(
-        str(journal), lock_obj=_AlreadyLocked()
-    )
-    try:
-        storage = optuna.storages.JournalStorage(backend)
-        if STUDY in optuna.get_all_study_names(storage):
-            return cast("Study", optuna.load_study(study_name=STUDY, storage=storage))
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InvalidInputError(f"{journal}: not the journal of a calibration: {error}") from None
-    return cast("Study", optuna.create_study(study_name=STUDY, storage=storage, direction="maximize"))
-
-
-class _AlreadyLocked:
-    """What optuna takes for a lock; the file is locked as a whole, and freed by the system when a process is killed."""
-
-    def acquire(self) -> bool:
-        return True
-
-    def release(self) -> None:
-        pass
 
 
 def refuse_other_file(journal: Path) -> None:

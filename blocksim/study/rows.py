@@ -122,17 +122,15 @@ def _unit(values: object) -> str:
     typed = next((unit for value in values if isinstance(value, str) and (unit := q.unit_in(value))), "")
     if _is_angle(typed) and not all(isinstance(value, str) or value == 0 for value in values):
         return ""  # friction angles among friction coefficients: no unit holds for both
-    return typed if typed and all(_is_number(value) for value in values) else ""
+    numbers = all(
+        not isinstance(value, bool) and (isinstance(value, int | float) or bool(q.unit_in(str(value))))
+        for value in values
+    )
+    return typed if numbers else ""
 
 
 def _is_angle(unit: str) -> bool:
     return bool(unit) and parse_unit(unit).dimension == q.ANGLE.dimension
-
-
-def _is_number(value: object) -> bool:
-    if isinstance(value, bool):
-        return False
-    return isinstance(value, int | float) or (isinstance(value, str) and bool(q.unit_in(value)))
 
 
 def si_number(value: object) -> float:
@@ -164,11 +162,6 @@ class Range:
     column: str
     lower: float
     upper: float
-
-    def off_centre(self, value: float) -> float:
-        """Return the distance from the middle in half-widths: at most 1 inside."""
-        half = 0.5 * (self.upper - self.lower)
-        return abs(value - 0.5 * (self.lower + self.upper)) / half
 
     def holds(self, value: float) -> bool:
         """Return True if a value is inside, ends included."""

@@ -5,7 +5,7 @@ import pytest
 
 from blocksim.scenario import Sweep
 from blocksim.scenario.models.study import Normal, Uniform
-from blocksim.study.calibrate_plan import Prior, Scatter, centre_on_fit, prior_of
+from blocksim.study.calibrate_plan import FRESH, Prior, Scatter, centre_on_fit, prior_of
 from blocksim.study.rows import si_number
 
 FRICTION = Prior("friction.block_block.kinetic", 0.17, 0.31)
@@ -110,7 +110,7 @@ def test_scatter_is_moved_to_the_fitted_value(
 
 def test_fresh_members_are_others_of_the_same_distribution() -> None:
     tried = [float(str(row[SCATTERED])) for row in NORMAL.members({}, 64, 5)]
-    fresh = [float(str(row[SCATTERED])) for row in NORMAL.fresh_members({}, 4096, 5)]
+    fresh = [float(str(row[SCATTERED])) for row in NORMAL.members({}, 4096, 5, FRESH)]
     assert not set(tried) & set(fresh)
     assert np.mean(fresh) == pytest.approx(0.01, abs=3 * 0.0003 / 64)
     assert np.std(fresh) == pytest.approx(0.0003, rel=0.05)
