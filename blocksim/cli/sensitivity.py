@@ -37,52 +37,42 @@ def sensitivity_command(
 
     Example: blocksim sensitivity scenarios/slide.toml --vary gravity=9.7:9.9
     """
-    _refuse_present(out, overwrite=overwrite)
+    if out is not None:  # before minutes of running
+        if out.is_dir() or not out.absolute().parent.is_dir():
+            reason = "it is a folder" if out.is_dir() else "no such folder"
+            raise OutputExistsError(f"{out}: cannot be created: {reason}")
+        if out.exists() and not overwrite:
+            raise OutputExistsError(f"{out}: already exists; --overwrite replaces it")
     start = partial(announce_compilation, quiet=screen.silent)
     with count_progress("runs", quiet=screen.silent) as on_member:
         found = sensitivity(source.document(), replace(options, on_start=start, on_member=on_member))
     if out is not None:
-        write_text(out, _csv(found))
-    return Report(_lines(found), found.to_dict(), _notes(found, out))
-
-
-def _refuse_present(out: Path | None, *, overwrite: bool) -> None:
-    """Check before minutes of running that the table can be written."""
-    if out is None:
-        return
-    if out.is_dir() or not out.absolute().parent.is_dir():
-        reason = "it is a folder" if out.is_dir() else "no such folder"
-        raise OutputExistsError(f"{out}: cannot be created: {reason}")
-    if out.exists() and not overwrite:
-        raise OutputExistsError(f"{out}: already exists; --overwrite replaces it")
-
-
-def _lines(found: Sensitivity) -> list[str]:
-    """Return a table for every output that varies."""
+        text = io.StringIO()
+        writer = csv.DictWriter(text, ["output", "unit", "key", *found.method.columns], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(found.records())
+        write_text(out, text.getvalue())
     lines: list[str] = []
     for output in found.outputs:
         if output.varies:
-            lines += [*([""] if lines else []), _title(output), *_table(found, output)]
-    return lines or ["no result varies: none of these inputs matters"]
-
-
-def _title(output: Indices) -> str:
-    if output.unit == INDICATOR:
-        return f"{output.name}: in {output.mean:.0%} of the runs"
-    return f"{output.name}: {number(output.mean)} {SIGNS.get(output.unit, output.unit)} ± {number(output.sd)} (s)"
+            lines += [*([""] if lines else []), *_table(found, output)]
+    return Report(lines or ["no result varies: none of these inputs matters"], found.to_dict(), _notes(found, out))
 
 
 def _table(found: Sensitivity, output: Indices) -> list[str]:
-    """Return the keys of an output, the most important first."""
+    """Return the keys of an output that varies, the most important first."""
+    sign = SIGNS.get(output.unit, output.unit)
+    what = f"{number(output.mean)} {sign} ± {number(output.sd)} (s)"
+    title = f"{output.name}: {f'in {output.mean:.0%} of the runs' if output.unit == INDICATOR else what}"
     columns = tuple(found.method.columns)
     first = output.numbers[columns[0]]
     order = sorted(range(len(found.keys)), key=lambda i: -abs(first[i]))
     rows = [[found.keys[i], *(number(output.numbers[column][i], DIGITS) for column in columns)] for i in order]
-    return table_lines(("key", *(column.split(" ")[0] for column in columns)), rows)
+    return [title, *table_lines(("key", *(column.split(" ")[0] for column in columns)), rows)]
 
 
 def _notes(found: Sensitivity, out: Path | None) -> Iterator[str]:
-    yield from (f"{column}: {meaning}" for column, meaning in found.method.columns.items())
+    yield from (f"{column}: {meaning}" for column, meaning in found.meanings.items())
     still = [output.name for output in found.outputs if not output.varies]
     if still:
         yield f"does not vary: {', '.join(still)}"
@@ -92,11 +82,3 @@ def _notes(found: Sensitivity, out: Path | None) -> Iterator[str]:
             f"{found.method.sample_word} are left out for it. The first: {found.first_problem}"
         )
     yield f"{found.runs} runs" + (f"; table: {out}" if out is not None else "")
-
-
-def _csv(found: Sensitivity) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, ["output", "unit", "key", *found.method.columns], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(found.records())
-    return text.getvalue()

@@ -4,7 +4,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.extras import load_module
 from blocksim.options import Option, takes
-from blocksim.scenario import Document, Source, Sweep, document_of
+from blocksim.scenario import Source, Sweep, document_of
 from blocksim.scenario.models.study import Normal, Variation
 from blocksim.silence import silent
 from blocksim.simulation.compilation import kernels_of
@@ -39,19 +39,29 @@ RESAMPLES = 500
 class Method:
     """A design of runs in blocks, and the numbers that come from the results of whole blocks.
 
-    `columns` are the names of the numbers of every key, with what they mean. `rows_of_block` gives the runs of a block
-    for k keys; blocks do not depend on one another, so some may be left out. `points` (keys, blocks, seed) gives the
-    design, shape (blocks * rows, keys), in [0, 1]. `numbers` (points, results, seed) gives the columns, shape (keys,).
+    `columns` are the names of the numbers of every key, with those of SALib and what they mean. A block has a run a key
+    and `more_rows`; blocks do not depend on one another, so some may be left out. `points` (keys, blocks, seed) gives
+    the design, shape (blocks * rows, keys), in [0, 1].
     """
 
     name: str
-    title: str
     samples: int
     sample_word: str
-    columns: Mapping[str, str]
-    rows_of_block: Callable[[int], int]
+    more_rows: int
     points: Callable[[int, int, int], Floats]
-    numbers: Callable[[Floats, Floats, int], Mapping[str, Floats]]
+    columns: Mapping[str, tuple[str, str]]
+
+    def numbers(self, points: Floats, results: Floats, seed: int) -> dict[str, tuple[float, ...]]:
+        """Return the columns, a number a key, from the results at the points of whole blocks."""
+        problem, analyse = unit_cube(points.shape[1]), load_module(f"SALib.analyze.{self.name}", PURPOSE).analyze
+        if self.name == "morris":
+            found = analyse(problem, points, results, num_levels=LEVELS, num_resamples=RESAMPLES, seed=seed)
+        else:  # SALib takes 0 for no seed
+            found = analyse(problem, results, calc_second_order=False, num_resamples=RESAMPLES, seed=seed + 1)
+        return {
+            column: tuple(np.asarray(found[name], dtype=np.float64).tolist())
+            for column, (name, _) in self.columns.items()
+        }
 
 
 def unit_cube(keys: int) -> dict[str, object]:
@@ -60,54 +70,23 @@ def unit_cube(keys: int) -> dict[str, object]:
 
 
 def _morris_points(keys: int, blocks: int, seed: int) -> Floats:
-    sample = load_module("SALib.sample.morris", PURPOSE).sample
-    pool = max(blocks, min(POOL * blocks, MOST_POINTS // (keys + 1)))
-    points = np.asarray(sample(unit_cube(keys), pool, num_levels=LEVELS, seed=seed), dtype=np.float64)
-    trajectories = points.reshape(pool, keys + 1, keys)
-    return trajectories[_far_apart(trajectories, blocks)].reshape(-1, keys)
-
-
-def _far_apart(trajectories: Floats, count: int) -> list[int]:
-    """Return the numbers of trajectories, each the farthest from those before; shape (pool, points, keys).
+    """Return random trajectories of which each is the farthest from those before.
 
     The distance of two is the sum over all pairs of their points; squares are added up.
     """
-    flat = trajectories.reshape(-1, trajectories.shape[2])
+    sample = load_module("SALib.sample.morris", PURPOSE).sample
+    pool = max(blocks, min(POOL * blocks, MOST_POINTS // (keys + 1)))
+    flat = np.asarray(sample(unit_cube(keys), pool, num_levels=LEVELS, seed=seed), dtype=np.float64)
     squares = np.sum(flat**2, axis=1)
     apart = np.sqrt(np.maximum(squares[:, None] + squares - 2.0 * flat @ flat.T, 0.0))
-    pool, points = trajectories.shape[:2]
-    distances = apart.reshape(pool, points, pool, points).sum(axis=(1, 3))
+    distances = apart.reshape(pool, keys + 1, pool, keys + 1).sum(axis=(1, 3))
     np.fill_diagonal(distances, 0.0)
     chosen = [int(np.argmax(distances.max(axis=1)))]
-    while len(chosen) < count:
+    while len(chosen) < blocks:
         sums = np.sum(distances[chosen] ** 2, axis=0)
         sums[chosen] = -1.0
         chosen.append(int(np.argmax(np.round(sums, 9))))  # equal sums are equal on every machine
-    return chosen
-
-
-def _morris_numbers(points: Floats, results: Floats, seed: int) -> Mapping[str, Floats]:
-    analyse = load_module("SALib.analyze.morris", PURPOSE).analyze
-    found = analyse(unit_cube(points.shape[1]), points, results, num_levels=LEVELS, num_resamples=RESAMPLES, seed=seed)
-    names = {"mu*": "mu_star", "±": "mu_star_conf", "mu": "mu", "sigma": "sigma"}
-    return {column: np.asarray(found[name], dtype=np.float64) for column, name in names.items()}
-
-
-MORRIS = Method(
-    name="morris",
-    title="Morris, elementary effects",
-    samples=16,
-    sample_word="trajectories",
-    columns={
-        "mu*": "mean size of the change per whole range of the key",
-        "±": "half-width of the 95 % interval of mu*, bootstrapped",
-        "mu": "mean change per whole range, with its sign",
-        "sigma": "standard deviation of the changes: curvature, or interaction with other keys",
-    },
-    rows_of_block=lambda keys: keys + 1,
-    points=_morris_points,
-    numbers=_morris_numbers,
-)
+    return flat.reshape(pool, keys + 1, keys)[chosen].reshape(-1, keys)
 
 
 def _sobol_points(keys: int, blocks: int, seed: int) -> Floats:
@@ -118,34 +97,34 @@ def _sobol_points(keys: int, blocks: int, seed: int) -> Floats:
     return np.asarray(points, dtype=np.float64)
 
 
-def _sobol_numbers(points: Floats, results: Floats, seed: int) -> Mapping[str, Floats]:
-    analyse = load_module("SALib.analyze.sobol", PURPOSE).analyze
-    seeded = seed + 1  # SALib takes 0 for no seed
-    found = analyse(unit_cube(points.shape[1]), results, calc_second_order=False, num_resamples=RESAMPLES, seed=seeded)
-    names = {"S1": "S1", "± S1": "S1_conf", "ST": "ST", "± ST": "ST_conf"}
-    return {column: np.asarray(found[name], dtype=np.float64) for column, name in names.items()}
-
-
-SOBOL = Method(
-    name="sobol",
-    title="Sobol, shares of the variance",
-    samples=128,
-    sample_word="base samples",
-    columns={
-        "S1": "share of the variance that is removed when the key is known",
-        "± S1": "half-width of the 95 % interval of S1, bootstrapped",
-        "ST": "share of the variance that remains when all other keys are known",
-        "± ST": "half-width of the 95 % interval of ST, bootstrapped",
-    },
-    rows_of_block=lambda keys: keys + 2,
-    points=_sobol_points,
-    numbers=_sobol_numbers,
-)
-
-
-METHODS: dict[str, Method] = {method.name: method for method in (MORRIS, SOBOL)}
-
-
+METHODS = {
+    "morris": Method(
+        name="morris",
+        samples=16,
+        sample_word="trajectories",
+        more_rows=1,
+        points=_morris_points,
+        columns={
+            "mu*": ("mu_star", "mean size of the change per whole range of the key"),
+            "±": ("mu_star_conf", "half-width of the 95 % interval of mu*, bootstrapped"),
+            "mu": ("mu", "mean change per whole range, with its sign"),
+            "sigma": ("sigma", "standard deviation of the changes: curvature, or interaction with other keys"),
+        },
+    ),
+    "sobol": Method(
+        name="sobol",
+        samples=128,
+        sample_word="base samples",
+        more_rows=2,
+        points=_sobol_points,
+        columns={
+            "S1": ("S1", "share of the variance that is removed when the key is known"),
+            "± S1": ("S1_conf", "half-width of the 95 % interval of S1, bootstrapped"),
+            "ST": ("ST", "share of the variance that remains when all other keys are known"),
+            "± ST": ("ST_conf", "half-width of the 95 % interval of ST, bootstrapped"),
+        },
+    ),
+}
 VARY = "--vary"
 MODE = "sobol"
 MOST_BLOCKS = 10
@@ -157,8 +136,7 @@ LEAST_SHARE = 0.5  # of the blocks of a design have to be whole
 OnMember = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
-class Output:
+class Output(NamedTuple):
     """One result of every run, shape (runs,): mm or degrees, or 1 and 0 where `unit` is "share"."""
 
     name: str
@@ -234,24 +212,32 @@ class Sensitivity:
     blocks: int
     left_out: int
 
-    def records(self) -> Iterator[dict[str, object]]:
-        """Yield one row per output that varies and key: output, unit, key, and the columns of the method."""
-        for output in self.outputs:
-            for index, key in enumerate(self.keys if output.varies else ()):
-                numbers = {column: values[index] for column, values in output.numbers.items()}
-                yield {"output": output.name, "unit": output.unit, "key": key, **numbers}
+    @property
+    def meanings(self) -> dict[str, str]:
+        """What the columns of the method mean."""
+        return {column: meaning for column, (_, meaning) in self.method.columns.items()}
+
+    def records(self) -> list[dict[str, object]]:
+        """Return one row per output that varies and key: output, unit, key, and the columns of the method."""
+        return [
+            {"output": output.name, "unit": output.unit, "key": key}
+            | {column: values[index] for column, values in output.numbers.items()}
+            for output in self.outputs
+            if output.varies
+            for index, key in enumerate(self.keys)
+        ]
 
     def to_frame(self) -> "pd.DataFrame":
         """Return the same rows as a pandas table."""
         import pandas as pd
 
-        return pd.DataFrame(list(self.records()))
+        return pd.DataFrame(self.records())
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON."""
         return {
             "method": self.method.name,
-            "meaning": dict(self.method.columns),
+            "meaning": self.meanings,
             "keys": list(self.keys),
             "runs": self.runs,
             "failed": self.failed,
@@ -261,7 +247,7 @@ class Sensitivity:
                 {"output": one.name, "unit": one.unit, "mean": one.mean, "sd": one.sd, "varies": one.varies}
                 for one in self.outputs
             ],
-            "indices": list(self.records()),
+            "indices": self.records(),
         }
 
 
@@ -315,7 +301,14 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
     if options.method not in METHODS:
         raise InvalidInputError(f"unknown method {options.method!r}; choose one of {', '.join(METHODS)}")
     document, method = document_of(scenario), METHODS[options.method]
-    plan = _sampled_plan(document, options.vary)
+    vary, is_typed = options.vary, isinstance(options.vary, Variations)
+    if vary:
+        plan: Sweep | None = build_distributions(document, Variations.of(vary), VARY if is_typed else "vary", MODE)
+    else:
+        plan = document.build().sweep
+    if plan is None or not plan.is_sampled:
+        given = f"{VARY} KEY=FROM:TO" if is_typed else "vary={key: {'from': a, 'to': b}}"
+        raise InvalidInputError(f"nothing to vary: give {given}, or a [sweep] table with distributions")
     document = document.without_sweep()
     base = document.build()
     options.on_start(kernels_of(base))
@@ -328,7 +321,7 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
     for member in run_members(document, settings_at(points, plan.vary)):
         members.append(member)
         options.on_member(len(members), len(points))
-    rows = method.rows_of_block(len(plan.vary))
+    rows = len(plan.vary) + method.more_rows
     has_final = np.array([member.final is not None for member in members])
     whole = np.asarray(np.all(has_final.reshape(-1, rows), axis=1))
     problems = [member.problem for member in members if member.final is None]
@@ -351,22 +344,6 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
     )
 
 
-def _sampled_plan(document: Document, vary: Mapping[str, Values] | None) -> Sweep:
-    """Return the distributions that are given, or those of the document where none are.
-
-    Raises ScenarioError for mistakes in them, and InvalidInputError where there are none.
-    """
-    is_typed = isinstance(vary, Variations)
-    if vary:
-        plan: Sweep | None = build_distributions(document, Variations.of(vary), VARY if is_typed else "vary", MODE)
-    else:
-        plan = document.build().sweep
-    if plan is None or not plan.is_sampled:
-        given = f"{VARY} KEY=FROM:TO" if is_typed else "vary={key: {'from': a, 'to': b}}"
-        raise InvalidInputError(f"nothing to vary: give {given}, or a [sweep] table with distributions")
-    return plan
-
-
 def settings_at(points: Floats, vary: Mapping[str, Variation]) -> Iterator[dict[str, object]]:
     """Yield the values of the keys at points of the unit cube, shape (runs, keys)."""
     columns = []
@@ -379,13 +356,7 @@ def settings_at(points: Floats, vary: Mapping[str, Variation]) -> Iterator[dict[
 
 def indices_of(output: Output, points: Floats, method: Method, seed: int) -> Indices:
     """Return the indices of one output of a design's runs."""
-    sd = float(np.std(output.values))
-    varies = sd > LEAST_VARIATION[output.unit]
-    numbers = method.numbers(points, output.values, seed) if varies else {}
-    return Indices(
-        name=output.name,
-        unit=output.unit,
-        mean=float(np.mean(output.values)),
-        sd=sd,
-        numbers={column: tuple(values.tolist()) for column, values in numbers.items()},
-    )
+    name, unit, values = output
+    sd = float(np.std(values))
+    numbers = method.numbers(points, values, seed) if sd > LEAST_VARIATION[unit] else {}
+    return Indices(name, unit, float(np.mean(values)), sd, numbers)

@@ -101,7 +101,7 @@ def test_same_seed_gives_the_same_design_and_numbers(method: str) -> None:
 def test_designs_consist_of_whole_blocks_in_the_unit_cube(method: str, keys: int) -> None:
     chosen = METHODS[method]
     points = chosen.points(keys, 5, 0)
-    assert points.shape == (5 * chosen.rows_of_block(keys), keys)
+    assert points.shape == (5 * (keys + chosen.more_rows), keys)
     assert points.min() >= 0.0
     assert points.max() <= 1.0
 
@@ -112,7 +112,7 @@ def test_blocks_may_be_left_out(method: str) -> None:
     vary = dict.fromkeys("xyz", Uniform(-math.pi, math.pi))
     points = chosen.points(3, 64, 0)
     rows = np.array([[float(str(value)) for value in row.values()] for row in settings_at(points, vary)])
-    kept = np.repeat(np.arange(64) % 5 != 0, chosen.rows_of_block(3))
+    kept = np.repeat(np.arange(64) % 5 != 0, 3 + chosen.more_rows)
     part = indices_of(Output("y", "mm", ishigami(*rows[kept].T)), points[kept], chosen, 0)
     whole = indices_of(Output("y", "mm", ishigami(*rows.T)), points, chosen, 0)
     first = next(iter(chosen.columns))
