@@ -18,10 +18,10 @@ from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, load_stored, scenario_hash
 from blocksim.scenario.input_files import read_limited
 from blocksim.silence import silent
-from blocksim.simulation import Result, Watcher, read_result, simulate
+from blocksim.simulation import Watcher, read_result, simulate
 from blocksim.simulation import folder as files
 from blocksim.simulation.checkpoint import STARTS_ANEW
-from blocksim.simulation.frames import Floats, csv_text
+from blocksim.simulation.frames import csv_text
 from blocksim.simulation.probes import ProbeSeries
 from blocksim.simulation.provenance import ROOM_PREFIX, environment
 from blocksim.simulation.result import MOST_BYTES, Summary, changed_files, read_summary
@@ -53,24 +53,22 @@ def differing_entries(folder: Path, then: Summary, now: Summary, *, same_code: b
     The final state and the status are not among them: they are reported by themselves.
     """
     whole = then.status != INTERRUPTED
-    names = (*ALWAYS, *(UNLESS_INTERRUPTED if whole else ()), *(HASHES if same_code else ()))
+    names = [*ALWAYS, *(UNLESS_INTERRUPTED if whole else ()), *(HASHES if same_code else ())]
     stored, wanted = _read_entries(folder / files.SUMMARY), json.loads(now.to_json())
     if not whole and same_code:  # the repetition is of a scenario with another end
         wanted |= {name: getattr(then, name) for name in HASHES}
+    names += [name for name in OF_THE_MOTION if same_code or stored.get(name)]
     found = [one for name in names for one in apart(files.SUMMARY, name, stored.get(name), wanted[name])]
-    kept = [name for name in OF_THE_MOTION if same_code or stored.get(name)]
-    found += [one for name in kept for one in apart(files.SUMMARY, name, stored.get(name), wanted[name])]
-    if whole and not _are_warnings(then, now.warnings):
+    # the warnings are those of now, after what was reported when the run went on or began again
+    before = then.warnings[: len(then.warnings) - len(now.warnings)]
+    is_allowed = bool(then.resumed_from) or all(text.endswith(STARTS_ANEW) for text in before)
+    if whole and not (is_allowed and (*before, *now.warnings) == then.warnings):
         found.append(EntryDifference(files.SUMMARY, "warnings", list(then.warnings), list(now.warnings)))
-    return (*found, *_of_the_mark(folder, then))
-
-
-def _of_the_mark(folder: Path, then: Summary) -> Iterator[EntryDifference]:
-    """Yield how done.json, where there is one, contradicts run.json."""
-    if files.is_finished(folder):
-        stored = _read_entries(folder / files.DONE)
+    if files.is_finished(folder):  # the mark of the end must not contradict run.json
+        marked = _read_entries(folder / files.DONE)
         for name in ("run", "status"):
-            yield from apart(files.DONE, name, stored.get(name), getattr(then, name))
+            found += apart(files.DONE, name, marked.get(name), getattr(then, name))
+    return tuple(found)
 
 
 def apart(file: str, entry: str, stored: Any, now: Any) -> Iterator[EntryDifference]:
@@ -85,13 +83,6 @@ def apart(file: str, entry: str, stored: Any, now: Any) -> Iterator[EntryDiffere
         yield EntryDifference(file, entry, stored, now)
 
 
-def _are_warnings(then: Summary, now: tuple[str, ...]) -> bool:
-    """Return True if the warnings are those of now, after what was reported when the run went on or began again."""
-    before = then.warnings[: len(then.warnings) - len(now)]
-    is_allowed = bool(then.resumed_from) or all(text.endswith(STARTS_ANEW) for text in before)
-    return (*before, *now) == then.warnings and is_allowed
-
-
 def differing_samples(stored: Mapping[str, ProbeSeries], again: Mapping[str, ProbeSeries]) -> Iterator[EntryDifference]:
     """Yield where the samples of each probe first are others, in the column that comes first."""
     for name, now in again.items():
@@ -101,17 +92,14 @@ def differing_samples(stored: Mapping[str, ProbeSeries], again: Mapping[str, Pro
             continue
         for column, values in now.columns.items():
             before = then.columns.get(column)
-            if before is None or before.tobytes() != values.tobytes():
-                yield _firstapart(f"{place}/{column}", before, values, now)
+            if before is None:
+                yield EntryDifference(files.FRAMES, f"{place}/{column}", None, float(values[0]))
                 break
-
-
-def _firstapart(place: str, before: Floats | None, values: Floats, probe: ProbeSeries) -> EntryDifference:
-    if before is None:
-        return EntryDifference(files.FRAMES, place, None, float(values[0]))
-    first = int(np.flatnonzero(before.view(np.int64) != values.view(np.int64))[0])
-    where = f"{place} at step {probe.step[first]}"
-    return EntryDifference(files.FRAMES, where, float(before[first]), float(values[first]))
+            if before.tobytes() != values.tobytes():
+                first = int(np.flatnonzero(before.view(np.int64) != values.view(np.int64))[0])
+                where = f"{place}/{column} at step {now.step[first]}"
+                yield EntryDifference(files.FRAMES, where, float(before[first]), float(values[first]))
+                break
 
 
 def _read_entries(path: Path) -> dict[str, Any]:
@@ -167,21 +155,33 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     folder = find_run(place)
     summary = read_summary(folder / files.SUMMARY)
     changed = changed_files(folder, summary)
-    stored = _read(folder, changed)
-    again = simulate(_as_far(stored.scenario, summary), threads=threads, on_progress=on_progress)
+    try:
+        stored = read_result(folder)
+    except InvalidInputError as error:  # what cannot be read because it was changed is reported as such
+        if not changed:
+            raise
+        why = f"{folder}: changed after the run, by their checksums: {', '.join(changed)}"
+        raise InvalidInputError(f"{error}\n{why}") from error
+    scenario, was_cut = stored.scenario, summary.status == INTERRUPTED
+    if was_cut:  # a run that was interrupted is repeated as far as it got
+        time = scenario.time.model_copy(update={"end": summary.simulated_time_s})
+        scenario = scenario.model_copy(update={"time": time})
+    again = simulate(scenario, threads=threads, on_progress=on_progress)
     if again.status == INTERRUPTED:
         raise StoppedEarlyError(f"{folder}: stopped before the new run was complete")
-    now = origins(summary, stored.scenario)
+    origins, now = changed_origins(summary.environment), scenario_hash(stored.scenario)
+    if now != summary.scenario_hash:
+        origins = (Origin(SCENARIO, summary.scenario_hash, now), *origins)
     return RunVerdict(
         folder,
         changed,
         state=again.summary.final_state_sha256 == summary.final_state_sha256,
         table=csv_text(again.columns).encode() == (folder / files.FINAL).read_bytes(),
-        status=_ends(summary, again.summary),
+        status=(again.status if was_cut else summary.status, again.status),
         frames=differences(stored.frames, again.frames),
-        origins=now,
+        origins=origins,
         entries=(
-            *differing_entries(folder, summary, again.summary, same_code=not tells_of_code(now)),
+            *differing_entries(folder, summary, again.summary, same_code=not tells_of_code(origins)),
             *differing_samples(stored.probes, again.probes),
         ),
     )
@@ -190,36 +190,6 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
 def scenario_of(place: Path | str) -> Scenario:
     """Return the scenario of a stored run. Raises what `find_run` and loading it raise."""
     return load_stored(find_run(place) / files.SCENARIO)
-
-
-def _read(folder: Path, changed: tuple[str, ...]) -> Result:
-    """Read what the run left; what cannot be read because it was changed is reported as such."""
-    try:
-        return read_result(folder)
-    except InvalidInputError as error:
-        if not changed:
-            raise
-        message = f"{error}\n{folder}: changed after the run, by their checksums: {', '.join(changed)}"
-        raise InvalidInputError(message) from error
-
-
-def _as_far(scenario: Scenario, summary: Summary) -> Scenario:
-    """Return the scenario, ending where the run was interrupted, if it was."""
-    if summary.status != INTERRUPTED:
-        return scenario
-    time = scenario.time.model_copy(update={"end": summary.simulated_time_s})
-    return scenario.model_copy(update={"time": time})
-
-
-def _ends(then: Summary, now: Summary) -> tuple[str, str]:
-    """Return how the run ended, then and now; an interruption is not to be repeated."""
-    return (now.status, now.status) if then.status == INTERRUPTED else (then.status, now.status)
-
-
-def origins(summary: Summary, scenario: Scenario) -> tuple[Origin, ...]:
-    """Return what is not the same now as when a run was made, of all that its run.json has."""
-    hashes = () if (now := scenario_hash(scenario)) == summary.scenario_hash else ((summary.scenario_hash, now),)
-    return (*(Origin(SCENARIO, *pair) for pair in hashes), *changed_origins(summary.environment))
 
 
 def tells_of_code(found: tuple[Origin, ...]) -> bool:
