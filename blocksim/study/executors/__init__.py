@@ -2,19 +2,20 @@
 
 import os
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import KW_ONLY, dataclass
 from importlib import import_module
 from itertools import takewhile
 from multiprocessing import current_process
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from blocksim.errors import InvalidInputError
 from blocksim.options import Option
 from blocksim.scenario import Scenario
 from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.silence import silent
 from blocksim.study.rows import Row
 
 SECONDS = 0.5  # of work in a batch
@@ -60,9 +61,9 @@ class Setting:
     folder: Path | None = None  # where folders of runs are kept
     peaks: bool = False  # whether rows need the largest rotation on the way
 
-    def folder_of(self, task: Task) -> Path | None:
-        """Return where a run is kept, None where it is not."""
-        return None if self.folder is None else self.folder / task.name
+    def folders(self, tasks: Iterable[Task]) -> list[Path]:
+        """Return where runs are kept, nothing where they are not."""
+        return [] if self.folder is None else [self.folder / task.name for task in tasks]
 
 
 Run = Callable[[Iterator[Task], Setting], Generator[Batch, None, None]]
@@ -71,17 +72,6 @@ Run = Callable[[Iterator[Task], Setting], Generator[Batch, None, None]]
 A task that fails has a row that says so. Once `is_stopped`, no batch is begun, and what has not ended within a second
 is given up. Closed before the end, it stops at once.
 """
-
-
-class Executor(NamedTuple):
-    """What runs tasks; `check` raises UnavailableError where it cannot, before anything is written.
-
-    `for_rounds` gives the same for one round of tasks after the other.
-    """
-
-    run: Run
-    check: Callable[[Setting], None]
-    for_rounds: Callable[[], AbstractContextManager[Run]]
 
 
 @dataclass
@@ -104,14 +94,15 @@ def take(tasks: Iterator[Task], count: int, is_stopped: Callable[[], bool]) -> t
     return tuple(task for _, task in zip(numbers, tasks, strict=False))
 
 
-def executor_named(name: str) -> Executor:
-    """Return an executor. Raises InvalidInputError."""
+def executor_named(name: str) -> Any:
+    """Return the module of an executor, with `run_tasks`. Raises InvalidInputError.
+
+    It may have `check`, which raises UnavailableError where it cannot run, before anything is written, and
+    `for_rounds`, which gives a `run_tasks` for one round of tasks after the other.
+    """
     if name not in EXECUTORS:
         raise InvalidInputError(f"unknown executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}")
-    module = import_module(EXECUTORS[name])
-    check = getattr(module, "check", lambda _: None)  # where it may be missing
-    for_rounds = getattr(module, "for_rounds", lambda: nullcontext(module.run_tasks))
-    return Executor(module.run_tasks, check, for_rounds)
+    return import_module(EXECUTORS[name])
 
 
 @dataclass(frozen=True)
@@ -139,12 +130,13 @@ class Execution:
         name = chosen_executor(self.executor, self.scheduler, keep_cases=folder is not None)
         runner = executor_named(name)
         setting = Setting(self.jobs or os.cpu_count() or 1, name, scheduler=self.scheduler, folder=folder)
-        runner.check(setting)
-        return runner.run, setting
+        getattr(runner, "check", silent)(setting)
+        return runner.run_tasks, setting
 
     def for_rounds(self) -> AbstractContextManager[Run]:
         """Give what runs the tasks of one round after the other, on the same processes. Raises InvalidInputError."""
-        return executor_named(chosen_executor(self.executor, self.scheduler)).for_rounds()
+        runner = executor_named(chosen_executor(self.executor, self.scheduler))
+        return runner.for_rounds() if hasattr(runner, "for_rounds") else nullcontext(runner.run_tasks)
 
 
 def chosen_executor(executor: str | None, scheduler: str | None, *, keep_cases: bool = False) -> str:

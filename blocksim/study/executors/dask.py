@@ -112,8 +112,8 @@ class Submission:
             tasks = self.again.popleft() if self.again else take(self.tasks, self.size.count, self.setting.is_stopped)
             if not tasks:
                 return
-            payload = [(task.scenario, None) for task in tasks]
-            future = self.client.submit(run_batch, payload, code_hash(), peaks=self.setting.peaks, pure=False)
+            scenarios, peaks = [task.scenario for task in tasks], self.setting.peaks
+            future = self.client.submit(run_batch, scenarios, (), code_hash(), peaks=peaks, pure=False)
             self._await(future, tasks)
 
     def _await(self, future: Any, tasks: tuple[Task, ...]) -> None:

@@ -12,11 +12,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
+from queue import SimpleQueue
 from typing import NamedTuple
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.simulation import MemberEnd, MemberFailure, Summary, run_in_batches
+from blocksim.simulation import MemberFailure, Summary, run_in_batches
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Columns, read_table
 from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
@@ -30,7 +31,6 @@ POLL = 0.05  # s
 THREAD = "blocksim-batch"
 BATCH = 64  # members run together: enough for all cores, few enough to report progress
 INTERRUPTED = "interrupted"
-Payload = Sequence[tuple[Scenario, Path | None]]  # None: nothing is kept but the row
 
 
 def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
@@ -38,42 +38,24 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
     size = BatchSize(2 * setting.jobs, least=setting.jobs)
     batch = take(tasks, size.count, setting.is_stopped)
     while batch and not setting.is_stopped():
-        began = time.monotonic()
-        running = BatchInProgress(batch, setting)
+        began, ended = time.monotonic(), SimpleQueue[Batch]()
+        thread = threading.Thread(target=_run, args=(batch, setting, ended), name=THREAD, daemon=True)
+        thread.start()
         following = take(tasks, size.count, setting.is_stopped)
-        if not running.wait(setting):
+        while thread.is_alive() and not setting.is_stopped():
+            thread.join(POLL)
+        thread.join(PATIENCE)
+        if thread.is_alive():  # the user does not want to wait that long
             return
         size.measured(len(batch), time.monotonic() - began)
-        yield running.ended()
+        yield ended.get_nowait()
         batch = following
 
 
-class BatchInProgress:
-    """A batch that is under way."""
-
-    def __init__(self, tasks: tuple[Task, ...], setting: Setting) -> None:
-        """Begin."""
-        self.tasks, self.setting = tasks, setting
-        self.rows: list[Row] = []
-        self.seconds = 0.0
-        self._thread = threading.Thread(target=self._run, name=THREAD, daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        began = time.perf_counter()
-        self.rows = rows_of([task.scenario for task in self.tasks], self.setting.jobs, peaks=self.setting.peaks)
-        self.seconds = time.perf_counter() - began
-
-    def wait(self, setting: Setting) -> bool:
-        """Wait for the end; False when the user did not want to wait that long."""
-        while self._thread.is_alive() and not setting.is_stopped():
-            self._thread.join(POLL)
-        self._thread.join(PATIENCE)
-        return not self._thread.is_alive()
-
-    def ended(self) -> Batch:
-        """Return what has come of the batch."""
-        return Batch(self.tasks, tuple(self.rows), self.seconds, platform.node())
+def _run(tasks: tuple[Task, ...], setting: Setting, ended: SimpleQueue[Batch]) -> None:
+    began = time.perf_counter()
+    rows = rows_of([task.scenario for task in tasks], setting.jobs, peaks=setting.peaks)
+    ended.put(Batch(tasks, tuple(rows), time.perf_counter() - began, platform.node()))
 
 
 def is_still_running() -> bool:
@@ -115,23 +97,20 @@ def run_members(document: Document, values: Iterable[Mapping[str, object]]) -> I
     """
     rest = iter(values)
     while batch := list(islice(rest, BATCH)):
-        built = [_built(document, one) for one in batch]
+        built: list[Scenario | Member] = []
+        for one in batch:
+            try:
+                built.append(document.with_values(one).build().model_copy(update={"sweep": None}))
+            except BlocksimError as error:
+                built.append(Member(None, str(error).splitlines()[0]))
         ends = chain(*run_in_batches([one for one in built if isinstance(one, Scenario)]))
-        for one in built:
-            yield one if isinstance(one, Member) else _member(next(ends))
-
-
-def _built(document: Document, values: Mapping[str, object]) -> Scenario | Member:
-    try:
-        return document.with_values(values).build().model_copy(update={"sweep": None})
-    except BlocksimError as error:
-        return Member(None, str(error).splitlines()[0])
-
-
-def _member(end: MemberEnd | MemberFailure) -> Member:
-    if isinstance(end, MemberFailure) or not end.outcome.is_finished:
-        return Member(None, end.outcome.reason.splitlines()[0])
-    return Member(end.columns)
+        for member in built:
+            if isinstance(member, Member):
+                yield member
+            elif isinstance(end := next(ends), MemberFailure) or not end.outcome.is_finished:
+                yield Member(None, end.outcome.reason.splitlines()[0])
+            else:
+                yield Member(end.columns)
 
 
 def run_case(scenario: Scenario, folder: Path) -> Row:
@@ -165,23 +144,21 @@ class BatchResult(NamedTuple):
     host: str
 
 
-def run_batch(payload: Payload, code: str, *, peaks: bool = False) -> BatchResult:
-    """Run scenarios on one thread, by the same code as whoever asks. Raises InvalidInputError where it is another."""
+def run_batch(scenarios: Sequence[Scenario], folders: Sequence[Path], code: str, *, peaks: bool = False) -> BatchResult:
+    """Run scenarios on one thread, into folders where these are given, by the same code as whoever asks.
+
+    Raises InvalidInputError where it is another.
+    """
     if code != code_hash():
         raise InvalidInputError(
             f"the worker on {platform.node()} has another version of blocksim (code {code_hash()[:HASH_DIGITS]}, "
             f"here {code[:HASH_DIGITS]}); install the same one"
         )
     began = time.perf_counter()
-    if any(folder is not None for _, folder in payload):
-        rows = [_kept(scenario, folder) for scenario, folder in payload if folder is not None]
-    else:
-        rows = rows_of([scenario for scenario, _ in payload], 1, peaks=peaks)
+    rows: list[Row] = []
+    for scenario, folder in zip(scenarios, folders, strict=False):
+        rows.append(run_case(scenario, folder))
+        if rows[-1]["status"] == INTERRUPTED:  # somebody has ended this process: no end of the case
+            raise KeyboardInterrupt
+    rows = rows or rows_of(scenarios, 1, peaks=peaks)
     return BatchResult(tuple(rows), time.perf_counter() - began, platform.node())
-
-
-def _kept(scenario: Scenario, folder: Path) -> Row:
-    row = run_case(scenario, folder)
-    if row["status"] == INTERRUPTED:  # somebody has ended this process: no end of the case
-        raise KeyboardInterrupt
-    return row

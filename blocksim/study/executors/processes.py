@@ -75,14 +75,13 @@ def _start_worker() -> None:
     """Leave to the parent what a terminal sends to all processes, and end with it."""
     for number in FOR_ALL:
         signal.signal(number, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
 
+    def end_with_parent() -> None:
+        if (parent := parent_process()) is not None:
+            parent.join()
+        _exit(0)
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-    _exit(0)
+    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 class Job(NamedTuple):
@@ -162,7 +161,8 @@ def _run_on(tasks: Iterator[Task], setting: Setting, pool_of: PoolOf) -> Generat
 def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, None]:
     """Run tasks one after the other in this process, as a worker does. Raises KeyboardInterrupt on Ctrl-C."""
     for task in tasks:
-        yield Batch((task,), *run_batch([(task.scenario, setting.folder_of(task))], code_hash(), peaks=setting.peaks))
+        folders = setting.folders([task])
+        yield Batch((task,), *run_batch([task.scenario], folders, code_hash(), peaks=setting.peaks))
 
 
 class Work:
@@ -200,12 +200,13 @@ class Work:
         return Job(tasks) if tasks else None
 
     def _submit(self, pool: ProcessPoolExecutor, job: Job) -> None:
-        payload = [(task.scenario, self.setting.folder_of(task)) for task in job.tasks]
+        scenarios, folders = [task.scenario for task in job.tasks], self.setting.folders(job.tasks)
         try:
-            self.pending[pool.submit(run_batch, payload, code_hash(), peaks=self.setting.peaks)] = job
+            future = pool.submit(run_batch, scenarios, folders, code_hash(), peaks=self.setting.peaks)
         except BrokenProcessPool:  # it died before it got the job
             self.suspects.append(job)
             raise
+        self.pending[future] = job
 
     def _ended(self, future: Future[BatchResult]) -> Batch:
         rows, seconds, host = future.result()

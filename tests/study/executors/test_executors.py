@@ -82,7 +82,7 @@ def test_stopped_executor_begins_no_batch(quick: Document, name: str) -> None:
             made.append(number)
             yield Task(number, str(number), {}, quick.build())
 
-    assert list(executor_named(name).run(tasks(), Setting(2, is_stopped=lambda: True))) == []
+    assert list(executor_named(name).run_tasks(tasks(), Setting(2, is_stopped=lambda: True))) == []
     assert len(made) <= 1
 
 
