@@ -1,6 +1,5 @@
 """blocksim calibrate: fit inputs to measured repeats, so that agreement is probable under the scatter of the others."""
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -8,6 +7,7 @@ from functools import partial
 from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import note, number, table_lines
 from blocksim.cli.prepare import ScenarioInput, announce_compilation
+from blocksim.cli.progress import pace
 from blocksim.errors import ExitCode
 from blocksim.silence import silent
 from blocksim.study.calibrate import CalibrateOptions, Fit, calibrate
@@ -39,7 +39,23 @@ def calibrate_command(source: ScenarioInput, options: CalibrateOptions, screen: 
             on_trial=silent if screen.silent else _trial_lines(),
         ),
     )
-    nothing = [] if found.found else ["", *_nothing_found(found)]
+    nothing = []
+    if not found.found:  # how far the nearest values are off, by quantity
+        rows = [
+            [
+                f"{hit.range.column} of {hit.range.block}",
+                f"[{number(hit.range.lower)}, {number(hit.range.upper)}]",
+                number(hit.median),
+                f"{hit.share_inside:.0%}",
+            ]
+            for hit in found.hits
+        ]
+        nothing = [
+            "",
+            "nothing found: no sample is inside all ranges. The values above are the nearest",
+            "of those tried; widen the priors, fit other keys or raise --trials",
+            *table_lines(("quantity", "measured", "median", "inside"), rows, left=1),
+        ]
     return Report(
         [*_values(found), "", *_probability(found), *nothing],
         found.to_dict(),
@@ -49,25 +65,21 @@ def calibrate_command(source: ScenarioInput, options: CalibrateOptions, screen: 
 
 
 def _trial_lines() -> Callable[[Trial, Trial, int], None]:
-    """Return a function that reports every trial that is the best so far, and others now and then."""
-    told_at = 0.0
+    """Return a function that reports every trial that is the best so far, and others now and then.
+
+    It tells the share inside or, where no trial has any, the distance: 0 at the ranges, towards 1 far from them.
+    """
+    is_due = pace(TOLD_SECONDS, 0.0)
 
     def tell(trial: Trial, best: Trial, trials: int) -> None:
-        nonlocal told_at
-        now = time.monotonic()
-        if trial is best or now - told_at > TOLD_SECONDS or trial.number == trials:
-            told_at = now
+        if is_due() or trial is best or trial.number == trials:
             values = ", ".join(f"{'.'.join(key.split('.')[-2:])} {value}" for key, value in trial.values.items())
-            note(f"{trial.number}/{trials}: {_agreement(trial, best)}: {values}")
+            told = f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
+            if best.score.inside:
+                told = f"{trial.score.share_inside:.0%} inside (best {best.score.share_inside:.0%})"
+            note(f"{trial.number}/{trials}: {told}: {values}")
 
     return tell
-
-
-def _agreement(trial: Trial, best: Trial) -> str:
-    """Return the share inside or, where no trial has any, the distance: 0 at the ranges, towards 1 far from them."""
-    if best.score.inside:
-        return f"{trial.score.share_inside:.0%} inside (best {best.score.share_inside:.0%})"
-    return f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
 
 
 def _values(found: Fit) -> list[str]:
@@ -81,24 +93,6 @@ def _values(found: Fit) -> list[str]:
         "",
         f"{len(found.ties)} of {found.trials} trials tie: the measurement does not decide between their values;",
         "the file holds one of them. More measurements or --samples may tell them apart",
-    ]
-
-
-def _nothing_found(found: Fit) -> list[str]:
-    """Report how far the nearest values are off, by quantity."""
-    rows = [
-        [
-            f"{hit.range.column} of {hit.range.block}",
-            f"[{number(hit.range.lower)}, {number(hit.range.upper)}]",
-            number(hit.median),
-            f"{hit.share_inside:.0%}",
-        ]
-        for hit in found.hits
-    ]
-    return [
-        "nothing found: no sample is inside all ranges. The values above are the nearest",
-        "of those tried; widen the priors, fit other keys or raise --trials",
-        *table_lines(("quantity", "measured", "median", "inside"), rows, left=1),
     ]
 
 

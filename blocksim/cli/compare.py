@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict
-from blocksim.analysis.evidence import BLOCK, Column, Findings, Form, Metric, Row, Value
+from blocksim.analysis.compare import Comparison, Verdict
+from blocksim.analysis.evidence import BLOCK, Column, Findings, Form, Metric, Row
 from blocksim.analysis.judgement import THRESHOLD, U_NUM, Judgement, Settings
 from blocksim.analysis.metrics import METRICS
 from blocksim.cli.command_line import Report, Screen
@@ -78,36 +78,35 @@ def compare_command(
     return Report(["\n\n".join(texts)], data, code=ExitCode.SUCCESS if all(judged) else ExitCode.OUTSIDE)
 
 
-def _meanings() -> Iterator[str]:
-    """Yield the names of all numbers with their meanings, for the help."""
-    for metric in METRICS.values():
-        numbers = [f"  {one.name:<13} {one.meaning}" for one in metric.columns if one not in BLOCK]
-        yield "\n".join(("\b", f"{metric.name}: {metric.meaning}", *numbers))
-
-
-compare_command.__doc__ = inspect.cleandoc(compare_command.__doc__ or "").replace(
-    "{meanings}", "\n\n".join(_meanings())
-)
+_MEANINGS: list[str] = []  # the names of all numbers, for the help
+for _one in METRICS.values():
+    _numbers = (f"  {one.name:<13} {one.meaning}" for one in _one.columns if one not in BLOCK)
+    _MEANINGS.append("\n".join(("\b", f"{_one.name}: {_one.meaning}", *_numbers)))
+compare_command.__doc__ = inspect.cleandoc(compare_command.__doc__ or "").replace("{meanings}", "\n\n".join(_MEANINGS))
 
 
 def comparison_table(comparison: Comparison) -> list[str]:
     """Return the table of a comparison: the measured blocks, with a digit less where it would not fit the screen."""
     measured = {row.block for row in comparison.rows if row.verdict != Verdict.NO_DATA}
     rows = [row for row in comparison.rows if row.block in measured]
-    tables = (table_lines(COLUMNS, [_cells(row, digits) for row in rows], left=2) for digits in (DIGITS, DIGITS - 1))
+
+    def table(digits: int) -> list[str]:
+        cells = [
+            (
+                row.block,
+                f"{row.quantity} {SIGNS.get(row.unit, row.unit)}",
+                number(row.simulated, digits),
+                f"{number(row.mean, digits)} ± {number(row.s, digits)}",
+                f"[{number(row.minimum, digits)}, {number(row.maximum, digits)}]",
+                number(row.error, digits),
+                str(row.verdict),
+            )
+            for row in rows
+        ]
+        return table_lines(COLUMNS, cells, left=2)
+
+    tables = (table(digits) for digits in (DIGITS, DIGITS - 1))
     return min(tables, key=lambda lines: (max(map(len, lines)) > width_of_screen(), any("…" in line for line in lines)))
-
-
-def _cells(row: ComparisonRow, digits: int) -> tuple[str, ...]:
-    return (
-        row.block,
-        f"{row.quantity} {SIGNS.get(row.unit, row.unit)}",
-        number(row.simulated, digits),
-        f"{number(row.mean, digits)} ± {number(row.s, digits)}",
-        f"[{number(row.minimum, digits)}, {number(row.maximum, digits)}]",
-        number(row.error, digits),
-        str(row.verdict),
-    )
 
 
 def verdict_lines(comparison: Comparison) -> list[str]:
@@ -152,27 +151,22 @@ def _table(metric: Metric, found: Findings) -> list[str]:
 
 
 def _cell(row: Row, column: Column) -> str:
-    value = row[column.name]
-    if column.name == "quantity" and row["unit"]:
-        return f"{value} {SIGNS.get(str(row['unit']), row['unit'])}"
-    return _shown(value, column)
-
-
-def _shown(value: Value, column: Column) -> str:
     """Return a value for people; a dash where there is none."""
-    is_share = column.form is Form.SHARE
+    value, is_share = row[column.name], column.form is Form.SHARE
+    scale = PERCENT if is_share else 1.0
     match value:
+        case str() if column.name == "quantity" and row["unit"]:
+            return f"{value} {SIGNS.get(str(row['unit']), row['unit'])}"
         case None:
             return DASH
         case bool():
             return "yes" if value else "no"
-        case (low, high) if is_share:
-            return f"{number(PERCENT * low, column.digits)}–{number(PERCENT * high, column.digits)} %"
         case (low, high):
-            ends = [number(low, column.digits), number(high, column.digits)]
-            return DASH if ends == [DASH, DASH] else f"[{ends[0]}, {ends[1]}]"
+            ends = [number(scale * end, column.digits) for end in (low, high)]
+            text = f"{ends[0]}–{ends[1]} %" if is_share else f"[{ends[0]}, {ends[1]}]"
+            return text if is_share or ends != [DASH, DASH] else DASH
         case float():
-            return f"{number(PERCENT * value, column.digits)} %" if is_share else number(value, column.digits)
+            return number(scale * value, column.digits) + (" %" if is_share else "")
         case _:
             return str(value)
 

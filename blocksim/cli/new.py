@@ -42,6 +42,10 @@ def new_command(
 
     Example: blocksim new three-blocks my_blocks
     """
+    from pydantic import TypeAdapter, ValidationError
+
+    from blocksim.scenario.models.base import Identifier
+
     known = templates()
     if kind not in known:
         hint = did_you_mean(kind, known) or f"use one of {', '.join(known)}"
@@ -49,37 +53,23 @@ def new_command(
     template = known[kind]
     ending = Path(template.name).suffix
     path = Path(name.removesuffix(ending) + ending)
-    _refuse_bad_name(path.stem)
-    _write(path, template.read_text(encoding="utf-8").replace(PLACE, path.stem))
-    following = "blocksim sweep {path} --dry-run" if kind.startswith(SWEEP) else NEXT[ending]
-    return Report([str(path)], notes=[f"next: {following.format(path=path)}"])
-
-
-def _refuse_bad_name(name: str) -> None:
-    from pydantic import TypeAdapter, ValidationError
-
-    from blocksim.scenario.models.base import Identifier
-
     try:
-        TypeAdapter(Identifier).validate_python(name)
+        TypeAdapter(Identifier).validate_python(path.stem)
     except ValidationError as error:
         raise typer.BadParameter(error.errors()[0]["msg"], param_hint="NAME") from None
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file that must not exist yet. Raises OutputExistsError, and OutputError where the disk is full."""
     try:
-        file = path.open("x", encoding="utf-8")
+        path.open("x", encoding="utf-8").close()
     except FileExistsError:
         raise OutputExistsError(f"{path}: already exists; choose another name") from None
     except OSError as error:
         raise OutputExistsError(f"{path}: cannot be created: {error.strerror}") from error
-    file.close()
     try:
-        write_text(path, text)
-    except OutputError:
+        write_text(path, template.read_text(encoding="utf-8").replace(PLACE, path.stem))
+    except OutputError:  # the disk is full
         path.unlink(missing_ok=True)  # it was made here, and is empty
         raise
+    following = "blocksim sweep {path} --dry-run" if kind.startswith(SWEEP) else NEXT[ending]
+    return Report([str(path)], notes=[f"next: {following.format(path=path)}"])
 
 
 def schema_command() -> None:

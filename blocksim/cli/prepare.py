@@ -1,7 +1,7 @@
 """What comes before a run: reading the scenario, so that later mistakes also point into the file, and compiling."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -28,21 +28,16 @@ class ScenarioInput:
         """Return the document. Raises what reading it raises."""
         return Document.read(self.scenario).with_settings(self.settings or [])
 
-    def built(self) -> AbstractContextManager[Scenario]:
+    @contextmanager
+    def built(self) -> Iterator[Scenario]:
         """Give the validated scenario; a step or skin that turns out not to fit is shown where it was written."""
-        return read_scenario(self.scenario, self.settings or [])
-
-
-@contextmanager
-def read_scenario(path: Path, settings: Sequence[str]) -> Iterator[Scenario]:
-    """Give the validated scenario; a step or skin that turns out not to fit is shown where it was written."""
-    document = Document.read(path).with_settings(settings)
-    try:
-        yield document.build()
-    except StepError as error:
-        raise ScenarioError([document.problem(Mistake(("time", "step"), str(error)))]) from None
-    except SkinTooSmallError as error:
-        raise ScenarioError([document.problem(Mistake(("contact", "skin"), str(error)))]) from None
+        document = self.document()
+        try:
+            yield document.build()
+        except StepError as error:
+            raise ScenarioError([document.problem(Mistake(("time", "step"), str(error)))]) from None
+        except SkinTooSmallError as error:
+            raise ScenarioError([document.problem(Mistake(("contact", "skin"), str(error)))]) from None
 
 
 def warn_of_values(scenario: Scenario) -> None:

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from blocksim.cli.output import note
 from blocksim.errors import StoppedEarlyError
+from blocksim.silence import silent
 
 if TYPE_CHECKING:  # stored results are shown without the solver
     from rich.progress import Progress
@@ -24,35 +25,62 @@ PLAIN_SECONDS = 2.0
 LIVE_SECONDS = 0.1
 
 
+def pace(seconds: float, since: float | None = None) -> Callable[[], bool]:
+    """Return a function that returns True where more than so many seconds have passed since it last did.
+
+    The first time counts from `since` (a monotonic time), by default from its first call.
+    """
+    last = since
+
+    def is_due() -> bool:
+        nonlocal last
+        now = time.monotonic()
+        is_over = now - (now if last is None else last) > seconds
+        last = now if is_over or last is None else last
+        return is_over
+
+    return is_due
+
+
 @contextmanager
 def run_progress(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
     """Give a function that shows the progress of a run; on a terminal the line disappears at the end."""
     console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield (lambda _: None) if quiet else _plain_lines()
+    if quiet:
+        yield silent
+        return
+    if not console.is_terminal:
+        is_time = pace(PLAIN_SECONDS)
+
+        def show_line(where: "Where") -> None:
+            if is_time():
+                note(
+                    f"{where.time:.3f} of at most {where.end:g} s simulated, {where.steps} steps, "
+                    f"relative energy error {where.relative_residual:.0e}"
+                )
+
+        yield show_line
         return
     rates = "{task.fields[speed]} steps/s, relative energy error {task.fields[residual]}"
     progress = _bar(console, "{task.completed:.3f} of {task.total:g} s", rates)
     task = progress.add_task("", total=1.0, visible=False, speed="", residual="")
-    began = shown_at = 0.0
-    steps: int | None = None  # when first shown: compiling comes before, and a resumed run has done some
+    is_due = pace(LIVE_SECONDS, 0.0)
+    began: tuple[float, int] | None = None  # time and steps when first shown: it compiles before, and may be resumed
 
     def show(where: "Where") -> None:
-        nonlocal began, shown_at, steps
-        now = time.monotonic()
-        if steps is None:
-            began, steps = now, where.steps
+        nonlocal began
+        if began is None:
+            began = time.monotonic(), where.steps
             progress.start()
-        if now - shown_at > LIVE_SECONDS:
-            shown_at = now
-            speed = f"{(where.steps - steps) / max(now - began, 1e-9):.1e}"
+        if is_due():
+            speed = f"{(where.steps - began[1]) / max(time.monotonic() - began[0], 1e-9):.1e}"
             residual = f"{where.relative_residual:.0e}"
             progress.update(task, completed=where.time, total=where.end, visible=True, speed=speed, residual=residual)
 
     try:
         yield show
     finally:
-        if steps is not None:
+        if began is not None:
             with suppress(OSError):  # the terminal has gone, and so has its line
                 progress.stop()
 
@@ -61,12 +89,15 @@ def run_progress(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
 def count_progress(what: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
     """Give a function that shows how many of all are done; on a terminal the line disappears at the end."""
     console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        yield (lambda *_: None) if quiet else _plain_count(what)
-        return
-    with _bar(console, "{task.completed} of {task.total} {task.description}") as progress:
-        task = progress.add_task(what, total=1, visible=False)
-        yield lambda done, total: progress.update(task, completed=done, total=total, visible=True)
+    if quiet:
+        yield silent
+    elif console.is_terminal:
+        with _bar(console, "{task.completed} of {task.total} {task.description}") as progress:
+            task = progress.add_task(what, total=1, visible=False)
+            yield lambda done, total: progress.update(task, completed=done, total=total, visible=True)
+    else:
+        is_due = pace(PLAIN_SECONDS, time.monotonic())
+        yield lambda done, total: note(f"{done} of {total} {what}") if is_due() else None
 
 
 def _bar(console: Console, first: str, *others: str) -> "Progress":
@@ -84,36 +115,6 @@ def one_by_one(items: Sequence[T], told: Callable[[T], str], *, quiet: bool) -> 
         if not quiet:
             note(f"{position}/{len(items)} {told(item)} ...")
         yield item
-
-
-def _plain_count(what: str) -> Callable[[int, int], None]:
-    shown_at = time.monotonic()
-
-    def show(done: int, total: int) -> None:
-        nonlocal shown_at
-        now = time.monotonic()
-        if now - shown_at > PLAIN_SECONDS:
-            shown_at = now
-            note(f"{done} of {total} {what}")
-
-    return show
-
-
-def _plain_lines() -> "Callable[[Where], None]":
-    shown_at: float | None = None
-
-    def show(where: "Where") -> None:
-        nonlocal shown_at
-        now = time.monotonic()
-        shown_at = now if shown_at is None else shown_at
-        if now - shown_at > PLAIN_SECONDS:
-            shown_at = now
-            note(
-                f"{where.time:.3f} of at most {where.end:g} s simulated, {where.steps} steps, "
-                f"relative energy error {where.relative_residual:.0e}"
-            )
-
-    return show
 
 
 @contextmanager
@@ -134,7 +135,7 @@ def exit_when_stopped() -> Iterator[None]:
 def case_progress(heads: "Iterable[Head]", *, quiet: bool) -> "Iterator[Callable[[int, int, Row], None]]":
     """Give a function that takes every row of a study of these columns: a bar on a terminal, lines elsewhere."""
     if quiet:
-        yield lambda *_: None
+        yield silent
     elif Console(stderr=True).is_terminal:
         with count_progress("cases", quiet=False) as show:
             yield lambda done, total, _: show(done, total)
@@ -148,23 +149,22 @@ def _case_lines(heads: "Sequence[Head]") -> "Callable[[int, int, Row], None]":
     from blocksim.view.sweeps.data import short_names
 
     names = short_names([head.key for head in heads])
-    began = shown_at = time.monotonic()
-    new = failed = 0
+    began, new, failed = time.monotonic(), 0, 0
+    is_due = pace(PLAIN_SECONDS, began)
 
     def show(done: int, total: int, row: "Row") -> None:
-        nonlocal shown_at, new, failed
+        nonlocal new, failed
         new += 1
         failed += row["status"] != FINISHED
         if total <= FEW:
             cells = (f"{cell_text(head.cell(row[head.key]))} {head.unit}".rstrip() for head in heads)
             values = ", ".join(f"{name} = {cell}" for name, cell in zip(names, cells, strict=True))
             note(f"{done}/{total} {row['status']}: {values}")
-        elif done == total or time.monotonic() - shown_at > PLAIN_SECONDS:
-            shown_at = time.monotonic()
-            pace = new / max(shown_at - began, 1e-9)
-            left = f", {(total - done) / pace:.0f} s left" if done < total else ""
+        elif is_due() or done == total:
+            speed = new / max(time.monotonic() - began, 1e-9)
+            left = f", {(total - done) / speed:.0f} s left" if done < total else ""
             failures = f", {failed} failed" if failed else ""
-            note(f"{done}/{total} cases{failures}, {pace:.3g} a second{left}")
+            note(f"{done}/{total} cases{failures}, {speed:.3g} a second{left}")
 
     return show
 

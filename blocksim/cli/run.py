@@ -18,7 +18,7 @@ from blocksim.simulation import Result
 from blocksim.simulation.folder import default_folder
 from blocksim.simulation.frames import rows_of
 from blocksim.simulation.loop import REST
-from blocksim.simulation.observables import FIRST, OUTCOME, Movement
+from blocksim.simulation.observables import FIRST, OUTCOME
 from blocksim.simulation.run import RunCallbacks
 from blocksim.study.compare import compare_run
 from blocksim.study.rows import FINISHED
@@ -104,32 +104,12 @@ def _answer_lines(result: Result) -> list[str]:
     rows = [(block, *map(number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
     lines = table_lines(("block", "x mm", "y mm", "rotation °"), rows) if rows else []
     more = [] if shown == count else [f"... and {count - shown} more blocks in final.csv"]
-    return [*lines, *more, *_ending_lines(result)]
-
-
-def _ending_lines(result: Result) -> list[str]:
-    """Return the tables of the systems beside the blocks."""
-    lines = []
-    for table in result.endings.values():
+    lines += more
+    for table in result.endings.values():  # of the systems beside the blocks
         titles = [name.replace("_", " ") for name in table]
         columns = [[number(cell) if isinstance(cell, float) else cell for cell in column] for column in table.values()]
         lines += ["", *table_lines(titles, list(zip(*columns, strict=True)))]
     return lines
-
-
-def _moved(found: Movement) -> str:
-    """Return what moved, how far on the way and first: blocks may end nearer."""
-    told = dict(found.lines(number))
-    outcome, first = told.pop(OUTCOME), told.pop(FIRST, "")
-    return f"{outcome}: {', '.join(map(' '.join, told.items()))}" + (f"\n{FIRST}: {first}" if first else "")
-
-
-def _moving(result: Result) -> str:
-    """Return a line for a run that has ended before its blocks were at rest; nothing for others."""
-    end = result.summary.movement
-    if end is None or result.summary.reason == REST.reason or end.fastest_m_s <= result.scenario.time.rest_speed:
-        return ""
-    return f"\nnot at rest: block {end.fastest_block} at {end.fastest_m_s:.2g} m/s"
 
 
 def _end_lines(result: Result) -> Iterator[str]:
@@ -145,7 +125,12 @@ def _end_lines(result: Result) -> Iterator[str]:
         settled = "settled" if summary.settled.at_rest else "released where it did not settle"
         yield f"{settled} before time zero in {summary.settled.steps} steps; largest displacement {far}"
     yield from (f"{one.time_s:.3f} s: {one.what}" for one in summary.events)
-    if summary.movement is not None:
-        yield f"{_moved(summary.movement)}{_moving(result)}"
+    moved = summary.movement
+    if moved is not None:  # what moved, how far on the way and first: blocks may end nearer
+        told = dict(moved.lines(number))
+        outcome, first = told.pop(OUTCOME), told.pop(FIRST, "")
+        yield f"{outcome}: {', '.join(map(' '.join, told.items()))}" + (f"\n{FIRST}: {first}" if first else "")
+    if moved is not None and summary.reason != REST.reason and moved.fastest_m_s > result.scenario.time.rest_speed:
+        yield f"not at rest: block {moved.fastest_block} at {moved.fastest_m_s:.2g} m/s"
     yield from (f"warning: {text}" for text in summary.warnings)
     yield ""
