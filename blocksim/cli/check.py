@@ -29,6 +29,15 @@ from blocksim.world.memory import FRAME_VALUES, PROCESS_BYTES
 MOST_BODIES = 12
 MOST_LINES = 8  # of events, loads or probes
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
+PAIR_COLUMNS = {
+    "μs": ("static_friction", ".3g"),
+    "μk": ("kinetic_friction", ".3g"),
+    "e": ("restitution", ".3g"),
+    "ζ": ("normal_damping_ratio", ".3f"),
+    "ζ shear": ("shear_damping_ratio", ".3f"),
+    "K": ("normal_stiffness", ".2e"),
+    "k/K": ("shear_stiffness_ratio", ".3f"),
+}
 LEAST_ROOM = 24
 HEAD = 11  # columns: width of the names on the left
 FAR_APART = 10.0  # steps of blocks and of systems beside them that are told with a cure
@@ -239,23 +248,12 @@ def _side_cells(body: PlacedBody) -> tuple[str, ...]:
 
 def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
     """List the contact parameters of each pair of materials, and what the heads mean."""
-    cells = [
-        {
-            "pair": pair.pair,
-            "μs": f"{pair.static_friction:.3g}",
-            "μk": f"{pair.kinetic_friction:.3g}",
-            "e": f"{pair.restitution:.3g}",
-            **_optional("ζ", pair.normal_damping_ratio),
-            **_optional("ζ shear", pair.shear_damping_ratio),
-            "K": f"{pair.normal_stiffness:.2e}",
-            **_optional("k/K", pair.shear_stiffness_ratio),
-        }
-        for pair in pairs
-    ]
+    heads = [head for head, (name, _) in PAIR_COLUMNS.items() if getattr(pairs[0], name) is not None]
     if all(pair.shear_damping_ratio == pair.normal_damping_ratio for pair in pairs):
-        for row in cells:
-            row.pop("ζ shear", None)
-    table = table_lines(list(cells[0]), [list(row.values()) for row in cells])
+        heads = [head for head in heads if head != "ζ shear"]
+    shown = [PAIR_COLUMNS[head] for head in heads]
+    rows = [[pair.pair, *(format(getattr(pair, name), form) for name, form in shown)] for pair in pairs]
+    table = table_lines(("pair", *heads), rows)
     if pairs[0].normal_damping_ratio is None:
         return [
             *table,
@@ -268,10 +266,6 @@ def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
         "μs static and μk kinetic friction, e restitution, ζ damping ratio, k/K in shear,",
         f"K stiffness in {pairs[0].stiffness_unit} of one contact point ({points})",
     ]
-
-
-def _optional(name: str, value: float | None) -> dict[str, str]:
-    return {} if value is None else {name: f"{value:.3f}"}
 
 
 def _rules(pairs: Sequence[PairDescription]) -> list[str]:
