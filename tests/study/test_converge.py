@@ -256,7 +256,7 @@ def test_interrupt_stops_the_study(slide: Scenario, tmp_path: Path) -> None:
 @pytest.mark.parametrize("wrong", [{"tolerance_mm": 0.0}, {"tolerance_mm": float("nan")}, {"levels": 1}])
 def test_useless_limits_are_refused(slide: Scenario, tmp_path: Path, wrong: dict[str, float]) -> None:
     with pytest.raises(InvalidInputError, match="levels 2 or more"):
-        converge(slide, out=tmp_path, **wrong)  # type: ignore[arg-type]
+        converge(slide, out=tmp_path, **wrong)  # type: ignore[call-overload]
     assert list(tmp_path.iterdir()) == []
 
 

@@ -35,7 +35,7 @@ class Formula(Execution):
     law: Law = staticmethod(linear(0.0))
     is_known = True  # the turn
 
-    def ready(self) -> tuple[Run, Setting]:
+    def ready(self, _: Path | None = None, /) -> tuple[Run, Setting]:
         def run(tasks: Iterator[Task], _: Setting) -> Generator[Batch, None, None]:
             for task in tasks:
                 yield Batch((task,), (self.row(task.scenario),), 0.0, "")
