@@ -85,7 +85,7 @@ def _trial_lines() -> Callable[[Trial, Trial, int], None]:
 def _values(found: Fit) -> list[str]:
     """Return the fitted values or, where trials tie, the ranges of those that are equally good."""
     rows = [(prior, str(found.best.values[prior.key])) for prior in found.plan.priors]
-    if not found.is_one_of_many:
+    if len(found.ties) < 2:
         return table_lines(COLUMNS, [[prior.key, str(prior), value] for prior, value in rows], left=1)
     tied = [[prior.key, str(prior), prior.range_of(*found.equally_good(prior)), value] for prior, value in rows]
     return [

@@ -166,11 +166,6 @@ class Fit:
         """Return True if a member of the best trial or a fresh one is inside all ranges; if not, it is the nearest."""
         return self.best.score.inside + self.score.inside > 0
 
-    @property
-    def is_one_of_many(self) -> bool:
-        """Return True if other values are as good: the measurement does not decide between them."""
-        return len(self.ties) > 1
-
     def equally_good(self, prior: Prior) -> tuple[float, float]:
         """Return the least and the greatest of the equally good values of a key, in the unit of its prior."""
         numbers = [prior.number(trial.values[prior.key]) for trial in self.ties or (self.best,)]
@@ -303,8 +298,8 @@ def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
     members = list(run_members(plan.bare, fresh))
     score = score_of(members, plan.ranges)
     fit = Fit(plan, best, score, options.trials, path, hits_of(members, plan.ranges), ties)
-    note = f"one of {len(ties)} equally good, see [provenance]" if fit.is_one_of_many else NOTE
-    which = f"one of {len(ties)} equally good trials: " if fit.is_one_of_many else ""
+    note = f"one of {len(ties)} equally good, see [provenance]" if len(fit.ties) > 1 else NOTE
+    which = f"one of {len(ties)} equally good trials: " if len(fit.ties) > 1 else ""
     shown = ", ".join(f"{key} = {value}" for key, value in best.values.items())
     head = f"{Path(plan.document.source.where).name} calibrated by blocksim: {which}{shown}"
     text = fitted_text(plan.document, best.values, _provenance(fit), path.parent, head, note)
@@ -381,6 +376,6 @@ def _provenance(fit: Fit) -> dict[str, str]:
     texts = {}
     for prior in plan.priors:
         span = prior.range_of(*fit.equally_good(prior))
-        among = f", one of {len(fit.ties)} equally good trials ({span})" if fit.is_one_of_many else ""
+        among = f", one of {len(fit.ties)} equally good trials ({span})" if len(fit.ties) > 1 else ""
         texts[prior.key] = f"{verb}{among}, prior {prior}, {found}"
     return texts

@@ -22,7 +22,7 @@ from blocksim.extras import load_module
 from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
 from blocksim.scenario import units as q
 from blocksim.scenario.input_files import read_head, user_value
-from blocksim.scenario.models.study import Uniform, Variation, toml_number
+from blocksim.scenario.models.study import Normal, Uniform, Variation, toml_number
 from blocksim.scenario.overrides import parse_key
 from blocksim.scenario.units import parse_unit
 from blocksim.simulation.atomic import sha256_of
@@ -127,7 +127,8 @@ class Scatter:
             values = dict(fitted)
             for key, value in row.items():
                 name = names.get(parse_key(key), key)
-                values[name] = centre_on_fit(plan.vary[key], value, fitted[name]) if name in fitted else value
+                about = plan.vary[key] if name in fitted else ()  # levels are refused when the plan is read
+                values[name] = value if isinstance(about, tuple) else centre_on_fit(about, value, fitted[name])
             yield values
 
     def described(self) -> dict[str, str]:
@@ -135,12 +136,11 @@ class Scatter:
         return {} if self.plan is None else {key: in_words(values) for key, values in self.plan.vary.items()}
 
 
-def centre_on_fit(distribution: Variation, drawn: object, fitted: object) -> object:
+def centre_on_fit(distribution: Uniform | Normal, drawn: object, fitted: object) -> object:
     """Return a drawn value moved so that the distribution lies about the fitted value.
 
     By the difference to its mean or middle, or by the ratio where its logarithm is evenly distributed.
     """
-    assert not isinstance(distribution, tuple)  # noqa: S101 - levels are refused when the plan is read
     number, centre = si_number(drawn), si_number(fitted)
     if isinstance(distribution, Uniform) and distribution.scale == "log":
         moved = number * centre / sqrt(distribution.low * distribution.high)
@@ -172,13 +172,9 @@ class CalibrationPlan:
     priors: tuple[Prior, ...]
     scatter: Scatter
     table: ExperimentTable
+    ranges: tuple[Range, ...]  # that members are judged by
     members: int
     seed: int
-
-    @property
-    def ranges(self) -> tuple[Range, ...]:
-        """The limits that members are judged by."""
-        return ranges_of(self.table)
 
     def fingerprint(self) -> dict[str, object]:
         """Return all that decides a trial: trials in a journal belong to this plan if theirs is the same."""
@@ -218,7 +214,7 @@ def calibration_plan(
         load_table(experiment)  # so that its mistakes are reported of the option
         document = document.with_values({TABLE: user_value(TABLE, str(experiment.absolute()))})
     fits = build_distributions(document, fit, FIT, MODE)
-    if scatter is not None and scatter:
+    if scatter:
         scattered: Sweep | None = build_distributions(document, scatter, SCATTER, MODE)
     else:
         own = document.build().sweep
@@ -226,19 +222,17 @@ def calibration_plan(
     bare = document.without_sweep()
     base = bare.build()
     if base.experiment is None:
-        message = f"{document.source.where}: the scenario names no experiment; give a table with --experiment"
-        raise InputMissingError(message)
+        how = "give a table with --experiment"
+        raise InputMissingError(f"{document.source.where}: the scenario names no experiment; {how}")
     check_experiment(base)
     _refuse_unfit(fits, scattered, fit, scatter)
     if scattered is None and members > 1:
         raise InvalidInputError(NO_SCATTER)
-    priors = []
-    for key, values in fits.vary.items():
-        assert isinstance(values, Uniform)  # noqa: S101 - all others have been refused
-        table = fit[key]
-        priors.append(prior_of(key, values, table["from"] if isinstance(table, Mapping) else None))
+    ends = {key: table["from"] if isinstance(table, Mapping) else None for key, table in fit.items()}
+    priors = [prior_of(key, one, ends[key]) for key, one in fits.vary.items() if isinstance(one, Uniform)]
+    table = load_table(base.experiment.table)
     return CalibrationPlan(
-        document, bare, base, tuple(priors), Scatter(scattered), load_table(base.experiment.table), members, seed
+        document, bare, base, tuple(priors), Scatter(scattered), table, ranges_of(table), members, seed
     )
 
 
@@ -254,7 +248,7 @@ def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter
             for other in _related(key, fits.vary)
         ]
     fitted = {parse_key(key): values for key, values in fits.vary.items()}
-    texts = scatter.texts if scatter is not None and scatter else {}
+    texts = scatter.texts if scatter else {}
     for key, values in scattered.vary.items() if scattered is not None else ():
         where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
         prior = fitted.get(parse_key(key))
@@ -272,8 +266,7 @@ def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter
 def _related(key: str, others: Iterable[str]) -> list[str]:
     """Return those keys that are part of one, or contain it."""
     one = parse_key(key)
-    paths = [(other, parse_key(other)) for other in others]
-    return [name for name, path in paths if len(path) != len(one) and all(map(eq, path, one))]
+    return [name for name in others if len(path := parse_key(name)) != len(one) and all(map(eq, path, one))]
 
 
 FAILED = 1.0  # the miss of a member that failed

@@ -437,7 +437,7 @@ def _notes(scenario: Scenario, runs: LevelRuns, studies: Iterable[str] | None) -
     if soil_tables(scenario):
         more = "; --study spacing halves soils.spacing, eight times the cost a level" if studies is None else ""
         notes.append(f"distances are those of blocks, not of soil{more}")
-    elif studies is None and not has_particles(scenario):
+    elif studies is None and scenario.contact.model not in PARTICLE_MODELS:
         notes.append(f"{effects_note(scenario, ['spacing'])}: not studied")
     reasons = {str(row["reason"]) for row in runs.rows.values() if row["status"] == FINISHED}
     if scenario.time.stop_at_rest and "end of simulated time" in reasons:
@@ -480,18 +480,13 @@ def _possible(scenario: Scenario) -> list[Refinement]:
         _halved(scenario, key, own),
         Refinement(STIFFNESS, "stiffness", "contact.stiffness_scale", scale, sqrt(10.0), coarser),
     ]
-    if has_particles(scenario):
+    if scenario.contact.model in PARTICLE_MODELS:
         key = "contact.particle_spacing"
         chosen.append(Refinement(SPACING, "particle spacing", key, contact.particle_spacing, 0.5, 1))
     soils = soil_tables(scenario)
     if soils:  # twice the spacing may be too coarse to be admissible
         chosen.append(Refinement(SPACING, "spacing of soil", SOIL_SPACING, soils[0].spacing, 0.5, 0))
     return chosen
-
-
-def has_particles(scenario: Scenario) -> bool:
-    """Return True if the contact model examines the particles on the boundaries."""
-    return scenario.contact.model in PARTICLE_MODELS
 
 
 def effects_note(scenario: Scenario, asked: Iterable[str]) -> str:

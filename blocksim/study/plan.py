@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from statistics import fmean
-from typing import TypeVar, overload
+from typing import TypeVar, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,9 +150,9 @@ def _value(cell: Cell, unit: str | None) -> object:
 @functools.lru_cache(maxsize=1024)
 def _word(text: str) -> object:
     value = parse_value(text)
-    if isinstance(value, list | dict):
-        message = f"a cell holds one value, not a {'list' if isinstance(value, list) else 'table'}"
-        raise ValueError(message)  # noqa: TRY004 - a mistake of the user's, reported with its cell
+    kinds: dict[type, str] = {list: "list", dict: "table"}
+    if type(value) in kinds:
+        raise ValueError(f"a cell holds one value, not a {kinds[type(value)]}")
     return value
 
 
@@ -448,9 +448,7 @@ def build_distributions(document: Document, given: Variations, option: str, mode
         replace(one, label=one.label.replace("--vary", option, 1)) if one.path[:1] == ("sweep",) else one
         for one in labelled.overrides
     ]
-    sweep = replace(labelled, overrides=tuple(overrides)).build().sweep
-    assert sweep is not None  # noqa: S101 - it was just put there
-    return sweep
+    return cast("Sweep", replace(labelled, overrides=tuple(overrides)).build().sweep)  # it was just put there
 
 
 @dataclass(frozen=True)
