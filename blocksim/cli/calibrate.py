@@ -4,10 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
-from blocksim.cli.command_line import Report, Screen
-from blocksim.cli.output import note, number, table_lines
-from blocksim.cli.prepare import ScenarioInput, announce_compilation
-from blocksim.cli.progress import pace
+from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode
 from blocksim.silence import silent
 from blocksim.study.calibrate import CalibrateOptions, Fit, calibrate
@@ -18,7 +15,9 @@ TIED = ("key", "prior", "equally good", "written")
 TOLD_SECONDS = 2.0
 
 
-def calibrate_command(source: ScenarioInput, options: CalibrateOptions, screen: Screen) -> Report:
+def calibrate_command(
+    source: prepare.ScenarioInput, options: CalibrateOptions, screen: command_line.Screen
+) -> command_line.Report:
     """Fit inputs to measured repeats, within their priors.
 
     Maximises the probability that a run is inside all measured ranges (as in compare) while the other inputs scatter as
@@ -35,7 +34,7 @@ def calibrate_command(source: ScenarioInput, options: CalibrateOptions, screen: 
         source.document(),
         replace(
             options,
-            on_start=partial(announce_compilation, quiet=screen.silent),
+            on_start=partial(prepare.announce_compilation, quiet=screen.silent),
             on_trial=silent if screen.silent else _trial_lines(),
         ),
     )
@@ -44,8 +43,8 @@ def calibrate_command(source: ScenarioInput, options: CalibrateOptions, screen: 
         rows = [
             [
                 f"{hit.range.column} of {hit.range.block}",
-                f"[{number(hit.range.lower)}, {number(hit.range.upper)}]",
-                number(hit.median),
+                f"[{output.number(hit.range.lower)}, {output.number(hit.range.upper)}]",
+                output.number(hit.median),
                 f"{hit.share_inside:.0%}",
             ]
             for hit in found.hits
@@ -54,9 +53,9 @@ def calibrate_command(source: ScenarioInput, options: CalibrateOptions, screen: 
             "",
             "nothing found: no sample is inside all ranges. The values above are the nearest",
             "of those tried; widen the priors, fit other keys or raise --trials",
-            *table_lines(("quantity", "measured", "median", "inside"), rows, left=1),
+            *output.table_lines(("quantity", "measured", "median", "inside"), rows, left=1),
         ]
-    return Report(
+    return command_line.Report(
         [*_values(found), "", *_probability(found), *nothing],
         found.to_dict(),
         _notes(found),
@@ -69,7 +68,7 @@ def _trial_lines() -> Callable[[Trial, Trial, int], None]:
 
     It tells the share inside or, where no trial has any, the distance: 0 at the ranges, towards 1 far from them.
     """
-    is_due = pace(TOLD_SECONDS, 0.0)
+    is_due = progress.pace(TOLD_SECONDS, 0.0)
 
     def tell(trial: Trial, best: Trial, trials: int) -> None:
         if is_due() or trial is best or trial.number == trials:
@@ -77,7 +76,7 @@ def _trial_lines() -> Callable[[Trial, Trial, int], None]:
             told = f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
             if best.score.inside:
                 told = f"{trial.score.share_inside:.0%} inside (best {best.score.share_inside:.0%})"
-            note(f"{trial.number}/{trials}: {told}: {values}")
+            output.note(f"{trial.number}/{trials}: {told}: {values}")
 
     return tell
 
@@ -86,10 +85,10 @@ def _values(found: Fit) -> list[str]:
     """Return the fitted values or, where trials tie, the ranges of those that are equally good."""
     rows = [(prior, str(found.best.values[prior.key])) for prior in found.plan.priors]
     if len(found.ties) < 2:
-        return table_lines(COLUMNS, [[prior.key, str(prior), value] for prior, value in rows], left=1)
+        return output.table_lines(COLUMNS, [[prior.key, str(prior), value] for prior, value in rows], left=1)
     tied = [[prior.key, str(prior), prior.range_of(*found.equally_good(prior)), value] for prior, value in rows]
     return [
-        *table_lines(TIED, tied, left=1),
+        *output.table_lines(TIED, tied, left=1),
         "",
         f"{len(found.ties)} of {found.trials} trials tie: the measurement does not decide between their values;",
         "the file holds one of them. More measurements or --samples may tell them apart",

@@ -7,24 +7,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from typing import Annotated
 
-from blocksim.cli.command_line import Report, Screen
-from blocksim.cli.output import GAP, duration, number, table_lines, width_of_screen
-from blocksim.cli.prepare import ScenarioInput
+from blocksim.cli import command_line, output, prepare
 from blocksim.options import Option
-from blocksim.scenario import PlacedBody, Scenario, place_bodies, scenario_to_toml
-from blocksim.scenario.check import implausible_values
+from blocksim.scenario import PlacedBody, Scenario, check, place_bodies, scenario_to_toml, units
 from blocksim.scenario.events import in_order, probe_names
 from blocksim.scenario.models.loads import AnyLoad, Constant, Force, Gravity, Horizontal, Moment, Pressure, Ramp
 from blocksim.scenario.models.stepping import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
 from blocksim.scenario.motion import drives_of, greatest_rate, settles
 from blocksim.scenario.resolved import DEFAULT, MATERIALS
-from blocksim.scenario.units import STANDARD_GRAVITY
 from blocksim.simulation.probes import bytes_of_series
 from blocksim.simulation.result import describe_event
 from blocksim.study.rows import check_experiment
+from blocksim.world import free_memory, memory
 from blocksim.world.describe import Description, PairDescription, StepLimits, describe
-from blocksim.world.free_memory import readable
-from blocksim.world.memory import FRAME_VALUES, PROCESS_BYTES
 
 MOST_BODIES = 12
 MOST_LINES = 8  # of events, loads or probes
@@ -48,11 +43,11 @@ PREFIXES = ((1e6, "M"), (1e3, "k"))
 
 
 def check_command(
-    source: ScenarioInput,
+    source: prepare.ScenarioInput,
     *,
     resolved: Annotated[bool, Option("Print the resolved scenario instead: every value, in SI.")] = False,
-    screen: Screen,
-) -> Report:
+    screen: command_line.Screen,
+) -> command_line.Report:
     """Validate a scenario and summarise it.
 
     Prints time step and cost, then masses, inertias, contact parameters and the keys that set them. Nothing is run;
@@ -66,16 +61,16 @@ def check_command(
     if screen.as_json:
         bodies = [{**body._asdict(), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
         data = {**asdict(replace(description, bodies=())), "bodies": bodies}
-        return Report(data={"scenario": ready.model_dump(mode="json", by_alias=True), **data})
+        return command_line.Report(data={"scenario": ready.model_dump(mode="json", by_alias=True), **data})
     if resolved:
-        return Report([scenario_to_toml(ready)])
+        return command_line.Report([scenario_to_toml(ready)])
     tables = [list(_summary(ready, description))]
     if description.bodies:
         tables += [_bodies(description.bodies), _pairs(ready, description.pairs), _rules(description.pairs)]
     lines = "\n\n".join("\n".join(table) for table in tables)
-    warnings = [*implausible_values(ready), *description.warnings]
+    warnings = [*check.implausible_values(ready), *description.warnings]
     notes = [*(f"warning: {text}" for text in warnings), f"{ready.name}: valid"]
-    return Report([] if screen.quiet else [lines], notes=notes)
+    return command_line.Report([] if screen.quiet else [lines], notes=notes)
 
 
 def _summary(scenario: Scenario, description: Description) -> Iterator[str]:
@@ -92,17 +87,18 @@ def _summary(scenario: Scenario, description: Description) -> Iterator[str]:
         if rigid.warning:
             yield f"warning: {rigid.warning}"
     until_rest = ", less if it stops at rest" if scenario.time.stop_at_rest else ""
-    yield f"solving    at most about {duration(description.seconds)} on one core{until_rest}"
-    yield f"memory     about {readable(description.memory)}, of which {readable(PROCESS_BYTES)} for the program itself"
-    size = description.bytes + bytes_of_series(scenario, description.steps, description.step, FRAME_VALUES)
-    yield f"results    at most {description.frames} frames, about {readable(size)}"
+    yield f"solving    at most about {output.duration(description.seconds)} on one core{until_rest}"
+    program = free_memory.readable(memory.PROCESS_BYTES)
+    yield f"memory     about {free_memory.readable(description.memory)}, of which {program} for the program itself"
+    size = description.bytes + bytes_of_series(scenario, description.steps, description.step, memory.FRAME_VALUES)
+    yield f"results    at most {description.frames} frames, about {free_memory.readable(size)}"
     if description.frames_at_every_step:
         yield f"           output.every = {scenario.output.every:.3g} s is shorter than a step: a frame at every step"
     motion = description.motion
     if motion is not None:
-        peaks = f"{number(MILLI * motion.displacement)} mm, {number(MILLI * motion.speed)} mm/s"
-        greatest = f"at most {peaks} and {number(motion.acceleration / STANDARD_GRAVITY)} g"
-        yield f"supports   move {greatest}; {number(MILLI * motion.final_speed)} mm/s at the end"
+        peaks = f"{output.number(MILLI * motion.displacement)} mm, {output.number(MILLI * motion.speed)} mm/s"
+        greatest = f"at most {peaks} and {output.number(motion.acceleration / units.STANDARD_GRAVITY)} g"
+        yield f"supports   move {greatest}; {output.number(MILLI * motion.final_speed)} mm/s at the end"
     yield from _acting(scenario)
     if rigid is None:
         yield f"boundary   {description.particles} particles ({_use_of_particles(scenario)})"
@@ -132,9 +128,9 @@ def _use_of_particles(scenario: Scenario) -> str:
         case "surface":
             return "the surface model uses those at the corners"
         case "kernel":
-            return f"{contact.kernel}, smoothing length {number(MILLI * contact.resolved_smoothing_length)} mm"
+            return f"{contact.kernel}, smoothing length {output.number(MILLI * contact.resolved_smoothing_length)} mm"
         case _:
-            return f"at most {number(MILLI * contact.particle_spacing)} mm apart"
+            return f"at most {output.number(MILLI * contact.particle_spacing)} mm apart"
 
 
 def _acting(scenario: Scenario) -> Iterator[str]:
@@ -143,7 +139,7 @@ def _acting(scenario: Scenario) -> Iterator[str]:
         spec = scenario.bodies[drive.body - sum(structure.size for structure in scenario.structures)]
         kind = "" if spec.motion is None else f" ({spec.motion.kind})"
         speed, spin = greatest_rate(drive.shift), math.degrees(greatest_rate(drive.turn))
-        rates = [f"{number(MILLI * speed)} mm/s"] * (speed > 0.0) + [f"{number(spin)} °/s"] * (spin > 0.0)
+        rates = [f"{output.number(MILLI * speed)} mm/s"] * (speed > 0.0) + [f"{output.number(spin)} °/s"] * (spin > 0.0)
         rests = f", at rest from {drive.rest_time:.3f} s on" if math.isfinite(drive.rest_time) else ""
         yield f"driven     {place_bodies(scenario)[drive.body].name}{kind}, at most {' and '.join(rates)}{rests}"
     events = [scenario.events[k] for k in in_order(scenario.events)]
@@ -163,7 +159,7 @@ def _some(head: str, lines: Sequence[str]) -> Iterator[str]:
     """Yield the first lines of a kind and how many more there are."""
     first, others = f"{head:<{HEAD}}", f"{'':<{HEAD}}  "
     for line in lines[:MOST_LINES]:
-        yield from textwrap.wrap(line, width_of_screen(), initial_indent=first, subsequent_indent=others)
+        yield from textwrap.wrap(line, output.width_of_screen(), initial_indent=first, subsequent_indent=others)
     if len(lines) > MOST_LINES:
         yield f"{'':<{HEAD}}and {len(lines) - MOST_LINES} more {head}s"
 
@@ -222,19 +218,21 @@ def _probe(probe: AnyProbe) -> str:
 def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
     """List every block; of more than MOST_BODIES list the kinds, their numbers and the range of the centres."""
     if len(bodies) <= MOST_BODIES:
-        cells = [(one.name, number(MILLI * one.x), number(MILLI * one.y), *_side_cells(one)) for one in bodies]
-        return table_lines(("block", "x mm", "y mm", *SIDES), cells)
+        cells = [
+            (one.name, output.number(MILLI * one.x), output.number(MILLI * one.y), *_side_cells(one)) for one in bodies
+        ]
+        return output.table_lines(("block", "x mm", "y mm", *SIDES), cells)
     counts = Counter(body.block for body in bodies)
     kinds = {body.block: body for body in bodies}
     common = counts.most_common(MOST_BODIES)
     rows = [(name, str(count), *_side_cells(kinds[name])) for name, count in common]
     more = [f"... and {len(counts) - len(common)} more kinds"] if len(counts) > len(common) else []
     ends = {axis: [MILLI * getattr(body, axis) for body in bodies] for axis in ("x", "y")}
-    spans = (f"{axis} {number(min(places))} to {number(max(places))} mm" for axis, places in ends.items())
+    spans = (f"{axis} {output.number(min(places))} to {output.number(max(places))} mm" for axis, places in ends.items())
     fixed = sum(body.fixed for body in bodies)
     still = f", {fixed} of them fixed" if fixed else ""
     return [
-        *table_lines(("kind", "blocks", *SIDES), rows),
+        *output.table_lines(("kind", "blocks", *SIDES), rows),
         *more,
         f"{len(bodies)} blocks{still}",
         f"centres at {', '.join(spans)}",
@@ -243,7 +241,7 @@ def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
 
 def _side_cells(body: PlacedBody) -> tuple[str, ...]:
     lengths = (body.size_x, body.size_y, body.depth)
-    return (*(number(MILLI * v) for v in lengths), f"{body.mass:.5g}", f"{body.inertia:.5g}")
+    return (*(output.number(MILLI * v) for v in lengths), f"{body.mass:.5g}", f"{body.inertia:.5g}")
 
 
 def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
@@ -253,7 +251,7 @@ def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
         heads = [head for head in heads if head != "ζ shear"]
     shown = [PAIR_COLUMNS[head] for head in heads]
     rows = [[pair.pair, *(format(getattr(pair, name), form) for name, form in shown)] for pair in pairs]
-    table = table_lines(("pair", *heads), rows)
+    table = output.table_lines(("pair", *heads), rows)
     if pairs[0].normal_damping_ratio is None:
         return [
             *table,
@@ -275,12 +273,12 @@ def _rules(pairs: Sequence[PairDescription]) -> list[str]:
         for key in pair.rules.values():
             if key not in {DEFAULT, MATERIALS}:
                 found.setdefault(key, {})[" - ".join(pair.materials).replace(" ", HARD_SPACE)] = None
-    room = max(LEAST_ROOM, width_of_screen() - len(GAP) - max(map(len, found), default=0))
+    room = max(LEAST_ROOM, output.width_of_screen() - len(output.GAP) - max(map(len, found), default=0))
     rows = [
         ("" if i else key, line.replace(HARD_SPACE, " "))
         for key in sorted(found, key=lambda key: not key.startswith("pairs."))
         for i, line in enumerate(textwrap.wrap(", ".join(found[key]), room))
     ]
-    lines = table_lines(("set by", "for"), rows, left=2) if found else []
+    lines = output.table_lines(("set by", "for"), rows, left=2) if found else []
     is_rigid = pairs[0].normal_damping_ratio is None
     return [*lines, f"other values: defaults{'' if is_rigid else '; stiffness from E and ν of the materials'}"]

@@ -6,18 +6,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.analysis.compare import Comparison, Verdict
-from blocksim.analysis.evidence import BLOCK, Column, Findings, Form, Metric, Row
+from blocksim.analysis import compare, evidence, metrics
 from blocksim.analysis.judgement import THRESHOLD, U_NUM, Judgement, Settings
-from blocksim.analysis.metrics import METRICS
 from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import number, table_lines, width_of_screen
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.input_files import relative_path
+from blocksim.study import manifest, stored_run
 from blocksim.study.compare import ExperimentTablePath, compare_run, compare_sweep
-from blocksim.study.manifest import is_sweep
-from blocksim.study.stored_run import find_run
 
 COLUMNS = ("block", "quantity", "simulated", "mean ± s", "[min, max]", "error", "verdict")
 DIGITS = 2
@@ -62,13 +59,13 @@ def compare_command(
     data: list[dict[str, object]] = []
     judged: list[bool] = []
     for place in runs:
-        if is_sweep(place):
+        if manifest.is_sweep(place):
             judgement = compare_sweep(place, experiment, Settings(threshold, u_num))
             head, source, lines = place, judgement.source, list(_judgement_lines(judgement))
             data.append(judgement.to_dict())
             judged.append(judgement.inside)
         else:
-            head = find_run(place)
+            head = stored_run.find_run(place)
             comparison = compare_run(head, experiment)
             source, lines = comparison.source, [*comparison_table(comparison), *verdict_lines(comparison)]
             data.append({"run": str(head), **comparison.to_dict()})
@@ -79,15 +76,15 @@ def compare_command(
 
 
 _MEANINGS: list[str] = []  # the names of all numbers, for the help
-for _one in METRICS.values():
-    _numbers = (f"  {one.name:<13} {one.meaning}" for one in _one.columns if one not in BLOCK)
+for _one in metrics.METRICS.values():
+    _numbers = (f"  {one.name:<13} {one.meaning}" for one in _one.columns if one not in evidence.BLOCK)
     _MEANINGS.append("\n".join(("\b", f"{_one.name}: {_one.meaning}", *_numbers)))
 compare_command.__doc__ = inspect.cleandoc(compare_command.__doc__ or "").replace("{meanings}", "\n\n".join(_MEANINGS))
 
 
-def comparison_table(comparison: Comparison) -> list[str]:
+def comparison_table(comparison: compare.Comparison) -> list[str]:
     """Return the table of a comparison: the measured blocks, with a digit less where it would not fit the screen."""
-    measured = {row.block for row in comparison.rows if row.verdict != Verdict.NO_DATA}
+    measured = {row.block for row in comparison.rows if row.verdict != compare.Verdict.NO_DATA}
     rows = [row for row in comparison.rows if row.block in measured]
 
     def table(digits: int) -> list[str]:
@@ -109,11 +106,11 @@ def comparison_table(comparison: Comparison) -> list[str]:
     return min(tables, key=lambda lines: (max(map(len, lines)) > width_of_screen(), any("…" in line for line in lines)))
 
 
-def verdict_lines(comparison: Comparison) -> list[str]:
+def verdict_lines(comparison: compare.Comparison) -> list[str]:
     """Return what is outside and by how much, or that all is inside."""
     outside = []
     for row in comparison.rows:
-        if row.verdict == Verdict.OUTSIDE:
+        if row.verdict == compare.Verdict.OUTSIDE:
             least = 10.0**-DIGITS  # a distance is never shown as zero
             distance = f"less than {least:g}" if row.distance < least else number(row.distance, DIGITS)
             outside.append(f"outside: {row.quantity} of block {row.block} by {distance} {row.unit}")
@@ -130,8 +127,8 @@ def _judgement_lines(judgement: Judgement) -> Iterator[str]:
     yield from _wrapped(judgement.messages)
     for name, found in judgement.findings.items():
         yield ""
-        yield from _wrapped([f"{name}: {METRICS[name].meaning}"])
-        yield from _table(METRICS[name], found)
+        yield from _wrapped([f"{name}: {metrics.METRICS[name].meaning}"])
+        yield from _table(metrics.METRICS[name], found)
         yield from _wrapped(found.messages)
     yield ""
     share, asked = (f"{PERCENT * part:.1f} %" for part in (judgement.share_inside, judgement.settings.threshold))
@@ -139,20 +136,20 @@ def _judgement_lines(judgement: Judgement) -> Iterator[str]:
     yield f"{count} are within all measured ranges; threshold: {asked}"
 
 
-def _table(metric: Metric, found: Findings) -> list[str]:
+def _table(metric: evidence.Metric, found: evidence.Findings) -> list[str]:
     if not found.rows:
         return []
     columns = [column for column in metric.columns if column.head]
     rows = [[_cell(row, column) for column in columns] for row in found.rows[:MOST_ROWS]]
-    left = next(i for i, column in enumerate(columns) if column.form is not Form.TEXT)
+    left = next(i for i, column in enumerate(columns) if column.form is not evidence.Form.TEXT)
     lines = table_lines([column.head for column in columns], rows, left)
     more = len(found.rows) - len(rows)
     return [*lines, f"... and {more} more rows (--json has all)"] if more else lines
 
 
-def _cell(row: Row, column: Column) -> str:
+def _cell(row: evidence.Row, column: evidence.Column) -> str:
     """Return a value for people; a dash where there is none."""
-    value, is_share = row[column.name], column.form is Form.SHARE
+    value, is_share = row[column.name], column.form is evidence.Form.SHARE
     scale = PERCENT if is_share else 1.0
     match value:
         case str() if column.name == "quantity" and row["unit"]:

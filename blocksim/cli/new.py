@@ -7,12 +7,10 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli.command_line import Report
-from blocksim.cli.output import print_json
+from blocksim.cli import command_line, output
 from blocksim.errors import OutputError, OutputExistsError
 from blocksim.options import Option
-from blocksim.scenario import json_schema
-from blocksim.scenario.spelling import did_you_mean
+from blocksim.scenario import json_schema, spelling
 from blocksim.simulation.atomic import write_text
 
 TEMPLATES = "templates"
@@ -35,7 +33,7 @@ def new_command(
     name: Annotated[
         str, Option("Name of the scenario, and of its file without extension.", metavar="NAME", is_argument=True)
     ],
-) -> Report:
+) -> command_line.Report:
     """Write a commented scenario, sweep or table from a template.
 
     The file is ready to be checked and run; existing files are never overwritten.
@@ -48,7 +46,7 @@ def new_command(
 
     known = templates()
     if kind not in known:
-        hint = did_you_mean(kind, known) or f"use one of {', '.join(known)}"
+        hint = spelling.did_you_mean(kind, known) or f"use one of {', '.join(known)}"
         raise typer.BadParameter(f"unknown kind {kind!r}, {hint}", param_hint="KIND")
     template = known[kind]
     ending = Path(template.name).suffix
@@ -69,7 +67,7 @@ def new_command(
         path.unlink(missing_ok=True)  # it was made here, and is empty
         raise
     following = "blocksim sweep {path} --dry-run" if kind.startswith(SWEEP) else NEXT[ending]
-    return Report([str(path)], notes=[f"next: {following.format(path=path)}"])
+    return command_line.Report([str(path)], notes=[f"next: {following.format(path=path)}"])
 
 
 def schema_command() -> None:
@@ -79,4 +77,4 @@ def schema_command() -> None:
 
     Example: blocksim schema > scenario.schema.json
     """
-    print_json(json_schema())
+    output.print_json(json_schema())

@@ -4,19 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli.command_line import Report, TextScreen
-from blocksim.cli.output import note
-from blocksim.cli.progress import count_progress
+from blocksim.cli import command_line, output, progress
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.options import Option
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
 from blocksim.simulation.stores.exports import format_named
-from blocksim.study.compare import ExperimentTablePath
-from blocksim.study.pictures import AnimateOptions, PlotOptions, Replace, draw, draw_film
-from blocksim.study.reporting import MEMBERS, report_on
-from blocksim.study.stored_run import load_stored_run
+from blocksim.study import compare, pictures, reporting, stored_run
 
 MEGABYTE = 1e6
 OLDER = "replaces an older file, "
@@ -35,8 +30,8 @@ def plot_command(
             is_argument=True,
         ),
     ],
-    options: PlotOptions,
-) -> Report:
+    options: pictures.PlotOptions,
+) -> command_line.Report:
     """Draw a run, a sweep or a table of sensitivities.
 
     The strip shows the measured ranges below the final state. --kind final shows the final positions, with rotation
@@ -57,11 +52,13 @@ def plot_command(
 
     Example: blocksim plot scenarios/three_blocks.toml --out strip.png
     """
-    picture, remark = draw(run, options)
-    return Report(notes=[f"picture: {picture}"], always=[remark] if remark else [])
+    picture, remark = pictures.draw(run, options)
+    return command_line.Report(notes=[f"picture: {picture}"], always=[remark] if remark else [])
 
 
-def animate_command(run: RunPath, options: AnimateOptions, screen: TextScreen) -> Report:
+def animate_command(
+    run: RunPath, options: pictures.AnimateOptions, screen: command_line.TextScreen
+) -> command_line.Report:
     """Render a run as an animation, GIF or MP4.
 
     The default is a GIF, NAME.gif, at a quarter of the real speed; the last frame is held. A run that was
@@ -71,11 +68,11 @@ def animate_command(run: RunPath, options: AnimateOptions, screen: TextScreen) -
 
     Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
     """
-    with count_progress("frames", quiet=screen.quiet) as on_picture:
-        film = draw_film(run, replace(options, on_picture=on_picture))
+    with progress.count_progress("frames", quiet=screen.quiet) as on_picture:
+        film = pictures.draw_film(run, replace(options, on_picture=on_picture))
     older, beyond = OLDER if film.is_replaced else "", f"; {film.beyond}" if film.beyond else ""
     told = f"animation: {film.path} ({older}{film.pictures} frames{beyond})"
-    return Report(notes=[told], always=[film.remark] if film.remark else [])
+    return command_line.Report(notes=[told], always=[film.remark] if film.remark else [])
 
 
 def report_command(
@@ -89,14 +86,14 @@ def report_command(
     ],
     *,
     out: Annotated[Path, Option("File to write.", metavar="FILE")] = Path("report.html"),
-    experiment: ExperimentTablePath = None,
+    experiment: compare.ExperimentTablePath = None,
     members: Annotated[
         int,
         Option("Maximum number of runs of a sweep in the page.", flags=("--runs", "--members"), metavar="N", least=0),
-    ] = MEMBERS,
-    overwrite: Replace = False,
-    screen: TextScreen,
-) -> Report:
+    ] = reporting.MEMBERS,
+    overwrite: pictures.Replace = False,
+    screen: command_line.TextScreen,
+) -> command_line.Report:
     """Write runs and sweeps into one HTML file.
 
     It has a player, time histories, the comparison with measured repeats, energies and provenance; for a sweep the
@@ -109,11 +106,11 @@ def report_command(
     """
     refuse_foreign(out, overwrite=overwrite)
     table = None if experiment is None else Path(experiment)
-    size, problems = report_on(places, out, table, members, silent if screen.quiet else note)
+    size, problems = reporting.report_on(places, out, table, members, silent if screen.quiet else output.note)
     screen.note(f"report: {out} ({size / MEGABYTE:.1f} MB)")
     if problems:
         raise InvalidInputError("\n".join([*problems, "the report shows everything else"]))
-    return Report()
+    return command_line.Report()
 
 
 def export_command(
@@ -123,8 +120,8 @@ def export_command(
         str, Option("csv, vtkhdf for ParaView, geojson or dxf.", flags=("--format",), metavar="FORMAT")
     ] = "csv",
     out: Annotated[Path | None, Option("File to write (default: NAME.csv, NAME.vtkhdf).", metavar="FILE")] = None,
-    overwrite: Replace = False,
-) -> Report:
+    overwrite: pictures.Replace = False,
+) -> command_line.Report:
     """Write all frames as CSV or VTKHDF, or final outlines as GeoJSON or DXF.
 
     CSV: a row for each frame and block, with units in the heads; stored contacts go into a second file,
@@ -138,7 +135,7 @@ def export_command(
     Example: blocksim export scenarios/three_blocks.toml --format vtkhdf
     """
     form = format_named(kind)
-    stored = load_stored_run(run)
+    stored = stored_run.load_stored_run(run)
     contacts = stored.frames.contacts
     file = out or Path(f"{stored.scenario.name}.{kind}")
     beside = file.with_name(f"{file.stem}_contacts{file.suffix}")
@@ -152,4 +149,4 @@ def export_command(
     if form.write_contacts is not None and contacts is not None:
         older = OLDER if beside.exists() else ""
         notes.append(f"file: {beside} ({older}{form.write_contacts(beside, stored.frames, contacts)} contacts)")
-    return Report(notes=notes, always=[stored.remark] if stored.remark else [])
+    return command_line.Report(notes=notes, always=[stored.remark] if stored.remark else [])

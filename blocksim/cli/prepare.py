@@ -6,14 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli.command_line import Settings
-from blocksim.cli.output import note
-from blocksim.cli.process import pause_collector
+from blocksim.cli import command_line, output, process
 from blocksim.errors import ScenarioError
 from blocksim.options import Option
-from blocksim.scenario import Document, Scenario
-from blocksim.scenario.check import implausible_values
-from blocksim.scenario.mistakes import Mistake
+from blocksim.scenario import Document, Scenario, check, mistakes
 from blocksim.world.step import SkinTooSmallError, StepError
 
 
@@ -22,7 +18,7 @@ class ScenarioInput:
     """A scenario file on the command line, with what is set in it."""
 
     scenario: Annotated[Path, Option("Scenario file (TOML).", metavar="SCENARIO", is_argument=True)]
-    settings: Settings = None
+    settings: command_line.Settings = None
 
     def document(self) -> Document:
         """Return the document. Raises what reading it raises."""
@@ -35,15 +31,15 @@ class ScenarioInput:
         try:
             yield document.build()
         except StepError as error:
-            raise ScenarioError([document.problem(Mistake(("time", "step"), str(error)))]) from None
+            raise ScenarioError([document.problem(mistakes.Mistake(("time", "step"), str(error)))]) from None
         except SkinTooSmallError as error:
-            raise ScenarioError([document.problem(Mistake(("contact", "skin"), str(error)))]) from None
+            raise ScenarioError([document.problem(mistakes.Mistake(("contact", "skin"), str(error)))]) from None
 
 
 def warn_of_values(scenario: Scenario) -> None:
     """Warn of values that are allowed but implausible."""
-    for text in implausible_values(scenario):
-        note(f"warning: {text}")
+    for text in check.implausible_values(scenario):
+        output.note(f"warning: {text}")
 
 
 def announce_compilation(kernels: str, *, quiet: bool) -> None:
@@ -52,14 +48,14 @@ def announce_compilation(kernels: str, *, quiet: bool) -> None:
     from blocksim.simulation.compilation import compile_kernels, is_compiled
 
     if is_compiled(kernels):
-        with pause_collector():
+        with process.pause_collector():
             compile_kernels(kernels)
         return
     if quiet:
         compile_kernels(kernels)
         return
-    note("Compiling the solver, once after installation (less than a minute) ...")
-    note(f"Compiled in {compile_kernels(kernels):.0f} s.")
+    output.note("Compiling the solver, once after installation (less than a minute) ...")
+    output.note(f"Compiled in {compile_kernels(kernels):.0f} s.")
     if not is_compiled(kernels):
         folder = jit.cache_folder() or jit.cache_root()
-        note(f"{folder}: the compiled solver cannot be stored there; free some space, or set BLOCKSIM_CACHE_DIR")
+        output.note(f"{folder}: the compiled solver cannot be stored there; free some space, or set BLOCKSIM_CACHE_DIR")

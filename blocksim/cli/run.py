@@ -9,16 +9,8 @@ from itertools import islice
 
 import typer
 
-from blocksim.cli.command_line import Report, Screen
-from blocksim.cli.compare import comparison_table, verdict_lines
-from blocksim.cli.output import note, number, table_lines
-from blocksim.cli.prepare import ScenarioInput, announce_compilation, warn_of_values
-from blocksim.cli.progress import run_progress
-from blocksim.simulation import Result
-from blocksim.simulation.folder import default_folder
-from blocksim.simulation.frames import rows_of
-from blocksim.simulation.loop import REST
-from blocksim.simulation.observables import FIRST, OUTCOME
+from blocksim.cli import command_line, compare, output, prepare, progress
+from blocksim.simulation import Result, folder, frames, loop, observables
 from blocksim.simulation.run import RunCallbacks
 from blocksim.study.compare import compare_run
 from blocksim.study.rows import FINISHED
@@ -29,7 +21,9 @@ FIRST_ROWS = 10
 INTERRUPTED = "interrupted"
 
 
-def run_command(context: typer.Context, source: ScenarioInput, options: RunOptions, screen: Screen) -> None:
+def run_command(
+    context: typer.Context, source: prepare.ScenarioInput, options: RunOptions, screen: command_line.Screen
+) -> None:
     """Simulate a scenario and print the final positions.
 
     If the scenario names an experiment, the table has the measured ranges. A finished run is not repeated but shown.
@@ -46,14 +40,14 @@ def run_command(context: typer.Context, source: ScenarioInput, options: RunOptio
     def start(kernels: str) -> None:
         if options.threads > (count := cores()):  # all wait for one another at every step
             plural = "s" if count > 1 else ""
-            note(f"warning: {options.threads} threads on {count} core{plural}: oversubscribed, use {count}")
-        announce_compilation(kernels, quiet=screen.silent)
+            output.note(f"warning: {options.threads} threads on {count} core{plural}: oversubscribed, use {count}")
+        prepare.announce_compilation(kernels, quiet=screen.silent)
 
-    listener = RunCallbacks(on_start=start) if screen.silent else RunCallbacks(note, start)
-    with source.built() as ready, run_progress(quiet=screen.silent) as on_progress:
+    listener = RunCallbacks(on_start=start) if screen.silent else RunCallbacks(output.note, start)
+    with source.built() as ready, progress.run_progress(quiet=screen.silent) as on_progress:
         if not screen.silent:
-            warn_of_values(ready)
-        out = options.out or default_folder(ready)
+            prepare.warn_of_values(ready)
+        out = options.out or folder.default_folder(ready)
         if context.obj is not None:  # imports and compiling are waited for too
             over = time.monotonic() - context.obj
             options = replace(options, precautions=replace(options.precautions, time_over=over))
@@ -68,14 +62,14 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _report(result: Result) -> Report:
+def _report(result: Result) -> command_line.Report:
     """Return the final table, with the measured ranges if the scenario names an experiment."""
-    endings = {name: rows_of(table) for name, table in result.endings.items()}
+    endings = {name: frames.rows_of(table) for name, table in result.endings.items()}
     summary = result.summary.model_dump()
     is_whole = result.status == FINISHED
-    return Report(
+    return command_line.Report(
         _answer_lines(result),
-        {"folder": str(result.folder), "final": rows_of(result.columns), **endings, "summary": summary},
+        {"folder": str(result.folder), "final": frames.rows_of(result.columns), **endings, "summary": summary},
         before=_end_lines(result),
         notes=[f"results: {result.folder}"] if is_whole else [],
         always=() if is_whole else _way_on(result),
@@ -97,18 +91,20 @@ def _answer_lines(result: Result) -> list[str]:
     """Return the lines of the final table; of a long one the first, as all are in the run's folder."""
     if result.experiment is not None and result.status == FINISHED:
         comparison = compare_run(result)
-        return [*comparison_table(comparison), *verdict_lines(comparison)]
+        return [*compare.comparison_table(comparison), *compare.verdict_lines(comparison)]
     blocks, *values = (result.columns[name] for name in ("block", "x_mm", "y_mm", "rotation_deg"))
     count = len(blocks)
     shown = count if count <= MOST_ROWS else FIRST_ROWS
-    rows = [(block, *map(number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
-    lines = table_lines(("block", "x mm", "y mm", "rotation °"), rows) if rows else []
+    rows = [(block, *map(output.number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
+    lines = output.table_lines(("block", "x mm", "y mm", "rotation °"), rows) if rows else []
     more = [] if shown == count else [f"... and {count - shown} more blocks in final.csv"]
     lines += more
     for table in result.endings.values():  # of the systems beside the blocks
         titles = [name.replace("_", " ") for name in table]
-        columns = [[number(cell) if isinstance(cell, float) else cell for cell in column] for column in table.values()]
-        lines += ["", *table_lines(titles, list(zip(*columns, strict=True)))]
+        columns = [
+            [output.number(cell) if isinstance(cell, float) else cell for cell in column] for column in table.values()
+        ]
+        lines += ["", *output.table_lines(titles, list(zip(*columns, strict=True)))]
     return lines
 
 
@@ -121,16 +117,18 @@ def _end_lines(result: Result) -> Iterator[str]:
         f"relative energy error {summary.energy_J.relative_residual:.0e}"
     )
     if summary.settled is not None:
-        far = f"{number(summary.settled.largest_displacement_mm)} mm (block {summary.settled.displaced_block})"
+        far = f"{output.number(summary.settled.largest_displacement_mm)} mm (block {summary.settled.displaced_block})"
         settled = "settled" if summary.settled.at_rest else "released where it did not settle"
         yield f"{settled} before time zero in {summary.settled.steps} steps; largest displacement {far}"
     yield from (f"{one.time_s:.3f} s: {one.what}" for one in summary.events)
     moved = summary.movement
     if moved is not None:  # what moved, how far on the way and first: blocks may end nearer
-        told = dict(moved.lines(number))
-        outcome, first = told.pop(OUTCOME), told.pop(FIRST, "")
-        yield f"{outcome}: {', '.join(map(' '.join, told.items()))}" + (f"\n{FIRST}: {first}" if first else "")
-    if moved is not None and summary.reason != REST.reason and moved.fastest_m_s > result.scenario.time.rest_speed:
+        told = dict(moved.lines(output.number))
+        outcome, first = told.pop(observables.OUTCOME), told.pop(observables.FIRST, "")
+        yield f"{outcome}: {', '.join(map(' '.join, told.items()))}" + (
+            f"\n{observables.FIRST}: {first}" if first else ""
+        )
+    if moved is not None and summary.reason != loop.REST.reason and moved.fastest_m_s > result.scenario.time.rest_speed:
         yield f"not at rest: block {moved.fastest_block} at {moved.fastest_m_s:.2g} m/s"
     yield from (f"warning: {text}" for text in summary.warnings)
     yield ""

@@ -18,32 +18,11 @@ from blocksim.scenario.document import locate
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import KeyPath, follow, format_key, with_value
 from blocksim.silence import silent
+from blocksim.simulation import atomic, compilation, stopping
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import write_text
-from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.stopping import interruptible
-from blocksim.study.calibrate_plan import (
-    FIT,
-    FRESH,
-    PURPOSE,
-    SCATTER,
-    CalibrationPlan,
-    Hit,
-    Prior,
-    Score,
-    Trial,
-    calibration_plan,
-    finished_trials,
-    hits_of,
-    open_journal,
-    refuse_other_file,
-    score_of,
-    search,
-)
-from blocksim.study.compare import ExperimentTablePath
+from blocksim.study import calibrate_plan, compare, vary
 from blocksim.study.executors.ensemble import run_members
 from blocksim.study.plan import Values, Variations
-from blocksim.study.vary import RANGE, SPREAD, variations_option
 
 TABLES: tuple[KeyPath, ...] = (("experiment", "table"), ("motion", "table"), ("sweep", "table"))
 NOTE = "calibrated, see [provenance]"
@@ -146,33 +125,33 @@ WRITTEN = "scenario.toml"
 JOURNAL = ".trials.jsonl"
 NEEDED = ("optuna", "scipy.stats.qmc")  # before anything is written
 TAKEN = "{}: already exists; --overwrite replaces it, --out FILE writes elsewhere"
-OnTrial = Callable[[Trial, Trial, int], None]
+OnTrial = Callable[[calibrate_plan.Trial, calibrate_plan.Trial, int], None]
 
 
 @dataclass(frozen=True)
 class Fit:
     """What a calibration found; `score` is of fresh samples, drawn independently, that no trial has seen."""
 
-    plan: CalibrationPlan
-    best: Trial
-    score: Score
+    plan: calibrate_plan.CalibrationPlan
+    best: calibrate_plan.Trial
+    score: calibrate_plan.Score
     trials: int
     path: Path
-    hits: tuple[Hit, ...]  # of the fresh members, a quantity each
-    ties: tuple[Trial, ...] = ()  # all that are as good as the best by `ties_with`, the best among them
+    hits: tuple[calibrate_plan.Hit, ...]  # of the fresh members, a quantity each
+    ties: tuple[calibrate_plan.Trial, ...] = ()  # all that are as good as the best by `ties_with`, the best among them
 
     @property
     def found(self) -> bool:
         """Return True if a member of the best trial or a fresh one is inside all ranges; if not, it is the nearest."""
         return self.best.score.inside + self.score.inside > 0
 
-    def equally_good(self, prior: Prior) -> tuple[float, float]:
+    def equally_good(self, prior: calibrate_plan.Prior) -> tuple[float, float]:
         """Return the least and the greatest of the equally good values of a key, in the unit of its prior."""
         numbers = [prior.number(trial.values[prior.key]) for trial in self.ties or (self.best,)]
         return min(numbers), max(numbers)
 
     @property
-    def at_bounds(self) -> tuple[Prior, ...]:
+    def at_bounds(self) -> tuple[calibrate_plan.Prior, ...]:
         """Priors at an end of which the fitted value lies: a wider one might give a better fit."""
         return tuple(prior for prior in self.plan.priors if prior.lies_at_bound(self.best.values[prior.key]))
 
@@ -224,24 +203,24 @@ class CalibrateOptions:
 
     fit: Annotated[
         Mapping[str, Values],
-        variations_option(
+        vary.variations_option(
             "A key to fit, and its prior. Repeatable.",
             "KEY=FROM:TO",
             'The priors by dotted key, as {"contact.restitution": {"from": 0.2, "to": 0.35}}.',
-            FIT,
-            RANGE,
+            calibrate_plan.FIT,
+            vary.RANGE,
         ),
     ] = field(default_factory=dict)
     scatter: Annotated[
         Mapping[str, Values] | None,
-        variations_option(
+        vary.variations_option(
             "Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
             "Default: the distributions of [sweep].",
             "KEY=MEAN+-SD",
             "The distributions of inputs, {mean, sd} or {from, to} (default: those of [sweep]); of a fitted "
             "key, about its fitted value.",
-            SCATTER,
-            SPREAD,
+            calibrate_plan.SCATTER,
+            vary.SPREAD,
         ),
     ] = None
     _: KW_ONLY
@@ -255,7 +234,7 @@ class CalibrateOptions:
         Option("Fresh samples for the final estimate of the probability.", flags=("--fresh",), metavar="M", least=1),
     ] = 512
     seed: Annotated[int, Option("Random seed.", metavar="S", least=0)] = 0
-    experiment: ExperimentTablePath = None
+    experiment: compare.ExperimentTablePath = None
     out: Annotated[
         Path | str | None,
         Option("Scenario file to write (default: results/NAME/calibrate-HASH/scenario.toml).", metavar="FILE"),
@@ -277,7 +256,7 @@ def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
     InvalidInputError, OutputExistsError, OutputError, UnavailableError without the extra `study`, and StoppedEarlyError
     on Ctrl-C.
     """
-    plan = calibration_plan(
+    plan = calibrate_plan.calibration_plan(
         document_of(scenario),
         Variations.of(options.fit),
         None if options.scatter is None else Variations.of(options.scatter),
@@ -285,26 +264,28 @@ def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
         members=options.members,
         seed=options.seed,
     )
-    options.on_start(kernels_of(plan.base))
+    options.on_start(compilation.kernels_of(plan.base))
     resume, overwrite = options.resume, options.overwrite
     path = Path(options.out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN)
     journal = path.parent / (path.stem + JOURNAL)
     for package in NEEDED:
-        load_module(package, PURPOSE)
+        load_module(package, calibrate_plan.PURPOSE)
     _make_room(path, journal, resume=resume, overwrite=overwrite)
     kept = path if path.exists() and not overwrite else None
     best, ties = _searched(plan, journal, options, kept)
-    fresh = plan.scatter.members(best.values, options.fresh_members if plan.scatter.plan else 1, plan.seed, FRESH)
+    fresh = plan.scatter.members(
+        best.values, options.fresh_members if plan.scatter.plan else 1, plan.seed, calibrate_plan.FRESH
+    )
     members = list(run_members(plan.bare, fresh))
-    score = score_of(members, plan.ranges)
-    fit = Fit(plan, best, score, options.trials, path, hits_of(members, plan.ranges), ties)
+    score = calibrate_plan.score_of(members, plan.ranges)
+    fit = Fit(plan, best, score, options.trials, path, calibrate_plan.hits_of(members, plan.ranges), ties)
     note = f"one of {len(ties)} equally good, see [provenance]" if len(fit.ties) > 1 else NOTE
     which = f"one of {len(ties)} equally good trials: " if len(fit.ties) > 1 else ""
     shown = ", ".join(f"{key} = {value}" for key, value in best.values.items())
     head = f"{Path(plan.document.source.where).name} calibrated by blocksim: {which}{shown}"
     text = fitted_text(plan.document, best.values, _provenance(fit), path.parent, head, note)
     if kept is None:
-        write_text(path, text)
+        atomic.write_text(path, text)
     elif kept.read_bytes() != text.encode():
         raise OutputExistsError(TAKEN.format(kept))
     return fit
@@ -324,33 +305,37 @@ def _make_room(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> N
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if overwrite and not resume and journal.exists():
-            refuse_other_file(journal)
+            calibrate_plan.refuse_other_file(journal)
             journal.unlink()
     except OSError as error:
         raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
 
 
 def _searched(
-    plan: CalibrationPlan, journal: Path, options: CalibrateOptions, kept: Path | None
-) -> tuple[Trial, tuple[Trial, ...]]:
+    plan: calibrate_plan.CalibrationPlan, journal: Path, options: CalibrateOptions, kept: Path | None
+) -> tuple[calibrate_plan.Trial, tuple[calibrate_plan.Trial, ...]]:
     """Return the best trial, the first of equally good ones, and all that tie with it, the best among them."""
-    tried: list[Trial] = []
+    tried: list[calibrate_plan.Trial] = []
     trials = options.trials
 
-    def evaluate(values: Mapping[str, object]) -> Score:
-        return score_of(run_members(plan.bare, plan.scatter.members(values, plan.members, plan.seed)), plan.ranges)
+    def evaluate(values: Mapping[str, object]) -> calibrate_plan.Score:
+        return calibrate_plan.score_of(
+            run_members(plan.bare, plan.scatter.members(values, plan.members, plan.seed)), plan.ranges
+        )
 
-    with open_journal(journal, plan.fingerprint()) as study, interruptible():
-        done = len(finished_trials(study))
+    with calibrate_plan.open_journal(journal, plan.fingerprint()) as study, stopping.interruptible():
+        done = len(calibrate_plan.finished_trials(study))
         if kept is not None and done < trials:  # they would change the file
             raise OutputExistsError(TAKEN.format(kept))
         try:
-            for trial in search(plan.priors, evaluate, study, trials=trials, seed=plan.seed):
+            for trial in calibrate_plan.search(plan.priors, evaluate, study, trials=trials, seed=plan.seed):
                 tried.append(trial)
                 if trial.number > done:
                     options.on_trial(trial, max(tried, key=lambda one: one.score.value), trials)
         except KeyboardInterrupt:
-            message = f"stopped after {len(finished_trials(study))} of {trials} trials; --resume runs the rest"
+            message = (
+                f"stopped after {len(calibrate_plan.finished_trials(study))} of {trials} trials; --resume runs the rest"
+            )
             raise StoppedEarlyError(message) from None
     if not tried:
         raise InvalidInputError("at least one trial is needed")

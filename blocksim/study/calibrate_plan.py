@@ -19,15 +19,10 @@ from blocksim.analysis.compare import interval
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError, OutputExistsError, Problem, ScenarioError
 from blocksim.extras import load_module
-from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
+from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides, scenario_hash, units
 from blocksim.scenario import units as q
-from blocksim.scenario.input_files import read_head, user_value
 from blocksim.scenario.models.study import Normal, Uniform, Variation, toml_number
-from blocksim.scenario.overrides import parse_key
-from blocksim.scenario.units import parse_unit
-from blocksim.simulation.atomic import sha256_of
-from blocksim.simulation.folder import takes_lock
-from blocksim.simulation.provenance import code_hash
+from blocksim.simulation import atomic, folder, provenance
 from blocksim.study.executors.ensemble import Member
 from blocksim.study.plan import Variations, build_distributions, design_of
 from blocksim.study.rows import Range, are_inside, check_experiment, ranges_of, si_number, values_at
@@ -100,7 +95,7 @@ def prior_of(key: str, table: Uniform, written: object) -> Prior:
     unit = q.unit_in(written) if isinstance(written, str) else ""
     if not unit:
         return Prior(key, table.low, table.high, "rad" if table.angle else "", table.scale == "log")
-    factor = float(parse_unit(unit).factor)
+    factor = float(units.parse_unit(unit).factor)
     low, high = (float(f"{end / factor:.12g}") for end in (table.low, table.high))
     return Prior(key, low, high, unit, table.scale == "log")
 
@@ -122,11 +117,11 @@ class Scatter:
             yield from (dict(fitted) for _ in range(count))
             return
         plan = self.plan.model_copy(update={"mode": mode, "samples": count, "seed": seed})
-        names = {parse_key(key): key for key in fitted}
+        names = {overrides.parse_key(key): key for key in fitted}
         for row in design_of(plan):
             values = dict(fitted)
             for key, value in row.items():
-                name = names.get(parse_key(key), key)
+                name = names.get(overrides.parse_key(key), key)
                 about = plan.vary[key] if name in fitted else ()  # levels are refused when the plan is read
                 values[name] = value if isinstance(about, tuple) else centre_on_fit(about, value, fitted[name])
             yield values
@@ -182,10 +177,10 @@ class CalibrationPlan:
             "scenario": scenario_hash(self.base),
             "priors": [str((one.key, one.low, one.high, one.unit, one.log)) for one in self.priors],
             "scatter": None if self.scatter.plan is None else str(self.scatter.plan.as_table()),
-            "experiment": sha256_of(Path(self.table.source)),
+            "experiment": atomic.sha256_of(Path(self.table.source)),
             "members": self.members,
             "seed": self.seed,
-            "code": code_hash(),
+            "code": provenance.code_hash(),
         }
 
     def name(self) -> str:
@@ -212,7 +207,7 @@ def calibration_plan(
         raise InvalidInputError(NO_FIT)
     if experiment is not None:
         load_table(experiment)  # so that its mistakes are reported of the option
-        document = document.with_values({TABLE: user_value(TABLE, str(experiment.absolute()))})
+        document = document.with_values({TABLE: input_files.user_value(TABLE, str(experiment.absolute()))})
     fits = build_distributions(document, fit, FIT, MODE)
     if scatter:
         scattered: Sweep | None = build_distributions(document, scatter, SCATTER, MODE)
@@ -247,11 +242,11 @@ def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter
             Problem(where, f"this is part of {other}, or contains it, which is fitted too")
             for other in _related(key, fits.vary)
         ]
-    fitted = {parse_key(key): values for key, values in fits.vary.items()}
+    fitted = {overrides.parse_key(key): values for key, values in fits.vary.items()}
     texts = scatter.texts if scatter else {}
     for key, values in scattered.vary.items() if scattered is not None else ():
         where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
-        prior = fitted.get(parse_key(key))
+        prior = fitted.get(overrides.parse_key(key))
         if prior is not None and isinstance(values, tuple):
             problems.append(Problem(where, "this key is fitted; its scatter must be a distribution, not a list"))
         elif isinstance(prior, Uniform) and not isinstance(values, tuple) and prior.angle != values.angle:
@@ -265,8 +260,8 @@ def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter
 
 def _related(key: str, others: Iterable[str]) -> list[str]:
     """Return those keys that are part of one, or contain it."""
-    one = parse_key(key)
-    return [name for name in others if len(path := parse_key(name)) != len(one) and all(map(eq, path, one))]
+    one = overrides.parse_key(key)
+    return [name for name in others if len(path := overrides.parse_key(name)) != len(one) and all(map(eq, path, one))]
 
 
 FAILED = 1.0  # the miss of a member that failed
@@ -423,7 +418,7 @@ def open_journal(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]"
     optuna.logging.set_verbosity(logging.ERROR)
     try:
         with journal.open("ab") as file:
-            if not takes_lock(file.fileno()):
+            if not folder.takes_lock(file.fileno()):
                 where = "wait for it, or choose another file with --out"
                 raise OutputExistsError(f"{journal}: another calibration is running here; {where}")
             refuse_other_file(journal)
@@ -455,6 +450,6 @@ def open_journal(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]"
 
 def refuse_other_file(journal: Path) -> None:
     """Raise InvalidInputError for a file that is no journal; one that is empty, or torn, may be."""
-    content = read_head(journal, len(BEGINNING))
+    content = input_files.read_head(journal, len(BEGINNING))
     if not BEGINNING.startswith(content):
         raise InvalidInputError(f"{journal}: not the journal of a calibration; choose another file with --out")

@@ -13,10 +13,8 @@ from blocksim.scenario import load_scenario, load_stored
 from blocksim.simulation import Result
 from blocksim.simulation import folder as files
 from blocksim.simulation.result import read_final, read_summary
-from blocksim.study.manifest import SweepResult, is_sweep, read_sweep
-from blocksim.study.rows import FINISHED, TABLE
-from blocksim.study.stored_run import ending_text, find_run
-from blocksim.study.sweep_folder import PLAN
+from blocksim.study import manifest, rows, stored_run, sweep_folder
+from blocksim.study.manifest import SweepResult
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,7 +53,7 @@ def compare(
     """
     if isinstance(run, SweepResult):
         return compare_sweep(run, experiment, settings)
-    if isinstance(run, Path | str) and is_sweep(run):
+    if isinstance(run, Path | str) and manifest.is_sweep(run):
         return compare_sweep(run, experiment, settings)
     return compare_run(run, experiment)
 
@@ -68,14 +66,14 @@ def compare_sweep(
     Raises InputMissingError without any experiment, InvalidInputError for tables that cannot be used or do not go with
     each other, UnavailableError without scipy.
     """
-    result = sweep if isinstance(sweep, SweepResult) else read_sweep(Path(sweep))
-    plan = result.folder / PLAN
+    result = sweep if isinstance(sweep, SweepResult) else manifest.read_sweep(Path(sweep))
+    plan = result.folder / sweep_folder.PLAN
     scenario = load_stored(plan) if plan.exists() else None
     table = experiment or (scenario.experiment.table if scenario is not None and scenario.experiment else None)
     if table is None:
         message = f"{result.folder}: the sweep's scenario names no experiment; give a table with --experiment"
         raise InputMissingError(message)
-    members = Members(result.table, str(result.folder / TABLE))
+    members = Members(result.table, str(result.folder / rows.TABLE))
     sweep_of = None if scenario is None else scenario.sweep
     remarks: tuple[str, ...] = ()
     if sweep_of is not None and not sweep_of.is_sampled:  # shares of members are no probabilities
@@ -98,14 +96,14 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
     elif not isinstance(run, Path | str):
         name, summary, final, named = "", None, run, None
     else:
-        folder = find_run(run)
+        folder = stored_run.find_run(run)
         name, summary, was = str(folder), read_summary(folder / files.SUMMARY), load_stored(folder / files.SCENARIO)
-        final = read_final(folder, was) if summary.status == FINISHED else {}
+        final = read_final(folder, was) if summary.status == rows.FINISHED else {}
         # a scenario file may name another table by now than it did when it was run
         now = (load_scenario(run) if Path(run).is_file() else was).experiment
         named = now.table if now else None
-    if summary is not None and summary.status != FINISHED:
-        how = ending_text(summary.status, summary.reason)
+    if summary is not None and summary.status != rows.FINISHED:
+        how = stored_run.ending_text(summary.status, summary.reason)
         raise InvalidInputError(f"{name}: {how}; only a finished run can be compared")
     table = experiment or named
     if table is None:

@@ -29,17 +29,12 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.options import Option, takes
-from blocksim.scenario import Scenario, Source, load_scenario, place_bodies
-from blocksim.scenario.start import soil_tables
+from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, start
 from blocksim.silence import silent
+from blocksim.simulation import compilation, provenance, result, stopping
 from blocksim.simulation import folder as files
-from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.provenance import run_hash
-from blocksim.simulation.result import read_summary
 from blocksim.simulation.schemes import build_scene
-from blocksim.simulation.stopping import interruptible
-from blocksim.study.executors import Setting, Task
-from blocksim.study.executors.processes import DEAD, run_here, run_tasks
+from blocksim.study.executors import Setting, Task, processes
 from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance
 from blocksim.world.step import safety_of
@@ -333,7 +328,7 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     check_experiment(scenario)
     build_scene(scenario)
     refinements = refinements_of(scenario, studies)
-    compile_kernels(kernels_of(scenario))
+    compilation.compile_kernels(compilation.kernels_of(scenario))
     folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / FOLDER
     runs = LevelRuns(folder, options.jobs or os.cpu_count() or 1, options.on_run)
     found = _refine(scenario, refinements, runs, tolerance_mm, levels)
@@ -357,19 +352,21 @@ class LevelRuns:
 
     def run(self, scenarios: dict[str, Scenario]) -> list[Row]:
         """Return the rows of scenarios, after running what has not run yet; the keys are labels for people."""
-        names = [run_hash(scenario) for scenario in scenarios.values()]
+        names = [provenance.run_hash(scenario) for scenario in scenarios.values()]
         named = dict(zip(reversed(names), reversed(scenarios.items()), strict=True))  # the first label of each
         missing = [name for name in dict.fromkeys(names) if name not in self.rows]
         tasks = [Task(number, name, {}, named[name][1]) for number, name in enumerate(missing)]
         jobs = min(self.jobs, len(tasks))
-        run = run_tasks if jobs > 1 else run_here
+        run = processes.run_tasks if jobs > 1 else processes.run_here
         try:
-            with interruptible(), closing(run(iter(tasks), Setting(jobs, folder=self.folder))) as batches:
+            with stopping.interruptible(), closing(run(iter(tasks), Setting(jobs, folder=self.folder))) as batches:
                 for task, row in (pair for batch in batches for pair in zip(batch.tasks, batch.rows, strict=True)):
-                    kept = {**row, "reason": DIED} if row == DEAD else row.copy()
+                    kept = {**row, "reason": DIED} if row == processes.DEAD else row.copy()
                     with suppress(BlocksimError):  # what the setting decides: time in compiled code, without files
-                        if row != DEAD:
-                            kept["seconds"] = read_summary(self.folder / task.name / files.SUMMARY).solver_seconds
+                        if row != processes.DEAD:
+                            kept["seconds"] = result.read_summary(
+                                self.folder / task.name / files.SUMMARY
+                            ).solver_seconds
                     self.rows[task.name] = kept
                     self.on_run(named[task.name][0], kept)
         except KeyboardInterrupt:
@@ -434,7 +431,7 @@ def _joint(
 def _notes(scenario: Scenario, runs: LevelRuns, studies: Iterable[str] | None) -> tuple[str, ...]:
     """Say what was not studied, and what the numbers cannot mean."""
     notes = []
-    if soil_tables(scenario):
+    if start.soil_tables(scenario):
         more = "; --study spacing halves soils.spacing, eight times the cost a level" if studies is None else ""
         notes.append(f"distances are those of blocks, not of soil{more}")
     elif studies is None and scenario.contact.model not in PARTICLE_MODELS:
@@ -483,7 +480,7 @@ def _possible(scenario: Scenario) -> list[Refinement]:
     if scenario.contact.model in PARTICLE_MODELS:
         key = "contact.particle_spacing"
         chosen.append(Refinement(SPACING, "particle spacing", key, contact.particle_spacing, 0.5, 1))
-    soils = soil_tables(scenario)
+    soils = start.soil_tables(scenario)
     if soils:  # twice the spacing may be too coarse to be admissible
         chosen.append(Refinement(SPACING, "spacing of soil", SOIL_SPACING, soils[0].spacing, 0.5, 0))
     return chosen

@@ -21,11 +21,9 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
-from blocksim.simulation.atomic import PERMISSIONS
+from blocksim.simulation import atomic, observables
 from blocksim.simulation.folder import brief_lock, takes_lock
-from blocksim.simulation.observables import table_columns
-from blocksim.study.plan import Cases, Settings
-from blocksim.study.rows import FINISHED, KEPT, TABLE, Ranges, Row, as_cell, blocks_in, varied_cells
+from blocksim.study import plan, rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,7 +88,7 @@ class Entry:
     number: int
     case: str
     values: str
-    row: Row
+    row: rows.Row
 
     def to_line(self) -> bytes:
         """Return the line of the manifest; numbers that are not finite become null."""
@@ -131,7 +129,7 @@ class Manifest:
         self.path = path
         with brief_lock(path.parent):  # who empties the folder sees the file locked, or not at all
             try:
-                self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, PERMISSIONS)
+                self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, atomic.PERMISSIONS)
             except OSError as error:
                 raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
             is_free = takes_lock(self._file)
@@ -199,10 +197,10 @@ class CaseIndex:
             return
         if path not in self.paths:
             self.paths.append(path)
-        self.state[number] = ENDED_WELL if entry.row.get("status") == FINISHED else ENDED_BADLY
+        self.state[number] = ENDED_WELL if entry.row.get("status") == rows.FINISHED else ENDED_BADLY
         self.starts[number], self.sources[number] = start, self.paths.index(path)
         self.values[number] = int(entry.values, 16)
-        blocks = blocks_in(entry.row)
+        blocks = rows.blocks_in(entry.row)
         self.blocks[blocks] = min(number, self.blocks.get(blocks, number))
 
     def holds(self, number: int, settings: dict[str, object]) -> bool:
@@ -215,7 +213,7 @@ class CaseIndex:
         """Return how many cases of a shard have a row."""
         return int(np.count_nonzero(self.state[shard.slice]))
 
-    def entries(self, cases: Cases, shard: Shard = WHOLE) -> Iterator[tuple[int, Settings, Entry]]:
+    def entries(self, cases: plan.Cases, shard: Shard = WHOLE) -> Iterator[tuple[int, plan.Settings, Entry]]:
         """Yield number, values and entry of every case that has a row; not where the file has changed since."""
         with ExitStack() as files:
             opened = [files.enter_context(open_regular(path)) for path in self.paths]
@@ -243,7 +241,7 @@ def note_timings(path: Path, executor: str, cases: Iterable[str], seconds: float
             writer = csv.writer(text, lineterminator="\n")
             writer.writerows([] if size else [TIMING_COLUMNS])
             share = f"{seconds / max(len(names), 1):.6f}"
-            writer.writerows((name, executor, share, as_cell(host)) for name in names)
+            writer.writerows((name, executor, share, rows.as_cell(host)) for name in names)
             file.write(text.getvalue().encode())
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
@@ -259,19 +257,19 @@ MOST_ROWS = 20  # that a notebook shows
 
 
 def table_rows(
-    cases: Cases, done: CaseIndex, ranges: Ranges | None, shard: Shard = WHOLE
+    cases: plan.Cases, done: CaseIndex, ranges: rows.Ranges | None, shard: Shard = WHOLE
 ) -> Iterator[Sequence[object]]:
     """Yield the heads and all rows so far, one after the other: none is kept."""
     verdict = [] if ranges is None else ["inside"]
     blocks = dict.fromkeys(block for names in sorted(done.blocks, key=done.blocks.__getitem__) for block in names)
-    ends = table_columns() + [f"{block}.{name}" for block in blocks for name in KEPT]
+    ends = observables.table_columns() + [f"{block}.{name}" for block in blocks for name in rows.KEPT]
     yield ["case", *map(str, cases.heads), *OUTCOME, *verdict, *ends]
     for _, settings, entry in done.entries(cases, shard):
         row = entry.row
         if ranges is not None:  # judged here and not when the case ended: the measured table may be mended
-            row = {**row, "inside": ranges.hold(row) if row.get("status") == FINISHED else None}
-        values = varied_cells(cases.heads, settings).values()
-        yield list(map(as_cell, [entry.case, *values, *map(row.get, (*OUTCOME, *verdict, *ends))]))
+            row = {**row, "inside": ranges.hold(row) if row.get("status") == rows.FINISHED else None}
+        values = rows.varied_cells(cases.heads, settings).values()
+        yield list(map(rows.as_cell, [entry.case, *values, *map(row.get, (*OUTCOME, *verdict, *ends))]))
 
 
 @dataclass(frozen=True, repr=False)
@@ -279,7 +277,7 @@ class SweepResult:
     """The folder of a sweep and its table, one row per case."""
 
     folder: Path
-    name: str = TABLE
+    name: str = rows.TABLE
     planned: int | None = None  # how many rows there are to be; None where only the table is known
 
     @cached_property
@@ -319,7 +317,7 @@ class SweepResult:
     @property
     def failed(self) -> int:
         """How many cases did not finish."""
-        return int((self.table["status"] != FINISHED).sum())
+        return int((self.table["status"] != rows.FINISHED).sum())
 
     @property
     def left(self) -> int:
@@ -335,13 +333,13 @@ class SweepResult:
 
     def share_inside_of(self, experiment: Path | str) -> float:
         """Share of all cases that lie inside all ranges of another table. Raises what reading it raises."""
-        finished = self.table[self.table["status"] == FINISHED]
-        return float(Ranges.read(experiment).inside(finished).sum()) / len(self.table)
+        finished = self.table[self.table["status"] == rows.FINISHED]
+        return float(rows.Ranges.read(experiment).inside(finished).sum()) / len(self.table)
 
 
 def is_sweep(place: Path | str) -> bool:
     """Return True if a place is the folder of a sweep."""
-    return (Path(place) / TABLE).is_file()
+    return (Path(place) / rows.TABLE).is_file()
 
 
 def read_sweep(folder: Path | str) -> SweepResult:

@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.analysis.compare import compare_final, limits
-from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
+from blocksim.analysis import compare, experiment
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import Scenario, Sweep, place_bodies
+from blocksim.scenario import Scenario, Sweep, place_bodies, units
 from blocksim.scenario import units as q
-from blocksim.scenario.units import parse_unit
 from blocksim.simulation.frames import COLUMNS, Columns
 
 if TYPE_CHECKING:
@@ -98,11 +96,11 @@ class Head:
         """Return a value as it stands in the column."""
         if not self.unit:
             return value
-        return float(f"{si_number(value) / float(parse_unit(self.unit).factor):.{DIGITS}g}")
+        return float(f"{si_number(value) / float(units.parse_unit(self.unit).factor):.{DIGITS}g}")
 
     def si(self, cell: float) -> float:
         """Return a number of the column in SI."""
-        return cell * float(parse_unit(self.unit).factor) if self.unit else cell
+        return cell * float(units.parse_unit(self.unit).factor) if self.unit else cell
 
 
 def heads_of(sweep: Sweep) -> tuple[Head, ...]:
@@ -130,7 +128,7 @@ def _unit(values: object) -> str:
 
 
 def _is_angle(unit: str) -> bool:
-    return bool(unit) and parse_unit(unit).dimension == q.ANGLE.dimension
+    return bool(unit) and units.parse_unit(unit).dimension == q.ANGLE.dimension
 
 
 def si_number(value: object) -> float:
@@ -168,11 +166,11 @@ class Range:
         return self.lower <= value <= self.upper
 
 
-def ranges_of(table: ExperimentTable) -> tuple[Range, ...]:
+def ranges_of(table: experiment.ExperimentTable) -> tuple[Range, ...]:
     """Return the limits of every measured quantity, as `compare` has them."""
-    column_of = {name: quantity.final_column for name, quantity in QUANTITIES.items()}
+    column_of = {name: quantity.final_column for name, quantity in experiment.QUANTITIES.items()}
     return tuple(
-        Range(one.block, column_of[one.quantity], *limits(one.quantity, one.mean, one.minimum, one.maximum))
+        Range(one.block, column_of[one.quantity], *compare.limits(one.quantity, one.mean, one.minimum, one.maximum))
         for one in table.summaries()
     )
 
@@ -198,7 +196,7 @@ class Ranges:
     @classmethod
     def read(cls, table: Path | str) -> "Ranges":
         """Take the limits of an experiment table by the rules of `compare`. Raises what reading it raises."""
-        measured = load_table(table)
+        measured = experiment.load_table(table)
         return cls(measured.source, {f"{one.block}.{one.column}": one for one in ranges_of(measured)})
 
     def hold(self, row: Mapping[str, object]) -> bool:
@@ -224,4 +222,4 @@ def check_experiment(scenario: Scenario) -> None:
     if scenario.experiment is not None:
         names = [body.name for body in place_bodies(scenario)]
         unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))
-        compare_final({"block": names, **unknown}, load_table(scenario.experiment.table))
+        compare.compare_final({"block": names, **unknown}, experiment.load_table(scenario.experiment.table))

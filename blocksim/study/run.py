@@ -9,13 +9,11 @@ from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.silence import silent
-from blocksim.simulation import Result, Watcher, read_result, renew_copies, simulate, simulate_into
+from blocksim.simulation import Result, Watcher, checkpoint, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation import folder as files
-from blocksim.simulation.checkpoint import DEFAULTS, CheckpointPolicy
 from blocksim.simulation.result import changed_results, read_summary
 from blocksim.simulation.run import NO_CALLBACKS, RunCallbacks
-from blocksim.study.rows import check_experiment
-from blocksim.study.stored_run import find_run
+from blocksim.study import rows, stored_run
 
 Threads = Annotated[
     int,
@@ -37,7 +35,7 @@ class RunOptions:
     ] = None
     overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
     resume: Annotated[bool, Option("Resume a run that was stopped or killed.")] = False
-    precautions: CheckpointPolicy = DEFAULTS
+    precautions: checkpoint.CheckpointPolicy = checkpoint.DEFAULTS
     threads: Threads = 1
     on_progress: Watcher = silent
     listener: RunCallbacks = NO_CALLBACKS
@@ -62,7 +60,7 @@ def run(scenario: Source, options: RunOptions) -> Result:
         raise ValueError("resume needs out=FOLDER, and cannot be combined with overwrite")
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    check_experiment(scenario)
+    rows.check_experiment(scenario)
     if out is None:
         return simulate(scenario, threads=threads, on_progress=on_progress, wall_time=precautions.wall_time)
     folder = Path(out)
@@ -95,4 +93,4 @@ def open_run(place: Path | str) -> Result:
 
     Raises InputMissingError where there is none and InvalidInputError for a damaged one.
     """
-    return read_result(find_run(place))
+    return read_result(stored_run.find_run(place))

@@ -16,8 +16,7 @@ from blocksim.options import Option, takes
 from blocksim.scenario import Source, Sweep, document_of
 from blocksim.scenario.models.study import Normal, Variation
 from blocksim.silence import silent
-from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.frames import Columns
+from blocksim.simulation import compilation, frames
 from blocksim.study.executors.ensemble import run_members
 from blocksim.study.plan import Values, Variations, build_distributions, draw_values, open_interval
 from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
@@ -144,7 +143,7 @@ class Output(NamedTuple):
     values: Floats
 
 
-def outputs_of(finals: Sequence[Columns], table: ExperimentTable | None) -> list[Output]:
+def outputs_of(finals: Sequence[frames.Columns], table: ExperimentTable | None) -> list[Output]:
     """Return every measured quantity (without a table: x of the first blocks), and indicators of the outcome."""
     blocks = finals[0]["block"]
     outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
@@ -311,7 +310,7 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
         raise InvalidInputError(f"nothing to vary: give {given}, or a [sweep] table with distributions")
     document = document.without_sweep()
     base = document.build()
-    options.on_start(kernels_of(base))
+    options.on_start(compilation.kernels_of(base))
     table = None if base.experiment is None else load_table(base.experiment.table)
     count = method.samples if options.samples is None else options.samples
     if count < LEAST_BLOCKS:

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, load_scenario, load_stored
-from blocksim.scenario.spelling import list_names
+from blocksim.scenario import Scenario, load_scenario, load_stored, spelling
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.result import EventRecord, read_summary
@@ -88,7 +87,7 @@ def _run_in(place: Path, needed: Sequence[str]) -> Path:
     below = sorted({path.parents[1] for path in place.glob(f"*/*/{files.DONE}")})
     for found, what in ((begun, "but an unfinished run"), (sweeps, "but a sweep"), (below, "but runs of scenarios")):
         if found:
-            message = f"{place}: no finished run in this folder, {what}: {list_names(found, MOST_FOLDERS)}"
+            message = f"{place}: no finished run in this folder, {what}: {spelling.list_names(found, MOST_FOLDERS)}"
             raise InputMissingError(message)
     raise InputMissingError(f"{place}: no finished run in this folder; blocksim run SCENARIO makes one")
 

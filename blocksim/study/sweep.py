@@ -19,10 +19,9 @@ from blocksim.options import Option, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.silence import silent
+from blocksim.simulation import compilation, provenance, stopping
 from blocksim.simulation import folder as files
-from blocksim.simulation.compilation import compile_kernels, kernel_set, kernels_of
-from blocksim.simulation.provenance import HASH_DIGITS, code_hash
-from blocksim.simulation.stopping import stop_requests
+from blocksim.study import rows, sweep_folder
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.manifest import (
     ENDED_BADLY,
@@ -39,15 +38,13 @@ from blocksim.study.manifest import (
     values_hash,
 )
 from blocksim.study.plan import Cases, Settings, Values, cases_of, levels_of, plan_of, table_digests, with_sweep
-from blocksim.study.rows import FINISHED, TABLE, Ranges, Row, invalid_row
-from blocksim.study.sweep_folder import CASES, SWEEP, FolderKind, prepare, read_plan, write_table
 from blocksim.study.vary import variations_option
 
 TIMINGS = "timings.csv"
 MOST_INVALID = 500  # kept in memory before they are written
 SOONEST = 2.0  # s between two tables while the sweep runs
 SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
-OnRow = Callable[[int, int, Row], None]
+OnRow = Callable[[int, int, rows.Row], None]
 SHARDED = re.compile(r"manifest-\d+-of-(\d+)\.jsonl")
 MOST_SHARDS = 20
 SharedCases = Annotated[
@@ -122,16 +119,16 @@ def run_sweep(document: Document, options: SweepOptions) -> SweepResult:
     cases = cases_of(document, plan)
     name = sweep_hash(base, plan, table_digests(document, plan.vary))
     folder = Path(options.out) if options.out is not None else files.RESULTS / base.name / f"sweep-{name}"
-    run, setting = options.ready(folder / CASES if options.keep_cases else None)
-    prepare(folder, base, name, overwrite=options.overwrite)
+    run, setting = options.ready(folder / sweep_folder.CASES if options.keep_cases else None)
+    sweep_folder.prepare(folder, base, name, overwrite=options.overwrite)
     for kernels in kernels_for(document):
-        compile_kernels(kernels)
+        compilation.compile_kernels(kernels)
     with closing(Manifest(folder / shard.file(MANIFEST))) as manifest:
         share = SweepRun(cases, shard, manifest, options.on_row, measured_ranges(base))
         if options.retry_failed:
             share.forget_failed()
         share.run(run, setting, fail_fast=options.fail_fast)
-    return SweepResult(folder, shard.file(TABLE), share.count)
+    return SweepResult(folder, shard.file(rows.TABLE), share.count)
 
 
 def refuse_loss(shard: Shard, *, overwrite: bool) -> None:
@@ -145,9 +142,9 @@ def cases_in(document: Document) -> Cases:
     return cases_of(document, plan_of(document.build()))
 
 
-def measured_ranges(base: Scenario) -> Ranges | None:
+def measured_ranges(base: Scenario) -> rows.Ranges | None:
     """Return the measured ranges that a scenario is compared with, if it names any."""
-    return None if base.experiment is None else Ranges.read(base.experiment.table)
+    return None if base.experiment is None else rows.Ranges.read(base.experiment.table)
 
 
 def sweep_hash(base: Scenario, plan: Sweep, tables: Mapping[str, Sequence[str]]) -> str:
@@ -155,8 +152,8 @@ def sweep_hash(base: Scenario, plan: Sweep, tables: Mapping[str, Sequence[str]])
 
     `tables` has the digests of the files that varied keys name.
     """
-    text = json.dumps([scenario_hash(base), plan.as_table(), *([tables] if tables else []), code_hash()])
-    return hashlib.sha256(text.encode()).hexdigest()[:HASH_DIGITS]
+    text = json.dumps([scenario_hash(base), plan.as_table(), *([tables] if tables else []), provenance.code_hash()])
+    return hashlib.sha256(text.encode()).hexdigest()[: provenance.HASH_DIGITS]
 
 
 def kernels_for(document: Document) -> tuple[str, ...]:
@@ -165,8 +162,8 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     vary = base.sweep.vary if base.sweep else {}
     schemes = (base.time.scheme, *map(str, levels_of(vary.get("time.scheme", ()))))
     models = (base.contact.model, *map(str, levels_of(vary.get("contact.model", ()))))
-    sets = (kernel_set(scheme, model) for scheme in schemes for model in models)
-    return tuple(dict.fromkeys((kernels_of(base), *sets)))
+    sets = (compilation.kernel_set(scheme, model) for scheme in schemes for model in models)
+    return tuple(dict.fromkeys((compilation.kernels_of(base), *sets)))
 
 
 class SweepRun:
@@ -178,9 +175,9 @@ class SweepRun:
         shard: Shard,
         manifest: Manifest,
         on_row: OnRow,
-        ranges: Ranges | None = None,
-        kind: FolderKind = SWEEP,
-        table: str = TABLE,
+        ranges: rows.Ranges | None = None,
+        kind: sweep_folder.FolderKind = sweep_folder.SWEEP,
+        table: str = rows.TABLE,
     ) -> None:
         """Take what is in the folder already; rows go into `table`, judged by `ranges` where these are given."""
         self.cases, self.shard, self.manifest, self.on_row = cases, shard, manifest, on_row
@@ -200,7 +197,7 @@ class SweepRun:
     def run(self, executor: Run, setting: Setting, *, fail_fast: bool = False) -> None:
         """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
         try:
-            with stop_requests() as is_stopped:
+            with stopping.stop_requests() as is_stopped:
                 setting = replace(setting, is_stopped=is_stopped)
                 # closed here and now: left to the garbage collector, workers would continue
                 with closing(executor(self._tasks(), setting)) as batches:
@@ -228,7 +225,7 @@ class SweepRun:
         """Write the table; the more rows, the longer the while until it is worth it again."""
         began = time.monotonic()
         self.next_at = began + SOONEST
-        write_table(self.table, self.kind, table_rows(self.cases, self.done, self.ranges, self.shard))
+        sweep_folder.write_table(self.table, self.kind, table_rows(self.cases, self.done, self.ranges, self.shard))
         ended = time.monotonic()
         self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
 
@@ -241,7 +238,7 @@ class SweepRun:
             if case.scenario is not None:
                 yield Task(number, case.name, case.settings, case.scenario)
                 continue
-            entry = Entry(number, case.name, values_hash(case.settings), invalid_row(case.problem))
+            entry = Entry(number, case.name, values_hash(case.settings), rows.invalid_row(case.problem))
             self.invalid.append((entry, case.settings))
             if len(self.invalid) >= MOST_INVALID:
                 self._keep()
@@ -252,7 +249,7 @@ class SweepRun:
             (Entry(task.number, task.name, values_hash(task.settings), row), task.settings)
             for task, row in zip(batch.tasks, batch.rows, strict=True)
         ]
-        has_failed = bool(self.invalid) or any(row["status"] != FINISHED for row in batch.rows)
+        has_failed = bool(self.invalid) or any(row["status"] != rows.FINISHED for row in batch.rows)
         self._keep(ended)
         names = [task.name for task in batch.tasks]
         note_timings(self.folder / self.shard.file(TIMINGS), executor, names, batch.seconds, batch.host)
@@ -279,7 +276,7 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
     missing, unless that is allowed.
     """
     folder = Path(folder)
-    document = read_plan(folder)
+    document = sweep_folder.read_plan(folder)
     base = document.build()
     cases = cases_in(document)
     done = CaseIndex(folder, len(cases))
@@ -298,5 +295,5 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
         if of > 1 and len(missing) > MOST_SHARDS:
             lines.append(f"  and {len(missing) - MOST_SHARDS} more shards")
         raise InvalidInputError("\n".join(lines))
-    write_table(folder / TABLE, SWEEP, table_rows(cases, done, measured_ranges(base)))
+    sweep_folder.write_table(folder / rows.TABLE, sweep_folder.SWEEP, table_rows(cases, done, measured_ranges(base)))
     return SweepResult(folder, planned=len(cases))

@@ -13,10 +13,8 @@ from pathlib import Path
 from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
-from blocksim.scenario import Document, Scenario
-from blocksim.scenario.input_files import MEGABYTE, open_regular, read_head, read_limited
-from blocksim.scenario.spelling import list_names
-from blocksim.simulation.atomic import atomic_path, sync_file, write_text
+from blocksim.scenario import Document, Scenario, input_files, spelling
+from blocksim.simulation import atomic, provenance
 from blocksim.simulation.folder import (
     Kind,
     TableRecord,
@@ -36,7 +34,6 @@ from blocksim.simulation.folder import (
     remove_run,
     takes_lock,
 )
-from blocksim.simulation.provenance import environment
 
 MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each
 log = logging.getLogger(__name__)
@@ -124,18 +121,18 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: F
                 began_at=datetime.now(UTC).isoformat(timespec="seconds"),
                 mode=None if plan is None else plan.mode,
                 seed=plan.seed if plan is not None and plan.is_sampled else None,
-                environment=environment(),
+                environment=provenance.environment(),
                 tables={},
             )
             text = origin.model_copy(update={"sha256": sums}).model_dump_json(indent=2)
-            write_text(folder / kind.origin, text + "\n")
+            atomic.write_text(folder / kind.origin, text + "\n")
 
 
 def read_origin(folder: Path, kind: FolderKind = SWEEP) -> Origin | None:
     """Return what a study came from, None where it is older than this file. Raises InvalidInputError."""
     path = folder / kind.origin
     try:
-        return Origin.model_validate_json(read_limited(path, MEGABYTE))
+        return Origin.model_validate_json(input_files.read_limited(path, input_files.MEGABYTE))
     except InputMissingError:
         return None
     except ValidationError as error:
@@ -147,15 +144,15 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
     present = [path for path in sorted(folder.iterdir()) if not is_leftover(path.name, (kind.plan,))]
     if not present:
         return
-    if not is_resolved(folder / kind.plan) or read_head(folder / kind.plan, len(kind.head)) != kind.head:
+    if not is_resolved(folder / kind.plan) or input_files.read_head(folder / kind.plan, len(kind.head)) != kind.head:
         raise OutputExistsError(f"{folder}: holds files that are not {kind.what}; choose another folder with --out")
-    is_same = read_head(folder / kind.plan, len(head)) == head
+    is_same = input_files.read_head(folder / kind.plan, len(head)) == head
     if not (overwrite or is_same):
         which = kind.what.replace("a ", "another ", 1)
         raise OutputExistsError(f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere")
     for path in present if overwrite else ():
         if path.suffix == ".jsonl" and kind.is_ours(path):
-            with open_regular(path) as file:
+            with input_files.open_regular(path) as file:
                 if not takes_lock(file.fileno()):
                     how = "wait for it, or write elsewhere with --out DIR"
                     raise OutputExistsError(f"{folder}: {kind.what} is running here; {how}")
@@ -182,7 +179,7 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
     told = []
     for path in changed:
         added = columns_added(path, kind.records_of(path) or ())  # None: it is no table of the study any more
-        shown = list_names([repr(name[:LONGEST_NAME]) for name in added or ()], MOST_SHOWN)
+        shown = spelling.list_names([repr(name[:LONGEST_NAME]) for name in added or ()], MOST_SHOWN)
         which = f" (columns added: {shown})" if added else ""
         text = f"{path}: changed since {whose} wrote it{which}; "
         if not overwrite or added is None:
@@ -208,17 +205,17 @@ def note_table(path: Path, written: Path, kind: FolderKind) -> None:
         _refuse_foreign([path] if is_there else [], kind)
         holds = tuple(TableRecord.of(one) for one in ([path, written] if is_there else [written]))
         noted = origin.model_copy(update={"tables": {**(origin.tables or {}), path.name: holds}})
-        kept = json.loads(read_limited(path.parent / kind.origin, MEGABYTE))
+        kept = json.loads(input_files.read_limited(path.parent / kind.origin, input_files.MEGABYTE))
         data = {**kept, "tables": noted.model_dump(mode="json")["tables"]}
-        write_text(path.parent / kind.origin, json.dumps(data, indent=2) + "\n")
+        atomic.write_text(path.parent / kind.origin, json.dumps(data, indent=2) + "\n")
 
 
 def write_table(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]]) -> None:
     """Write a table of a study, heads first, one row after the other. Raises as `note_table`."""
-    with atomic_path(path) as temporary:
+    with atomic.atomic_path(path) as temporary:
         with temporary.open("w", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows(rows)
-        sync_file(temporary)
+        atomic.sync_file(temporary)
         note_table(path, temporary, kind)
 
 
@@ -227,7 +224,7 @@ def write_answer(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]],
     write_table(path, kind, rows)
     origin = read_origin(path.parent, kind)
     begun = {} if origin is None else origin.model_dump(mode="json", exclude_none=True)
-    write_text(path.parent / kind.origin, json.dumps({**begun, **answer}, indent=2) + "\n")
+    atomic.write_text(path.parent / kind.origin, json.dumps({**begun, **answer}, indent=2) + "\n")
 
 
 def case_folder(sweep: Path, case: str) -> Path | None:

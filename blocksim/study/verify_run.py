@@ -15,22 +15,17 @@ import numpy as np
 
 from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
-from blocksim.scenario import Scenario, load_stored, scenario_hash
-from blocksim.scenario.input_files import read_limited
+from blocksim.scenario import Scenario, input_files, load_stored, scenario_hash
 from blocksim.silence import silent
-from blocksim.simulation import Watcher, read_result, simulate
+from blocksim.simulation import Watcher, checkpoint, probes, provenance, read_result, result, simulate
 from blocksim.simulation import folder as files
-from blocksim.simulation.checkpoint import STARTS_ANEW
 from blocksim.simulation.frames import csv_text
-from blocksim.simulation.probes import ProbeSeries
-from blocksim.simulation.provenance import ROOM_PREFIX, environment
-from blocksim.simulation.result import MOST_BYTES, Summary, changed_files, read_summary
 from blocksim.study.stored_run import find_run
 
 INTERRUPTED = "interrupted"
 SCENARIO = "scenario"  # its hash, beside the entries of `environment`
 CODE = "code"
-DECIDES = ("blocksim", ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
+DECIDES = ("blocksim", provenance.ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
 ALWAYS = ("name", "steps", "time_step_s", "simulated_time_s", "energy_J")
 UNLESS_INTERRUPTED = ("reason", "exit_code")
 OF_THE_MOTION = ("settled", "events", "movement")  # what earlier versions did not keep is not there, or null
@@ -47,7 +42,9 @@ class EntryDifference:
     now: Any
 
 
-def differing_entries(folder: Path, then: Summary, now: Summary, *, same_code: bool) -> tuple[EntryDifference, ...]:
+def differing_entries(
+    folder: Path, then: result.Summary, now: result.Summary, *, same_code: bool
+) -> tuple[EntryDifference, ...]:
     """Return which entries of a run's folder are not those of its repetition; some of them only for the same code.
 
     The final state and the status are not among them: they are reported by themselves.
@@ -61,7 +58,7 @@ def differing_entries(folder: Path, then: Summary, now: Summary, *, same_code: b
     found = [one for name in names for one in apart(files.SUMMARY, name, stored.get(name), wanted[name])]
     # the warnings are those of now, after what was reported when the run went on or began again
     before = then.warnings[: len(then.warnings) - len(now.warnings)]
-    is_allowed = bool(then.resumed_from) or all(text.endswith(STARTS_ANEW) for text in before)
+    is_allowed = bool(then.resumed_from) or all(text.endswith(checkpoint.STARTS_ANEW) for text in before)
     if whole and not (is_allowed and (*before, *now.warnings) == then.warnings):
         found.append(EntryDifference(files.SUMMARY, "warnings", list(then.warnings), list(now.warnings)))
     if files.is_finished(folder):  # the mark of the end must not contradict run.json
@@ -83,7 +80,9 @@ def apart(file: str, entry: str, stored: Any, now: Any) -> Iterator[EntryDiffere
         yield EntryDifference(file, entry, stored, now)
 
 
-def differing_samples(stored: Mapping[str, ProbeSeries], again: Mapping[str, ProbeSeries]) -> Iterator[EntryDifference]:
+def differing_samples(
+    stored: Mapping[str, probes.ProbeSeries], again: Mapping[str, probes.ProbeSeries]
+) -> Iterator[EntryDifference]:
     """Yield where the samples of each probe first are others, in the column that comes first."""
     for name, now in again.items():
         then, place = stored[name], f"probes/{name}"
@@ -105,7 +104,7 @@ def differing_samples(stored: Mapping[str, ProbeSeries], again: Mapping[str, Pro
 def _read_entries(path: Path) -> dict[str, Any]:
     """Return the entries of a file. Raises InputMissingError or InvalidInputError."""
     try:
-        entries = json.loads(read_limited(path, MOST_BYTES))
+        entries = json.loads(input_files.read_limited(path, result.MOST_BYTES))
     except (ValueError, RecursionError) as error:
         raise InvalidInputError(f"{path}: not the entries of a run: {error}") from error
     if not isinstance(entries, dict):
@@ -153,8 +152,8 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     InvalidInputError (ScenarioError) for files that cannot be read, StoppedEarlyError where the repetition is stopped.
     """
     folder = find_run(place)
-    summary = read_summary(folder / files.SUMMARY)
-    changed = changed_files(folder, summary)
+    summary = result.read_summary(folder / files.SUMMARY)
+    changed = result.changed_files(folder, summary)
     try:
         stored = read_result(folder)
     except InvalidInputError as error:  # what cannot be read because it was changed is reported as such
@@ -194,12 +193,12 @@ def scenario_of(place: Path | str) -> Scenario:
 
 def tells_of_code(found: tuple[Origin, ...]) -> bool:
     """Return True if the code is among what is not the same: what is named by its hash then has another name."""
-    return any(one.name in {CODE, "blocksim"} or one.name.startswith(ROOM_PREFIX) for one in found)
+    return any(one.name in {CODE, "blocksim"} or one.name.startswith(provenance.ROOM_PREFIX) for one in found)
 
 
 def changed_origins(then: Mapping[str, str]) -> tuple[Origin, ...]:
     """Return which entries of an older `environment` are others now; what it lacks cannot be compared."""
-    now = environment()
-    whole = () if any(name.startswith(ROOM_PREFIX) for name in then) else (CODE,)  # rooms say more
+    now = provenance.environment()
+    whole = () if any(name.startswith(provenance.ROOM_PREFIX) for name in then) else (CODE,)  # rooms say more
     known = [name for name in now if name in then and (name in whole or name.startswith(DECIDES))]
     return tuple(Origin(name, then[name], now[name]) for name in known if then[name] != now[name])

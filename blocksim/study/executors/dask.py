@@ -15,8 +15,7 @@ from typing import Any, NoReturn
 from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.extras import CLUSTER, load_module
 from blocksim.simulation.provenance import code_hash
-from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
-from blocksim.study.executors.ensemble import run_batch
+from blocksim.study.executors import Batch, BatchSize, Setting, Task, ensemble, take
 from blocksim.study.rows import row_of_error
 
 PATIENCE = 3.0  # s until a scheduler has answered
@@ -113,7 +112,7 @@ class Submission:
             if not tasks:
                 return
             scenarios, peaks = [task.scenario for task in tasks], self.setting.peaks
-            future = self.client.submit(run_batch, scenarios, (), code_hash(), peaks=peaks, pure=False)
+            future = self.client.submit(ensemble.run_batch, scenarios, (), code_hash(), peaks=peaks, pure=False)
             self._await(future, tasks)
 
     def _await(self, future: Any, tasks: tuple[Task, ...]) -> None:

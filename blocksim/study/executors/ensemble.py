@@ -17,10 +17,8 @@ from typing import NamedTuple
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.simulation import MemberFailure, Summary, run_in_batches
+from blocksim.simulation import MemberFailure, Summary, frames, provenance, run_in_batches
 from blocksim.simulation import folder as files
-from blocksim.simulation.frames import Columns, read_table
-from blocksim.simulation.provenance import HASH_DIGITS, code_hash, run_hash
 from blocksim.simulation.result import changed_results, read_summary
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
@@ -85,7 +83,7 @@ def rows_of(scenarios: Sequence[Scenario], threads: int, *, peaks: bool = False)
 class Member:
     """The end of one member: its final table, or the reason why it has none."""
 
-    final: Columns | None
+    final: frames.Columns | None
     problem: str = ""
 
 
@@ -120,8 +118,8 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
             summary = read_summary(folder / files.SUMMARY)
             # a case that failed has come to its end too
             has_ended = files.is_finished(folder) if summary.status == FINISHED else summary.status != INTERRUPTED
-            if has_ended and summary.run == run_hash(scenario) and not changed_results(folder, summary):
-                return _row_of(summary, read_table(folder / files.FINAL))
+            if has_ended and summary.run == provenance.run_hash(scenario) and not changed_results(folder, summary):
+                return _row_of(summary, frames.read_table(folder / files.FINAL))
         try:
             result = run(scenario, out=folder, resume=True)
         except (InvalidInputError, InputMissingError, OutputExistsError):  # it cannot be taken up, or there was none
@@ -131,7 +129,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         return row_of_error(error)
 
 
-def _row_of(summary: Summary, final: Columns) -> Row:
+def _row_of(summary: Summary, final: frames.Columns) -> Row:
     moved = summary.movement
     return row_of(summary, summary.simulated_time_s, {} if moved is None else moved.row, final)
 
@@ -149,11 +147,10 @@ def run_batch(scenarios: Sequence[Scenario], folders: Sequence[Path], code: str,
 
     Raises InvalidInputError where it is another.
     """
-    if code != code_hash():
-        raise InvalidInputError(
-            f"the worker on {platform.node()} has another version of blocksim (code {code_hash()[:HASH_DIGITS]}, "
-            f"here {code[:HASH_DIGITS]}); install the same one"
-        )
+    if code != (own := provenance.code_hash()):
+        other, here = own[: provenance.HASH_DIGITS], code[: provenance.HASH_DIGITS]
+        versions = f"has another version of blocksim (code {other}, here {here})"
+        raise InvalidInputError(f"the worker on {platform.node()} {versions}; install the same one")
     began = time.perf_counter()
     rows: list[Row] = []
     for scenario, folder in zip(scenarios, folders, strict=False):

@@ -15,8 +15,7 @@ from multiprocessing import active_children, get_context, parent_process, resour
 from os import _exit
 from typing import Any, NamedTuple
 
-from blocksim.simulation.provenance import code_hash
-from blocksim.simulation.stopping import FOR_ALL
+from blocksim.simulation import provenance, stopping
 from blocksim.study.executors import Batch, BatchSize, Run, Setting, Task, take
 from blocksim.study.executors.ensemble import BatchResult, run_batch
 from blocksim.study.rows import Row
@@ -64,7 +63,7 @@ def _signals_held() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, FOR_ALL)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, stopping.FOR_ALL)
     try:
         yield
     finally:
@@ -73,7 +72,7 @@ def _signals_held() -> Iterator[None]:
 
 def _start_worker() -> None:
     """Leave to the parent what a terminal sends to all processes, and end with it."""
-    for number in FOR_ALL:
+    for number in stopping.FOR_ALL:
         signal.signal(number, signal.SIG_IGN)
 
     def end_with_parent() -> None:
@@ -162,7 +161,7 @@ def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, 
     """Run tasks one after the other in this process, as a worker does. Raises KeyboardInterrupt on Ctrl-C."""
     for task in tasks:
         folders = setting.folders([task])
-        yield Batch((task,), *run_batch([task.scenario], folders, code_hash(), peaks=setting.peaks))
+        yield Batch((task,), *run_batch([task.scenario], folders, provenance.code_hash(), peaks=setting.peaks))
 
 
 class Work:
@@ -202,7 +201,7 @@ class Work:
     def _submit(self, pool: ProcessPoolExecutor, job: Job) -> None:
         scenarios, folders = [task.scenario for task in job.tasks], self.setting.folders(job.tasks)
         try:
-            future = pool.submit(run_batch, scenarios, folders, code_hash(), peaks=self.setting.peaks)
+            future = pool.submit(run_batch, scenarios, folders, provenance.code_hash(), peaks=self.setting.peaks)
         except BrokenProcessPool:  # it died before it got the job
             self.suspects.append(job)
             raise
