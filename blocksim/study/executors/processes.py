@@ -6,11 +6,10 @@ The only executor that can keep whole runs, in folders of their own.
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
-from functools import partial
+from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import active_children, get_context, parent_process, resource_tracker
 from os import _exit
 from typing import Any, NamedTuple
@@ -27,7 +26,6 @@ DEAD: Row = {
     "reason": "its worker process has died twice (out of memory?); --retry-failed runs it again",
     "seconds": 0.0,
 }
-PoolOf = Callable[[int], AbstractContextManager[ProcessPoolExecutor]]  # of so many processes
 
 
 @contextmanager
@@ -116,45 +114,46 @@ class LastingPool:
 
     def __enter__(self) -> Run:
         """Give what runs the tasks of each round."""
-        return partial(_run_on, pool_of=self.of)
+        return self.run
 
     def __exit__(self, *error: object) -> None:
         """End the processes."""
         self._ended.__exit__(*error)  # type: ignore[arg-type]
+
+    def run(self, tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
+        """Run batches on `setting.jobs` processes, each on one thread; a pool that dies is replaced by a new one."""
+        rows: dict[str, Row | None] = {}  # by run
+        later: list[Task] = []
+
+        def first_of_each() -> Iterator[Task]:
+            """Yield the first task of every run: "10 mm" and 0.01 come to one, and its folder has one writer."""
+            for task in tasks:
+                if task.name in rows:
+                    later.append(task)
+                else:
+                    rows[task.name] = None
+                    yield task
+
+        work = Work(tasks if setting.folder is None else first_of_each(), setting)
+        with suppress(StoppedError):
+            while not work.is_done:
+                with suppress(BrokenProcessPool), self.of(setting.jobs) as pool:
+                    for batch in work.run_on(pool):
+                        if setting.folder is not None:
+                            rows |= zip((task.name for task in batch.tasks), batch.rows, strict=True)
+                        yield batch
+                yield from work.after_death()
+            if later:
+                yield Batch(tuple(later), tuple(rows[task.name] or DEAD for task in later), 0.0, "")
 
 
 for_rounds = LastingPool
 
 
 def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
-    """Run batches on `setting.jobs` processes, each on one thread; a pool that has died is replaced by a new one."""
-    return _run_on(tasks, setting, pool_of)
-
-
-def _run_on(tasks: Iterator[Task], setting: Setting, pool_of: PoolOf) -> Generator[Batch, None, None]:
-    rows: dict[str, Row | None] = {}  # by run
-    later: list[Task] = []
-
-    def first_of_each() -> Iterator[Task]:
-        """Yield the first task of every run: "10 mm" and 0.01 come to one, and its folder has one writer."""
-        for task in tasks:
-            if task.name in rows:
-                later.append(task)
-            else:
-                rows[task.name] = None
-                yield task
-
-    work = Work(tasks if setting.folder is None else first_of_each(), setting)
-    with suppress(StoppedError):
-        while not work.is_done:
-            with suppress(BrokenProcessPool), pool_of(setting.jobs) as pool:
-                for batch in work.run_on(pool):
-                    if setting.folder is not None:
-                        rows |= zip((task.name for task in batch.tasks), batch.rows, strict=True)
-                    yield batch
-            yield from work.after_death()
-        if later:
-            yield Batch(tuple(later), tuple(rows[task.name] or DEAD for task in later), 0.0, "")
+    """Run the tasks of one round."""
+    with LastingPool() as run:
+        yield from run(tasks, setting)
 
 
 def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, None]:
@@ -177,9 +176,15 @@ class Work:
 
     def run_on(self, pool: ProcessPoolExecutor) -> Iterator[Batch]:
         """Run until nothing is left. Raises BrokenProcessPool where a process dies, and StoppedError."""
+        peaks, code = self.setting.peaks, provenance.code_hash()
         while True:
             while (job := self._next()) is not None:
-                self._submit(pool, job)
+                scenarios, folders = [task.scenario for task in job.tasks], self.setting.folders(job.tasks)
+                try:
+                    self.pending[pool.submit(run_batch, scenarios, folders, code, peaks=peaks)] = job
+                except BrokenProcessPool:  # it died before it got the job
+                    self.suspects.append(job)
+                    raise
             if self.setting.is_stopped():
                 raise StoppedError
             if not self.pending:
@@ -197,15 +202,6 @@ class Work:
             return None
         tasks = take(self.tasks, self.size.count, self.setting.is_stopped)
         return Job(tasks) if tasks else None
-
-    def _submit(self, pool: ProcessPoolExecutor, job: Job) -> None:
-        scenarios, folders = [task.scenario for task in job.tasks], self.setting.folders(job.tasks)
-        try:
-            future = pool.submit(run_batch, scenarios, folders, provenance.code_hash(), peaks=self.setting.peaks)
-        except BrokenProcessPool:  # it died before it got the job
-            self.suspects.append(job)
-            raise
-        self.pending[future] = job
 
     def _ended(self, future: Future[BatchResult]) -> Batch:
         rows, seconds, host = future.result()
