@@ -17,7 +17,7 @@ from blocksim.options import Option
 from blocksim.scenario import Document
 from blocksim.simulation.observables import DISPLACEMENT, END_SPEED, FIRST_MOVED, FIRST_MOVER, MOVES_ON, OUTCOME, TURN
 from blocksim.study.manifest import SweepResult
-from blocksim.study.plan import Estimate, estimate
+from blocksim.study.plan import estimate
 from blocksim.study.rows import FINISHED, heads_of
 from blocksim.study.sweep import SweepOptions, kernels_for, merge, run_sweep
 from blocksim.view.sweeps.data import short_names
@@ -65,28 +65,25 @@ def sweep_command(
     if dry_run:
         found = estimate(document, keep_cases=options.keep_cases)
         cores = options.jobs or os.cpu_count() or 1
-        remarks = () if screen.as_json else found.remarks
-        return Report(_estimate_lines(found, cores), {**asdict(found), "jobs": cores}, always=remarks)
+        on = f"{cores} core{'' if cores == 1 else 's'}"
+        until_rest = "; less if they stop at rest" if found.stop_at_rest else ""
+        lines = [
+            f"cases      {found.cases}",
+            f"solving    at most about {duration(found.seconds / cores)} on {on}",
+            f"results    at most about {readable(found.bytes)}",
+            f"memory     about {readable(found.memory)} for a process that runs one case",
+            f"from the steps of {found.looked_at} cases at the measured speed{until_rest}",
+        ]
+        if found.impossible:
+            which = f"{found.impossible} of these {found.looked_at}"
+            lines.append(f"{which} cannot be simulated; the first: {found.reason}")
+        return Report(lines, {**asdict(found), "jobs": cores}, always=() if screen.as_json else found.remarks)
     for kernels in kernels_for(document):
         announce_compilation(kernels, quiet=screen.silent)
     heads = () if base.sweep is None else heads_of(base.sweep)
     with exit_when_stopped(), case_progress(heads, quiet=screen.silent) as on_row:
         result = run_sweep(document, replace(options, on_row=on_row))
     return _table_report(result)
-
-
-def _estimate_lines(found: Estimate, cores: int) -> list[str]:
-    until_rest = "; less if they stop at rest" if found.stop_at_rest else ""
-    lines = [
-        f"cases      {found.cases}",
-        f"solving    at most about {duration(found.seconds / cores)} on {cores} {'core' if cores == 1 else 'cores'}",
-        f"results    at most about {readable(found.bytes)}",
-        f"memory     about {readable(found.memory)} for a process that runs one case",
-        f"from the steps of {found.looked_at} cases at the measured speed{until_rest}",
-    ]
-    if found.impossible:
-        lines.append(f"{found.impossible} of these {found.looked_at} cannot be simulated; the first: {found.reason}")
-    return lines
 
 
 def _table_report(result: SweepResult) -> Report:

@@ -330,24 +330,26 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     refinements = refinements_of(scenario, studies)
     compilation.compile_kernels(compilation.kernels_of(scenario))
     folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / FOLDER
-    runs = LevelRuns(folder, options.jobs or os.cpu_count() or 1, options.on_run)
-    found = _refine(scenario, refinements, runs, tolerance_mm, levels)
-    return Convergence(
-        name=scenario.name,
-        blocks=Coordinates(scenario).blocks,
-        tolerance_mm=tolerance_mm,
-        studies=found,
-        notes=_notes(scenario, runs, studies),
-        recommended=_recommended(scenario, found, runs, tolerance_mm),
-    )
+    runs = LevelRuns(scenario, folder, options.jobs or os.cpu_count() or 1, options.on_run)
+    found = runs.refine(refinements, tolerance_mm, levels)
+    notes, recommended = runs.notes(studies), None  # notes are about the levels
+    if found[0].own.is_finished and not any(study.verdict in UNRELIABLE for study in found):
+        # all recommended values together, then each alone, the cheapest first; None where none holds the tolerance
+        changed = [(level, study.key) for study in found if (level := study.recommended) and not level.is_own]
+        together = {key: level.value for level, key in changed}
+        singles = [{key: level.value} for level, key in sorted(changed, key=lambda pair: pair[0].seconds)]
+        candidates = (runs.joint(settings, found) for settings in (together, *singles) if settings)
+        recommended = next((joint for joint in candidates if joint.to_finest_mm <= tolerance_mm), None)
+    return Convergence(scenario.name, runs.coordinates.blocks, tolerance_mm, found, notes, recommended)
 
 
 class LevelRuns:
-    """All runs so far, by the hash of their scenario, each in a folder of this name."""
+    """All runs of a scenario with other settings so far, by their hashes, each in a folder of this name."""
 
-    def __init__(self, folder: Path, jobs: int, on_run: OnRun) -> None:
+    def __init__(self, scenario: Scenario, folder: Path, jobs: int, on_run: OnRun) -> None:
         """Run nothing yet."""
-        self.folder, self.jobs, self.on_run = folder, jobs, on_run
+        self.scenario, self.folder, self.jobs, self.on_run = scenario, folder, jobs, on_run
+        self.coordinates = Coordinates(scenario)
         self.rows: dict[str, Row] = {}
 
     def run(self, scenarios: dict[str, Scenario]) -> list[Row]:
@@ -364,82 +366,58 @@ class LevelRuns:
                     kept = {**row, "reason": DIED} if row == processes.DEAD else row.copy()
                     with suppress(BlocksimError):  # what the setting decides: time in compiled code, without files
                         if row != processes.DEAD:
-                            kept["seconds"] = result.read_summary(
-                                self.folder / task.name / files.SUMMARY
-                            ).solver_seconds
+                            path = self.folder / task.name / files.SUMMARY
+                            kept["seconds"] = result.read_summary(path).solver_seconds
                     self.rows[task.name] = kept
                     self.on_run(named[task.name][0], kept)
         except KeyboardInterrupt:
             raise StoppedEarlyError(f"stopped after {len(self.rows)} runs; rerun the command to finish") from None
         return [self.rows[name] for name in names]
 
+    def refine(
+        self, refinements: tuple[Refinement, ...], tolerance_mm: float, levels: int
+    ) -> tuple[RefinementStudy, ...]:
+        """Run all coarser levels and two finer ones of every study, then one finer at a time where it is needed."""
+        finest = {one.study: FEWEST_LEVELS for one in refinements}
+        while True:
+            wanted = [(one, n) for one in refinements for n in range(-one.coarser, finest[one.study] + 1)]
+            scenarios = {
+                f"{one.key} = {one.value(n):g}": with_setting(self.scenario, one.key, one.value(n)) for one, n in wanted
+            }
+            rows = dict(zip(wanted, self.run(scenarios), strict=True))
+            found = tuple(
+                judge({n: row for (of, n), row in rows.items() if of is one}, one, self.coordinates, tolerance_mm)
+                for one in refinements
+            )
+            again = [study.study for study in found if study.verdict in UNFINISHED and finest[study.study] < levels]
+            if not again:
+                return found
+            for name in again:
+                finest[name] += 1
 
-def _refine(
-    scenario: Scenario, refinements: tuple[Refinement, ...], runs: LevelRuns, tolerance_mm: float, levels: int
-) -> tuple[RefinementStudy, ...]:
-    """Run all coarser levels and two finer ones of every study, then one finer at a time where it is needed."""
-    finest = {one.study: FEWEST_LEVELS for one in refinements}
-    coordinates = Coordinates(scenario)
-    while True:
-        wanted = [(one, n) for one in refinements for n in range(-one.coarser, finest[one.study] + 1)]
-        scenarios = {
-            f"{one.key} = {one.value(n):g}": with_setting(scenario, one.key, one.value(n)) for one, n in wanted
-        }
-        rows = dict(zip(wanted, runs.run(scenarios), strict=True))
-        found = tuple(
-            judge({n: row for (of, n), row in rows.items() if of is one}, one, coordinates, tolerance_mm)
-            for one in refinements
-        )
-        again = [study.study for study in found if study.verdict in UNFINISHED and finest[study.study] < levels]
-        if not again:
-            return found
-        for name in again:
-            finest[name] += 1
+    def joint(self, settings: dict[str, float], studies: tuple[RefinementStudy, ...]) -> Recommendation:
+        """Run the scenario with some settings and compare it with the finest level of every study."""
+        changed = self.scenario
+        for key, value in settings.items():
+            changed = with_setting(changed, key, value)
+        finest = {study.key: with_setting(self.scenario, study.key, study.levels[-1].value) for study in studies}
+        row, *others = self.run({"recommended settings together": changed, **finest})
+        point = self.coordinates.point(row)
+        far = max(distance(point, self.coordinates.point(one)) for one in others)
+        return Recommendation(settings, float(str(row["seconds"])), studies[0].own.seconds, far)
 
-
-def _recommended(
-    scenario: Scenario, studies: tuple[RefinementStudy, ...], runs: LevelRuns, tolerance_mm: float
-) -> Recommendation | None:
-    """Try all recommended values together, then each alone, the cheapest first; None where none holds the tolerance."""
-    if any(study.verdict in UNRELIABLE for study in studies) or not studies[0].own.is_finished:
-        return None
-    changed = [(level, study.key) for study in studies if (level := study.recommended) and not level.is_own]
-    together = {key: level.value for level, key in changed}
-    singles = [{key: level.value} for level, key in sorted(changed, key=lambda pair: pair[0].seconds)]
-    candidates = (_joint(scenario, settings, studies, runs) for settings in (together, *singles) if settings)
-    return next((joint for joint in candidates if joint.to_finest_mm <= tolerance_mm), None)
-
-
-def _joint(
-    scenario: Scenario, settings: dict[str, float], studies: tuple[RefinementStudy, ...], runs: LevelRuns
-) -> Recommendation:
-    """Run the scenario with some settings and compare it with the finest level of every study."""
-    changed = scenario
-    for key, value in settings.items():
-        changed = with_setting(changed, key, value)
-    finest = {study.key: with_setting(scenario, study.key, study.levels[-1].value) for study in studies}
-    row, *others = runs.run({"recommended settings together": changed, **finest})
-    point = Coordinates(scenario).point
-    return Recommendation(
-        settings=settings,
-        seconds=float(str(row["seconds"])),
-        own_seconds=studies[0].own.seconds,
-        to_finest_mm=max(distance(point(row), point(one)) for one in others),
-    )
-
-
-def _notes(scenario: Scenario, runs: LevelRuns, studies: Iterable[str] | None) -> tuple[str, ...]:
-    """Say what was not studied, and what the numbers cannot mean."""
-    notes = []
-    if start.soil_tables(scenario):
-        more = "; --study spacing halves soils.spacing, eight times the cost a level" if studies is None else ""
-        notes.append(f"distances are those of blocks, not of soil{more}")
-    elif studies is None and scenario.contact.model not in PARTICLE_MODELS:
-        notes.append(f"{effects_note(scenario, ['spacing'])}: not studied")
-    reasons = {str(row["reason"]) for row in runs.rows.values() if row["status"] == FINISHED}
-    if scenario.time.stop_at_rest and "end of simulated time" in reasons:
-        notes.append("some runs ended before everything was at rest: their final positions depend on time.end")
-    return tuple(notes)
+    def notes(self, studies: Iterable[str] | None) -> tuple[str, ...]:
+        """Say what was not studied, and what the numbers cannot mean."""
+        notes, scenario = [], self.scenario
+        if start.soil_tables(scenario):
+            more = "; --study spacing halves soils.spacing, eight times the cost a level" if studies is None else ""
+            notes.append(f"distances are those of blocks, not of soil{more}")
+        elif studies is None and scenario.contact.model not in PARTICLE_MODELS:
+            notes.append(f"{effects_note(scenario, ['spacing'])}: not studied")
+        reasons = {str(row["reason"]) for row in self.rows.values() if row["status"] == FINISHED}
+        if scenario.time.stop_at_rest and "end of simulated time" in reasons:
+            notes.append("some runs ended before everything was at rest: their final positions depend on time.end")
+        return tuple(notes)
 
 
 def refinements_of(scenario: Scenario, studies: Iterable[str] | None = None) -> tuple[Refinement, ...]:
