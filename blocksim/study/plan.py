@@ -4,14 +4,13 @@ import functools
 import hashlib
 import math
 import re
-from abc import abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from statistics import fmean
-from typing import TypeVar, cast, overload
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,6 @@ from blocksim.scenario.units import toml
 from blocksim.simulation.provenance import run_hash
 from blocksim.study.rows import Head, check_experiment, heads_of
 
-T_co = TypeVar("T_co", covariant=True)
 Settings = dict[str, object]
 """Dotted key and value of everything that one case sets."""
 LARGEST_FILE = 20_000_000  # bytes
@@ -40,26 +38,9 @@ HEAD = re.compile(r"(?P<key>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
 
 
-class LazySequence(Sequence[T_co]):
-    """A sequence that keeps none of its entries: each is made when it is asked for."""
-
-    @abstractmethod
-    def row(self, number: int) -> T_co:
-        """Return an entry, 0 <= number < len."""
-
-    @overload
-    def __getitem__(self, number: int) -> T_co: ...
-    @overload
-    def __getitem__(self, number: slice) -> Sequence[T_co]: ...
-    def __getitem__(self, number: int | slice) -> T_co | Sequence[T_co]:
-        if isinstance(number, slice):
-            return [self.row(index) for index in range(len(self))[number]]
-        return self.row(range(len(self))[number])
-
-
 @dataclass(frozen=True)
-class Design(LazySequence[Settings]):
-    """The settings of cases, made from one column of values a key.
+class Design:
+    """The settings of cases, made from one column of values a key; each when it is asked for, and none is kept.
 
     The k-th case has the k-th value of every key, or, in a grid, every value comes with all values of the others; the
     last key changes fastest.
@@ -73,13 +54,15 @@ class Design(LazySequence[Settings]):
         lengths = [len(column) for column in self.columns.values()]
         return math.prod(lengths) if self.is_grid else lengths[0]
 
-    def row(self, number: int) -> Settings:
-        """Return the values of one case."""
-        settings: Settings = {}
+    def __getitem__(self, number: int) -> Settings:
+        number, settings = range(len(self))[number], {}
         for key, column in reversed(list(self.columns.items())):
             number, place = divmod(number, len(column)) if self.is_grid else (number, number)
             settings[key] = column[place]
         return {key: settings[key] for key in self.columns}
+
+    def __iter__(self) -> Iterator[Settings]:
+        return map(self.__getitem__, range(len(self)))
 
 
 def levels_of(values: Variation) -> tuple[object, ...]:
@@ -292,7 +275,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Cases(LazySequence[Case]):
+class Cases:
     """All cases of a sweep; each is made when it is asked for, and none is kept."""
 
     document: Document
@@ -303,14 +286,16 @@ class Cases(LazySequence[Case]):
         """Return the number of cases."""
         return len(self.design)
 
-    def row(self, number: int) -> Case:
-        """Return one case."""
+    def __getitem__(self, number: int) -> Case:
         values = self.design[number]
         try:
             scenario = self.document.with_values(values).build()
         except BlocksimError as error:  # mistakes that only show in the combination
             return Case(values, None, problem=str(error).splitlines()[0])
         return Case(values, scenario, name=run_hash(scenario))
+
+    def __iter__(self) -> Iterator[Case]:
+        return map(self.__getitem__, range(len(self)))
 
 
 def plan_of(base: Scenario) -> Sweep:

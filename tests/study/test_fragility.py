@@ -53,7 +53,7 @@ def test_each_member_slides_where_its_own_friction_is_less_than_the_tangent_of_t
     assert plan is not None
     slopes = [math.tan(math.radians(number)) for number in plan.levels]
     below = [
-        sum(float(str(case[MU])) < slope for case in plan.cases.design[i :: len(slopes)])
+        sum(float(str(case[MU])) < slope for case in list(plan.cases.design)[i :: len(slopes)])
         for i, slope in enumerate(slopes)
     ]
     assert [point.failures for point in whole.points] == below
