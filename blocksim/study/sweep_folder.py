@@ -15,25 +15,8 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario, input_files, spelling
 from blocksim.simulation import atomic, provenance
-from blocksim.simulation.folder import (
-    Kind,
-    TableRecord,
-    append_only_kind,
-    brief_lock,
-    columns_added,
-    has_keys,
-    is_leftover,
-    is_own,
-    is_resolved,
-    is_written,
-    keep_scenario,
-    make_folder,
-    prefix_kind,
-    read_tables,
-    refuse_foreign_copies,
-    remove_run,
-    takes_lock,
-)
+from blocksim.simulation import folder as files
+from blocksim.simulation.folder import is_resolved
 
 MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each
 log = logging.getLogger(__name__)
@@ -42,7 +25,10 @@ CASES = "cases"
 SHARD = r"(?:-\d+-of-\d+)?"
 
 
-MANIFEST_KIND, TIMINGS_KIND = append_only_kind(b'{"number":'), append_only_kind(b"case,executor,seconds,host\n")
+MANIFEST_KIND, TIMINGS_KIND = (
+    files.append_only_kind(b'{"number":'),
+    files.append_only_kind(b"case,executor,seconds,host\n"),
+)
 
 
 class FolderKind:
@@ -57,17 +43,17 @@ class FolderKind:
         self.tables = re.compile(names)  # their checksums are kept; the other results grow by lines
         self.leftover = re.compile(rf"\.({names}|{name}\.json|{name}\.toml)\..*")  # of a writer that was killed
         self.results = {
-            **{table: prefix_kind(form.encode()) for table, form in tables.items()},
+            **{table: files.prefix_kind(form.encode()) for table, form in tables.items()},
             rf"manifest{SHARD}\.jsonl": MANIFEST_KIND,
             rf"timings{SHARD}\.csv": TIMINGS_KIND,
-            rf"{name}\.json": has_keys("began_at"),
+            rf"{name}\.json": files.has_keys("began_at"),
         }
 
-    def kind_of(self, name: str) -> Kind | None:
+    def kind_of(self, name: str) -> files.Kind | None:
         """Return the kind of content that a file of this name has, None for a file that is no result."""
         return next((kind for pattern, kind in self.results.items() if re.fullmatch(pattern, name)), None)
 
-    def records_of(self, path: Path) -> tuple[TableRecord, ...] | None:
+    def records_of(self, path: Path) -> tuple[files.TableRecord, ...] | None:
         """Return what the summary says of a table; None for anything else, and where the study is older than that."""
         if not self.tables.fullmatch(path.name) or not path.is_file() or path.is_symlink():
             return None
@@ -80,11 +66,11 @@ class FolderKind:
     def is_ours(self, path: Path) -> bool:
         """Return True for a file that a study has written, or left half written when it was killed."""
         if (records := self.records_of(path)) is not None:
-            return is_own(path, records)
+            return files.is_own(path, records)
         if (kind := self.kind_of(path.name)) is not None:
-            return is_written(path, {path.name: kind}, self.plan)
+            return files.is_written(path, {path.name: kind}, self.plan)
         named = self.leftover.fullmatch(path.name)
-        return named is not None and is_leftover(path.name, (named[1],)) and path.is_file()
+        return named is not None and files.is_leftover(path.name, (named[1],)) and path.is_file()
 
 
 SWEEP = FolderKind(  # shards have tables of their own
@@ -100,21 +86,21 @@ class Origin(BaseModel, frozen=True):
     seed: int | None = None
     environment: dict[str, str]
     sha256: dict[str, str] = {}  # of the copies of tables, as they were written
-    tables: dict[str, tuple[TableRecord, ...]] | None = None  # last two of each result; None in older versions
+    tables: dict[str, tuple[files.TableRecord, ...]] | None = None  # last two of each result; None in older versions
 
 
 def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: FolderKind = SWEEP) -> None:
     """Make the folder and write the plan into it. Raises OutputExistsError when something else is there."""
     head = f"{kind.head.decode()}{name}. To run it again: {kind.command}\n"
-    tables, plan = read_tables(base), base.sweep
+    tables, plan = files.read_tables(base), base.sweep
     sums = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
-    make_folder(folder)
-    with brief_lock(folder):
+    files.make_folder(folder)
+    with files.brief_lock(folder):
         try:
             _make_free(folder, head.encode(), tables, kind, overwrite=overwrite)
         except OSError as error:
             raise OutputExistsError(f"{folder}: cannot be created: {error.strerror}") from error
-        keep_scenario(base, tables, folder, kind.plan, head)
+        files.keep_scenario(base, tables, folder, kind.plan, head)
         known = read_origin(folder, kind)  # whoever continues with a study did not begin it
         if known is None or known.sha256 != sums:
             origin = known or Origin(
@@ -141,7 +127,7 @@ def read_origin(folder: Path, kind: FolderKind = SWEEP) -> Origin | None:
 
 def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: FolderKind, *, overwrite: bool) -> None:
     """Raise OutputExistsError where the folder is not free; with `overwrite` remove what an older study has written."""
-    present = [path for path in sorted(folder.iterdir()) if not is_leftover(path.name, (kind.plan,))]
+    present = [path for path in sorted(folder.iterdir()) if not files.is_leftover(path.name, (kind.plan,))]
     if not present:
         return
     if not is_resolved(folder / kind.plan) or input_files.read_head(folder / kind.plan, len(kind.head)) != kind.head:
@@ -153,10 +139,10 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
     for path in present if overwrite else ():
         if path.suffix == ".jsonl" and kind.is_ours(path):
             with input_files.open_regular(path) as file:
-                if not takes_lock(file.fileno()):
+                if not files.takes_lock(file.fileno()):
                     how = "wait for it, or write elsewhere with --out DIR"
                     raise OutputExistsError(f"{folder}: {kind.what} is running here; {how}")
-    refuse_foreign_copies(tables, folder, kind.plan)
+    files.refuse_foreign_copies(tables, folder, kind.plan)
     changed = _refuse_foreign(present, kind, overwrite=overwrite)
     if overwrite:  # whatever else lies there stays
         for path in {*changed, *(one for one in folder.iterdir() if one.name != kind.plan and kind.is_ours(one))}:
@@ -164,7 +150,7 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
         cases = folder / CASES
         if cases.is_dir() and not cases.is_symlink():
             for case in cases.iterdir():
-                remove_run(case)
+                files.remove_run(case)
             with suppress(OSError):  # not empty
                 cases.rmdir()
 
@@ -178,7 +164,7 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
     changed = [path for path in present if kind.kind_of(path.name) and not kind.is_ours(path)]
     told = []
     for path in changed:
-        added = columns_added(path, kind.records_of(path) or ())  # None: it is no table of the study any more
+        added = files.columns_added(path, kind.records_of(path) or ())  # None: it is no table of the study any more
         shown = spelling.list_names([repr(name[:LONGEST_NAME]) for name in added or ()], MOST_SHOWN)
         which = f" (columns added: {shown})" if added else ""
         text = f"{path}: changed since {whose} wrote it{which}; "
@@ -197,13 +183,13 @@ def note_table(path: Path, written: Path, kind: FolderKind) -> None:
     Shards have one summary in common, so nobody else writes it meanwhile. Raises OutputError, and OutputExistsError
     where somebody has changed the table since it was written.
     """
-    with brief_lock(path.parent):
+    with files.brief_lock(path.parent):
         origin = read_origin(path.parent, kind)
         if origin is None:
             return
         is_there = path.exists() or path.is_symlink()
         _refuse_foreign([path] if is_there else [], kind)
-        holds = tuple(TableRecord.of(one) for one in ([path, written] if is_there else [written]))
+        holds = tuple(files.TableRecord.of(one) for one in ([path, written] if is_there else [written]))
         noted = origin.model_copy(update={"tables": {**(origin.tables or {}), path.name: holds}})
         kept = json.loads(input_files.read_limited(path.parent / kind.origin, input_files.MEGABYTE))
         data = {**kept, "tables": noted.model_dump(mode="json")["tables"]}

@@ -15,8 +15,7 @@ from os import _exit
 from typing import Any, NamedTuple
 
 from blocksim.simulation import provenance, stopping
-from blocksim.study.executors import Batch, BatchSize, Run, Setting, Task, take
-from blocksim.study.executors.ensemble import BatchResult, run_batch
+from blocksim.study.executors import Batch, BatchSize, Run, Setting, Task, ensemble, take
 from blocksim.study.rows import Row
 
 AHEAD = 2  # batches a process: it need not wait for the next one
@@ -160,7 +159,7 @@ def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, 
     """Run tasks one after the other in this process, as a worker does. Raises KeyboardInterrupt on Ctrl-C."""
     for task in tasks:
         folders = setting.folders([task])
-        yield Batch((task,), *run_batch([task.scenario], folders, provenance.code_hash(), peaks=setting.peaks))
+        yield Batch((task,), *ensemble.run_batch([task.scenario], folders, provenance.code_hash(), peaks=setting.peaks))
 
 
 class Work:
@@ -170,7 +169,7 @@ class Work:
         """Begin nothing yet."""
         self.tasks, self.setting = tasks, setting
         self.size = BatchSize()
-        self.pending: dict[Future[BatchResult], Job] = {}
+        self.pending: dict[Future[ensemble.BatchResult], Job] = {}
         self.suspects: deque[Job] = deque()
         self.is_done = False
 
@@ -181,7 +180,7 @@ class Work:
             while (job := self._next()) is not None:
                 scenarios, folders = [task.scenario for task in job.tasks], self.setting.folders(job.tasks)
                 try:
-                    self.pending[pool.submit(run_batch, scenarios, folders, code, peaks=peaks)] = job
+                    self.pending[pool.submit(ensemble.run_batch, scenarios, folders, code, peaks=peaks)] = job
                 except BrokenProcessPool:  # it died before it got the job
                     self.suspects.append(job)
                     raise
@@ -203,7 +202,7 @@ class Work:
         tasks = take(self.tasks, self.size.count, self.setting.is_stopped)
         return Job(tasks) if tasks else None
 
-    def _ended(self, future: Future[BatchResult]) -> Batch:
+    def _ended(self, future: Future[ensemble.BatchResult]) -> Batch:
         rows, seconds, host = future.result()
         tasks = self.pending.pop(future).tasks
         self.size.measured(len(tasks), seconds)
