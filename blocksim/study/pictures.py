@@ -17,7 +17,7 @@ from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, load_scenario, load_stored
 from blocksim.scenario import units as q
 from blocksim.scenario.input_files import Cell, raise_problems, read_table
-from blocksim.scenario.models.study import Normal, Uniform
+from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.scenario.overrides import field_of, si_unit
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.units import TIME, Quantity
@@ -27,7 +27,7 @@ from blocksim.simulation.folder import refuse_foreign
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study.compare import ExperimentTablePath
 from blocksim.study.manifest import is_sweep, read_sweep
-from blocksim.study.rows import FINISHED, NUMBERS, TABLE, Head, Ranges, blocks_in, quarter_turns
+from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
 from blocksim.study.stored_run import Place, find_run, folder_of, load_stored_run
 from blocksim.study.study import draw_study, study_in
 from blocksim.study.sweep_folder import PLAN
@@ -45,7 +45,7 @@ from blocksim.view.time_panels import draw_probes, draw_support_motion
 if TYPE_CHECKING:
     import pandas as pd
 
-    from blocksim.study.converge import Convergence, RefinementStudy
+    from blocksim.study.converge import Convergence
 
 
 Floats = NDArray[np.float64]
@@ -115,38 +115,28 @@ def _inputs(scenario: Scenario, table: "pd.DataFrame") -> tuple[Input, ...]:
     if missing or not heads:
         message = f"{TABLE} has no column {missing[0]}" if missing else f"{PLAN} varies no key"
         raise InvalidInputError(f"{message}; table and plan do not belong together")
-    inputs = [_input(scenario, head, table[str(head)]) for head in heads]
-    varied = [one for one in inputs if one.count > 1]
-    return tuple(varied or inputs[:1])
+    inputs = [_input(scenario, head, table[str(head)], vary[head.key]) for head in heads]
+    return tuple([one for one in inputs if one.count > 1] or inputs[:1])
 
 
-def _input(scenario: Scenario, head: Head, column: "pd.Series") -> Input:
-    key = head.key
-    numbers = column.to_list() if column.dtype.kind in NUMBERS else [*map(_number, column)]
-    known = np.array([number for number in numbers if number is not None], dtype=np.float64)
-    values = known * head.si(1.0)
+def _input(scenario: Scenario, head: Head, column: "pd.Series", vary: Variation) -> Input:
+    """Return the values of a key in SI, or the numbers of its words; in the table they stand as they were given."""
+    numbers = []
+    for value in column:
+        for read in (float, lambda text: q.parse_quantity(text, q.NUMBER)[0]):
+            with suppress(ValueError):
+                numbers.append(read(str(value)))
+                break
+    values = np.array(numbers, dtype=np.float64) * head.si(1.0)
     if not (np.abs(values) <= LARGEST).all():
-        raise InvalidInputError(f"{TABLE}: the column {key} holds values that are not numbers or too large")
-    if len(values) == len(numbers):
+        raise InvalidInputError(f"{TABLE}: the column {head.key} holds values that are not numbers or too large")
+    if len(values) == len(column):
         typed = InputUnit(head.unit, head.si(1.0)) if head.unit else None
-        vary = scenario.sweep.vary[key] if scenario.sweep is not None else ()
         is_even = isinstance(vary, Normal) or (isinstance(vary, Uniform) and vary.scale == "linear")
-        return Input(key, unit_of(scenario, key) or head.si_unit, values, is_even=is_even, typed=typed)
+        return Input(head.key, unit_of(scenario, head.key) or head.si_unit, values, is_even=is_even, typed=typed)
     words = [q.toml(value).strip('"') for value in column]
     levels = tuple(dict.fromkeys(words))
-    return Input(key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)
-
-
-def _number(value: object) -> float | None:
-    """Return a value in SI, None for a word; in the table of a sweep it stands as it was given."""
-    try:
-        return float(str(value))
-    except ValueError:
-        pass
-    try:
-        return q.parse_quantity(str(value), q.NUMBER)[0]
-    except ValueError:
-        return None
+    return Input(head.key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)
 
 
 def unit_of(scenario: Scenario, key: str) -> str:
@@ -180,30 +170,14 @@ METHODS = (
 )
 
 
-def accept_any_path(_: Path) -> None:
-    """Accept any place for a picture."""
-
-
-def draw_indices(
-    table: Path,
-    path: Path | None = None,
-    kind: str | None = None,
-    paper: Paper = OWN,
-    *,
-    ready: Callable[[Path], None] = accept_any_path,
-) -> Path:
-    """Draw the table of a sensitivity study; return the picture's path (default: that of the table, as PNG).
-
-    `ready` is asked as in `draw_sweep`.
-    Raises what `read_indices` raises, InvalidInputError for an unknown picture format or another kind, OutputError.
-    """
-    if kind not in {None, TORNADO}:
-        message = f"{table}: a table of indices is drawn as {TORNADO!r}, not as {kind!r}"
+def _draw_indices(table: Path, options: "PlotOptions") -> Path:
+    """Draw the table of a sensitivity study. Raises what reading and drawing it raise, and for another kind."""
+    if options.kind not in {None, TORNADO}:
+        message = f"{table}: a table of indices is drawn as {TORNADO!r}, not as {options.kind!r}"
         raise InvalidInputError(message)
     panels, labels = read_indices(table)
-    path = path or Path(f"{table.stem}.png")
-    ready(path)
-    draw_tornado(panels, labels, path, title="Which inputs matter", paper=paper)
+    path = options.picture(f"{table.stem}.png")
+    draw_tornado(panels, labels, path, title="Which inputs matter", paper=options.paper)
     return path
 
 
@@ -247,22 +221,16 @@ def _read(cell: Cell, problems: list[Problem]) -> str | float:
         return 0.0
 
 
-LOOKS = {  # options of the pictures of runs, by field: their flag, and what they do
-    "times": ("--at", "selects frames of a run's strip, final picture or profile"),
-    "frames": ("--frames", "sets the number of panels of a run's strip"),
-    "panels": ("--panels", "selects the panels of a run's history"),
-    "blocks": ("--block", "selects the blocks of a run's history"),
-    "relative": ("--relative", "plots a run's history relative to the ground"),
-    "probes": ("--probe", "selects the probes of a run"),
-    "forces": ("--forces", "shows contacts of a run"),
-    "colour": ("--colour", "colours the blocks of a run"),
-}
-MEANT = {  # the kinds that have them
-    STRIP: ("times", "frames", "forces", "colour"),
-    FINAL: ("times", "forces", "colour"),
-    PROFILE: ("times", "forces", "colour"),
-    HISTORY: ("panels", "blocks", "relative", "forces", "colour"),
-    PROBE: ("probes",),
+OF_SCENES = (STRIP, FINAL, PROFILE)
+LOOKS = {  # options of the pictures of runs, by field: their flag, what they do, and the kinds that have them
+    "times": ("--at", "selects frames of a run's strip, final picture or profile", OF_SCENES),
+    "frames": ("--frames", "sets the number of panels of a run's strip", (STRIP,)),
+    "panels": ("--panels", "selects the panels of a run's history", (HISTORY,)),
+    "blocks": ("--block", "selects the blocks of a run's history", (HISTORY,)),
+    "relative": ("--relative", "plots a run's history relative to the ground", (HISTORY,)),
+    "probes": ("--probe", "selects the probes of a run", (PROBE,)),
+    "forces": ("--forces", "shows contacts of a run", (*OF_SCENES, HISTORY)),
+    "colour": ("--colour", "colours the blocks of a run", (*OF_SCENES, HISTORY)),
 }
 MOST_SHOWN = 40  # letters of a value in a message
 
@@ -277,16 +245,16 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _moments(text: str) -> tuple[float, ...]:
     """Return times in s, separated by commas, with or without their unit. Raises ValueError."""
-    return tuple(map(_seconds, text.split(",")))
-
-
-def _seconds(text: str) -> float:
-    with suppress(ValueError):
-        return float(text)
-    with suppress(ValueError):
-        return Quantity(TIME, above=0.0).read(text)
-    example = "give seconds, separated by commas, such as 0,0.1,0.355 or '20 ms'"
-    raise ValueError(f"{text.strip()[:MOST_SHOWN]!r} is not a time; {example}")
+    times = []
+    for part in text.split(","):
+        for read in (float, Quantity(TIME, above=0.0).read):
+            with suppress(ValueError):
+                times.append(read(part))
+                break
+        else:
+            example = "give seconds, separated by commas, such as 0,0.1,0.355 or '20 ms'"
+            raise ValueError(f"{part.strip()[:MOST_SHOWN]!r} is not a time; {example}")
+    return tuple(times)
 
 
 def _colour(text: str) -> str:
@@ -364,19 +332,18 @@ class PlotOptions(PageOptions):
 
     def refuse(self, kind: str | None, what: str) -> None:
         """Raise InvalidInputError for an option that was given and means nothing for a kind of picture."""
-        for name, (flag, meaning) in LOOKS.items():
-            if name not in MEANT.get(kind or "", ()) and getattr(self, name) != getattr(PlotOptions, name):
+        for name, (flag, meaning, kinds) in LOOKS.items():
+            if kind not in kinds and getattr(self, name) != getattr(PlotOptions, name):
                 raise InvalidInputError(f"{flag} {meaning}, but {what}")
 
     def picture(self, default: str) -> Path:
-        """Return the path of the picture. Raises OutputExistsError, OutputError where it may not go there."""
-        path = Path(self.out or default)
-        self.ready(path)
-        return path
+        """Return the path of the picture.
 
-    def ready(self, path: Path) -> None:
-        """Raise OutputExistsError, OutputError where a picture may not be written."""
+        Raises InvalidInputError for an unknown format, OutputExistsError, OutputError where it may not go there.
+        """
+        path = picture_path(self.out or default)
         refuse_foreign(path, overwrite=self.overwrite)
+        return path
 
     @property
     def table(self) -> Path | None:
@@ -384,19 +351,24 @@ class PlotOptions(PageOptions):
         return None if self.experiment is None else Path(self.experiment)
 
 
-def draw_run(run: Path, options: PlotOptions, kind: str) -> tuple[Path, str]:
-    """Draw a run; return the picture's path (default: NAME.png or NAME_KIND.png) and a remark on an unfinished run.
+def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
+    """Draw a run, or its probes; return the picture's path and a remark on an unfinished run.
 
-    Raises InvalidInputError for an unknown kind or format and options that mean nothing for it, what `stored_run`
-    and `PlotOptions.picture` raise, OutputError.
+    The path is by default NAME.png or NAME_KIND.png. Raises InvalidInputError for an unknown kind or format and options
+    that mean nothing for it, what `stored_run` and `PlotOptions.picture` raise, OutputError.
     """
-    draw = run_kind(kind)
+    kind = options.kind or STRIP
+    draw = None if kind == PROBE else run_kind(kind)
     options.refuse(kind, f"this picture is of kind {kind}")
     stored = load_stored_run(run)
     scenario = stored.scenario
     table = options.table or (scenario.experiment.table if scenario.experiment is not None else None)
-    measured = None if table is None else load_table(table)
+    measured = None if table is None or draw is None else load_table(table)
     picture = options.picture(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
+    if draw is None:
+        probes = read_probes(stored.folder / files.FRAMES, scenario)
+        draw_probes(probes, picture, f"{scenario.name}: probes", tuple(options.probes or ()), options.paper)
+        return picture, stored.remark
     chosen: dict[str, Any] = {"times": options.times}
     if kind == HISTORY:
         names = tuple(options.panels or ()), tuple(options.blocks or ())
@@ -417,23 +389,12 @@ def draw_run(run: Path, options: PlotOptions, kind: str) -> tuple[Path, str]:
     return picture, stored.remark
 
 
-def draw_probes_of(place: Path, options: PlotOptions) -> tuple[Path, str]:
-    """Draw the probes of a run, all or those that are named; return as `draw_run`.
-
-    Raises what `stored_run`, reading the probes and `draw_probes` raise.
-    """
-    stored = load_stored_run(place)
-    picture = options.picture(f"{stored.scenario.name}_{PROBE}.png")
-    probes = read_probes(stored.folder / files.FRAMES, stored.scenario)
-    draw_probes(probes, picture, f"{stored.scenario.name}: probes", tuple(options.probes or ()), options.paper)
-    return picture, stored.remark
-
-
-def draw_motion_of(place: Path, options: PlotOptions) -> Path:
+def _draw_motion(place: Path, options: PlotOptions) -> Path:
     """Draw how the supports of a run or of a scenario file move, which need not have been run; return the picture.
 
     Raises what loading the scenario and `draw_support_motion` raise.
     """
+    options.refuse(MOTION, f"this picture is of kind {MOTION}")
     if place.is_file():
         scenario = load_scenario(place)
     else:
@@ -510,11 +471,26 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, pape
     Raises InvalidInputError for an unknown picture format or too small a page, and OutputError when the file cannot be
     written.
     """
-    panels = [
-        _panel(result, study, unit_of(scenario, study.key))
-        for study in result.studies
-        if sum(level.is_finished for level in study.levels) >= FEWEST_LEVELS
-    ]
+    panels = []
+    for study in result.studies:
+        levels = [level for level in study.levels if level.is_finished]
+        if len(levels) < FEWEST_LEVELS:
+            continue
+        x, unit = np.array([level.x_mm for level in levels]), unit_of(scenario, study.key)
+        panels.append(
+            Panel(
+                title=study.title,
+                key=f"{study.key} ({unit})" if unit else study.key,
+                verdict=study.verdict.value,
+                values=np.array([level.value for level in levels]),
+                blocks=result.blocks,
+                off_mm=np.abs(x - x[-1]),
+                largest_off_mm=np.array([level.to_finest_mm for level in levels]),
+                tolerance_mm=result.tolerance_mm,
+                own=study.own.value,
+                recommended=None if study.recommended is None else study.recommended.value,
+            )
+        )
     if panels:
         table = None if scenario.experiment is None else load_table(scenario.experiment.table)
         rows = [] if table is None else [row for row in table.summaries() if row.quantity == "x"]
@@ -523,54 +499,26 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, pape
     return bool(panels)
 
 
-def draw_sweep(
-    folder: Path,
-    path: Path | None = None,
-    experiment: Path | None = None,
-    kind: str | None = None,
-    paper: Paper = OWN,
-    *,
-    ready: Callable[[Path], None] = accept_any_path,
-) -> Path:
+def _draw_sweep(folder: Path, options: PlotOptions) -> Path:
     """Draw a sweep, by default as the kind that suits it; return the picture's path (default: NAME.png).
-
-    `ready` is asked about the path before anything is drawn; it raises where no picture may go there.
 
     Raises what `read_sweep_data` raises, InvalidInputError for an unknown picture format or kind and for one that
     cannot show this sweep, OutputError.
     """
+    kind = options.kind
     if kind == TORNADO:
         message = f"a {TORNADO} is drawn from a table of indices: blocksim sensitivity SCENARIO --out TABLE.csv"
         raise InvalidInputError(message)
     if kind is not None and kind not in SWEEP_KINDS:
         message = f"--kind {kind}: unknown kind, {did_you_mean_or_list(kind, [*SWEEP_KINDS, TORNADO])}"
         raise InvalidInputError(message)
-    found = read_sweep_data(folder, experiment)
+    found = read_sweep_data(folder, options.table)
     chosen = kind_for(found) if kind is None else SWEEP_KINDS[kind]
     if kind is not None and (reason := chosen.refusal(found)):
         raise InvalidInputError(f"{folder}: {reason}")
-    path = path or Path(f"{load_stored(folder / PLAN).name}.png")
-    picture_path(path)
-    ready(path)
-    chosen.draw(found, path, paper)
+    path = options.picture(f"{load_stored(folder / PLAN).name}.png")
+    chosen.draw(found, path, options.paper)
     return path
-
-
-def _panel(result: "Convergence", study: "RefinementStudy", unit: str) -> Panel:
-    levels = [level for level in study.levels if level.is_finished]
-    x = np.array([level.x_mm for level in levels])
-    return Panel(
-        title=study.title,
-        key=f"{study.key} ({unit})" if unit else study.key,
-        verdict=study.verdict.value,
-        values=np.array([level.value for level in levels]),
-        blocks=result.blocks,
-        off_mm=np.abs(x - x[-1]),
-        largest_off_mm=np.array([level.to_finest_mm for level in levels]),
-        tolerance_mm=result.tolerance_mm,
-        own=study.own.value,
-        recommended=None if study.recommended is None else study.recommended.value,
-    )
 
 
 @takes(PlotOptions)
@@ -590,19 +538,14 @@ def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
     if not place.exists():
         message = f"{place}: no such run folder, sweep folder, table or scenario file"
         raise InputMissingError(message)
-    out = None if options.out is None else Path(options.out)
-    kind, paper, ready = options.kind, options.paper, options.ready
     study = study_in(place)
     if study is not None:
         options.refuse(None, f"{place} is {study.answer.files.what}")
-        return draw_study(place, study, out, kind, paper, ready, options.table), ""
+        return draw_study(place, study, options), ""
     if is_sweep(place):
         options.refuse(None, f"{place} is a sweep")
-        return draw_sweep(place, out, options.table, kind, paper, ready=ready), ""
+        return _draw_sweep(place, options), ""
     if place.suffix.lower() == ".csv":
         options.refuse(None, f"{place} is a table")
-        return draw_indices(place, out, kind, paper, ready=ready), ""
-    if kind in {MOTION, PROBE}:
-        options.refuse(kind, f"this picture is of kind {kind}")
-        return (draw_motion_of(place, options), "") if kind == MOTION else draw_probes_of(place, options)
-    return draw_run(place, options, kind or STRIP)
+        return _draw_indices(place, options), ""
+    return (_draw_motion(place, options), "") if options.kind == MOTION else _draw_run(place, options)

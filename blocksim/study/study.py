@@ -15,9 +15,10 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import load_stored
 from blocksim.study.answer import Answer
 from blocksim.view.report.subjects import StudyPage
-from blocksim.view.style import OWN, Paper, picture_path
+from blocksim.view.style import OWN
 
 if TYPE_CHECKING:
+    from blocksim.study.pictures import PlotOptions
     from blocksim.study.runs import Replay
 
 STUDIES = {
@@ -48,35 +49,24 @@ def study_named(name: str) -> Study:
     return getattr(import_module(module), kind)  # type: ignore[no-any-return]
 
 
-def draw_study(
-    folder: Path,
-    study: Study,
-    path: Path | None,
-    picture: str | None,
-    paper: Paper,
-    ready: Callable[[Path], None],
-    published: Path | None = None,
-) -> Path:
+def draw_study(folder: Path, study: Study, options: "PlotOptions") -> Path:
     """Draw a study; return the picture's path (default: NAME_KIND.png).
 
-    `ready` is asked about the path first; `published` is a table of others to draw beside it. Raises InvalidInputError
-    for another kind of picture, an unknown format, a table for another study and what cannot be read,
-    InputMissingError, OutputError.
+    `options.table` is one of others to draw beside it. Raises InvalidInputError for another kind of picture, an unknown
+    format, a table for another study and what cannot be read, InputMissingError, OutputExistsError, OutputError.
     """
-    kind = study.answer
-    if picture not in {None, kind.picture}:
-        message = f"{folder}: {kind.files.what} is drawn as {kind.picture!r}, not as {picture!r}"
+    kind, published = study.answer, options.table
+    if options.kind not in {None, kind.picture}:
+        message = f"{folder}: {kind.files.what} is drawn as {kind.picture!r}, not as {options.kind!r}"
         raise InvalidInputError(message)
     if published is not None and not kind.takes_table:
         takers = [one.files.what for one in (study_named(name).answer for name in STUDIES) if one.takes_table]
         message = f"{published}: a table is drawn beside {takers[0]} only, and {folder} is {kind.files.what}"
         raise InvalidInputError(message)
     scenario = load_stored(folder / kind.files.plan)
-    path = path or Path(f"{scenario.name}_{kind.picture}.png")
-    picture_path(path)
-    ready(path)
+    path = options.picture(f"{scenario.name}_{kind.picture}.png")
     answer = kind.read(folder).model_copy(update={"beside": published})
-    answer.draw(path, scenario.description or scenario.name, paper)
+    answer.draw(path, scenario.description or scenario.name, options.paper)
     return path
 
 

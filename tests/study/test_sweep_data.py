@@ -7,7 +7,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document, Scenario
-from blocksim.study.pictures import draw_sweep, read_sweep_data, unit_of
+from blocksim.study.pictures import plot, read_sweep_data, unit_of
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_folder import prepare
@@ -49,7 +49,7 @@ def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) ->
     assert [(one.unit, one.typed and one.typed.unit) for one in (overlap, tilt)] == [("m", "cm"), ("rad", "rad")]
     assert overlap.label(0.009) == "0.9 cm"
     for kind, second in (("map", "ground.tilt (rad)"), ("lines", "ground.tilt = 0.01 rad")):
-        draw_sweep(folder, tmp_path / f"{kind}.svg", kind=kind)
+        plot(folder, tmp_path / f"{kind}.svg", kind=kind)
         drawn = (tmp_path / f"{kind}.svg").read_text()
         assert "<!-- structures.0.overlap (cm) -->" in drawn
         assert f"<!-- {second} -->" in drawn
