@@ -125,18 +125,14 @@ def takes(
 
         for name in ("__module__", "__name__", "__qualname__"):
             setattr(call, name, getattr(function, name))
-        call.__doc__ = f"{inspect.cleandoc(function.__doc__ or '')}\n\n{_described(options)}"
+        name = getattr(options, "__name__", "")
+        lines = [inspect.cleandoc(function.__doc__ or ""), "", f"All of these at once: {name}(...).", "Options:"]
+        for field in option_fields(options):
+            if field.option is not None:
+                text = f"{field.name}: {field.option.python or field.option.help}"
+                lines += textwrap.wrap(text, WIDTH, initial_indent="    ", subsequent_indent="        ")
+        call.__doc__ = "\n".join(lines)
         call.__signature__ = signature  # type: ignore[attr-defined]
         return call
 
     return decorate
-
-
-def _described(options: Any) -> str:
-    """Return a paragraph about each option."""
-    lines = [f"All of these at once: {options.__name__}(...).", "Options:"]
-    for field in option_fields(options):
-        if field.option is not None:
-            text = f"{field.name}: {field.option.python or field.option.help}"
-            lines += textwrap.wrap(text, WIDTH, initial_indent="    ", subsequent_indent="        ")
-    return "\n".join(lines)

@@ -78,19 +78,15 @@ def _tell_trouble(error: OSError) -> ExitCode:
         abandon(sys.stdout)
         return ExitCode.INPUT_OUTPUT
     if error.errno in PATH_TROUBLE and error.filename is not None:
-        note(f"{_shortened(error.filename)}: cannot be reached: {error.strerror}")
+        name = "".join(c if c.isprintable() else "\ufffd" for c in str(error.filename))
+        name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}…"
+        note(f"{name}: cannot be reached: {error.strerror}")
         return ExitCode.INPUT_OUTPUT
     if error.errno not in DISK_TROUBLE:
         raise error
     note(f"{error.filename or 'the answer'}: cannot be written: {error.strerror}")
     abandon(sys.stdout)
     return ExitCode.INPUT_OUTPUT
-
-
-def _shortened(name: object) -> str:
-    """Return a name for a line of a message."""
-    text = "".join(c if c.isprintable() else "\ufffd" for c in str(name))
-    return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}…"
 
 
 def report_internal_error(error: Exception) -> None:
@@ -153,7 +149,10 @@ class CommandGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
         """Import the command that the user named."""
         name, command, rest = super().resolve_command(ctx, args)
-        _refuse_no_folder()
+        try:
+            Path.cwd()  # where it was removed, no path could be shown or written
+        except OSError:
+            raise InputMissingError("the current folder no longer exists; change to another one with cd") from None
         return name, load_command(name) if name in COMMANDS else command, rest
 
     def invoke(self, ctx: Any) -> Any:
@@ -162,26 +161,14 @@ class CommandGroup(TyperGroup):
             try:
                 return super().invoke(ctx)
             except UsageError as error:
-                error.message += _quoting_hint(error.message)
+                match = re.fullmatch(r"Got unexpected extra argument\w*(?:\(s\))? \((\S+)\)", error.message)
+                if match is not None:  # the shell may have taken a unit for an argument
+                    from blocksim.scenario.units import unit_in
+
+                    error.message += (
+                        f'; quote a value that has a unit: "KEY=10 {match[1]}"' if unit_in(f"1 {match[1]}") else ""
+                    )
                 raise
-
-
-def _quoting_hint(message: str) -> str:
-    """Return how to quote a value where the shell took its unit for an argument; empty otherwise."""
-    found = re.fullmatch(r"Got unexpected extra argument\w*(?:\(s\))? \((\S+)\)", message)
-    if found is None:
-        return ""
-    from blocksim.scenario.units import unit_in
-
-    return f'; quote a value that has a unit: "KEY=10 {found[1]}"' if unit_in(f"1 {found[1]}") else ""
-
-
-def _refuse_no_folder() -> None:
-    """Raise InputMissingError where the current folder was removed: no path could be shown or written."""
-    try:
-        Path.cwd()
-    except OSError:
-        raise InputMissingError("the current folder no longer exists; change to another one with cd") from None
 
 
 def function_of(name: str) -> Any:

@@ -76,8 +76,9 @@ def table_lines(columns: Sequence[str], rows: Iterable[Sequence[str]], left: int
         excess -= cut
 
     def line(row: Sequence[str]) -> str:
-        texts = (_fitted(text, width).ljust(width) for text, width in zip(row[:left], widths, strict=False))
-        numbers = (text.rjust(width) for text, width in zip(row[left:], widths[left:], strict=True))
+        cut = [text if len(text) <= width else f"{text[: width - 1]}…" for text, width in zip(row, widths, strict=True)]
+        texts = (text.ljust(width) for text, width in zip(cut[:left], widths, strict=False))
+        numbers = (text.rjust(width) for text, width in zip(cut[left:], widths[left:], strict=True))
         return GAP.join((*texts, *numbers)).rstrip()
 
     return [line(columns), GAP.join("─" * width for width in widths), *map(line, cells)]
@@ -91,10 +92,6 @@ def grouped_lines(
     head, rule, *lines = table_lines(columns, [row for _, rows in groups for row in rows], left)
     left_over = iter(lines)
     return [head, rule, *(line for name, rows in groups for line in (name, *islice(left_over, len(rows))))]
-
-
-def _fitted(text: str, width: int) -> str:
-    return text if len(text) <= width else text[: width - 1] + "…"
 
 
 def number(value: float, digits: int = 2) -> str:

@@ -34,15 +34,16 @@ class Table(NamedTuple):
 
     def texts(self) -> list[list[str]]:
         """Return the cells of all rows: fixed digits, no minus sign on zero, a dash where there is no number."""
-        return [[self._text(cell) for cell in row] for row in self.rows]
+        digits = self.digits
+        return [[number_text(cell, digits) if isinstance(cell, float) else cell for cell in row] for row in self.rows]
 
-    def _text(self, cell: str | float) -> str:
-        if not isinstance(cell, float):
-            return str(cell)
-        if not math.isfinite(cell):
-            return "–"
-        text = f"{cell:.{self.digits}f}"
-        return text[1:] if text.startswith("-") and not text.strip("-0.") else text
+
+def number_text(number: float, digits: int) -> str:
+    """Return a number with fixed digits, without a minus sign on zero; a dash where there is none."""
+    if not math.isfinite(number):
+        return "–"
+    text = f"{number:.{digits}f}"
+    return text[1:] if text.startswith("-") and not text.strip("-0.") else text
 
 
 class Answer(BaseModel, frozen=True):

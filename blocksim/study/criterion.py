@@ -11,14 +11,14 @@ zero (`start.settle`) falls.
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import units as q
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.simulation.observables import MOVES_ON, OBSERVABLES, Observable
+from blocksim.simulation.observables import MOVES_ON, OBSERVABLES
 from blocksim.simulation.result import NOT_AT_REST
 from blocksim.study.rows import FINISHED
 
@@ -34,8 +34,9 @@ UNITS = {  # of observables: kind, units in one of SI
     "s": (q.TIME, 1.0),
     "": (q.NUMBER, 1.0),
 }
-BELOW: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, "<=": operator.le}
-ABOVE: dict[str, Callable[[float, float], bool]] = {">": operator.gt, ">=": operator.ge}
+COMPARISONS: dict[str, Callable[[float, float], bool]] = {
+    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge
+}  # fmt: skip
 
 
 class Verdict(StrEnum):
@@ -77,57 +78,42 @@ def falls_before_zero(row: Mapping[str, object]) -> bool:
 
 def read_criterion(text: str, option: str = STANDS) -> Criterion:
     """Read conditions given to an option. Raises InvalidInputError for anything else, with what may be written."""
-    parts = text.split(",")
-    try:
-        return Criterion(text, tuple(_condition(part) for part in parts), _least_moved(parts))
-    except InvalidInputError as error:
-        message = f"{option} {error}"
-        raise InvalidInputError(message) from None
+    conditions, ways = [], []
+    for part in text.split(","):
+        try:
+            condition, way = _condition(part)
+        except ValueError as error:
+            message = f"{option} {part.strip() or '(empty)'}: {error}"
+            raise InvalidInputError(message) from None
+        conditions.append(condition)
+        ways += way
+    return Criterion(text, tuple(conditions), min(ways, default=None))
 
 
-def _least_moved(parts: Iterable[str]) -> float | None:
-    """Return the least displacement (m) that conditions name which have been read."""
-    found = (FORM.fullmatch(part) for part in parts)
-    ways = (q.parse_quantity(one[3], q.LENGTH)[0] for one in found if one is not None and one[1] == MOVED)
-    return min(ways, default=None)
-
-
-def _condition(text: str) -> Callable[[Mapping[str, object]], bool]:
-    found = FORM.fullmatch(text)
-    if found is None:
-        raise _mistake(text, 'write for example "moved < 5 mm" or "outcome != fell"')
-    word, sign, value = found[1], found[2].replace("==", "="), found[3]
+def _condition(text: str) -> tuple[Callable[[Mapping[str, object]], bool], list[float]]:
+    """Return a condition, and the displacement (m) that it names if it does. Raises ValueError."""
+    match = FORM.fullmatch(text)
+    if match is None:
+        raise ValueError('write for example "moved < 5 mm" or "outcome != fell"')
+    word, sign, value = match[1], match[2].replace("==", "="), match[3]
     known = {one.word: one for one in OBSERVABLES.values() if one.word}
     if word not in known:
-        raise _mistake(text, f"unknown quantity '{word}', {did_you_mean_or_list(word, known)}")
-    return (_choice if known[word].choices else _number)(text, known[word], sign, value)
-
-
-def _choice(text: str, of: Observable, sign: str, value: str) -> Callable[[Mapping[str, object]], bool]:
-    named, known = {part.strip() for part in value.split("|")}, set(of.choices)
-    unknown = sorted(named - known)
-    if unknown:
-        raise _mistake(text, f"unknown {of.word} '{unknown[0]}', {did_you_mean_or_list(unknown[0], sorted(known))}")
-    if sign not in ("=", "!="):
-        raise _mistake(text, f"an {of.word} is compared with = or !=")
-    allowed = named if sign == "=" else known - named
-    return lambda row: row[of.name] in allowed
-
-
-def _number(text: str, of: Observable, sign: str, value: str) -> Callable[[Mapping[str, object]], bool]:
-    kind, units = UNITS[of.unit]
-    compare = {**BELOW, **ABOVE}.get(sign)
+        raise ValueError(f"unknown quantity '{word}', {did_you_mean_or_list(word, known)}")
+    name = known[word].name
+    if choices := set(known[word].choices):
+        named = {part.strip() for part in value.split("|")}
+        if unknown := sorted(named - choices):
+            raise ValueError(f"unknown {word} '{unknown[0]}', {did_you_mean_or_list(unknown[0], sorted(choices))}")
+        if sign not in ("=", "!="):
+            raise ValueError(f"an {word} is compared with = or !=")
+        allowed = named if sign == "=" else choices - named
+        return lambda row: row[name] in allowed, []
+    kind, units = UNITS[known[word].unit]
+    compare = COMPARISONS.get(sign)
     if compare is None:
-        raise _mistake(text, f"{of.word} is compared with <, <=, > or >=")
-    try:
-        number, dimension = q.parse_quantity(value, kind)
-    except ValueError as error:
-        raise _mistake(text, str(error)) from None
+        raise ValueError(f"{word} is compared with <, <=, > or >=")
+    number, dimension = q.parse_quantity(value, kind)
     if dimension != kind.dimension:
-        raise _mistake(text, f'{kind.name} is needed, such as "{kind.example}"')
+        raise ValueError(f'{kind.name} is needed, such as "{kind.example}"')
     limit = number * units
-    return lambda row: compare(float(str(row[of.name])), limit)
-
-
-def _mistake(text: str, why: str) -> InvalidInputError:
-    return InvalidInputError(f"{text.strip() or '(empty)'}: {why}")
+    return lambda row: compare(float(str(row[name])), limit), [number] if word == MOVED else []

@@ -271,7 +271,7 @@ def with_sides(answer: LimitAnswer) -> LimitAnswer:
     plan = answer.plan
     assert plan is not None  # noqa: S101 - it was just searched
     sides: dict[float, Side] = {}
-    for side in [one for bracket in answer.falls[:MOST_PICTURED] for one in (bracket.below, bracket.above)]:
+    for side in [one for bracket in answer.falls[:MOST_PICTURED] for one in bracket.sides.values()]:
         falls = falls_before_zero(side.model_dump())
         if side.value in sides or not (falls or side.status == FINISHED):
             continue
@@ -292,12 +292,7 @@ def with_sides(answer: LimitAnswer) -> LimitAnswer:
             update = {name: row.get(name) for name in (*table_columns(), PEAK)} if is_seen else {}
             sides[side.value] = side.model_copy(update={**update, "case": name})
     brackets = [
-        one.model_copy(
-            update={
-                "below": sides.get(one.below.value, one.below),
-                "above": sides.get(one.above.value, one.above),
-            }
-        )
+        one.model_copy(update={name: sides.get(side.value, side) for name, side in one.sides.items()})
         for one in answer.brackets
     ]
     return answer.model_copy(update={"brackets": tuple(brackets)})

@@ -124,6 +124,11 @@ class Bracket(BaseModel, frozen=True):
         return replace(self.given, low=self.low, high=self.high)
 
     @property
+    def sides(self) -> dict[str, Side]:
+        """Both sides by their names."""
+        return {"below": self.below, "above": self.above}
+
+    @property
     def verdicts(self) -> set[Verdict]:
         """What both sides came to."""
         return {self.below.verdict, self.above.verdict}
@@ -265,7 +270,7 @@ class LimitAnswer(Answer, frozen=True):
     @property
     def kept(self) -> dict[float, str]:
         """Folders in `cases` of runs with frames, by value."""
-        sides = (side for one in self.brackets for side in (one.below, one.above))
+        sides = (side for one in self.brackets for side in one.sides.values())
         return {side.value: side.case for side in sides if side.case is not None}
 
     @property
@@ -280,7 +285,7 @@ class LimitAnswer(Answer, frozen=True):
 
     def overview(self) -> Table:
         """Return both sides of every change; where there is none, both ends of the range."""
-        sides = [side for one in self.brackets for side in (one.below, one.above)]
+        sides = [side for one in self.brackets for side in one.sides.values()]
         if not sides and self.plan is not None:
             verdicts = list(self.plan.verdicts(self.rows).items())
             sides = [Side.of(value, verdict, self.rows[value]) for value, verdict in (verdicts[0], verdicts[-1])]

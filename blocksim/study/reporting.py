@@ -9,7 +9,7 @@ from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.analysis.judgement import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
-from blocksim.scenario import Scenario, load_stored
+from blocksim.scenario import load_stored
 from blocksim.scenario.input_files import MEGABYTE
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
@@ -78,7 +78,8 @@ def report_on(
         if is_sweep(place):
             subjects, damage = _sweep(key, place, experiment, members)
         else:
-            folder = _folder(place)
+            is_run = place.is_dir() and any((place / name).is_file() for name in files.OURS)  # even if files lack
+            folder = place if is_run else find_run(place)
             run = read_stored(folder)
             subjects, damage = [run_subject(key, run, *_compared(run, experiment))], run.damage
             remark = choice(place, folder)
@@ -88,13 +89,6 @@ def report_on(
         problems += damage
     names = dict.fromkeys(subject.name for subject in shown if not subject.page.get("parent"))
     return write_report(shown, out, title=f"{', '.join(names)} – blocksim report", version=__version__), problems
-
-
-def _folder(place: Path) -> Path:
-    """Return the folder of a run; one that lacks files is taken as it is. Raises what `find_run` raises."""
-    if place.is_dir() and any((place / name).is_file() for name in files.OURS):
-        return place
-    return find_run(place)
 
 
 def _compared(run: PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
@@ -120,67 +114,45 @@ def _shown(found: Comparison | Judgement) -> dict[str, Any]:
 
 
 def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[list[Subject], tuple[str, ...]]:
-    """Return a sweep and those of its members that have frames as subjects, and what is damaged in them."""
-    table = _case_table(place)
-    scenario, problems = None, []
+    """Return a sweep and those of its members that have frames as subjects, and what is damaged in them.
+
+    Rows that are cut off are left out. Raises InvalidInputError for what is no table of a sweep.
+    """
+    path = place / TABLE
+    columns, *rows = list(filter(None, lines_in(path, MOST_TABLE_BYTES))) or [[]]
+    if not set(columns) >= NEEDED:
+        raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
+    table = CaseTable(place, tuple(columns), tuple(tuple(row) for row in rows if len(row) == len(columns)))
+    problems: list[str] = []
+    scenario, judged, pictures = None, None, []
     try:
         scenario = load_stored(place / PLAN)
     except InputMissingError:
         pass
     except BlocksimError as error:
         problems.append(str(error))
-    judged, remarks = _judged(place, scenario, experiment)
-    pictures, undrawn = _pictures(place, experiment, len(table.rows))
+    try:
+        if experiment is not None or (scenario is not None and scenario.experiment is not None):
+            judged = _shown(compare_sweep(place, experiment))
+    except BlocksimError as error:
+        if experiment is not None and not isinstance(error, UnavailableError):
+            raise
+        problems.append(str(error))
+    try:
+        sweep = read_sweep_data(place, experiment)
+    except BlocksimError as error:
+        problems.append(f"no picture of the sweep: {error}")
+    else:
+        is_whole = len(sweep.finished) == len(table.rows)
+        pictures = pictures_of(sweep) if is_whole else []
+        problems += [] if is_whole else ["no picture of the sweep: its table is damaged"]
     folders = {case: case_folder(table.folder, case) for case in table.column("case")}
     cases = {case: one for case, one in folders.items() if one is not None and (one / files.FRAMES).is_file()}
     found = [(case, read_stored(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
-    sweep = sweep_subject(
-        key,
-        table,
-        scenario,
-        keys,
-        [*problems, *remarks, *undrawn],
-        list(cases)[most:],
-        judged=judged,
-        pictures=pictures,
-    )
+    subject = sweep_subject(key, table, scenario, keys, problems, list(cases)[most:], judged=judged, pictures=pictures)
     shown = [
         run_subject(keys[case], run, *_compared(run, experiment), most_bytes=MOST_BYTES // len(found), parent=key)
         for case, run in found
     ]
-    return [sweep, *shown], tuple(text for _, run in found for text in run.damage)
-
-
-def _case_table(folder: Path) -> CaseTable:
-    """Return the table of a sweep's folder; rows that are cut off are left out. Raises InvalidInputError."""
-    path = folder / TABLE
-    columns, *rows = list(filter(None, lines_in(path, MOST_TABLE_BYTES))) or [[]]
-    if not set(columns) >= NEEDED:
-        raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
-    return CaseTable(folder, tuple(columns), tuple(tuple(row) for row in rows if len(row) == len(columns)))
-
-
-def _judged(
-    place: Path, scenario: Scenario | None, experiment: Path | None
-) -> tuple[dict[str, object] | None, tuple[str, ...]]:
-    """Return the judgement of a sweep's members, or why there is none though there is a measurement."""
-    if experiment is None and (scenario is None or scenario.experiment is None):
-        return None, ()
-    try:
-        return _shown(compare_sweep(place, experiment)), ()
-    except BlocksimError as error:
-        if experiment is not None and not isinstance(error, UnavailableError):
-            raise
-        return None, (str(error),)
-
-
-def _pictures(place: Path, experiment: Path | None, cases: int) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Return the pictures of a sweep for the page, or why there is none."""
-    try:
-        sweep = read_sweep_data(place, experiment)
-    except BlocksimError as error:
-        return [], (f"no picture of the sweep: {error}",)
-    if len(sweep.finished) != cases:
-        return [], ("no picture of the sweep: its table is damaged",)
-    return pictures_of(sweep), ()
+    return [subject, *shown], tuple(text for _, run in found for text in run.damage)

@@ -33,24 +33,21 @@ def read_variations(texts: Sequence[str], option: str = "--vary", forms: str = F
     Raises ScenarioError where a text is none of these `forms`, which are those that the option takes; wrong keys and
     values show when the document is built.
     """
-    problems = [Problem(f"{option} {text}", f"write {forms}") for text in texts if not _parts(text)]
-    keys = [key for text in texts for key, _ in _parts(text)]
-    problems += [
-        Problem(f"{option} {key}", "given twice; list all its values once") for key in keys if keys.count(key) > 1
-    ]
-    if problems:
+    unread, repeated, parts = [], [], {}
+    for text in texts:
+        key, equals, values = (part.strip() for part in text.partition("="))
+        if not (equals and key and values):
+            unread.append(Problem(f"{option} {text}", f"write {forms}"))
+        elif key in parts:
+            repeated.append(Problem(f"{option} {key}", "given twice; list all its values once"))
+        else:
+            parts[key] = (text, values)
+    if problems := [*unread, *repeated]:
         raise ScenarioError(list(dict.fromkeys(problems)))
-    split = {key: (text, values) for text in texts for key, values in _parts(text)}
     return Variations(
-        tables={key: _values(values) for key, (_, values) in split.items()},
-        texts={key: text for key, (text, _) in split.items()},
+        tables={key: _values(values) for key, (_, values) in parts.items()},
+        texts={key: text for key, (text, _) in parts.items()},
     )
-
-
-def _parts(text: str) -> list[tuple[str, str]]:
-    """Return key and values, or nothing."""
-    key, equals, values = (part.strip() for part in text.partition("="))
-    return [(key, values)] if equals and key and values else []
 
 
 def _values(text: str) -> Values:

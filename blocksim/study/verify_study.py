@@ -5,11 +5,10 @@ running anything, in a folder of its own: its tables and its answer have to come
 again too, and runs that were kept are verified as runs.
 """
 
-import csv
-import io
 import os
 import random
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -50,14 +49,6 @@ class CellDifference:
     stored: str
     now: str
 
-    @property
-    def size(self) -> float:
-        """The difference of two numbers; NaN where one of the cells holds none."""
-        try:
-            return abs(float(self.stored) - float(self.now))
-        except ValueError:  # this case did not finish
-            return float("nan")
-
 
 @dataclass(frozen=True)
 class SweepVerdict:
@@ -77,14 +68,18 @@ class SweepVerdict:
         return not (self.cells or self.entries) and all(run.agrees for run in self.runs)
 
     def largest(self, unit: str) -> float:
-        """Return the largest difference of two numbers in columns of a unit."""
-        return max((one.size for one in self.cells if one.column.endswith(unit)), default=0.0)
+        """Return the largest difference of two numbers in columns of a unit; of a case that failed there is none."""
+        sizes = [0.0]
+        for one in self.cells:
+            with suppress(ValueError):
+                sizes += [abs(float(one.stored) - float(one.now))] if one.column.endswith(unit) else []
+        return max(sizes)
 
     def to_dict(self) -> dict[str, object]:
         """Return it for programs."""
-        largest = {"largest_mm": self.largest(MM), "largest_deg": self.largest(DEGREES)}
         data = {**asdict(self), "folder": str(self.folder), "runs": [run.to_dict() for run in self.runs]}
         first = {name: data.pop(name) for name in ("folder", "rows", "checked", "cells")}
+        largest = {"largest_mm": self.largest(MM), "largest_deg": self.largest(DEGREES)}
         return {"agrees": self.agrees, "kind": "sweep", **first, **largest, **data}
 
 
@@ -213,6 +208,5 @@ def _cells(columns: Sequence[str], case: Case, row: Row, ranges: Ranges | None) 
     values: Row = {CASE: case.name, **varied_cells(heads, case.settings), **row}
     if ranges is not None:
         values[INSIDE] = ranges.hold(row) if row["status"] == FINISHED else None
-    text = io.StringIO(newline="")
-    csv.writer(text).writerow([as_cell(values.get(name)) for name in columns])
-    return dict(zip(columns, next(csv.reader(io.StringIO(text.getvalue(), newline=""))), strict=True))
+    cells = {name: as_cell(values.get(name)) for name in columns}
+    return {name: "" if cell is None else str(cell) for name, cell in cells.items()}
