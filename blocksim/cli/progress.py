@@ -133,21 +133,21 @@ def exit_when_stopped() -> Iterator[None]:
 
 @contextmanager
 def case_progress(heads: "Iterable[Head]", *, quiet: bool) -> "Iterator[Callable[[int, int, Row], None]]":
-    """Give a function that takes every row of a study of these columns: a bar on a terminal, lines elsewhere."""
+    """Give a function that takes every row of a study of these columns: a bar on a terminal, lines elsewhere.
+
+    It reports each of a few cases with the values of the varied keys, and the pace of many.
+    """
     if quiet:
         yield silent
-    elif Console(stderr=True).is_terminal:
-        with count_progress("cases", quiet=False) as show:
-            yield lambda done, total, _: show(done, total)
-    else:
-        yield _case_lines(list(heads))
-
-
-def _case_lines(heads: "Sequence[Head]") -> "Callable[[int, int, Row], None]":
-    """Return a function that reports each of a few cases with the values of the varied keys, and the pace of many."""
+        return
+    if Console(stderr=True).is_terminal:
+        with count_progress("cases", quiet=False) as count:
+            yield lambda done, total, _: count(done, total)
+        return
     from blocksim.study.rows import FINISHED
     from blocksim.view.sweeps.data import short_names
 
+    heads = list(heads)
     names = short_names([head.key for head in heads])
     began, new, failed = time.monotonic(), 0, 0
     is_due = pace(PLAIN_SECONDS, began)
@@ -166,7 +166,7 @@ def _case_lines(heads: "Sequence[Head]") -> "Callable[[int, int, Row], None]":
             failures = f", {failed} failed" if failed else ""
             note(f"{done}/{total} cases{failures}, {speed:.3g} a second{left}")
 
-    return show
+    yield show
 
 
 def cell_text(value: object) -> str:

@@ -1,5 +1,6 @@
 """Calibration: values within their priors for which agreement with the repeats is most probable."""
 
+import hashlib
 import os
 import re
 from collections.abc import Callable, Mapping
@@ -138,7 +139,7 @@ class Fit:
     trials: int
     path: Path
     hits: tuple[calibrate_plan.Hit, ...]  # of the fresh members, a quantity each
-    ties: tuple[calibrate_plan.Trial, ...] = ()  # all that are as good as the best by `ties_with`, the best among them
+    ties: tuple[calibrate_plan.Trial, ...] = ()  # all that are as good as the best, the best among them
 
     @property
     def found(self) -> bool:
@@ -266,7 +267,8 @@ def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
     )
     options.on_start(compilation.kernels_of(plan.base))
     resume, overwrite = options.resume, options.overwrite
-    path = Path(options.out or files.RESULTS / plan.base.name / f"calibrate-{plan.name()}" / WRITTEN)
+    name = hashlib.sha256(str(plan.fingerprint()).encode()).hexdigest()[:12]
+    path = Path(options.out or files.RESULTS / plan.base.name / f"calibrate-{name}" / WRITTEN)
     journal = path.parent / (path.stem + JOURNAL)
     for package in NEEDED:
         load_module(package, calibrate_plan.PURPOSE)
@@ -340,7 +342,11 @@ def _searched(
     if not tried:
         raise InvalidInputError("at least one trial is needed")
     best = max(tried, key=lambda one: one.score.value)
-    return best, tuple(trial for trial in tried if trial.score.ties_with(best.score))
+    # as good are those of which as many members are inside, or none is, and as far off; how near the middle of their
+    # ranges members are inside only steers the search: no measurement prefers it
+    inside, miss = best.score.inside, best.score.miss
+    ties = (one for one in tried if one.score.inside == inside and (inside > 0 or one.score.miss == miss))
+    return best, tuple(ties)
 
 
 def _provenance(fit: Fit) -> dict[str, str]:

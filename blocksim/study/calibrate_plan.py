@@ -1,6 +1,5 @@
 """What a calibration is asked for, checked before anything runs, and the search for the best values."""
 
-import hashlib
 import logging
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -25,7 +24,7 @@ from blocksim.scenario.models.study import Normal, Uniform, Variation, toml_numb
 from blocksim.simulation import atomic, folder, provenance
 from blocksim.study.executors.ensemble import Member
 from blocksim.study.plan import Variations, build_distributions, design_of
-from blocksim.study.rows import Range, are_inside, check_experiment, ranges_of, si_number, values_at
+from blocksim.study.rows import Range, check_experiment, ranges_of, si_number, values_at
 
 if TYPE_CHECKING:
     from optuna import Study
@@ -183,10 +182,6 @@ class CalibrationPlan:
             "code": provenance.code_hash(),
         }
 
-    def name(self) -> str:
-        """Return a short name that no other plan has."""
-        return hashlib.sha256(str(self.fingerprint()).encode()).hexdigest()[:12]
-
 
 def calibration_plan(
     document: Document,
@@ -293,13 +288,6 @@ class Score:
         """The number to be maximised."""
         return self.share_inside - self.miss / (2.0 * self.members)
 
-    def ties_with(self, best: "Score") -> bool:
-        """Return True if a score is as good as the best one: as many members are inside, or none is, and as far off.
-
-        How near the middle of their ranges members are inside only steers the search: no measurement prefers it.
-        """
-        return self.inside == best.inside and (best.inside > 0 or self.miss == best.miss)
-
     @property
     def interval(self) -> tuple[float, float]:
         """95 % limits (Clopper-Pearson) of the probability behind this share, for members drawn independently."""
@@ -343,7 +331,7 @@ def miss_of(values: Sequence[float], ranges: Sequence[Range]) -> float:
     middles = [(0.5 * (one.lower + one.upper), 0.5 * (one.upper - one.lower)) for one in ranges]
     # distances from the middle in half-widths: at most 1 inside
     off = [abs(value - middle) / half for value, (middle, half) in zip(values, middles, strict=True)]
-    if are_inside(values, ranges):
+    if all(one.holds(value) for one, value in zip(ranges, values, strict=True)):
         return min(max(off) - 1.0, 0.0)
     # above 0 also where rounding hides by how much
     outside = [

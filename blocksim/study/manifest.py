@@ -36,8 +36,7 @@ DIGITS = 12
 SUM = b',"sum":"'
 NEWLINE = b"\n"
 NO_LINK = getattr(os, "O_NOFOLLOW", 0)
-LONGEST = 1 << 30
-"""Bytes of a line that are read at once; a row of a million blocks has 200 million."""
+LONGEST = 1 << 30  # bytes of a line that are read at once; a row of a million blocks has 200 million
 MISSING, ENDED_WELL, ENDED_BADLY = range(3)
 TIMING_COLUMNS = ("case", "executor", "seconds", "host")
 
@@ -248,8 +247,7 @@ def note_timings(path: Path, executor: str, cases: Iterable[str], seconds: float
 
 
 TEXT_COLUMNS = {"case": str, "status": str, "reason": str, "first_mover": str}
-MOST_BYTES = 2000 * MEGABYTE
-"""Of sweep.csv: a million cases of a hundred blocks do not fit into most memories."""
+MOST_BYTES = 2000 * MEGABYTE  # of sweep.csv: a million cases of a hundred blocks do not fit into most memories
 OUTCOME = ("status", "reason", "seconds")
 NEEDED = {"case", "status"}
 NO_TABLE, NO_COLUMNS = "not the table of a sweep", "no columns case and status"

@@ -29,11 +29,9 @@ from blocksim.scenario.units import toml
 from blocksim.simulation.provenance import run_hash
 from blocksim.study.rows import Head, check_experiment, heads_of
 
-Settings = dict[str, object]
-"""Dotted key and value of everything that one case sets."""
+Settings = dict[str, object]  # dotted key and value of everything that one case sets
 LARGEST_FILE = 20_000_000  # bytes
-MOST_TRIED = 50
-"""Different values of a column that are tried by themselves, beside its least and its greatest number."""
+MOST_TRIED = 50  # different values of a column that are tried by themselves, beside its least and its greatest number
 HEAD = re.compile(r"(?P<key>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?")
 WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
 
@@ -160,16 +158,13 @@ def refuse_wrong_values(document: Document, columns: Iterable[Column]) -> None:
         raise_problems(list(dict.fromkeys(problems)))
 
 
-Places = NDArray[np.float64]
-"""Numbers u with 0 < u < 1, shape (samples,)."""
-LEAST = 2.0**-54
-"""Places stay this far away from 0, and one rounding from 1: the normal distribution is infinite there."""
+Places = NDArray[np.float64]  # numbers u with 0 < u < 1, shape (samples,)
+LEAST = 2.0**-54  # places stay this far away from 0, and one rounding from 1: the normal distribution is infinite there
 WORD_BYTES = 4
 DIMENSIONS = 128
 """Dimensions that are scrambled, however few are used: so those in use do not depend on how many they are."""
 BITS = 30
-CHUNK = 4096
-"""Points made at a time; a power of two."""
+CHUNK = 4096  # points made at a time; a power of two
 
 
 def draw_values(values: Variation, places: Places) -> Sequence[object]:
@@ -253,13 +248,10 @@ def remarks(sweep: Sweep) -> list[str]:
 MOST_CASES = 1_000_000
 MEASURED = "experiment.table"
 TABLE = "table"  # last part of keys that name a file
-MOST_LOOKED_AT = 1_000
-"""Cases that are built in search of one that can be simulated, before anything runs."""
+MOST_LOOKED_AT = 1_000  # cases that are built in search of one that can be simulated, before anything runs
 Values = Iterable[object] | Mapping[str, object]  # a list, { from, to, count }, { from, to } or { mean, sd }
-LOOKED_AT = 32
-"""Cases that are built to estimate all of them."""
-SMALL_FILES = 12_000
-"""Bytes of the files beside run.h5 in the folder of a case."""
+LOOKED_AT = 32  # cases that are built to estimate all of them
+SMALL_FILES = 12_000  # bytes of the files beside run.h5 in the folder of a case
 ROW, ROW_OF_BLOCK = 570, 230
 """Bytes of a case in manifest and table, and more for each block; three blocks and three keys take 1.25 kB."""
 

@@ -26,10 +26,8 @@ if TYPE_CHECKING:
     from blocksim.simulation.result import Summary
 
 Row = dict[str, object]
-FINISHED = "finished"
-"""Status of a run that has come to its end."""
-TABLE = "sweep.csv"
-"""Rows of all cases; it makes a folder one of a sweep."""
+FINISHED = "finished"  # status of a run that has come to its end
+TABLE = "sweep.csv"  # rows of all cases; it makes a folder one of a sweep
 X = ".x_mm"
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
 QUARTER = 90.0  # deg
@@ -179,11 +177,6 @@ def values_at(final: Columns, ranges: Sequence[Range]) -> list[float]:
     """Return the values of a final table (mm, degrees) that the ranges are about."""
     rows = {name: row for row, name in enumerate(final["block"])}
     return [float(final[one.column][rows[one.block]]) for one in ranges]
-
-
-def are_inside(values: Sequence[float], ranges: Sequence[Range]) -> bool:
-    """Return True if all values are inside their ranges."""
-    return all(one.holds(value) for one, value in zip(ranges, values, strict=True))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from blocksim.silence import silent
 from blocksim.simulation import compilation, frames
 from blocksim.study.executors.ensemble import run_members
 from blocksim.study.plan import Values, Variations, build_distributions, draw_values, open_interval
-from blocksim.study.rows import are_inside, quarter_turns, ranges_of, values_at
+from blocksim.study.rows import quarter_turns, ranges_of, values_at
 from blocksim.study.vary import SPREAD, variations_option
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ def outputs_of(finals: Sequence[frames.Columns], table: ExperimentTable | None) 
             for row, column in zip(summaries, np.array(values).T, strict=True)
         ]
         means = {row.block: row.mean for row in summaries if row.quantity == "rotation"}
-        are_in = [are_inside(row, ranges) for row in values]
+        are_in = [all(one.holds(value) for one, value in zip(ranges, row, strict=True)) for row in values]
     if set(blocks) <= set(means):
         name, wanted = "measured outcome", quarter_turns([means[block] for block in blocks])
     else:

@@ -137,11 +137,6 @@ def refuse_loss(shard: Shard, *, overwrite: bool) -> None:
         raise InvalidInputError("a shard cannot overwrite what other shards have done; remove the folder first")
 
 
-def cases_in(document: Document) -> Cases:
-    """Return the cases of a document that has a sweep. Raises InvalidInputError where it has none."""
-    return cases_of(document, plan_of(document.build()))
-
-
 def measured_ranges(base: Scenario) -> rows.Ranges | None:
     """Return the measured ranges that a scenario is compared with, if it names any."""
     return None if base.experiment is None else rows.Ranges.read(base.experiment.table)
@@ -278,7 +273,7 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
     folder = Path(folder)
     document = sweep_folder.read_plan(folder)
     base = document.build()
-    cases = cases_in(document)
+    cases = cases_of(document, plan_of(base))
     done = CaseIndex(folder, len(cases))
     if not done.paths:
         raise InputMissingError(f"{folder}: no case of this sweep has run yet")

@@ -18,11 +18,11 @@ from blocksim.errors import InvalidInputError
 from blocksim.simulation.observables import PEAK
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.manifest import NO_TABLE, OUTCOME, PATTERN, CaseIndex, lines_in, read_entries
-from blocksim.study.plan import Case, Cases
+from blocksim.study.plan import Case, Cases, cases_of, plan_of
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row, varied_cells
 from blocksim.study.runs import Replay
 from blocksim.study.study import Study, study_in
-from blocksim.study.sweep import cases_in, measured_ranges
+from blocksim.study.sweep import measured_ranges
 from blocksim.study.sweep_folder import CASES, SWEEP, FolderKind, case_folder, read_origin, read_plan
 from blocksim.study.verify_run import (
     EntryDifference,
@@ -91,13 +91,14 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
     Raises InputMissingError, or InvalidInputError where table, plan and manifests do not go together.
     """
     document = read_plan(folder)
-    cases = cases_in(document)
+    base = document.build()
+    cases = cases_of(document, plan_of(base))
     columns, lines = _read_table(folder / TABLE)
     numbers = _numbers(folder, cases, len(lines))
     rows = _chosen(len(lines), sample, seed)
     scenarios = [case.scenario for row in rows if (case := cases[numbers[row]]).scenario is not None]
     ends = iter(rows_of(scenarios, os.cpu_count() or 1))
-    ranges = measured_ranges(document.build())
+    ranges = measured_ranges(base)
     origins, is_same_code = _origins(folder, SWEEP)
     entries = (entry for path in sorted(folder.glob(PATTERN)) for _, entry in read_entries(path))
     names = {entry.number: entry.case for entry in entries}  # the last one of each
