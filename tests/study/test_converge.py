@@ -11,7 +11,6 @@ import pytest
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.start import soil_tables
-from blocksim.study import converge as converging
 from blocksim.study.converge import (
     REFINEMENTS,
     ConvergenceVerdict,
@@ -23,7 +22,7 @@ from blocksim.study.converge import (
     refinements_of,
     with_setting,
 )
-from blocksim.study.executors import Batch, Setting, Task
+from blocksim.study.executors import Batch, Setting, Task, processes
 from blocksim.study.executors import ensemble as folders
 from blocksim.study.executors.processes import DEAD
 from tests.soils import column, scene
@@ -231,7 +230,7 @@ def test_dead_worker_fails_its_runs_and_says_what_to_do(
     def dying(tasks: Iterator[Task], _: Setting) -> Iterator[Batch]:
         yield from (Batch((task,), (DEAD,), 0.0, "") for task in tasks)
 
-    monkeypatch.setattr(converging, "run_tasks", dying)
+    monkeypatch.setattr(processes, "run_tasks", dying)
     study = converge(slide, studies=["step"], out=tmp_path, jobs=2).studies[0]
     assert {level.status for level in study.levels} == {"failed"}
     assert "rerun the command to repeat this case" in study.own.reason
