@@ -124,11 +124,11 @@ def export_command(
 ) -> command_line.Report:
     """Write all frames as CSV or VTKHDF, or final outlines as GeoJSON or DXF.
 
-    CSV: a row for each frame and block, with units in the heads; stored contacts go into a second file,
-    NAME_contacts.csv. VTKHDF: one file with all times, blocks with number, velocity and rotation,
-    ground and walls with number 0; ParaView opens it. GeoJSON and DXF: the outlines of all blocks in the last frame, in
-    m, which can be re-imported as `polygons`; blocks at rest overlap by the contact deformation, so set `shrink`,
-    such as "0.01 mm". A run that was stopped or killed is written as far as it got.
+    CSV: a row for each frame and block, with units in the heads. VTKHDF: one file with all times, blocks with number,
+    name, velocity and rotation, ground and walls with number 0; ParaView opens it. Stored contacts and their forces go
+    into a second file, NAME_contacts.csv or NAME_contacts.vtkhdf. GeoJSON and DXF: the outlines of all blocks in the
+    last frame, in m, which can be re-imported as `polygons`; blocks at rest overlap by the contact deformation, so set
+    `shrink`, such as "0.01 mm". A run that was stopped or killed is written as far as it got.
 
     An older export is replaced; any other file only with --overwrite.
 

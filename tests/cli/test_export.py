@@ -45,3 +45,8 @@ def test_contacts_get_a_file_beside_where_they_are_stored(blocksim: Command, tmp
         rows = list(csv.DictReader(file))
     assert {row["body_b"] for row in rows} >= {"", "2", "3"}
     assert "replaces an older file" in blocksim("export", tmp_path / "run", "--out", "all.csv").err
+    for told in ("file: all.vtkhdf (", "file: all.vtkhdf (replaces an older file, "):
+        answer = blocksim("export", tmp_path / "run", "--format", "vtkhdf", "--out", "all.vtkhdf")
+        assert answer.code == 0
+        assert told in answer.err
+        assert f"file: all_contacts.vtkhdf ({told.partition('(')[2]}{len(rows)} contacts)" in answer.err

@@ -18,7 +18,7 @@ from blocksim.extras import load_module
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.structures.polygons import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
 from blocksim.simulation import atomic, folder, probes
-from blocksim.simulation.frames import BODIES, UNITS, Contacts, Frames
+from blocksim.simulation.frames import BODIES, UNITS, Contacts, Frames, forces_on_a, join_contacts
 from blocksim.world.systems.blocks import BLOCKS, are_removed, distinct, local_corners, placed_points, supports_track
 from blocksim.world.systems.system import Floats, System, Track
 
@@ -147,7 +147,7 @@ def _last_blocks(frames: Frames, scenario: Scenario) -> Iterator[tuple[Floats, P
 
 
 VERSION = (2, 0)
-QUAD, POLYGON = 9, 7  # VTK's numbers of cells
+VERTEX, QUAD, POLYGON = 1, 9, 7  # VTK's numbers of cells
 BATCH = 1 << 16  # blocks times frames that are computed at once
 CHUNK = 1 << 14  # rows of a data set that are packed together
 PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
@@ -160,24 +160,85 @@ def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
     """Write all frames in which every number is finite and return their number.
 
     Points in m, z = 0. Cells are the outlines of all systems, blocks first; all others have block number 0, ground and
-    walls come last. What a system does not have is zero. Beside the VTK group the names of the blocks are kept,
+    walls come last. What a system does not have is zero. Names of the blocks are field data, and beside the VTK group
     `blocksim/block_names`, in the order of the cells. Raises InvalidInputError when there is nothing to write, and
     OutputError. The file is made in memory, packed: HDF5 does not survive a disk that is full.
     """
-    finite = np.isfinite(frames.time)  # a failed run may end in others
+    chosen = _finite(frames)
+    tracks = (*frames.tracks, supports_track(scenario, frames.tracks[0], frames.time))
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        _write_grid(file.create_group("VTKHDF"), tracks, frames.time[chosen], chosen)
+        _write_names(file["VTKHDF"], frames.names, len(chosen))
+        names = [name.encode() for name in frames.names]
+        file.create_dataset("blocksim/block_names", data=names, dtype=h5py.string_dtype())
+    atomic.write_bytes(path, content.getbuffer())
+    return len(chosen)
+
+
+def write_contacts_vtkhdf(path: Path, frames: Frames, contacts: Contacts) -> int:
+    """Write the contacts of the frames that `write_vtkhdf` writes, and return their number: points in m, z = 0.
+
+    Data of points are the block numbers of that file (0: no block), the force on the first body and what tables of
+    contacts have. Raises InvalidInputError and OutputError.
+    """
+    chosen = _finite(frames)
+    some = join_contacts([contacts.at(frame) for frame in chosen.tolist()])
+    counts = np.diff(some.ends, prepend=0)
+    first, rows = some.ends - counts, some.rows
+    force = forces_on_a(rows)
+    data: dict[str, Any] = {name: rows[name].astype(np.int64) + 1 for name in BODIES}
+    data["force_on_a_N"] = np.pad(force, ((0, 0), (0, 1)))
+    for name in CONTACT_NUMBERS:
+        suffix, factor = probes.TABLE_UNITS[UNITS[name]]
+        data[f"{name}{suffix}"] = factor * rows[name]
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        group = file.create_group("VTKHDF")
+        group.attrs["Version"] = np.array(VERSION, dtype=np.int64)
+        group.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
+        for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
+            group[name] = counts
+        group["Points"] = np.stack([rows["x"], rows["y"], 0.0 * rows["x"]], axis=-1)
+        group["Connectivity"] = np.arange(len(rows)) - np.repeat(first, counts)
+        group["Offsets"] = np.concatenate([np.arange(count + 1) for count in counts.tolist()])
+        group["Types"] = np.full(len(rows), VERTEX, dtype=np.uint8)
+        steps = group.create_group("Steps")
+        steps.attrs["NSteps"] = np.int64(len(chosen))
+        steps["Values"] = frames.time[chosen]
+        steps["NumberOfParts"] = np.ones(len(chosen), dtype=np.int64)
+        steps["PartOffsets"] = np.arange(len(chosen), dtype=np.int64)
+        steps["PointOffsets"] = first
+        steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = first[:, None]
+        for name, values in data.items():
+            group.create_dataset(f"PointData/{name}", data=values, **(PACKED if len(values) else {}))
+            steps[f"PointDataOffsets/{name}"] = first
+        _write_names(group, frames.names, len(chosen))
+    atomic.write_bytes(path, content.getbuffer())
+    return len(rows)
+
+
+def _finite(frames: Frames) -> Indices:
+    """Return the frames that can be shown; a failed run may end in others."""
+    finite = np.isfinite(frames.time)
     for track in frames.tracks:
         finite &= np.isfinite(track.values).all(axis=(1, 2))
     chosen = np.flatnonzero(finite)
     if len(chosen) == 0 or not any(track.values.size for track in frames.tracks):
         raise InvalidInputError("no frame to export")
-    tracks = (*frames.tracks, supports_track(scenario, frames.tracks[0], frames.time))
-    content = io.BytesIO()
-    with h5py.File(content, "w") as file:
-        _write_grid(file.create_group("VTKHDF"), tracks, frames.time[chosen], chosen)
-        names = [name.encode() for name in frames.names]
-        file.create_dataset("blocksim/block_names", data=names, dtype=h5py.string_dtype())
-    atomic.write_bytes(path, content.getbuffer())
-    return len(chosen)
+    return chosen
+
+
+def _write_names(group: Any, names: Sequence[str], times: int) -> None:
+    """Write the names of the blocks as field data of every time; no blocks, no field data.
+
+    VTK reads strings of variable length, and takes them for UTF-8, where HDF5 says that they are ASCII.
+    """
+    if names:
+        text = [name.encode() for name in names]
+        group.create_dataset("FieldData/block_names", data=text, dtype=h5py.string_dtype("ascii"))
+        group["Steps/FieldDataOffsets/block_names"] = np.zeros(times, dtype=np.int64)
+        group["Steps/FieldDataSizes/block_names"] = np.array([[1, len(names)]] * times, dtype=np.int64)
 
 
 def _write_grid(group: Any, tracks: Sequence[Track], times: Floats, chosen: Indices) -> None:
@@ -263,7 +324,7 @@ class Format(NamedTuple):
 # A format is one entry here.
 FORMATS: dict[str, Format] = {
     "csv": Format(lambda path, frames, _: write_frames_csv(path, frames), write_contacts_csv),
-    "vtkhdf": Format(write_vtkhdf),
+    "vtkhdf": Format(write_vtkhdf, write_contacts_vtkhdf),
     "geojson": Format(write_geojson, counted="blocks"),
     "dxf": Format(write_dxf, counted="blocks"),
 }

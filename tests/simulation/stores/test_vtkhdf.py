@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.geometry import regular
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.frames import SUPPORT, UNITS, Frames, empty_rows, forces_on_a, join_contacts
 from blocksim.simulation.stores import exports
-from blocksim.simulation.stores.exports import write_vtkhdf
+from blocksim.simulation.stores.exports import write_contacts_vtkhdf, write_vtkhdf
 from blocksim.view.scene import corners
 from blocksim.world.systems.blocks import support_quads
 from tests.view.made_up import HOSTILE, polygons, toppling
@@ -116,6 +116,42 @@ def test_vtk_shows_ground_and_walls_where_they_are(tmp_path: Path) -> None:
     reader.Update()
     found = points_of(reader.GetOutputDataObject(0))[2:]
     np.testing.assert_allclose(found, support_quads(SLOPE, toppling(2, steps=3).tracks[0]))
+
+
+def test_vtk_reads_back_names_and_the_contacts_of_every_time(tmp_path: Path) -> None:
+    hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="reading back needs the extra paraview-check (vtk)")
+    names = ("Stein ä", "b", *HOSTILE)
+    tables = [empty_rows(count) for count in (2, 0, 3, 1)]
+    for number, rows in enumerate(tables):
+        for name in UNITS:
+            rows[name] = 10.0 * number + np.arange(len(rows)) + len(name)
+        rows["body_a"], rows["body_b"] = np.arange(len(rows)), SUPPORT
+    frames = replace(toppling(len(names), steps=4), names=names, contacts=join_contacts(tables))
+    frames.vx[2, 1] = np.inf  # a frame that neither file has
+    assert frames.contacts is not None
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", frames, LEVEL) == 3
+    assert write_contacts_vtkhdf(tmp_path / "contacts.vtkhdf", frames, frames.contacts) == 3
+    for file in ("run", "contacts"):
+        reader = hdf.vtkHDFReader()
+        reader.SetFileName(str(tmp_path / f"{file}.vtkhdf"))
+        reader.UpdateInformation()
+        assert times_of(reader) == frames.time[[0, 1, 3]].tolist()
+        for step, rows in enumerate(tables[number] for number in (0, 1, 3)):
+            reader.SetStep(step)
+            reader.Update()
+            grid = reader.GetOutputDataObject(0)
+            texts = grid.GetFieldData().GetAbstractArray("block_names")
+            assert tuple(texts.GetValue(number) for number in range(len(names))) == names
+            if file == "contacts":
+                places = [grid.GetPoint(number)[:2] for number in range(grid.GetNumberOfPoints())]
+                assert places == [*zip(rows["x"].tolist(), rows["y"].tolist(), strict=True)]
+                assert [grid.GetCell(number).GetPointId(0) for number in range(len(rows))] == [*range(len(rows))]
+                data = grid.GetPointData()
+                assert values(data, "body_a").tolist() == [*range(1, len(rows) + 1)]
+                assert values(data, "body_b").tolist() == [0] * len(rows)
+                assert values(data, "force_on_a_N")[:, :2].tolist() == forces_on_a(rows).tolist()
+                assert values(data, "normal_force_N").tolist() == rows["normal_force"].tolist()
+                assert values(data, "overlap_mm") == pytest.approx(1e3 * rows["overlap"])
 
 
 def times_of(reader: Any) -> list[float]:
