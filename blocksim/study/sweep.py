@@ -121,6 +121,7 @@ def run_sweep(document: Document, options: SweepOptions) -> SweepResult:
     folder = Path(options.out) if options.out is not None else files.RESULTS / base.name / f"sweep-{name}"
     run, setting = options.ready(folder / sweep_folder.CASES if options.keep_cases else None)
     sweep_folder.prepare(folder, base, name, overwrite=options.overwrite)
+    sweep_folder.keep_varied(folder, document, plan.vary, overwrite=options.overwrite)
     for kernels in kernels_for(document):
         compilation.compile_kernels(kernels)
     with closing(Manifest(folder / shard.file(MANIFEST))) as manifest:

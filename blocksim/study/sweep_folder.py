@@ -7,13 +7,16 @@ import logging
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
-from blocksim.scenario import Document, Scenario, input_files, spelling
+from blocksim.scenario import Document, Scenario, input_files, overrides, spelling
+from blocksim.scenario.models.motion import FromTable, content_of
+from blocksim.scenario.models.record import TABLED
 from blocksim.simulation import atomic, provenance
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import is_resolved
@@ -76,6 +79,9 @@ class FolderKind:
 SWEEP = FolderKind(  # shards have tables of their own
     "sweep", "a sweep", "sweep", {rf"sweep{SHARD}\.csv": "case,(?:.*,)?status,reason,seconds(?:,.*)?"}
 )
+
+
+VARIED = "tables"  # folder of the copies of tables that a sweep varies
 
 
 class Origin(BaseModel, frozen=True):
@@ -224,4 +230,33 @@ def read_plan(folder: Path) -> Document:
     """Return the plan of a sweep. Raises InputMissingError where the folder holds none."""
     if not (folder / PLAN).exists():
         raise InputMissingError(f"{folder}: not a sweep folder (no {PLAN})")
-    return Document.read(folder / PLAN, is_stored=True)
+    document = Document.read(folder / PLAN, is_stored=True)
+    if not (folder / VARIED).is_dir():
+        return document
+    base, data = document.without_sweep().build(), document.data  # what the plan itself names lies beside it
+    if base.experiment is not None:
+        data = {**data, "experiment": {"table": base.experiment.table}}
+    if isinstance(base.motion, TABLED):
+        data, _ = overrides.with_value(data, ("motion", "table"), base.motion.table)
+    for number, body in enumerate(base.bodies):
+        if isinstance(body.motion, FromTable):
+            data, _ = overrides.with_value(data, ("bodies", number, "motion", "table"), body.motion.table)
+    return replace(document, data=data, folder=folder / VARIED)
+
+
+def keep_varied(folder: Path, document: Document, vary: Mapping[str, object], *, overwrite: bool) -> None:
+    """Copy the tables that varied keys name, so that the sweep can be repeated without them; see `read_plan`.
+
+    They keep their names, in a folder of their own; those outside the folder of the scenario stay where they are.
+    Raises OutputExistsError where another file is in the way, and OutputError.
+    """
+    for key, values in vary.items():
+        for value in values if overrides.parse_key(key)[-1] == "table" and isinstance(values, tuple) else ():
+            path = Path(str(value))
+            if path.is_absolute() or ".." in path.parts or not (document.folder / path).is_file():
+                continue
+            copy, content = folder / VARIED / path, content_of(document.folder / path)
+            if copy.exists() and not overwrite and copy.read_bytes() != content:
+                raise OutputExistsError(f"{copy}: is not the table of this sweep; --overwrite replaces it")
+            files.make_folder(copy.parent)
+            atomic.write_bytes(copy, content)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -268,6 +269,25 @@ def test_changed_sweep_is_told(
 def test_renamed_case_is_found_whatever_rows_are_drawn(blocksim: Command, copy_of_sweep: Path) -> None:
     rename_a_case(copy_of_sweep)
     assert blocksim("verify-run", copy_of_sweep, "--sample", 1).code == 1
+
+
+def test_a_sweep_of_records_comes_out_again_wherever_its_folder_is(blocksim: Command, tmp_path: Path) -> None:
+    record = "time_s,acceleration_m_s2\n0,0\n0.1,{0}\n0.2,-{0}\n0.3,0\n"
+    (tmp_path / "made" / "records").mkdir(parents=True)
+    for name in "ab":
+        (tmp_path / "made" / "records" / f"{name}.csv").write_text(record.format(1 + "ab".index(name)))
+    text = (SCENARIOS / "three_blocks_nonsmooth.toml").read_text()
+    moved = '[motion]\nkind = "table"\ntable = "records/a.csv"\n'
+    (tmp_path / "made" / "shaken.toml").write_text(re.sub(r"(?ms)^\[experiment\].*?(?=^\[|\Z)", "", text) + moved)
+    varied = ("--set", "time.end=0.02", "--vary", "motion.table=records/a.csv,records/b.csv", "--quiet")
+    assert blocksim("sweep", tmp_path / "made" / "shaken.toml", *varied, "--out", tmp_path / "sweep").code == 0
+    shutil.rmtree(tmp_path / "made")
+    (tmp_path / "sweep").rename(tmp_path / "elsewhere")
+    answer = blocksim("verify-run", tmp_path / "elsewhere")
+    assert (answer.code, answer.out) == (0, f"{tmp_path / 'elsewhere'}: identical numbers in 2 of 2 rows\n")
+    copy = tmp_path / "elsewhere" / "tables" / "records" / "b.csv"
+    copy.write_text(record.format(3))
+    assert blocksim("verify-run", tmp_path / "elsewhere").code == 1
 
 
 def test_kept_cases_are_verified_as_runs(blocksim: Command) -> None:
