@@ -107,8 +107,8 @@ COLUMNS: Mapping[str, tuple[Column, ...]] = {
     ),
     JOINT: (
         Column("opening", "m", "gap in the middle of the joint"),
-        Column("opening_first", "m", "gap at its first end"),
-        Column("opening_last", "m", "gap at its last end"),
+        Column("opening_first", "m", "gap at its first end: on the left, seen from the first body"),
+        Column("opening_last", "m", "gap at its last end: on the right, seen from the first body"),
         Column("slip", "m", "displacement of the second body along the joint, towards +x where it lies on the first"),
         Column("rotation", "rad", "angle that the second body has turned relative to the first"),
     ),

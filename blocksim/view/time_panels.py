@@ -227,7 +227,8 @@ def panels_of(probe: ProbeSeries) -> list[TimePanel]:
     if not len(probe):
         return []
     if probe.kind == probes.JOINT:
-        return [panel("joint", "mm", MILLIMETRES, columns("opening_first", "opening_last", "slip"))]
+        ends = {f"opening at {one} end": probe[f"opening_{one}"] for one in ("first", "last")}  # not in time
+        return [panel("joint", "mm", MILLIMETRES, {**ends, "slip": probe["slip"]})]
     if probe.kind == probes.ENERGY:
         energies = drawn_energies(probe.columns, np.arange(len(probe)))
         factor, unit = unit_for(max((_largest(one) for one in energies.values()), default=0.0), "J")

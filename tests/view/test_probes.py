@@ -26,7 +26,14 @@ def test_every_kind_of_probe_is_drawn_in_units_of_its_own(tmp_path: Path) -> Non
     probes = {kind: made_up(kind, kind) for kind in (*COLUMNS, "energy")}
     draw_probes(probes, tmp_path / "all.svg", "run: probes")
     texts = (tmp_path / "all.svg").read_text(encoding="utf-8")
-    for label in ("force (kN)", "share of friction", "displacement (mm)", "joint (mm)", "energy (kJ)", "opening first"):
+    for label in (
+        "force (kN)",
+        "share of friction",
+        "displacement (mm)",
+        "joint (mm)",
+        "energy (kJ)",
+        "opening at first end",
+    ):
         assert f"<!-- {label} -->" in texts
     draw_probes(probes, tmp_path / "one.svg", names=("joint",))
     assert "force" not in (tmp_path / "one.svg").read_text(encoding="utf-8")
