@@ -10,7 +10,7 @@ import typer
 
 from blocksim.cli.app import app
 from blocksim.scenario import Document
-from blocksim.scenario.key_table import with_key_table
+from blocksim.scenario.key_table import BEGIN, END, key_table, with_part
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -59,7 +59,7 @@ def test_no_text_for_users_has_a_phrase_that_readers_stumbled_over() -> None:
 def test_the_table_of_keys_is_the_one_of_the_models() -> None:
     page = TEXTS["scenarios/README.md"]
     assert "<!-- keys" in page
-    assert with_key_table(page) == page, "run: make readme"
+    assert with_part(page, BEGIN, key_table(), END) == page, "run: make readme"
 
 
 def test_the_scenario_in_the_readme_is_valid() -> None:

@@ -25,11 +25,8 @@ from blocksim.scenario.structures import KINDS, Structure
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
 HEAD = "| key | unit | default | meaning |\n| --- | --- | --- | --- |"
-SUBTABLES = (dict, tuple, BaseModel)
-
-
 SHARED = (Structure, Load, Time, Probe)
-"""What kinds of a table have in common, told once."""
+"""What kinds of a table have in common, listed once."""
 
 
 def key_table() -> str:
@@ -69,11 +66,6 @@ def key_table() -> str:
     return "\n".join([HEAD, *rows])
 
 
-def with_key_table(text: str) -> str:
-    """Return a README with the table between the two marks replaced by the present one."""
-    return with_part(text, BEGIN, key_table(), END)
-
-
 def with_part(text: str, begin: str, part: str, end: str) -> str:
     """Return a page with what stands between two marks replaced."""
     marked = re.compile(f"{re.escape(begin)}.*{re.escape(end)}", re.DOTALL)
@@ -81,15 +73,11 @@ def with_part(text: str, begin: str, part: str, end: str) -> str:
 
 
 def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
-    place = prefix.partition(",")[0]
-    note = prefix.partition(", ")[2]
-    told = next(
-        (base.model_fields for base in SHARED if issubclass(model, base) and model is not base),
-        {},
-    )
+    place, _, note = prefix.partition(", ")
+    shared = next((base.model_fields for base in SHARED if issubclass(model, base) and model is not base), {})
     for name, info in model.model_fields.items():
         has_rows_of_its_own = _is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"
-        if name == "kind" or info.alias == HELD or name in told or has_rows_of_its_own:
+        if name == "kind" or info.alias == HELD or name in shared or has_rows_of_its_own:
             continue
         key = f"{place}.{info.alias or name}" if place else (info.alias or name)
         if model is Sweep and name == "vary":
@@ -101,7 +89,9 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
 
 def _is_table(info: FieldInfo) -> bool:
     kind = typing.get_origin(info.annotation) or info.annotation
-    is_model = isinstance(kind, type) and issubclass(kind, SUBTABLES) and "Speed" not in str(info.annotation)
+    is_model = (
+        isinstance(kind, type) and issubclass(kind, dict | tuple | BaseModel) and "Speed" not in str(info.annotation)
+    )
     parts = list(options(info.annotation))
     optional = len(parts) > 1 and any(isinstance(part, type) and issubclass(part, BaseModel) for part in parts)
     has_values = re.search(r"\b(float|int)\b|tuple\[str", str(info.annotation)) is not None
@@ -121,4 +111,4 @@ def _default(info: FieldInfo) -> str:
 
 if __name__ == "__main__":
     readme = Path(sys.argv[1])
-    readme.write_text(with_key_table(readme.read_text(encoding="utf-8")), encoding="utf-8")
+    readme.write_text(with_part(readme.read_text(encoding="utf-8"), BEGIN, key_table(), END), encoding="utf-8")

@@ -12,7 +12,7 @@ import tomli_w
 from pydantic import BaseModel
 
 from blocksim.scenario.models.base import HELD
-from blocksim.scenario.models.contact import GROUND, Friction, Pair, PairFriction
+from blocksim.scenario.models.contact import GROUND, Friction, PairFriction
 from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.models.motion import FromTable, MotionTable
 from blocksim.scenario.models.record import TABLED
@@ -53,12 +53,9 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
         partners.append((one, GROUND))
     elif ground and scenario.ground.material is not None:
         partners.append((one, scenario.ground.material))
-    overrides: list[tuple[str, Pair]] = []
-    for names in partners:
-        for left, right in dict.fromkeys([names, names[::-1]]):
-            pair = scenario.pairs.get(left, {}).get(right)
-            if pair is not None:
-                overrides.append((format_key(("pairs", left, right)), pair))
+    ways = dict.fromkeys(way for names in partners for way in (names, names[::-1]))
+    found = ((way, scenario.pairs.get(way[0], {}).get(way[1])) for way in ways)
+    overrides = [(format_key(("pairs", *way)), pair) for way, pair in found if pair is not None]
     side = "block_ground" if ground else "block_block"
     contact = scenario.contact
     general: dict[str, tuple[object, str]] = {}
@@ -75,7 +72,7 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
     rules: dict[str, str] = {}
     for quantity, usual in general.items():
         special = ((getattr(pair, quantity), f"{key}.{quantity}") for key, pair in overrides)
-        values[quantity], rules[quantity] = next((found for found in special if found[0] is not None), usual)
+        values[quantity], rules[quantity] = next((one for one in special if one[0] is not None), usual)
     return ResolvedPair(**values, rules=rules)
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 from pydantic import ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -26,11 +26,6 @@ NO_FIXED_STIFFNESS = 'law "hertz-mindlin" takes it from the materials and contac
 
 GROUND = "ground"
 """Stands for the ground where pairs name materials; no material can have this name."""
-
-
-def or_bare(table: JsonSchemaValue, bare: JsonSchemaValue) -> JsonSchemaValue:
-    """Let the JSON Schema accept the short form as well as the table."""
-    return {"anyOf": [bare, table]}
 
 
 class PairFriction(Table):
@@ -69,7 +64,7 @@ class PairFriction(Table):
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Accept a bare number or angle."""
-        return or_bare(handler(schema), q.FrictionCoefficient().json_schema({"type": "number"}))
+        return {"anyOf": [q.FrictionCoefficient().json_schema({"type": "number"}), handler(schema)]}
 
 
 class Friction(Table):
@@ -99,8 +94,7 @@ class Restitution(Table):
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Accept a bare number."""
-        bare: dict[str, Any] = {"type": "number", "minimum": 0, "maximum": 1}
-        return or_bare(handler(schema), bare)
+        return {"anyOf": [{"type": "number", "minimum": 0, "maximum": 1}, handler(schema)]}
 
 
 class Pair(Table):

@@ -182,12 +182,12 @@ class Block(Table):
     @cached_property
     def size_x(self) -> float:
         """Extent along x in m; of an outline that of its bounding box."""
-        return self._extent(0) if self.polygon else self._side(self.along)
+        return self._extent(0, self.along)
 
     @cached_property
     def size_y(self) -> float:
         """Extent upright in m; of an outline that of its bounding box."""
-        return self._extent(1) if self.polygon else self._side(self.upright)
+        return self._extent(1, self.upright)
 
     @property
     def depth(self) -> float:
@@ -195,12 +195,11 @@ class Block(Table):
         if self.given_depth is not None:
             return self.given_depth
         (third,) = set(SIDES) - {self.along, self.upright}
-        return self._side(third)
+        return getattr(self, third) or 0.0
 
-    def _side(self, name: Side) -> float:
-        return {"width": self.width, "height": self.height, "length": self.length}[name] or 0.0
-
-    def _extent(self, axis: int) -> float:
+    def _extent(self, axis: int, side: Side) -> float:
+        if not self.polygon:
+            return getattr(self, side) or 0.0
         low, high = geometry.box_of(self.polygon)
         return high[axis] - low[axis]
 

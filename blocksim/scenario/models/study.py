@@ -22,7 +22,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf, Table, Whole, table_path
 from blocksim.scenario.spelling import nearest
-from blocksim.scenario.units import Dimension, parse_unit
+from blocksim.scenario.units import parse_unit
 
 MAX_VALUES = 100_000
 SIGNIFICANT = 12
@@ -49,8 +49,7 @@ class Uniform:
 
     def as_table(self) -> dict[str, object]:
         """Return the table of the file that says this."""
-        ends = {"from": _typed(self.low, self), "to": _typed(self.high, self)}
-        return ends if self.scale == "linear" else {**ends, "scale": self.scale}
+        return _table_of(self, {"from": self.low, "to": self.high}, self.scale)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +68,7 @@ class Normal:
 
     def as_table(self) -> dict[str, object]:
         """Return the table of the file that says this."""
-        ends = {"mean": self.mean, "sd": self.sd, "from": self.low, "to": self.high}
-        return {name: _typed(end, self) for name, end in ends.items() if math.isfinite(end)}
+        return _table_of(self, {"mean": self.mean, "sd": self.sd, "from": self.low, "to": self.high})
 
 
 Distribution = Uniform | Normal
@@ -82,13 +80,16 @@ def toml_number(number: float, *, angle: bool) -> object:
     return f"{number!r} rad" if angle else number
 
 
-def _typed(number: float, values: Distribution) -> object:
-    """Return a number with the unit of the file, if that gives the same number again."""
-    if values.unit:
-        text = f"{number / float(parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
-        if q.parse_quantity(text)[0] == number:
-            return text
-    return toml_number(number, angle=values.angle)
+def _table_of(values: Distribution, ends: Mapping[str, float], scale: Scale = "linear") -> dict[str, object]:
+    """Return the finite ones of some numbers with the unit of the file, if that gives the same numbers again."""
+    table: dict[str, object] = {}
+    for key, number in ends.items():
+        if math.isfinite(number):
+            table[key] = toml_number(number, angle=values.angle)
+            if values.unit:
+                text = f"{number / float(parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
+                table[key] = text if q.parse_quantity(text)[0] == number else table[key]
+    return table if scale == "linear" else {**table, "scale": scale}
 
 
 def _unit(value: Mapping[str, Any], *names: str) -> str:
@@ -103,7 +104,11 @@ def round_digits(number: float) -> float:
 
 
 def read_spread(value: object) -> tuple[Any, ...]:
-    """Return the values of a list or of { from, to, count }; raises a pydantic error for anything else."""
+    """Return the values of a list or of { from, to, count }; raises a pydantic error for anything else.
+
+    `count` values are evenly spaced: both ends as written, between them SI numbers, angles as texts in rad. Between
+    ends that are written as whole numbers such values stay whole, for keys that take no others.
+    """
     if not isinstance(value, Mapping):
         return _levels(value, "{ from, to, count }")
     is_whole = {"from", "to"} <= set(value) and "count" not in value and set(value) <= {"from", "to", "scale"}
@@ -111,7 +116,22 @@ def read_spread(value: object) -> tuple[Any, ...]:
         message = "a distribution needs one of the modes lhs, sobol and normal; "
         raise q.invalid(message + "otherwise write a list or { from, to, count }")
     _refuse_slips(value, ("from", "to", "count", "scale"), needed=("from", "to", "count"))
-    return _spread(value)
+    count = value["count"]
+    if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:
+        raise q.invalid(f"count {q.toml(count)} is not a whole number from 2 to {MAX_VALUES}")
+    (first, last), angle = _numbers(value, "from", "to")
+    scale = _scale(value, first, last)
+    if scale == "log":
+        inner = [round_digits(first * (last / first) ** (i / (count - 1))) for i in range(1, count - 1)]
+    else:
+        inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
+    if type(value["from"]) is type(value["to"]) is int:
+        return tuple(int(number) if number.is_integer() else number for number in (first, *inner, last))
+    ends = [  # as typed, with their unit
+        value[name] if isinstance(value[name], str) else toml_number(number, angle=angle)
+        for name, number in (("from", first), ("to", last))
+    ]
+    return (ends[0], *(toml_number(number, angle=angle) for number in inner), ends[1])
 
 
 def read_sampled(value: object) -> Variation:
@@ -154,29 +174,6 @@ def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tupl
         raise q.invalid(f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing")
 
 
-def _spread(value: Mapping[str, Any]) -> tuple[object, ...]:
-    """Return `count` evenly spaced values: both ends as written, between them SI numbers, angles as texts in rad.
-
-    Between ends that are written as whole numbers such values stay whole, for keys that take no others.
-    """
-    count = value["count"]
-    if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MAX_VALUES:
-        raise q.invalid(f"count {q.toml(count)} is not a whole number from 2 to {MAX_VALUES}")
-    (first, last), angle = _numbers(value, "from", "to")
-    scale = _scale(value, first, last)
-    if scale == "log":
-        inner = [round_digits(first * (last / first) ** (i / (count - 1))) for i in range(1, count - 1)]
-    else:
-        inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
-    if type(value["from"]) is type(value["to"]) is int:
-        return tuple(int(number) if number.is_integer() else number for number in (first, *inner, last))
-    ends = [  # as typed, with their unit
-        value[name] if isinstance(value[name], str) else toml_number(number, angle=angle)
-        for name, number in (("from", first), ("to", last))
-    ]
-    return (ends[0], *(toml_number(number, angle=angle) for number in inner), ends[1])
-
-
 def is_descending(value: Mapping[str, Any]) -> bool:
     """Return True if `from` and `to` are of one kind and `from` is the greater; False for what cannot be read."""
     try:
@@ -217,7 +214,15 @@ def _scale(value: Mapping[str, Any], low: float, high: float) -> Scale:
 
 def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
     """Return the SI numbers of keys of one kind, and whether they are angles."""
-    ends = [_end(value[name]) for name in names]
+    ends = []
+    for end in (value[name] for name in names):
+        if not isinstance(end, str):
+            ends.append((q.Quantity(q.NUMBER).read(end), NO_DIMENSION))
+            continue
+        try:
+            ends.append(q.parse_quantity(end, q.LENGTH))
+        except ValueError as error:
+            raise q.invalid(f"{q.toml(end)}: {error}") from None
     kinds = {dimension for number, dimension in ends if number != 0.0 or dimension != NO_DIMENSION}
     if len(kinds) > 1:
         *others, last = (f"{name} {q.toml(value[name])}" for name in names)
@@ -225,34 +230,18 @@ def _numbers(value: Mapping[str, Any], *names: str) -> tuple[list[float], bool]:
     return [number for number, _ in ends], q.ANGLE.dimension in kinds
 
 
-def _end(value: object) -> tuple[float, Dimension]:
-    if not isinstance(value, str):
-        return q.Quantity(q.NUMBER).read(value), NO_DIMENSION
-    try:
-        return q.parse_quantity(value, q.LENGTH)
-    except ValueError as error:
-        raise q.invalid(f"{q.toml(value)}: {error}") from None
-
-
 _END: dict[str, Any] = {"type": ["number", "string"]}
-_SCALE: dict[str, Any] = {"enum": ["linear", "log"]}
-
-
-def _table_schema(properties: dict[str, Any], *required: str) -> dict[str, Any]:
-    return {
-        "type": "object",
-        "properties": properties,
-        "required": list(required),
-        "additionalProperties": False,
-    }
-
-
 _COUNT: dict[str, Any] = {"type": "integer", "minimum": 2, "maximum": MAX_VALUES}
+_SPREAD = {"from": _END, "to": _END, "count": _COUNT, "scale": {"enum": ["linear", "log"]}}
+_NORMAL = {"mean": _END, "sd": _END, "from": _END, "to": _END}
+_TABLES = ((_SPREAD, ["from", "to"]), (_NORMAL, ["mean", "sd"]))
 VALUES_SCHEMA: dict[str, Any] = {
     "anyOf": [
         {"type": "array", "minItems": 1},
-        _table_schema({"from": _END, "to": _END, "count": _COUNT, "scale": _SCALE}, "from", "to"),
-        _table_schema({"mean": _END, "sd": _END, "from": _END, "to": _END}, "mean", "sd"),
+        *(
+            {"type": "object", "properties": table, "required": needed, "additionalProperties": False}
+            for table, needed in _TABLES
+        ),
     ]
 }
 """JSON Schema of all values of a varied key."""
