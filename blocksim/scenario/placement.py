@@ -10,7 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.geometry import Corner, Corners, box_of, is_upright, least_width, middle_of, section_of
+from blocksim.scenario.geometry import (
+    Corner,
+    Corners,
+    box_of,
+    centre_outline,
+    is_upright,
+    least_width,
+    middle_of,
+    section_of,
+)
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import KeyPath
 from blocksim.scenario.structures import PolygonStructure, Pose, Structure
@@ -167,9 +176,8 @@ def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedB
     poses = structure.start(scenario.blocks[structure.block])
     if isinstance(structure, PolygonStructure):
         built = []
-        for number, (cell, outline, pose) in enumerate(
-            zip(structure.cells, structure.shapes, poses, strict=True), start=first
-        ):
+        for number, (cell, pose) in enumerate(zip(structure.cells, poses, strict=True), start=first):
+            outline = centre_outline(cell.corners)
             key = cell.block or structure.block
             block = scenario.blocks[key]
             (left, bottom), (right, top) = box_of(outline)

@@ -268,7 +268,7 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
     for number, structure in enumerate(scenario.structures):
         if not isinstance(structure, PolygonStructure):
             needing.append((("structures", number, "block"), structure.block))
-        for place, cell in enumerate(structure.drawn if isinstance(structure, Polygons) else ()):
+        for place, cell in enumerate(structure.divide() if isinstance(structure, Polygons) else ()):
             if cell.block is not None and cell.block not in scenario.blocks:
                 hint = spelling.did_you_mean_or_list(cell.block, scenario.blocks)
                 where = ("structures", number, "cells", place, "block")

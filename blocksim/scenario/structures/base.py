@@ -11,7 +11,7 @@ from pydantic import Field
 
 from blocksim.scenario import geometry
 from blocksim.scenario import units as q
-from blocksim.scenario.geometry import Corner, Corners
+from blocksim.scenario.geometry import Corner
 from blocksim.scenario.models.base import Table, Whole
 from blocksim.scenario.models.geometry import Block
 
@@ -104,9 +104,8 @@ class Courses(Structure):
 
 def poses_at(x: Floats, y: Floats, angle: Floats | None = None) -> list[Pose]:
     """Return resting poses at centres (m), turned by angles (rad) where some are given."""
-    if angle is None:
-        return [Pose(*centre) for centre in zip(x.ravel().tolist(), y.ravel().tolist(), strict=True)]
-    return [Pose(*pose) for pose in zip(x.ravel().tolist(), y.ravel().tolist(), angle.ravel().tolist(), strict=True)]
+    values = (x, y) if angle is None else (x, y, angle)
+    return [Pose(*pose) for pose in zip(*(one.ravel().tolist() for one in values), strict=True)]
 
 
 def draws(seed: int, *shape: int) -> Floats:
@@ -132,30 +131,25 @@ class PolygonStructure(Structure):
     `left` and `bottom` are those of the box around all blocks.
     """
 
-    @property
     @abstractmethod
-    def drawn(self) -> Sequence[Cell]:
-        """All blocks, wherever they are; raises UnfitError where keys do not make blocks."""
+    def divide(self) -> Sequence[Cell]:
+        """Return all blocks, wherever they are; raises UnfitError where keys do not make blocks."""
+
+    def shift(self, cells: Sequence[Cell]) -> Corner:
+        """Return how far all blocks move (m) from where `divide` has them."""
+        low, _ = geometry.box_of([corner for cell in cells for corner in cell.corners])
+        return self.left - low[0], self.bottom - low[1]
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
         """All blocks where they start; raises UnfitError."""
-        dx, dy = self.shift
-        cells = tuple(cell._replace(corners=[(x + dx, y + dy) for x, y in cell.corners]) for cell in self._as_drawn)
+        cells = self.divide()
+        dx, dy = self.shift(cells)
+        cells = tuple(cell._replace(corners=[(x + dx, y + dy) for x, y in cell.corners]) for cell in cells)
         for number, cell in enumerate(cells, start=1):
             for _, message in geometry.faults(cell.corners):
                 raise UnfitError("kind", f"block {number} of this structure: {message}")
         return cells
-
-    @cached_property
-    def _as_drawn(self) -> Sequence[Cell]:
-        return self.drawn
-
-    @property
-    def shift(self) -> Corner:
-        """How far all blocks move (m) from where they are drawn."""
-        low, _ = geometry.box_of([corner for cell in self._as_drawn for corner in cell.corners])
-        return self.left - low[0], self.bottom - low[1]
 
     @property
     def size(self) -> int:
@@ -164,11 +158,6 @@ class PolygonStructure(Structure):
             return len(self.cells)
         except UnfitError:
             return 0
-
-    @property
-    def shapes(self) -> Sequence[Corners]:
-        """Corners (m) of every block about its centroid."""
-        return [geometry.centre_outline(cell.corners) for cell in self.cells]
 
     def height(self, block: Block) -> float:  # noqa: ARG002 - blocks have the shape that this gives them
         """Upper edge of the highest block."""

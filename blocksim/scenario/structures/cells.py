@@ -12,7 +12,7 @@ from blocksim.scenario import units as q
 from blocksim.scenario.geometry import Corner, clean_cell, relax_points, voronoi
 from blocksim.scenario.models.base import Whole, require_one
 from blocksim.scenario.models.geometry import Point
-from blocksim.scenario.structures.base import Cell, Floats, PolygonStructure, Seed, UnfitError, draws
+from blocksim.scenario.structures.base import Cell, PolygonStructure, Seed, UnfitError, draws
 
 MOST_VOUSSOIRS = 1000
 MOST_TURN = 0.9 * math.pi
@@ -53,24 +53,21 @@ class Arch(PolygonStructure):
             return self.radius
         return 0.5 * (self.span or math.nan) / math.sin(0.5 * self.embrace) + 0.5 * self.thickness
 
-    @property
-    def drawn(self) -> Sequence[Cell]:
-        """Voussoirs about the centre of the circles; raises UnfitError for one that turns by half a circle or more."""
+    def divide(self) -> Sequence[Cell]:
+        """Return voussoirs about the centre of the circles; raises UnfitError for one that turns by half a circle."""
         if self.embrace / self.count > MOST_TURN:
             raise UnfitError("count", f"a voussoir of {math.degrees(self.embrace / self.count):.4g} deg is not convex")
         inner, outer = self.mean_radius - 0.5 * self.thickness, self.mean_radius + 0.5 * self.thickness
         joints = [0.5 * math.pi + self.embrace * (0.5 - number / self.count) for number in range(self.count + 1)]
         ends = [(_at(inner, angle), _at(outer, angle)) for angle in joints]
-        ring = [Cell([one[0], other[0], other[1], one[1]]) for one, other in pairwise(ends)]
-        return [*ring, *([self._abutment(joints[0], 1.0), self._abutment(joints[-1], -1.0)] if self.abutments else [])]
-
-    def _abutment(self, angle: float, way: float) -> Cell:
-        """Return the fixed block behind a joint; `way` is 1 where it lies counter-clockwise of it."""
+        cells = [Cell([one[0], other[0], other[1], one[1]]) for one, other in pairwise(ends)]
         inner, outer = (self.mean_radius + 0.5 * sign * ABUTMENT * self.thickness for sign in (-1.0, 1.0))
-        back = way * self.thickness
-        dx, dy = -back * math.sin(angle), back * math.cos(angle)
-        (x0, y0), (x1, y1) = _at(inner, angle), _at(outer, angle)
-        return Cell([(x0, y0), (x1, y1), (x1 + dx, y1 + dy), (x0 + dx, y0 + dy)], fixed=True)
+        for angle, way in ((joints[0], 1.0), (joints[-1], -1.0)) if self.abutments else ():  # behind it, to this side
+            back = way * self.thickness
+            dx, dy = -back * math.sin(angle), back * math.cos(angle)
+            (x0, y0), (x1, y1) = _at(inner, angle), _at(outer, angle)
+            cells.append(Cell([(x0, y0), (x1, y1), (x1 + dx, y1 + dy), (x0 + dx, y0 + dy)], fixed=True))
+        return cells
 
 
 def _at(radius: float, angle: float) -> Corner:
@@ -89,16 +86,16 @@ class Column(PolygonStructure):
     width: q.PositiveLength = Field(description="width at its foot")
     top_width: q.PositiveLength | None = Field(default=None, description="width at its top (default: width)")
 
-    @property
-    def drawn(self) -> Sequence[Cell]:
-        """Drums from the ground up."""
+    def divide(self) -> Sequence[Cell]:
+        """Return the drums from the ground up."""
         top = self.width if self.top_width is None else self.top_width
         levels = [number / self.count for number in range(self.count + 1)]
         halves = [0.5 * (self.width + (top - self.width) * level) for level in levels]
-        ends = [
-            ((-half, self.tall * level), (half, self.tall * level)) for half, level in zip(halves, levels, strict=True)
+        heights = [self.tall * level for level in levels]
+        return [
+            Cell([(-half, low), (half, low), (upper, high), (-upper, high)])
+            for (half, low), (upper, high) in pairwise(zip(halves, heights, strict=True))
         ]
-        return [Cell([low[0], low[1], high[1], high[0]]) for low, high in pairwise(ends)]
 
 
 MOST_CELLS = 5000
@@ -146,26 +143,25 @@ class Voronoi(PolygonStructure):
         for number, message in geometry.faults(self.region) if self.region is not None else ():
             raise q.invalid(message, "region", *(() if number is None else (number,)))
 
-    @property
-    def whole(self) -> Sequence[Corner]:
-        """Corners (m) of what is divided, counter-clockwise."""
+    def divide(self) -> Sequence[Cell]:
+        """Return cells from the lowest to the highest centroid; raises UnfitError where none is large enough."""
+        width, tall = self.width or 0.0, self.tall or 0.0
+        whole = [(0.0, 0.0), (width, 0.0), (width, tall), (0.0, tall)]
         if self.region is not None:
             x, y = geometry.centroid(self.region)
-            return [(x + u, y + v) for u, v in geometry.centre_outline(self.region)]
-        width, tall = self.width or 0.0, self.tall or 0.0
-        return [(0.0, 0.0), (width, 0.0), (width, tall), (0.0, tall)]
-
-    @property
-    def drawn(self) -> Sequence[Cell]:
-        """Cells from the lowest to the highest centroid; raises UnfitError where none is large enough."""
-        side = math.sqrt(geometry.area_of(self.whole) / self.count)
+            whole = [(x + u, y + v) for u, v in geometry.centre_outline(self.region)]
+        (left, bottom), (right, top) = geometry.box_of(whole)
+        random = draws(self.seed, TRIALS * self.count, 2).tolist()
+        places = ((left + u * (right - left), bottom + v * (top - bottom)) for u, v in random)
+        inside = [place for place in places if geometry.holds(whole, place, 0.0)]
+        points = relax_points(inside[: self.count] or [geometry.centroid(whole)], whole, self.relax)
+        side = math.sqrt(geometry.area_of(whole) / self.count)
         least = LEAST_WIDTH * side if self.smallest is None else self.smallest
-        points = relax_points(self._points(), self.whole, self.relax)
-        for _ in range(MOST_ROUNDS):
-            found = [clean_cell(cell, LEAST_EDGE * side) for cell in voronoi(points, self.whole)]
-            is_large = [_width(cell) >= least for cell in found]
+        for _ in range(MOST_ROUNDS if points else 0):
+            cells = [clean_cell(cell, LEAST_EDGE * side) for cell in voronoi(points, whole)]
+            is_large = [not any(geometry.faults(one)) and geometry.least_width(tuple(one)) >= least for one in cells]
             if all(is_large):
-                return [Cell(cell) for cell in sorted(found, key=lambda cell: geometry.centroid(cell)[::-1])]
+                return [Cell(cell) for cell in sorted(cells, key=lambda cell: geometry.centroid(cell)[::-1])]
             points = [point for point, stays in zip(points, is_large, strict=True) if stays]
             if not points:
                 break
@@ -173,21 +169,6 @@ class Voronoi(PolygonStructure):
             f"no division into cells of at least {1e3 * least:g} mm was found; give a smaller width, or fewer cells"
         )
         raise UnfitError("count" if self.smallest is None else "smallest", message)
-
-    def _points(self) -> list[Corner]:
-        """Return random points in the region, the same for a seed."""
-        (left, bottom), (right, top) = geometry.box_of(self.whole)
-        random = draws(self.seed, TRIALS * self.count, 2).tolist()
-        places = ((left + u * (right - left), bottom + v * (top - bottom)) for u, v in random)
-        found = [place for place in places if geometry.holds(self.whole, place, 0.0)]
-        return found[: self.count] or [geometry.centroid(self.whole)]
-
-
-def _width(cell: Sequence[Corner]) -> float:
-    """Return the least width (m), zero for an outline that no block may have."""
-    if len(cell) < geometry.FEWEST or next(geometry.faults(cell), None) is not None:
-        return 0.0
-    return geometry.least_width(tuple(cell))
 
 
 MOST_BLOCKS = 20_000
@@ -230,15 +211,20 @@ class Rubble(PolygonStructure):
         if self.fewest_sides > self.most_sides:
             raise q.invalid(f"the least number of sides is above the most, {self.most_sides}", "fewest_sides")
 
-    @property
-    def drawn(self) -> Sequence[Cell]:
-        """Blocks row by row from below, each from left to right."""
-        pitch = self.largest + self.gap
-        random = draws(self.seed, self.count, PER_BLOCK + MOST_SIDES)
-        cells = []
-        for number, numbers in enumerate(random):
+    def divide(self) -> Sequence[Cell]:
+        """Return blocks row by row from below, each from left to right."""
+        pitch, cells = self.largest + self.gap, []
+        for number, random in enumerate(draws(self.seed, self.count, PER_BLOCK + MOST_SIDES).tolist()):
+            share, flat, turn, sides, *shifts = random
+            count = self.fewest_sides + int(sides * (self.most_sides - self.fewest_sides + 1))
+            half, flatness = 0.5 * self._size(share), FLATTEST + (1.0 - FLATTEST) * flat
+            c, s = math.cos(2.0 * math.pi * turn), math.sin(2.0 * math.pi * turn)
+            corners = []
+            for place, shift in enumerate(shifts[:count]):
+                angle = 2.0 * math.pi * (place + JITTER * (2.0 * shift - 1.0)) / count
+                u, v = half * math.cos(angle), half * flatness * math.sin(angle)
+                corners.append((c * u - s * v, s * u + c * v))
             row, column = divmod(number, self.columns)
-            corners = self._corners(numbers)
             x, y = geometry.middle_of(corners)
             dx, dy = pitch * column - x, pitch * row - y
             cells.append(Cell([(u + dx, v + dy) for u, v in corners]))
@@ -253,17 +239,3 @@ class Rubble(PolygonStructure):
             return float(self.largest * (1.0 + share * (ratio**-self.exponent - 1.0)) ** (-1.0 / self.exponent))
         except OverflowError:  # so steep that all blocks are small
             return self.smallest
-
-    def _corners(self, random: Floats) -> list[geometry.Corner]:
-        share, flat, turn, sides, *shifts = random.tolist()
-        count = self.fewest_sides + int(sides * (self.most_sides - self.fewest_sides + 1))
-        half = 0.5 * self._size(share)
-        flatness = FLATTEST + (1.0 - FLATTEST) * flat
-        angle = 2.0 * math.pi * turn
-        c, s = math.cos(angle), math.sin(angle)
-        corners = []
-        for number, shift in enumerate(shifts[:count]):
-            place = 2.0 * math.pi * (number + JITTER * (2.0 * shift - 1.0)) / count
-            u, v = half * math.cos(place), half * flatness * math.sin(place)
-            corners.append((c * u - s * v, s * u + c * v))
-        return corners

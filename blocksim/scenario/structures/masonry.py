@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -64,12 +64,10 @@ class Staircase(Structure):
 
 
 Bond = Literal["running", "stack"]
-BONDS: tuple[Bond, ...] = ("running", "stack")
-PLACE = 2  # numbers of the position of a hole
 
 
 def _hole(value: object) -> object:
-    if not isinstance(value, list | tuple) or len(value) != PLACE:
+    if not isinstance(value, list | tuple) or len(value) != 2:
         raise q.invalid(f"{q.toml(value)} is not a hole; write [row, column], counted from 1 at the lower left")
     return value
 
@@ -87,7 +85,7 @@ class BlockWall(Courses):
 
     kind: Literal["wall"] = Field(description="kind of structure")
     columns: Count = Field(description="number of blocks in a course")
-    bond: Annotated[Bond, OneOf(BONDS)] = Field(
+    bond: Annotated[Bond, OneOf(get_args(Bond))] = Field(
         default="running", description="running: every second course is shifted by half a block; stack: none is"
     )
     gap: q.NonNegativeLength = Field(default=0.0, description="gap between neighbours in a course")
@@ -124,10 +122,7 @@ class BlockWall(Courses):
     def size(self) -> int:
         """Number of blocks that are not left out."""
         others = self.rows * self.columns - len(self.holes)
-        return others - self._random_holes(others)
-
-    def _random_holes(self, others: int) -> int:
-        return round(self.missing * others)
+        return others - round(self.missing * others)
 
     def place(self, block: Block) -> Sequence[Pose]:
         """Return the poses course by course, each from left to right."""
@@ -141,7 +136,7 @@ class BlockWall(Courses):
         for hole_row, hole_column in self.holes:
             kept[hole_row - 1, hole_column - 1] = False
         others = np.flatnonzero(kept)
-        lowest = np.argsort(random[1].ravel()[others], kind="stable")[: self._random_holes(others.size)]
+        lowest = np.argsort(random[1].ravel()[others], kind="stable")[: round(self.missing * others.size)]
         kept.ravel()[others[lowest]] = False
         return poses_at(x[kept], y[kept])
 

@@ -14,7 +14,6 @@ from pydantic import Field, ValidationInfo, model_validator
 from blocksim.errors import BlocksimError
 from blocksim.extras import load_module
 from blocksim.scenario import geometry
-from blocksim.scenario import geometry as outlines
 from blocksim.scenario import units as q
 from blocksim.scenario.geometry import Corner
 from blocksim.scenario.input_files import MEGABYTE, read_limited
@@ -76,21 +75,21 @@ def read_drawing(path: Path) -> list[DrawingOutline]:
     if len(found) > MOST_OUTLINES or sum(len(one.outline) for one in found) > MOST_CORNERS:
         most = f"at most {MOST_OUTLINES} with {MOST_CORNERS} corners are allowed"
         raise DrawingError(f"{len(found)} outlines are too many; {most}")
-    outlines_found = [one._replace(outline=simplify(one.outline)) for one in found]
-    for one in outlines_found:
-        for number, message in outlines.faults(one.outline):
+    found = [one._replace(outline=simplify(one.outline)) for one in found]
+    for one in found:
+        for number, message in geometry.faults(one.outline):
             place = "" if number is None else ", corner ({:g}, {:g})".format(*one.outline[number])
             raise DrawingError(f"{one.name}{place}: {message}")
-    return outlines_found
+    return found
 
 
 def simplify(points: Sequence[Corner]) -> list[Corner]:
     """Return an outline without points that repeat or lie within a straight edge, and not closed."""
     corners = [point for number, point in enumerate(points) if point != points[(number + 1) % len(points)]]
-    low, high = outlines.box_of(corners) if corners else ((0.0, 0.0), (0.0, 0.0))
+    low, high = geometry.box_of(corners) if corners else ((0.0, 0.0), (0.0, 0.0))
     near = STRAY * math.dist(low, high)
     number = 0
-    while number < len(corners) > outlines.FEWEST:
+    while number < len(corners) > geometry.FEWEST:
         before, here, after = corners[number - 1], corners[number], corners[(number + 1) % len(corners)]
         (x, y), (u, v) = ((x1 - before[0], y1 - before[1]) for x1, y1 in (after, here))
         length = math.hypot(x, y)
@@ -120,8 +119,13 @@ def _polygons(node: Any, name: str, properties: Mapping[str, Any], depth: int) -
         yield from _polygons(_part(node, "geometry", dict, place), name, own, depth - 1)
     elif kind in ("Polygon", "MultiPolygon"):
         coordinates = _part(node, "coordinates", list, place)
-        several = [coordinates] if kind == "Polygon" else coordinates
-        yield from (_polygon(rings, name, properties) for rings in several)
+        for rings in [coordinates] if kind == "Polygon" else coordinates:
+            if not rings:
+                raise DrawingError(f"{place}a polygon without corners")
+            if len(rings) > 1:
+                holes = "a hole" if len(rings) == 2 else f"{len(rings) - 1} holes"
+                raise DrawingError(f"{place}a polygon with {holes}; blocks have none")
+            yield DrawingOutline([_point(point) for point in rings[0]], name or "polygon", properties)
     else:
         raise DrawingError(f"{place}{toml(kind)} is not a polygon")
 
@@ -132,16 +136,6 @@ def _part(node: Mapping[str, Any], key: str, kind: type, place: str) -> Any:
     if not isinstance(found, kind):
         raise DrawingError(f"{place}it has no {key}")
     return found
-
-
-def _polygon(rings: Any, name: str, properties: Mapping[str, Any]) -> DrawingOutline:
-    place = f"{name}: " if name else ""
-    if not rings:
-        raise DrawingError(f"{place}a polygon without corners")
-    if len(rings) > 1:
-        holes = "a hole" if len(rings) == 2 else f"{len(rings) - 1} holes"
-        raise DrawingError(f"{place}a polygon with {holes}; blocks have none")
-    return DrawingOutline([_point(point) for point in rings[0]], name or "polygon", properties)
 
 
 def _point(values: Any) -> Corner:
@@ -220,14 +214,12 @@ class Polygons(PolygonStructure):
             drawn = read_drawing(path)
         except DrawingError as error:
             raise q.invalid(f"{path.name}: {error}", "table") from None
+        cells = []
         for one in drawn:
             if "material" in one.properties and "block" not in one.properties:
                 raise q.invalid(f"{path.name}: {one.name}: material is not read; name a block, which has one", "table")
-        cells = []
-        for one in drawn:
-            known = {
-                key: one.properties[key] for key in ("block", "fixed", "name") if one.properties.get(key) is not None
-            }
+            known = {key: one.properties.get(key) for key in ("block", "fixed", "name")}
+            known = {key: value for key, value in known.items() if value is not None}
             cells.append({"outline": tuple((x * unit, y * unit) for x, y in one.outline), **known})
         return {**{key: value for key, value in data.items() if key not in ("table", "unit")}, "cells": tuple(cells)}
 
@@ -245,15 +237,13 @@ class Polygons(PolygonStructure):
             if any(geometry.faults(self._outline(one))):
                 raise q.invalid(f"block {number + 1} loses an edge; shrink less", "shrink")
 
-    @property
-    def drawn(self) -> Sequence[Cell]:
-        """All blocks in their order."""
+    def divide(self) -> Sequence[Cell]:
+        """Return all blocks in their order."""
         return [Cell(self._outline(one), one.fixed, one.block, one.name) for one in self.cells_given]
 
     def _outline(self, one: DrawnBlock) -> Sequence[Point]:
         return geometry.shrink_outline(one.outline, self.shrink) if self.shrink else one.outline
 
-    @property
-    def shift(self) -> tuple[float, float]:
-        """How far all blocks move (m)."""
-        return (0.0, 0.0) if self.in_place else super().shift
+    def shift(self, cells: Sequence[Cell]) -> Corner:
+        """Return how far all blocks move (m)."""
+        return (0.0, 0.0) if self.in_place else super().shift(cells)
