@@ -14,9 +14,9 @@ from typing import Self
 from pydantic import BaseModel
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
-from blocksim.scenario import Scenario, body_table_contents, events, input_files, motion_table_content, scenario_to_toml
+from blocksim.scenario import Scenario, events, input_files, scenario_to_toml
 from blocksim.scenario.models.motion import MOST_BODY_TABLES
-from blocksim.scenario.resolved import MARK
+from blocksim.scenario.resolved import MARK, body_table_contents, motion_table_content
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.provenance import run_hash
 

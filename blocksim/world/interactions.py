@@ -21,7 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.kernels.common.arrays import INTERACTION, Records, zeros
-from blocksim.scenario import GROUND, PlacedBody, ResolvedPair, Scenario, resolve_pair
+from blocksim.scenario import GROUND, PlacedBody, Scenario, resolve_pair
+from blocksim.scenario.resolved import ResolvedPair
 
 # e = 0 would need infinite damping; this rebound counts as none (the promise is at most 1 % of the impact speed)
 SMALLEST_RESTITUTION = 0.009

@@ -10,14 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from blocksim.scenario import (
-    Scenario,
-    load_scenario,
-    motion_table_content,
-    scenario_from_mapping,
-    scenario_hash,
-    scenario_to_toml,
-)
+from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
 from blocksim.scenario.motion import (
     Floats,
     MotionPieces,
@@ -26,6 +19,7 @@ from blocksim.scenario.motion import (
     motion_pieces,
     spline_slopes,
 )
+from blocksim.scenario.resolved import motion_table_content
 from tests.scenario.conftest import data_of
 
 END = 3.0

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from blocksim.scenario import GROUND, Document, PairFriction, Scenario, resolve_pair, scenario_from_mapping
+from blocksim.scenario import GROUND, Document, Scenario, resolve_pair, scenario_from_mapping
+from blocksim.scenario.models.contact import PairFriction
 from tests.scenario.conftest import MATERIAL, data_of
 
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario import PlacedSegment, Scenario, place_segments, scenario_from_mapping, surface_height
-from blocksim.scenario.placement import ENDLESS
+from blocksim.scenario import PlacedSegment, Scenario, place_segments, scenario_from_mapping
+from blocksim.scenario.placement import ENDLESS, surface_height
 from tests.scenario.conftest import data_of
 
 Point = tuple[float, float]

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import GROUND, Material, Scenario, geometry, overrides, place_bodies, resolve_pair
+from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, resolve_pair
 from blocksim.scenario.models.contact import PairFriction
+from blocksim.scenario.models.geometry import Material
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.models.stepping import Explicit
 from blocksim.scenario.start import soil_tables

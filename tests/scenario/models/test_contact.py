@@ -5,7 +5,8 @@ import math
 import pytest
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import Contact, Document, PairFriction, Restitution, scenario_hash, scenario_to_toml
+from blocksim.scenario import Document, scenario_hash, scenario_to_toml
+from blocksim.scenario.models.contact import Contact, PairFriction, Restitution
 
 SIDE = "friction.block_block"
 

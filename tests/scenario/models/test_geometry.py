@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from blocksim.scenario import Block, Material
+from blocksim.scenario.models.geometry import Block, Material
 
 
 @pytest.mark.parametrize(

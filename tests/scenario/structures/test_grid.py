@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario import Block, PlacedBody
+from blocksim.scenario import PlacedBody
+from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.overlap import overlapping_pairs
 from blocksim.scenario.structures import Grid, Pose, UnfitError
 

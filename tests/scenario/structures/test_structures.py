@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from blocksim.scenario import Block
+from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.structures import (
     KINDS,
     Arch,

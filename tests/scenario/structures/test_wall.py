@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blocksim.scenario import Block
+from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.structures import BlockWall, Pose
 
 BRICK = Block(width=0.05, height=0.025, length=0.032, material="aluminium")
