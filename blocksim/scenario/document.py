@@ -11,9 +11,7 @@ from pathlib import Path
 from typing import NamedTuple, Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
-from blocksim.scenario.check import examine
-from blocksim.scenario.input_files import NoSuchFileError, file_access, is_anywhere, is_folder, read_head, user_value
-from blocksim.scenario.mistakes import Mistake
+from blocksim.scenario import check, input_files, mistakes, resolved, units
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import (
     MAX_PARTS,
@@ -29,8 +27,6 @@ from blocksim.scenario.overrides import (
     skip,
     with_value,
 )
-from blocksim.scenario.resolved import scenario_to_toml
-from blocksim.scenario.units import toml
 
 MAX_SHOWN = 110
 """Characters of a line that a message shows; a longer line is cut on both sides of the caret."""
@@ -264,7 +260,7 @@ class Document:
     source: ScenarioText
     folder: Path = Path()
     overrides: tuple[Override, ...] = ()
-    allow_outside: bool = field(default_factory=is_anywhere)
+    allow_outside: bool = field(default_factory=input_files.is_anywhere)
     is_stored: bool = False
 
     @classmethod
@@ -318,7 +314,9 @@ class Document:
 
     def with_values(self, values: Mapping[str, object]) -> Self:
         """Set values by dotted key; raises ScenarioError where a key leads nowhere."""
-        return self._with([(f"value {key}", f"{key} = {toml(value)}", (key, value)) for key, value in values.items()])
+        return self._with(
+            [(f"value {key}", f"{key} = {units.toml(value)}", (key, value)) for key, value in values.items()]
+        )
 
     def with_settings(self, settings: Sequence[str]) -> Self:
         """Set values as --set takes them ("contact.stiffness_scale=0.1"); raises ScenarioError."""
@@ -337,7 +335,7 @@ class Document:
         for label, text, pair in settings:
             try:
                 key, value = parse_override(text) if pair is None else pair
-                data, path = with_value(data, key, user_value(key, value) if pair is None else value)
+                data, path = with_value(data, key, input_files.user_value(key, value) if pair is None else value)
                 overrides.append(Override(label, text, path))
             except (UnfitOverrideError, TooDeepError) as error:
                 problems.append(override_problem(Override(label, text, ()), (), str(error), "key"))
@@ -347,19 +345,19 @@ class Document:
 
     def build(self) -> Scenario:
         """Validate; raises ScenarioError with every mistake, those in the file first and by line."""
-        with file_access(anywhere=self.allow_outside, links=not self.is_stored):
-            scenario, findings = examine(self.data, self.folder)
+        with input_files.file_access(anywhere=self.allow_outside, links=not self.is_stored):
+            scenario, findings = check.examine(self.data, self.folder)
         if scenario is None:
             raise ScenarioError(self._problems(findings))
         return scenario
 
-    def _problems(self, findings: Sequence[Mistake]) -> list[Problem]:
+    def _problems(self, findings: Sequence[mistakes.Mistake]) -> list[Problem]:
         problems = list(dict.fromkeys(self.problem(finding) for finding in findings))
         problems.sort(key=lambda p: (p.line_number is None, p.line_number or 0, p.caret_start))
         more = [Problem(self.source.where, "more mistakes follow")] if len(problems) > MAX_PROBLEMS else []
         return [*problems[:MAX_PROBLEMS], *more]
 
-    def problem(self, finding: Mistake) -> Problem:
+    def problem(self, finding: mistakes.Mistake) -> Problem:
         """Show a finding where it can be corrected: in a value set from outside, or else in the text."""
         override = next((one for one in reversed(self.overrides) if self._is_cause(one, finding)), None)
         if override is None:  # something may be missing in a table that is not in the text but was created from outside
@@ -370,7 +368,7 @@ class Document:
             return override_problem(override, finding.path, finding.message, finding.at)
         return self.source.problem(finding.path, finding.message, finding.at)
 
-    def _is_cause(self, override: Override, finding: Mistake) -> bool:
+    def _is_cause(self, override: Override, finding: mistakes.Mistake) -> bool:
         path, found = override.path, finding.path
         inside = found[: len(path)] == path
         on_the_way = path[: len(found)] == found and found not in self.source.places
@@ -406,7 +404,7 @@ def load_scenario(
     document = replace(document, allow_outside=allow_outside or document.allow_outside)
     if not isinstance(overrides, Mapping):
         return document.with_settings(overrides).build()
-    return document.with_values({key: user_value(key, value) for key, value in overrides.items()}).build()
+    return document.with_values({key: input_files.user_value(key, value) for key, value in overrides.items()}).build()
 
 
 def scenario_from_mapping(
@@ -437,7 +435,7 @@ def document_of(source: Source) -> Document:
     if isinstance(source, Document):
         return source
     if isinstance(source, Scenario):
-        return replace(Document.parse(scenario_to_toml(source), source.name), allow_outside=True)
+        return replace(Document.parse(resolved.scenario_to_toml(source), source.name), allow_outside=True)
     return Document.from_mapping(source) if isinstance(source, Mapping) else Document.read(source)
 
 
@@ -447,11 +445,11 @@ def _unusable(where: str, message: str) -> ScenarioError:
 
 def _content(path: Path, *, is_stored: bool) -> bytes:
     """Read a file, but never much more than a scenario may have."""
-    if is_folder(path):
+    if input_files.is_folder(path):
         raise InputMissingError(f"{path}: this is a folder; a scenario file is needed{_similar_file(path / path.name)}")
     try:
-        content = read_head(path, MAX_BYTES + 1, links=not is_stored)
-    except NoSuchFileError as error:
+        content = input_files.read_head(path, MAX_BYTES + 1, links=not is_stored)
+    except input_files.NoSuchFileError as error:
         raise InputMissingError(f"{error}{_similar_file(path)}") from None
     if len(content) > MAX_BYTES:
         raise _unusable(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")

@@ -10,56 +10,49 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from blocksim.scenario.models import contact, geometry, loads, motion, record, scenario, stepping, study
 from blocksim.scenario.models.base import HELD, SYSTEMS
-from blocksim.scenario.models.contact import Contact, Friction, Pair, PairFriction, Restitution
-from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
-from blocksim.scenario.models.loads import HISTORIES, LOADS, Load
-from blocksim.scenario.models.motion import OWN_DRIVES
-from blocksim.scenario.models.record import MOTIONS
-from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.stepping import PROBES, SCHEMES, Event, NewVelocity, Output, Probe, Start, Time
-from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS, Structure
 
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
 HEAD = "| key | unit | default | meaning |\n| --- | --- | --- | --- |"
-SHARED = (Structure, Load, Time, Probe)
+SHARED = (Structure, loads.Load, stepping.Time, stepping.Probe)
 """What kinds of a table have in common, listed once."""
 
 
 def key_table() -> str:
     """Return all keys as a Markdown table: key, SI unit, default, meaning."""
     sections: list[tuple[str, type[BaseModel]]] = [
-        ("", Scenario),
-        ("materials.NAME", Material),
-        ("blocks.NAME", Block),
+        ("", scenario.Scenario),
+        ("materials.NAME", geometry.Material),
+        ("blocks.NAME", geometry.Block),
         ("structures, every kind", Structure),
         *((f'structures, kind = "{kind}"', model) for kind, model in KINDS.items()),
-        ("bodies", BodySpec),
-        *((f'bodies.motion, kind = "{kind}"', model) for kind, model in OWN_DRIVES.items()),
-        ("ground", Ground),
-        ("walls", Wall),
-        *((f'motion, kind = "{kind}"', model) for kind, model in MOTIONS.items()),
-        ("events", Event),
-        ("events.velocity", NewVelocity),
-        ("loads, every kind", Load),
-        *((f'loads, kind = "{kind}"', model) for kind, model in LOADS.items()),
-        *((f'loads.history, kind = "{kind}"', model) for kind, model in HISTORIES.items()),
-        ("start", Start),
-        ("friction", Friction),
-        ("friction.PAIR", PairFriction),
-        ("pairs.A.B", Pair),
-        ("contact", Contact),
-        ("contact.restitution", Restitution),
-        ("time", Time),
-        *((f'time, scheme = "{scheme}"', model) for scheme, model in SCHEMES.items()),
-        ("output", Output),
-        ("probes, every kind", Probe),
-        *((f'probes, kind = "{kind}"', model) for kind, model in PROBES.items()),
-        ("experiment", Experiment),
-        ("sweep", Sweep),
+        ("bodies", geometry.BodySpec),
+        *((f'bodies.motion, kind = "{kind}"', model) for kind, model in motion.OWN_DRIVES.items()),
+        ("ground", geometry.Ground),
+        ("walls", geometry.Wall),
+        *((f'motion, kind = "{kind}"', model) for kind, model in record.MOTIONS.items()),
+        ("events", stepping.Event),
+        ("events.velocity", stepping.NewVelocity),
+        ("loads, every kind", loads.Load),
+        *((f'loads, kind = "{kind}"', model) for kind, model in loads.LOADS.items()),
+        *((f'loads.history, kind = "{kind}"', model) for kind, model in loads.HISTORIES.items()),
+        ("start", stepping.Start),
+        ("friction", contact.Friction),
+        ("friction.PAIR", contact.PairFriction),
+        ("pairs.A.B", contact.Pair),
+        ("contact", contact.Contact),
+        ("contact.restitution", contact.Restitution),
+        ("time", stepping.Time),
+        *((f'time, scheme = "{scheme}"', model) for scheme, model in stepping.SCHEMES.items()),
+        ("output", stepping.Output),
+        ("probes, every kind", stepping.Probe),
+        *((f'probes, kind = "{kind}"', model) for kind, model in stepping.PROBES.items()),
+        ("experiment", study.Experiment),
+        ("sweep", study.Sweep),
         *SYSTEMS.items(),
     ]
     rows = [row for prefix, model in sections for row in _rows(prefix, model)]
@@ -76,14 +69,16 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place, _, note = prefix.partition(", ")
     shared = next((base.model_fields for base in SHARED if issubclass(model, base) and model is not base), {})
     for name, info in model.model_fields.items():
-        has_rows_of_its_own = _is_table(info) and model not in {Friction, Pair, Sweep} and name != "provenance"
+        has_rows_of_its_own = (
+            _is_table(info) and model not in {contact.Friction, contact.Pair, study.Sweep} and name != "provenance"
+        )
         if name == "kind" or info.alias == HELD or name in shared or has_rows_of_its_own:
             continue
         key = f"{place}.{info.alias or name}" if place else (info.alias or name)
-        if model is Sweep and name == "vary":
+        if model is study.Sweep and name == "vary":
             key = 'sweep."KEY"'
         where = f" ({note})" if note else ""
-        default = f"`{info.default.static}`" if model is Friction else _default(info)
+        default = f"`{info.default.static}`" if model is contact.Friction else _default(info)
         yield f"| `{key}`{where} | {si_unit(info)} | {default} | {info.description} |"
 
 

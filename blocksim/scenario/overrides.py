@@ -11,10 +11,8 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from blocksim.scenario.models.base import HELD, SYSTEMS, Table
-from blocksim.scenario.models.contact import GROUND, Friction
+from blocksim.scenario.models import base, contact, stepping
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.stepping import SCHEMES, Time
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.units import Kind, Quantity, toml
 
@@ -107,7 +105,7 @@ def follow(data: object, path: Sequence[str | int]) -> object:
     return data
 
 
-def table_at(path: Sequence[str | int], data: object) -> type[Table] | None:
+def table_at(path: Sequence[str | int], data: object) -> type[base.Table] | None:
     """Return the model of the table at a path; `data` has the kinds of structures and motion."""
     annotation: object = Scenario
     for depth, part in enumerate(path):
@@ -142,7 +140,7 @@ def field_of(key: str, scenario: Scenario) -> FieldInfo | None:
 
 def is_known(path: Sequence[str | int], data: object) -> bool:
     """Return True if the models have a place for this path (what has a name or number must be in `data`)."""
-    named = 2 if path[0] in SYSTEMS else NAMED.get(path[0], 0)
+    named = 2 if path[0] in base.SYSTEMS else NAMED.get(path[0], 0)
     if named and follow(data, path[:named]) is MISSING:
         return False
     if len(path) <= named:
@@ -152,24 +150,24 @@ def is_known(path: Sequence[str | int], data: object) -> bool:
     )
 
 
-def fields_of(table: type[Table]) -> dict[str, FieldInfo]:
+def fields_of(table: type[base.Table]) -> dict[str, FieldInfo]:
     """Return the fields of a table by their keys in the file; of a scenario those of the tables of all systems too."""
     systems = {
         name: FieldInfo(annotation=tuple[entry, ...], default=(), description=entry.__doc__)  # type: ignore[valid-type]
-        for name, entry in (SYSTEMS.items() if table is Scenario else ())
+        for name, entry in (base.SYSTEMS.items() if table is Scenario else ())
     }
     return {**_own_fields(table), **systems}
 
 
 @functools.cache
-def _own_fields(table: type[Table]) -> dict[str, FieldInfo]:
-    return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != HELD}
+def _own_fields(table: type[base.Table]) -> dict[str, FieldInfo]:
+    return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != base.HELD}
 
 
-def _table(annotation: object, node: object) -> type[Table] | None:
-    tables = [option for option in options(annotation) if isinstance(option, type) and issubclass(option, Table)]
+def _table(annotation: object, node: object) -> type[base.Table] | None:
+    tables = [option for option in options(annotation) if isinstance(option, type) and issubclass(option, base.Table)]
     if len(tables) > 1:
-        tables = [*SCHEMES.values()] if issubclass(tables[0], Time) else tables
+        tables = [*stepping.SCHEMES.values()] if issubclass(tables[0], stepping.Time) else tables
         for table in tables:
             tag = next(tag for tag in TAGS if tag in table.model_fields)  # the key that tells, here or by default
             word = node.get(tag, MISSING) if isinstance(node, Mapping) else MISSING
@@ -214,7 +212,7 @@ MAX_DEPTH = 16
 SYNONYMS = {"kinetic": "kinetic_ratio", "kinetic_ratio": "kinetic"}
 """Two keys with the same meaning; setting one removes the other."""
 _NAMED = (("materials",), ("blocks",))
-_FRICTION = Friction()
+_FRICTION = contact.Friction()
 
 
 class UnfitOverrideError(ValueError):
@@ -300,7 +298,7 @@ def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
     inside_friction = parts[0] == "pairs" and tuple(parts[3:4]) == ("friction",) and len(parts) > 4
     if not inside_friction or follow(data, parts[:4]) is not MISSING:
         return data
-    side = "block_ground" if GROUND in parts[1:3] else "block_block"
+    side = "block_ground" if contact.GROUND in parts[1:3] else "block_block"
     general = follow(data, ("friction", side))
     return with_value(data, parts[:4], getattr(_FRICTION, side).static if general is MISSING else general)[0]
 
@@ -361,7 +359,7 @@ def _opened(path: KeyPath, child: object) -> object:
     bare = child is not MISSING and not isinstance(child, Mapping | tuple | list)
     if path == ("contact", "restitution") and bare:
         return {"block_block": child, "block_ground": child}
-    if path[:-1] == ("friction",) and path[-1] in Friction.model_fields:
+    if path[:-1] == ("friction",) and path[-1] in contact.Friction.model_fields:
         if child is MISSING:
             return {"static": getattr(_FRICTION, str(path[-1])).static}
         return {"static": child} if bare else child

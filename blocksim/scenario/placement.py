@@ -10,18 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.geometry import (
-    Corner,
-    Corners,
-    box_of,
-    centre_outline,
-    is_upright,
-    least_width,
-    middle_of,
-    section_of,
-)
+from blocksim.scenario import geometry, overrides
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.overrides import KeyPath
 from blocksim.scenario.structures import PolygonStructure, Pose, Structure
 
 LENGTH_WITHOUT_BLOCKS = 0.1  # m: can be seen beside soil
@@ -50,29 +40,29 @@ class PlacedBody(NamedTuple):
     fixed: bool  # held at the start: forces do not move it
     driven: bool = False  # by a motion of its own; fixed as well
     freed: bool = False  # by an event
-    outline: Corners = ()  # empty for a rectangle
+    outline: geometry.Corners = ()  # empty for a rectangle
 
     @property
     def is_polygon(self) -> bool:
         """Whether the block has an outline that is no rectangle with sides along its axes."""
-        return bool(self.outline) and not is_upright(self.outline)
+        return bool(self.outline) and not geometry.is_upright(self.outline)
 
     @property
     def mass(self) -> float:
         """Mass in kg."""
         if self.is_polygon:
-            return self.density * section_of(self.outline)[0] * self.depth
+            return self.density * geometry.section_of(self.outline)[0] * self.depth
         return self.density * self.size_x * self.size_y * self.depth
 
     @property
     def inertia(self) -> float:
         """Moment of inertia about the centroid in kg m²."""
         if self.is_polygon:
-            return self.density * section_of(self.outline)[1] * self.depth
+            return self.density * geometry.section_of(self.outline)[1] * self.depth
         return self.mass * (self.size_x * self.size_x + self.size_y * self.size_y) / 12.0
 
     @property
-    def corners(self) -> Corners:
+    def corners(self) -> geometry.Corners:
         """Corners in m along the body's own axes about its centroid, counter-clockwise; of a rectangle too."""
         if self.outline:
             return self.outline
@@ -82,7 +72,7 @@ class PlacedBody(NamedTuple):
     @property
     def least_width(self) -> float:
         """Smaller side in m; of an outline the least distance of two parallel lines with the block between them."""
-        return least_width(self.outline) if self.is_polygon else min(self.size_x, self.size_y)
+        return geometry.least_width(self.outline) if self.is_polygon else min(self.size_x, self.size_y)
 
     @property
     def radius(self) -> float:
@@ -91,12 +81,12 @@ class PlacedBody(NamedTuple):
             return max(math.hypot(x, y) for x, y in self.outline)
         return 0.5 * math.hypot(self.size_x, self.size_y)
 
-    def ground_point(self, x: float, y: float) -> Corner:
+    def ground_point(self, x: float, y: float) -> geometry.Corner:
         """Return where a point is (m) that is given in the body's own axes (m)."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         return self.x + cosine * x - sine * y, self.y + sine * x + cosine * y
 
-    def own_point(self, x: float, y: float) -> Corner:
+    def own_point(self, x: float, y: float) -> geometry.Corner:
         """Return a point (m) in the body's own axes."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         return cosine * (x - self.x) + sine * (y - self.y), cosine * (y - self.y) - sine * (x - self.x)
@@ -121,7 +111,7 @@ class _Placement(NamedTuple):
 
     scenario: weakref.ref[Scenario]
     bodies: tuple[PlacedBody, ...]
-    origins: list[KeyPath]  # of every body the structure or single body that it comes from
+    origins: list[overrides.KeyPath]  # of every body the structure or single body that it comes from
 
 
 _latest: list[_Placement] = []  # at most one, for as long as its scenario lives: a million bodies take seconds to place
@@ -142,7 +132,7 @@ def has_outlines(scenario: Scenario) -> bool:
     return shaped or any(block.polygon for block in scenario.blocks.values())
 
 
-def origins_of(scenario: Scenario) -> list[KeyPath]:
+def origins_of(scenario: Scenario) -> list[overrides.KeyPath]:
     """Return for every placed body the path of the structure or body that it comes from."""
     return _placement(scenario).origins
 
@@ -156,7 +146,7 @@ def _placement(scenario: Scenario) -> _Placement:
 def _placed(scenario: Scenario) -> _Placement:
     freed = {name for event in scenario.events for name in event.free}
     bodies: list[PlacedBody] = []
-    origins: list[KeyPath] = []
+    origins: list[overrides.KeyPath] = []
     for number, structure in enumerate(scenario.structures):
         built = _built(scenario, structure, len(bodies) + 1)
         bodies += [body._replace(freed=True) if body.fixed and body.name in freed else body for body in built]
@@ -177,15 +167,15 @@ def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedB
     if isinstance(structure, PolygonStructure):
         built = []
         for number, (cell, pose) in enumerate(zip(structure.cells, poses, strict=True), start=first):
-            outline = centre_outline(cell.corners)
+            outline = geometry.centre_outline(cell.corners)
             key = cell.block or structure.block
             block = scenario.blocks[key]
-            (left, bottom), (right, top) = box_of(outline)
+            (left, bottom), (right, top) = geometry.box_of(outline)
             density = scenario.materials[block.material].density
             what = cell.name or str(number), key, block.material, right - left, top - bottom, block.depth, density
             built.append(PlacedBody(*what, *pose, cell.fixed, outline=outline))
         return built
-    x, y = middle_of(scenario.blocks[structure.block].polygon or ((0.0, 0.0),))
+    x, y = geometry.middle_of(scenario.blocks[structure.block].polygon or ((0.0, 0.0),))
     if x or y:  # structures place the middle of the bounding box, bodies are placed by their centroid
         poses = [_moved(pose, -x, -y) for pose in poses]
     named = ((str(index), pose) for index, pose in enumerate(poses, start=first))
@@ -295,7 +285,7 @@ def profile_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     )
 
 
-def _corners(points: Sequence[Corner]) -> list[Corner]:
+def _corners(points: Sequence[geometry.Corner]) -> list[geometry.Corner]:
     """Leave out the points where the line does not turn."""
     kept = [points[0]]
     for middle, other in pairwise(points[1:]):
@@ -304,7 +294,7 @@ def _corners(points: Sequence[Corner]) -> list[Corner]:
     return [*kept, points[-1]]
 
 
-def _turn(before: Corner, joint: Corner, after: Corner) -> float:
+def _turn(before: geometry.Corner, joint: geometry.Corner, after: geometry.Corner) -> float:
     """Return the sine of the turn at a joint, positive to the left; -1 where it goes back."""
     x0, y0 = joint[0] - before[0], joint[1] - before[1]
     x1, y1 = after[0] - joint[0], after[1] - joint[1]
@@ -312,7 +302,7 @@ def _turn(before: Corner, joint: Corner, after: Corner) -> float:
     return -1.0 if abs(sine) <= STRAIGHT and x0 * x1 + y0 * y1 < 0.0 else sine
 
 
-def _is_sharp(before: Corner, joint: Corner, after: Corner) -> bool:
+def _is_sharp(before: geometry.Corner, joint: geometry.Corner, after: geometry.Corner) -> bool:
     """Return True at an edge with less than a right angle of solid behind it."""
     back = (joint[0] - before[0]) * (after[0] - joint[0]) + (joint[1] - before[1]) * (after[1] - joint[1]) < 0.0
     return back and _turn(before, joint, after) < 0.0
@@ -348,13 +338,13 @@ def wall_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     return tuple(pieces)
 
 
-def _neighbour(points: Floats, end: Corner, number: int) -> int | None:
+def _neighbour(points: Floats, end: geometry.Corner, number: int) -> int | None:
     """Return the first other wall with an end at the same point; ends are (n, 2)."""
     near = np.flatnonzero(np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) <= TOLERANCE)
     return next((int(other) for other in near if other != number), None)
 
 
-def _touches(point: Corner, starts: Floats, ends: Floats) -> bool:
+def _touches(point: geometry.Corner, starts: Floats, ends: Floats) -> bool:
     """Return True if a point is on any of these walls."""
     along, beyond = ends - starts, np.array(point) - starts
     share = np.clip(np.sum(beyond * along, axis=1) / np.sum(along * along, axis=1), 0.0, 1.0)

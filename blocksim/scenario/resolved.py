@@ -11,14 +11,9 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
-from blocksim.scenario.models.base import HELD
+from blocksim.scenario.models import base, geometry, motion, record, stepping, study
 from blocksim.scenario.models.contact import GROUND, Friction, PairFriction
-from blocksim.scenario.models.geometry import Block
-from blocksim.scenario.models.motion import FromTable, MotionTable
-from blocksim.scenario.models.record import TABLED
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.stepping import Time
-from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.overrides import format_key, si_unit
 from blocksim.scenario.units import ANGLE
 
@@ -108,10 +103,10 @@ def scenario_to_toml(
             if friction is not None and "kinetic" not in friction.model_fields_set:
                 functools.reduce(dict.__getitem__, path, data).pop("kinetic", None)
     if scenario.sweep is not None and SCHEME in scenario.sweep.vary:
-        data["time"] = {key: value for key, value in data["time"].items() if key in Time.model_fields}
+        data["time"] = {key: value for key, value in data["time"].items() if key in stepping.Time.model_fields}
     if experiment_table is not None and "experiment" in data:
         data["experiment"] = {"table": experiment_table}
-    if motion_table is not None and isinstance(scenario.motion, TABLED):
+    if motion_table is not None and isinstance(scenario.motion, record.TABLED):
         data["motion"]["table"] = motion_table
     for number, table in _body_tables(scenario):
         name = (body_tables or {}).get(table.digest)
@@ -123,17 +118,17 @@ def scenario_to_toml(
 def deciding_values(scenario: Scenario) -> dict[str, Any]:
     """Return everything that determines the motion and the output, as for JSON; of a table of motion its digest."""
     data = scenario.model_dump(mode="json", exclude=UNHASHED)
-    if isinstance(scenario.motion, TABLED):
+    if isinstance(scenario.motion, record.TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
     for number, table in _body_tables(scenario):
         data["bodies"][number]["motion"]["table"] = table.digest
     return data
 
 
-def _body_tables(scenario: Scenario) -> Iterator[tuple[int, MotionTable]]:
+def _body_tables(scenario: Scenario) -> Iterator[tuple[int, motion.MotionTable]]:
     """Yield the numbers of bodies whose motion is a table, and the tables."""
     for number, body in enumerate(scenario.bodies):
-        if isinstance(body.motion, FromTable):
+        if isinstance(body.motion, motion.FromTable):
             yield number, body.motion.table
 
 
@@ -150,12 +145,12 @@ def scenario_hash(scenario: Scenario) -> str:
 
 def motion_table_content(scenario: Scenario) -> bytes | None:
     """Return the table of motion as it was read, for a copy, or None without one."""
-    return scenario.motion.table.content if isinstance(scenario.motion, TABLED) else None
+    return scenario.motion.table.content if isinstance(scenario.motion, record.TABLED) else None
 
 
 def _plain(table: BaseModel) -> dict[str, Any]:
     """Turn a table into its TOML form; keys without a value are left out."""
-    if isinstance(table, Sweep):
+    if isinstance(table, study.Sweep):
         return {key: _value(entry) for key, entry in table.as_table().items()}
     entries: dict[str, Any] = {}
     for name, info in type(table).model_fields.items():
@@ -167,10 +162,10 @@ def _plain(table: BaseModel) -> dict[str, Any]:
         else:
             value = f"{value!r} rad"
         entries[info.alias or name] = value
-    entries |= entries.pop(HELD, None) or {}
+    entries |= entries.pop(base.HELD, None) or {}
     if isinstance(table, PairFriction) and table.kinetic_ratio is not None:
         entries["kinetic"] = None
-    if isinstance(table, Block):
+    if isinstance(table, geometry.Block):
         entries = {key: entry for key, entry in entries.items() if table.has_key(key)}
     return {key: entry for key, entry in entries.items() if entry is not None}
 
@@ -185,7 +180,7 @@ def _value(value: object) -> object:
             return [_value(entry) for entry in value]
         case Path():
             return value.as_posix()
-        case MotionTable():
+        case motion.MotionTable():
             return value.path.as_posix()
         case _:
             return value

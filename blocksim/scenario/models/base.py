@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
-from blocksim.scenario.input_files import OutOfReachError, table_in
-from blocksim.scenario.spelling import nearest
-from blocksim.scenario.units import TIME, FieldReader, Quantity, invalid, toml
+from blocksim.scenario import input_files, spelling, units
 
 if TYPE_CHECKING:
     from blocksim.scenario.models.scenario import Scenario
@@ -30,11 +28,11 @@ class Table(BaseModel):
         """Raise pydantic's error where values do not go together, each valid by itself."""
 
 
-POSITIVE_TIME = Quantity(TIME, above=0.0)
+POSITIVE_TIME = units.Quantity(units.TIME, above=0.0)
 
 
 @dataclass(frozen=True)
-class OneOf(FieldReader):
+class OneOf(units.FieldReader):
     """Annotation of a literal field: the words that are available, and those that are planned."""
 
     available: tuple[str | int, ...]
@@ -43,22 +41,22 @@ class OneOf(FieldReader):
     @property
     def wanted(self) -> str:
         """Return what is allowed."""
-        return " or ".join(toml(word) for word in self.available)
+        return " or ".join(units.toml(word) for word in self.available)
 
     def read(self, value: object) -> object:
         """Pass an available word; raises a pydantic error that lists the available words."""
         if type(value) in (str, int) and value in self.available:
             return value
         if isinstance(value, str) and value in self.planned:
-            raise invalid(f"{toml(value)} is not available yet; use {self.wanted}")
+            raise units.invalid(f"{units.toml(value)} is not available yet; use {self.wanted}")
         words = [word for word in self.available if isinstance(word, str)]
-        similar = nearest(value, words, most=2) if isinstance(value, str) else None
-        hint = f"did you mean {toml(similar)}?" if similar else f"use {self.wanted}"
-        raise invalid(f"{toml(value)} is unknown, {hint}")
+        similar = spelling.nearest(value, words, most=2) if isinstance(value, str) else None
+        hint = f"did you mean {units.toml(similar)}?" if similar else f"use {self.wanted}"
+        raise units.invalid(f"{units.toml(value)} is unknown, {hint}")
 
 
 @dataclass(frozen=True)
-class TimeOr(FieldReader):
+class TimeOr(units.FieldReader):
     """Annotation of a time above 0 (s) or one word; `what` it is stands in messages."""
 
     word: str
@@ -69,7 +67,7 @@ class TimeOr(FieldReader):
         if isinstance(value, str) and not any(letter.isdigit() for letter in value):
             if value == self.word:
                 return value
-            raise invalid(f'{toml(value)} is not {self.what}; use "{self.word}" or {POSITIVE_TIME.wanted}')
+            raise units.invalid(f'{units.toml(value)} is not {self.what}; use "{self.word}" or {POSITIVE_TIME.wanted}')
         return POSITIVE_TIME.read(value)
 
     def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
@@ -79,7 +77,7 @@ class TimeOr(FieldReader):
 
 
 @dataclass(frozen=True)
-class Whole(FieldReader):
+class Whole(units.FieldReader):
     """Annotation of a whole number in a range."""
 
     least: int
@@ -88,7 +86,7 @@ class Whole(FieldReader):
     def read(self, value: object) -> object:
         """Pass a whole number in the range; raises a pydantic error."""
         if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
-            raise invalid(f"{toml(value)} is not a whole number from {self.least} to {self.most}")
+            raise units.invalid(f"{units.toml(value)} is not a whole number from {self.least} to {self.most}")
         return value
 
     def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
@@ -106,32 +104,34 @@ def require_one(missing: str, **values: object) -> None:
     """Raise pydantic's error unless exactly one of some keys has a value; `missing` is the message for none."""
     given = [key for key, value in values.items() if value is not None]
     if not given:
-        raise invalid(missing)
+        raise units.invalid(missing)
     if len(given) > 1:
-        raise invalid(f"{' and '.join(given)} are both given; keep one of them", given[-1])
+        raise units.invalid(f"{' and '.join(given)} are both given; keep one of them", given[-1])
 
 
 def table_path(value: object, folder: Path | str | None, example: str) -> Path:
     """Return the file that a key names, found from a folder, or unchecked without one; raises a pydantic error."""
     if not isinstance(value, str) or not value or "\0" in value:
-        raise invalid(f"{toml(value)} is not the path of a table, such as {toml(example)}")
+        raise units.invalid(f"{units.toml(value)} is not the path of a table, such as {units.toml(example)}")
     if folder is None:
         return Path(value)
     try:
-        return table_in(folder, value)
-    except OutOfReachError as error:
-        raise invalid(str(error)) from None
+        return input_files.table_in(folder, value)
+    except input_files.OutOfReachError as error:
+        raise units.invalid(str(error)) from None
 
 
 def _identifier(value: object) -> object:
     if not isinstance(value, str):
-        raise invalid(f"{toml(value)} is not a string in quotes")
+        raise units.invalid(f"{units.toml(value)} is not a string in quotes")
     allowed = value.isascii() and all(c.isalnum() or c in "._-" for c in value)
     if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
-        message = f"{toml(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
-        raise invalid(message)
+        message = (
+            f"{units.toml(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
+        )
+        raise units.invalid(message)
     if value.endswith(".") or value.partition(".")[0].upper() in DEVICES:
-        raise invalid(f"{toml(value)} is not a name: some systems reserve it")
+        raise units.invalid(f"{units.toml(value)} is not a name: some systems reserve it")
     return value
 
 

@@ -16,11 +16,10 @@ from pydantic import (
 )
 from pydantic_core import PydanticKnownError
 
-from blocksim.scenario import geometry
+from blocksim.scenario import geometry, units
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole, require_one
 from blocksim.scenario.models.motion import AnyDrive
-from blocksim.scenario.units import USUAL_GRAVITY
 
 Side = Literal["width", "height", "length"]
 YieldSurface = Literal["mohr-coulomb", "plane-strain-associated"]
@@ -76,7 +75,7 @@ class Material(Table):
         """Mass per volume in kg/m³."""
         if self.given_density is not None:
             return self.given_density
-        return (self.unit_weight or math.nan) / USUAL_GRAVITY
+        return (self.unit_weight or math.nan) / units.USUAL_GRAVITY
 
 
 class Block(Table):

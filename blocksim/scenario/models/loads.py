@@ -21,9 +21,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 from pydantic import Field, ValidationInfo, model_validator
 
 from blocksim.scenario import units as q
-from blocksim.scenario.models.base import Identifier, OneOf, Table, by_kind, require_one, table_path
-from blocksim.scenario.models.geometry import Point
-from blocksim.scenario.models.motion import TIME, MotionTableError, content_of, read_series
+from blocksim.scenario.models import base, geometry, motion
 
 MAX_BYTES = 1_000_000
 MAX_ROWS = 10_000
@@ -38,13 +36,13 @@ class Stretch(NamedTuple):
     rate: float
 
 
-class Constant(Table):
+class Constant(base.Table):
     """The whole load from the beginning to the end."""
 
     kind: Literal["constant"] = Field(description="kind of history")
 
 
-class Ramp(Table):
+class Ramp(base.Table):
     """A factor that changes evenly from one time to another, and stays."""
 
     kind: Literal["ramp"] = Field(description="kind of history")
@@ -59,7 +57,7 @@ class Ramp(Table):
             raise q.invalid(message, "end")
 
 
-class Steps(Table):
+class Steps(base.Table):
     """Factors that hold from their time on; none before the first."""
 
     kind: Literal["steps"] = Field(description="kind of history")
@@ -70,7 +68,7 @@ class Steps(Table):
         check_samples(self.times, self.factors, "factors", least=1)
 
 
-class Samples(Table):
+class Samples(base.Table):
     """Factors at some times, joined by straight lines: of a CSV table, or `times` and `factors`."""
 
     kind: Literal["table"] = Field(description="kind of history")
@@ -91,7 +89,7 @@ class Samples(Table):
 
 AnyHistory = Annotated[Constant | Ramp | Steps | Samples, Field(discriminator="kind")]
 """Any history, distinguished by its `kind`."""
-HISTORIES: dict[str, type[Table]] = by_kind(AnyHistory)
+HISTORIES: dict[str, type[base.Table]] = base.by_kind(AnyHistory)
 """Class by kind, as written in a scenario."""
 
 
@@ -114,10 +112,12 @@ def read_samples(value: object, info: ValidationInfo, column: str, key: str) -> 
     for other in ("times", key):
         if other in value:
             raise q.invalid(f"table and {other} are both given; keep one of them", other)
-    path = table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv")
+    path = base.table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv")
     try:
-        _, times, values = read_series(content_of(path, MAX_BYTES), (column,), f"{TIME},{column}", MAX_ROWS)
-    except MotionTableError as error:
+        _, times, values = motion.read_series(
+            motion.content_of(path, MAX_BYTES), (column,), f"{motion.TIME},{column}", MAX_ROWS
+        )
+    except motion.MotionTableError as error:
         raise q.invalid(f"{path.name}: {error}", "table") from None
     kept = {name: entry for name, entry in value.items() if name != "table"}
     return {**kept, "times": times, key: values}
@@ -131,10 +131,10 @@ WATER = 9810.0
 BODY = Field(description="the name of the body that it acts on (without a name, its number)")
 
 
-class Load(Table):
+class Load(base.Table):
     """One load; every kind adds its own keys."""
 
-    name: Identifier | None = Field(default=None, description="name, as in `--vary loads.NAME.magnitude=1N:9N`")
+    name: base.Identifier | None = Field(default=None, description="name, as in `--vary loads.NAME.magnitude=1N:9N`")
 
 
 class VaryingLoad(Load):
@@ -150,10 +150,10 @@ class Force(VaryingLoad):
     body: str = BODY
     magnitude: q.Force = Field(description="size of the force; negative against its direction")
     direction: q.Angle = Field(default=0.0, description="direction, counter-clockwise from +x of the axes")
-    axes: Annotated[Axes, OneOf(get_args(Axes))] = Field(
+    axes: Annotated[Axes, base.OneOf(get_args(Axes))] = Field(
         default="world", description="axes of the direction: world, or body, with which it turns"
     )
-    point: Point = Field(default=(0.0, 0.0), description="[x, y] of its point in the body, from the centre")
+    point: geometry.Point = Field(default=(0.0, 0.0), description="[x, y] of its point in the body, from the centre")
 
 
 class Moment(VaryingLoad):
@@ -172,7 +172,7 @@ class Pressure(VaryingLoad):
 
     kind: Literal["pressure"] = Field(description="kind of load")
     body: str = BODY
-    face: Annotated[Face, OneOf(FACES)] = Field(
+    face: Annotated[Face, base.OneOf(FACES)] = Field(
         description="face of the body before it is turned by its angle: left, right, top or bottom"
     )
     magnitude: q.AnyPressure | None = Field(
@@ -185,7 +185,7 @@ class Pressure(VaryingLoad):
 
     def _check(self) -> None:
         missing = 'the pressure is missing: give magnitude (such as "10 kPa") or water_level'
-        require_one(missing, magnitude=self.magnitude, water_level=self.water_level)
+        base.require_one(missing, magnitude=self.magnitude, water_level=self.water_level)
         if self.magnitude is not None and "unit_weight" in self.model_fields_set and self.unit_weight != WATER:
             raise q.invalid("a uniform pressure has no unit weight, which belongs to water_level", "unit_weight")
 
@@ -241,7 +241,7 @@ class Gravity(Load):
 
 AnyLoad = Annotated[Force | Moment | Pressure | Horizontal | Gravity, Field(discriminator="kind")]
 """Any load, distinguished by its `kind`."""
-LOADS: dict[str, type[Load]] = by_kind(AnyLoad)
+LOADS: dict[str, type[Load]] = base.by_kind(AnyLoad)
 """Class by kind, as written in a scenario."""
 OnBody = Force | Moment | Pressure
 """Those that act on one body."""

@@ -27,10 +27,9 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from blocksim.errors import BlocksimError
+from blocksim.scenario import input_files, units
 from blocksim.scenario import units as q
-from blocksim.scenario.input_files import DIALECT, bare_rows, read_limited
 from blocksim.scenario.models.base import OneOf, Table, require_one, table_path
-from blocksim.scenario.units import STANDARD_GRAVITY
 
 PIECES_PER_CYCLE = 200
 """The cubic pieces are then off by less than (2 pi/200)^4/384 = 3e-9 of the amplitude."""
@@ -39,7 +38,7 @@ COLUMNS: dict[str, tuple[Literal["displacement", "acceleration"], float]] = {
     "displacement_m": ("displacement", 1.0),
     "displacement_mm": ("displacement", 1e-3),
     "acceleration_m_s2": ("acceleration", 1.0),
-    "acceleration_g": ("acceleration", STANDARD_GRAVITY),
+    "acceleration_g": ("acceleration", units.STANDARD_GRAVITY),
 }
 """Possible names of the second column: the quantity, and its unit in SI."""
 MAX_BYTES = 20_000_000
@@ -108,7 +107,7 @@ class MotionTable:
 def content_of(path: Path, most: int = MAX_BYTES) -> bytes:
     """Return what a file of samples holds; raises MotionTableError where it cannot be read, or has too many bytes."""
     try:
-        return read_limited(path, most, links=True)
+        return input_files.read_limited(path, most, links=True)
     except BlocksimError as error:
         raise MotionTableError(str(error).removeprefix(f"{path}: ")) from None
 
@@ -129,7 +128,7 @@ def read_series(
     Raises MotionTableError with the line of the first mistake; `needed` names the columns.
     """
     try:
-        lines = bare_rows(content)
+        lines = input_files.bare_rows(content)
     except UnicodeDecodeError:
         raise MotionTableError("not a text file in UTF-8") from None
     line, names = lines[0] if lines else (1, [])
@@ -138,13 +137,13 @@ def read_series(
         found = q.toml(",".join(names))
         message = f"the columns are {found}; {needed} are needed"
         if ";" in found:
-            message = f"{found}: columns are separated by semicolons; {DIALECT}"
+            message = f"{found}: columns are separated by semicolons; {input_files.DIALECT}"
         raise MotionTableError(f"line {line}: {message}")
     times: list[float] = []
     values: list[float] = []
     for line, cells in lines[1:]:
         if len(cells) != 2:
-            hint = f"; {DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""
+            hint = f"; {input_files.DIALECT}" if len(cells) > 2 or any(";" in cell for cell in cells) else ""
             raise MotionTableError(f"line {line}: {q.toml(','.join(cells))}: a time and a value are needed{hint}")
         empty = next((name for name, cell in zip(names, cells, strict=True) if not cell), "")
         if empty:

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 import numpy as np
 from pydantic import Field
 
-from blocksim.scenario import geometry
+from blocksim.scenario import geometry, spelling
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import SYSTEMS, Identifier, OneOf, SystemTable
 from blocksim.scenario.models.geometry import Point
-from blocksim.scenario.spelling import did_you_mean_or_list
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -105,7 +104,7 @@ class SoilTable(SystemTable):
         from blocksim.scenario.start import meetings  # noqa: PLC0415 - the same
 
         if self.material not in scenario.materials:
-            hint = did_you_mean_or_list(self.material, scenario.materials)
+            hint = spelling.did_you_mean_or_list(self.material, scenario.materials)
             yield "material", f"unknown material {q.toml(self.material)}, {hint}"
         elif not scenario.materials[self.material].is_soil:
             yield "material", f"{q.toml(self.material)} is no soil; give this material a friction_angle"

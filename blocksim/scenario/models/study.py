@@ -19,10 +19,9 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
+from blocksim.scenario import spelling, units
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf, Table, Whole, table_path
-from blocksim.scenario.spelling import nearest
-from blocksim.scenario.units import parse_unit
 
 MAX_VALUES = 100_000
 SIGNIFICANT = 12
@@ -87,7 +86,7 @@ def _table_of(values: Distribution, ends: Mapping[str, float], scale: Scale = "l
         if math.isfinite(number):
             table[key] = toml_number(number, angle=values.angle)
             if values.unit:
-                text = f"{number / float(parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
+                text = f"{number / float(units.parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
                 table[key] = text if q.parse_quantity(text)[0] == number else table[key]
     return table if scale == "linear" else {**table, "scale": scale}
 
@@ -166,7 +165,7 @@ def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tupl
         raise q.invalid(message)
     for key in value:
         if key not in known:
-            meant = nearest(str(key), known, most=2)
+            meant = spelling.nearest(str(key), known, most=2)
             hint = f"did you mean {meant!r}?" if meant else f"allowed are: {', '.join(known)}"
             raise q.invalid(f"unknown key {q.toml(key)}, {hint}")
     missing = [key for key in needed if key not in value]
@@ -386,4 +385,4 @@ OWN_KEYS = tuple(name for name in Sweep.model_fields if name != "vary")
 
 def slip_of(key: object) -> str | None:
     """Return the key of [sweep] itself that a word was probably meant to be."""
-    return nearest(str(key), OWN_KEYS, most=2)
+    return spelling.nearest(str(key), OWN_KEYS, most=2)

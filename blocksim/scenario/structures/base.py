@@ -11,7 +11,6 @@ from pydantic import Field
 
 from blocksim.scenario import geometry
 from blocksim.scenario import units as q
-from blocksim.scenario.geometry import Corner
 from blocksim.scenario.models.base import Table, Whole
 from blocksim.scenario.models.geometry import Block
 
@@ -119,7 +118,7 @@ def draws(seed: int, *shape: int) -> Floats:
 class Cell(NamedTuple):
     """One block where it is: its corners (m), counter-clockwise."""
 
-    corners: Sequence[Corner]
+    corners: Sequence[geometry.Corner]
     fixed: bool = False
     block: str | None = None  # None: that of the structure
     name: str | None = None  # None: its number
@@ -135,7 +134,7 @@ class PolygonStructure(Structure):
     def divide(self) -> Sequence[Cell]:
         """Return all blocks, wherever they are; raises UnfitError where keys do not make blocks."""
 
-    def shift(self, cells: Sequence[Cell]) -> Corner:
+    def shift(self, cells: Sequence[Cell]) -> geometry.Corner:
         """Return how far all blocks move (m) from where `divide` has them."""
         low, _ = geometry.box_of([corner for cell in cells for corner in cell.corners])
         return self.left - low[0], self.bottom - low[1]

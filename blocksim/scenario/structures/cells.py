@@ -9,7 +9,6 @@ from pydantic import ConfigDict, Field
 
 from blocksim.scenario import geometry
 from blocksim.scenario import units as q
-from blocksim.scenario.geometry import Corner, clean_cell, relax_points, voronoi
 from blocksim.scenario.models.base import Whole, require_one
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure, Seed, UnfitError, draws
@@ -70,7 +69,7 @@ class Arch(PolygonStructure):
         return cells
 
 
-def _at(radius: float, angle: float) -> Corner:
+def _at(radius: float, angle: float) -> geometry.Corner:
     return radius * math.cos(angle), radius * math.sin(angle)
 
 
@@ -154,11 +153,11 @@ class Voronoi(PolygonStructure):
         random = draws(self.seed, TRIALS * self.count, 2).tolist()
         places = ((left + u * (right - left), bottom + v * (top - bottom)) for u, v in random)
         inside = [place for place in places if geometry.holds(whole, place, 0.0)]
-        points = relax_points(inside[: self.count] or [geometry.centroid(whole)], whole, self.relax)
+        points = geometry.relax_points(inside[: self.count] or [geometry.centroid(whole)], whole, self.relax)
         side = math.sqrt(geometry.area_of(whole) / self.count)
         least = LEAST_WIDTH * side if self.smallest is None else self.smallest
         for _ in range(MOST_ROUNDS if points else 0):
-            cells = [clean_cell(cell, LEAST_EDGE * side) for cell in voronoi(points, whole)]
+            cells = [geometry.clean_cell(cell, LEAST_EDGE * side) for cell in geometry.voronoi(points, whole)]
             is_large = [not any(geometry.faults(one)) and geometry.least_width(tuple(one)) >= least for one in cells]
             if all(is_large):
                 return [Cell(cell) for cell in sorted(cells, key=lambda cell: geometry.centroid(cell)[::-1])]

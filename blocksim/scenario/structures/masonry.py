@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from blocksim.scenario import units as q
-from blocksim.scenario.models.base import OneOf
-from blocksim.scenario.models.geometry import Block
+from blocksim.scenario.models import base, geometry
 from blocksim.scenario.structures.base import Count, Courses, Pose, Seed, Structure, UnfitError, draws, poses_at
 
 
@@ -25,11 +24,11 @@ class Stack(Structure):
         """Number of blocks."""
         return self.count
 
-    def height(self, block: Block) -> float:
+    def height(self, block: geometry.Block) -> float:
         """All blocks on top of each other."""
         return self.count * block.size_y
 
-    def place(self, block: Block) -> Sequence[Pose]:
+    def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
         first = self.left + block.size_x / 2
         return [Pose(first + i * self.offset, self.bottom + (i + 0.5) * block.size_y) for i in range(self.count)]
@@ -47,11 +46,11 @@ class Staircase(Structure):
         """Number of blocks."""
         return self.count
 
-    def height(self, block: Block) -> float:
+    def height(self, block: geometry.Block) -> float:
         """All blocks on top of each other."""
         return self.count * block.size_y
 
-    def place(self, block: Block) -> Sequence[Pose]:
+    def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
         if self.overlap > block.size_x:
             raise UnfitError(
@@ -85,7 +84,7 @@ class BlockWall(Courses):
 
     kind: Literal["wall"] = Field(description="kind of structure")
     columns: Count = Field(description="number of blocks in a course")
-    bond: Annotated[Bond, OneOf(get_args(Bond))] = Field(
+    bond: Annotated[Bond, base.OneOf(get_args(Bond))] = Field(
         default="running", description="running: every second course is shifted by half a block; stack: none is"
     )
     gap: q.NonNegativeLength = Field(default=0.0, description="gap between neighbours in a course")
@@ -124,7 +123,7 @@ class BlockWall(Courses):
         others = self.rows * self.columns - len(self.holes)
         return others - round(self.missing * others)
 
-    def place(self, block: Block) -> Sequence[Pose]:
+    def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses course by course, each from left to right."""
         random = draws(self.seed, 2, self.rows, self.columns)
         pitch = block.size_x + self.gap
@@ -152,7 +151,7 @@ class Pyramid(Courses):
         """Number of blocks."""
         return self.rows * (self.rows + 1) // 2
 
-    def place(self, block: Block) -> Sequence[Pose]:
+    def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses course by course, each from left to right."""
         row = np.repeat(np.arange(self.rows), np.arange(self.rows, 0, -1))
         column = np.concatenate([np.arange(count) for count in range(self.rows, 0, -1)])
@@ -182,11 +181,11 @@ class Dominoes(Structure):
         """Number of blocks."""
         return self.count
 
-    def height(self, block: Block) -> float:
+    def height(self, block: geometry.Block) -> float:
         """One block."""
         return block.size_y
 
-    def place(self, block: Block) -> Sequence[Pose]:
+    def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from left to right."""
         pitch, y = block.size_x + self.spacing, self.bottom + 0.5 * block.size_y
         first = Pose(
@@ -220,11 +219,11 @@ class Grid(Courses):
         """Number of blocks."""
         return self.rows * self.columns
 
-    def height(self, block: Block) -> float:
+    def height(self, block: geometry.Block) -> float:
         """All rows, before blocks are shifted and turned."""
         return self.rows * block.size_y + (self.rows - 1) * self.gap_y
 
-    def place(self, block: Block) -> Sequence[Pose]:
+    def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses row by row, each from left to right."""
         needs = {  # gaps in which two neighbours, shifted and turned towards each other, cannot overlap
             "gap_x": (self.columns, self.gap_x, _growth(block.size_x, block.size_y, self.turn)),

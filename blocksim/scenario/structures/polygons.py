@@ -13,16 +13,13 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from blocksim.errors import BlocksimError
 from blocksim.extras import load_module
-from blocksim.scenario import geometry
+from blocksim.scenario import geometry, input_files, units
 from blocksim.scenario import units as q
-from blocksim.scenario.geometry import Corner
-from blocksim.scenario.input_files import MEGABYTE, read_limited
 from blocksim.scenario.models.base import Identifier, Table, table_path
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure
-from blocksim.scenario.units import toml
 
-MOST_BYTES = 20 * MEGABYTE
+MOST_BYTES = 20 * input_files.MEGABYTE
 MOST_OUTLINES, MOST_CORNERS = 2000, 16_000
 """In a drawing; the scenario that is kept with the results has them all, and a scenario has a megabyte at most."""
 STRAY = 1e-6
@@ -41,7 +38,7 @@ DAMAGE = (ArithmeticError, AttributeError, LookupError, OSError, RecursionError,
 class DrawingOutline(NamedTuple):
     """One outline of a drawing, its coordinates as they are there."""
 
-    outline: list[Corner]
+    outline: list[geometry.Corner]
     name: str  # for messages
     properties: Mapping[str, Any]  # block, fixed, name
 
@@ -59,7 +56,7 @@ def read_drawing(path: Path) -> list[DrawingOutline]:
     ezdxf = load_module("ezdxf", f"reading {path.name}", DXF) if is_dxf else None
     damage = DAMAGE if ezdxf is None else (ezdxf.DXFError, *DAMAGE)
     try:
-        content = read_limited(path, MOST_BYTES)  # no file that is larger, no pipe
+        content = input_files.read_limited(path, MOST_BYTES)  # no file that is larger, no pipe
         if ezdxf is not None:
             found = [*_polylines(ezdxf.readfile(path).modelspace())]
         else:
@@ -83,7 +80,7 @@ def read_drawing(path: Path) -> list[DrawingOutline]:
     return found
 
 
-def simplify(points: Sequence[Corner]) -> list[Corner]:
+def simplify(points: Sequence[geometry.Corner]) -> list[geometry.Corner]:
     """Return an outline without points that repeat or lie within a straight edge, and not closed."""
     corners = [point for number, point in enumerate(points) if point != points[(number + 1) % len(points)]]
     low, high = geometry.box_of(corners) if corners else ((0.0, 0.0), (0.0, 0.0))
@@ -127,7 +124,7 @@ def _polygons(node: Any, name: str, properties: Mapping[str, Any], depth: int) -
                 raise DrawingError(f"{place}a polygon with {holes}; blocks have none")
             yield DrawingOutline([_point(point) for point in rings[0]], name or "polygon", properties)
     else:
-        raise DrawingError(f"{place}{toml(kind)} is not a polygon")
+        raise DrawingError(f"{place}{units.toml(kind)} is not a polygon")
 
 
 def _part(node: Mapping[str, Any], key: str, kind: type, place: str) -> Any:
@@ -138,7 +135,7 @@ def _part(node: Mapping[str, Any], key: str, kind: type, place: str) -> Any:
     return found
 
 
-def _point(values: Any) -> Corner:
+def _point(values: Any) -> geometry.Corner:
     x, y = (float(value) for value in values[:2])
     if not (abs(x) < FARTHEST and abs(y) < FARTHEST):
         raise DrawingError(f"({x:g}, {y:g}) is not a place")
@@ -244,6 +241,6 @@ class Polygons(PolygonStructure):
     def _outline(self, one: DrawnBlock) -> Sequence[Point]:
         return geometry.shrink_outline(one.outline, self.shrink) if self.shrink else one.outline
 
-    def shift(self, cells: Sequence[Cell]) -> Corner:
+    def shift(self, cells: Sequence[Cell]) -> geometry.Corner:
         """Return how far all blocks move (m)."""
         return (0.0, 0.0) if self.in_place else super().shift(cells)
