@@ -101,7 +101,7 @@ def _fields(
         fields = {"kind": LOAD_FORCE, "x": x, "y": y, "fx": fx, "fy": fy, "turns": load.axes == "body"}
         force, arm = abs(load.magnitude), math.hypot(*load.point)
     else:
-        nx, ny = NORMALS[load.face]
+        nx, ny = map(float, NORMALS[load.face])
         (x, y), (half_x, half_y) = face_of(body, load.face) or NO_FACE
         along_x, along_y = abs(ny) * half_x, abs(nx) * half_y
         length = 2.0 * (along_x + along_y)

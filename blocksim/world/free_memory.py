@@ -1,14 +1,18 @@
 """Available memory, and numbers of bytes as text. Independent of scenes and the solver."""
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
 THOUSAND = 1000
 MOST_SHOWN = 999.5  # rounds to four digits
 KIBI = 1024
+# Of control groups of version 1 and 2, by their controllers: where they are mounted, their limit and usage, and the
+# entry of memory.stat for cached files that are given up when memory runs short.
+GROUP_FILES = {
+    "memory": ("sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+    "": ("sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),
+}
 
 
 def readable(count: int) -> str:
@@ -22,54 +26,32 @@ def readable(count: int) -> str:
 def available_bytes(root: Path = Path("/")) -> int | None:
     """Return the memory (bytes) that a process can still get, or None on a system that does not report it.
 
-    That of the machine, or what is left of the limit of a control group (container, batch job). Swap does not count.
+    That of the machine, or what is left of the limit of a control group (container, batch job) that this process is in,
+    or of one around it. Swap does not count.
     """
-    limits = [limit for limit in (_of_machine(root), *_of_groups(root)) if limit is not None]
+    limits = []
+    for name, value, *_ in (line.split() for line in _lines(root / "proc/meminfo")):
+        if name == "MemAvailable:":
+            limits.append(int(value) * KIBI)
+    if not limits and "SC_AVPHYS_PAGES" in getattr(os, "sysconf_names", {}):
+        limits.append(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    for line in _lines(root / "proc/self/cgroup"):  # hierarchy:controllers:path
+        _, controllers, path = line.split(":", 2)
+        if controllers in GROUP_FILES:
+            mount, *names = GROUP_FILES[controllers]
+            own = root / mount / path.strip("/")
+            groups = (group for group in (own, *own.parents) if group.is_relative_to(root / mount))
+            limits += [left for group in groups if (left := _left_in(group, *names)) is not None]
     return max(0, min(limits)) if limits else None
 
 
-def _of_machine(root: Path) -> int | None:
-    for name, value, *_ in (line.split() for line in _lines(root / "proc/meminfo")):
-        if name == "MemAvailable:":
-            return int(value) * KIBI
-    names = getattr(os, "sysconf_names", {})
-    if "SC_AVPHYS_PAGES" in names:
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return None
-
-
-class _Names(NamedTuple):
-    """Files of a control group."""
-
-    folder: str
-    limit: str
-    usage: str
-    reclaimable: str  # entry of memory.stat: cached files that are given up when memory runs short
-
-
-VERSION_1 = _Names("sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
-VERSION_2 = _Names("sys/fs/cgroup", "memory.max", "memory.current", "inactive_file")
-
-
-def _of_groups(root: Path) -> Iterator[int | None]:
-    """Yield what is left of the limits of the control group that this process is in and of all groups around it."""
-    for line in _lines(root / "proc/self/cgroup"):  # hierarchy:controllers:path
-        _, controllers, path = line.split(":", 2)
-        if controllers in ("", "memory"):
-            names = VERSION_1 if controllers else VERSION_2
-            folder = root / names.folder
-            own = folder / path.strip("/")
-            for group in (own, *own.parents):
-                if group.is_relative_to(folder):
-                    yield _left_in(group, names)
-
-
-def _left_in(group: Path, names: _Names) -> int | None:
-    limit, usage = _lines(group / names.limit), _lines(group / names.usage)
+def _left_in(group: Path, limit_file: str, usage_file: str, reclaimable: str) -> int | None:
+    """Return what is left (bytes) of the limit of a control group; None where there is none."""
+    limit, usage = _lines(group / limit_file), _lines(group / usage_file)
     if not (limit and usage) or not limit[0].isdecimal():  # "max": no limit
         return None
     stat = dict(line.split() for line in _lines(group / "memory.stat"))
-    return int(limit[0]) - int(usage[0]) + int(stat.get(names.reclaimable, "0"))
+    return int(limit[0]) - int(usage[0]) + int(stat.get(reclaimable, "0"))
 
 
 def _lines(path: Path) -> list[str]:

@@ -185,13 +185,9 @@ class Speeds(NamedTuple):
 
     given: float  # of any point of a block, by the scenario itself
     fall: float  # of the highest corner at the lowest ground, from rest
+    impact: float  # of any point of a block that does not slide downhill
     greatest: float  # of any point of a block
     support: float  # zero where it does not move
-
-    @property
-    def impact(self) -> float:
-        """The bound of any point of a block that does not slide downhill."""
-        return math.hypot(self.given, self.fall)
 
 
 def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
@@ -213,7 +209,8 @@ def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
     held = friction * math.cos(tilt)
     pull = max(0.0, scenario.gravity * (math.sin(tilt) - held) + layout.applied.push)
     support = 0.0 if scenario.motion is None else greatest_rate(motion_pieces(scenario))
-    return Speeds(given, fall, math.hypot(given, fall) + pull * scenario.time.end, support)
+    impact = math.hypot(given, fall)
+    return Speeds(given, fall, impact, impact + pull * scenario.time.end, support)
 
 
 class ContactStiffness(NamedTuple):

@@ -4,7 +4,7 @@ A system of the user's choice is one file, and one line in `blocksim.scenario.mo
 every pair that can meet is one line in `INTERACTIONS`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -38,16 +38,10 @@ INTERACTIONS: dict[tuple[str, str], Interaction] = {
 """By the names of both; a system comes before blocks and supports, whose function gets the world as its partner."""
 
 
-def system_named(name: str) -> System:
-    """Return what the tables of a scenario of this name declare."""
-    module, _, declared = SYSTEMS[name].declared_in.partition(":")
-    found: System = getattr(import_module(module), declared)
-    return found
-
-
 def systems_of(scenario: Scenario) -> tuple[System, ...]:
     """Return what the systems beside blocks and supports declare, in the order in which they are registered."""
-    return tuple(system_named(name) for name in SYSTEMS if scenario.systems.get(name))
+    places = [table.declared_in.split(":") for name, table in SYSTEMS.items() if scenario.systems.get(name)]
+    return tuple(getattr(import_module(module), declared) for module, declared in places)
 
 
 def others_of(scenario: Scenario) -> tuple[SystemInScene, ...]:
@@ -68,29 +62,19 @@ def warnings_of(scenario: Scenario) -> Iterator[str]:
             yield from system.warnings(scenario)
 
 
-def interaction_of(one: System, other: System) -> tuple[bool, Interaction]:
-    """Return whether a pair stands in the table the other way round, and what happens between the two.
+def acts_of(systems: Sequence[System]) -> Iterator[tuple[int, int | None, Any]]:
+    """Yield who acts on whom by which function: numbers of systems, None for blocks and supports.
 
     Raises InvalidInputError for a pair that is not modelled.
     """
-    for is_turned, key in enumerate(((one.name, other.name), (other.name, one.name))):
-        if key in INTERACTIONS:
-            return bool(is_turned), INTERACTIONS[key]
-    message = f"{one.name} and {other.name} cannot be in one scene: what happens between them is not modelled"
-    raise InvalidInputError(message)
-
-
-def acts_of(systems: tuple[System, ...]) -> Iterator[tuple[int, int | None, Any]]:
-    """Yield who acts on whom by which function: numbers of systems, None for blocks and supports.
-
-    Raises as `interaction_of`.
-    """
     for i, one in enumerate(systems):
-        for other in IN_WORLD:
-            _, interaction = interaction_of(one, other)
+        partners: list[tuple[int | None, System]] = [(None, other) for other in IN_WORLD]
+        for number, other in (*partners, *enumerate(systems[i:], i)):
+            pair, turned = (one.name, other.name), (other.name, one.name)
+            is_turned = pair not in INTERACTIONS
+            if is_turned and turned not in INTERACTIONS:
+                message = "cannot be in one scene: what happens between them is not modelled"
+                raise InvalidInputError(f"{one.name} and {other.name} {message}")
+            interaction = INTERACTIONS[turned if is_turned else pair]
             if interaction is not None:
-                yield i, None, interaction()
-        for j in range(i, len(systems)):
-            is_turned, interaction = interaction_of(one, systems[j])
-            if interaction is not None:
-                yield (j, i, interaction()) if is_turned else (i, j, interaction())
+                yield (number, i, interaction()) if is_turned and number is not None else (i, number, interaction())

@@ -154,7 +154,10 @@ class Track:
         for number, one in enumerate(self.system.quantities):
             if one.name == name:
                 return np.asarray(self.values[:, number])
-        return self._constant(name, self.present.elements.constants)
+        for one, values in zip(self.system.constants, self.present.elements.constants, strict=True):
+            if one.name == name:
+                return np.asarray(values)
+        raise KeyError(name)
 
     def some(self, chosen: Indices) -> "Track":
         """Return the same of some frames."""
@@ -164,12 +167,6 @@ class Track:
         """Return a quantity at time zero, (b,)."""
         numbers = [one.name for one in self.system.quantities]
         return np.asarray(self.present.elements.start[numbers.index(name)])
-
-    def _constant(self, name: str, constants: Floats) -> Floats:
-        for one, values in zip(self.system.constants, constants, strict=True):
-            if one.name == name:
-                return np.asarray(values)
-        raise KeyError(name)
 
     def columns(self) -> dict[str, Floats]:
         """Return what tables show, (n, b) by the name of the column."""
