@@ -111,8 +111,7 @@ def joints_of(
     """
     sides = []
     for i, body in enumerate(placed):
-        c, s = math.cos(body.angle), math.sin(body.angle)
-        corners = [(body.x + c * x - s * y, body.y + s * x + c * y) for x, y in body.corners]
+        corners = [body.ground_point(x, y) for x, y in body.corners]
         sides.append(_Side(i, list(zip(corners, [*corners[1:], corners[0]], strict=True)), corners))
     low, high = box_of([corner for side in sides if side.body in free for corner in side.corners])
     (left, bottom), (right, top) = (low[0] - near, low[1] - near), (high[0] + near, high[1] + near)
@@ -218,16 +217,9 @@ def thrust_shift(layout: Layout) -> float:
 def _carried(joints: Sequence[Joint], free: set[int]) -> tuple[list[Joint], list[int]]:
     """Return the joints of blocks that stand on supports, by way of others or not, and these blocks."""
     held: set[int] = set()
-    grows = True
-    while grows:
-        more = {
-            i
-            for joint in joints
-            for i, other in ((joint.one, joint.other), (joint.other, joint.one))
-            if i in free and i not in held and (other not in free or other in held)
-        }
+    sides = [side for joint in joints for side in ((joint.one, joint.other), (joint.other, joint.one))]
+    while more := {i for i, other in sides if i in free - held and (other not in free or other in held)}:
         held |= more
-        grows = bool(more)
     return [joint for joint in joints if joint.one in held or joint.other in held], sorted(held)
 
 

@@ -12,18 +12,8 @@ k/K = 0.82 and 29 % as k/K goes to 0; a safety of 0.05 leaves room for that. Sti
 (kernels/explicit/bearing.py) only lowers that of a corner: the bound holds, and a body on several others is in all as
 stiff as on one. Models with particles spread the stiffness of a face over it, which is softer in rocking.
 
-Damping. The dashpot of a pair is implicit in the pair's own force and takes the forces of other pairs from the step
-before. Alone, a pair is then stable for w dt < 2 at any damping ratio z. Where p pairs bear a body, each stands for a
-piece of it (kernels/explicit/inertia.py) and sees p times the inverse mass. So pairs that act alike are one pair p
-times as stiff, and stable as that at any z. Where they act against one another, the own force counts for more than it
-does; the recurrence of position, velocity and lagged force is then stable for p (w dt)^2 < 2, at any z as well. A thin
-plank on narrow seats at its ends rocks with three times the inverse mass of its pieces; and in the models with
-particles pairs have the whole body each and count their own force q = max(1, p/2) times (kernels/explicit/contact.py).
-Where the own force counts q times of p, the recurrence is stable up to
-
-    z w dt = (1 - p (w dt)^2 / 4) / (2 (p - q))   (for small w dt and p = 2, 3, 4, 6: 0.5, 0.33, 0.25, 0.17)
-
-So well beyond critical damping the step shrinks with 1/z:
+Damping. Pairs that act against one another count their own, implicit force for more than it does (world/README.md), so
+that well beyond critical damping the step shrinks with 1/z, z being the damping ratio:
 
     dt = safety * (2 / w) / max(1, z/2)
 
