@@ -11,7 +11,7 @@ from blocksim.cli.progress import one_by_one
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
-from blocksim.simulation.compilation import kernel_set
+from blocksim.simulation.schemes import SCHEMES
 from blocksim.verification.case import Outcome, Setting, run_case
 from blocksim.verification.cases import choose_cases, excluded_cases
 
@@ -40,7 +40,7 @@ def verify_command(
     """
     setting = Setting(model, law, quick, scheme)
     wanted = choose_cases(cases or [], setting, soil=soil)
-    announce_compilation(kernel_set(setting.scheme, setting.model), quiet=screen.silent)
+    announce_compilation(SCHEMES[setting.scheme].kernels(setting.model), quiet=screen.silent)
     outcomes: list[Outcome] = []
     try:
         under_way = one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=screen.silent)

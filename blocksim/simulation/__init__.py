@@ -28,23 +28,16 @@ __all__ = [
 
 # found when first asked for, so that stored results can be read without waiting for numba and the kernels
 _HOMES = {
-    "Frames": "frames",
-    "MemberEnd": "ensemble",
-    "MemberFailure": "ensemble",
-    "Progress": "loop",
-    "Result": "result",
-    "Summary": "result",
-    "Watcher": "loop",
-    "read_result": "result",
-    "renew_copies": "result",
-    "run_ensemble": "ensemble",
-    "run_in_batches": "ensemble",
-    "simulate": "run",
-    "simulate_into": "run",
+    "ensemble": ("MemberEnd", "MemberFailure", "run_ensemble", "run_in_batches"),
+    "frames": ("Frames",),
+    "loop": ("Progress", "Watcher"),
+    "result": ("Result", "Summary", "read_result", "renew_copies"),
+    "run": ("simulate", "simulate_into"),
 }
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'blocksim.simulation' has no attribute '{name}'")
-    return getattr(import_module(f"blocksim.simulation.{_HOMES[name]}"), name)
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"blocksim.simulation.{module}"), name)
+    raise AttributeError(f"module 'blocksim.simulation' has no attribute '{name}'")

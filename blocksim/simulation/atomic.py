@@ -49,7 +49,11 @@ def atomic_path(path: Path) -> Iterator[Path]:
         yield temporary
         temporary.chmod(mode)
         temporary.replace(path)
-        sync_folder(path.parent)
+        try:  # a file whose name is not on the disk is lost when the power fails
+            sync_file(path.parent)
+        except OSError as error:
+            if error.errno not in NO_SUCH_SYNC:
+                raise
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
@@ -81,15 +85,6 @@ def _remove_leftovers(path: Path) -> None:
                 os.unlink(leftover)  # noqa: PTH108 - a name from scandir
             finally:
                 os.close(handle)
-
-
-def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk: a file whose name is not there is lost when the power fails."""
-    try:
-        sync_file(folder)
-    except OSError as error:
-        if error.errno not in NO_SUCH_SYNC:
-            raise
 
 
 def sync_file(path: Path) -> None:

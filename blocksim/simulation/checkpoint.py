@@ -24,9 +24,9 @@ from blocksim.scenario.units import TIME
 from blocksim.simulation import atomic, provenance, result
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import CHECKPOINTS
-from blocksim.simulation.recorder import Recorder, rows_of_frames
+from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.schemes import AnyScene
-from blocksim.simulation.stores.hdf5 import read_probes, read_systems
+from blocksim.simulation.stores.hdf5 import read_probes, read_rows
 from blocksim.world.build import arrays_of, with_parts
 from blocksim.world.free_memory import available_bytes, readable
 
@@ -330,13 +330,12 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
 def take_over(stored: StoredCheckpoint, scenario: Scenario, recorder: Recorder) -> None:
     """Let a recorder begin with the frames at output times, and samples of probes, that earlier parts have left.
 
-    Frames after the checkpoint are among them, as the run would only repeat them; that of the moment at which it was
-    stopped is not. Raises what reading them raises, and InvalidInputError where some before the checkpoint are missing,
-    or are not as they were recorded.
+    Raises what reading them raises, and InvalidInputError where some before the checkpoint are missing, or are not as
+    they were recorded.
     """
     position, path = stored.position, stored.path.parent / files.FRAMES
-    rows = rows_of_frames(read_systems(path, recorder.systems))
-    recorder.take_over(rows.chosen(np.array([recorder.is_output_time(step) for step in rows.steps.tolist()])))
+    _, rows = read_rows(path, recorder.systems)
+    recorder.take_over(rows)
     count = recorder.count_until(position.step)
     before = f"before step {position.step}, at which {stored.path.name} resumes; {REMEDY}"
     if count != position.frames:

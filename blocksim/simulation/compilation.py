@@ -5,11 +5,9 @@ import time
 from collections.abc import Sequence
 
 from blocksim.errors import OutputError
-from blocksim.kernels.common import jit
-from blocksim.kernels.common.compiler import compiling
-from blocksim.scenario import PlacedBody, Scenario, scenario_from_mapping
-from blocksim.scenario.placement import has_outlines
-from blocksim.simulation.schemes import SCHEMES, build_scene, measure_row, scheme_named
+from blocksim.kernels.common import compiler, jit
+from blocksim.scenario import PlacedBody, Scenario, placement, scenario_from_mapping
+from blocksim.simulation.schemes import SCHEMES, build_scene, measure_row
 from blocksim.simulation.team import ALONE
 
 DEFAULT = "surface"  # the set without a mark of its own in the cache
@@ -24,16 +22,11 @@ SMALLEST_SCENE = {
 
 def kernels_of(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> str:
     """Return which set of kernels a scenario needs; `placed` are its bodies, where they are known."""
-    scheme = scheme_named(scenario)
+    scheme = SCHEMES[scenario.time.scheme]
     kernels = scheme.kernels(scenario.contact.model)
-    if has_outlines(scenario):
+    if placement.has_outlines(scenario):
         kernels = scheme.of_outlines.get(kernels, kernels)
     return scheme.kernel_variant(kernels, scenario, placed)
-
-
-def kernel_set(scheme: str, model: str) -> str:
-    """Return which set of kernels a stepping scheme with a contact model needs."""
-    return SCHEMES[scheme].kernels(model)
 
 
 @functools.cache
@@ -44,33 +37,22 @@ def compile_kernels(kernels: str = DEFAULT) -> float:
     """
     began = time.perf_counter()
     try:
-        with compiling():
-            _compile(kernels)
+        with compiler.compiling():
+            changes = next(
+                scheme.kernel_sets.get(kernels, {"time": {"scheme": scheme.name}})
+                for scheme in SCHEMES.values()
+                if kernels in (*scheme.kernel_sets, scheme.kernels(""))
+            )
+            scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **changes})), 0)
+            measure_row(scene)
+            if kernels != DEFAULT:
+                jit.mark(kernels)
     except OSError as error:
         raise OutputError(
             f"{jit.cache_folder()}: the compiled solver cannot be stored there: {error.strerror or error}; "
             "free some space, or set BLOCKSIM_CACHE_DIR to a folder on another disk"
         ) from error
     return time.perf_counter() - began
-
-
-def compile_systems(scenario: Scenario) -> None:
-    """Compile what a scenario with systems beside blocks and supports needs as well, for these systems."""
-    if scenario.systems:
-        with compiling():
-            measure_row(ALONE.advance(build_scene(scenario), 0)[0])
-
-
-def _compile(kernels: str) -> None:
-    changes = next(
-        scheme.kernel_sets.get(kernels, {"time": {"scheme": scheme.name}})
-        for scheme in SCHEMES.values()
-        if kernels in (*scheme.kernel_sets, scheme.kernels(""))
-    )
-    scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **changes})), 0)
-    measure_row(scene)
-    if kernels != DEFAULT:
-        jit.mark(kernels)
 
 
 def is_compiled(kernels: str = DEFAULT) -> bool:

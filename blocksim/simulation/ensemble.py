@@ -11,15 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED
-from blocksim.kernels.common.compiler import compiling
-from blocksim.kernels.common.frame_times import next_frame
+from blocksim.kernels.common import arrays, compiler, frame_times, systems
 from blocksim.kernels.common.members import Watched
-from blocksim.kernels.common.systems import Coupled
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
-from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.events import NEVER, Timeline
+from blocksim.simulation import compilation, events, loop, probes, recorder, settling, team
 from blocksim.simulation.frames import COLUMNS, Columns, Frames, as_frame, final_values
 from blocksim.simulation.ledger import (
     EnergyLedger,
@@ -30,13 +26,8 @@ from blocksim.simulation.ledger import (
     next_energy_check,
     start_energy,
 )
-from blocksim.simulation.loop import Outcome, diagnose, last_step_of, outcome_of
 from blocksim.simulation.observables import OBSERVABLES, Value, Watch, observe
-from blocksim.simulation.probes import MovingSupport
-from blocksim.simulation.recorder import POSITION, Rows, frames_from_rows, steps_per_frame
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measure_row, scheme_of
-from blocksim.simulation.settling import initial_scene
-from blocksim.simulation.team import ALONE
 from blocksim.world.build import Refusal, Stack, member, stack_of_one
 from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
 
@@ -51,19 +42,19 @@ Placed = tuple[PlacedBody, ...]
 class MemberEnd:
     """Where one member ended and how."""
 
-    outcome: Outcome
+    outcome: loop.Outcome
     ledger: EnergyLedger
     seconds: float  # simulated
     columns: Columns  # the final table, as `final.csv` has it
     placed: Placed = field(repr=False)
     time_step: float  # s
-    rows: Rows = field(repr=False)  # one: the last
+    rows: recorder.Rows = field(repr=False)  # one: the last
     observables: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
 
     @cached_property
     def frames(self) -> Frames:
         """One: the last."""
-        return frames_from_rows((blocks_placed(self.placed),), self.time_step, self.rows)
+        return recorder.frames_from_rows((blocks_placed(self.placed),), self.time_step, self.rows)
 
     @property
     def final(self) -> "pd.DataFrame":
@@ -78,17 +69,17 @@ class MemberFailure:
     error: BlocksimError
 
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> loop.Outcome:
         """The same words and code as where it had been run by itself."""
-        return Outcome("failed", str(self.error), self.error.exit_code)
+        return loop.Outcome("failed", str(self.error), self.error.exit_code)
 
 
 EnsembleEnd = MemberEnd | MemberFailure
 
 
-def in_play_of(scenes: AnyScene | Coupled, members: Sequence[int]) -> list[InPlay]:
+def in_play_of(scenes: AnyScene | systems.Coupled, members: Sequence[int]) -> list[InPlay]:
     """Return what decides the energy in play, of some members of a stack."""
-    further = mass_of_systems(member(scenes, 0)) if isinstance(scenes, Coupled) else 0.0  # in a stack of one
+    further = mass_of_systems(member(scenes, 0)) if isinstance(scenes, systems.Coupled) else 0.0  # in a stack of one
     mass = scenes.world.bodies.view(np.ndarray)["mass"]
     masses = [float(np.sum(mass[m])) + further for m in members]  # one by one: the order matters
     book = scenes.world.ledger[:, 0]
@@ -96,68 +87,52 @@ def in_play_of(scenes: AnyScene | Coupled, members: Sequence[int]) -> list[InPla
     return [*map(InPlay, masses, moved[list(members)].tolist())]
 
 
-class FinalStates:
-    """The last states of a stack of scenes."""
+def member_ends(
+    scenes: AnyScene,
+    placed: list[Placed],
+    measured: NDArray[np.float64],
+    watch: Watch,
+    starts: Sequence[float],
+    codes: Sequence[int],
+    turned: NDArray[np.float64] | None = None,
+) -> dict[int, MemberEnd]:
+    """Return where the members of a stack of scenes are now, without those that lack room for contacts.
 
-    def __init__(
-        self,
-        scenes: AnyScene,
-        placed: list[Placed],
-        measured: NDArray[np.float64],
-        watch: Watch,
-        turned: NDArray[np.float64] | None = None,
-    ) -> None:
-        """Take what is measured (m, e + 2) in the scenes as they are now, as the scheme's `measured`.
-
-        `watch` has seen them on the way; `turned` (m, 1) is their largest rotation (rad), where it was followed.
-        """
-        world, blocks = scenes.world, len(placed[0])
-        self.names = ledger_names(scenes)
-        self.scenes, self.placed = scenes, placed
-        self.measured = measured
-        self.motion = motion_of(world.bodies[:, :blocks])  # (m, 6, b)
-        self.steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
-        self.time_steps: list[float] = world.controls["step"][:, 0].tolist()
-        self.in_play = in_play_of(scenes, range(len(placed)))
-        self.columns = final_values(self.motion, _shapes(placed), _outlines(placed)).tolist()
-        support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
-        ends = watch.ends(self.motion, support, [self._seconds(m) for m in range(len(placed))], turned)
-        self.observables = observe(ends, [one.name for one in OBSERVABLES.values() if one.in_rows])
-
-    def _seconds(self, m: int) -> float:
-        return float(self.steps[m, 0]) * self.time_steps[m]
-
-    def end(self, m: int, start: float, code: int) -> MemberEnd:
-        """Return the end of one member: energy (J) at the start, status code that it came to."""
-        ledger = ledger_of(self.names, self.measured[m], start, self.in_play[m])
-        names = [body.name for body in self.placed[m]]
-        some = slice(m, m + 1)
-        outcome = outcome_of(code, ledger)
+    `measured` (m, e + 2) is as the scheme's `measured`, `starts` are energies (J) at the start, `codes` status codes.
+    `watch` has seen them on the way; `turned` (m, 1) is their largest rotation (rad), where it was followed.
+    """
+    world, bodies = scenes.world, [body for one in placed for body in one]
+    count, names = len(placed), ledger_names(scenes)
+    motion = motion_of(world.bodies[:, : len(placed[0])])  # (m, 6, b)
+    steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
+    time_steps: list[float] = world.controls["step"][:, 0].tolist()
+    seconds = [float(steps[m, 0]) * time_steps[m] for m in range(count)]
+    sides = np.array([(one.size_x, one.size_y, one.angle) for one in bodies]).reshape(count, -1, 3).swapaxes(1, 2)
+    corners = outlines_of(bodies)  # (m, b, k, 2); None where all are rectangles
+    corners = None if corners is None else corners.reshape(count, -1, *corners.shape[1:])
+    tables = final_values(motion, sides, corners).tolist()
+    support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
+    in_rows = [name for name, one in OBSERVABLES.items() if one.in_rows]
+    observables = observe(watch.ends(motion, support, seconds, turned), in_rows)
+    ends: dict[int, MemberEnd] = {}
+    for m, (code, in_play) in enumerate(zip(codes, in_play_of(scenes, range(count)), strict=True)):
+        if code == arrays.PAIRS_FULL:
+            continue
+        some, ledger = slice(m, m + 1), ledger_of(names, measured[m], starts[m], in_play)
+        outcome = loop.outcome_of(code, ledger)
         if not outcome.is_finished:
-            outcome = diagnose(outcome, code, member(self.scenes, m), self.placed[m])
-        return MemberEnd(
+            outcome = loop.diagnose(outcome, code, member(scenes, m), placed[m])
+        ends[m] = MemberEnd(
             outcome=outcome,
             ledger=ledger,
-            seconds=self._seconds(m),
-            columns=dict(zip(COLUMNS, (names, *self.columns[m]), strict=True)),
-            placed=self.placed[m],
-            time_step=self.time_steps[m],
-            rows=Rows(self.steps[m], (self.motion[some],), self.measured[some], self.names),
-            observables=self.observables[m],
+            seconds=seconds[m],
+            columns=dict(zip(COLUMNS, ([body.name for body in placed[m]], *tables[m]), strict=True)),
+            placed=placed[m],
+            time_step=time_steps[m],
+            rows=recorder.Rows(steps[m], (motion[some],), measured[some], names),
+            observables=observables[m],
         )
-
-
-def _outlines(placed: list[Placed]) -> NDArray[np.float64] | None:
-    """Return the corners (m, b, k, 2) of blocks; None where all are rectangles."""
-    outlines = outlines_of([one for member in placed for one in member])
-    return None if outlines is None else outlines.reshape(len(placed), -1, *outlines.shape[1:])
-
-
-def _shapes(placed: list[Placed]) -> NDArray[np.float64]:
-    """Return sides and angles (m, 3, b) as placed."""
-    bodies = ((one.size_x, one.size_y, one.angle) for member in placed for one in member)
-    values = np.array([*bodies]).reshape(len(placed), -1, 3)
-    return values.swapaxes(1, 2)
+    return ends
 
 
 BATCH = 256  # members in memory at the same time
@@ -203,8 +178,8 @@ def run_in_batches(
 def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: bool) -> Iterator[list[EnsembleEnd]]:
     with ThreadPoolExecutor(threads) as pool:
         for batch in _batches(scenarios, most):
-            for kernels in dict.fromkeys(map(kernels_of, batch)):
-                compile_kernels(kernels)
+            for kernels in dict.fromkeys(map(compilation.kernels_of, batch)):
+                compilation.compile_kernels(kernels)
             yield _run_batch(batch, pool, threads, peaks=peaks)
 
 
@@ -230,8 +205,11 @@ def _run_batch(
         if isinstance(one, Refusal):
             ends[one.number] = MemberFailure(one.error)
             continue
+        first, stack = scenarios[one.numbers[0]], one
         try:
-            stack = _settled(scenarios[one.numbers[0]], one)
+            if settles(first):  # it has one scene
+                scene, _ = settling.initial_scene(member(one.scenes, 0), first, one.placed[0], team.ALONE)
+                stack = one._replace(scenes=stack_of_one(scene))
         except BlocksimError as error:
             ends[one.numbers[0]] = MemberFailure(error)
             continue
@@ -239,14 +217,6 @@ def _run_batch(
         ensemble.advance(pool, threads)
         ends.update(zip(one.numbers, ensemble.ends(), strict=True))
     return [ends[i] for i in range(len(scenarios))]
-
-
-def _settled(scenario: Scenario, stack: Stack) -> Stack:
-    """Return a stack as its runs begin; one that settles first has one scene. Raises SettleError."""
-    if not settles(scenario):
-        return stack
-    scene, _ = initial_scene(member(stack.scenes, 0), scenario, stack.placed[0], ALONE)
-    return stack._replace(scenes=stack_of_one(scene))
 
 
 class Ensemble:
@@ -264,15 +234,15 @@ class Ensemble:
         self.bodies = int(self.scenes.world.bodies.shape[1]) - 1
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
         own = zip([scenarios[number] for number in stack.numbers], self.placed, self.time_steps, strict=True)
-        self.timelines = [Timeline(one, placed, step) if one.events else None for one, placed, step in own]
+        self.timelines = [events.Timeline(one, placed, step) if one.events else None for one, placed, step in own]
         ends = [scenarios[number].time.end for number in stack.numbers]
-        self.last_steps = np.array([*map(last_step_of, ends, self.time_steps)], dtype=np.int64)
+        self.last_steps = np.array([*map(loop.last_step_of, ends, self.time_steps)], dtype=np.int64)
         self.starts = np.zeros((len(ends), len(self.scheme.measured)))
         self.codes = np.zeros(len(ends), dtype=np.int64)
         every = [scenarios[number].output.every for number in stack.numbers]
-        self.periods = np.array([*map(steps_per_frame, every, self.time_steps)])
+        self.periods = np.array([max(one / step, 1.0) for one, step in zip(every, self.time_steps, strict=True)])
         start = self._positions(self.scenes, slice(None))
-        self.supports = [MovingSupport(scenarios[number]) for number in stack.numbers]
+        self.supports = [probes.MovingSupport(scenarios[number]) for number in stack.numbers]
         self.watch = Watch(self.placed, self.supports, start)
         steps, places = np.zeros(len(ends), dtype=np.int64), np.zeros_like(start)
         reach, thresholds = self.watch.shapes.reach, self.watch.thresholds
@@ -284,13 +254,13 @@ class Ensemble:
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
         nobody = np.zeros(0, dtype=np.int64)
-        with compiling():  # what a single run has no use for, before there are threads
+        with compiler.compiling():  # what a single run has no use for, before there are threads
             self._advance_members(nobody, self.last_steps, self.starts, self.codes)
         count = len(self.codes)
         if any(self.timelines):  # each is advanced alone, from where it begins
             self._advance_members(np.arange(count), np.zeros_like(self.codes), self.starts, self.codes)
         if self.scheme.advance_members is None or any(self.timelines):
-            self.codes[:] = PAIRS_FULL
+            self.codes[:] = arrays.PAIRS_FULL
             return
         chunk = min(CHUNK, -(-count // threads))
         list(pool.map(self._advance, (np.arange(i, min(i + chunk, count)) for i in range(0, count, chunk))))
@@ -307,92 +277,48 @@ class Ensemble:
             for m in members[rides].tolist():
                 self._advance_watching(m, int(stops[m]), rows)
             rows = np.zeros_like(self.starts)  # what is measured at the start of a later call
-            members = members[(self.codes[members] == REACHED) & (self.last_steps[members] > done)]
+            members = members[(self.codes[members] == arrays.REACHED) & (self.last_steps[members] > done)]
             if members.size:
-                members = members[self._add_up(members)]
+                measured, which = self._measured(members), members.tolist()
+                ledgers = (
+                    ledger_of(self.names, measured[m], self._start(m), own)
+                    for m, own in zip(which, in_play_of(self.scenes, which), strict=True)
+                )
+                members = members[[*map(adds_up, ledgers)]]
 
     def _advance_watching(self, m: int, stop: int, rows: NDArray[np.float64]) -> None:
         """Advance a member on a moving support to a step, from frame to frame until something has moved there."""
         stops, is_under_way = np.zeros_like(self.codes), True
         while is_under_way:
-            frame = stop if self.watch.first[m] else min(stop, self._next_frame(m))
+            done = int(self.scenes.world.clock["steps"][m, 0])
+            frame = stop if self.watch.first[m] else min(stop, frame_times.next_frame(done, self.periods[m]))
             stops[m] = frame
             self._advance_members(np.array([m]), stops, rows, self.codes)
             rows = np.zeros_like(rows)  # what is measured at the start of a later call
-            is_under_way = self.codes[m] == REACHED and frame < stop
-            if self.codes[m] == REACHED and self._is_frame(m, frame):
-                self.watch.see([m], self._motion(self.scenes, [m]), [frame * self.time_steps[m]])
-
-    def _next_frame(self, m: int) -> int:
-        return next_frame(int(self.scenes.world.clock["steps"][m, 0]), self.periods[m])
+            is_under_way = self.codes[m] == arrays.REACHED and frame < stop
+            if self.codes[m] == arrays.REACHED and self._is_frame(m, frame):
+                self.watch.follow([m], self._motion([m]), [frame * self.time_steps[m]])
 
     def _advance_members(self, members: Steps, stops: Steps, rows: NDArray[np.float64], codes: Steps) -> None:
         """Advance some members in compiled code, where the scheme can."""
         if self.scheme.advance_members is not None:
             self.scheme.advance_members(self.scenes, members, stops, rows, codes, self.watched)
 
-    def _next_look(self, m: int, done: int) -> int:
-        """Return the step at which the energy of a member is checked next, or its last."""
-        return min(next_energy_check(done, self.bodies), int(self.last_steps[m]))
-
-    def _next_stop(self, m: int, done: int) -> int:
-        """Return where a member stops next that is advanced alone: frames count until something has moved."""
-        look = self._next_look(m, done)
-        if self.watch.first[m] and not self.supports[m].moves:  # which carries a block until it is removed
-            return look
-        return min(look, next_frame(done, self.periods[m]))
-
     def _is_frame(self, m: int, step: int) -> bool:
-        return step > 0 and next_frame(step - 1, self.periods[m]) == step
-
-    def _see_ends(self) -> None:
-        """Find what moved first in members without a frame in which anything had: the end is one too.
-
-        Those whose list of pairs is full continue alone.
-        """
-        self.watch.take(self.watched.steps, self.watched.places, self.time_steps)
-        which = [m for m, code in enumerate(self.codes) if self.watch.first[m] is None and code != PAIRS_FULL]
-        steps = self.scenes.world.clock["steps"][which, 0].tolist()
-        times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
-        self.watch.see(which, self._motion(self.scenes, which), times)
+        return step > 0 and frame_times.next_frame(step - 1, self.periods[m]) == step
 
     def _positions(self, scenes: AnyScene, which: list[int] | slice) -> NDArray[np.float64]:
         """Return x, y (m) and angle (rad) of the blocks of some scenes of a stack, (k, 3, b)."""
         bodies = scenes.world.bodies.view(np.ndarray)  # a record array takes five times as long for a field
-        return np.stack([bodies[name][which, : len(self.placed[0])] for name in POSITION], axis=1)
+        return np.stack([bodies[name][which, : len(self.placed[0])] for name in recorder.POSITION], axis=1)
 
-    def _motion(self, scenes: AnyScene, which: list[int]) -> NDArray[np.float64]:
-        """Return the states of the blocks of some scenes of a stack, (k, 6, b)."""
-        return motion_of(scenes.world.bodies[which, : len(self.placed[0])])
-
-    def _add_up(self, members: Steps) -> list[bool]:
-        """Return for each of some members if its energy adds up."""
-        rows, which = self._measured(members), members.tolist()
-        in_play = in_play_of(self.scenes, which)
-        ledgers = (ledger_of(self.names, rows[m], self._start(m), own) for m, own in zip(which, in_play, strict=True))
-        return [*map(adds_up, ledgers)]
+    def _motion(self, which: list[int]) -> NDArray[np.float64]:
+        """Return the states of the blocks of some members, (k, 6, b)."""
+        return motion_of(self.scenes.world.bodies[which, : len(self.placed[0])])
 
     def _start(self, m: int) -> float:
         """Return the energy (J) of a member at the start."""
         return float(self.starts[m, : len(self.scheme.ledger)].sum())
-
-    def ends(self) -> list[EnsembleEnd]:
-        """Return where the members ended, in order."""
-        self._see_ends()
-        measured = self._measured(np.arange(len(self.codes)))
-        closing = FinalStates(self.scenes, self.placed, measured, self.watch, self._peaks())
-        return [
-            self._run_alone(m, self._start(m)) if code == PAIRS_FULL else closing.end(m, self._start(m), code)
-            for m, code in enumerate(self.codes.tolist())
-        ]
-
-    def _peaks(self) -> NDArray[np.float64] | None:
-        """Return the largest rotation (rad) of each member, (m, 1), in frames and at the end, where it was followed."""
-        if not self.has_peaks:
-            return None
-        turns = np.abs(self._positions(self.scenes, slice(None))[:, 2] - self.watched.start[:, 2])
-        at_end = np.where(self.watch.shapes.is_free, turns, 0.0).max(axis=1, initial=0.0)
-        return np.asarray(np.fmax(self.watched.peaks, at_end))[:, None]
 
     def _measured(self, members: Steps) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
@@ -400,33 +326,49 @@ class Ensemble:
         self._advance_members(members, nowhere, rows, nowhere.copy())
         return rows
 
+    def ends(self) -> list[EnsembleEnd]:
+        """Return where the members ended, in order; those whose list of pairs is full go on alone."""
+        codes: list[int] = self.codes.tolist()
+        # the end is a frame too: it shows what moved first where nothing had before
+        self.watch.take_first_moves(self.watched.steps, self.watched.places, self.time_steps)
+        which = [m for m, code in enumerate(codes) if self.watch.first[m] is None and code != arrays.PAIRS_FULL]
+        steps = self.scenes.world.clock["steps"][which, 0].tolist()
+        times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
+        self.watch.follow(which, self._motion(which), times)
+        turned = None
+        if self.has_peaks:  # in frames and at the end
+            turns = np.abs(self._positions(self.scenes, slice(None))[:, 2] - self.watched.start[:, 2])
+            at_end = np.where(self.watch.shapes.is_free, turns, 0.0).max(axis=1, initial=0.0)
+            turned = np.asarray(np.fmax(self.watched.peaks, at_end))[:, None]
+        measured, starts = self._measured(np.arange(len(codes))), [self._start(m) for m in range(len(codes))]
+        ends = member_ends(self.scenes, self.placed, measured, self.watch, starts, codes, turned)
+        return [ends.get(m) or self._run_alone(m, starts[m]) for m in range(len(codes))]
+
     def _run_alone(self, m: int, start: float) -> EnsembleEnd:
-        """Go on with a member whose pair list is full."""
-        scene, placed = member(self.scenes, m), [self.placed[m]]
+        """Go on with a member whose pair list is full, from stop to stop, as `_advance` does."""
+        scene, timeline, last = member(self.scenes, m), self.timelines[m], int(self.last_steps[m])
+        code, continues = arrays.REACHED, True
         try:
             if not scene.world.clock[0].is_started:
-                scene, _ = ALONE.advance(self.scheme.with_more_room(scene), 0)
+                scene, _ = team.ALONE.advance(self.scheme.with_more_room(scene), 0)
                 start = start_energy(scene)
-            scene, code = self._finish(m, scene, start)
+            while continues:
+                done = int(scene.world.clock[0].steps)
+                look = stop = min(next_energy_check(done, self.bodies), last)
+                # frames count until something has moved, and on a support that moves until a block is removed
+                if self.supports[m].moves or not self.watch.first[m]:
+                    stop = min(stop, frame_times.next_frame(done, self.periods[m]))
+                event = events.NEVER if timeline is None else timeline.next_step(done)
+                scene, code = team.ALONE.advance(scene, min(stop, event))
+                if timeline is not None:
+                    scene, code = timeline.act(scene, team.ALONE, code)
+                now = int(scene.world.clock[0].steps)
+                is_under_way = code == arrays.REACHED and now < last
+                continues = is_under_way and (now != look or adds_up(energy_ledger(scene, start)))
+                if not continues or self._is_frame(m, now):
+                    motion = motion_of(stack_of_one(scene).world.bodies[[0], : len(self.placed[0])])
+                    self.watch.follow([m], motion, [now * self.time_steps[m]])
         except BlocksimError as error:
             return MemberFailure(error)
-        closing = FinalStates(stack_of_one(scene), placed, measure_row(scene)[np.newaxis], self.watch.only(m))
-        return closing.end(0, start, code)
-
-    def _finish(self, m: int, scene: AnyScene, start: float) -> tuple[AnyScene, int]:
-        """Advance one scene from stop to stop, as `_advance` does; return it and its status code."""
-        while True:
-            done = int(scene.world.clock[0].steps)
-            look, timeline = self._next_look(m, done), self.timelines[m]
-            event = NEVER if timeline is None else timeline.next_step(done)
-            scene, code = ALONE.advance(scene, min(self._next_stop(m, done), event))
-            if timeline is not None:
-                scene, code = timeline.act(scene, ALONE, code)
-            now = int(scene.world.clock[0].steps)
-            is_under_way = code == REACHED and now < self.last_steps[m]
-            continues = is_under_way and (now != look or adds_up(energy_ledger(scene, start)))
-            if not continues or self._is_frame(m, now):
-                time = now * self.time_steps[m]
-                self.watch.see([m], self._motion(stack_of_one(scene), [0]), [time])
-            if not continues:
-                return scene, code
+        measured, watch = measure_row(scene)[np.newaxis], self.watch.only(m)
+        return member_ends(stack_of_one(scene), [self.placed[m]], measured, watch, [start], [code])[0]

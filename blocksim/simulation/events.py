@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from blocksim.kernels.common.arrays import AT_REST, DRIVEN, REACHED, REMOVED, SUPPORT, Record, World, zeros
-from blocksim.scenario import PlacedBody, Scenario
-from blocksim.scenario.events import in_order, wall_names
+from blocksim.scenario import PlacedBody, Scenario, events
 from blocksim.scenario.models.stepping import Event
-from blocksim.simulation.ledger import start_energy
-from blocksim.simulation.result import EventRecord, describe_event
+from blocksim.simulation import ledger, result
 from blocksim.simulation.schemes import AnyScene, scheme_of
 from blocksim.simulation.team import Team
 
@@ -35,10 +33,10 @@ class Timeline:
         """Take the bodies as placed and the time step (s)."""
         self.events, self.placed, self.step = scenario.events, placed, step
         self.names = {body.name: number for number, body in enumerate(placed)}
-        self.walls = wall_names(scenario)
+        self.walls = events.wall_names(scenario)
         self.loads = [load.name for load in scenario.loads]
-        self.happened: tuple[EventRecord, ...] = ()
-        order = in_order(self.events)
+        self.records: tuple[result.EventRecord, ...] = ()
+        order = events.in_order(self.events)
         timed = ((self.events[number].at, number) for number in order)
         self.timed = [(max(1, round(at / step)), number) for at, number in timed if at is not None]
         self.at_rest = [number for number in order if self.events[number].at is None]
@@ -46,7 +44,7 @@ class Timeline:
     @property
     def pending(self) -> list[int]:
         """Numbers of the events that have not happened."""
-        done = {one.event for one in self.happened}
+        done = {one.event for one in self.records}
         return [number for number in range(len(self.events)) if number not in done]
 
     def next_step(self, done: int) -> int:
@@ -73,27 +71,28 @@ class Timeline:
 
     def _happen(self, scene: AnyScene, team: Team, number: int) -> tuple[AnyScene, int]:
         """Change the arrays and have the pair list made anew, and the contacts of this moment where the scheme asks."""
-        before, event, bodies = start_energy(scene), self.events[number], scene.world.bodies.copy()
+        before, event, bodies = ledger.start_energy(scene), self.events[number], scene.world.bodies.copy()
         scene, status = self._changed(scene, event), REACHED
         clock = scene.world.clock[0]
         clock.rebuilds = 0
         if scheme_of(scene).after_event(scene, bodies):
             scene, status = team.advance(scene, int(clock.steps))
-        clock, energy = scene.world.clock[0], before - start_energy(scene)
+        clock, energy = scene.world.clock[0], before - ledger.start_energy(scene)
         clock.checks_at_rest = 0
         scene.world.ledger[0].events += energy
         steps = int(clock.steps)
-        told = EventRecord(
-            event=number, step=steps, time_s=steps * self.step, what=describe_event(event), energy_J=energy
-        )
-        self.happened = (*self.happened, told)
+        what, seconds = result.describe_event(event), steps * self.step
+        record = result.EventRecord(event=number, step=steps, time_s=seconds, what=what, energy_J=energy)
+        self.records = (*self.records, record)
         return scene, status
 
     def _changed(self, scene: Any, event: Event) -> Any:
         """Return the scene with what an event does in its arrays."""
         world = scene.world
         for name in event.remove:
-            world = remove_body(world, self._number(world, name))
+            # walls are the last before the half-plane
+            walls = {wall: world.bodies.size - 1 - k for k, wall in enumerate(reversed(self.walls), start=1)}
+            world = remove_body(world, {**walls, **self.names}[name])
         for name in event.fix:
             world = fix_body(world, self.names[name])
         for name in event.free:
@@ -106,12 +105,6 @@ class Timeline:
                 if (value := getattr(event.velocity, rate)) is not None:
                     body[rate] = value
         return world if isinstance(scene, World) else scene._replace(world=world)
-
-    def _number(self, world: World, name: str) -> int:
-        """Return the number of a body or a wall; walls are the last before the half-plane."""
-        if name in self.names:
-            return self.names[name]
-        return int(world.bodies.size) - 1 - len(self.walls) + self.walls.index(name)
 
 
 def remove_body(world: World, number: int) -> World:
@@ -135,7 +128,12 @@ def fix_body(world: World, number: int) -> World:
     body.is_moved = SUPPORT
     ground, controls = world.bodies[-1], world.controls[0]
     body.vx, body.vy = ground.vx, ground.vy
-    moved = _displacement(world)
+    clock = world.clock[0]
+    time, first = float(clock.steps * controls.step), int(clock.motion_piece)
+    initial = int(np.searchsorted(world.motion["start"][first:], time, side="right"))
+    piece = world.motion[first + max(0, initial - 1)]
+    t = time - piece.start
+    moved = float(piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3)))  # m, of the support so far
     extended = zeros(world.moved.size + 1, world.moved.dtype)
     extended[1:] = world.moved  # those of the support come first
     first = extended[0]
@@ -180,14 +178,3 @@ def _without(world: World, number: int) -> World:
     moved[:] = world.moved[kept]
     world.controls[0].driven = np.count_nonzero(moved["shift_end"])
     return world._replace(moved=moved)
-
-
-def _displacement(world: World) -> float:
-    """Return how far (m) the support has come along its direction."""
-    clock, controls = world.clock[0], world.controls[0]
-    time = float(clock.steps * controls.step)
-    first = int(clock.motion_piece)
-    begun = int(np.searchsorted(world.motion["start"][first:], time, side="right"))
-    piece = world.motion[first + max(0, begun - 1)]
-    t = time - piece.start
-    return float(piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3)))

@@ -54,10 +54,6 @@ class Contacts:
         """Return the contacts of all frames, one table each."""
         return [self.at(frame) for frame in range(len(self))]
 
-    def chosen(self, which: NDArray[np.bool_]) -> "Contacts":
-        """Return those of some frames."""
-        return join_contacts([self.at(frame) for frame in np.flatnonzero(which).tolist()])
-
     @property
     def frame(self) -> NDArray[np.intp]:
         """Number of the frame of every contact, (c,)."""
@@ -131,15 +127,12 @@ class Frames:
     def tracks(self) -> tuple[Track, ...]:
         """Every system over time, blocks first."""
         unknown = np.full(len(self.names), np.nan)
-        shape = (self.size_x, self.size_y, unknown, *(unknown if one is None else one for one in self._inert))
+        inert = (unknown if one is None else one for one in (self.mass, self.inertia))
+        shape = (self.size_x, self.size_y, unknown, *inert)
         start = np.stack([unknown, unknown, self.start_angle, unknown, unknown, unknown])
         blocks = SystemInScene(BLOCKS, Elements(self.names, np.stack(shape), start, self.outlines))
         values = np.stack([getattr(self, one.name) for one in BLOCKS.quantities], axis=1)
         return (Track(blocks, values), *self.others)
-
-    @property
-    def _inert(self) -> tuple[Floats | None, Floats | None]:
-        return self.mass, self.inertia
 
     @property
     def rotation(self) -> Floats:
@@ -183,11 +176,11 @@ def data_set(frames: Frames, name: str) -> "xr.Dataset":
         prefix = "" if track.system is BLOCKS else f"{track.system.name}_"
         coordinates[element] = (element, list(track.names))
         for one in track.system.outputs:
-            told = {"units": one.unit, "long_name": one.meaning}
-            variables[prefix + one.name] = (("time", element), one.of(track), told)
+            attributes = {"units": one.unit, "long_name": one.meaning}
+            variables[prefix + one.name] = (("time", element), one.of(track), attributes)
     energies = {f"energy_{key}": (("time",), values, {"units": "J"}) for key, values in frames.energy.items()}
-    found: xr.Dataset = xarray.Dataset({**variables, **energies}, coords=coordinates, attrs={"scenario": name})
-    return found
+    dataset: xr.Dataset = xarray.Dataset({**variables, **energies}, coords=coordinates, attrs={"scenario": name})
+    return dataset
 
 
 Columns = dict[str, list[Any]]  # by the names in COLUMNS, a value a block: its name, then numbers
@@ -275,8 +268,8 @@ def csv_text(columns: Columns) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    rows = zip(*columns.values(), strict=True)
-    writer.writerows([name, *("" if value != value else value for value in values)] for name, *values in rows)  # noqa: PLR0124 - NaN alone is not itself, and other cells are words
+    for name, *values in zip(*columns.values(), strict=True):
+        writer.writerow([name, *("" if isinstance(one, float) and math.isnan(one) else one for one in values)])
     return text.getvalue()
 
 
@@ -290,18 +283,14 @@ def read_table(path: Path) -> Columns:
 
 
 def _columns_of(lines: Iterator[list[str]]) -> Columns:
-    """Return the columns in the lines of a file, which are not kept. Raises ValueError."""
+    """Return the columns in the lines of a file, which are not kept; an empty cell is NaN. Raises ValueError."""
     if tuple(next(lines, ())) != COLUMNS:
         raise ValueError(f"the columns must be {','.join(COLUMNS)}")
     columns: Columns = {name: [] for name in COLUMNS}
     for number, cells in enumerate(lines, start=1):
         if len(cells) != len(COLUMNS):
             raise ValueError(f"row {number} has {len(cells)} cells, not {len(COLUMNS)}")
-        for column, value in zip(columns.values(), (cells[0], *map(_number, cells[1:])), strict=True):
-            column.append(value)
+        columns[COLUMNS[0]].append(cells[0])
+        for name, cell in zip(COLUMNS[1:], cells[1:], strict=True):
+            columns[name].append(float(cell or "nan"))
     return columns
-
-
-def _number(text: str) -> float:
-    """Return the number of a cell to the last bit; an empty cell is one that is not finite."""
-    return float(text) if text else math.nan

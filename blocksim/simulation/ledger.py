@@ -6,7 +6,8 @@ alone: where outputs, checkpoints and signals interrupt a run must not decide wh
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from importlib import import_module
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,11 +80,15 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
         return abs(self.residual) / self.in_play if self.in_play else abs(self.residual)
 
 
+def compiled(module: str) -> Any:
+    """Return a module of blocksim that needs the compiler: who reads stored runs never asks for it."""
+    return import_module(f"blocksim.{module}")
+
+
 def start_energy(scene: "AnyScene") -> float:
     """Return all energy (J) that a scene holds and has lost: constant, if the ledger is complete."""
-    from blocksim.simulation.schemes import ledger_names, measure_row  # noqa: PLC0415 - numba, not for readers
-
-    return float(measure_row(scene)[: len(ledger_names(scene))].sum())
+    schemes = compiled("simulation.schemes")
+    return float(schemes.measure_row(scene)[: len(schemes.ledger_names(scene))].sum())
 
 
 class InPlay(NamedTuple):
@@ -95,12 +100,10 @@ class InPlay(NamedTuple):
 
 def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start."""
-    from blocksim.simulation.schemes import ledger_names, mass_of_systems, measure_row  # noqa: PLC0415 - as above
-
-    book = scene.world.ledger[0]
-    mass = float(np.sum(scene.world.bodies.mass)) + mass_of_systems(scene)
+    schemes, book = compiled("simulation.schemes"), scene.world.ledger[0]
+    mass = float(np.sum(scene.world.bodies.mass)) + schemes.mass_of_systems(scene)
     in_play = InPlay(mass, float(book.largest_kinetic + book.travel_work))
-    return ledger_of(ledger_names(scene), measure_row(scene), start, in_play)
+    return ledger_of(schemes.ledger_names(scene), schemes.measure_row(scene), start, in_play)
 
 
 def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_play: InPlay) -> EnergyLedger:

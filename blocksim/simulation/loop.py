@@ -10,9 +10,8 @@ import numpy as np
 
 from blocksim.errors import ExitCode
 from blocksim.kernels.common import arrays
-from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED, World
 from blocksim.scenario import PlacedBody
-from blocksim.simulation.checkpoint import NEVER, CheckpointWriter, Position
+from blocksim.simulation import checkpoint, result
 from blocksim.simulation.events import Timeline
 from blocksim.simulation.ledger import (
     RESIDUAL_LIMIT,
@@ -23,12 +22,9 @@ from blocksim.simulation.ledger import (
     start_energy,
 )
 from blocksim.simulation.recorder import MOTION, Recorder
-from blocksim.simulation.result import EventRecord
 from blocksim.simulation.schemes import AnyScene, measure_row, scheme_of
 from blocksim.simulation.team import ALONE, Team
 
-GROUND = "the ground"
-WALL = "a wall"
 MILLI = 1e3
 
 
@@ -63,29 +59,30 @@ BY_CODE = {
 }
 
 
-def interrupted_outcome(why: str) -> Outcome:
-    """Return what a run comes to that is stopped, and can continue."""
-    return Outcome("interrupted", why, ExitCode.STOPPED_EARLY)
-
-
 def diagnose(outcome: Outcome, code: int, scene: AnyScene, placed: Sequence[PlacedBody]) -> Outcome:
     """Return the outcome of a run that failed with the step and the block in its reason; of others as it is."""
     if outcome.status != "failed":
         return outcome
-    names = [body.name for body in placed]
+    scheme, world, reason, who = scheme_of(scene), scene.world, outcome.reason, ""
+    bodies = world.bodies[: len(placed)]
     with np.errstate(all="ignore"):  # not finite numbers are what is searched for
-        who = _FINDERS.get(code, _fastest)(scene, names)
-        scheme = scheme_of(scene)
-        reason = scheme.lost_contact(scene, scheme.overlaps(scene)) if code == OVERLAP_LIMIT else ""
-    return replace(outcome, reason=f"{reason or outcome.reason} ({who}, step {int(scene.world.clock[0].steps)})")
-
-
-def _not_finite(scene: AnyScene, names: Sequence[str]) -> str:
-    bodies = scene.world.bodies[: len(names)]
-    lost = ~np.all([np.isfinite(bodies[name]) for name in MOTION], axis=0)
-    if lost.any():
-        return f"block {names[int(np.argmax(lost))]}"
-    return _lost_system(scene) or _fastest(scene, names)
+        if code == arrays.OVERLAP_LIMIT:
+            overlaps = scheme.overlaps(scene)
+            reason = scheme.lost_contact(scene, overlaps) or reason
+            worst = int(np.nanargmax(overlaps.depth / overlaps.limit))
+            depth, limit = (MILLI * one[worst] for one in (overlaps.depth, overlaps.limit))
+            pair = " and ".join(_name(world, placed, int(one[worst])) for one in (overlaps.a, overlaps.b))
+            is_capped = overlaps.limit[worst] < world.controls[0].max_overlap
+            most = f", more than half of a side of {2.0 * limit:.3g} mm" if is_capped else ""
+            who = f"{pair} by {depth:.3g} mm{most}"
+        elif code == arrays.NOT_FINITE:
+            lost = ~np.all([np.isfinite(bodies[name]) for name in MOTION], axis=0)
+            who = f"block {placed[int(np.argmax(lost))].name}" if lost.any() else _lost_system(scene)
+        if not who:
+            speed = np.hypot(bodies["vx"], bodies["vy"])
+            fastest = int(np.argmax(speed))
+            who = f"the fastest is block {placed[fastest].name} with {speed[fastest]:.3g} m/s"
+    return replace(outcome, reason=f"{reason} ({who}, step {int(world.clock[0].steps)})")
 
 
 def _lost_system(scene: AnyScene) -> str:
@@ -98,30 +95,11 @@ def _lost_system(scene: AnyScene) -> str:
     return ""
 
 
-def _fastest(scene: AnyScene, names: Sequence[str]) -> str:
-    bodies = scene.world.bodies[: len(names)]
-    speed = np.hypot(bodies["vx"], bodies["vy"])
-    fastest = int(np.argmax(speed))
-    return f"the fastest is block {names[fastest]} with {speed[fastest]:.3g} m/s"
-
-
-def _deepest(scene: AnyScene, names: Sequence[str]) -> str:
-    world, found = scene.world, scheme_of(scene).overlaps(scene)
-    worst = int(np.nanargmax(found.depth / found.limit))
-    pair = " and ".join(_name(world, names, int(i[worst])) for i in (found.a, found.b))
-    is_capped = found.limit[worst] < world.controls[0].max_overlap
-    most = f", more than half of a side of {MILLI * 2.0 * found.limit[worst]:.3g} mm" if is_capped else ""
-    return f"{pair} by {MILLI * found.depth[worst]:.3g} mm{most}"
-
-
-def _name(world: World, names: Sequence[str], body: int) -> str:
-    if body < len(names):
-        return f"block {names[body]}"
+def _name(world: arrays.World, placed: Sequence[PlacedBody], body: int) -> str:
+    if body < len(placed):
+        return f"block {placed[body].name}"
     is_wall = body < world.bodies.size - 1 and math.isfinite(world.bodies[-1].y)
-    return WALL if is_wall else GROUND
-
-
-_FINDERS = {NOT_FINITE: _not_finite, OVERLAP_LIMIT: _deepest}
+    return "a wall" if is_wall else "the ground"
 
 
 CALL_SECONDS = 0.05
@@ -149,7 +127,7 @@ class RunControl:
 
     on_progress: Watcher = lambda _: None
     stop: Callable[[], str] = lambda: ""  # why to stop now; nothing as long as the run may continue
-    checkpoints: CheckpointWriter | None = None
+    checkpoints: checkpoint.CheckpointWriter | None = None
     timeline: Timeline | None = None  # where there are events
 
 
@@ -169,7 +147,7 @@ class LoopResult:
     solver_seconds: float
     threads: int
     overlap: float
-    events: tuple[EventRecord, ...] = ()
+    events: tuple[result.EventRecord, ...] = ()
     pending: tuple[int, ...] = ()  # numbers of events that have not happened
 
 
@@ -193,18 +171,27 @@ def run_loop(
     *,
     team: Team = ALONE,
     control: RunControl = UNCONTROLLED,
-    since: Position | None = None,
+    since: checkpoint.Position | None = None,
 ) -> LoopResult:
     """Advance a scene to `end` (s) or until it rests, fails or is stopped; the recorder samples on the way.
 
     `since` is where the scene of a checkpoint stood. Raises what keeping frames and checkpoints raises.
     """
-    run = _Run(scene, recorder, end, team, control)
-    run.begin(since)
-    why = run.advance()
+    run = _Run(scene, recorder, end, team, control, since)
+    why = ""
+    while run.status == arrays.REACHED and run.done < run.last and not (run.is_lost or why):
+        why = control.stop()
+        if not why:
+            run.advance_towards(min(recorder.next_step(run.done), run.last))
     if why:
         run.write_checkpoint()
-    return run.result(why)
+    recorder.sample(run.scene)  # wherever it ended
+    ledger = energy_ledger(run.scene, run.start)
+    outcome = Outcome("interrupted", why, ExitCode.STOPPED_EARLY) if why else outcome_of(run.status, ledger)
+    outcome = diagnose(outcome, run.status, run.scene, recorder.placed)
+    overlap, timeline = float(measure_row(run.scene)[-1]), control.timeline
+    records, pending = ((), ()) if timeline is None else (timeline.records, tuple(timeline.pending))
+    return LoopResult(run.scene, outcome, ledger, run.seconds, team.threads, overlap, records, pending)
 
 
 class Pace:
@@ -227,59 +214,58 @@ class Pace:
 class _Run:
     """A run under way."""
 
-    def __init__(self, scene: AnyScene, recorder: Recorder, end: float, team: Team, control: RunControl) -> None:
+    def __init__(
+        self,
+        scene: AnyScene,
+        recorder: Recorder,
+        end: float,
+        team: Team,
+        control: RunControl,
+        since: checkpoint.Position | None,
+    ) -> None:
+        """Evaluate the contacts at the start, or take over what an earlier part of the run has left."""
         self.scene, self.recorder, self.end, self.team, self.control = scene, recorder, end, team, control
         self.step = float(scene.world.controls[0].step)
         self.last = last_step_of(end, self.step)
         self.bodies = scene.world.bodies.size - 1
         self.pace = Pace(self.bodies)
-        self.status, self.is_lost = REACHED, False
+        self.status, self.is_lost = arrays.REACHED, False
         self.seconds = self.start = 0.0  # in compiled code; J
         self.timeline = control.timeline
-
-    @property
-    def done(self) -> int:
-        """Return the number of steps done."""
-        return int(self.scene.world.clock[0].steps)
-
-    def begin(self, since: Position | None) -> None:
-        """Evaluate the contacts at the start, or take over what an earlier part of the run has left."""
         if since is not None:
             self.start, self.seconds = since.start_energy, since.solver_seconds
             if self.timeline is not None:
-                self.timeline.happened = since.events
+                self.timeline.records = since.events
             return
         self._advance(0)
         self.start = start_energy(self.scene)
         self.recorder.sample(self.scene)
         self.recorder.probes.sample(self.scene)
 
-    def advance(self) -> str:
-        """Run to the end, or until somebody wants to stop; return why, and nothing at the end."""
-        while self.status == REACHED and self.done < self.last and not self.is_lost:
-            if why := self.control.stop():
-                return why
-            self._advance_towards(min(self.recorder.next_step(self.done), self.last))
-        return ""
+    @property
+    def done(self) -> int:
+        """Return the number of steps done."""
+        return int(self.scene.world.clock[0].steps)
 
-    def _advance_towards(self, wanted: int) -> None:
+    def advance_towards(self, wanted: int) -> None:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
         done, before = self.done, time.perf_counter()
         look = next_energy_check(done, self.bodies)
         event = wanted if self.timeline is None else self.timeline.next_step(done)
         checkpoints = self.control.checkpoints
-        due = NEVER if checkpoints is None else checkpoints.next_step(done)
+        due = checkpoint.NEVER if checkpoints is None else checkpoints.next_step(done)
         self._advance_by_probes(min(wanted, look, event, done + self.pace.steps, due))
         self.pace.learn(self.done - done, time.perf_counter() - before)
         if self.timeline is not None:
             self.scene, self.status = self.timeline.act(self.scene, self.team, self.status)
         self.recorder.probes.sample(self.scene)  # like frames after what happens at this step
-        self.recorder.keep_up()
+        if self.recorder.probes.all and self.recorder.sink is not None:
+            self.recorder.sink.keep_up()  # with the samples
         if self.done == wanted:
             self.recorder.sample(self.scene)
         ledger = energy_ledger(self.scene, self.start)
         self.is_lost = self.done == look and not adds_up(ledger)
-        is_sound = self.status == REACHED and adds_up(ledger) and self.done < self.last
+        is_sound = self.status == arrays.REACHED and adds_up(ledger) and self.done < self.last
         if is_sound and checkpoints is not None and checkpoints.is_due(self.done):
             self.write_checkpoint()
         self.control.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))
@@ -293,11 +279,11 @@ class _Run:
         if not probes.all:
             self._advance(last_step)
             return
-        while self.status == REACHED and self.done < last_step:
+        while self.status == arrays.REACHED and self.done < last_step:
             self._advance(min(last_step, probes.next_step(self.done)))
             if time.perf_counter() - began > LONGEST_CALL:
                 return
-            if self.status == REACHED and self.done < last_step:
+            if self.status == arrays.REACHED and self.done < last_step:
                 probes.sample(self.scene)
 
     def _advance(self, last_step: int) -> None:
@@ -309,24 +295,13 @@ class _Run:
         """Keep the present state, before the frame of a moment that is no output time is recorded."""
         if self.control.checkpoints is None:
             return
-        position = Position(
+        position = checkpoint.Position(
             step=self.done,
             frames=self.recorder.count_until(self.done),
             frames_sha256=self.recorder.digest_until(self.done),
             start_energy=self.start,
             solver_seconds=self.seconds,
             threads=self.team.threads,
-            events=() if self.timeline is None else self.timeline.happened,
+            events=() if self.timeline is None else self.timeline.records,
         )
         self.control.checkpoints.write(self.scene, position)
-
-    def result(self, why: str) -> LoopResult:
-        """Record where the run ended, and return its outcome."""
-        self.recorder.sample(self.scene)  # wherever it ended
-        ledger = energy_ledger(self.scene, self.start)
-        outcome = interrupted_outcome(why) if why else outcome_of(self.status, ledger)
-        outcome = diagnose(outcome, self.status, self.scene, self.recorder.placed)
-        overlap = float(measure_row(self.scene)[-1])
-        happened, pending = ((), []) if self.timeline is None else (self.timeline.happened, self.timeline.pending)
-        threads = self.team.threads
-        return LoopResult(self.scene, outcome, ledger, self.seconds, threads, overlap, happened, tuple(pending))

@@ -44,7 +44,7 @@ Flags = NDArray[np.bool_]
 Value = str | float | bool | None
 
 
-class Manner(StrEnum):
+class Response(StrEnum):
     """What a scene came to."""
 
     STANDS = "stands"
@@ -80,10 +80,6 @@ class Shapes(NamedTuple):
                 shortest[number], reach[number] = body.least_width, body.radius
         count = len(placed)
         return cls(shortest.reshape(count, -1), reach.reshape(count, -1), is_free.reshape(count, -1))
-
-    def chosen(self, scenes: list[int]) -> "Shapes":
-        """Return those of some scenes."""
-        return Shapes(self.shortest[scenes], self.reach[scenes], self.is_free[scenes])
 
     def shares(self, way: Floats, turn: Floats) -> Floats:
         """Return how far blocks are from their start (m, rad), in units of the threshold: above 1 is moved."""
@@ -149,20 +145,15 @@ class Ends:
         return [scene[block].name for scene, block in zip(self.placed, which, strict=True)]
 
 
-def _outcomes(ends: Ends) -> list[Manner]:
+def _outcomes(ends: Ends) -> list[Response]:
     turn, shapes = np.radians(ends.turn_deg), ends.shapes
     is_down = (turn > FALLEN_TURN) | (-ends.shift[:, 1] > FALLEN_SHARE * shapes.shortest)
     fell = np.any(shapes.is_free & is_down, axis=1)
     moved = np.any(shapes.shares(ends.way, turn) > 1.0, axis=1)
-    found = []
-    for m, (first, turns_on) in enumerate(zip(ends.first, ends.go_on(ends.turning), strict=True)):
-        if fell[m]:
-            found.append(Manner.FELL)
-        elif moved[m]:
-            found.append(Manner.ROCKING if turns_on else Manner.SLID)
-        else:
-            found.append(Manner.STANDS if first is None else Manner.ROCKED)
-    return found
+    turns_on, is_still = ends.go_on(ends.turning), [one is None for one in ends.first]
+    responses = [Response.FELL, Response.ROCKING, Response.SLID, Response.STANDS]
+    names = np.select([fell, moved & turns_on, moved, is_still], responses, Response.ROCKED)
+    return [Response(name) for name in names.tolist()]
 
 
 def _fastest(ends: Ends) -> Floats:
@@ -207,7 +198,7 @@ DISPLACEMENT, TURN, END_SPEED, PEAK = "displacement_mm", "turn_deg", "end_speed_
 LARGEST_TURN = "largest_rotation_deg"
 FIRST = "first to move"
 _ALL = (
-    Observable(OUTCOME, _outcomes, word="outcome", choices=tuple(Manner)),
+    Observable(OUTCOME, _outcomes, word="outcome", choices=tuple(Response)),
     Observable(
         "largest_displacement_mm",  # of the centre of a block, in any frame
         lambda ends: None if ends.moved is None else MILLI * ends.largest(ends.moved),
@@ -302,7 +293,7 @@ class Watch:
         """Distance (m) of every block, (m, b), beyond which it has moved; infinite for fixed ones."""
         return np.where(self.shapes.is_free, MOVED_SHARE * self.shapes.shortest, np.inf)
 
-    def see(self, scenes: list[int], motion: Floats, times: Sequence[float]) -> None:
+    def follow(self, scenes: list[int], motion: Floats, times: Sequence[float]) -> None:
         """Examine some scenes: (k, 6, b) x, y, angle and their rates (SI), at times (s)."""
         if self.start is None:
             self.start = motion[:, :3].copy()
@@ -315,7 +306,7 @@ class Watch:
         self.turned[which] = np.fmax(self.turned[which], turn)
         self._note_first(scenes, way, turn, times)
 
-    def take(self, steps: NDArray[np.int64], places: Floats, time_steps: Sequence[float]) -> None:
+    def take_first_moves(self, steps: NDArray[np.int64], places: Floats, time_steps: Sequence[float]) -> None:
         """Take what compiled code has found on supports at rest: steps (m,), zero for none, and places (m, 3, b)."""
         assert self.start is not None  # noqa: S101 - compiled code has it from here
         scenes = np.flatnonzero(steps).tolist()
@@ -336,7 +327,7 @@ class Watch:
         """Note what has moved first, where nothing had before."""
         if not way.size or all(self.first[m] for m in scenes):
             return
-        shares = self.shapes.chosen(scenes).shares(way, turn)
+        shares = Shapes._make(one[scenes] for one in self.shapes).shares(way, turn)
         for m, block, share, time in zip(scenes, shares.argmax(axis=1), shares.max(axis=1), times, strict=True):
             if share > threshold and self.first[m] is None:
                 self.first[m] = FirstMove(self.placed[m][block].name, time)

@@ -6,16 +6,17 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import PlacedBody, Scenario, place_segments
-from blocksim.scenario.events import GROUND, SUPPORTS, WALL, WALLS, Joint, joint_between, probe_names
-from blocksim.scenario.models.stepping import STEP, EnergyProbe, ForceProbe, JointProbe, PointProbe
-from blocksim.scenario.motion import motion_direction, motion_pieces
+from blocksim.scenario import PlacedBody, Scenario, events, motion, place_segments
+from blocksim.scenario.models.stepping import STEP, ForceProbe, JointProbe, PointProbe
 from blocksim.simulation.frames import empty_rows, forces_on_a
+from blocksim.simulation.ledger import compiled
+from blocksim.world.systems import systems_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,8 +34,8 @@ class MovingSupport:
         self.coefficients: list[list[float]] = []
         self.direction = (1.0, 0.0)
         if scenario is not None and scenario.motion is not None:
-            pieces = motion_pieces(scenario)
-            self.direction = motion_direction(scenario)
+            pieces = motion.motion_pieces(scenario)
+            self.direction = motion.motion_direction(scenario)
             self.times, self.coefficients = pieces.times.tolist(), pieces.coefficients.tolist()
 
     @property
@@ -218,39 +219,25 @@ class Moment:
 
         Parts of further systems have numbers after all bodies.
         """
-        from blocksim.simulation.schemes import scheme_of  # noqa: PLC0415 - numba, not for readers
-
-        rows = scheme_of(self.scene).contacts(self.scene, self.bodies.size)
+        rows = compiled("simulation.schemes").scheme_of(self.scene).contacts(self.scene, self.bodies.size)
         classes = self.bodies["contact_class"]
         table = self.scene.world.interactions["static_friction"]
         friction = table[classes[rows["body_a"]], classes[rows["body_b"]]]
-        for more in self._of_systems():
-            rows = np.concatenate([rows, rows_of(more)])
-            friction = np.concatenate([friction, more.friction])
-        return rows, forces_on_a(rows), friction
-
-    def _of_systems(self) -> "Iterator[BodyContacts]":
-        """Yield the contacts of further systems with bodies, their parts numbered."""
         first = self.bodies.size
         for (system, count), arrays in zip(self.parts, getattr(self.scene, "systems", ()), strict=True):
             if system.touching is not None:
-                found = system.touching(arrays, self.scene.world)
-                yield found._replace(part=first + found.part)
+                touching = system.touching(arrays, self.scene.world)
+                rows = np.concatenate([rows, rows_of(touching._replace(part=first + touching.part))])
+                friction = np.concatenate([friction, touching.friction])
             first += count
-
-    @cached_property
-    def carried(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Displacement (m) and velocity (m/s) of the support along x and y."""
-        return self.support.at(self.time)
+        return rows, forces_on_a(rows), friction
 
     @cached_property
     def energies(self) -> Values:
         """Energies (J) of the ledger."""
-        from blocksim.simulation.schemes import measure_row  # noqa: PLC0415 - numba, not for readers
-        from blocksim.simulation.schemes.scheme import COUNTED  # noqa: PLC0415
-
-        found: list[float] = measure_row(self.scene)[: -len(COUNTED)].tolist()
-        return found
+        schemes = compiled("simulation.schemes")
+        energies: list[float] = schemes.measure_row(self.scene)[: len(schemes.ledger_names(self.scene))].tolist()
+        return energies
 
 
 def rows_of(touching: "BodyContacts") -> Any:
@@ -296,14 +283,14 @@ def point_sampler(body: int, placed: PlacedBody, at: tuple[float, float]) -> Sam
         rx, ry = _arm(angle, at)
         x, y = float(record.x) + rx, float(record.y) + ry
         vx, vy = float(record.vx) - spin * ry, float(record.vy) + spin * rx
-        (ux, uy), (wx, wy) = moment.carried
+        (ux, uy), (wx, wy) = moment.support.at(moment.time)
         dx, dy = x - start[0], y - start[1]
         return x, y, dx, dy, dx - ux, dy - uy, vx, vy, vx - wx, vy - wy, angle - placed.angle
 
     return sample
 
 
-def joint_sampler(bodies: tuple[int, int], placed: tuple[PlacedBody, PlacedBody], joint: Joint) -> Sampler:
+def joint_sampler(bodies: tuple[int, int], placed: tuple[PlacedBody, PlacedBody], joint: events.Joint) -> Sampler:
     """Return what samples the joint between two bodies by number."""
     turned = placed[1].angle - placed[0].angle
 
@@ -339,9 +326,7 @@ class Probe:
 
     def next_step(self, done: int) -> int:
         """Return the next step to sample after `done` steps."""
-        from blocksim.kernels.common.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
-
-        return next_frame(done, self.period)
+        return int(compiled("kernels.common.frame_times").next_frame(done, self.period))
 
     def sample(self, moment: Moment) -> None:
         """Add a sample if one is due at this step, wherever the run ends, and it is not there yet."""
@@ -364,10 +349,6 @@ class Probe:
         self.rows = [*zip(series.step[:kept].tolist(), values, strict=True)]
         self.last = last_step
         return kept == self.count_until(last_step)
-
-    def series(self, time_step: float) -> ProbeSeries:
-        """Return the samples that are held; `time_step` in s."""
-        return series_of(self.name, self.kind, self.columns, self.rows, time_step)
 
 
 class Probes:
@@ -404,9 +385,9 @@ class Probes:
 
     def series(self) -> dict[str, ProbeSeries]:
         """Return the samples that are held by the names of their probes."""
-        return {probe.name: probe.series(self.time_step) for probe in self.all}
+        return {one.name: series_of(one.name, one.kind, one.columns, one.rows, self.time_step) for one in self.all}
 
-    def taken(self) -> dict[str, ProbeSeries]:
+    def drain(self) -> dict[str, ProbeSeries]:
         """Return the samples that are held, and hold them no more."""
         found = self.series()
         for probe in self.all:
@@ -419,71 +400,47 @@ NO_PROBES = Probes((), AT_REST, 1.0)
 
 def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float, ledger: Sequence[str]) -> Probes:
     """Return the probes of a scenario with steps of this length (s); `ledger` names its energies (J)."""
-    from blocksim.world.systems import systems_of  # noqa: PLC0415 - kernels, not for readers
+    parts = [(one, () if one.parts is None else one.parts(scenario)) for one in systems_of(scenario)]
+    named = _numbers(scenario, placed, [part for _, parts_of in parts for part in parts_of])
+    count = 1 + max(number for numbers in named.values() for number in numbers)
 
-    usual = scenario.output.every
-    made = [
-        Probe(name, probe.kind, columns_of(probe.kind, ledger), _period(probe.every, usual, time_step), sampler)
-        for probe, name, sampler in zip(
-            scenario.probes, probe_names(scenario), _samplers(scenario, placed), strict=True
-        )
-    ]
-    systems = [(one, len(_parts(one, scenario))) for one in systems_of(scenario)]
+    def flags(name: str) -> NDArray[np.bool_]:
+        flags = np.zeros(count, dtype=np.bool_)
+        flags[[*named[name]]] = True
+        return flags
+
+    made = []
+    for probe, name in zip(scenario.probes, events.probe_names(scenario), strict=True):
+        sampler: Sampler = attrgetter("energies")
+        match probe:
+            case ForceProbe():
+                on = flags(probe.on)
+                sampler = force_sampler(on, (~on if probe.by is None else flags(probe.by)) & ~on)
+            case PointProbe():
+                (number,) = named[probe.body]
+                sampler = point_sampler(number, placed[number], probe.at)
+            case JointProbe():
+                (first,), (second,) = (named[name] for name in probe.bodies)
+                joint = events.joint_between(placed[first], placed[second])
+                assert joint is not None  # noqa: S101 - the scenario was checked
+                sampler = joint_sampler((first, second), (placed[first], placed[second]), joint)
+        every = scenario.output.every if probe.every is None else probe.every
+        period = 1.0 if every == STEP else max(float(every) / time_step, 1.0)
+        made.append(Probe(name, probe.kind, columns_of(probe.kind, ledger), period, sampler))
+    systems = [(one, len(parts_of)) for one, parts_of in parts]
     return Probes(made, MovingSupport(scenario if made else None), time_step, systems)
 
 
-def _parts(system: "System", scenario: Scenario) -> tuple[str, ...]:
-    return () if system.parts is None else system.parts(scenario)
-
-
-def _period(every: float | str | None, usual: float, step: float) -> float:
-    """Return the steps between two samples; `usual` is the time (s) between frames."""
-    if every == STEP:
-        return 1.0
-    return max(float(usual if every is None else every) / step, 1.0)
-
-
-def _samplers(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Sampler]:
-    numbers = {body.name: number for number, body in enumerate(placed)}
-    for probe in scenario.probes:
-        match probe:
-            case ForceProbe():
-                on = _chosen(probe.on, scenario, placed)
-                by = ~on if probe.by is None else _chosen(probe.by, scenario, placed)
-                yield force_sampler(on, by & ~on)
-            case PointProbe():
-                number = numbers[probe.body]
-                yield point_sampler(number, placed[number], probe.at)
-            case JointProbe():
-                first, second = (numbers[name] for name in probe.bodies)
-                joint = joint_between(placed[first], placed[second])
-                assert joint is not None  # noqa: S101 - the scenario was checked
-                yield joint_sampler((first, second), (placed[first], placed[second]), joint)
-            case EnergyProbe():
-                yield lambda moment: moment.energies
-
-
-def _chosen(name: str, scenario: Scenario, placed: Sequence[PlacedBody]) -> NDArray[np.bool_]:
-    """Return which bodies a name means: blocks, pieces of ground, walls, the half-plane, then parts of systems."""
-    walls, blocks = len(scenario.walls), len(placed)
+def _numbers(scenario: Scenario, placed: Sequence[PlacedBody], parts: Sequence[str]) -> dict[str, Sequence[int]]:
+    """Return which bodies names mean: blocks, pieces of ground, walls, the half-plane, then parts of systems."""
+    blocks = len(placed)
     count = blocks + len(place_segments(scenario)) + 1
-    from blocksim.world.systems import systems_of  # noqa: PLC0415 - kernels, not for readers
-
-    parts = [part for system in systems_of(scenario) for part in _parts(system, scenario)]
-    flags = np.zeros(count + len(parts), dtype=np.bool_)
-    own = [number for number, body in enumerate(placed) if body.name == name]
-    if own:
-        flags[own] = True
-    elif name in parts:
-        flags[count + parts.index(name)] = True
-    elif name == SUPPORTS:
-        flags[blocks:count] = True
-        flags[:blocks] = [body.fixed for body in placed]
-    elif name == GROUND:
-        flags[blocks:count] = True
-        flags[count - 1 - walls : count - 1] = False
-    elif name == WALLS:
-        flags[count - 1 - walls : count - 1] = True
-    else:
-        flags[count - 2 - walls + int(name.removeprefix(WALL))] = True
-    return flags
+    walls = range(count - 1 - len(scenario.walls), count - 1)
+    return {
+        events.SUPPORTS: [*(number for number, body in enumerate(placed) if body.fixed), *range(blocks, count)],
+        events.GROUND: [number for number in range(blocks, count) if number not in walls],
+        events.WALLS: walls,
+        **{name: [wall] for name, wall in zip(events.wall_names(scenario), walls, strict=True)},
+        **{part: [number] for number, part in enumerate(parts, start=count)},
+        **{body.name: [number] for number, body in enumerate(placed)},
+    }

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blocksim.scenario import Scenario, scenario_hash
+from blocksim.simulation.ledger import compiled
 
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
@@ -30,10 +31,8 @@ def code_version() -> str:
 @functools.cache
 def code_hashes() -> dict[str, str]:
     """Return a hash of the code of each room that decides the bits of a run, with the versions it is compiled with."""
-    from blocksim.kernels.common.jit import source_hash  # noqa: PLC0415 - numba, which reading a folder does not need
-
-    package = Path(__file__).resolve().parents[1]
-    return {room: source_hash(package / room) for room in ROOMS}
+    jit, package = compiled("kernels.common.jit"), Path(__file__).resolve().parents[1]
+    return {room: jit.source_hash(package / room) for room in ROOMS}
 
 
 @functools.cache
@@ -62,18 +61,20 @@ def state_hash(scene: "AnyScene") -> str:
 
 def environment() -> dict[str, str]:
     """Return versions, machine and command; `cpu` and `cpu_features` are what machine code is compiled for."""
-    versions = {name: metadata.version(name) for name in PACKAGES}
-    cpu, features = _compiled_for()
+    from numba.core.registry import cpu_target  # noqa: PLC0415 - which reading a folder does not need
+
+    # by these numba names the files of what it has compiled
+    _, cpu, features = cpu_target.target_context.codegen().magic_tuple()
     return {
         "blocksim": code_version(),
         "code": code_hash()[:HASH_DIGITS],
         **{f"{ROOM_PREFIX}{room}": digest for room, digest in code_hashes().items()},
         "python": platform.python_version(),
-        **versions,
+        **{name: metadata.version(name) for name in PACKAGES},
         "platform": platform.platform(),
         "processor": _processor(),
         "cpu": cpu,
-        "cpu_features": features,
+        "cpu_features": " ".join(sorted(one[1:] for one in features.split(",") if one.startswith("+"))),
         "cores": str(os.cpu_count()),
         "command": shlex.join(sys.argv).encode(errors="backslashreplace").decode(),  # names may be no text
     }
@@ -83,15 +84,6 @@ def machine() -> str:
     """Return processor, system and its C library, whose sines may differ in the last digit, in one line."""
     parts = (_processor(), sys.platform, platform.machine(), *platform.libc_ver())
     return " ".join(part for part in parts if part)
-
-
-def _compiled_for() -> tuple[str, str]:
-    """Return the name of the processor, and its features, that numba has compiled for: by these it names its files."""
-    from numba.core.registry import cpu_target  # noqa: PLC0415 - as in `code_hashes`
-
-    _, name, features = cpu_target.target_context.codegen().magic_tuple()
-    present = sorted(one[1:] for one in features.split(",") if one.startswith("+"))
-    return name, " ".join(present)
 
 
 def _processor() -> str:

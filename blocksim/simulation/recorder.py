@@ -3,7 +3,7 @@
 import hashlib
 from bisect import bisect_right
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from blocksim.scenario import PlacedBody
 from blocksim.simulation.frames import Contacts, Frames, join_contacts
 from blocksim.simulation.frames import Rows as ContactRows
+from blocksim.simulation.ledger import compiled
 from blocksim.simulation.observables import Watch
 from blocksim.simulation.probes import AT_REST, NO_PROBES, MovingSupport, Probes
 from blocksim.world.systems.blocks import BLOCKS, blocks_placed
@@ -18,6 +19,7 @@ from blocksim.world.systems.system import Floats, SystemInScene, Track
 
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
+    from blocksim.simulation.stores.hdf5 import FrameFile
 
 MOTION = tuple(one.name for one in BLOCKS.quantities)
 POSITION = MOTION[:3]
@@ -39,21 +41,6 @@ class Frame(NamedTuple):
         return hashlib.sha256(b"".join(parts)).digest()
 
 
-class FrameSink(Protocol):
-    """Whatever keeps frames while the run continues, such as a file."""
-
-    def append(self, frame: Frame) -> None:
-        """Keep one frame."""
-
-    def keep_up(self) -> None:
-        """Keep the samples of probes so far, where enough time has passed."""
-
-
-def steps_per_frame(every: float, step: float) -> float:
-    """Return the number of steps (s) between two frames that are wanted `every` seconds; at least one, not rounded."""
-    return max(every / step, 1.0)
-
-
 class Recorder:
     """Frames, growing as the run continues; with a sink only the last one, so that long runs need no more memory."""
 
@@ -62,14 +49,13 @@ class Recorder:
         placed: Sequence[PlacedBody],
         every: float,
         step: float,
-        sink: FrameSink | None = None,
         *,
         others: Sequence[SystemInScene] = (),
         contacts: bool = False,
         probes: Probes = NO_PROBES,
         support: MovingSupport = AT_REST,
     ) -> None:
-        """Record every `every` seconds, at the nearest step of length `step` (s); where there is a `sink`, in there.
+        """Record every `every` seconds, at the nearest step of length `step` (s).
 
         `others` are the systems beside the blocks. With `contacts` the contacts of every frame are recorded as well.
         `probes` are sampled at steps of their own. What has moved is seen from the `support`.
@@ -77,8 +63,8 @@ class Recorder:
         self.placed = tuple(placed)
         self.systems = (blocks_placed(placed), *others)
         self.time_step = step
-        self.sink = sink
-        self.steps_per_frame = steps_per_frame(every, step)
+        self.sink: FrameFile | None = None
+        self.steps_per_frame = max(every / step, 1.0)
         self.steps: list[int] = []
         self.digests: list[bytes] = []  # of each frame and all before it
         self.altered: list[int] = []  # steps of frames of an earlier part that have come out otherwise when repeated
@@ -90,18 +76,7 @@ class Recorder:
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
-        from blocksim.kernels.common.frame_times import next_frame  # noqa: PLC0415 - kernels, not for readers
-
-        return next_frame(done, self.steps_per_frame)
-
-    def keep_up(self) -> None:
-        """Let the sink keep the samples of probes so far."""
-        if self.probes.all and self.sink is not None:
-            self.sink.keep_up()
-
-    def is_output_time(self, step: int) -> bool:
-        """Return True if a step is recorded wherever the run ends."""
-        return step == 0 or self.next_step(step - 1) == step
+        return int(compiled("kernels.common.frame_times").next_frame(done, self.steps_per_frame))
 
     def count_until(self, step: int) -> int:
         """Return the number of frames up to a step."""
@@ -113,58 +88,47 @@ class Recorder:
         return self.digests[count - 1].hex() if count else ""
 
     def take_over(self, rows: "Rows") -> None:
-        """Begin with the frames of an earlier part of the run; what it recorded is not recorded again."""
-        self.ledger = rows.ledger
-        self.steps = rows.steps.tolist()
-        contacts = [None] * len(self.steps) if rows.contacts is None else rows.contacts.tables()
-        states = [*zip(*rows.values, strict=True)]
-        for step, (motion, *_) in zip(self.steps, states, strict=True):
-            self.watch.see([0], motion[None], [step * self.time_step])
-        self.held = [Frame(*one) for one in zip(self.steps, states, rows.measured, contacts, strict=True)]
-        self.digests = []
+        """Begin with the frames of an earlier part of the run at output times, which are not recorded again.
+
+        Those after its checkpoint are among them, as the run would only repeat them; that of the moment at which it was
+        stopped is not.
+        """
+        tables = [None] * len(rows.steps) if rows.contacts is None else rows.contacts.tables()
+        states = zip(*rows.values, strict=True)
+        frames = (Frame(*one) for one in zip(rows.steps.tolist(), states, rows.measured, tables, strict=True))
+        self.held = [one for one in frames if one.step == 0 or self.next_step(one.step - 1) == one.step]
+        self.steps, self.digests, self.ledger = [frame.step for frame in self.held], [], rows.ledger
         for frame in self.held:
-            self._note_digest(frame)
+            self.watch.follow([0], frame.states[0][None], [frame.step * self.time_step])
+            self.digests.append(frame.digest(self.digests[-1] if self.digests else b""))
 
-    def _note_digest(self, frame: Frame) -> None:
-        self.digests.append(frame.digest(self.digests[-1] if self.digests else b""))
-
-    def pour_into(self, sink: FrameSink) -> None:
+    def pour_into(self, sink: "FrameFile") -> None:
         """Hold no more than the last frame from now on; `sink` has those so far, and gets all others."""
         self.sink = sink
         del self.held[:-1]
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already: then look whether that is the same."""
-        from blocksim.simulation.schemes import ledger_names, measure_row, scheme_of  # noqa: PLC0415 - numba, not for readers
-
-        step = int(scene.world.clock[0].steps)
-        row = measure_row(scene)
-        states = self._states(scene)
-        self.watch.see([0], states[0][None], [step * self.time_step])
-        self.ledger = ledger_names(scene)
-        touching = scheme_of(scene).contacts(scene, len(self.placed)) if self.with_contacts else None
+        schemes, step = compiled("simulation.schemes"), int(scene.world.clock[0].steps)
+        row = schemes.measure_row(scene)
+        arrays = (scene.world, *getattr(scene, "systems", ()))
+        states = tuple(one.system.state(its, one.count) for one, its in zip(self.systems, arrays, strict=True))
+        self.watch.follow([0], states[0][None], [step * self.time_step])
+        self.ledger = schemes.ledger_names(scene)
+        touching = schemes.scheme_of(scene).contacts(scene, len(self.placed)) if self.with_contacts else None
         frame = Frame(step, states, row, touching)
         if self.steps and self.steps[-1] >= step:
-            self._compare(frame)
+            place = self.count_until(step) - 1
+            before = self.digests[place - 1] if place > 0 else b""
+            if self.steps[place] == step and frame.digest(before) != self.digests[place]:
+                self.altered.append(step)
             return
         self.steps.append(step)
-        self._note_digest(frame)
+        self.digests.append(frame.digest(self.digests[-1] if self.digests else b""))
         if self.sink is not None:
             self.sink.append(frame)
             self.held.clear()
         self.held.append(frame)
-
-    def _states(self, scene: "AnyScene") -> tuple[Floats, ...]:
-        """Return the state of every system; blocks are in the world."""
-        arrays = (scene.world, *getattr(scene, "systems", ()))
-        return tuple(one.system.state(its, one.count) for one, its in zip(self.systems, arrays, strict=True))
-
-    def _compare(self, frame: Frame) -> None:
-        """Note a frame that is not the one that was recorded for its step, if any was."""
-        place = self.count_until(frame.step) - 1
-        before = self.digests[place - 1] if place > 0 else b""
-        if self.steps[place] == frame.step and frame.digest(before) != self.digests[place]:
-            self.altered.append(frame.step)
 
     def frames(self) -> Frames:
         """Return all frames that are held: those so far, or, with a sink, the last one."""
@@ -183,19 +147,6 @@ class Rows(NamedTuple):
     measured: NDArray[np.float64]  # (n, e + 2): energies, number of contacts, largest overlap
     ledger: tuple[str, ...]  # names of the e energies
     contacts: Contacts | None = None  # of all frames
-
-    def chosen(self, which: NDArray[np.bool_]) -> "Rows":
-        """Return some of the frames."""
-        contacts = None if self.contacts is None else self.contacts.chosen(which)
-        values = tuple(one[which] for one in self.values)
-        return Rows(self.steps[which], values, self.measured[which], self.ledger, contacts)
-
-
-def rows_of_frames(frames: Frames) -> Rows:
-    """Return what frames consist of: the other way round than `frames_from_rows`."""
-    measured = np.stack([*frames.energy.values(), frames.contact_count, frames.largest_overlap], axis=1)
-    values = tuple(track.values for track in frames.tracks)
-    return Rows(frames.step, values, measured, tuple(frames.energy), frames.contacts)
 
 
 def frames_from_rows(systems: Sequence[SystemInScene], time_step: float, rows: Rows) -> Frames:

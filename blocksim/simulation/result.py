@@ -1,7 +1,7 @@
 """A finished, failed or interrupted run: run.json with rest state and events, the object, and how a folder keeps it."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -11,15 +11,12 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario, load_stored, place_bodies
-from blocksim.scenario.input_files import MEGABYTE, read_limited
-from blocksim.scenario.models.stepping import Event, NewVelocity
+from blocksim.scenario import Scenario, input_files, load_stored, place_bodies
+from blocksim.scenario.models.stepping import Event
+from blocksim.simulation import atomic, ledger, observables
 from blocksim.simulation import folder as files
-from blocksim.simulation.atomic import sha256_of, write_text
 from blocksim.simulation.folder import PROBE, keep_scenario, probe_tables, read_tables
 from blocksim.simulation.frames import Columns, Frames, as_frame, csv_text, data_set, read_table, tidy_table
-from blocksim.simulation.ledger import EnergyLedger
-from blocksim.simulation.observables import Movement
 from blocksim.simulation.probes import ProbeSeries
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 
@@ -43,6 +40,7 @@ class RestState(BaseModel, frozen=True):
 
 LISTED = 6
 """Names of bodies that a line has; of more it has the number."""
+RATES = {"vx": "m/s", "vy": "m/s", "spin": "rad/s"}
 
 
 class EventRecord(BaseModel, frozen=True):
@@ -57,29 +55,21 @@ class EventRecord(BaseModel, frozen=True):
 
 def describe_event(event: Event) -> str:
     """Return what an event does."""
-    return "; ".join(_parts(event))
-
-
-def _parts(event: Event) -> Iterator[str]:
-    for names, done in ((event.remove, "removed"), (event.fix, "fixed"), (event.free, "freed")):
-        if names:
-            yield f"{_listed(names)} {done}"
+    parts = [
+        f"{', '.join(names) if len(names) <= LISTED else f'{len(names)} bodies'} {done}"
+        for names, done in ((event.remove, "removed"), (event.fix, "fixed"), (event.free, "freed"))
+        if names
+    ]
     if event.unload:
-        yield f"{'load' if len(event.unload) == 1 else 'loads'} {', '.join(event.unload)} ended"
+        parts.append(f"{'load' if len(event.unload) == 1 else 'loads'} {', '.join(event.unload)} ended")
     if event.velocity is not None:
-        yield f"{event.velocity.body} gets {_values(event.velocity)}"
+        rates = ((name, getattr(event.velocity, name), unit) for name, unit in RATES.items())
+        values = ", ".join(f"{name} {value:g} {unit}" for name, value, unit in rates if value is not None)
+        parts.append(f"{event.velocity.body} gets {values}")
+    return "; ".join(parts)
 
 
-def _listed(names: tuple[str, ...]) -> str:
-    return ", ".join(names) if len(names) <= LISTED else f"{len(names)} bodies"
-
-
-def _values(new: NewVelocity) -> str:
-    values = (("vx", new.vx, "m/s"), ("vy", new.vy, "m/s"), ("spin", new.spin, "rad/s"))
-    return ", ".join(f"{name} {value:g} {unit}" for name, value, unit in values if value is not None)
-
-
-MOST_BYTES = MEGABYTE
+MOST_BYTES = input_files.MEGABYTE
 """Of run.json; a run writes two thousand."""
 
 
@@ -103,10 +93,10 @@ class Summary(BaseModel, frozen=True):
     threads: int = 1
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
-    energy_J: EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    energy_J: ledger.EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
     settled: RestState | None = None  # how it came to rest before time zero, where it did
     events: tuple[EventRecord, ...] = ()  # in the order in which they have happened
-    movement: Movement | None = None  # None in runs of earlier versions and without blocks
+    movement: observables.Movement | None = None  # None in runs of earlier versions and without blocks
     warnings: tuple[str, ...]
     environment: dict[str, str]
     sha256: dict[str, str] = {}
@@ -119,7 +109,7 @@ class Summary(BaseModel, frozen=True):
 def read_summary(path: Path) -> Summary:
     """Return what a run.json holds. Raises InputMissingError or InvalidInputError."""
     try:
-        return Summary.model_validate_json(read_limited(path, MOST_BYTES))
+        return Summary.model_validate_json(input_files.read_limited(path, MOST_BYTES))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))
@@ -133,7 +123,7 @@ def changed_files(folder: Path, summary: Summary) -> tuple[str, ...]:
     return tuple(
         name
         for name, digest in summary.sha256.items()
-        if not (folder / Path(name).name).is_file() or sha256_of(folder / Path(name).name) != digest
+        if not (folder / Path(name).name).is_file() or atomic.sha256_of(folder / Path(name).name) != digest
     )
 
 
@@ -160,18 +150,17 @@ class Result:
     @cached_property
     def frames(self) -> Frames:
         """The frames, read from the folder when first asked for. Raises what reading them raises."""
-        if self.held is not None:
-            return self.held
-        assert self.folder is not None  # noqa: S101 - one of the two is there
-        return read_frames(self.folder / files.FRAMES, self.scenario)
+        return read_frames(self._run_file, self.scenario) if self.held is None else self.held
 
     @cached_property
     def probes(self) -> dict[str, ProbeSeries]:
         """The samples of probes by name, read from the folder when first asked for. Raises what reading them raises."""
-        if self.held_probes is not None:
-            return self.held_probes
-        assert self.folder is not None  # noqa: S101 - one of the two is there
-        return read_probes(self.folder / files.FRAMES, self.scenario)
+        return read_probes(self._run_file, self.scenario) if self.held_probes is None else self.held_probes
+
+    @property
+    def _run_file(self) -> Path:
+        assert self.folder is not None  # noqa: S101 - where frames are not held, they are in a folder
+        return self.folder / files.FRAMES
 
     @cached_property
     def endings(self) -> dict[str, Columns]:
@@ -198,19 +187,15 @@ class Result:
     def __repr__(self) -> str:
         """Return a line: name, status and reason, blocks, simulated time, folder."""
         where = "in memory" if self.folder is None else str(self.folder)
-        count = len(self.columns["block"])
+        count, seconds = len(self.columns["block"]), self.summary.simulated_time_s
         blocks = f"{count} block{'s' if count != 1 else ''}"
-        return f"<Result {self.name}: {self.status} ({self.reason}), {blocks}, {self._seconds}, {where}>"
+        return f"<Result {self.name}: {self.status} ({self.reason}), {blocks}, {seconds:.4g} s simulated, {where}>"
 
     def _repr_html_(self) -> str:
         """Return the same line above the final table, for notebooks."""
-        line = f"{self.name}: {self.status} ({self.reason}), {self._seconds}"
+        line = f"{self.name}: {self.status} ({self.reason}), {self.summary.simulated_time_s:.4g} s simulated"
         table: str = self.final.to_html(index=False, max_rows=MOST_ROWS, float_format="{:.2f}".format)
         return f"<p>{escape(line)}</p>{table}"
-
-    @property
-    def _seconds(self) -> str:
-        return f"{self.summary.simulated_time_s:.4g} s simulated"
 
     @property
     def status(self) -> str:
@@ -245,35 +230,26 @@ def read_final(folder: Path, scenario: Scenario) -> Columns:
     return columns
 
 
-COPIES = (files.SCENARIO, files.EXPERIMENT, files.MOTION, *files.BODY_MOTIONS)
-
-
-def _with_checksums(summary: Summary, folder: Path) -> Summary:
-    tables = [name for name in summary.sha256 if name.startswith(PROBE)]
-    kept = [name for name in (*COPIES, files.FINAL, files.SOILS, files.FRAMES, *tables) if (folder / name).is_file()]
-    return summary.model_copy(update={"sha256": {name: sha256_of(folder / name) for name in kept}})
+def _with_checksums(summary: Summary, folder: Path, tables: Iterable[str]) -> Summary:
+    names = (files.SCENARIO, *files.COPIES, files.FINAL, files.SOILS, files.FRAMES, *tables)
+    sums = {name: atomic.sha256_of(folder / name) for name in names if (folder / name).is_file()}
+    return summary.model_copy(update={"sha256": sums})
 
 
 def keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     """Keep the tables and the summary of a run that has ended in its folder, beside its frames. Raises OutputError."""
-    write_text(folder / files.FINAL, csv_text(result.columns))
+    atomic.write_text(folder / files.FINAL, csv_text(result.columns))
     for name, table in result.endings.items():
-        write_text(folder / f"{name}.csv", csv_text(table))
-    tables = _keep_probes(result.scenario, folder)
-    summary = _with_checksums(summary.model_copy(update={"sha256": dict.fromkeys(tables, "")}), folder)
-    write_text(folder / files.SUMMARY, summary.to_json())
+        atomic.write_text(folder / f"{name}.csv", csv_text(table))
+    tables = probe_tables(result.scenario)
+    for name, series in zip(tables, read_probes(folder / files.FRAMES, result.scenario).values(), strict=True):
+        atomic.write_text(folder / name, "".join(series.csv_lines()))
+    summary = _with_checksums(summary, folder, tables)
+    atomic.write_text(folder / files.SUMMARY, summary.to_json())
     if result.status == "finished":
-        write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
+        atomic.write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
         files.clear_remains(folder, files.CHECKPOINTS)
     return Result(result.name, result.columns, summary, result.scenario, folder)
-
-
-def _keep_probes(scenario: Scenario, folder: Path) -> list[str]:
-    """Write a CSV for each probe, from what the run file has of it; return their names. Raises OutputError."""
-    tables = probe_tables(scenario)
-    for name, series in zip(tables, read_probes(folder / files.FRAMES, scenario).values(), strict=True):
-        write_text(folder / name, "".join(series.csv_lines()))
-    return tables
 
 
 def renew_copies(scenario: Scenario, folder: Path) -> None:
@@ -281,13 +257,14 @@ def renew_copies(scenario: Scenario, folder: Path) -> None:
 
     Neither decides the motion, so both may have changed since the run: another table, or another description.
     """
-    tables = read_tables(scenario)
-    old = tuple(_bytes_of(folder / name) for name in COPIES)
+
+    def contents() -> list[bytes | None]:
+        paths = [folder / name for name in (files.SCENARIO, *files.COPIES)]
+        return [path.read_bytes() if path.is_file() else None for path in paths]
+
+    tables, old = read_tables(scenario), contents()
     keep_scenario(scenario, tables, folder)
-    if old != tuple(_bytes_of(folder / name) for name in COPIES):
-        summary = _with_checksums(read_summary(folder / files.SUMMARY), folder)
-        write_text(folder / files.SUMMARY, summary.to_json())
-
-
-def _bytes_of(path: Path) -> bytes | None:
-    return path.read_bytes() if path.is_file() else None
+    if old != contents():
+        summary = read_summary(folder / files.SUMMARY)
+        names = [name for name in summary.sha256 if name.startswith(PROBE)]
+        atomic.write_text(folder / files.SUMMARY, _with_checksums(summary, folder, names).to_json())

@@ -13,6 +13,7 @@ import numpy as np
 
 from blocksim.errors import OutputError
 from blocksim.kernels.common.arrays import World
+from blocksim.kernels.common.compiler import compiling
 from blocksim.scenario import PlacedBody, Scenario, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
 from blocksim.silence import silent
@@ -23,10 +24,10 @@ from blocksim.simulation.frames import final_columns
 from blocksim.simulation.probes import MovingSupport, bytes_of_series, probes_of
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.result import RestState, Result, Summary, describe_event, keep_result
-from blocksim.simulation.schemes import AnyScene, build, ledger_names, scheme_of
+from blocksim.simulation.schemes import AnyScene, build, ledger_names, measure_row, scheme_of
 from blocksim.simulation.stopping import WallTime, stop_requests
-from blocksim.simulation.stores.hdf5_writer import FrameFile
-from blocksim.simulation.team import Team, team_for
+from blocksim.simulation.stores.hdf5 import FrameFile
+from blocksim.simulation.team import ALONE, Team, team_for
 from blocksim.world.build import Built, arrays_of
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import is_shorter_than_step, output_count, recorded_contacts, run_bytes
@@ -177,17 +178,7 @@ def simulate_into(
                 past = checkpoint.Past(position.total_seconds, parts, stored.path, position.step, settled)
                 checkpoint.take_over(stored, scenario, recorder)
             toml = keep_scenario(scenario, tables, folder)
-            with FrameFile(
-                folder / files.FRAMES,
-                recorder.placed,
-                recorder.time_step,
-                toml,
-                ledger=ledger_names(scene),
-                kept=recorder.held,
-                others=recorder.systems[1:],
-                contacts=scenario.output.contacts,
-                probes=recorder.probes,
-            ) as sink:
+            with FrameFile(folder / files.FRAMES, recorder, toml, ledger_names(scene)) as sink:
                 recorder.pour_into(sink)
                 # of the part before
                 files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(scenario)))
@@ -220,7 +211,9 @@ def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> floa
     kernels = compilation.kernels_of(scenario)
     listener.on_start(kernels)
     compilation.compile_kernels(kernels)
-    compilation.compile_systems(scenario)
+    if scenario.systems:  # these need code of their own
+        with compiling():
+            measure_row(ALONE.advance(build(scenario).scene, 0)[0])
     return time.perf_counter() - began
 
 
@@ -289,9 +282,9 @@ def _warnings(
     if is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from warnings_of(scenario)
-    for number in ended.pending if ended.outcome.is_finished else ():
+    for number in ended.pending if ended.outcome.status == "finished" else ():
         yield f"events.{number} has not happened, as nothing came to rest: {describe_event(scenario.events[number])}"
-    if ended.outcome.is_finished and placed:
+    if ended.outcome.status == "finished" and placed:
         sunk = scheme_of(ended.scene).warning(ended.scene, ended.overlap, placement.smallest_width(placed))
         if sunk:
             yield sunk

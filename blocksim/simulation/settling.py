@@ -30,14 +30,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
-from blocksim.kernels.common.arrays import REACHED, World
-from blocksim.scenario import PlacedBody, Scenario
-from blocksim.scenario.motion import settles
-from blocksim.scenario.overlap import Outlines, penetration
-from blocksim.scenario.placement import smallest_width
+from blocksim.kernels.common.arrays import REACHED
+from blocksim.scenario import PlacedBody, Scenario, motion, overlap, placement
 from blocksim.simulation.result import NOT_AT_REST, RestState
-from blocksim.simulation.schemes import AnyScene, scheme_of
-from blocksim.simulation.schemes.scheme import corner_ways, outlines_of
+from blocksim.simulation.schemes import AnyScene, corner_ways, outlines_of, scheme_of
 from blocksim.simulation.team import Team
 from blocksim.world.build import arrays_of
 
@@ -80,12 +76,12 @@ def initial_scene(
     """
     if scenario.start.settle:
         return settle(scene, scenario, placed, team, stop)
-    if not settles(scenario) or any(body.vx or body.vy or body.spin for body in placed):
+    if not motion.settles(scenario) or any(body.vx or body.vy or body.spin for body in placed):
         return scene, None
     kept = [array.copy() for array in arrays_of(scene)]
     with suppress(SettleError):
         found, settled = settle(scene, scenario, placed, team, stop)
-        if settled.largest_displacement_mm <= MILLI * UNASKED_SHARE * smallest_width(placed):
+        if settled.largest_displacement_mm <= MILLI * UNASKED_SHARE * placement.smallest_width(placed):
             return found, settled
     _restore(scene, kept)
     return scene, None
@@ -107,9 +103,20 @@ def settle(
         except SettleError:
             if not run.is_released:
                 raise
-            run.lean_back()
+            if run.lean is not None:  # back to where blocks had come a little way
+                run.scene = run.lean[0]
+                _restore(*run.lean)
+            run.leaving = {name: run.bodies[name].copy() for name in VELOCITIES}
     run.begin()
-    return run.scene, run.settled()
+    ways = run.ways()
+    far = int(np.argmax(ways))
+    return run.scene, RestState(
+        steps=run.steps,
+        largest_displacement_mm=MILLI * float(ways[far]),
+        displaced_block=placed[far].name,
+        held=scenario.start.hold,
+        at_rest=not run.leaving,
+    )
 
 
 class _Settlement:
@@ -123,16 +130,21 @@ class _Settlement:
         self.pace = self.scheme.settling
         self.count = len(placed)
         names = {body.name: number for number, body in enumerate(placed)}
-        self.names = scenario.start.hold
         self.held = np.array([names[name] for name in scenario.start.hold], dtype=np.intp)
         self.is_free = np.array([not body.fixed for body in placed])
         self.is_free[self.held] = False
         controls = scene.world.controls[0]
         self.gravity = float(controls.gravity_x), float(controls.gravity_y)
-        self.support = _support_acceleration(scene)
+        self.support = 0.0, 0.0  # m/s2, acceleration just after time zero
+        pieces = scene.world.motion[int(scene.world.clock[0].motion_piece) :]
+        initial = pieces[pieces["start"] <= 0.0]
+        if initial.size:
+            now = initial[-1]
+            rate = float(2.0 * now["c2"] - 6.0 * now["c3"] * now["start"])
+            self.support = rate * float(controls.motion_x), rate * float(controls.motion_y)
         self.carried = 0.0  # share of the inertial force of that
         self.scale = float(np.hypot(*self.gravity) + controls.push)
-        self.smallest = smallest_width(placed)
+        self.smallest = placement.smallest_width(placed)
         self.start = self._places()
         self.before = self.start
         self.energy, self.steps = 0.0, 0
@@ -151,7 +163,14 @@ class _Settlement:
         """Keep what is held or driven still, supports too, and loads as at time zero; give all back at the end."""
         world = self.scene.world
         paths, driven = world.motion.copy(), world.moved.copy()
-        _freeze_paths(world)
+        for one in world.moved:  # driven bodies stay where they are at time zero
+            for first, end in ((one.shift, one.shift_end), (one.turn, one.turn_end)):
+                path = world.motion[int(first) : int(end)]
+                if len(path):
+                    t = -path["start"][0]
+                    path["c0"] = sum(path[f"c{power}"][0] * t**power for power in range(4))
+                    for power in range(1, 4):
+                        path[f"c{power}"] = 0.0
         controls, loads, pieces = world.controls.copy(), world.loads.copy(), world.load_pieces.copy()
         held = {name: self.bodies[name][self.held].copy() for name in HELD}
         velocities = {name: self.bodies[name].copy() for name in VELOCITIES}
@@ -196,7 +215,7 @@ class _Settlement:
             self._go()
             if self._unrest() <= BALANCE:
                 self._stop()
-            elif self._is_mechanism() and not (self.is_released and self._leans_little()):
+            elif self._is_mechanism() and not (self.is_released and self.ways().max() <= LEAN_SHARE * self.smallest):
                 raise self._error()
 
     def follow_support(self) -> None:
@@ -208,22 +227,15 @@ class _Settlement:
             scene, steps = self.scene, self.steps
             kept = [array.copy() for array in arrays_of(scene)]
             share = min(self.carried + part, 1.0)
-            if self._carries(share, most):
+            self._load(1.0, share)
+            try:
+                self._go()
+                self.rest(self.steps + most)
                 self.carried = share
-            else:
+            except SettleError:
                 _restore(scene, kept)
                 self.scene, self.steps, self.energy, is_bounded = scene, steps, 0.0, True
             part *= 0.5 if is_bounded else 1.0
-
-    def _carries(self, share: float, steps: int) -> bool:
-        """Return True if the scene rests under a share of the inertial force after some steps."""
-        self._load(1.0, share)
-        try:
-            self._go()
-            self.rest(self.steps + steps)
-        except SettleError:
-            return False
-        return True
 
     def begin(self) -> None:
         """Make this time zero: clock and books begin anew, contacts stay as they are."""
@@ -236,32 +248,8 @@ class _Settlement:
                 clock[name] = 0
         for name in ledger.dtype.names or ():
             ledger[name] = 0.0
-        bodies = self.bodies
-        energies = bodies["mass"] * (bodies["vx"] ** 2 + bodies["vy"] ** 2) + bodies["inertia"] * bodies["spin"] ** 2
-        ledger["largest_kinetic"][0] = 0.5 * float(np.sum(energies))
+        ledger["largest_kinetic"][0] = self._kinetic()
         self.scheme.begin(self.scene)
-
-    def settled(self) -> RestState:
-        """Return how it came to rest."""
-        ways = self._ways()
-        far = int(np.argmax(ways))
-        return RestState(
-            steps=self.steps,
-            largest_displacement_mm=MILLI * float(ways[far]),
-            displaced_block=self.placed[far].name,
-            held=self.names,
-            at_rest=not self.leaving,
-        )
-
-    def lean_back(self) -> None:
-        """Go back to where blocks had come a little way, and let them go on as fast as they were."""
-        if self.lean is not None:
-            self.scene = self.lean[0]
-            _restore(*self.lean)
-        self.leaving = {name: self.bodies[name].copy() for name in VELOCITIES}
-
-    def _leans_little(self) -> bool:
-        return bool(self._ways().max() <= LEAN_SHARE * self.smallest)
 
     def _load(self, share: float, inertial: float = 0.0) -> None:
         world = self.scene.world
@@ -281,9 +269,9 @@ class _Settlement:
         self.steps += self.pace.call
         self.scene, status = self.team.advance(self.scene, self.steps)
         energy = self._kinetic()
-        if status != REACHED or not np.isfinite(energy) or self._ways().max() > MOVED_SHARE * self.smallest:
+        if status != REACHED or not np.isfinite(energy) or self.ways().max() > MOVED_SHARE * self.smallest:
             raise self._error()
-        if self.is_released and self._leans_little():
+        if self.is_released and self.ways().max() <= LEAN_SHARE * self.smallest:
             self.lean = self.scene, [array.copy() for array in arrays_of(self.scene)]
         if energy < self.energy:
             self._stop()
@@ -324,11 +312,19 @@ class _Settlement:
         """Return True if blocks come to bear on one another on a way from where they are, that of some share."""
         now = outlines_of(self.scene.world)
         now = now.some(np.arange(now.kinds.size - 1))  # without the half-plane
-        later = _at(now, self._places() + change)
-        one, other = _near(later, self.is_free)
+        x, y, angle = self._places() + change
+        places = {"x": x, "y": y, "cosine": np.cos(angle), "sine": np.sin(angle)}
+        moved = {name: np.concatenate([one, getattr(now, name)[self.count :]]) for name, one in places.items()}
+        later = now._replace(**moved)
+        extent = np.hypot(later.half_x, later.half_y)
+        free = np.flatnonzero(self.is_free)
+        one, other = (pairs.ravel() for pairs in np.meshgrid(free, np.arange(extent.size), indexing="ij"))
+        are_near = np.hypot(later.x[one] - later.x[other], later.y[one] - later.y[other]) < extent[one] + extent[other]
+        chosen = are_near & (~np.isin(other, free) | (one < other))  # each pair once
+        one, other = one[chosen], other[chosen]
         most = ARC * share**2 * self.smallest
-        deeper = penetration(later.some(one), later.some(other)) - np.maximum(
-            penetration(now.some(one), now.some(other)), 0.0
+        deeper = overlap.penetration(later.some(one), later.some(other)) - np.maximum(
+            overlap.penetration(now.some(one), now.some(other)), 0.0
         )
         ground = float(self.scene.world.bodies[-1].y)
         below = (np.minimum(now.bottom, ground) - later.bottom)[: self.count] if np.isfinite(ground) else np.zeros(1)
@@ -351,7 +347,7 @@ class _Settlement:
     def _places(self) -> Floats:
         return np.stack([self.bodies[name] for name in ("x", "y", "angle")])
 
-    def _ways(self) -> Floats:
+    def ways(self) -> Floats:
         """Return how far every block has come (m)."""
         return np.where(self.is_free, corner_ways(self._places() - self.start, self.bodies["radius"]), 0.0)
 
@@ -359,7 +355,7 @@ class _Settlement:
         bodies = self.bodies
         speeds = np.hypot(bodies["vx"], bodies["vy"]) + bodies["radius"] * np.abs(bodies["spin"])
         fastest = int(np.nanargmax(np.where(self.is_free, speeds, -1.0)))
-        ways = self._ways()
+        ways = self.ways()
         far = int(np.nanargmax(ways))
         return SettleError(
             f"the scene {NOT_AT_REST} (start.settle): block {self.placed[fastest].name} moves at "
@@ -368,55 +364,7 @@ class _Settlement:
         )
 
 
-def _near(boxes: Outlines, is_free: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the pairs of free boxes, the first of which may be, with all others.
-
-    Without those whose circles do not meet.
-    """
-    reach = np.hypot(boxes.half_x, boxes.half_y)
-    free = np.flatnonzero(is_free)
-    one, other = (pairs.ravel() for pairs in np.meshgrid(free, np.arange(reach.size), indexing="ij"))
-    apart = np.hypot(boxes.x[one] - boxes.x[other], boxes.y[one] - boxes.y[other]) < reach[one] + reach[other]
-    is_free_too = np.isin(other, free)
-    kept = apart & (~is_free_too | (one < other))
-    return one[kept], other[kept]
-
-
-def _at(outlines: Outlines, places: Floats) -> Outlines:
-    """Return the outlines with the first of them at other places (3, b), x, y (m) and angle (rad)."""
-    count = places.shape[1]
-    values = (places[0], places[1], np.cos(places[2]), np.sin(places[2]))
-    moved = {
-        name: np.concatenate([value, getattr(outlines, name)[count:]])
-        for name, value in zip(("x", "y", "cosine", "sine"), values, strict=True)
-    }
-    return outlines._replace(**moved)
-
-
 def _restore(scene: AnyScene, kept: Sequence[NDArray[Any]]) -> None:
     """Give all arrays of a scene the values that they had."""
     for array, values in zip(arrays_of(scene), kept, strict=True):
         array[...] = values
-
-
-def _support_acceleration(scene: AnyScene) -> tuple[float, float]:
-    """Return the acceleration (m/s2) of the supports just after time zero."""
-    controls, pieces = scene.world.controls[0], scene.world.motion[int(scene.world.clock[0].motion_piece) :]
-    begun = pieces[pieces["start"] <= 0.0]
-    if begun.size == 0:
-        return 0.0, 0.0
-    now = begun[-1]
-    rate = float(2.0 * now["c2"] - 6.0 * now["c3"] * now["start"])
-    return rate * float(controls.motion_x), rate * float(controls.motion_y)
-
-
-def _freeze_paths(world: World) -> None:
-    """Let driven bodies stay where they are at time zero."""
-    for one in world.moved:
-        for first, end in ((one.shift, one.shift_end), (one.turn, one.turn_end)):
-            pieces = world.motion[int(first) : int(end)]
-            if len(pieces):
-                t = -pieces["start"][0]
-                rest = sum(pieces[f"c{power}"][0] * t**power for power in range(4))
-                for power in range(4):
-                    pieces[f"c{power}"] = rest if power == 0 else 0.0

@@ -74,7 +74,8 @@ def _handling(numbers: tuple[signal.Signals, ...], handler: Callable[[int, Any],
         yield
         return
     before = {number: signal.getsignal(number) for number in numbers}
-    taken = [number for number in numbers if _gives_way(before[number])]
+    # Python's own handlers give way, and those that say so
+    taken = [one for one in numbers if before[one] in DEFAULT or getattr(before[one], "gives_way", False)]
     for number in taken:
         signal.signal(number, handler)
     try:
@@ -82,8 +83,3 @@ def _handling(numbers: tuple[signal.Signals, ...], handler: Callable[[int, Any],
     finally:
         for number in taken:
             signal.signal(number, before[number])
-
-
-def _gives_way(handler: Any) -> bool:
-    """Return True if a handler is Python's own, or one that lets others take its place."""
-    return handler in DEFAULT or getattr(handler, "gives_way", False)

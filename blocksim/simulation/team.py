@@ -6,10 +6,8 @@ from types import TracebackType
 from typing import Self
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.common.arrays import PAIRS_FULL, TEAM_SIZE
-from blocksim.kernels.common.jit import config
-from blocksim.simulation.schemes import AnyScene, Scene, scheme_of
-from blocksim.simulation.schemes.scheme import BODIES_A_THREAD
+from blocksim.kernels.common import arrays, jit
+from blocksim.simulation.schemes import BODIES_A_THREAD, AnyScene, Scene, scheme_of
 
 START_SECONDS = 60.0
 
@@ -19,7 +17,7 @@ def useful_threads(threads: int, bodies: int, least_bodies: int = BODIES_A_THREA
 
     `bodies` are blocks and elements of further systems, `least_bodies` is the scheme's.
     """
-    most = 1 if config.DISABLE_JIT else max(1, bodies // least_bodies)
+    most = 1 if jit.config.DISABLE_JIT else max(1, bodies // least_bodies)
     return min(threads, most)
 
 
@@ -68,7 +66,7 @@ class Team:
         if scheme.threads_of(scene) != self.threads:
             scene = scheme.with_threads(scene, self.threads)
         status = self._advance(scene, last_step)
-        while status == PAIRS_FULL:
+        while status == arrays.PAIRS_FULL:
             scene = scheme.with_more_room(scene)
             status = self._advance(scene, last_step)
         return scene, status
@@ -77,7 +75,7 @@ class Team:
         scheme = scheme_of(scene)
         if self._pool is None:
             return scheme.advance(scene, last_step)
-        scene.world.team[TEAM_SIZE] = self.threads
+        scene.world.team[arrays.TEAM_SIZE] = self.threads
         others = [scheme.for_another_thread(scene) for _ in range(1, self.threads)]
         for k, other in enumerate(others, start=1):
             self._pool.submit(scheme.advance_in_team, other, last_step, k)

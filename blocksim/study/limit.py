@@ -21,7 +21,7 @@ from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of
 from blocksim.scenario.motion import settles
 from blocksim.silence import silent
-from blocksim.simulation.observables import PEAK, Manner, table_columns
+from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import build
 from blocksim.study import limit_margin as margins
@@ -288,7 +288,7 @@ def with_sides(answer: LimitAnswer) -> LimitAnswer:
             message = f"{row['reason']}; the limit is found, its runs are not kept: rerun the command, or --no-runs"
             raise OutputError(message)
         if row["status"] == FINISHED:
-            is_seen = falls and row["outcome"] != Manner.STANDS.value  # of one that was released to be seen to fall
+            is_seen = falls and row["outcome"] != Response.STANDS.value  # of one that was released to be seen to fall
             update = {name: row.get(name) for name in (*table_columns(), PEAK)} if is_seen else {}
             sides[side.value] = side.model_copy(update={**update, "case": name})
     brackets = [

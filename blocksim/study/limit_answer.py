@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_valid
 
 from blocksim.errors import ExitCode, InvalidInputError, Problem
 from blocksim.scenario.input_files import raise_problems, read_table
-from blocksim.simulation.observables import PEAK, Manner, table_columns
+from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.study.answer import Answer, Table, with_unit
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
@@ -64,7 +64,7 @@ class Side(BaseModel, frozen=True, extra="allow"):
             return [value, self.verdict.value, str(self.reason).splitlines()[0], *nothing]
         if self.outcome is None:
             return [value, self.verdict.value, "does not settle", *nothing]
-        amplitude = f" ±{self.peak_deg:.2g}°" if self.outcome == Manner.ROCKING and self.peak_deg is not None else ""
+        amplitude = f" ±{self.peak_deg:.2g}°" if self.outcome == Response.ROCKING and self.peak_deg is not None else ""
         first = "" if self.first_mover is None else f"block {self.first_mover}"
         at = "" if self.first_moved_s is None else f"{self.first_moved_s:.3f}"
         moved = (self.displacement_mm or 0.0, self.turn_deg or 0.0)

@@ -38,7 +38,7 @@ from blocksim.scenario.models.motion import Pulse
 from blocksim.scenario.models.stepping import SPRINGS
 from blocksim.scenario.motion import settles
 from blocksim.scenario.placement import smallest_width
-from blocksim.simulation.observables import FURTHER, MOVED_SHARE, Manner
+from blocksim.simulation.observables import FURTHER, MOVED_SHARE, Response
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
 from blocksim.study.rows import Row
@@ -168,7 +168,7 @@ class StandingSide:
 
     def _give(self, row: Row) -> Give | None:
         """Return how far springs have given way; None where it is not known from what stands there."""
-        if not self.plan.scenario.time.has_springs or row.get("outcome") != Manner.STANDS.value:  # turned otherwise too
+        if not self.plan.scenario.time.has_springs or row.get("outcome") != Response.STANDS.value:  # it turned too
             return None
         turn = max(abs(float(str(row[name]))) for name in row if name.endswith(ROTATION))
         # of the load k that topples a block by k g along the ground, atan k = a, a turn d takes away 2 d/sin(2 a) k

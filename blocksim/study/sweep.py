@@ -21,6 +21,7 @@ from blocksim.scenario.models.study import Sweep
 from blocksim.silence import silent
 from blocksim.simulation import compilation, provenance, stopping
 from blocksim.simulation import folder as files
+from blocksim.simulation.schemes import SCHEMES
 from blocksim.study import rows, sweep_folder
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.manifest import (
@@ -158,7 +159,7 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     vary = base.sweep.vary if base.sweep else {}
     schemes = (base.time.scheme, *map(str, levels_of(vary.get("time.scheme", ()))))
     models = (base.contact.model, *map(str, levels_of(vary.get("contact.model", ()))))
-    sets = (compilation.kernel_set(scheme, model) for scheme in schemes for model in models)
+    sets = (SCHEMES[scheme].kernels(model) for scheme in schemes for model in models)
     return tuple(dict.fromkeys((compilation.kernels_of(base), *sets)))
 
 

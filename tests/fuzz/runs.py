@@ -10,9 +10,8 @@ import h5py
 import numpy as np
 
 from blocksim.scenario import load_scenario, place_bodies
-from blocksim.simulation.recorder import Frame
-from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.recorder import Frame, Recorder
+from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,7 +48,7 @@ def _left_open(folder: Path) -> bytes:
     motion = np.stack([frames.x, frames.y, frames.angle, frames.vx, frames.vy, frames.spin], axis=1)
     rows = np.stack([*frames.energy.values(), frames.contact_count, frames.largest_overlap], axis=1)
     path = folder / "killed.h5"
-    with FrameFile(path, place_bodies(scenario), 1e-5, "", ledger=list(frames.energy)) as sink:
+    with FrameFile(path, Recorder(place_bodies(scenario), 1.0, 1e-5), "", list(frames.energy)) as sink:
         for step, moving, row in zip(frames.step.tolist(), motion, rows, strict=True):
             sink.append(Frame(step, (moving,), row))
         sink.commit()

@@ -11,7 +11,7 @@ from blocksim.scenario import PlacedBody, Scenario, load_scenario, place_bodies
 from blocksim.simulation import simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
-from blocksim.simulation.observables import Manner, Movement, Watch
+from blocksim.simulation.observables import Movement, Response, Watch
 from blocksim.simulation.probes import AT_REST, MovingSupport
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -36,7 +36,7 @@ def seen(
     """Return what a run has come to that had these frames, at these times (s)."""
     watch = Watch([placed], [support])
     for motion, time in frames:
-        watch.see([0], motion[None], [time])
+        watch.follow([0], motion[None], [time])
     found = Movement.of(watch, frames[-1][0], (velocity, 0.0), frames[-1][1])
     assert found is not None
     return found
@@ -45,17 +45,17 @@ def seen(
 @pytest.mark.parametrize(
     ("end", "manner"),
     [
-        ({"dx": 0.31}, Manner.STANDS),  # a hundredth of 32 mm is 0.32 mm
-        ({"dx": 0.33}, Manner.SLID),
-        ({"turn": 0.5}, Manner.STANDS),  # half a diagonal is 29.7 mm
-        ({"turn": 0.7}, Manner.SLID),
-        ({"turn": -46.0}, Manner.FELL),
-        ({"dy": -15.0}, Manner.SLID),
-        ({"dy": -17.0}, Manner.FELL),
-        ({"dy": 17.0}, Manner.SLID),
+        ({"dx": 0.31}, Response.STANDS),  # a hundredth of 32 mm is 0.32 mm
+        ({"dx": 0.33}, Response.SLID),
+        ({"turn": 0.5}, Response.STANDS),  # half a diagonal is 29.7 mm
+        ({"turn": 0.7}, Response.SLID),
+        ({"turn": -46.0}, Response.FELL),
+        ({"dy": -15.0}, Response.SLID),
+        ({"dy": -17.0}, Response.FELL),
+        ({"dy": 17.0}, Response.SLID),
     ],
 )
-def test_manner_follows_from_the_end(end: dict[str, float], manner: Manner) -> None:
+def test_manner_follows_from_the_end(end: dict[str, float], manner: Response) -> None:
     assert seen([(frame(), 0.0), (frame(**end), 0.1)]).outcome == manner
 
 
@@ -109,7 +109,7 @@ def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
     members = run_ensemble(scenarios, threads=1, peaks=True)
     ends = [one.observables["outcome"] for one in members]
     # the last ones are caught on their way, the first of them long before it would be seen to go on
-    assert ends == [Manner.ROCKED, Manner.ROCKED, Manner.SLID, Manner.ROCKING]
+    assert ends == [Response.ROCKED, Response.ROCKED, Response.SLID, Response.ROCKING]
     for scenario, member in zip(scenarios, members, strict=True):
         found = simulate(scenario).summary.movement
         assert found is not None

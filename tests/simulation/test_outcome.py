@@ -14,7 +14,7 @@ from blocksim.scenario import place_bodies
 from blocksim.simulation import run as running
 from blocksim.simulation import run_ensemble, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
-from blocksim.simulation.loop import BY_CODE, RESIDUAL, diagnose, interrupted_outcome
+from blocksim.simulation.loop import BY_CODE, RESIDUAL, Outcome, diagnose
 from blocksim.simulation.schemes import build, build_scene
 from tests.simulation.sliding import sliding
 
@@ -91,7 +91,7 @@ def test_lost_energy_names_the_fastest_block() -> None:
 
 def test_runs_that_did_not_fail_keep_their_words() -> None:
     scenario = sliding({})
-    for outcome in (BY_CODE[REACHED], interrupted_outcome("stopped by SIGTERM")):
+    for outcome in (BY_CODE[REACHED], Outcome("interrupted", "stopped by SIGTERM", ExitCode.STOPPED_EARLY)):
         assert diagnose(outcome, OVERLAP_LIMIT, build_scene(scenario), place_bodies(scenario)) == outcome
 
 

@@ -7,21 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import HALF, Records, World
-from blocksim.kernels.common.systems import Coupled
-from blocksim.kernels.explicit.depth import MIDDLE, ROWS_APART
+from blocksim.kernels.common import arrays, systems
+from blocksim.kernels.explicit import depth, ensemble, step
 from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
-from blocksim.kernels.explicit.ensemble import advance_members
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
 from blocksim.kernels.explicit.models import KERNEL
 from blocksim.kernels.explicit.models import SURFACE as SURFACE_MODEL
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
-from blocksim.kernels.explicit.step import advance, advance_coupled_alone, advance_coupled_in_team, advance_in_team
 from blocksim.scenario.overlap import penetration
 from blocksim.simulation.frames import SUPPORT, UNITS, Rows, empty_rows
-from blocksim.simulation.schemes.scheme import BODIES_A_THREAD, Overlaps, Scheme, outlines_of, smallest_sides
-from blocksim.world.build import EXPLICIT as CONSTRUCTION
-from blocksim.world.build import with_more_room, with_threads
+from blocksim.simulation.schemes import BODIES_A_THREAD, Overlaps, Scheme, outlines_of, smallest_sides
+from blocksim.world import build
 
 WORK_SPACE = ("points", "matrices", "before", "action")
 ENERGIES = {LINEAR: (0.5, 2.0), HERTZ_MINDLIN: (0.4, 2.5)}  # stored per stiffness: factor, power of the overlap
@@ -29,7 +25,7 @@ Indices = NDArray[np.intp]
 SIDES_X, SIDES_Y = (-1.0, 1.0, 1.0, -1.0), (-1.0, -1.0, 1.0, 1.0)  # of the corners, counter-clockwise from lower left
 
 
-def explicit_contacts(world: World, blocks: int) -> Rows:
+def explicit_contacts(world: arrays.World, blocks: int) -> Rows:
     """Return all contacts in the order of pairs and slots; bodies from number `blocks` on are ground and walls."""
     pairs = world.pairs[: int(world.clock[0].pair_count)]
     pair, place = np.nonzero(np.arange(world.contacts.shape[1]) < pairs["active"][:, None])
@@ -47,7 +43,7 @@ def explicit_contacts(world: World, blocks: int) -> Rows:
     return rows
 
 
-def _add_bearing(rows: Rows, world: World, pairs: Any) -> None:
+def _add_bearing(rows: Rows, world: arrays.World, pairs: Any) -> None:
     """Add what a stiffness does that changes by slip and tilt: a force along the tangent, and a couple.
 
     The couple is a normal force that acts a little beside its corner. Without a normal force there is no such place.
@@ -61,11 +57,11 @@ def _add_bearing(rows: Rows, world: World, pairs: Any) -> None:
     rows["y"] += way * rows["normal_x"]
 
 
-def _places(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
+def _places(world: arrays.World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
     """Return place (m) and normal of contacts: those of particles keep them, corners are found again as kernels do."""
     if "nx" in (contacts.dtype.names or ()):
         return [contacts[name] for name in ("x", "y", "nx", "ny")]
-    half = HALF if world.corners is None else MOST_CORNERS  # slots of the corners of a, then those of b
+    half = arrays.HALF if world.corners is None else MOST_CORNERS  # slots of the corners of a, then those of b
     is_of_a = contacts["slot"] < half
     owner, touched = world.bodies[np.where(is_of_a, a, b)], world.bodies[np.where(is_of_a, b, a)]
     number, face = contacts["slot"] % half, contacts["face"]
@@ -84,12 +80,12 @@ def _places(world: World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
     return [x, y, outward * nx, outward * ny]
 
 
-def with_own_work_space(world: World) -> World:
+def with_own_work_space(world: arrays.World) -> arrays.World:
     """Return the same world with arrays of its own where one pair is worked on."""
     return world._replace(**{name: getattr(world, name).copy() for name in WORK_SPACE})
 
 
-def evaluate_anew(scene: Any, _before: Records) -> bool:
+def evaluate_anew(scene: Any, _before: arrays.Records) -> bool:
     """Have contacts and what bears a block evaluated at this moment, as if after a step of no length.
 
     What bears a block may have changed without a contact that begins or ends: stiffness is measured and all sums of it
@@ -104,7 +100,7 @@ def evaluate_anew(scene: Any, _before: Records) -> bool:
     return True
 
 
-def _depths(world: World) -> tuple[Any, NDArray[np.float64]]:
+def _depths(world: arrays.World) -> tuple[Any, NDArray[np.float64]]:
     """Return the pairs of a world, and the largest overlap (m) of contacts of each."""
     count = int(world.clock[0].pair_count)
     pairs, contacts = world.pairs[:count], world.contacts[:count]
@@ -123,23 +119,23 @@ def overlaps_of_springs(scene: Any) -> Overlaps:
     lost = np.where(is_pressed, 0.0, np.where(pairs["b"] == world.bodies.size - 1, below, inside))
     limit = pairs["limit"]
     if world.controls[0].model != SURFACE_MODEL:
-        middle = MIDDLE * smallest_sides(world, pairs["a"], pairs["b"])
+        middle = depth.MIDDLE * smallest_sides(world, pairs["a"], pairs["b"])
         limit = np.where(is_pressed, limit, np.minimum(_reach(world), middle))
     return Overlaps(pairs["a"], pairs["b"], np.maximum(deepest, lost), limit)
 
 
-def _reach(world: World) -> float:
+def _reach(world: arrays.World) -> float:
     """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.explicit.depth."""
     controls = world.controls[0]
-    return float(controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size)
+    return float(controls.support if controls.model == KERNEL else depth.ROWS_APART * controls.particle_size)
 
 
-def particle_depth_warning(scene: Any, found: Overlaps) -> str:
+def particle_depth_warning(scene: Any, overlaps: Overlaps) -> str:
     """Return what limits the deepest overlap where that is how far particles reach; nothing where it is not."""
     model, reach = scene.world.controls[0].model, _reach(scene.world)
-    if model == SURFACE_MODEL or found.limit[np.nanargmax(found.depth / found.limit)] != reach:
+    if model == SURFACE_MODEL or overlaps.limit[np.nanargmax(overlaps.depth / overlaps.limit)] != reach:
         return ""
-    what = "the reach of the kernel" if model == KERNEL else f"{ROWS_APART:g} contact.particle_spacing"
+    what = "the reach of the kernel" if model == KERNEL else f"{depth.ROWS_APART:g} contact.particle_spacing"
     return f"an overlap exceeds {what}, {1e3 * reach:.3g} mm, beyond which particles lose one another"
 
 
@@ -147,21 +143,21 @@ SURFACE, PARTICLES, SURFACE_OF_OUTLINES = "surface", "with-particles", "outlines
 POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
 
 
-def _inside(change: Callable[..., Any]) -> Callable[..., Coupled]:
+def _inside(change: Callable[..., Any]) -> Callable[..., systems.Coupled]:
     """Return what changes the world of a scene with further systems."""
     return lambda scene, *values: scene._replace(world=change(scene.world, *values))
 
 
 WORLDS = Scheme(
     name="explicit",
-    scene_type=World,
-    construction=CONSTRUCTION,
-    advance=advance,
-    advance_in_team=advance_in_team,
-    advance_members=advance_members,
+    scene_type=arrays.World,
+    construction=build.EXPLICIT,
+    advance=step.advance,
+    advance_in_team=step.advance_in_team,
+    advance_members=ensemble.advance_members,
     least_bodies=BODIES_A_THREAD,
-    with_more_room=with_more_room,
-    with_threads=with_threads,
+    with_more_room=build.with_more_room,
+    with_threads=build.with_threads,
     threads_of=lambda scene: int(scene.world.shares.size),
     for_another_thread=with_own_work_space,
     after_event=evaluate_anew,
@@ -181,12 +177,12 @@ WORLDS = Scheme(
 )
 COUPLED = replace(
     WORLDS,
-    scene_type=Coupled,
-    advance=lambda scene, last_step: int(advance_coupled_alone(scene, last_step)),
-    advance_in_team=advance_coupled_in_team,
+    scene_type=systems.Coupled,
+    advance=lambda scene, last_step: int(step.advance_coupled_alone(scene, last_step)),
+    advance_in_team=step.advance_coupled_in_team,
     advance_members=None,
-    with_more_room=_inside(with_more_room),
-    with_threads=_inside(with_threads),
+    with_more_room=_inside(build.with_more_room),
+    with_threads=_inside(build.with_threads),
     for_another_thread=_inside(with_own_work_space),
     measure=lambda scene, row: measure(scene.world, row),
 )

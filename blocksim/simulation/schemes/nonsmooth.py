@@ -11,32 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import REMOVED, Records
-from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
-from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER, measure_nonsmooth
-from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
-from blocksim.kernels.nonsmooth.step import advance_nonsmooth, advance_nonsmooth_in_team
+from blocksim.kernels.nonsmooth import arrays, energy, ensemble, step
 from blocksim.scenario import PlacedBody, Scenario
+from blocksim.simulation import schemes
 from blocksim.simulation.frames import SUPPORT, Rows, empty_rows
-from blocksim.simulation.schemes.scheme import (
-    BODIES_A_THREAD,
-    Overlaps,
-    Scheme,
-    SettlingSteps,
-    corner_ways,
-    smallest_sides,
-)
-from blocksim.world.nonsmooth import NONSMOOTH as CONSTRUCTION
-from blocksim.world.nonsmooth import needs_repeated_impacts, threads_of, with_more_constraints, with_more_threads
-from blocksim.world.sag import current_crush_depth, overlap_warning
+from blocksim.world import nonsmooth, sag
 
 Floats = NDArray[np.float64]
 
 
-def nonsmooth_contacts(scene: Nonsmooth, blocks: int) -> Rows:
+def nonsmooth_contacts(scene: arrays.Nonsmooth, blocks: int) -> Rows:
     """Return all points that press, those of a manifold beside one another; bodies from `blocks` on are the support."""
     stepping = scene.contacts.stepping[0]
     manifolds = scene.contacts.constraints[: int(stepping.constraint_count)]
-    manifolds = manifolds[manifolds["reach"] != AWAY]
+    manifolds = manifolds[manifolds["reach"] != arrays.AWAY]
     points = np.stack([_points(scene, manifolds, "one", 0.0), _points(scene, manifolds, "two", 1.0)], axis=-1).ravel()
     rows = points[points["normal_force"] > 0.0]
     for name in ("normal_force", "shear_force"):
@@ -45,7 +33,7 @@ def nonsmooth_contacts(scene: Nonsmooth, blocks: int) -> Rows:
     return rows
 
 
-def _points(scene: Nonsmooth, manifolds: Any, which: str, along: float) -> Rows:
+def _points(scene: arrays.Nonsmooth, manifolds: Any, which: str, along: float) -> Rows:
     """Return one point of every manifold, with impulses (N s); `along` counts widths from point one."""
     nx, ny = manifolds["nx"], manifolds["ny"]
     body = scene.world.bodies[manifolds["a"]]
@@ -61,7 +49,7 @@ def _points(scene: Nonsmooth, manifolds: Any, which: str, along: float) -> Rows:
     return rows
 
 
-def renew(scene: Nonsmooth, old: Records) -> bool:
+def renew(scene: arrays.Nonsmooth, old: Records) -> bool:
     """Bring lines and rows of contacts up to date with bodies that an event has changed; `old` are these before.
 
     All velocities begin anew half a substep back, as those at the start of a run do: what was held falls from now on.
@@ -85,17 +73,17 @@ def renew(scene: Nonsmooth, old: Records) -> bool:
     is_gone = (bodies["is_moved"][rows["a"]] == REMOVED) | (bodies["is_moved"][rows["b"]] == REMOVED)
     for name in ("normal_one", "normal_two", "shear"):
         rows[name][is_gone] = 0.0
-    rows["reach"][is_gone] = AWAY
+    rows["reach"][is_gone] = arrays.AWAY
     return False
 
 
-def halt(scene: Nonsmooth, count: int) -> None:
+def halt(scene: arrays.Nonsmooth, count: int) -> None:
     """Take their velocities from the first bodies."""
     for name in RATES:
         scene.contacts.states[name][:count] = 0.0
 
 
-def begin(scene: Nonsmooth) -> None:
+def begin(scene: arrays.Nonsmooth) -> None:
     """Let the first substep begin with the impulses that hold against gravity, and clear the books."""
     contacts = scene.contacts
     for books in (contacts.tallies, scene.pushes):
@@ -105,30 +93,32 @@ def begin(scene: Nonsmooth) -> None:
     contacts.stepping["is_settled"] = 1
 
 
-def unrest(scene: Nonsmooth, is_free: NDArray[np.bool_], change: Floats, side: float, _scale: float) -> float:
+def unrest(scene: arrays.Nonsmooth, is_free: NDArray[np.bool_], change: Floats, side: float, _scale: float) -> float:
     """Return how far free blocks have moved in a step, over that at rest, as a share of gravity and loads."""
-    ways = corner_ways(change, scene.world.bodies["radius"][: is_free.size])
+    ways = schemes.corner_ways(change, scene.world.bodies["radius"][: is_free.size])
     return STILL_BALANCE * float(ways[is_free].max()) / (SETTLING.call * STILL * side)
 
 
-def overlaps_of_constraints(scene: Nonsmooth) -> Overlaps:
+def overlaps_of_constraints(scene: arrays.Nonsmooth) -> schemes.Overlaps:
     """Return how deep bodies overlap, over their smallest sides unless contact.max_overlap is judged by."""
     constraints = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
     depth = np.maximum(-constraints["gap_one"], -constraints["gap_two"])
     limit = np.ones(constraints.size)
     if not scene.world.controls[0].max_overlap > 0.0:
-        limit = smallest_sides(scene.world, constraints["a"], constraints["b"])
-    return Overlaps(constraints["a"], constraints["b"], np.where(constraints["reach"] == TOUCHING, depth, 0.0), limit)
+        limit = schemes.smallest_sides(scene.world, constraints["a"], constraints["b"])
+    return schemes.Overlaps(
+        constraints["a"], constraints["b"], np.where(constraints["reach"] == arrays.TOUCHING, depth, 0.0), limit
+    )
 
 
 def _variant(kernels: str, scenario: Scenario, placed: Sequence[PlacedBody] | None) -> str:
-    return IN_ROUNDS[kernels] if needs_repeated_impacts(scenario, placed) else kernels
+    return IN_ROUNDS[kernels] if nonsmooth.needs_repeated_impacts(scenario, placed) else kernels
 
 
 RATES = ("vx", "vy", "spin")
 STILL = 1e-10  # of the smallest side of a block: way in a step at rest
 STILL_BALANCE = 1e-8  # what that counts as, beside accelerations over gravity
-SETTLING = SettlingSteps(call=2, part=40, most=40_000, least_share=0.01)
+SETTLING = schemes.SettlingSteps(call=2, part=40, most=40_000, least_share=0.01)
 RIGID, OF_OUTLINES = "nonsmooth", "outlines"  # sets of machine code
 IN_ROUNDS = {RIGID: "nonsmooth-in-rounds", OF_OUTLINES: "outlines-in-rounds"}  # where impacts follow from one another
 TWO = [{"block": "any", "x": x, "y": 0.5} for x in (0.0, 5.0)]  # impacts of a single block are always in rounds
@@ -136,17 +126,17 @@ PLAIN: dict[str, object] = {"time": {"scheme": RIGID}, "contact": {"restitution"
 ROUNDS: dict[str, object] = {"time": {"scheme": RIGID}, "contact": {"restitution": 0.5}}
 POLYGON = {"any": {"sides": 4, "radius": 0.5, "depth": 1.0, "material": "any"}}
 
-NONSMOOTH = Scheme(
+NONSMOOTH = schemes.Scheme(
     name="nonsmooth",
-    scene_type=Nonsmooth,
-    construction=CONSTRUCTION,
-    advance=advance_nonsmooth,
-    advance_in_team=advance_nonsmooth_in_team,
-    advance_members=advance_nonsmooth_members,
-    least_bodies=BODIES_A_THREAD,
-    with_more_room=with_more_constraints,
-    with_threads=with_more_threads,
-    threads_of=threads_of,
+    scene_type=arrays.Nonsmooth,
+    construction=nonsmooth.NONSMOOTH,
+    advance=step.advance_nonsmooth,
+    advance_in_team=step.advance_nonsmooth_in_team,
+    advance_members=ensemble.advance_nonsmooth_members,
+    least_bodies=schemes.BODIES_A_THREAD,
+    with_more_room=nonsmooth.with_more_constraints,
+    with_threads=nonsmooth.with_more_threads,
+    threads_of=nonsmooth.threads_of,
     after_event=renew,
     kernels=lambda _: RIGID,
     of_outlines={RIGID: OF_OUTLINES},
@@ -161,9 +151,9 @@ NONSMOOTH = Scheme(
     halt=halt,
     begin=begin,
     unrest=unrest,
-    ledger=NONSMOOTH_LEDGER,
-    measure=measure_nonsmooth,
+    ledger=energy.NONSMOOTH_LEDGER,
+    measure=energy.measure_nonsmooth,
     contacts=nonsmooth_contacts,
     overlaps=overlaps_of_constraints,
-    warning=lambda scene, overlap, side: overlap_warning(overlap, current_crush_depth(scene), side),
+    warning=lambda scene, overlap, side: sag.overlap_warning(overlap, sag.current_crush_depth(scene), side),
 )

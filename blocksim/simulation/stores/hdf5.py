@@ -1,26 +1,37 @@
-"""run.h5: the table of its data sets, opening a file whoever wrote it, and reading frames, contacts and probes."""
+"""run.h5: the table of its data sets, opened safely whoever wrote it, read, and written.
+
+A file that is killed in the middle of a plain write is often unreadable. Here all data sets exist, with fixed-length
+types, before the file switches to single-writer-multiple-reader mode, and only then does it get its name; every flush
+is followed by a new value of `n_committed`. HDF5 cannot recover from a write that fails, so space is reserved before.
+"""
 
 import io
+import itertools
 import math
 import os
 import struct
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter, itemgetter
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.errors import BlocksimError, InvalidInputError
+from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.scenario import Scenario, events, input_files, place_bodies
-from blocksim.simulation import probes, recorder
+from blocksim.simulation import atomic
 from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames, empty_rows
+from blocksim.simulation.probes import CHUNK_ROWS, ProbeSeries
+from blocksim.simulation.recorder import Frame, Recorder, Rows, frames_from_rows
 from blocksim.world.free_memory import available_bytes, readable
+from blocksim.world.memory import chunk_rows
 from blocksim.world.systems import blocks, others_of
 from blocksim.world.systems.system import System, SystemInScene
 
@@ -42,7 +53,7 @@ class DataSet:
     of: Callable[[Any], Values]  # its rows in frames, or in a ProbeSeries
     kind: Any = np.float64
     row: tuple[int, ...] = ()  # shape of a row
-    chunk: int = probes.CHUNK_ROWS  # rows
+    chunk: int = CHUNK_ROWS  # rows
     is_sum: bool = False  # what it counts goes on from its last row
 
 
@@ -88,7 +99,7 @@ def sets_of_contacts() -> Iterator[DataSet]:
     """Yield the data sets with a row a contact."""
     none = empty_rows(0)
 
-    def column(name: str, frames: Sequence[recorder.Frame]) -> Values:
+    def column(name: str, frames: Sequence[Frame]) -> Values:
         return np.concatenate([(none if one.contacts is None else one.contacts)[name] for one in frames])
 
     for name, unit in {**dict.fromkeys(BODIES, "1"), **UNITS}.items():
@@ -199,28 +210,28 @@ def _turned(word: int, bits: int) -> int:
 
 def data_set(file: Any, name: str, dimensions: int) -> Any:
     """Return a data set of plain numbers, reached by no links but its own groups. Raises UnsafeError, KeyError."""
-    found = member(file, name)
-    if not isinstance(found, h5py.Dataset):
+    node = member(file, name)
+    if not isinstance(node, h5py.Dataset):
         raise UnsafeError(f"{name}: not a data set")
-    if found.is_virtual or found.external:
+    if node.is_virtual or node.external:
         raise UnsafeError(f"{name}: its values are in other files, which are not read")
-    if found.dtype.kind not in "if" or found.dtype.itemsize > 8 or found.dtype.shape:
-        raise UnsafeError(f"{name}: holds {found.dtype}, not plain numbers")
-    if found.ndim != dimensions:
-        raise UnsafeError(f"{name}: has {found.ndim} dimensions, not {dimensions}")
-    if found.id.get_create_plist().get_nfilters():
+    if node.dtype.kind not in "if" or node.dtype.itemsize > 8 or node.dtype.shape:
+        raise UnsafeError(f"{name}: holds {node.dtype}, not plain numbers")
+    if node.ndim != dimensions:
+        raise UnsafeError(f"{name}: has {node.ndim} dimensions, not {dimensions}")
+    if node.id.get_create_plist().get_nfilters():
         raise UnsafeError(f"{name}: compressed, unlike any run file")
-    return found
+    return node
 
 
 def group(file: Any, name: str) -> Any:
     """Return a group with a number of members that a run can have. Raises UnsafeError, KeyError."""
-    found = member(file, name)
-    if not isinstance(found, h5py.Group):
+    node = member(file, name)
+    if not isinstance(node, h5py.Group):
         raise UnsafeError(f"{name}: not a group")
-    if len(found) > MOST_MEMBERS:
-        raise UnsafeError(f"{name}: {len(found)} members; at most {MOST_MEMBERS} are read")
-    return found
+    if len(node) > MOST_MEMBERS:
+        raise UnsafeError(f"{name}: {len(node)} members; at most {MOST_MEMBERS} are read")
+    return node
 
 
 def member(file: Any, name: str) -> Any:
@@ -252,7 +263,7 @@ def refuse_too_many(path: Path, sets: dict[str, Any], rows: int, what: str = "fr
         )
 
 
-def read_probes(path: Path, scenario: Scenario) -> dict[str, probes.ProbeSeries]:
+def read_probes(path: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
     """Return the samples of all probes of a scenario in a run file, by name.
 
     Raises InputMissingError, or InvalidInputError for a damaged file or one without these probes.
@@ -264,7 +275,7 @@ def read_probes(path: Path, scenario: Scenario) -> dict[str, probes.ProbeSeries]
         return {name: _samples(path, file, name) for name in names}
 
 
-def _samples(path: Path, file: Any, name: str) -> probes.ProbeSeries:
+def _samples(path: Path, file: Any, name: str) -> ProbeSeries:
     place = f"{PROBES}/{name}"
     count = int(data_set(file, f"{place}/{COMMITTED}", 0)[()])
     sets = {one: data_set(file, f"{place}/{one}", 1) for one in group(file, place) if one != COMMITTED}
@@ -277,7 +288,7 @@ def _samples(path: Path, file: Any, name: str) -> probes.ProbeSeries:
     times = np.asarray(sets.pop(PROBE_TIME)[:count], dtype=np.float64)
     columns = {one: np.asarray(data[:count], dtype=np.float64) for one, data in sets.items()}
     units = {one: str(data.attrs["unit"]) for one, data in sets.items()}
-    return probes.ProbeSeries(name, kind, steps, times, columns, units)
+    return ProbeSeries(name, kind, steps, times, columns, units)
 
 
 def read_frames(path: Path, scenario: Scenario) -> Frames:
@@ -285,11 +296,13 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
 
     Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty.
     """
-    return read_systems(path, (blocks.blocks_placed(place_bodies(scenario)), *others_of(scenario)))
+    systems = (blocks.blocks_placed(place_bodies(scenario)), *others_of(scenario))
+    time_step, rows = read_rows(path, systems)
+    return frames_from_rows(systems, time_step, rows)
 
 
-def read_systems(path: Path, systems: Sequence[SystemInScene]) -> Frames:
-    """Return the committed frames of a run file of these systems, blocks first. Raises as `read_frames`.
+def read_rows(path: Path, systems: Sequence[SystemInScene]) -> tuple[float, Rows]:
+    """Return step (s) and committed frames of a run file of these systems, blocks first. Raises as `read_frames`.
 
     What a run that continues writes at this moment may look like damage: a file without an end is tried a few times.
     """
@@ -297,8 +310,7 @@ def read_systems(path: Path, systems: Sequence[SystemInScene]) -> Frames:
     while True:
         try:
             with open_hdf5(path) as file, refuse_damage(path, "not a complete run file"):
-                time_step, rows = _read(path, file, systems)
-            return recorder.frames_from_rows(systems, time_step, rows)
+                return _read(path, file, systems)
         except InvalidInputError:
             pause = next(pauses, None)
             if pause is None or not is_left_open(path):
@@ -314,17 +326,17 @@ def is_left_open(path: Path) -> bool:
         return False
 
 
-def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, recorder.Rows]:
+def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, Rows]:
     """Return step (s) and rows of all committed frames, after looking at what would be read."""
     count = int(data_set(file, COMMITTED, 0)[()])
     ledger = tuple(name for name in group(file, OBSERVABLES) if name not in COUNTED_UNITS)
     table = sets_of_frames(systems, ledger, math.nan, 1, contacts=False)
     sets = {one.name: data_set(file, one.name, 1 + len(one.row)) for one in table if one.name != TIME}
     for present in systems:
-        found = {sets[place].shape[1] for place in places_of(present.system)}
-        if found != {present.count}:
+        node = {sets[place].shape[1] for place in places_of(present.system)}
+        if node != {present.count}:
             what = "bodies" if present is systems[0] else present.system.name
-            raise ValueError(f"holds {'/'.join(map(str, sorted(found)))} {what}, not {present.count}")
+            raise ValueError(f"holds {'/'.join(map(str, sorted(node)))} {what}, not {present.count}")
     if count <= 0:
         raise ValueError("holds no frame: the run was killed before its first one, or has just started")
     refuse_too_many(path, sets, count)
@@ -339,7 +351,7 @@ def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[floa
         np.stack([values[place] for place in places_of(one.system)], axis=1, dtype=np.float64) for one in systems
     )
     contacts = _contacts(path, file, count, systems[0].count)
-    return time_step, recorder.Rows(steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts)
+    return time_step, Rows(steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts)
 
 
 def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | None:
@@ -362,3 +374,171 @@ def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | Non
         if count and not (least <= rows[name].min() and rows[name].max() < bodies):
             raise ValueError(f"{CONTACTS}/{name} names bodies that are not among the {bodies}")
     return Contacts(ends, rows)
+
+
+FLUSH_SECONDS = 0.25
+APART = 10.0  # times what the last flush took: a tenth of a run at most
+RESERVE = 1 << 18  # bytes
+
+
+class FrameFile:
+    """Writes frames as they come; use as a context manager."""
+
+    def __init__(self, path: Path, recorder: Recorder, scenario_toml: str, ledger: Sequence[str]) -> None:
+        """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails.
+
+        It begins with the frames that the recorder holds from an earlier part of the run. Only with those on the disk
+        it takes the place of an older file. The samples that probes hold are taken from them, written with the frames.
+        """
+        self.path, self.systems, self.probes = path, recorder.systems, recorder.probes
+        time_step, chunk = recorder.time_step, chunk_rows(max(one.count for one in self.systems))
+        self.sets = [*sets_of_frames(self.systems, ledger, time_step, chunk, contacts=recorder.with_contacts)]
+        self.probe_sets = {
+            name: [
+                DataSet(f"{PROBES}/{name}/{PROBE_STEP}", "1", attrgetter("step"), np.int64),
+                DataSet(f"{PROBES}/{name}/{PROBE_TIME}", "s", attrgetter("time")),
+                *(DataSet(f"{PROBES}/{name}/{of}", unit, itemgetter(of)) for of, unit in units),
+            ]
+            for name, units in ((name, one.units.items()) for name, one in self.probes.series().items())
+        }
+        self.count = 0
+        self.is_broken = False
+        self.waiting: list[Frame] = []
+        self.flushed_at = -np.inf
+        self.flush_seconds = 0.0
+        unnamed = path.with_name(f".{path.name}.new")
+        with self._locate_errors():
+            try:  # before HDF5 does: room for a small file
+                unnamed.write_bytes(bytes(RESERVE))
+            finally:
+                unnamed.unlink(missing_ok=True)
+            self.file = h5py.File(unnamed, "w", libver="latest")
+            try:
+                self._reserve(len(scenario_toml))
+                self._create(scenario_toml)
+                self.file[STEP].attrs["time_step"] = time_step  # s
+                self.file.swmr_mode = True
+                self.waiting.extend(recorder.held)
+                if self.waiting:  # and with them the samples of probes
+                    self.sync()
+                unnamed.chmod(atomic.permissions_of(path) or atomic.permissions_of(unnamed) or atomic.PERMISSIONS)
+                unnamed.replace(path)
+            except BaseException:
+                with suppress(OSError, RuntimeError):
+                    self.file.close()
+                unnamed.unlink(missing_ok=True)
+                raise
+
+    def _create(self, scenario_toml: str) -> None:
+        """Create all data sets, those that grow empty."""
+        h5md = self.file.create_group("h5md")
+        h5md.attrs["version"] = np.array([1, 1])
+        h5md.create_group("creator").attrs["name"] = "blocksim"
+        self.file.create_dataset(COMMITTED, (), dtype=np.int64).attrs["unit"] = "1"
+        self.file.create_group(OBSERVABLES, track_order=True)  # readers list the energies as the scheme does
+        for name, probe in self.probes.series().items():
+            group = self.file.create_group(f"{PROBES}/{name}", track_order=True)
+            group.attrs["kind"] = probe.kind
+            group.create_dataset(COMMITTED, (), dtype=np.int64).attrs["unit"] = "1"
+        for one in itertools.chain(self.sets, *self.probe_sets.values()):
+            # a scene may have no blocks; a chunk of nothing cannot be
+            chunks, most = (one.chunk, *(size or 1 for size in one.row)), (None, *(size or None for size in one.row))
+            data_set = self.file.create_dataset(one.name, (0, *one.row), dtype=one.kind, maxshape=most, chunks=chunks)
+            data_set.attrs["unit"] = one.unit
+        for system, elements in ((present.system, present.elements) for present in self.systems):
+            place = f"{PARTICLES}/{system.name}"
+            for constant, values in zip(system.constants, elements.constants, strict=True):
+                data_set = self.file.create_dataset(f"{place}/{constant.name}", data=values)
+                data_set.attrs["unit"] = constant.stored_unit
+            if elements.outlines is not None:  # (b, k, 2) of every element, the last corner repeated
+                self.file.create_dataset(f"{place}/outlines", data=elements.outlines).attrs["unit"] = "m"
+        text = self.file.create_dataset(SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))
+        text.attrs["unit"] = "TOML"
+
+    def _reserve(self, size: int) -> None:
+        """Make sure of the space on the disk, and of what HDF5 adds: after a write that fails it cannot continue."""
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(self.file.id.get_vfd_handle(), self.file.id.get_filesize(), size + RESERVE)
+
+    def append(self, frame: Frame) -> None:
+        """Take one frame; writes what has come together a few times a second. Raises OutputError."""
+        self.waiting.append(frame)
+        self.keep_up()
+
+    def keep_up(self) -> None:
+        """Write what has come together, a few times a second; less often where that takes long. Raises OutputError."""
+        if time.monotonic() - self.flushed_at > max(FLUSH_SECONDS, APART * self.flush_seconds):
+            self.commit()
+
+    def commit(self) -> None:
+        """Bring all frames so far to the disk and then say how many there are. Raises OutputError (disk full …)."""
+        began = time.monotonic()
+        samples = {name: series for name, series in self.probes.drain().items() if len(series)}
+        with self._locate_errors():
+            added = [(one, one.of(self.waiting)) for one in self.sets if self.waiting]
+            for name, series in samples.items():
+                added.extend((one, one.of(series)) for one in self.probe_sets[name])
+            if added:  # room for chunks that are begun, too
+                self._reserve(
+                    sum(
+                        (len(values) + 2 * one.chunk) * math.prod(one.row) * int(np.dtype(one.kind).itemsize)
+                        for one, values in added
+                    )
+                )
+                for one, values in added:
+                    data_set = self.file[one.name]
+                    count = data_set.shape[0]
+                    before = data_set[count - 1] if one.is_sum and count else 0
+                    data_set.resize(count + len(values), axis=0)
+                    data_set[count:] = before + values if one.is_sum else values
+                self.count += len(self.waiting)
+                self.waiting.clear()
+                self.file.flush()
+            for name in samples:
+                group = self.file[f"{PROBES}/{name}"]
+                group[COMMITTED][()] = group[PROBE_STEP].shape[0]
+            self.file[COMMITTED][()] = self.count
+            self.file.flush()
+        self.flushed_at = time.monotonic()
+        self.flush_seconds = self.flushed_at - began
+
+    def sync(self) -> None:
+        """Commit, and wait until it is on the disk, where it outlives a power failure. Raises OutputError."""
+        self.commit()
+        with self._locate_errors():
+            os.fsync(self.file.id.get_vfd_handle())
+
+    @contextmanager
+    def _locate_errors(self) -> Iterator[None]:
+        """Turn what HDF5 raises into one line; nothing more is written then."""
+        try:
+            yield
+        except (OSError, RuntimeError) as error:
+            self.is_broken = True
+            number = getattr(error, "errno", None)
+            raise OutputError(f"{self.path}: cannot be written: {os.strerror(number) if number else error}") from error
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the file, whatever happened; who asks for the second time to stop at once does not wait for frames."""
+        self.is_broken |= kind is not None and not issubclass(kind, Exception)
+        self.close()
+
+    def close(self) -> None:
+        """Commit, close the file normally, wait for the disk. Raises OutputError, once."""
+        if self.is_broken:
+            with suppress(OSError, RuntimeError):
+                self.file.close()
+            return
+        self.commit()
+        with self._locate_errors():
+            self.file.close()
+            with self.path.open("r+b") as file:  # cut off what was reserved, which HDF5 knows nothing of
+                *_, end, _, _ = SUPERBLOCK.unpack(file.read(SUPERBLOCK.size))
+                file.truncate(end)
+            atomic.sync_file(self.path)  # no mark of a finished run may outlive its frames

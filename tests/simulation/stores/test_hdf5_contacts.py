@@ -7,10 +7,9 @@ import numpy as np
 
 from blocksim.scenario import place_bodies
 from blocksim.simulation.frames import Rows, empty_rows
-from blocksim.simulation.recorder import MOTION, Frame
+from blocksim.simulation.recorder import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 from tests.simulation.conftest import Shipped
 
 MEASURED = SCHEMES["explicit"].measured
@@ -33,7 +32,7 @@ def add_frames(sink: FrameFile, first: int, last: int) -> None:
 def test_what_was_committed_is_there_after_a_kill(soft: Shipped, tmp_path: Path) -> None:
     scenario = soft(output__contacts=True)
     path, ledger = tmp_path / "run.h5", SCHEMES["explicit"].ledger
-    with FrameFile(path, place_bodies(scenario), 1e-6, "", ledger=ledger, contacts=True) as sink:
+    with FrameFile(path, Recorder(place_bodies(scenario), 1.0, 1e-6, contacts=True), "", ledger) as sink:
         add_frames(sink, 0, 1000)
         sink.commit()
         add_frames(sink, 1000, 1400)
@@ -47,6 +46,8 @@ def test_what_was_committed_is_there_after_a_kill(soft: Shipped, tmp_path: Path)
 
 
 def test_file_without_contacts_has_none(soft: Shipped, tmp_path: Path) -> None:
-    with FrameFile(tmp_path / "run.h5", place_bodies(soft()), 1e-6, "", ledger=SCHEMES["explicit"].ledger) as sink:
+    with FrameFile(
+        tmp_path / "run.h5", Recorder(place_bodies(soft()), 1.0, 1e-6), "", SCHEMES["explicit"].ledger
+    ) as sink:
         add_frames(sink, 0, 3)
     assert read_frames(tmp_path / "run.h5", soft()).contacts is None

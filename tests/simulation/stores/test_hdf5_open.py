@@ -9,9 +9,8 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
-from blocksim.simulation.recorder import MOTION, Frame
-from blocksim.simulation.stores.hdf5 import SUPERBLOCK, is_left_open, lookup3, open_hdf5, read_frames
-from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.recorder import MOTION, Frame, Recorder
+from blocksim.simulation.stores.hdf5 import SUPERBLOCK, FrameFile, is_left_open, lookup3, open_hdf5, read_frames
 
 FRAMES = 300
 
@@ -34,7 +33,7 @@ def scenario() -> Scenario:
 def killed(scenario: Scenario, tmp_path: Path) -> Path:
     """Return a file as it lies on the disk while its writer is at work."""
     path = tmp_path / "run.h5"
-    with FrameFile(tmp_path / "going_on.h5", place_bodies(scenario), 1e-5, "", ledger=("kinetic",)) as sink:
+    with FrameFile(tmp_path / "going_on.h5", Recorder(place_bodies(scenario), 1.0, 1e-5), "", ("kinetic",)) as sink:
         for step in range(FRAMES):
             sink.append(Frame(step, (np.full((len(MOTION), 1), step),), np.ones(3)))
         sink.commit()

@@ -12,10 +12,9 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError
 from blocksim.scenario import place_bodies
 from blocksim.simulation import Result
-from blocksim.simulation.recorder import MOTION, Frame
+from blocksim.simulation.recorder import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 from tests.simulation.conftest import Shipped
 
 UNITS = {"x": "m", "angle": "rad", "vy": "m s-1", "spin": "rad s-1", "time": "s", "mass": "kg", "inertia": "kg m2"}
@@ -30,7 +29,7 @@ def file_of(result: Result) -> Path:
 
 
 def open_file(path: Path, soft: Shipped) -> FrameFile:
-    return FrameFile(path, place_bodies(soft()), 1e-6, "schema = 1\n", ledger=SCHEMES["explicit"].ledger)
+    return FrameFile(path, Recorder(place_bodies(soft()), 1.0, 1e-6), "schema = 1\n", SCHEMES["explicit"].ledger)
 
 
 def add_frames(sink: FrameFile, count: int) -> None:
@@ -121,7 +120,7 @@ def test_file_of_other_bodies_is_refused(kept: Result, soft: Shipped) -> None:
 
 def test_file_without_a_frame_says_so(soft: Shipped, tmp_path: Path) -> None:
     scenario = soft()
-    with FrameFile(tmp_path / "run.h5", place_bodies(scenario), 1e-6, "", ledger=()):
+    with FrameFile(tmp_path / "run.h5", Recorder(place_bodies(scenario), 1.0, 1e-6), "", ()):
         pass
     with pytest.raises(InvalidInputError, match="holds no frame: the run was killed before its first one"):
         read_frames(tmp_path / "run.h5", scenario)

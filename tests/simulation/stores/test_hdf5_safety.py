@@ -12,9 +12,8 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
-from blocksim.simulation.recorder import MOTION, Frame
-from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.recorder import MOTION, Frame, Recorder
+from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 
 LEDGER = ("kinetic", "potential")
 X = "particles/blocks/x"
@@ -39,7 +38,7 @@ def scenario() -> Scenario:
 def refusal(scenario: Scenario, tmp_path: Path) -> Callable[[Change], str]:
     """Change a run file of four frames, and return why it is refused."""
     path = tmp_path / "run.h5"
-    with FrameFile(path, place_bodies(scenario), 1e-5, "", ledger=LEDGER) as sink:
+    with FrameFile(path, Recorder(place_bodies(scenario), 1.0, 1e-5), "", LEDGER) as sink:
         for step in range(4):
             sink.append(Frame(step, (np.ones((len(MOTION), 2)),), np.ones(len(LEDGER) + 2)))
 

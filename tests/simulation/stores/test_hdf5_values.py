@@ -6,10 +6,9 @@ import h5py
 import numpy as np
 
 from blocksim.scenario import place_bodies
-from blocksim.simulation.recorder import MOTION, Frame
+from blocksim.simulation.recorder import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 from tests.simulation.conftest import Shipped
 
 STEP = 1e-6  # s
@@ -21,7 +20,7 @@ def test_every_number_comes_back_under_its_name(soft: Shipped, tmp_path: Path) -
     rows = [(random.random((len(MOTION), 3)), random.random(len(scheme.measured))) for _ in range(3)]
     written = [Frame(step, (motion,), measured) for step, (motion, measured) in zip((0, 5, 7), rows, strict=True)]
     path = tmp_path / "run.h5"
-    with FrameFile(path, place_bodies(scenario), STEP, "schema = 1\n", ledger=scheme.ledger) as file:
+    with FrameFile(path, Recorder(place_bodies(scenario), 1.0, STEP), "schema = 1\n", scheme.ledger) as file:
         for frame in written:
             file.append(frame)
     back = read_frames(path, scenario)
@@ -36,7 +35,7 @@ def test_every_number_comes_back_under_its_name(soft: Shipped, tmp_path: Path) -
 
 def test_frames_beyond_what_was_committed_do_not_count(soft: Shipped, tmp_path: Path) -> None:
     scheme, scenario, path = SCHEMES["explicit"], soft(), tmp_path / "run.h5"
-    with FrameFile(path, place_bodies(scenario), STEP, "schema = 1\n", ledger=scheme.ledger) as file:
+    with FrameFile(path, Recorder(place_bodies(scenario), 1.0, STEP), "schema = 1\n", scheme.ledger) as file:
         for step in range(3):
             file.append(Frame(step, (np.zeros((len(MOTION), 3)),), np.zeros(len(scheme.measured))))
     with h5py.File(path, "r+") as stored:
@@ -50,7 +49,7 @@ def test_outlines_are_stored_once_and_rectangles_store_none(soft: Shipped, tmp_p
     first, *others = place_bodies(scenario)
     wedge = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
     for placed, name in (((first, *others), "plain"), ((first._replace(outline=wedge), *others), "outlined")):
-        with FrameFile(tmp_path / name, placed, STEP, "schema = 1\n", ledger=scheme.ledger):
+        with FrameFile(tmp_path / name, Recorder(placed, 1.0, STEP), "schema = 1\n", scheme.ledger):
             pass
     with h5py.File(tmp_path / "plain") as plain, h5py.File(tmp_path / "outlined") as outlined:
         assert "outlines" not in plain["particles/blocks"]

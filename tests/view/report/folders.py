@@ -12,10 +12,9 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.folder import keep_scenario, read_tables
 from blocksim.simulation.frames import SUPPORT, Frames, Rows, csv_text, empty_rows, final_columns
 from blocksim.simulation.ledger import EnergyLedger
-from blocksim.simulation.recorder import Frame
+from blocksim.simulation.recorder import Frame, Recorder
 from blocksim.simulation.result import Summary
-from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.stores.hdf5_writer import FrameFile
+from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 LEDGER = ("kinetic", "potential", "friction")
@@ -44,7 +43,7 @@ def write_frames(path: Path, scenario: Scenario, count: int) -> None:
     numbers = np.arange(len(placed)) / len(placed)
     speed = np.array([0.5 * numbers, 0.2 * numbers, -4.0 * numbers])
     contacts = scenario.output.contacts
-    with FrameFile(path, placed, TIME_STEP, "", ledger=LEDGER, contacts=contacts) as file:
+    with FrameFile(path, Recorder(placed, 1.0, TIME_STEP, contacts=contacts), "", LEDGER) as file:
         for step in range(count):
             motion = start.copy()
             motion[:3] += speed * step * TIME_STEP * 10.0

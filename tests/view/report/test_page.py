@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.simulation.ledger import EnergyLedger
-from blocksim.simulation.observables import Manner, Movement
+from blocksim.simulation.observables import Movement, Response
 from blocksim.view.report.page import labels, page_text
 from blocksim.view.report.subjects import CaseTable, Subject, read_stored, run_subject, sweep_subject
 from tests.view.report.folders import write_run
@@ -75,7 +75,7 @@ def test_report_names_the_outcome_and_the_block_that_moved_first(tmp_path: Path)
     stored = read_stored(tmp_path / "run")
     assert stored.summary is not None
     known = {
-        "outcome": Manner.FELL,
+        "outcome": Response.FELL,
         "largest_displacement_mm": 12.3,
         "displaced_block": "2",
         "largest_rotation_deg": 90.0,
