@@ -17,7 +17,7 @@ from blocksim.cli.commands import load_command
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError
 from blocksim.options import option_fields
 from blocksim.simulation import Result
-from blocksim.study.calibrate import CalibrateOptions
+from blocksim.study.calibrate_plan import CalibrateOptions
 from blocksim.study.pictures import AnimateOptions, PlotOptions
 from blocksim.study.run import RunOptions
 from blocksim.study.sensitivity import SensitivityOptions

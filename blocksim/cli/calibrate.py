@@ -7,8 +7,8 @@ from functools import partial
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode
 from blocksim.silence import silent
-from blocksim.study.calibrate import CalibrateOptions, Fit, calibrate
-from blocksim.study.calibrate_plan import Trial
+from blocksim.study.calibrate import Fit, calibrate
+from blocksim.study.calibrate_plan import CalibrateOptions, Trial
 
 COLUMNS = ("key", "prior", "fitted")
 TIED = ("key", "prior", "equally good", "written")

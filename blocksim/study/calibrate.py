@@ -3,27 +3,24 @@
 import hashlib
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
 
 import tomli_w
 
 from blocksim.errors import BlocksimError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.extras import load_module
-from blocksim.options import Option, takes
+from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of, scenario_hash, scenario_to_toml
 from blocksim.scenario.document import locate
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import KeyPath, follow, format_key, with_value
-from blocksim.silence import silent
 from blocksim.simulation import atomic, compilation, stopping
 from blocksim.simulation import folder as files
-from blocksim.study import calibrate_plan, compare, vary
+from blocksim.study import calibrate_plan
 from blocksim.study.executors.ensemble import run_members
-from blocksim.study.plan import Values, Variations
 
 TABLES: tuple[KeyPath, ...] = (("experiment", "table"), ("motion", "table"), ("sweep", "table"))
 NOTE = "calibrated, see [provenance]"
@@ -126,7 +123,6 @@ WRITTEN = "scenario.toml"
 JOURNAL = ".trials.jsonl"
 NEEDED = ("optuna", "scipy.stats.qmc")  # before anything is written
 TAKEN = "{}: already exists; --overwrite replaces it, --out FILE writes elsewhere"
-OnTrial = Callable[[calibrate_plan.Trial, calibrate_plan.Trial, int], None]
 
 
 @dataclass(frozen=True)
@@ -198,56 +194,8 @@ class Fit:
         }
 
 
-@dataclass(frozen=True)
-class CalibrateOptions:
-    """What is fitted under which scatter, how long it is searched, and where the answer goes."""
-
-    fit: Annotated[
-        Mapping[str, Values],
-        vary.variations_option(
-            "A key to fit, and its prior. Repeatable.",
-            "KEY=FROM:TO",
-            'The priors by dotted key, as {"contact.restitution": {"from": 0.2, "to": 0.35}}.',
-            calibrate_plan.FIT,
-            vary.RANGE,
-        ),
-    ] = field(default_factory=dict)
-    scatter: Annotated[
-        Mapping[str, Values] | None,
-        vary.variations_option(
-            "Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
-            "Default: the distributions of [sweep].",
-            "KEY=MEAN+-SD",
-            "The distributions of inputs, {mean, sd} or {from, to} (default: those of [sweep]); of a fitted "
-            "key, about its fitted value.",
-            calibrate_plan.SCATTER,
-            vary.SPREAD,
-        ),
-    ] = None
-    _: KW_ONLY
-    trials: Annotated[int, Option("Number of trials.", metavar="N", least=1)] = 100
-    members: Annotated[
-        int,
-        Option("Samples of the scatter per trial.", flags=("--samples", "--members"), metavar="M", least=1),
-    ] = 64
-    fresh_members: Annotated[
-        int,
-        Option("Fresh samples for the final estimate of the probability.", flags=("--fresh",), metavar="M", least=1),
-    ] = 512
-    seed: Annotated[int, Option("Random seed.", metavar="S", least=0)] = 0
-    experiment: compare.ExperimentTablePath = None
-    out: Annotated[
-        Path | str | None,
-        Option("Scenario file to write (default: results/NAME/calibrate-HASH/scenario.toml).", metavar="FILE"),
-    ] = None
-    resume: Annotated[bool, Option("Resume with the existing trials.")] = False
-    overwrite: Annotated[bool, Option("Replace the file and the existing trials.")] = False
-    on_start: Callable[[str], None] = silent
-    on_trial: OnTrial = silent
-
-
-@takes(CalibrateOptions)
-def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
+@takes(calibrate_plan.CalibrateOptions)
+def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit:
     """Fit inputs to measured repeats so that agreement is probable under the scatter of the other inputs.
 
     Finds the best values, measures how probable agreement is with them, and writes a scenario with these values and
@@ -257,14 +205,7 @@ def calibrate(scenario: Source, options: CalibrateOptions) -> Fit:
     InvalidInputError, OutputExistsError, OutputError, UnavailableError without the extra `study`, and StoppedEarlyError
     on Ctrl-C.
     """
-    plan = calibrate_plan.calibration_plan(
-        document_of(scenario),
-        Variations.of(options.fit),
-        None if options.scatter is None else Variations.of(options.scatter),
-        experiment=None if options.experiment is None else Path(options.experiment),
-        members=options.members,
-        seed=options.seed,
-    )
+    plan = calibrate_plan.calibration_plan(document_of(scenario), options)
     options.on_start(compilation.kernels_of(plan.base))
     resume, overwrite = options.resume, options.overwrite
     name = hashlib.sha256(str(plan.fingerprint()).encode()).hexdigest()[:12]
@@ -314,7 +255,7 @@ def _make_room(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> N
 
 
 def _searched(
-    plan: calibrate_plan.CalibrationPlan, journal: Path, options: CalibrateOptions, kept: Path | None
+    plan: calibrate_plan.CalibrationPlan, journal: Path, options: calibrate_plan.CalibrateOptions, kept: Path | None
 ) -> tuple[calibrate_plan.Trial, tuple[calibrate_plan.Trial, ...]]:
     """Return the best trial, the first of equally good ones, and all that tie with it, the best among them."""
     tried: list[calibrate_plan.Trial] = []

@@ -4,13 +4,13 @@ import logging
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from math import ceil, exp, isfinite, log, log10, nan, sqrt
 from operator import eq
 from pathlib import Path
 from statistics import median
 from threading import RLock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -18,12 +18,15 @@ from blocksim.analysis.compare import interval
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError, OutputExistsError, Problem, ScenarioError
 from blocksim.extras import load_module
+from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides, scenario_hash, units
 from blocksim.scenario import units as q
 from blocksim.scenario.models.study import Normal, Uniform, Variation, toml_number
+from blocksim.silence import silent
 from blocksim.simulation import atomic, folder, provenance
+from blocksim.study import compare, vary
 from blocksim.study.executors.ensemble import Member
-from blocksim.study.plan import Variations, build_distributions, design_of
+from blocksim.study.plan import Values, Variations, build_distributions, design_of
 from blocksim.study.rows import Range, check_experiment, ranges_of, si_number, values_at
 
 if TYPE_CHECKING:
@@ -37,7 +40,6 @@ FRESH = "normal"  # independent draws, from streams of their own
 FIT, SCATTER = "--fit", "--scatter"
 MODE = "sobol"
 TABLE = "experiment.table"
-NO_FIT = "nothing to fit: give --fit KEY=FROM:TO"
 NO_SCATTER = (
     "no input scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO), or a [sweep] table with distributions; "
     "--samples 1 fits a single run, whose agreement may be chance"
@@ -183,24 +185,100 @@ class CalibrationPlan:
         }
 
 
-def calibration_plan(
-    document: Document,
-    fit: Variations,
-    scatter: Variations | None = None,
-    *,
-    experiment: Path | None = None,
-    members: int,
-    seed: int,
-) -> CalibrationPlan:
-    """Check what is asked for. Without `scatter`, the scenario's own [sweep] table counts where it has distributions.
+@dataclass(frozen=True)
+class Score:
+    """What the members of one ensemble come to."""
+
+    members: int
+    inside: int
+    failed: int
+    miss: float  # mean over all members
+
+    @property
+    def share_inside(self) -> float:
+        """Share of all members, also of failed ones, that are inside all ranges."""
+        return self.inside / self.members
+
+    @property
+    def value(self) -> float:
+        """The number to be maximised."""
+        return self.share_inside - self.miss / (2.0 * self.members)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % limits (Clopper-Pearson) of the probability behind this share, for members drawn independently."""
+        return interval(self.inside, self.members)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One set of values that was tried, as a scenario takes them, and what it came to; numbers count from 1."""
+
+    number: int
+    values: dict[str, object]
+    score: Score
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """What is fitted under which scatter, how long it is searched, and where the answer goes."""
+
+    fit: Annotated[
+        Mapping[str, Values],
+        vary.variations_option(
+            "A key to fit, and its prior. Repeatable.",
+            "KEY=FROM:TO",
+            'The priors by dotted key, as {"contact.restitution": {"from": 0.2, "to": 0.35}}.',
+            FIT,
+            vary.RANGE,
+        ),
+    ] = field(default_factory=dict)
+    scatter: Annotated[
+        Mapping[str, Values] | None,
+        vary.variations_option(
+            "Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
+            "Default: the distributions of [sweep].",
+            "KEY=MEAN+-SD",
+            "The distributions of inputs, {mean, sd} or {from, to} (default: those of [sweep]); of a fitted "
+            "key, about its fitted value.",
+            SCATTER,
+            vary.SPREAD,
+        ),
+    ] = None
+    _: KW_ONLY
+    trials: Annotated[int, Option("Number of trials.", metavar="N", least=1)] = 100
+    members: Annotated[
+        int,
+        Option("Samples of the scatter per trial.", flags=("--samples", "--members"), metavar="M", least=1),
+    ] = 64
+    fresh_members: Annotated[
+        int,
+        Option("Fresh samples for the final estimate of the probability.", flags=("--fresh",), metavar="M", least=1),
+    ] = 512
+    seed: Annotated[int, Option("Random seed.", metavar="S", least=0)] = 0
+    experiment: compare.ExperimentTablePath = None
+    out: Annotated[
+        Path | str | None,
+        Option("Scenario file to write (default: results/NAME/calibrate-HASH/scenario.toml).", metavar="FILE"),
+    ] = None
+    resume: Annotated[bool, Option("Resume with the existing trials.")] = False
+    overwrite: Annotated[bool, Option("Replace the file and the existing trials.")] = False
+    on_start: Callable[[str], None] = silent
+    on_trial: Callable[[Trial, Trial, int], None] = silent
+
+
+def calibration_plan(document: Document, options: CalibrateOptions) -> CalibrationPlan:
+    """Check what is asked for. Without scatter, the scenario's own [sweep] table counts where it has distributions.
 
     Raises ScenarioError for keys, priors and distributions that do not fit, InputMissingError without a table,
     InvalidInputError where the table does not go with the blocks, nothing is fitted, or nothing scatters though there
     is more than one member.
     """
+    fit, scatter = Variations.of(options.fit), Variations.of(options.scatter or {})
     if not fit:
-        raise InvalidInputError(NO_FIT)
-    if experiment is not None:
+        raise InvalidInputError("nothing to fit: give --fit KEY=FROM:TO")
+    if options.experiment is not None:
+        experiment = Path(options.experiment)
         load_table(experiment)  # so that its mistakes are reported of the option
         document = document.with_values({TABLE: input_files.user_value(TABLE, str(experiment.absolute()))})
     fits = build_distributions(document, fit, FIT, MODE)
@@ -216,17 +294,17 @@ def calibration_plan(
         raise InputMissingError(f"{document.source.where}: the scenario names no experiment; {how}")
     check_experiment(base)
     _refuse_unfit(fits, scattered, fit, scatter)
-    if scattered is None and members > 1:
+    if scattered is None and options.members > 1:
         raise InvalidInputError(NO_SCATTER)
     ends = {key: table["from"] if isinstance(table, Mapping) else None for key, table in fit.items()}
     priors = [prior_of(key, one, ends[key]) for key, one in fits.vary.items() if isinstance(one, Uniform)]
     table = load_table(base.experiment.table)
     return CalibrationPlan(
-        document, bare, base, tuple(priors), Scatter(scattered), table, ranges_of(table), members, seed
+        document, bare, base, tuple(priors), Scatter(scattered), table, ranges_of(table), options.members, options.seed
     )
 
 
-def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter: Variations | None) -> None:
+def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter: Variations) -> None:
     """Refuse priors that are no ranges, keys inside one another, and scatter that cannot be moved to a fitted value."""
     problems = []
     for key, values in fits.vary.items():
@@ -238,9 +316,8 @@ def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter
             for other in _related(key, fits.vary)
         ]
     fitted = {overrides.parse_key(key): values for key, values in fits.vary.items()}
-    texts = scatter.texts if scatter else {}
     for key, values in scattered.vary.items() if scattered is not None else ():
-        where = f"{SCATTER} {texts[key]}" if key in texts else f"[sweep] {key}"
+        where = f"{SCATTER} {scatter.texts[key]}" if key in scatter.texts else f"[sweep] {key}"
         prior = fitted.get(overrides.parse_key(key))
         if prior is not None and isinstance(values, tuple):
             problems.append(Problem(where, "this key is fitted; its scatter must be a distribution, not a list"))
@@ -267,31 +344,6 @@ PLAN = "plan"
 BEGINNING = b'{"op_code":0,'  # of a journal of optuna: a study is created
 VALUES = "values"
 SCORE = "score"
-
-
-@dataclass(frozen=True)
-class Score:
-    """What the members of one ensemble come to."""
-
-    members: int
-    inside: int
-    failed: int
-    miss: float  # mean over all members
-
-    @property
-    def share_inside(self) -> float:
-        """Share of all members, also of failed ones, that are inside all ranges."""
-        return self.inside / self.members
-
-    @property
-    def value(self) -> float:
-        """The number to be maximised."""
-        return self.share_inside - self.miss / (2.0 * self.members)
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % limits (Clopper-Pearson) of the probability behind this share, for members drawn independently."""
-        return interval(self.inside, self.members)
 
 
 @dataclass(frozen=True)
@@ -342,15 +394,6 @@ def miss_of(values: Sequence[float], ranges: Sequence[Range]) -> float:
 
 
 Evaluate = Callable[[Mapping[str, object]], Score]
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One set of values that was tried, as a scenario takes them, and what it came to; numbers count from 1."""
-
-    number: int
-    values: dict[str, object]
-    score: Score
 
 
 def search(priors: Sequence[Prior], evaluate: Evaluate, study: "Study", *, trials: int, seed: int) -> Iterator[Trial]:
