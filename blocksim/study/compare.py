@@ -48,12 +48,9 @@ def compare(
 ) -> Comparison | Judgement:
     """Compare a run, or a sweep or its folder, with an experiment table.
 
-    A run is what `compare_run` takes; `settings` are for sweeps. Raises what `compare` and
-    `compare_sweep` raise.
+    A run is what `compare_run` takes; `settings` are for sweeps. Raises what `compare_run` and `compare_sweep` raise.
     """
-    if isinstance(run, SweepResult):
-        return compare_sweep(run, experiment, settings)
-    if isinstance(run, Path | str) and manifest.is_sweep(run):
+    if isinstance(run, SweepResult) or (isinstance(run, Path | str) and manifest.is_sweep(run)):
         return compare_sweep(run, experiment, settings)
     return compare_run(run, experiment)
 

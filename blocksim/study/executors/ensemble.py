@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
 from queue import SimpleQueue
-from typing import NamedTuple
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
@@ -134,12 +133,7 @@ def _row_of(summary: Summary, final: frames.Columns) -> Row:
     return row_of(summary, summary.simulated_time_s, {} if moved is None else moved.row, final)
 
 
-class BatchResult(NamedTuple):
-    """Rows in the order of the scenarios, wall time (s), name of the machine."""
-
-    rows: tuple[Row, ...]
-    seconds: float
-    host: str
+BatchResult = tuple[tuple[Row, ...], float, str]  # rows in the order of the scenarios, wall time (s), machine
 
 
 def run_batch(scenarios: Sequence[Scenario], folders: Sequence[Path], code: str, *, peaks: bool = False) -> BatchResult:
@@ -158,4 +152,4 @@ def run_batch(scenarios: Sequence[Scenario], folders: Sequence[Path], code: str,
         if rows[-1]["status"] == INTERRUPTED:  # somebody has ended this process: no end of the case
             raise KeyboardInterrupt
     rows = rows or rows_of(scenarios, 1, peaks=peaks)
-    return BatchResult(tuple(rows), time.perf_counter() - began, platform.node())
+    return tuple(rows), time.perf_counter() - began, platform.node()
