@@ -20,7 +20,6 @@ from blocksim.errors import InputMissingError, InvalidInputError, OutputError, O
 from blocksim.extras import load_module
 from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides, scenario_hash, units
-from blocksim.scenario import units as q
 from blocksim.scenario.models.study import Normal, Uniform, Variation, toml_number
 from blocksim.silence import silent
 from blocksim.simulation import atomic, folder, provenance
@@ -93,7 +92,7 @@ class Prior:
 
 def prior_of(key: str, table: Uniform, written: object) -> Prior:
     """Return the prior that a distribution says; `written` is its lower end as the user wrote it, for the unit."""
-    unit = q.unit_in(written) if isinstance(written, str) else ""
+    unit = units.unit_in(written) if isinstance(written, str) else ""
     if not unit:
         return Prior(key, table.low, table.high, "rad" if table.angle else "", table.scale == "log")
     factor = float(units.parse_unit(unit).factor)

@@ -17,15 +17,13 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError, Problem, ScenarioError
 from blocksim.extras import load_module
-from blocksim.scenario import Document, Scenario, Sweep, scenario_hash
-from blocksim.scenario import units as q
+from blocksim.scenario import Document, Scenario, Sweep, scenario_hash, units
 from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fault
 from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.record import TABLED
 from blocksim.scenario.models.study import Normal, Uniform, Variation, round_digits, toml_number
 from blocksim.scenario.overrides import Override, format_key, freeze, parse_key, parse_value, with_value
-from blocksim.scenario.units import toml
 from blocksim.simulation.provenance import run_hash
 from blocksim.study.rows import Head, check_experiment, heads_of
 
@@ -101,7 +99,7 @@ def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Colum
     complaint = variation_fault(key)
     if unit is not None and not complaint:
         try:
-            q.parse_quantity(f"1 {unit}", q.LENGTH)
+            units.parse_quantity(f"1 {unit}", units.LENGTH)
         except ValueError as error:
             complaint = str(error)
     if complaint:
@@ -321,7 +319,7 @@ def with_sweep(
             table[key] = freeze(values)
         else:  # numbers of numpy as Python has them
             table[key] = tuple(one.item() if hasattr(one, "item") else one for one in values)
-        text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={toml(table[key])}"
+        text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={units.toml(table[key])}"
         label = f"--vary {text}" if isinstance(vary, Variations) else "vary"
         overrides.append(Override(label, text, ("sweep", key)))
     own = {"mode": mode, "samples": samples, "seed": seed}

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 from blocksim.analysis import compare, experiment
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Scenario, Sweep, place_bodies, units
-from blocksim.scenario import units as q
 from blocksim.simulation.frames import COLUMNS, Columns
 
 if TYPE_CHECKING:
@@ -115,24 +114,24 @@ def _unit(values: object) -> str:
     """Return the unit of a column: the first that was typed, where all values are numbers."""
     if not isinstance(values, tuple):
         return str(getattr(values, "unit", ""))
-    typed = next((unit for value in values if isinstance(value, str) and (unit := q.unit_in(value))), "")
+    typed = next((unit for value in values if isinstance(value, str) and (unit := units.unit_in(value))), "")
     if _is_angle(typed) and not all(isinstance(value, str) or value == 0 for value in values):
         return ""  # friction angles among friction coefficients: no unit holds for both
     numbers = all(
-        not isinstance(value, bool) and (isinstance(value, int | float) or bool(q.unit_in(str(value))))
+        not isinstance(value, bool) and (isinstance(value, int | float) or bool(units.unit_in(str(value))))
         for value in values
     )
     return typed if numbers else ""
 
 
 def _is_angle(unit: str) -> bool:
-    return bool(unit) and units.parse_unit(unit).dimension == q.ANGLE.dimension
+    return bool(unit) and units.parse_unit(unit).dimension == units.ANGLE.dimension
 
 
 def si_number(value: object) -> float:
     """Return a value as a scenario takes it in SI; NaN for what is no number."""
     if isinstance(value, str):
-        return q.parse_quantity(value)[0]
+        return units.parse_quantity(value)[0]
     return float(value) if isinstance(value, int | float) else math.nan
 
 
@@ -143,7 +142,7 @@ def as_cell(value: object) -> object:
     """
     if not isinstance(value, str) or not value.startswith(FORMULA):
         return value
-    for read in (float, lambda text: q.parse_quantity(text, q.NUMBER)):
+    for read in (float, lambda text: units.parse_quantity(text, units.NUMBER)):
         with suppress(ValueError):
             read(value)
             return value
