@@ -97,7 +97,7 @@ def _values(found: Fit) -> list[str]:
 
 def _probability(found: Fit) -> list[str]:
     score, tried = found.score, found.best.score
-    if found.plan.scatter.plan is None:
+    if found.plan.scatter is None:
         verdict = "inside all ranges" if score.inside else f"not inside all ranges ({score.miss:.3g} off)"
         return [f"one run, without input scatter: {verdict}"]
     low, high = score.interval

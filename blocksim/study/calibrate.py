@@ -169,7 +169,7 @@ class Fit:
                 }
                 for prior in self.plan.priors
             ],
-            "scatter": self.plan.scatter.described(),
+            "scatter": calibrate_plan.described(self.plan.scatter),
             "experiment": self.plan.table.source,
             "trials": self.trials,
             "members": self.plan.members,
@@ -216,9 +216,8 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
     _make_room(path, journal, resume=resume, overwrite=overwrite)
     kept = path if path.exists() and not overwrite else None
     best, ties = _searched(plan, journal, options, kept)
-    fresh = plan.scatter.members(
-        best.values, options.fresh_members if plan.scatter.plan else 1, plan.seed, calibrate_plan.FRESH
-    )
+    count = 1 if plan.scatter is None else options.fresh_members
+    fresh = calibrate_plan.members_of(plan.scatter, best.values, count, plan.seed, calibrate_plan.FRESH)
     members = list(run_members(plan.bare, fresh))
     score = calibrate_plan.score_of(members, plan.ranges)
     fit = Fit(plan, best, score, options.trials, path, calibrate_plan.hits_of(members, plan.ranges), ties)
@@ -262,9 +261,8 @@ def _searched(
     trials = options.trials
 
     def evaluate(values: Mapping[str, object]) -> calibrate_plan.Score:
-        return calibrate_plan.score_of(
-            run_members(plan.bare, plan.scatter.members(values, plan.members, plan.seed)), plan.ranges
-        )
+        members = calibrate_plan.members_of(plan.scatter, values, plan.members, plan.seed)
+        return calibrate_plan.score_of(run_members(plan.bare, members), plan.ranges)
 
     with calibrate_plan.open_journal(journal, plan.fingerprint()) as study, stopping.interruptible():
         done = len(calibrate_plan.finished_trials(study))
@@ -293,12 +291,12 @@ def _searched(
 def _provenance(fit: Fit) -> dict[str, str]:
     """Say of every fitted value where it comes from, and among which equally good ones it is one of several."""
     plan, score, table = fit.plan, fit.score, Path(fit.plan.table.source).name
-    if plan.scatter.plan is None:
+    if plan.scatter is None:
         inside = "inside" if score.inside else "not inside"
         found = f"seed {plan.seed}, {fit.trials} trials of one run, {inside} all ranges of {table}"
     else:
         low, high = score.interval
-        scatter = ", ".join(f"{key} {words}" for key, words in plan.scatter.described().items())
+        scatter = ", ".join(f"{key} {words}" for key, words in calibrate_plan.described(plan.scatter).items())
         found = (
             f"seed {plan.seed}, {fit.trials} trials of {plan.members} samples, P(inside all ranges) "
             f"{score.share_inside:.3f} [{low:.3f}, {high:.3f}] of {score.members} fresh samples, {table}, "

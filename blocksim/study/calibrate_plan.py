@@ -20,7 +20,7 @@ from blocksim.errors import InputMissingError, InvalidInputError, OutputError, O
 from blocksim.extras import load_module
 from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides, scenario_hash, units
-from blocksim.scenario.models.study import Normal, Uniform, Variation, toml_number
+from blocksim.scenario.models.study import Normal, Uniform, toml_number
 from blocksim.silence import silent
 from blocksim.simulation import atomic, folder, provenance
 from blocksim.study import compare, vary
@@ -100,35 +100,25 @@ def prior_of(key: str, table: Uniform, written: object) -> Prior:
     return Prior(key, low, high, unit, table.scale == "log")
 
 
-@dataclass(frozen=True)
-class Scatter:
-    """Distributions of scenario keys; `plan` is None where nothing scatters."""
+def members_of(
+    scatter: Sweep | None, fitted: Mapping[str, object], count: int, seed: int, mode: str = SAME
+) -> Iterator[dict[str, object]]:
+    """Yield the values of the members of a trial: the same points of the unit cube for every trial.
 
-    plan: Sweep | None
-
-    def members(
-        self, fitted: Mapping[str, object], count: int, seed: int, mode: str = SAME
-    ) -> Iterator[dict[str, object]]:
-        """Yield the values of the members of a trial: the same points of the unit cube for every trial.
-
-        In mode FRESH they are drawn independently, from random numbers that no trial has seen.
-        """
-        if self.plan is None:
-            yield from (dict(fitted) for _ in range(count))
-            return
-        plan = self.plan.model_copy(update={"mode": mode, "samples": count, "seed": seed})
-        names = {overrides.parse_key(key): key for key in fitted}
-        for row in design_of(plan):
-            values = dict(fitted)
-            for key, value in row.items():
-                name = names.get(overrides.parse_key(key), key)
-                about = plan.vary[key] if name in fitted else ()  # levels are refused when the plan is read
-                values[name] = value if isinstance(about, tuple) else centre_on_fit(about, value, fitted[name])
-            yield values
-
-    def described(self) -> dict[str, str]:
-        """Return every key with its distribution in words."""
-        return {} if self.plan is None else {key: in_words(values) for key, values in self.plan.vary.items()}
+    In mode FRESH they are drawn independently, from random numbers that no trial has seen.
+    """
+    if scatter is None:
+        yield from (dict(fitted) for _ in range(count))
+        return
+    plan = scatter.model_copy(update={"mode": mode, "samples": count, "seed": seed})
+    names = {overrides.parse_key(key): key for key in fitted}
+    for row in design_of(plan):
+        values = dict(fitted)
+        for key, value in row.items():
+            name = names.get(overrides.parse_key(key), key)
+            about = plan.vary[key] if name in fitted else ()  # levels are refused when the plan is read
+            values[name] = value if isinstance(about, tuple) else centre_on_fit(about, value, fitted[name])
+        yield values
 
 
 def centre_on_fit(distribution: Uniform | Normal, drawn: object, fitted: object) -> object:
@@ -146,15 +136,19 @@ def centre_on_fit(distribution: Uniform | Normal, drawn: object, fitted: object)
     return toml_number(moved, angle=distribution.angle)
 
 
-def in_words(values: Variation) -> str:
-    """Write a distribution for a message or for provenance, in SI."""
-    if isinstance(values, tuple):
-        return " or ".join(map(str, values))
-    table = values.as_table()
-    if "mean" in table:
-        bounds = f" in {table['from']}-{table['to']}" if {"from", "to"} <= set(table) else ""
-        return f"{table['mean']} +- {table['sd']}{bounds}"
-    return f"{table['from']} to {table['to']}" + (", log" if "scale" in table else "")
+def described(scatter: Sweep | None) -> dict[str, str]:
+    """Return every key with its distribution in words, in SI, for a message or for provenance."""
+    words = {}
+    for key, values in scatter.vary.items() if scatter else ():
+        table = {"levels": " or ".join(map(str, values))} if isinstance(values, tuple) else values.as_table()
+        if "mean" in table:
+            bounds = f" in {table['from']}-{table['to']}" if {"from", "to"} <= set(table) else ""
+            words[key] = f"{table['mean']} +- {table['sd']}{bounds}"
+        elif "from" in table:
+            words[key] = f"{table['from']} to {table['to']}" + (", log" if "scale" in table else "")
+        else:
+            words[key] = str(table["levels"])
+    return words
 
 
 @dataclass(frozen=True)
@@ -165,7 +159,7 @@ class CalibrationPlan:
     bare: Document  # the same without [sweep], which no member needs
     base: Scenario
     priors: tuple[Prior, ...]
-    scatter: Scatter
+    scatter: Sweep | None  # None where nothing scatters
     table: ExperimentTable
     ranges: tuple[Range, ...]  # that members are judged by
     members: int
@@ -176,7 +170,7 @@ class CalibrationPlan:
         return {
             "scenario": scenario_hash(self.base),
             "priors": [str((one.key, one.low, one.high, one.unit, one.log)) for one in self.priors],
-            "scatter": None if self.scatter.plan is None else str(self.scatter.plan.as_table()),
+            "scatter": None if self.scatter is None else str(self.scatter.as_table()),
             "experiment": atomic.sha256_of(Path(self.table.source)),
             "members": self.members,
             "seed": self.seed,
@@ -299,7 +293,7 @@ def calibration_plan(document: Document, options: CalibrateOptions) -> Calibrati
     priors = [prior_of(key, one, ends[key]) for key, one in fits.vary.items() if isinstance(one, Uniform)]
     table = load_table(base.experiment.table)
     return CalibrationPlan(
-        document, bare, base, tuple(priors), Scatter(scattered), table, ranges_of(table), options.members, options.seed
+        document, bare, base, tuple(priors), scattered, table, ranges_of(table), options.members, options.seed
     )
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from blocksim.scenario import Sweep
 from blocksim.scenario.models.study import Normal, Uniform
-from blocksim.study.calibrate_plan import FRESH, Prior, Scatter, centre_on_fit, prior_of
+from blocksim.study.calibrate_plan import FRESH, Prior, centre_on_fit, members_of, prior_of
 from blocksim.study.rows import si_number
 
 FRICTION = Prior("friction.block_block.kinetic", 0.17, 0.31)
@@ -59,23 +59,23 @@ def test_si_number_of_values_with_and_without_unit() -> None:
 SCATTERED, KINETIC = "structures.0.overlap", "friction.block_block.kinetic"
 
 
-def scatter(**tables: object) -> Scatter:
+def scatter(**tables: object) -> Sweep:
     keys = {"overlap": SCATTERED, "kinetic": KINETIC}
-    return Scatter(Sweep.model_validate({"mode": "sobol", **{keys[name]: table for name, table in tables.items()}}))
+    return Sweep.model_validate({"mode": "sobol", **{keys[name]: table for name, table in tables.items()}})
 
 
 NORMAL = scatter(overlap={"mean": "10 mm", "sd": "0.3 mm"}, kinetic={"from": 0.18, "to": 0.2})
 
 
 def test_every_trial_has_the_same_points() -> None:
-    one, other = (list(NORMAL.members({"contact.restitution": e}, 16, 5)) for e in (0.2, 0.3))
+    one, other = (list(members_of(NORMAL, {"contact.restitution": e}, 16, 5)) for e in (0.2, 0.3))
     assert [row[SCATTERED] for row in one] == [row[SCATTERED] for row in other]
     assert len({row[SCATTERED] for row in one}) == 16
     assert {row["contact.restitution"] for row in other} == {0.3}
 
 
 def test_fitted_key_scatters_about_its_fitted_value() -> None:
-    rows = list(NORMAL.members({KINETIC: 0.25}, 256, 5))
+    rows = list(members_of(NORMAL, {KINETIC: 0.25}, 256, 5))
     values = np.array([float(str(row[KINETIC])) for row in rows])
     assert values.mean() == pytest.approx(0.25, abs=1e-4)
     assert 0.24 <= values.min() < 0.241
@@ -84,7 +84,7 @@ def test_fitted_key_scatters_about_its_fitted_value() -> None:
 
 
 def test_fitted_key_written_with_other_quotes_is_the_same_key() -> None:
-    rows = list(NORMAL.members({'friction."block_block".kinetic': 0.25}, 4, 5))
+    rows = list(members_of(NORMAL, {'friction."block_block".kinetic': 0.25}, 4, 5))
     assert all(len(row) == 2 for row in rows)
 
 
@@ -109,12 +109,12 @@ def test_scatter_is_moved_to_the_fitted_value(
 
 
 def test_fresh_members_are_others_of_the_same_distribution() -> None:
-    tried = [float(str(row[SCATTERED])) for row in NORMAL.members({}, 64, 5)]
-    fresh = [float(str(row[SCATTERED])) for row in NORMAL.members({}, 4096, 5, FRESH)]
+    tried = [float(str(row[SCATTERED])) for row in members_of(NORMAL, {}, 64, 5)]
+    fresh = [float(str(row[SCATTERED])) for row in members_of(NORMAL, {}, 4096, 5, FRESH)]
     assert not set(tried) & set(fresh)
     assert np.mean(fresh) == pytest.approx(0.01, abs=3 * 0.0003 / 64)
     assert np.std(fresh) == pytest.approx(0.0003, rel=0.05)
 
 
 def test_without_scatter_all_members_are_the_fitted_values() -> None:
-    assert list(Scatter(None).members({KINETIC: 0.2}, 2, 0)) == [{KINETIC: 0.2}, {KINETIC: 0.2}]
+    assert list(members_of(None, {KINETIC: 0.2}, 2, 0)) == [{KINETIC: 0.2}, {KINETIC: 0.2}]
