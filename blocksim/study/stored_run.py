@@ -5,10 +5,8 @@ Finished, failed, stopped, killed or still in progress.
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored, spelling
@@ -92,37 +90,16 @@ def _run_in(place: Path, needed: Sequence[str]) -> Path:
     raise InputMissingError(f"{place}: no finished run in this folder; blocksim run SCENARIO makes one")
 
 
-@dataclass(frozen=True)
-class StoredRun:
+class StoredRun(NamedTuple):
     """What a run has left so far."""
 
     folder: Path
     scenario: Scenario
     frames: Frames
-    choice: str = ""
-
-    @cached_property
-    def events(self) -> tuple[EventRecord, ...]:
-        """The events that have happened; none where run.json is missing or damaged."""
-        with suppress(BlocksimError):
-            return read_summary(self.folder / files.SUMMARY).events
-        return ()
-
-    @cached_property
-    def remark(self) -> str:
-        """What somebody who examines the frames has to know; empty for a finished run that was meant for certain."""
-        if not (self.folder / files.SUMMARY).is_file():
-            state = "this run was killed or is still running"
-        else:
-            try:
-                summary = read_summary(self.folder / files.SUMMARY)
-            except BlocksimError:
-                state = f"{files.SUMMARY} of this run is damaged"
-            else:
-                if summary.status == FINISHED:
-                    return self.choice
-                state = ending_text(summary.status, summary.reason)
-        return f"{self.folder}: {state}; its {len(self.frames)} frames end at {float(self.frames.time[-1]):.4g} s"
+    events: tuple[EventRecord, ...]  # that have happened; none where run.json is missing or damaged
+    remark: (
+        str  # what one who examines the frames has to know; empty for a finished run that was meant for certain
+    )
 
 
 def load_stored_run(place: Path | str) -> StoredRun:
@@ -132,7 +109,17 @@ def load_stored_run(place: Path | str) -> StoredRun:
     """
     folder = find_run(place, needed=(files.SCENARIO, files.FRAMES))
     scenario = load_stored(folder / files.SCENARIO)
-    return StoredRun(folder, scenario, read_frames(folder / files.FRAMES, scenario), choice(Path(place), folder))
+    frames = read_frames(folder / files.FRAMES, scenario)
+    events: tuple[EventRecord, ...] = ()
+    state = "this run was killed or is still running"
+    if (folder / files.SUMMARY).is_file():
+        state = f"{files.SUMMARY} of this run is damaged"
+        with suppress(BlocksimError):
+            summary = read_summary(folder / files.SUMMARY)
+            is_whole, events = summary.status == FINISHED, summary.events
+            state = "" if is_whole else ending_text(summary.status, summary.reason)
+    end = f"{folder}: {state}; its {len(frames)} frames end at {float(frames.time[-1]):.4g} s"
+    return StoredRun(folder, scenario, frames, events, end if state else choice(Path(place), folder))
 
 
 def choice(place: Path, folder: Path) -> str:
