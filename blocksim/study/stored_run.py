@@ -97,9 +97,7 @@ class StoredRun(NamedTuple):
     scenario: Scenario
     frames: Frames
     events: tuple[EventRecord, ...]  # that have happened; none where run.json is missing or damaged
-    remark: (
-        str  # what one who examines the frames has to know; empty for a finished run that was meant for certain
-    )
+    remark: str  # for whoever examines the frames; empty for a finished run that was meant for certain
 
 
 def load_stored_run(place: Path | str) -> StoredRun:
