@@ -305,8 +305,9 @@ def with_sweep(
     *,
     samples: int | None = None,
     seed: int | None = None,
+    option: str = "--vary",
 ) -> Document:
-    """Return the document with another [sweep] table; mistakes in it are shown at the texts of Variations.
+    """Return the document with another [sweep] table; mistakes in it are shown at the texts given to an option.
 
     Without `vary`, the document keeps the keys of its own table. Where the mode is "table", the file is read and its
     columns take its place as lists. Raises ScenarioError, InputMissingError or InvalidInputError for a wrong table.
@@ -320,10 +321,9 @@ def with_sweep(
         else:  # numbers of numpy as Python has them
             table[key] = tuple(one.item() if hasattr(one, "item") else one for one in values)
         text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={units.toml(table[key])}"
-        label = f"--vary {text}" if isinstance(vary, Variations) else "vary"
+        label = f"{option} {text}" if isinstance(vary, Variations) else "vary"
         overrides.append(Override(label, text, ("sweep", key)))
-    own = {"mode": mode, "samples": samples, "seed": seed}
-    for name, value in own.items():
+    for name, value in {"mode": mode, "samples": samples, "seed": seed}.items():
         if value is not None and table:
             table[name] = value
             label = f"--{name}" if isinstance(vary, Variations) else name
@@ -418,12 +418,7 @@ def build_distributions(document: Document, given: Variations, option: str, mode
 
     Raises ScenarioError that shows each mistake in the text given to `option`.
     """
-    labelled = with_sweep(document, given, mode)
-    overrides = [
-        replace(one, label=one.label.replace("--vary", option, 1)) if one.path[:1] == ("sweep",) else one
-        for one in labelled.overrides
-    ]
-    return cast("Sweep", replace(labelled, overrides=tuple(overrides)).build().sweep)  # it was just put there
+    return cast("Sweep", with_sweep(document, given, mode, option=option).build().sweep)  # it was just put there
 
 
 @dataclass(frozen=True)
