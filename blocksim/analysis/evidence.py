@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.analysis.compare import limits
-from blocksim.analysis.experiment import MOST_NAMES, QUANTITIES, ExperimentTable, Statistics
+from blocksim.analysis import compare, experiment
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import list_names
 
@@ -75,7 +74,7 @@ class Members:
     @property
     def blocks(self) -> tuple[str, ...]:
         """The blocks with any result, in the order of the columns."""
-        ends = tuple(f".{quantity.final_column}" for quantity in QUANTITIES.values())
+        ends = tuple(f".{quantity.final_column}" for quantity in experiment.QUANTITIES.values())
         names = (str(name) for name in self.table.columns)
         return tuple(dict.fromkeys(name.rpartition(".")[0] for name in names if name.endswith(ends)))
 
@@ -108,7 +107,7 @@ class Members:
 
 
 def _column(block: str, quantity: str) -> str:
-    return f"{block}.{QUANTITIES[quantity].final_column}"
+    return f"{block}.{experiment.QUANTITIES[quantity].final_column}"
 
 
 Floats = NDArray[np.float64]
@@ -141,7 +140,7 @@ class Column:
 class Pair:
     """One measured quantity of one block: m repeats, and the value of each of n members (NaN: none)."""
 
-    measured: Statistics
+    measured: experiment.Statistics
     repeats: dict[int, float]  # by replicate, ascending
     values: Floats = field(repr=False)
 
@@ -158,7 +157,7 @@ class Pair:
     @property
     def limits(self) -> Interval:
         """The limits of inside, as for a single run."""
-        return limits(self.measured.quantity, self.measured.mean, self.measured.minimum, self.measured.maximum)
+        return compare.limits(self.measured.quantity, self.measured.mean, self.measured.minimum, self.measured.maximum)
 
     @property
     def inside(self) -> NDArray[np.bool_]:
@@ -185,7 +184,7 @@ class Evidence:
     """Input of the metrics; `u_num` is the standard uncertainty (mm) of the numerical solution."""
 
     members: Members
-    table: ExperimentTable
+    table: experiment.ExperimentTable
     u_num: float
 
     @cached_property
@@ -239,5 +238,5 @@ def complete_repeats(pairs: Sequence[Pair]) -> tuple[Floats, str]:
     every = sorted({replicate for pair in pairs for replicate in pair.repeats})
     complete = [replicate for replicate in every if all(replicate in pair.repeats for pair in pairs)]
     rows = [[pair.repeats[replicate] for pair in pairs] for replicate in complete]
-    others = list_names(sorted(set(every) - set(complete)), MOST_NAMES)
+    others = list_names(sorted(set(every) - set(complete)), experiment.MOST_NAMES)
     return np.array(rows, dtype=float).reshape(len(rows), len(pairs)), others

@@ -8,9 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from blocksim.errors import InvalidInputError, Problem
-from blocksim.scenario.input_files import Cell, Table, raise_problems, read_table
-from blocksim.scenario.spelling import list_names, suggestion
-from blocksim.scenario.units import unit_factor
+from blocksim.scenario import input_files, spelling, units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,7 +75,7 @@ class ExperimentTable:
     source: str
     notes: tuple[str, ...] = ()
     missing: tuple[Measurement, ...] = ()
-    places: Mapping[str, Cell] = field(default_factory=dict, repr=False)
+    places: Mapping[str, input_files.Cell] = field(default_factory=dict, repr=False)
 
     @property
     def data(self) -> "pd.DataFrame":
@@ -118,7 +116,7 @@ class ExperimentTable:
             if block in self.places
         ]
         if located:
-            raise_problems(located)
+            input_files.raise_problems(located)
         if unknown:
             message = f"{self.source} measures block {quote_names(unknown)}, {known}"
             raise InvalidInputError(message)
@@ -155,7 +153,7 @@ class ExperimentTable:
 
 def quote_names(names: Sequence[str]) -> str:
     """List names for a message, a long list cut short."""
-    return list_names([f"'{name}'" for name in names], MOST_NAMES)
+    return spelling.list_names([f"'{name}'" for name in names], MOST_NAMES)
 
 
 def _frame(rows: Iterable[Any]) -> "pd.DataFrame":
@@ -172,7 +170,7 @@ def load_table(path: Path | str) -> ExperimentTable:
     Raises InputMissingError when the file cannot be read and InvalidInputError with every mistake, located by line and
     column.
     """
-    table = read_table(Path(path), COLUMNS)
+    table = input_files.read_table(Path(path), COLUMNS)
     rows = []
     first_lines: dict[tuple[str, str, int], int] = {}
     for row in table.rows:
@@ -193,19 +191,19 @@ def load_table(path: Path | str) -> ExperimentTable:
             message = f"block '{one.block}', {one.quantity} has no value in any replicate"
             table.problems.append(row["value"].problem(message))
     if table.problems:
-        raise_problems(table.problems)
+        input_files.raise_problems(table.problems)
     missing = tuple(one for one, _ in rows if not isfinite(one.value))
     places = {row["block"].text: row["block"] for row in reversed(table.rows)}
     return ExperimentTable(measured, str(path), table.notes, missing, places)
 
 
-def _refuse_empty(table: Table) -> None:
+def _refuse_empty(table: input_files.Table) -> None:
     """Record a problem if there is no row, and no other problem that says why."""
     if not table.rows and not table.problems:
         table.problems.append(table.header.problem("the table has a header and no rows"))
 
 
-def _measurement(row: dict[str, Cell], problems: list[Problem]) -> Measurement | None:
+def _measurement(row: dict[str, input_files.Cell], problems: list[Problem]) -> Measurement | None:
     """Check one row; None after recording its problems. The value is NaN for an empty cell."""
     before = len(problems)
     block, number, unit, cell = (row[name] for name in ("block", "replicate", "unit", "value"))
@@ -215,12 +213,14 @@ def _measurement(row: dict[str, Cell], problems: list[Problem]) -> Measurement |
     elif len(block.text) > LONGEST_NAME:
         problems.append(block.problem(f"the name has {len(block.text)} characters, at most {LONGEST_NAME}"))
     if quantity is None:
-        complaint = f"unknown quantity '{row['quantity'].text}', {suggestion(row['quantity'].text, tuple(QUANTITIES))}"
+        complaint = (
+            f"unknown quantity '{row['quantity'].text}', {spelling.suggestion(row['quantity'].text, tuple(QUANTITIES))}"
+        )
         problems.append(row["quantity"].problem(complaint))
     is_number = number.text.isascii() and number.text.isdigit() and len(number.text) <= len(str(LARGEST_REPLICATE))
     if not is_number or not 1 <= int(number.text) <= LARGEST_REPLICATE:
         problems.append(number.problem(f"'{number.text}' is not a repeat number; count repeats as 1, 2, 3, ..."))
-    factor = 1.0 if quantity is None else unit_factor(unit.text, quantity.unit)
+    factor = 1.0 if quantity is None else units.unit_factor(unit.text, quantity.unit)
     if quantity is not None and factor is None:
         kind, allowed = ("an angle", "deg or rad") if quantity.unit == "deg" else ("a length", "mm, cm or m")
         found = f"'{unit.text}' is not the unit of {kind}" if unit.text else "no unit"
@@ -278,19 +278,19 @@ def load_properties(path: Path | str) -> PropertyTable:
 
     Raises InputMissingError when the file cannot be read and InvalidInputError with every mistake located.
     """
-    table = read_table(Path(path), PROPERTY_COLUMNS)
+    table = input_files.read_table(Path(path), PROPERTY_COLUMNS)
     values: dict[str, float] = {}
     for row in table.rows:
         cell, unit = row["property"], row["unit"]
         name = cell.text
         if name not in PROPERTIES:
-            complaint = f"unknown property '{name}', {suggestion(name, tuple(PROPERTIES))}"
+            complaint = f"unknown property '{name}', {spelling.suggestion(name, tuple(PROPERTIES))}"
             table.problems.append(cell.problem(complaint))
             continue
         if name in values:
             table.problems.append(cell.problem(f"'{name}' is given twice"))
         interval = PROPERTIES[name]
-        factor = unit_factor(unit.text, interval.unit)
+        factor = units.unit_factor(unit.text, interval.unit)
         if factor is None:
             found = f"'{unit.text}'" if unit.text else "nothing"
             table.problems.append(unit.problem(f"{found} is not a unit of {name}, write for example {interval.unit}"))
@@ -301,7 +301,7 @@ def load_properties(path: Path | str) -> PropertyTable:
             table.problems.append(row["value"].problem(str(error)))
     _refuse_empty(table)
     if table.problems:
-        raise_problems(table.problems)
+        input_files.raise_problems(table.problems)
     return PropertyTable(values=MappingProxyType(values), source=str(path), notes=table.notes)
 
 

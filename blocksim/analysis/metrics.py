@@ -9,14 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.analysis.compare import (
-    CONFIDENCE,
-    data_uncertainty,
-    interval,
-    lower_bound,
-    prediction_half_width,
-    quantile,
-)
+from blocksim.analysis import compare
 from blocksim.analysis.evidence import (
     BLOCK,
     Column,
@@ -73,7 +66,7 @@ def _find_outcome(evidence: Evidence) -> Findings:
         row: Row = {"outcome": name, "members": found[name], "of": found.total(), **_share(found[name], found.total())}
         row |= dict.fromkeys(("measured", "repeats", "lower_bound"), None)
         if seen[name]:
-            bound = lower_bound(seen[name], seen.total())
+            bound = compare.lower_bound(seen[name], seen.total())
             row |= {"measured": seen[name], "repeats": seen.total(), "lower_bound": bound}
         rows.append(row)
     messages = ["blocks: " + ", ".join(blocks)]
@@ -85,7 +78,7 @@ def _find_outcome(evidence: Evidence) -> Findings:
 
 
 def _share(count: int, total: int) -> Row:
-    return {"share": count / total, "interval": interval(count, total)}
+    return {"share": count / total, "interval": compare.interval(count, total)}
 
 
 OUTCOME = Metric(
@@ -140,7 +133,7 @@ def _find_predicted(evidence: Evidence) -> Findings:
     total = evidence.members.count
     rows: list[Row] = []
     for pair in (pair for pair in evidence.lengths if pair.scatters):
-        half = prediction_half_width(pair.measured.s, pair.measured.n)
+        half = compare.prediction_half_width(pair.measured.s, pair.measured.n)
         ends = (pair.measured.mean - half, pair.measured.mean + half)
         count = int(pair.between(ends).sum())
         rows.append({**pair.head, "prediction": ends, "inside": count, "of": total, **_share(count, total)})
@@ -183,7 +176,7 @@ def _find_validation(evidence: Evidence) -> Findings:
         simulated = float(np.mean(values)) if values.size else nan
         error = simulated - measured.mean
         u_input = float(np.std(values, ddof=1)) if values.size >= ENOUGH else nan
-        u_data = data_uncertainty(measured.s, measured.n)
+        u_data = compare.data_uncertainty(measured.s, measured.n)
         u_val = hypot(u_num, u_input, u_data)
         row: Row = {**pair.head, "members": int(values.size), "S": simulated, "D": measured.mean, "E": error}
         row |= {"u_num": u_num, "u_input": u_input, "u_D": u_data, "u_val": u_val}
@@ -246,7 +239,9 @@ def area_interval(members: Floats, repeats: Floats, resamples: int = RESAMPLES, 
     samples = ([places[random.integers(0, places.size, places.size)] for places in both] for _ in range(resamples))
     areas = [_area(widths, *sample) for sample in samples]
     area = _area(widths, *both)
-    widened = NormalDist().cdf(quantile(0.5 * (1.0 + CONFIDENCE), smaller - 1) * sqrt(smaller / (smaller - 1)))
+    widened = NormalDist().cdf(
+        compare.quantile(0.5 * (1.0 + compare.CONFIDENCE), smaller - 1) * sqrt(smaller / (smaller - 1))
+    )
     half = max(float(np.quantile(areas, widened)) - area, 0.0)
     return max(area - half, 0.0), area + half
 
@@ -311,7 +306,7 @@ def hotelling(repeats: Floats, members: Floats) -> Hotelling | None:
         return None
     scale = degrees * p / rest
     special = load_module("scipy.special", "judging a sweep")
-    critical = scale * float(special.fdtri(p, rest, CONFIDENCE))
+    critical = scale * float(special.fdtri(p, rest, compare.CONFIDENCE))
     return Hotelling(squared, squared / scale, float(p), rest, critical, float(special.fdtrc(p, rest, squared / scale)))
 
 

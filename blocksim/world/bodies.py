@@ -19,20 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.common.arrays import (
-    ALL,
-    BODY,
-    CORNER,
-    DRIVEN,
-    MOVED,
-    OUTLINE,
-    PARTICLE,
-    SLOTS,
-    SUPPORT,
-    Record,
-    Records,
-    zeros,
-)
+from blocksim.kernels.common import arrays
 from blocksim.kernels.explicit.models.particles import PER_PARTICLE
 from blocksim.kernels.explicit.outlines import WIDEST_CONE
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
@@ -54,7 +41,7 @@ Corners = tuple[tuple[float, float], ...]  # m, counter-clockwise about the cent
 class Shapes(NamedTuple):
     """The shapes of a scene, and where each of its bodies has its corners."""
 
-    table: Records  # (q,) CORNER
+    table: arrays.Records  # (q,) CORNER
     firsts: tuple[int, ...]  # (n + 1,) of blocks, pieces of ground and the half-plane
     sizes: tuple[int, ...]  # (n + 1,) numbers of corners
     inner: Mapping[Corners, float]  # m: from the centroid of a block to the nearest face
@@ -84,7 +71,7 @@ def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]
         for (x, y), (nx, ny) in zip(corners, NORMALS, strict=True):
             side = (half_y, half_x) if nx == 0.0 else (half_x, half_y)
             rows.append((x, y, nx, ny, *side, 0.0, 1.0, 0.0, 0.0, WIDEST_CONE))
-    table = zeros(len(rows), CORNER)
+    table = arrays.zeros(len(rows), arrays.CORNER)
     for name, column in zip(FIELDS, zip(*rows, strict=True), strict=True):
         table[name] = column
     sizes = (*map(len, blocks), *[len(CORNERS)] * (len(firsts) - len(blocks)))
@@ -127,7 +114,7 @@ def cone_of(corners: Corners) -> float:
     return min(WIDEST_CONE, math.sin(0.5 * min(turns)), math.sin(0.5 * (math.pi - max(turns))))
 
 
-def place_particles(bodies: Records, model: str, spacing: float) -> Records:
+def place_particles(bodies: arrays.Records, model: str, spacing: float) -> arrays.Records:
     """Give every body its boundary particles: fills its row and range fields and returns the particles of all.
 
     `spacing` (m) is the largest distance of neighbours; bodies of equal sides share their particles. `model` is
@@ -135,10 +122,10 @@ def place_particles(bodies: Records, model: str, spacing: float) -> Records:
     kernel also its free ends, which blocks can land on.
     """
     inset = 0.0 if model == "kernel" else 0.5 * spacing
-    known: dict[tuple[float, ...], tuple[int, Records]] = {}
+    known: dict[tuple[float, ...], tuple[int, arrays.Records]] = {}
     total = 0
     for body in bodies[:-1]:
-        is_block = body.faces == ALL
+        is_block = body.faces == arrays.ALL
         body.row_x = division(2.0 * (body.half_x - inset), spacing) if is_block else 1
         body.row_y = division(2.0 * (body.half_y - inset), spacing) if is_block else 1
         key = (body.half_x, body.half_y, body.faces, body.corners)
@@ -146,13 +133,13 @@ def place_particles(bodies: Records, model: str, spacing: float) -> Records:
             known[key] = (total, _edge_particles(body, inset) if is_block else _end_particles(body, inset))
             total += known[key][1].size
         body.first_particle, body.particle_count = known[key][0], known[key][1].size
-    particles = zeros(total, PARTICLE)
+    particles = arrays.zeros(total, arrays.PARTICLE)
     for first, part in known.values():
         particles[first : first + part.size] = part
     return particles
 
 
-def _edge_particles(body: Record, inset: float) -> Records:
+def _edge_particles(body: arrays.Record, inset: float) -> arrays.Records:
     """Return the particles of a block, counter-clockwise from the lower left corner.
 
     Without an `inset` (m) four rows on the true edge, both ends of each included: half an interval is tributary to an
@@ -164,7 +151,7 @@ def _edge_particles(body: Record, inset: float) -> Records:
     sides = [2.0 * (side - inset) for side in (body.half_x, body.half_y)] * 2
     parts = []
     for k, (normal, count) in enumerate(zip(NORMALS, counts, strict=True)):
-        row = zeros(count + ends, PARTICLE)
+        row = arrays.zeros(count + ends, arrays.PARTICLE)
         begin, end = np.array(CORNERS[k]), np.array(CORNERS[(k + 1) % 4])
         way = (end - begin) * (np.arange(row.size) / count)[:, None]
         places = (begin + way) * (body.half_x - inset, body.half_y - inset)
@@ -184,10 +171,10 @@ def _edge_particles(body: Record, inset: float) -> Records:
     return np.concatenate(parts).view(np.recarray)
 
 
-def _end_particles(body: Record, inset: float) -> Records:
+def _end_particles(body: arrays.Record, inset: float) -> arrays.Records:
     """Return the particles at the free ends of a piece of ground; discs, which have an inset, do not see them."""
     ends = [] if inset else [k for k in (2, 3) if body.corners >> k & 1]
-    row = zeros(len(ends), PARTICLE)
+    row = arrays.zeros(len(ends), arrays.PARTICLE)
     for particle, k in zip(row, ends, strict=True):
         particle.x, particle.y = CORNERS[k][0] * body.half_x, body.half_y
         particle.ny = particle.my = 1.0
@@ -195,10 +182,10 @@ def _end_particles(body: Record, inset: float) -> Records:
     return row
 
 
-def slots_of_a_pair(bodies: Records, model: str) -> int:
+def slots_of_a_pair(bodies: arrays.Records, model: str) -> int:
     """Return how many contact slots the pair of the two largest bodies needs."""
     most = int(bodies["particle_count"].max())
-    return {"surface": SLOTS, "kernel": 2 * most, "particles": PER_PARTICLE * most}[model]
+    return {"surface": arrays.SLOTS, "kernel": 2 * most, "particles": PER_PARTICLE * most}[model]
 
 
 def division(side: float, spacing: float) -> int:
@@ -217,7 +204,7 @@ class Layout(NamedTuple):
     interactions: Interactions
     drives: Drives
     applied: LoadArrays
-    slabs: Records  # (s,) BODY: the pieces of ground and walls
+    slabs: arrays.Records  # (s,) BODY: the pieces of ground and walls
     shapes: Shapes | None
 
     @property
@@ -253,9 +240,9 @@ def _slab_records(
     placed: Sequence[PlacedBody],
     segments: Sequence[PlacedSegment],
     classes: Sequence[ContactClass],
-) -> Records:
+) -> arrays.Records:
     """Return every piece of ground as a slab below its line, longer where it must leave no crack."""
-    slabs = zeros(len(segments), BODY)
+    slabs = arrays.zeros(len(segments), arrays.BODY)
     if not segments:
         return slabs
     thickness = max(SLAB_SHARE * length_beside(smallest_width(placed)), 2.0 * (scenario.contact.max_overlap or 0.0))
@@ -278,15 +265,15 @@ def _slab_records(
     return slabs
 
 
-def body_records(layouts: Sequence[Layout]) -> Records:
+def body_records(layouts: Sequence[Layout]) -> arrays.Records:
     """Return the records (m, n + 1) of blocks, pieces and half-plane of scenes of one shape.
 
     With a profile the half-plane is out of reach. The ground's face still has the length of the block above it.
     """
     blocks = len(layouts[0].placed)
-    bodies = zeros((len(layouts), blocks + len(layouts[0].segments) + 1), BODY)
+    bodies = arrays.zeros((len(layouts), blocks + len(layouts[0].segments) + 1), arrays.BODY)
     bodies["cos"] = 1.0  # the half-plane's, last
-    bodies["faces"] = bodies["corners"] = ALL
+    bodies["faces"] = bodies["corners"] = arrays.ALL
     _fill_blocks(bodies[:, :blocks], layouts)
     for records, layout in zip(bodies, layouts, strict=True):
         if layout.segments:
@@ -300,11 +287,11 @@ def body_records(layouts: Sequence[Layout]) -> Records:
                     axes = zip(*body.outline, strict=True)
                     record["half_x"], record["half_y"] = (max(map(abs, axis)) for axis in axes)
                     record["radius"] = body.radius
-                    record["faces"] = OUTLINE
+                    record["faces"] = arrays.OUTLINE
     has_profile = [layout.scenario.ground.profile is not None for layout in layouts]
     bodies["y"][has_profile, -1] = -math.inf
-    bodies["is_moved"] = np.where(bodies["inverse_mass"] == 0.0, SUPPORT, 0)
-    bodies["is_moved"][:, layouts[0].drives.driven["body"]] = DRIVEN
+    bodies["is_moved"] = np.where(bodies["inverse_mass"] == 0.0, arrays.SUPPORT, 0)
+    bodies["is_moved"][:, layouts[0].drives.driven["body"]] = arrays.DRIVEN
     return bodies
 
 
@@ -337,15 +324,15 @@ def _fill_blocks(records: NDArray[np.record], layouts: Sequence[Layout]) -> None
     )
 
 
-def moved_records(bodies: Records, layouts: Sequence[Layout]) -> Records:
+def moved_records(bodies: arrays.Records, layouts: Sequence[Layout]) -> arrays.Records:
     """Return where all bodies of scenes (m, n + 1) start that move with the supports, then all that are driven, (m, f).
 
     In every scene there are equally many.
     """
     driven = layouts[0].drives.driven.size
-    numbers = np.nonzero(bodies["is_moved"] == SUPPORT)[-1].reshape(len(bodies), -1)
+    numbers = np.nonzero(bodies["is_moved"] == arrays.SUPPORT)[-1].reshape(len(bodies), -1)
     count = numbers.shape[1]
-    records = zeros((len(bodies), count + driven), MOVED)
+    records = arrays.zeros((len(bodies), count + driven), arrays.MOVED)
     records["body"][:, :count] = numbers
     for name in ("x", "y"):
         records[name][:, :count] = np.take_along_axis(bodies[name], numbers, -1)

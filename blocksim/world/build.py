@@ -15,33 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.common.arrays import (
-    ACTION,
-    CLOCK,
-    CONTACT,
-    CONTACTS,
-    CONTROLS,
-    GROUP,
-    HALF,
-    LEDGER,
-    OPERATOR,
-    PAIR,
-    PARTICLE_CONTACT,
-    POINT,
-    SHARE,
-    SLOTS,
-    TEAM_WORDS,
-    Records,
-    World,
-    zeros,
-)
+from blocksim.kernels.common import arrays
 from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
 from blocksim.kernels.explicit.broad_phase import TRAVELLED
 from blocksim.kernels.explicit.laws import LAW_CODES
 from blocksim.kernels.explicit.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
-from blocksim.scenario import PlacedBody, Scenario
-from blocksim.scenario.motion import motion_direction
+from blocksim.scenario import PlacedBody, Scenario, motion
 from blocksim.world.bodies import Layout, body_records, layout_of, moved_records, place_particles, slots_of_a_pair
 from blocksim.world.interactions import interaction_tables
 from blocksim.world.memory import Size, refuse_if_too_large, scene_size
@@ -66,9 +46,9 @@ class Parts(NamedTuple):
     """What m scenes of one shape consist of, whatever the scheme."""
 
     layouts: Sequence[Layout]
-    bodies: Records  # (m, n + 1) BODY
+    bodies: arrays.Records  # (m, n + 1) BODY
     cell_radius: Floats  # (m,) m
-    particles: Records | None  # (m, q) PARTICLE
+    particles: arrays.Records | None  # (m, q) PARTICLE
     slots: int  # of a pair
 
     @property
@@ -170,21 +150,21 @@ def _stacks(
             yield Stack(names, placed, construction.assemble(chosen, [strides[k] for k in places]))
 
 
-def _divided(layouts: Sequence[Layout], bodies: Records) -> Iterator[tuple[list[int], Parts]]:
+def _divided(layouts: Sequence[Layout], bodies: arrays.Records) -> Iterator[tuple[list[int], Parts]]:
     """Yield the parts of scenes of one layout, all those of one shape together, and which they are.
 
     What decides the shape by now: how many bodies are large, how many move with the support, how many particles there
     are, and how many slots a pair has: of corners those of its two bodies, at most.
     """
     contact, has_springs = layouts[0].scenario.contact, layouts[0].scenario.time.has_springs
-    particles: list[Records] = []
+    particles: list[arrays.Records] = []
     if contact.model == SURFACE or not has_springs:
-        slots = [SLOTS if one.shapes is None else 2 * max(HALF, *one.shapes.sizes) for one in layouts]
+        slots = [arrays.SLOTS if one.shapes is None else 2 * max(arrays.HALF, *one.shapes.sizes) for one in layouts]
     else:
         spacings = [layout.scenario.contact.particle_spacing for layout in layouts]
         particles = [place_particles(one, contact.model, space) for one, space in zip(bodies, spacings, strict=True)]
         slots = [slots_of_a_pair(one, contact.model) for one in bodies]
-    parts = Parts(layouts, bodies, cell_radius(bodies), None, SLOTS)
+    parts = Parts(layouts, bodies, cell_radius(bodies), None, arrays.SLOTS)
     counts = zip(
         np.count_nonzero(parts.is_large, axis=1),
         np.count_nonzero(bodies["is_moved"], axis=1),
@@ -197,7 +177,7 @@ def _divided(layouts: Sequence[Layout], bodies: Records) -> Iterator[tuple[list[
         yield same, parts.chosen(same)._replace(slots=slots[same[0]], particles=joined)
 
 
-def cell_radius(bodies: Records) -> Floats:
+def cell_radius(bodies: arrays.Records) -> Floats:
     """Return the half diagonal (m) of the largest of the bodies (..., n + 1) in the grid.
 
     In it are all but a few pieces of ground and planks.
@@ -220,20 +200,20 @@ def group_equal(keys: Sequence[Hashable]) -> list[list[int]]:
     return list(places.values())
 
 
-def join_records(records: Sequence[Records]) -> Records:
+def join_records(records: Sequence[arrays.Records]) -> arrays.Records:
     """Return records (k,) of m scenes as one array (m, k)."""
-    whole = zeros((len(records), records[0].size), records[0].dtype)
+    whole = arrays.zeros((len(records), records[0].size), records[0].dtype)
     plain = whole.view(np.ndarray)
     for m, one in enumerate(records):
         plain[m] = one
     return whole
 
 
-def take_members(records: Records, numbers: Sequence[int]) -> Records:
+def take_members(records: arrays.Records, numbers: Sequence[int]) -> arrays.Records:
     """Return the records of some of the scenes (m, ...), from a cache line on; all of them as they are."""
     if len(numbers) == len(records):
         return records
-    chosen = zeros((len(numbers), *records.shape[1:]), records.dtype)
+    chosen = arrays.zeros((len(numbers), *records.shape[1:]), records.dtype)
     chosen[...] = records[list(numbers)]
     return chosen
 
@@ -274,13 +254,13 @@ def with_parts(scene: Any, parts: list[Any]) -> Any:
     return type(scene)(*parts) if hasattr(scene, "_fields") else tuple(parts)
 
 
-def build_world(scenario: Scenario) -> World:
+def build_world(scenario: Scenario) -> arrays.World:
     """Return the world at time zero: arrays as described in blocksim.kernels.common.arrays, pair lists still empty.
 
     Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
-    world: World = build_one(scenario, EXPLICIT).scene
+    world: arrays.World = build_one(scenario, EXPLICIT).scene
     return world
 
 
@@ -289,12 +269,12 @@ def _size(parts: Parts) -> Size:
     return scene_size(bodies, first_capacity(bodies), parts.slots, has_particles=parts.particles is not None)
 
 
-def _assemble(parts: Parts, strides: Sequence[Stride]) -> World:
+def _assemble(parts: Parts, strides: Sequence[Stride]) -> arrays.World:
     members, bodies = parts.bodies.shape
     if parts.particles is None:
-        contacts = zeros((members, CONTACTS), CONTACT)
+        contacts = arrays.zeros((members, arrays.CONTACTS), arrays.CONTACT)
     else:
-        contacts = zeros((members, parts.slots), PARTICLE_CONTACT)
+        contacts = arrays.zeros((members, parts.slots), arrays.PARTICLE_CONTACT)
     controls = run_controls(parts, strides)
     reach = np.maximum(controls["skin"], TRAVELLED * controls["skin"] + controls["approach"])
     controls["cell_width"] = 2.0 * controls["cell_radius"] + reach
@@ -305,8 +285,8 @@ EXPLICIT = Construction(choose_stride, _size, _assemble)
 
 
 def assemble_world(
-    parts: Parts, controls: Records, capacity: int = 1, slots: int = 1, contacts: Records | None = None
-) -> World:
+    parts: Parts, controls: arrays.Records, capacity: int = 1, slots: int = 1, contacts: arrays.Records | None = None
+) -> arrays.World:
     """Return stacked worlds at time zero with room for `capacity` pairs, `slots` and contacts of each.
 
     A scheme that keeps pairs and contacts elsewhere needs none: there is room for one.
@@ -314,13 +294,13 @@ def assemble_world(
     members, count = parts.bodies.shape
     bodies, layouts, is_large = parts.bodies, parts.layouts, parts.is_large
     bodies["half_x"][:, -1] = math.inf  # the half-plane has one face without ends
-    before = zeros((members, 1), CONTACT) if contacts is None else contacts
-    points = zeros((members, slots + 1), POINT)
+    before = arrays.zeros((members, 1), arrays.CONTACT) if contacts is None else contacts
+    points = arrays.zeros((members, slots + 1), arrays.POINT)
     points["share"] = 1.0  # as it stays in the surface model
     blocks = count - 1
     large = np.nonzero(is_large)[1].reshape(members, -1)
     tables = [one.shapes.table for one in layouts if one.shapes is not None]  # none where all are rectangles
-    world = World(
+    world = arrays.World(
         bodies=bodies,
         points=points,
         before=before,
@@ -332,16 +312,16 @@ def assemble_world(
         large=numbers(large.shape, np.uint32),
         neighbours=numbers((members, blocks), np.uint32),
         interactions=interaction_tables([layout.interactions for layout in layouts]),
-        ledger=zeros((members, count // GROUP + 1), LEDGER),
-        action=zeros((members, 1), ACTION),
+        ledger=arrays.zeros((members, count // arrays.GROUP + 1), arrays.LEDGER),
+        action=arrays.zeros((members, 1), arrays.ACTION),
         matrices=numbers((members, 8, 3, 3), np.float64),
         moved=moved_records(bodies, layouts),
         motion=join_records([layout.drives.pieces for layout in layouts]),
         controls=controls,
-        clock=zeros((members, 1), CLOCK),
-        shares=zeros((members, 1), SHARE),
-        between=zeros((members, 1), ACTION),
-        team=numbers((members, TEAM_WORDS), np.int64),
+        clock=arrays.zeros((members, 1), arrays.CLOCK),
+        shares=arrays.zeros((members, 1), arrays.SHARE),
+        between=arrays.zeros((members, 1), arrays.ACTION),
+        team=numbers((members, arrays.TEAM_WORDS), np.int64),
         loads=join_records([layout.applied.loads for layout in layouts]),
         load_pieces=join_records([layout.applied.pieces for layout in layouts]),
     )
@@ -358,7 +338,7 @@ def assemble_world(
 def numbers(shape: int | tuple[int, ...], kind: type[np.generic]) -> Any:
     """Return zeros that start on a cache line."""
     plain: Any = np.dtype(kind)
-    return zeros(shape, plain).view(np.ndarray)
+    return arrays.zeros(shape, plain).view(np.ndarray)
 
 
 def first_capacity(bodies: int) -> int:
@@ -366,7 +346,7 @@ def first_capacity(bodies: int) -> int:
     return max(LEAST_PAIRS, PAIRS_PER_BODY * bodies)
 
 
-def empty_lists(capacity: int, slots: int, contacts: Records) -> dict[str, Any]:
+def empty_lists(capacity: int, slots: int, contacts: arrays.Records) -> dict[str, Any]:
     """Return the pair lists of a world, or of a stack of them, without pairs, with room for `capacity` of them.
 
     Every pair has `slots` of what can come into contact, and as many contacts at the same time, of the same type, as
@@ -374,18 +354,18 @@ def empty_lists(capacity: int, slots: int, contacts: Records) -> dict[str, Any]:
     """
     *members, most = contacts.shape
     pairs = (*members, capacity)
-    kind = np.uint8 if contacts.dtype == CONTACT else np.uint32
+    kind = np.uint8 if contacts.dtype == arrays.CONTACT else np.uint32
     return {
-        "pairs": zeros(pairs, PAIR),
-        "contacts": zeros((*pairs, most), contacts.dtype),
+        "pairs": arrays.zeros(pairs, arrays.PAIR),
+        "contacts": arrays.zeros((*pairs, most), contacts.dtype),
         "candidates": numbers((*pairs, slots), kind),
-        "operators": zeros((*pairs, 2), OPERATOR),
-        "spare_pairs": zeros(pairs, PAIR),
+        "operators": arrays.zeros((*pairs, 2), arrays.OPERATOR),
+        "spare_pairs": arrays.zeros(pairs, arrays.PAIR),
         "spare_candidates": numbers((*pairs, slots), kind),
     }
 
 
-def with_more_room(world: World) -> World:
+def with_more_room(world: arrays.World) -> arrays.World:
     """Return the same world with more room for candidate pairs. Raises SceneTooLargeError."""
     used = world.pairs.size
     capacity, slots = math.ceil(GROWTH * used), world.candidates.shape[1]
@@ -396,19 +376,19 @@ def with_more_room(world: World) -> World:
     return with_threads(world._replace(**lists), world.shares.size)
 
 
-def with_threads(world: World, threads: int) -> World:
+def with_threads(world: arrays.World, threads: int) -> arrays.World:
     """Return the same world with room for the exchange between that many threads."""
     between = world.pairs.size if threads > 1 else 1  # memory that was never written is not allocated yet
-    return world._replace(shares=zeros(threads, SHARE), between=zeros(between, ACTION))
+    return world._replace(shares=arrays.zeros(threads, arrays.SHARE), between=arrays.zeros(between, arrays.ACTION))
 
 
-def run_controls(parts: Parts, strides: Sequence[Stride]) -> Records:
+def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
     """Return the controls (m, 1) of runs, but for the width of a cell."""
-    controls = zeros((len(strides), 1), CONTROLS)
+    controls = arrays.zeros((len(strides), 1), arrays.CONTROLS)
     rows = []
     for layout, (step, skin, approach) in zip(parts.layouts, strides, strict=True):
         scenario, contact, time = layout.scenario, layout.scenario.contact, layout.scenario.time
-        motion_x, motion_y = (0.0, 0.0) if scenario.motion is None else motion_direction(scenario)
+        motion_x, motion_y = (0.0, 0.0) if scenario.motion is None else motion.motion_direction(scenario)
         kernel, smoothing_length = KERNEL_CODES[contact.kernel], contact.resolved_smoothing_length
         few = round(min(CHEAP_CHECKS, LONGEST_CHECK / step))  # of a quotient that may be infinite
         every = max(1, few, round(min(MOST_STEPS, CHECK_INTERVAL / step)))
@@ -445,8 +425,8 @@ def couple(scenario: Scenario, world: Any, others: tuple[SystemInScene, ...]) ->
     """Return a world with further systems at time zero. Raises InvalidInputError for a pair that is not modelled."""
     systems = tuple(present.system for present in others)
     acts = tuple(Act(*one) for one in acts_of(systems))
-    arrays = tuple(system.build(scenario) for system in systems if system.build is not None)
+    built = tuple(system.build(scenario) for system in systems if system.build is not None)
     stages = tuple(system.stages() for system in systems if system.stages is not None)
     energies = tuple(tuple(f"{system.name}_{name}" for name in system.energies) for system in systems)
-    plan(arrays, Plan(stages, acts, energies))
-    return Coupled(world, arrays)
+    plan(built, Plan(stages, acts, energies))
+    return Coupled(world, built)

@@ -6,24 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import GROUND, PlacedBody, Scenario
-from blocksim.scenario.geometry import edges_of
+from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, placement
 from blocksim.scenario.motion import motion_peaks, motion_pieces
-from blocksim.scenario.placement import has_outlines
+from blocksim.world import build, interactions, memory, nonsmooth, rigid_step
 from blocksim.world.bodies import Layout, division, layout_of
-from blocksim.world.build import build_world, couple, stack_of_one
-from blocksim.world.interactions import pair_of
-from blocksim.world.memory import (
-    PROCESS_BYTES,
-    is_shorter_than_step,
-    output_count,
-    recorded_contacts,
-    rigid_size,
-    run_bytes,
-    scene_size,
-)
-from blocksim.world.nonsmooth import build_nonsmooth, velocity_tolerance
-from blocksim.world.rigid_step import longest_step, reason_of_step
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 from blocksim.world.step import Bounds, Speeds, bounds_of, speeds_of, step_of_contacts
 from blocksim.world.systems import largest_step, others_of, warnings_of
@@ -119,26 +105,26 @@ def describe(scenario: Scenario) -> Description:
     layout, others = layout_of(scenario), others_of(scenario)
     count, has_rigid = len(layout.placed), scenario.time.has_rigid_contacts
     if has_rigid:
-        scene = build_nonsmooth(scenario)
-        world, size = scene.world, rigid_size(count, scene.contacts.constraints.size)
+        scene = nonsmooth.build_nonsmooth(scenario)
+        world, size = scene.world, memory.rigid_size(count, scene.contacts.constraints.size)
     else:
-        world = build_world(scenario)
+        world = build.build_world(scenario)
         if scenario.systems:
-            couple(scenario, world, others)  # refuses pairs that are not modelled
+            build.couple(scenario, world, others)  # refuses pairs that are not modelled
         slots, has_particles = world.candidates.shape[1], world.particles is not None
-        size = scene_size(count, world.pairs.size, slots, has_particles=has_particles)
+        size = memory.scene_size(count, world.pairs.size, slots, has_particles=has_particles)
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
-    frames = output_count(steps, scenario.time.end, scenario.output.every) + 1
-    (bounds,) = bounds_of([layout], stack_of_one(world.bodies))
+    frames = memory.output_count(steps, scenario.time.end, scenario.output.every) + 1
+    (bounds,) = bounds_of([layout], build.stack_of_one(world.bodies))
     speeds = speeds_of(layout, bounds)
     spacing = scenario.contact.particle_spacing
     particles = sum(
-        number * sum(division(math.dist(a, b), spacing) for a, b, _ in edges_of(corners))
+        number * sum(division(math.dist(a, b), spacing) for a, b, _ in geometry.edges_of(corners))
         for corners, number in Counter(body.corners for body in layout.placed).items()
     )
     touching = 0 if world.particles is None else particles // PARTICLES_OF_A_CONTACT
-    contacts = recorded_contacts(count, touching) if scenario.output.contacts else 0
+    contacts = memory.recorded_contacts(count, touching) if scenario.output.contacts else 0
     more = sum(one.count * one.system.cost.memory for one in others)
     of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
     motion = None
@@ -154,9 +140,9 @@ def describe(scenario: Scenario) -> Description:
         steps=steps,
         frames=frames,
         seconds=steps * (_seconds_per_step(scenario, count, particles) + of_systems),
-        bytes=run_bytes(count, frames, contacts, others),
-        memory=PROCESS_BYTES + size.bytes + more,  # without frames: into a folder, they are written as they come
-        frames_at_every_step=is_shorter_than_step(scenario.output.every, step),
+        bytes=memory.run_bytes(count, frames, contacts, others),
+        memory=memory.PROCESS_BYTES + size.bytes + more,  # without frames: into a folder, they are written as they come
+        frames_at_every_step=memory.is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
         rigid=_rigid(layout, bounds, speeds, step) if has_rigid else None,
@@ -175,7 +161,7 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
         block, particle, more = SECONDS_WITH_PARTICLES[scenario.contact.model]
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
     rectangles = blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
-    return OUTLINES_COST * rectangles if has_outlines(scenario) else rectangles
+    return OUTLINES_COST * rectangles if placement.has_outlines(scenario) else rectangles
 
 
 def _limits(layout: Layout, bounds: Bounds, speeds: Speeds) -> StepLimits | None:
@@ -190,10 +176,10 @@ def _rigid(layout: Layout, bounds: Bounds, speeds: Speeds, step: float) -> SagDe
     substeps = layout.scenario.time.parts
     sag = scene_sag(step / substeps, layout.placed, layout.scenario.gravity)
     return SagDescription(
-        why=reason_of_step(layout, bounds, speeds).why,
+        why=rigid_step.reason_of_step(layout, bounds, speeds).why,
         substeps=substeps,
-        tolerance=velocity_tolerance(layout.scenario, len(layout.placed)),
-        longest_step=longest_step(layout, bounds, speeds),
+        tolerance=nonsmooth.velocity_tolerance(layout.scenario, len(layout.placed)),
+        longest_step=rigid_step.longest_step(layout, bounds, speeds),
         sag=sag.sag,
         block=sag.block,
         overlap=sag.overlap,
@@ -219,7 +205,7 @@ def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
     for i, block in enumerate(classes):
         for j, other in enumerate(classes):
             if not block.is_ground and (other.is_ground or j <= i):
-                pair, row = pair_of(scenario, block, other), world.interactions[i, j]
+                pair, row = interactions.pair_of(scenario, block, other), world.interactions[i, j]
                 normal_stiffness, rules = float(row.normal_stiffness), pair.rules
                 if has_rigid:
                     substep = float(world.controls[0].step) / scenario.time.parts

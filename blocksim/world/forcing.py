@@ -9,19 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.common.arrays import (
-    LOAD,
-    LOAD_FIELD,
-    LOAD_FORCE,
-    LOAD_PIECE,
-    LOAD_TILT,
-    LOAD_WATER,
-    MOTION_PIECE,
-    MOVED,
-    Records,
-    zeros,
-)
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.kernels.common import arrays
+from blocksim.scenario import PlacedBody, Scenario, motion, place_bodies, start
 from blocksim.scenario.models.loads import (
     AnyLoad,
     Force,
@@ -33,20 +22,18 @@ from blocksim.scenario.models.loads import (
     Stretch,
     stretches_of,
 )
-from blocksim.scenario.motion import MotionPieces, drives_of, greatest_rate, motion_pieces
-from blocksim.scenario.start import NORMALS, face_of
 
 NO_FACE = ((0.0, 0.0), (0.0, 0.0))
 """Of a body that has none: no load acts on it, as such a scenario is refused."""
 COEFFICIENTS = ("c0", "c1", "c2", "c3")
-STANDSTILL = zeros(1, MOTION_PIECE)
+STANDSTILL = arrays.zeros(1, arrays.MOTION_PIECE)
 
 
 class LoadArrays(NamedTuple):
     """The loads of one scene."""
 
-    loads: Records  # (l,) LOAD
-    pieces: Records  # (k,) LOAD_PIECE
+    loads: arrays.Records  # (l,) LOAD
+    pieces: arrays.Records  # (k,) LOAD_PIECE
     push: float  # m/s2: no load gives a point of a body more, with water no deeper than at the start
     end: float  # s: from then on none changes with time
 
@@ -54,7 +41,7 @@ class LoadArrays(NamedTuple):
 def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
     """Return the loads of a scenario, in its order."""
     numbers = {body.name: number for number, body in enumerate(placed)} if scenario.loads else {}
-    loads = zeros(len(scenario.loads), LOAD)
+    loads = arrays.zeros(len(scenario.loads), arrays.LOAD)
     rows: list[tuple[float, float, float]] = []
     push = end = 0.0
     for record, load in zip(loads, scenario.loads, strict=True):
@@ -70,7 +57,7 @@ def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
             level = load.water_level
         rows += [(one.start, level * one.value, level * one.rate) for one in stretches]
         push, end = push + own, max(end, stretches[-1].start)
-    pieces = zeros(len(rows), LOAD_PIECE)
+    pieces = arrays.zeros(len(rows), arrays.LOAD_PIECE)
     for name, column in zip(Stretch._fields, zip(*rows, strict=True), strict=False):
         pieces[name] = column
     return LoadArrays(loads, pieces, push, end)
@@ -85,32 +72,32 @@ def _fields(
     """
     tilt = scenario.ground.tilt
     if isinstance(load, Gravity):  # it turns, and gets no larger
-        return {"kind": LOAD_TILT, "fx": scenario.gravity}, 0.0
+        return {"kind": arrays.LOAD_TILT, "fx": scenario.gravity}, 0.0
     if isinstance(load, Horizontal):
         size = load.magnitude * scenario.gravity
-        fields = {"kind": LOAD_FIELD, "fx": size * math.cos(tilt), "fy": -size * math.sin(tilt)}
+        fields = {"kind": arrays.LOAD_FIELD, "fx": size * math.cos(tilt), "fy": -size * math.sin(tilt)}
         return fields, largest * abs(load.magnitude) * scenario.gravity
     body = placed[numbers[load.body]]
     radius = body.radius
     if isinstance(load, Moment):
-        fields = {"kind": LOAD_FORCE, "torque": load.magnitude}
+        fields = {"kind": arrays.LOAD_FORCE, "torque": load.magnitude}
         return fields, largest * (abs(load.magnitude) * radius / body.inertia)
     if isinstance(load, Force):
         x, y = load.point
         fx, fy = load.magnitude * math.cos(load.direction), load.magnitude * math.sin(load.direction)
-        fields = {"kind": LOAD_FORCE, "x": x, "y": y, "fx": fx, "fy": fy, "turns": load.axes == "body"}
+        fields = {"kind": arrays.LOAD_FORCE, "x": x, "y": y, "fx": fx, "fy": fy, "turns": load.axes == "body"}
         force, arm = abs(load.magnitude), math.hypot(*load.point)
     else:
-        nx, ny = map(float, NORMALS[load.face])
-        (x, y), (half_x, half_y) = face_of(body, load.face) or NO_FACE
+        nx, ny = map(float, start.NORMALS[load.face])
+        (x, y), (half_x, half_y) = start.face_of(body, load.face) or NO_FACE
         along_x, along_y = abs(ny) * half_x, abs(nx) * half_y
         length = 2.0 * (along_x + along_y)
-        fields = {"kind": LOAD_FORCE, "x": x, "y": y, "turns": 1.0}
+        fields = {"kind": arrays.LOAD_FORCE, "x": x, "y": y, "turns": 1.0}
         if load.magnitude is not None:
             force = load.magnitude * length * body.depth
             fields |= {"fx": -nx * force, "fy": -ny * force}
         else:
-            fields |= {"kind": LOAD_WATER, "x": x - along_x, "y": y - along_y, "end_x": x + along_x}
+            fields |= {"kind": arrays.LOAD_WATER, "x": x - along_x, "y": y - along_y, "end_x": x + along_x}
             fields |= {"end_y": y + along_y, "fx": -nx * body.depth, "fy": -ny * body.depth}
             fields |= {"unit_weight": load.unit_weight * length, "up_x": math.sin(tilt), "up_y": math.cos(tilt)}
         deepest = abs(load.magnitude or 0.0)
@@ -130,15 +117,15 @@ def steepest_tilt(scenario: Scenario) -> float:
 class Drives(NamedTuple):
     """Driven bodies of one scene, and the pieces of all motions."""
 
-    driven: Records  # (d,) MOVED
-    pieces: Records  # (m,) MOTION_PIECE: of all paths of driven bodies, then of the support
+    driven: arrays.Records  # (d,) MOVED
+    pieces: arrays.Records  # (m,) MOTION_PIECE: of all paths of driven bodies, then of the support
     paths: int  # how many pieces the former have
 
 
 def drive_records(scenario: Scenario, placed: Sequence[PlacedBody]) -> Drives:
     """Return all that moves as prescribed in a scenario."""
-    drives, support = drives_of(scenario), support_pieces(scenario)
-    driven, pieces, count = zeros(len(drives), MOVED), [], 0
+    drives, support = motion.drives_of(scenario), support_pieces(scenario)
+    driven, pieces, count = arrays.zeros(len(drives), arrays.MOVED), [], 0
     for record, drive in zip(driven, drives, strict=True):
         body = placed[drive.body]
         record.body, record.rest_time = drive.body, drive.rest_time
@@ -152,19 +139,19 @@ def drive_records(scenario: Scenario, placed: Sequence[PlacedBody]) -> Drives:
             pieces.append(_piece_records(one))
     if not drives:
         return Drives(driven, support, 0)
-    together = zeros(count + support.size, MOTION_PIECE)
+    together = arrays.zeros(count + support.size, arrays.MOTION_PIECE)
     together[:] = np.concatenate([*pieces, support])
     return Drives(driven, together, count)
 
 
-def support_pieces(scenario: Scenario) -> Records:
+def support_pieces(scenario: Scenario) -> arrays.Records:
     """Return the pieces of the support's motion; where it ends before the run, the last one is constant."""
-    records = STANDSTILL if scenario.motion is None else _piece_records(motion_pieces(scenario))
+    records = STANDSTILL if scenario.motion is None else _piece_records(motion.motion_pieces(scenario))
     return records if records.size else STANDSTILL
 
 
-def _piece_records(pieces: MotionPieces) -> Records:
-    records = zeros(len(pieces.coefficients), MOTION_PIECE)
+def _piece_records(pieces: motion.MotionPieces) -> arrays.Records:
+    records = arrays.zeros(len(pieces.coefficients), arrays.MOTION_PIECE)
     records["start"] = pieces.times[:-1]
     for k, name in enumerate(COEFFICIENTS):
         records[name] = pieces.coefficients[:, k]
@@ -178,12 +165,12 @@ def drive_bounds(scenario: Scenario) -> tuple[float, float]:
     are zero where no body is driven.
     """
     speed = rise = 0.0
-    drives = drives_of(scenario)
+    drives = motion.drives_of(scenario)
     placed = place_bodies(scenario) if drives else ()
     for drive in drives:
         body = placed[drive.body]
         reach = math.dist((body.x, body.y), drive.about) + body.radius
-        speed = max(speed, greatest_rate(drive.shift) + reach * greatest_rate(drive.turn))
+        speed = max(speed, motion.greatest_rate(drive.shift) + reach * motion.greatest_rate(drive.turn))
         c0, c1, c2, c3 = drive.shift.coefficients.T
         length = np.diff(drive.shift.times)[: len(c0)]
         ends = np.concatenate([c0, c0 + length * (c1 + length * (c2 + length * c3))])

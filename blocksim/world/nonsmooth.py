@@ -8,42 +8,12 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import CACHE_LINE, Records, World, zeros
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth.arrays import (
-    ASIDE,
-    BEFORE,
-    COLOURS,
-    CONSTRAINT,
-    GROUP,
-    IMPACT,
-    KEPT,
-    LISTED,
-    PART,
-    PUSH,
-    STATE,
-    STEPPING,
-    TALLY,
-    Contacts,
-    Nonsmooth,
-)
+from blocksim.kernels.nonsmooth import arrays
 from blocksim.kernels.nonsmooth.groups import LONELY
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario import PlacedBody, Scenario, place_bodies, placement
 from blocksim.scenario.models.stepping import Nonsmooth as Stepping
-from blocksim.scenario.placement import smallest_width
+from blocksim.world import build, memory, rigid_step, sag, step
 from blocksim.world.bodies import Layout
-from blocksim.world.build import (
-    GROWTH,
-    Construction,
-    Parts,
-    assemble_world,
-    build_one,
-    first_capacity,
-    numbers,
-    run_controls,
-)
-from blocksim.world.memory import refuse_if_too_large, rigid_size
-from blocksim.world.rigid_step import FEW, choose_rigid_stride
-from blocksim.world.sag import DAMPING, box_of, loads_at_rest, soft_contact
-from blocksim.world.step import Stride
 
 MOST_REACH = 1.5  # of a body, in skins
 WEAK_RESTITUTION = 0.5  # up to which the impacts of a substep happen all at once
@@ -84,21 +54,21 @@ def velocity_tolerance(scenario: Scenario, blocks: int) -> float:
 
 def is_cut_at_impacts(scenario: Scenario, free: int) -> bool:
     """Return True if steps of so many free blocks may be cut at impacts, where these go in rounds."""
-    return free < FEW and not scenario.loads  # parts shift velocities by what gravity alone brings them
+    return free < rigid_step.FEW and not scenario.loads  # parts shift velocities by what gravity alone brings them
 
 
 def has_row(placed: Sequence[PlacedBody]) -> bool:
     """Return True if free blocks stand side by side, BESIDE apart at most, and none lies on another at the start."""
     free = [body for body in placed if not body.fixed]
-    boxes = [box_of(body) for body in free]
-    near = BESIDE * smallest_width(free)
+    boxes = [sag.box_of(body) for body in free]
+    near = BESIDE * placement.smallest_width(free)
     touching = (
         max(one.left, other.left) <= min(one.right, other.right) + near
         and min(one.top, other.top) > max(one.bottom, other.bottom) + near
         for one, other in combinations(boxes, 2)
     )
     return any(touching) and not any(
-        load.lower is not None and not placed[load.lower].fixed for load in loads_at_rest(placed, 1.0)
+        load.lower is not None and not placed[load.lower].fixed for load in sag.loads_at_rest(placed, 1.0)
     )
 
 
@@ -135,37 +105,37 @@ def needs_repeated_impacts(scenario: Scenario, placed: Sequence[PlacedBody] | No
     return has_impacts_in_rounds(scenario, restitution, free, lambda: placed or place_bodies(scenario))
 
 
-def build_nonsmooth(scenario: Scenario) -> Nonsmooth:
+def build_nonsmooth(scenario: Scenario) -> arrays.Nonsmooth:
     """Return a world at time zero with all that stepping it without springs needs.
 
     Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
-    scene: Nonsmooth = build_one(scenario, NONSMOOTH).scene
+    scene: arrays.Nonsmooth = build.build_one(scenario, NONSMOOTH).scene
     return scene
 
 
-def _assemble(parts: Parts, strides: Sequence[Stride]) -> Nonsmooth:
-    controls = run_controls(parts, strides)
-    stepping = zeros(controls.shape, STEPPING)
+def _assemble(parts: build.Parts, strides: Sequence[step.Stride]) -> arrays.Nonsmooth:
+    controls = build.run_controls(parts, strides)
+    stepping = zeros(controls.shape, arrays.STEPPING)
     rows = [_stepping(layout, stride) for layout, stride in zip(parts.layouts, strides, strict=True)]
     for name in rows[0]:
         stepping[name][:, 0] = [row[name] for row in rows]
     controls["cell_width"] = 2.0 * (controls["cell_radius"] + stepping["most_reach"])
-    return with_lists(assemble_world(parts, controls), stepping, first_capacity(parts.bodies.shape[1]))
+    return with_lists(build.assemble_world(parts, controls), stepping, build.first_capacity(parts.bodies.shape[1]))
 
 
-NONSMOOTH = Construction(
-    choose=choose_rigid_stride,
-    size=lambda parts: rigid_size(parts.bodies.shape[1], first_capacity(parts.bodies.shape[1])),
+NONSMOOTH = build.Construction(
+    choose=rigid_step.choose_rigid_stride,
+    size=lambda parts: memory.rigid_size(parts.bodies.shape[1], build.first_capacity(parts.bodies.shape[1])),
     assemble=_assemble,
 )
 
 
-def _stepping(layout: Layout, stride: Stride) -> dict[str, float]:
+def _stepping(layout: Layout, stride: step.Stride) -> dict[str, float]:
     time = stepping_of(layout.scenario)
     substep = stride.step / time.substeps
-    soft = soft_contact(substep)
+    soft = sag.soft_contact(substep)
     restitution = max(material.restitution for row in layout.interactions for material in row)
     free = sum(not body.fixed for body in layout.placed)
     rounds = has_impacts_in_rounds(layout.scenario, restitution, free, lambda: layout.placed)
@@ -175,7 +145,7 @@ def _stepping(layout: Layout, stride: Stride) -> dict[str, float]:
         "rest_gap": time.restitution_threshold * substep,
         "touch_gap": TOUCH * min((min(body.size_x, body.size_y) for body in layout.placed), default=0.0),
         "frequency": soft.frequency,
-        "damping": DAMPING,
+        "damping": sag.DAMPING,
         "closed_bias": soft.bias,
         "softness": soft.softness,
         "open_bias": 1.0 / substep,
@@ -191,46 +161,47 @@ def _stepping(layout: Layout, stride: Stride) -> dict[str, float]:
     }
 
 
-def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1) -> Nonsmooth:
+def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1) -> arrays.Nonsmooth:
     """Return worlds (one, or a stack) with empty constraints, as many as there is room for pairs."""
     *members, bodies = world.bodies.shape
-    groups = min(capacity, capacity // WIDTH + LONELY * COLOURS)  # full ones, and those in every colour that are not
+    # full groups, and those in every colour that are not
+    groups = min(capacity, capacity // WIDTH + LONELY * arrays.COLOURS)
     follows = bool(stepping["is_guarded"].any())
-    contacts = Contacts(
-        states=zeros((*members, bodies), STATE),
-        before=zeros((*members, bodies), BEFORE),
-        constraints=zeros((*members, capacity), CONSTRAINT),
-        groups=zeros((*members, groups), GROUP),
-        ends=numbers((*members, COLOURS + 1), np.int64),
+    contacts = arrays.Contacts(
+        states=zeros((*members, bodies), arrays.STATE),
+        before=zeros((*members, bodies), arrays.BEFORE),
+        constraints=zeros((*members, capacity), arrays.CONSTRAINT),
+        groups=zeros((*members, groups), arrays.GROUP),
+        ends=build.numbers((*members, arrays.COLOURS + 1), np.int64),
         materials=world.interactions.reshape(*members, -1).view(np.recarray),
-        tallies=zeros((*members, groups // PART + 1), TALLY),
-        impacts=zeros((*members, bodies), IMPACT) if follows else None,
-        asides=zeros((*members, groups), ASIDE) if follows else None,
-        residuals=numbers((*members, 2, LINE_WORDS * threads), np.float64),
+        tallies=zeros((*members, groups // arrays.PART + 1), arrays.TALLY),
+        impacts=zeros((*members, bodies), arrays.IMPACT) if follows else None,
+        asides=zeros((*members, groups), arrays.ASIDE) if follows else None,
+        residuals=build.numbers((*members, 2, LINE_WORDS * threads), np.float64),
         stepping=stepping,
     )
-    return Nonsmooth(
+    return arrays.Nonsmooth(
         world=world,
         contacts=contacts,
-        kept=zeros((*members, capacity), KEPT),
-        listed=zeros((*members, bodies), LISTED),
-        firsts=numbers((*members, bodies), np.int64),
-        begins=numbers((*members, COLOURS + 1), np.int64),
-        used=numbers((*members, bodies), np.int64),
-        pushes=zeros((*members, bodies if world.loads.size else 1), PUSH),
+        kept=zeros((*members, capacity), arrays.KEPT),
+        listed=zeros((*members, bodies), arrays.LISTED),
+        firsts=build.numbers((*members, bodies), np.int64),
+        begins=build.numbers((*members, arrays.COLOURS + 1), np.int64),
+        used=build.numbers((*members, bodies), np.int64),
+        pushes=zeros((*members, bodies if world.loads.size else 1), arrays.PUSH),
     )
 
 
-def threads_of(scene: Nonsmooth) -> int:
+def threads_of(scene: arrays.Nonsmooth) -> int:
     """Return for how many threads there is room to exchange data."""
     return int(scene.contacts.residuals.shape[1]) // LINE_WORDS
 
 
-def with_more_constraints(scene: Nonsmooth) -> Nonsmooth:
+def with_more_constraints(scene: arrays.Nonsmooth) -> arrays.Nonsmooth:
     """Return the same scene with more room for pairs. Raises SceneTooLargeError."""
     old = scene.contacts
-    capacity = math.ceil(GROWTH * old.constraints.size)
-    refuse_if_too_large(rigid_size(scene.world.bodies.size, capacity))
+    capacity = math.ceil(build.GROWTH * old.constraints.size)
+    memory.refuse_if_too_large(memory.rigid_size(scene.world.bodies.size, capacity))
     larger = with_lists(scene.world, old.stepping, capacity)
     for name in ("constraints", "tallies"):
         getattr(larger.contacts, name)[: getattr(old, name).size] = getattr(old, name)
@@ -238,6 +209,6 @@ def with_more_constraints(scene: Nonsmooth) -> Nonsmooth:
     return larger._replace(contacts=contacts, listed=scene.listed, begins=scene.begins, pushes=scene.pushes)
 
 
-def with_more_threads(scene: Nonsmooth, threads: int) -> Nonsmooth:
+def with_more_threads(scene: arrays.Nonsmooth, threads: int) -> arrays.Nonsmooth:
     """Return the same scene with room for the exchange between that many threads."""
     return scene._replace(contacts=scene.contacts._replace(residuals=np.zeros((2, LINE_WORDS * threads))))

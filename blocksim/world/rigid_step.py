@@ -39,10 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import LOAD_FIELD, LOAD_FORCE
-from blocksim.scenario import PlacedBody, PlacedSegment
-from blocksim.scenario.geometry import box_of
-from blocksim.scenario.motion import shortest_cycle, shortest_period
-from blocksim.scenario.placement import smallest_width
+from blocksim.scenario import PlacedBody, PlacedSegment, geometry, motion, placement
 from blocksim.world.bodies import Layout
 from blocksim.world.sag import CRUSHED_SHARE, TOUCHING, UNLIKE, WARNING_SHARE, scene_sag, soft_contact
 from blocksim.world.step import Bounds, Speeds, StepError, Stride, choose_skin, refuse_uncountable, speeds_of
@@ -113,7 +110,7 @@ def joints_of(
     for i, body in enumerate(placed):
         corners = [body.ground_point(x, y) for x, y in body.corners]
         sides.append(_Side(i, list(zip(corners, [*corners[1:], corners[0]], strict=True)), corners))
-    low, high = box_of([corner for side in sides if side.body in free for corner in side.corners])
+    low, high = geometry.box_of([corner for side in sides if side.body in free for corner in side.corners])
     (left, bottom), (right, top) = (low[0] - near, low[1] - near), (high[0] + near, high[1] + near)
     for one in segments:  # a piece has its solid on the right; its ends count where they are edges
         start, end = (one.x0, one.y0), (one.x1, one.y1)
@@ -124,7 +121,7 @@ def joints_of(
     within = [
         side
         for side in sides
-        for (x0, y0), (x1, y1) in [box_of([corner for face in side.faces for corner in face])]
+        for (x0, y0), (x1, y1) in [geometry.box_of([corner for face in side.faces for corner in face])]
         if x0 <= right and x1 >= left and y0 <= top and y1 >= bottom
     ]
     hits = defaultdict(list)
@@ -205,7 +202,7 @@ def thrust_shift(layout: Layout) -> float:
     is_vertical = scenario.ground.tilt == 0.0 and not scenario.loads
     if not free or (is_upright and (len(free) <= FEW_UPRIGHT or is_vertical)):
         return 0.0
-    joints = joints_of(placed, layout.segments, free, TOUCHING * smallest_width(placed), level=is_level)
+    joints = joints_of(placed, layout.segments, free, TOUCHING * placement.smallest_width(placed), level=is_level)
     joints, blocks = _carried(joints, free)
     if not joints:
         return 0.0
@@ -381,7 +378,7 @@ def choose_rigid_stride(layout: Layout, bounds: Bounds) -> Stride:
     step, limit = reason_of_step(layout, bounds, speeds).step, longest_step(layout, bounds, speeds)
     refuse_uncountable(time.end, step)
     if step > limit and not time.force_step:
-        cycle = shortest_cycle(layout.scenario)
+        cycle = motion.shortest_cycle(layout.scenario)
         if step > PERIOD_SHARE * cycle:
             limit = PERIOD_SHARE * cycle
             message = f"a motion with a cycle of {cycle:.4g} s: at most a twentieth of it, {limit:.4g} s"
@@ -412,7 +409,7 @@ def reason_of_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> Reason:
         way = SHARE * few * bounds.smallest
         why = "supports move no farther than {:.3g} mm in it, at most at {:.3g} m/s with the blocks"
         reasons.append(Reason(way / speed, why, (MILLI * way, speed)))
-    period = shortest_period(scenario)
+    period = motion.shortest_period(scenario)
     if period > 0.0:
         why = "a twentieth of {:.3g} s, the shortest period of a motion"
         reasons.append(Reason(PERIOD_SHARE * period, why, (period,)))
@@ -465,4 +462,4 @@ def longest_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> float:
     time = layout.scenario.time
     rate = max(speeds.given + speeds.support, speeds.greatest / time.parts)
     longest = SHARE * bounds.smallest / rate if rate > 0.0 else time.end
-    return min(longest, PERIOD_SHARE * shortest_cycle(layout.scenario))
+    return min(longest, PERIOD_SHARE * motion.shortest_cycle(layout.scenario))

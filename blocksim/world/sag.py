@@ -20,9 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.kernels.nonsmooth.arrays import AWAY, NOT_STRUCK, Nonsmooth
-from blocksim.scenario import PlacedBody
-from blocksim.scenario.geometry import box_of as corners_box
-from blocksim.scenario.placement import smallest_width
+from blocksim.scenario import PlacedBody, geometry, placement
 
 TOUCHING = 1e-3  # of the smallest side: faces that near to each other touch
 FREQUENCY = 0.125  # of the soft contact, per substep: w h = 2 pi / 8. Above 0.15 walls spread like a fluid
@@ -58,7 +56,7 @@ def box_of(body: PlacedBody) -> Box:
     """Return the bounding box of a block."""
     c, s = math.cos(body.angle), math.sin(body.angle)
     if body.outline:
-        (left, bottom), (right, top) = corners_box([(c * x - s * y, s * x + c * y) for x, y in body.outline])
+        (left, bottom), (right, top) = geometry.box_of([(c * x - s * y, s * x + c * y) for x, y in body.outline])
         return Box(body.x + left, body.x + right, body.y + bottom, body.y + top)
     c, s = abs(c), abs(s)
     half_x, half_y = 0.5 * (c * body.size_x + s * body.size_y), 0.5 * (s * body.size_x + c * body.size_y)
@@ -68,7 +66,7 @@ def box_of(body: PlacedBody) -> Box:
 def loads_at_rest(placed: Sequence[PlacedBody], gravity: float) -> list[EndLoad]:
     """Return what the ends of all contacts below free blocks carry, from above downwards."""
     boxes = [box_of(body) for body in placed]
-    near = TOUCHING * smallest_width(placed)
+    near = TOUCHING * placement.smallest_width(placed)
     courses: dict[int, list[tuple[float, int]]] = defaultdict(list)  # blocks by the heights of their upper faces
     for i, box in enumerate(boxes):
         courses[math.floor(box.top / near)].append((box.right, i))

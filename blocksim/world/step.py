@@ -45,10 +45,8 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import OUTLINE
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
-from blocksim.scenario import Scenario
+from blocksim.scenario import Scenario, motion, placement
 from blocksim.scenario.models.stepping import Explicit
-from blocksim.scenario.motion import greatest_rate, motion_pieces
-from blocksim.scenario.placement import length_beside
 from blocksim.world.bodies import Layout, Shapes
 from blocksim.world.forcing import drive_bounds, steepest_tilt
 from blocksim.world.interactions import Interactions
@@ -198,7 +196,7 @@ def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
     friction = min((layout.interactions[i][j].kinetic_friction for i, j in pairs), default=math.inf)
     held = friction * math.cos(tilt)
     pull = max(0.0, scenario.gravity * (math.sin(tilt) - held) + layout.applied.push)
-    support = 0.0 if scenario.motion is None else greatest_rate(motion_pieces(scenario))
+    support = 0.0 if scenario.motion is None else motion.greatest_rate(motion.motion_pieces(scenario))
     impact = math.hypot(given, fall)
     return Speeds(given, fall, impact, impact + pull * scenario.time.end, support)
 
@@ -335,7 +333,7 @@ def choose_stride(layout: Layout, bounds: Bounds) -> Stride:
         raise StepError(f'{message}; use step = "auto", or force_step = true to override', limit)
     approach = 0.0
     if not has_particles:
-        default = length_beside(bounds.smallest) * SKIN_SHARE
+        default = placement.length_beside(bounds.smallest) * SKIN_SHARE
         way = APPROACH_STEPS * step * speeds.greatest
         approach = min(max(way, LEAST_APPROACH * default), MOST_APPROACH * default)
     return Stride(step, choose_skin(layout, bounds, speeds, step), approach)
@@ -359,7 +357,7 @@ def choose_skin(layout: Layout, bounds: Bounds, speeds: Speeds, step: float) -> 
     skin = contact.skin
     if skin is None:
         share = SKIN_SHARE_OF_PARTICLES if contact.model != "surface" and has_springs else SKIN_SHARE
-        return length_beside(bounds.smallest) * share
+        return placement.length_beside(bounds.smallest) * share
     speed = speeds.greatest + speeds.support
     nearer = 2.0 * speed * step  # a list holds for one step at least, even where it is updated at every one
     least = (RESERVE if has_springs else 1.0) * nearer

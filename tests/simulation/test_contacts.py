@@ -86,7 +86,9 @@ def test_contacts_and_weight_are_all_that_accelerates_blocks(soft: Shipped, mode
 def test_impulses_and_weight_are_all_that_accelerates_blocks_without_springs(
     soft: Shipped, restitution: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("blocksim.world.nonsmooth.FEW", 0)  # no step is cut: a frame has the impulses of the last part
+    monkeypatch.setattr(
+        "blocksim.world.nonsmooth.is_cut_at_impacts", lambda *_: False
+    )  # no step is cut: a frame has the impulses of the last part
     values = {"time__end": 0.5, "time__substeps": 1, "output__contacts": True, "output__every": EVERY_STEP}
     result = simulate(soft("three_blocks_nonsmooth", contact__restitution=restitution, **values))
     found, expected = changes(result), accelerations(result)[1:]

@@ -11,53 +11,42 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario import PlacedBody, Scenario, place_bodies, placement
 from blocksim.scenario.motion import displacement_and_velocity, motion_direction, motion_pieces
-from blocksim.scenario.placement import length_beside, wall_segments
-from blocksim.world.systems.system import (
-    Elements,
-    Floats,
-    Indices,
-    Output,
-    Quantity,
-    System,
-    SystemInScene,
-    Track,
-    quantity_as_stored,
-)
+from blocksim.world.systems import system
 
 MILLI, DEGREES = 1e3, float(np.degrees(1.0))
 QUANTITIES = (
-    Quantity("x", "m"),  # centre
-    Quantity("y", "m"),
-    Quantity("angle", "rad"),  # of the body axes, counter-clockwise, never wrapped
-    Quantity("vx", "m/s"),
-    Quantity("vy", "m/s"),
-    Quantity("spin", "rad/s"),
+    system.Quantity("x", "m"),  # centre
+    system.Quantity("y", "m"),
+    system.Quantity("angle", "rad"),  # of the body axes, counter-clockwise, never wrapped
+    system.Quantity("vx", "m/s"),
+    system.Quantity("vy", "m/s"),
+    system.Quantity("spin", "rad/s"),
 )
 CONSTANTS = (
-    Quantity("size_x", "m"),  # along the body's own axes
-    Quantity("size_y", "m"),
-    Quantity("depth", "m"),
-    Quantity("mass", "kg"),
-    Quantity("inertia", "kg m2"),
+    system.Quantity("size_x", "m"),  # along the body's own axes
+    system.Quantity("size_y", "m"),
+    system.Quantity("depth", "m"),
+    system.Quantity("mass", "kg"),
+    system.Quantity("inertia", "kg m2"),
 )
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
-def kinetic_energy(track: Track) -> Floats:
+def kinetic_energy(track: system.Track) -> system.Floats:
     """Return the kinetic energies (J); those of fixed blocks too, which the ledger does not count."""
     speed_squared = track["vx"] ** 2 + track["vy"] ** 2
     return np.asarray(0.5 * (track["mass"] * speed_squared + track["inertia"] * track["spin"] ** 2))
 
 
-def corners(track: Track, chosen: Indices) -> Floats:
+def corners(track: system.Track, chosen: system.Indices) -> system.Floats:
     """Return the corners (m) of blocks in some frames, from the lower left one on, (f, b, 4, 2)."""
     local = local_corners(track["size_x"], track["size_y"], track.present.elements.outlines)
     return placed_points(local, track["x"][chosen], track["y"][chosen], track["angle"][chosen])
 
 
-def local_corners(size_x: Floats, size_y: Floats, outlines: Floats | None) -> Floats:
+def local_corners(size_x: system.Floats, size_y: system.Floats, outlines: system.Floats | None) -> system.Floats:
     """Return the corners (m) of blocks along their own axes, counter-clockwise, (b, k, 2).
 
     A rectangle (4 corners) begins at its lower left one. Where there are `outlines` they are returned as they are: a
@@ -68,7 +57,7 @@ def local_corners(size_x: Floats, size_y: Floats, outlines: Floats | None) -> Fl
     return np.asarray(UNIT_CORNERS * np.stack([size_x, size_y], axis=-1)[:, None])
 
 
-def placed_points(local: Floats, x: Floats, y: Floats, angle: Floats) -> Floats:
+def placed_points(local: system.Floats, x: system.Floats, y: system.Floats, angle: system.Floats) -> system.Floats:
     """Turn and move points (..., b, k, 2) given along the axes of blocks (..., b), all m and rad."""
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     along = x[..., None] + cosine * local[..., 0] - sine * local[..., 1]
@@ -76,13 +65,15 @@ def placed_points(local: Floats, x: Floats, y: Floats, angle: Floats) -> Floats:
     return np.stack([along, up], axis=-1)
 
 
-def distinct(corners: Floats) -> Floats:
+def distinct(corners: system.Floats) -> system.Floats:
     """Return the corners (k, 2) of one block without repetitions of the last one."""
     is_new = np.any(corners[1:] != corners[:-1], axis=-1)
     return np.asarray(corners[: 1 + int(is_new.sum())])
 
 
-def boxes_around(outlines: Floats, x: Floats, y: Floats, angle: Floats) -> tuple[Floats, Floats]:
+def boxes_around(
+    outlines: system.Floats, x: system.Floats, y: system.Floats, angle: system.Floats
+) -> tuple[system.Floats, system.Floats]:
     """Return the lower left and upper right corners (m, (..., b, 2)) of the boxes around turned polygons."""
     cosine, sine = np.cos(angle), np.sin(angle)
     low, high = np.full((*x.shape, 2), np.inf), np.full((*x.shape, 2), -np.inf)
@@ -93,7 +84,7 @@ def boxes_around(outlines: Floats, x: Floats, y: Floats, angle: Floats) -> tuple
     return low, high
 
 
-def least_widths(size_x: Floats, size_y: Floats, outlines: Floats | None) -> Floats:
+def least_widths(size_x: system.Floats, size_y: system.Floats, outlines: system.Floats | None) -> system.Floats:
     """Return the smaller sides (m) of blocks, of polygons the least distance of parallel lines around them, (b,)."""
     if outlines is None:
         return np.minimum(size_x, size_y)
@@ -105,14 +96,14 @@ def least_widths(size_x: Floats, size_y: Floats, outlines: Floats | None) -> Flo
     return np.asarray(np.where(is_edge, np.ptp(heights, axis=2), np.inf).min(axis=1))
 
 
-def radii(size_x: Floats, size_y: Floats, outlines: Floats | None) -> Floats:
+def radii(size_x: system.Floats, size_y: system.Floats, outlines: system.Floats | None) -> system.Floats:
     """Return the distances (m) of the farthest corners of blocks from their centroids, (b,)."""
     if outlines is None:
         return np.asarray(0.5 * np.hypot(size_x, size_y))
     return np.asarray(np.hypot(outlines[..., 0], outlines[..., 1]).max(axis=1))
 
 
-def outlines_of(placed: Sequence[PlacedBody]) -> Floats | None:
+def outlines_of(placed: Sequence[PlacedBody]) -> system.Floats | None:
     """Return the corners (m, (b, k, 2)) of blocks as `local_corners` takes them; None where all are rectangles."""
     if not any(body.outline for body in placed):
         return None
@@ -121,7 +112,7 @@ def outlines_of(placed: Sequence[PlacedBody]) -> Floats | None:
     return np.array(full, dtype=np.float64)
 
 
-def motion_of(bodies: Any) -> Floats:
+def motion_of(bodies: Any) -> system.Floats:
     """Return the quantities (..., 6, b) of bodies (..., b): a removed one is where it was and has no velocity: NaN."""
     from blocksim.kernels.common.arrays import REMOVED  # noqa: PLC0415 - kernels, not for readers
 
@@ -133,20 +124,20 @@ def motion_of(bodies: Any) -> Floats:
     return values
 
 
-def are_removed(vx: Floats) -> Any:
+def are_removed(vx: system.Floats) -> Any:
     """Return which blocks have been removed, given their velocities along x in frames (m/s)."""
     return np.isnan(vx)
 
 
-BLOCKS = System(
+BLOCKS = system.System(
     name="blocks",
     element="block",
     quantities=QUANTITIES,
     constants=CONSTANTS,
     outputs=(
-        Output("x", "m", "centre along the ground", "x_mm", quantity_as_stored("x"), MILLI),
-        Output("y", "m", "centre above the ground", "y_mm", quantity_as_stored("y"), MILLI),
-        Output(
+        system.Output("x", "m", "centre along the ground", "x_mm", system.quantity_as_stored("x"), MILLI),
+        system.Output("y", "m", "centre above the ground", "y_mm", system.quantity_as_stored("y"), MILLI),
+        system.Output(
             "rotation",
             "rad",
             "angle turned since the start, counter-clockwise positive, not wrapped",
@@ -154,10 +145,10 @@ BLOCKS = System(
             lambda track: track["angle"] - track.at_start("angle"),
             DEGREES,
         ),
-        Output("vx", "m/s", "velocity along the ground", "vx_mm_s", quantity_as_stored("vx"), MILLI),
-        Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", quantity_as_stored("vy"), MILLI),
-        Output("spin", "rad/s", "angular velocity", "spin_deg_s", quantity_as_stored("spin"), DEGREES),
-        Output("kinetic_energy", "J", "kinetic energy", "kinetic_energy_J", kinetic_energy),
+        system.Output("vx", "m/s", "velocity along the ground", "vx_mm_s", system.quantity_as_stored("vx"), MILLI),
+        system.Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", system.quantity_as_stored("vy"), MILLI),
+        system.Output("spin", "rad/s", "angular velocity", "spin_deg_s", system.quantity_as_stored("spin"), DEGREES),
+        system.Output("kinetic_energy", "J", "kinetic energy", "kinetic_energy_J", kinetic_energy),
     ),
     elements=lambda scenario: blocks_placed(place_bodies(scenario)).elements,
     state=lambda world, count: motion_of(world.bodies[:count]),
@@ -165,57 +156,64 @@ BLOCKS = System(
 )
 
 
-def blocks_placed(placed: Sequence[PlacedBody]) -> SystemInScene:
+def blocks_placed(placed: Sequence[PlacedBody]) -> system.SystemInScene:
     """Return the blocks of a scene that were placed so."""
     constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
     start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
-    return SystemInScene(BLOCKS, Elements(tuple(body.name for body in placed), constants, start, outlines_of(placed)))
+    return system.SystemInScene(
+        BLOCKS, system.Elements(tuple(body.name for body in placed), constants, start, outlines_of(placed))
+    )
 
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks
 THICKNESS = 0.25  # of the smallest side of all blocks
-CORNERS = tuple(Quantity(f"{axis}{corner}", "m") for corner in range(4) for axis in "xy")  # at rest
-SUPPORT_QUANTITIES = (Quantity("dx", "m"), Quantity("dy", "m"), Quantity("vx", "m/s"), Quantity("vy", "m/s"))
+CORNERS = tuple(system.Quantity(f"{axis}{corner}", "m") for corner in range(4) for axis in "xy")  # at rest
+SUPPORT_QUANTITIES = (
+    system.Quantity("dx", "m"),
+    system.Quantity("dy", "m"),
+    system.Quantity("vx", "m/s"),
+    system.Quantity("vy", "m/s"),
+)
 
 
-def _moved(track: Track, chosen: Indices) -> Floats:
+def _moved(track: system.Track, chosen: system.Indices) -> system.Floats:
     """Return the corners (m) of pieces of ground and walls in some frames, (f, b, 4, 2)."""
     at_rest = track.present.elements.constants.T.reshape(-1, 4, 2)
     offset = np.stack([track["dx"][chosen], track["dy"][chosen]], axis=-1)
     return np.asarray(at_rest + offset[:, :, None])
 
 
-SUPPORTS = System(
+SUPPORTS = system.System(
     name="supports",
     element="support",
     quantities=SUPPORT_QUANTITIES,
     constants=CORNERS,
     outputs=(),
-    elements=lambda _: Elements((), np.zeros((len(CORNERS), 0)), np.zeros((len(SUPPORT_QUANTITIES), 0))),
+    elements=lambda _: system.Elements((), np.zeros((len(CORNERS), 0)), np.zeros((len(SUPPORT_QUANTITIES), 0))),
     state=lambda _, count: np.zeros((0, count)),
     outlines=_moved,
 )
 
 
-def supports_track(scenario: Scenario, blocks: Track, times: Floats) -> Track:
+def supports_track(scenario: Scenario, blocks: system.Track, times: system.Floats) -> system.Track:
     """Return the supports of a run at these times (s), as far as its blocks reach."""
-    quads, walls = support_quads(scenario, blocks), len(wall_segments(scenario))
+    quads, walls = support_quads(scenario, blocks), len(placement.wall_segments(scenario))
     names = (*["ground"] * (len(quads) - walls), *(f"wall {k}" for k in range(1, walls + 1)))
-    elements = Elements(names, quads.reshape(-1, 8).T, np.zeros((len(SUPPORT_QUANTITIES), len(quads))))
+    elements = system.Elements(names, quads.reshape(-1, 8).T, np.zeros((len(SUPPORT_QUANTITIES), len(quads))))
     motion = np.concatenate(support_motion(scenario, times), axis=1)
     values = np.repeat(motion[:, :, None], len(names), axis=2)
-    return Track(SystemInScene(SUPPORTS, elements), values)
+    return system.Track(system.SystemInScene(SUPPORTS, elements), values)
 
 
-def support_quads(scenario: Scenario, blocks: Track) -> Floats:
+def support_quads(scenario: Scenario, blocks: system.Track) -> system.Floats:
     """Return the corners (m, (q, 4, 2), counter-clockwise) of ground and walls at rest, in the frames' axes.
 
     Every straight piece of the ground is filled down to a common depth, and it reaches beyond all places where blocks
     have been, or beyond the ends of walls without any; a wall has a thickness behind its face.
     """
-    walls = wall_segments(scenario)
-    thick = THICKNESS * length_beside(np.minimum(blocks["size_x"], blocks["size_y"]).min(initial=np.inf))
-    beyond = BEYOND * length_beside(np.hypot(blocks["size_x"], blocks["size_y"]).max(initial=-np.inf))
+    walls = placement.wall_segments(scenario)
+    thick = THICKNESS * placement.length_beside(np.minimum(blocks["size_x"], blocks["size_y"]).min(initial=np.inf))
+    beyond = BEYOND * placement.length_beside(np.hypot(blocks["size_x"], blocks["size_y"]).max(initial=-np.inf))
     profile = np.array(scenario.ground.profile or ()).reshape(-1, 2)
     places = blocks["x"][np.isfinite(blocks["x"])]
     if not places.size:
@@ -232,7 +230,7 @@ def support_quads(scenario: Scenario, blocks: Track) -> Floats:
     return np.array(quads).reshape(-1, 4, 2)
 
 
-def support_motion(scenario: Scenario, times: Floats) -> tuple[Floats, Floats]:
+def support_motion(scenario: Scenario, times: system.Floats) -> tuple[system.Floats, system.Floats]:
     """Return displacement (m) and velocity (m/s) of ground and walls along x and y at these times (s), (n, 2) each."""
     if scenario.motion is None:
         return np.zeros((len(times), 2)), np.zeros((len(times), 2))

@@ -7,20 +7,16 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.systems import Stages
-from blocksim.kernels.soil.arrays import CONTROLS, GROUP, HISTORY, KIND, NEIGHBOURS, POINT, STATE, TALLY, TOUCH, Soils
-from blocksim.kernels.soil.contact import touch_blocks, touch_supports
-from blocksim.kernels.soil.energy import measure, survey
-from blocksim.kernels.soil.step import finish, flow, start
+from blocksim.kernels.soil import arrays, contact, energy, step
 from blocksim.kernels.sph.wendland_c2 import SUPPORT
 from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.start import soil_tables
-from blocksim.world.build import numbers
-from blocksim.world.interactions import contact_classes
+from blocksim.world import build, interactions
 from blocksim.world.systems import soils
 
-STAGES = Stages(start, finish, survey, measure)
-ACTS = {"soils": flow, "blocks": touch_blocks, "supports": touch_supports}
+STAGES = Stages(step.start, step.finish, energy.survey, energy.measure)
+ACTS = {"soils": step.flow, "blocks": contact.touch_blocks, "supports": contact.touch_supports}
 # Factor of artificial viscosity. Sheared soil feels a c h/8 of it, a resistance that the material does not have; in the
 # thin front of a collapse 0.03 is several times the friction of its weight. It is there to damp waves: with 0.003 a
 # collapse loses 2 to 4 % of its energy to it, pressures at rest and thrusts stay as they are. A numerical choice.
@@ -29,21 +25,21 @@ SKIN = 0.4  # of lists, in spacings
 FEW_TOUCHES = 128
 
 
-def build_soils(scenario: Scenario) -> Soils:
+def build_soils(scenario: Scenario) -> arrays.Soils:
     """Return the arrays of the soils of a scenario at time zero."""
     tables, places = soil_tables(scenario), soils.places_of(scenario)
     start = soils.elements_of(scenario).start
     n = start.shape[1]
-    points, states = zeros(n, POINT), zeros(n, STATE)
+    points, states = zeros(n, arrays.POINT), zeros(n, arrays.STATE)
     for number, quantity in enumerate(soils.QUANTITIES):
         holder = points if number < 4 else states
         holder[quantity.name] = start[number]
     states["number"] = np.arange(n)
     states["kind"] = np.repeat(np.arange(len(tables)), [len(one) for one in places])
-    groups = math.ceil(n / GROUP)
+    groups = math.ceil(n / arrays.GROUP)
     room = n + FEW_TOUCHES
     bodies = len(place_bodies(scenario)) + len(place_segments(scenario)) + 1
-    spacing, controls = tables[0].spacing, zeros(1, CONTROLS)
+    spacing, controls = tables[0].spacing, zeros(1, arrays.CONTROLS)
     one = controls[0]
     one.area = spacing**2
     one.smoothing = soils.SMOOTHING * spacing
@@ -54,29 +50,29 @@ def build_soils(scenario: Scenario) -> Soils:
     one.ramp = soils.RAMP if any(table.start == "ramp" for table in tables) else 0.0
     one.blocks = len(place_bodies(scenario))
     one.is_uniform = len(tables) == 1
-    return Soils(
+    return arrays.Soils(
         points=points,
         states=states,
         kinds=kind_records(scenario, tables),
         interactions=interactions_with(scenario, tables),
-        order=numbers(n, np.uint32),
-        starts=numbers(3 * n // 2 + 3, np.uint32),
-        lists=numbers((groups, GROUP * NEIGHBOURS), np.uint32),
-        lengths=numbers(n, np.uint32),
-        touches=zeros(room, TOUCH),
-        kept=zeros(room, HISTORY),
-        by_body=numbers(room, np.uint32),
-        begins=numbers(bodies + 1, np.uint32),
-        tallies=zeros(groups, TALLY),
-        spare_point=zeros(1, POINT),
-        spare_state=zeros(1, STATE),
+        order=build.numbers(n, np.uint32),
+        starts=build.numbers(3 * n // 2 + 3, np.uint32),
+        lists=build.numbers((groups, arrays.GROUP * arrays.NEIGHBOURS), np.uint32),
+        lengths=build.numbers(n, np.uint32),
+        touches=zeros(room, arrays.TOUCH),
+        kept=zeros(room, arrays.HISTORY),
+        by_body=build.numbers(room, np.uint32),
+        begins=build.numbers(bodies + 1, np.uint32),
+        tallies=zeros(groups, arrays.TALLY),
+        spare_point=zeros(1, arrays.POINT),
+        spare_state=zeros(1, arrays.STATE),
         controls=controls,
     )
 
 
 def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
     """Return one KIND for each soil."""
-    records = zeros(len(tables), KIND)
+    records = zeros(len(tables), arrays.KIND)
     depth = soils.depth_of_scene(scenario)
     for record, table in zip(records, tables, strict=True):
         material = scenario.materials[table.material]
@@ -94,7 +90,7 @@ def kind_records(scenario: Scenario, tables: list[SoilTable]) -> Any:
 
 def interactions_with(scenario: Scenario, tables: list[SoilTable]) -> Any:
     """Return the parameters (soils, classes) of contacts with each class of bodies; see `world.interactions`."""
-    classes = contact_classes(scenario, place_bodies(scenario))
+    classes = interactions.contact_classes(scenario, place_bodies(scenario))
     records = zeros((len(tables), len(classes)), INTERACTION)
     depth = soils.depth_of_scene(scenario)
     for row, table in zip(records, tables, strict=True):

@@ -16,27 +16,11 @@ from typing import Any
 import numpy as np
 
 from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, resolve_pair
-from blocksim.scenario.models.contact import PairFriction
+from blocksim.scenario.models import contact, stepping
 from blocksim.scenario.models.geometry import Material
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.models.stepping import Explicit
 from blocksim.scenario.start import soil_tables
-from blocksim.world.systems.blocks import placed_points
-from blocksim.world.systems.system import (
-    BodyContacts,
-    Cost,
-    Elements,
-    Floats,
-    Indices,
-    Output,
-    Quantity,
-    Shade,
-    System,
-    Table,
-    Track,
-    discs,
-    quantity_as_stored,
-)
+from blocksim.world.systems import blocks, system
 
 MILLI, KILO = 1e3, 1e-3
 GAP = 2.0  # spacings without a particle that end the connected part
@@ -74,20 +58,20 @@ ENERGIES = (
     "settling",
     "ramp",
 )
-COST = Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
+COST = system.Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
 GRADIENT_COST = {"raw": 1.0, "corrected": 1.5}  # time of a step over that, measured
 QUANTITIES = (
-    Quantity("x", "m"),
-    Quantity("y", "m"),
-    Quantity("vx", "m/s"),
-    Quantity("vy", "m/s"),
-    Quantity("sxx", "Pa"),  # tension positive
-    Quantity("syy", "Pa"),
-    Quantity("szz", "Pa"),
-    Quantity("sxy", "Pa"),
-    Quantity("plastic", "1"),  # accumulated plastic shear strain
+    system.Quantity("x", "m"),
+    system.Quantity("y", "m"),
+    system.Quantity("vx", "m/s"),
+    system.Quantity("vy", "m/s"),
+    system.Quantity("sxx", "Pa"),  # tension positive
+    system.Quantity("syy", "Pa"),
+    system.Quantity("szz", "Pa"),
+    system.Quantity("sxy", "Pa"),
+    system.Quantity("plastic", "1"),  # accumulated plastic shear strain
 )
-CONSTANTS = (Quantity("mass", "kg"), Quantity("spacing", "m"))
+CONSTANTS = (system.Quantity("mass", "kg"), system.Quantity("spacing", "m"))
 
 
 def lame_constants(material: Material) -> tuple[float, float]:
@@ -139,7 +123,7 @@ def damping_at_start(scenario: Scenario, table: SoilTable) -> tuple[float, float
     return SHOCK_DAMPING * speed / smoothing, SHOCK_TIME * smoothing / speed
 
 
-def friction_with(scenario: Scenario, soil: str, partner: str, *, ground: bool) -> PairFriction:
+def friction_with(scenario: Scenario, soil: str, partner: str, *, ground: bool) -> contact.PairFriction:
     """Return the friction of a soil's material with another one; `ground` for the ground (GROUND) and walls.
 
     As [pairs] has it, else that of the soil itself, as on a rough face: [friction] is about blocks.
@@ -147,10 +131,10 @@ def friction_with(scenario: Scenario, soil: str, partner: str, *, ground: bool) 
     pair = resolve_pair(scenario, soil, partner, ground=ground)
     if pair.rules["friction"].startswith("pairs."):
         return pair.friction
-    return PairFriction(static=math.tan(scenario.materials[soil].friction_angle or 0.0))
+    return contact.PairFriction(static=math.tan(scenario.materials[soil].friction_angle or 0.0))
 
 
-def geostatic_stress(scenario: Scenario, table: SoilTable, places: Floats) -> Floats:
+def geostatic_stress(scenario: Scenario, table: SoilTable, places: system.Floats) -> system.Floats:
     """Return xx, yy, zz and xy (Pa, tension positive, (4, n)) at places (m, (n, 2)) of a soil; zero with a ramp.
 
     The vertical stress is the weight of all soil straight above, the horizontal ones K0 times that.
@@ -192,13 +176,13 @@ def _is_beside_a_block(scenario: Scenario, soil: SoilTable) -> bool:
     for body in place_bodies(scenario):
         if body.driven or not body.fixed:
             place = (np.array([value]) for value in (body.x, body.y, body.angle))
-            corners = placed_points(np.array([body.corners]), *place)[0]
+            corners = blocks.placed_points(np.array([body.corners]), *place)[0]
             if any(geometry.overlap(one, corners) for one in moved):
                 return True
     return False
 
 
-def body_contacts(soils: Any, world: Any) -> BodyContacts:
+def body_contacts(soils: Any, world: Any) -> system.BodyContacts:
     """Return the contacts of soils with bodies."""
     touches = soils.touches[: int(soils.controls["touch_count"][0])]
     touches = touches[touches["normal_force"] > 0.0].view(np.ndarray)
@@ -210,18 +194,18 @@ def body_contacts(soils: Any, world: Any) -> BodyContacts:
     apart = float(soils.controls["radius"][0]) - touches["depth"]
     centre = np.stack([soils.points["x"][particle], soils.points["y"][particle]], axis=-1)
     friction = soils.interactions["static_friction"][kind, world.bodies["contact_class"][body]]
-    return BodyContacts(
+    return system.BodyContacts(
         body.astype(np.intp), kind.astype(np.intp), centre - apart[:, None] * normal, -normal, push, -rub, friction
     )
 
 
-def parts_of(track: Track) -> dict[str, Indices]:
+def parts_of(track: system.Track) -> dict[str, system.Indices]:
     """Return the numbers of the particles of each soil; they are called SOIL.NUMBER."""
     owners = np.array([name.rpartition(".")[0] for name in track.names])
     return {str(name): np.flatnonzero(owners == name) for name in dict.fromkeys(owners.tolist())}
 
 
-def connected_span(x: Floats, gap: float) -> tuple[float, float]:
+def connected_span(x: system.Floats, gap: float) -> tuple[float, float]:
     """Return the ends (m) of the part around the median that no gap (m) interrupts."""
     ordered = np.sort(x)
     breaks = np.flatnonzero(np.diff(ordered) > gap)
@@ -231,7 +215,7 @@ def connected_span(x: Floats, gap: float) -> tuple[float, float]:
     return float(ordered[first]), float(ordered[last])
 
 
-def final_table(scenario: Scenario, track: Track) -> Table:
+def final_table(scenario: Scenario, track: system.Track) -> system.Table:
     """Return the table of the last frame: a row for each soil.
 
     left and right end the part without a gap of 2 spacings, first and last particle wherever they are. The back is the
@@ -256,7 +240,7 @@ def final_table(scenario: Scenario, track: Track) -> Table:
     return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
 
 
-def _is_left_back(track: Track, own: Indices, scenario: Scenario, ends: tuple[float, float]) -> bool:
+def _is_left_back(track: system.Track, own: system.Indices, scenario: Scenario, ends: tuple[float, float]) -> bool:
     """Return True if the left end of a soil is its back; `ends` are where it ends now (m)."""
     near = GAP * float(track["spacing"][own[0]])
     x, y = track.at_start("x")[own], track.at_start("y")[own]
@@ -276,12 +260,12 @@ def _is_left_back(track: Track, own: Indices, scenario: Scenario, ends: tuple[fl
     return abs(ends[0] - left) <= abs(ends[1] - right) + float(track["spacing"][own[0]])
 
 
-def surface(track: Track, frame: int) -> list[Floats]:
+def surface(track: system.Track, frame: int) -> list[system.Floats]:
     """Return for each soil lines (m, (k, 2)) through the highest points of columns of two spacings.
 
     Columns in which there is no particle interrupt the line.
     """
-    lines: list[Floats] = []
+    lines: list[system.Floats] = []
     for own in parts_of(track).values():
         spacing = float(track["spacing"][own[0]])
         x, y = track["x"][frame, own], track["y"][frame, own]
@@ -296,12 +280,12 @@ def surface(track: Track, frame: int) -> list[Floats]:
     return lines
 
 
-def displacement(track: Track) -> Floats:
+def displacement(track: system.Track) -> system.Floats:
     """Return how far (m) particles are from where they began."""
     return np.asarray(np.hypot(track["x"] - track.at_start("x"), track["y"] - track.at_start("y")))
 
 
-def pressure(track: Track) -> Floats:
+def pressure(track: system.Track) -> system.Floats:
     """Return mean pressures (Pa), averaged over neighbours; for pictures only.
 
     Particles share theirs out to the cells of a grid of one spacing, cells average over the next ones, and particles
@@ -312,7 +296,7 @@ def pressure(track: Track) -> Floats:
     return np.stack([_smoothed(*one, spacing) for one in zip(track["x"], track["y"], raw, strict=True)])
 
 
-def _smoothed(x: Floats, y: Floats, values: Floats, spacing: float) -> Floats:
+def _smoothed(x: system.Floats, y: system.Floats, values: system.Floats, spacing: float) -> system.Floats:
     known = np.isfinite(x + y + values)
     if not known.any():
         return values
@@ -320,8 +304,8 @@ def _smoothed(x: Floats, y: Floats, values: Floats, spacing: float) -> Floats:
     i, j = (np.clip(np.nan_to_num(one), SMOOTHED, 1e7).astype(np.int64) for one in (u, v))
     cells, at = np.unique(np.stack([i, j], axis=-1)[known], axis=0, return_inverse=True)
     at = at.ravel()
-    count: Floats = np.bincount(at).astype(np.float64)
-    total: Floats = np.bincount(at, values[known]).astype(np.float64)
+    count: system.Floats = np.bincount(at).astype(np.float64)
+    total: system.Floats = np.bincount(at, values[known]).astype(np.float64)
     for _ in range(SMOOTHED):
         count, total = _shared(cells, count, total)
     result = values.copy()
@@ -329,7 +313,7 @@ def _smoothed(x: Floats, y: Floats, values: Floats, spacing: float) -> Floats:
     return result
 
 
-def _shared(cells: Any, count: Floats, total: Floats) -> tuple[Floats, Floats]:
+def _shared(cells: Any, count: system.Floats, total: system.Floats) -> tuple[system.Floats, system.Floats]:
     """Return what cells hold, (k, 2) of them, after each has given a half to the four next to it, where they are."""
     keys = cells[:, 0] * (cells[:, 1].max() + 3) + cells[:, 1]  # in order, as cells are
     own = np.arange(len(cells))
@@ -343,19 +327,19 @@ def _shared(cells: Any, count: Floats, total: Floats) -> tuple[Floats, Floats]:
 
 
 SHADES = (
-    Shade("displacement", "displacement (mm)", lambda track: MILLI * displacement(track)),
-    Shade("speed", "speed (mm/s)", lambda track: MILLI * np.hypot(track["vx"], track["vy"])),
-    Shade("plastic", "plastic shear strain", lambda track: track["plastic"]),
-    Shade("pressure", "mean pressure (kPa), smoothed", lambda track: KILO * pressure(track)),
+    system.Shade("displacement", "displacement (mm)", lambda track: MILLI * displacement(track)),
+    system.Shade("speed", "speed (mm/s)", lambda track: MILLI * np.hypot(track["vx"], track["vy"])),
+    system.Shade("plastic", "plastic shear strain", lambda track: track["plastic"]),
+    system.Shade("pressure", "mean pressure (kPa), smoothed", lambda track: KILO * pressure(track)),
 )
 
 
-def places_of(scenario: Scenario) -> list[Floats]:
+def places_of(scenario: Scenario) -> list[system.Floats]:
     """Return the places (m, (n, 2)) of the particles of each soil."""
     return [geometry.fill_lattice(table.corners, table.spacing) for table in soil_tables(scenario)]
 
 
-def elements_of(scenario: Scenario) -> Elements:
+def elements_of(scenario: Scenario) -> system.Elements:
     """Return the particles of all soils of a scenario."""
     tables, places = soil_tables(scenario), places_of(scenario)
     names = tuple(
@@ -371,12 +355,12 @@ def elements_of(scenario: Scenario) -> Elements:
     start[4:8] = np.concatenate(
         [geostatic_stress(scenario, table, one) for table, one in zip(tables, places, strict=True)], axis=1
     )
-    return Elements(names, constants, start)
+    return system.Elements(names, constants, start)
 
 
-def _state(soils: Any, count: int) -> Floats:
+def _state(soils: Any, count: int) -> system.Floats:
     number = soils.states["number"]
-    values: Floats = np.empty((len(QUANTITIES), count))
+    values: system.Floats = np.empty((len(QUANTITIES), count))
     for row, quantity in enumerate(QUANTITIES):
         holder = soils.points if row < 4 else soils.states
         values[row, number] = holder[quantity.name]
@@ -385,7 +369,7 @@ def _state(soils: Any, count: int) -> Floats:
 
 def _largest_step(scenario: Scenario) -> float:
     tables = soil_tables(scenario)
-    usual = float(Explicit.model_fields["safety"].default)
+    usual = float(stepping.Explicit.model_fields["safety"].default)
     courant = COURANT * min(
         1.0, float(getattr(scenario.time, "safety", usual)) / usual
     )  # a finer step is finer for all
@@ -406,27 +390,35 @@ def soils_and(other: str) -> Callable[[], Any]:
     return lambda: _arrays("ACTS")[other]
 
 
-SOILS = System(
+SOILS = system.System(
     name="soils",
     element="particle",
     quantities=QUANTITIES,
     constants=CONSTANTS,
     outputs=(
-        Output("x", "m", "place along the ground", "x_mm", quantity_as_stored("x"), MILLI),
-        Output("y", "m", "place above the ground", "y_mm", quantity_as_stored("y"), MILLI),
-        Output("vx", "m/s", "velocity along the ground", "vx_mm_s", quantity_as_stored("vx"), MILLI),
-        Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", quantity_as_stored("vy"), MILLI),
-        Output("displacement", "m", "distance from where it began", "displacement_mm", displacement, MILLI),
-        Output("sxx", "Pa", "stress along the ground, tension positive", "sxx_Pa", quantity_as_stored("sxx")),
-        Output("syy", "Pa", "stress normal to the ground, tension positive", "syy_Pa", quantity_as_stored("syy")),
-        Output("szz", "Pa", "stress out of the plane, tension positive", "szz_Pa", quantity_as_stored("szz")),
-        Output("sxy", "Pa", "shear stress", "sxy_Pa", quantity_as_stored("sxy")),
-        Output("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", pressure),
-        Output("plastic", "1", "accumulated plastic shear strain", "plastic_strain", quantity_as_stored("plastic")),
+        system.Output("x", "m", "place along the ground", "x_mm", system.quantity_as_stored("x"), MILLI),
+        system.Output("y", "m", "place above the ground", "y_mm", system.quantity_as_stored("y"), MILLI),
+        system.Output("vx", "m/s", "velocity along the ground", "vx_mm_s", system.quantity_as_stored("vx"), MILLI),
+        system.Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", system.quantity_as_stored("vy"), MILLI),
+        system.Output("displacement", "m", "distance from where it began", "displacement_mm", displacement, MILLI),
+        system.Output(
+            "sxx", "Pa", "stress along the ground, tension positive", "sxx_Pa", system.quantity_as_stored("sxx")
+        ),
+        system.Output(
+            "syy", "Pa", "stress normal to the ground, tension positive", "syy_Pa", system.quantity_as_stored("syy")
+        ),
+        system.Output(
+            "szz", "Pa", "stress out of the plane, tension positive", "szz_Pa", system.quantity_as_stored("szz")
+        ),
+        system.Output("sxy", "Pa", "shear stress", "sxy_Pa", system.quantity_as_stored("sxy")),
+        system.Output("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", pressure),
+        system.Output(
+            "plastic", "1", "accumulated plastic shear strain", "plastic_strain", system.quantity_as_stored("plastic")
+        ),
     ),
     elements=elements_of,
     state=_state,
-    outlines=lambda track, chosen: discs(track, chosen, 0.5 * track["spacing"]),
+    outlines=lambda track, chosen: system.discs(track, chosen, 0.5 * track["spacing"]),
     energies=ENERGIES,
     build=_build,
     largest_step=_largest_step,
