@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -136,76 +135,51 @@ class Column:
     digits: int = 2
 
 
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """One measured quantity of one block: m repeats, and the value of each of n members (NaN: none)."""
+class Pair(NamedTuple):
+    """One measured quantity of one block: m repeats, and the value of each of n members."""
 
     measured: experiment.Statistics
     repeats: dict[int, float]  # by replicate, ascending
-    values: Floats = field(repr=False)
+    simulated: Floats  # by the members, NaN where one has none
+    known: Floats  # of the members that have one
+    limits: Interval  # of inside, as for a single run
+    name: str  # in a message
+    head: Row  # first cells of its row in a table
+
+    def between(self, ends: Interval) -> NDArray[np.bool_]:
+        """Return for each member whether it lies between two ends, ends included; one without a value does not."""
+        return (self.simulated >= ends[0]) & (self.simulated <= ends[1])
 
     @property
     def scatters(self) -> bool:
         """Whether the repeats differ; equal ones only show that the scatter is below the reading."""
         return self.measured.minimum < self.measured.maximum
 
-    @property
-    def known(self) -> Floats:
-        """The values of the members that have one."""
-        return self.values[np.isfinite(self.values)]
 
-    @property
-    def limits(self) -> Interval:
-        """The limits of inside, as for a single run."""
-        return compare.limits(self.measured.quantity, self.measured.mean, self.measured.minimum, self.measured.maximum)
-
-    @property
-    def inside(self) -> NDArray[np.bool_]:
-        """Whether each member is inside the limits, ends included; a member without a value is not."""
-        return self.between(self.limits)
-
-    def between(self, ends: Interval) -> NDArray[np.bool_]:
-        """Return for each member whether it lies between two ends, ends included."""
-        return (self.values >= ends[0]) & (self.values <= ends[1])
-
-    @property
-    def name(self) -> str:
-        """Its name in a message."""
-        return f"{self.measured.quantity} of block {self.measured.block}"
-
-    @property
-    def head(self) -> Row:
-        """The first cells of its row in a table."""
-        return {"block": self.measured.block, "quantity": self.measured.quantity, "unit": self.measured.unit}
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """Input of the metrics; `u_num` is the standard uncertainty (mm) of the numerical solution."""
+class Evidence(NamedTuple):
+    """Input of the metrics."""
 
     members: Members
-    table: experiment.ExperimentTable
-    u_num: float
+    u_num: float  # mm, standard uncertainty of the numerical solution
+    pairs: tuple[Pair, ...]  # of block and quantity, in the order of the experiment's table
+    lengths: tuple[Pair, ...]  # those of positions in mm, not of angles
+    inside: NDArray[np.bool_]  # whether each member is within all measured ranges
 
-    @cached_property
-    def pairs(self) -> tuple[Pair, ...]:
-        """All measured pairs of block and quantity, in the order of the experiment's table."""
-        repeats: dict[tuple[str, str], dict[int, float]] = {}
-        for one in sorted(self.table.measurements, key=lambda one: one.replicate):
-            repeats.setdefault((one.block, one.quantity), {})[one.replicate] = one.value
-        pairs = [(row, (row.block, row.quantity)) for row in self.table.summaries()]
-        return tuple(Pair(row, repeats[pair], self.members.values(*pair)) for row, pair in pairs)
 
-    @property
-    def lengths(self) -> list[Pair]:
-        """Those of positions in mm, not of angles."""
-        return [pair for pair in self.pairs if pair.measured.unit == "mm"]
-
-    @property
-    def inside(self) -> NDArray[np.bool_]:
-        """Whether each member is within all measured ranges."""
-        inside: NDArray[np.bool_] = np.all([pair.inside for pair in self.pairs], axis=0)
-        return inside
+def evidence_of(members: Members, table: experiment.ExperimentTable, u_num: float) -> Evidence:
+    """Return the members of a sweep beside repeats. Raises InvalidInputError where they lack a measured quantity."""
+    repeats: dict[tuple[str, str], dict[int, float]] = {}
+    for one in sorted(table.measurements, key=lambda one: one.replicate):
+        repeats.setdefault((one.block, one.quantity), {})[one.replicate] = one.value
+    pairs = []
+    for row in table.summaries():
+        values = members.values(row.block, row.quantity)
+        limits = compare.limits(row.quantity, row.mean, row.minimum, row.maximum)
+        head: Row = {"block": row.block, "quantity": row.quantity, "unit": row.unit}
+        name, known = f"{row.quantity} of block {row.block}", values[np.isfinite(values)]
+        pairs.append(Pair(row, repeats[row.block, row.quantity], values, known, limits, name, head))
+    inside: NDArray[np.bool_] = np.all([pair.between(pair.limits) for pair in pairs], axis=0)
+    return Evidence(members, u_num, tuple(pairs), tuple(one for one in pairs if one.measured.unit == "mm"), inside)
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,14 @@
-"""Metrics that compare an ensemble with repeats: outcome, inside, prediction, validation, area and joint test."""
+"""Judgement of an ensemble, the members of a sweep, against the repeats of an experiment by all metrics.
+
+These are outcome, inside, prediction, validation, area and joint test.
+"""
 
 from collections import Counter
-from collections.abc import Sequence
-from math import hypot, isfinite, nan, sqrt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot, inf, isfinite, nan, sqrt
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +18,26 @@ from blocksim.analysis.evidence import (
     BLOCK,
     Column,
     Evidence,
+    Failure,
     Findings,
     Floats,
     Form,
     Interval,
+    Members,
     Metric,
     Row,
     complete_repeats,
+    evidence_of,
 )
+from blocksim.analysis.experiment import ExperimentTable
+from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+U_NUM = 0.5  # mm: numerical error that step and stiffness may cause in an affordable ensemble
+THRESHOLD = 0.5
 QUARTER = 90.0  # deg
 ROTATION = "rotation"
 UNKNOWN = "?"
@@ -117,7 +131,7 @@ def _find_inside(evidence: Evidence) -> Findings:
     rows: list[Row] = []
     ranged = []  # repeats of those whose limits are those of the repeats, and no tolerance about them
     for pair in evidence.pairs:
-        n, count = pair.measured.n, int(pair.inside.sum())
+        n, count = pair.measured.n, int(pair.between(pair.limits).sum())
         has_range = pair.limits == (pair.measured.minimum, pair.measured.maximum)
         ranged += [n] if has_range else []
         row: Row = {**pair.head, "limits": pair.limits, "inside": count, "of": total, **_share(count, total)}
@@ -330,7 +344,7 @@ def _find_joint(evidence: Evidence) -> Findings:
     if not chosen:
         return Findings((), (*messages, "not computed: no measured position scatters"))
     repeats, incomplete = complete_repeats(chosen)
-    members = np.column_stack([pair.values for pair in chosen])
+    members = np.column_stack([pair.simulated for pair in chosen])
     members = members[np.isfinite(members).all(axis=1)]
     if incomplete:
         messages.append(f"left out, as not all positions were measured: replicate {incomplete}")
@@ -378,3 +392,112 @@ JOINT = Metric(
 
 
 METRICS: dict[str, Metric] = {metric.name: metric for metric in (INSIDE, OUTCOME, VALIDATION, PREDICTION, AREA, JOINT)}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings: the share of members that must be inside, and u_num (mm)."""
+
+    threshold: float = THRESHOLD
+    u_num: float = U_NUM
+
+    def __post_init__(self) -> None:
+        """Raise InvalidInputError for an invalid share or uncertainty."""
+        if not 0.0 <= self.threshold <= 1.0:
+            message = f"threshold {self.threshold} is not a share from 0 to 1"
+            raise InvalidInputError(message)
+        if not 0.0 <= self.u_num < inf:
+            message = f"u_num {self.u_num} is not an uncertainty in mm: a number from 0 up"
+            raise InvalidInputError(message)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Judgement:
+    """Results of all metrics by name; `sweep` and `source` are what was compared."""
+
+    sweep: str
+    source: str
+    members: int
+    inside_all: int
+    failures: tuple[Failure, ...]
+    settings: Settings
+    findings: Mapping[str, Findings]
+    messages: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return a line: sweep, table, share inside and the verdict."""
+        verdict = "inside" if self.inside else "outside"
+        share = f"{self.inside_all} of {self.members} samples inside all ranges"
+        return f"<Judgement of {self.sweep} against {self.source}: {share}, {verdict}>"
+
+    @property
+    def share_inside(self) -> float:
+        """Share of all members, failed ones included, that are within all measured ranges."""
+        return self.inside_all / self.members
+
+    @property
+    def inside(self) -> bool:
+        """Whether that share reaches the threshold."""
+        return self.share_inside >= self.settings.threshold
+
+    def to_frame(self, metric: str = "inside") -> "pd.DataFrame":
+        """Return the rows of one metric; its columns are explained in METRICS."""
+        import pandas as pd
+
+        names = [column.name for column in METRICS[metric].columns]
+        return pd.DataFrame(self.findings[metric].rows, columns=names)
+
+    def _repr_html_(self) -> str:
+        """Return the same line above the samples inside the measured limits, for notebooks."""
+        return compare.html_of(self, self.to_frame())
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values for JSON, with the meaning of each; a missing number is None."""
+        return {
+            "sweep": self.sweep,
+            "experiment": self.source,
+            "members": self.members,
+            "finished": self.members - len(self.failures),
+            "failed": [failure._asdict() for failure in self.failures],
+            "inside_all": self.inside_all,
+            "share_inside": self.share_inside,
+            "threshold": self.settings.threshold,
+            "inside": self.inside,
+            "messages": list(self.messages),
+            "metrics": {
+                name: {
+                    "meaning": METRICS[name].meaning,
+                    "columns": {column.name: column.meaning for column in METRICS[name].columns},
+                    "rows": [{key: compare.plain(value) for key, value in row.items()} for row in found.rows],
+                    "messages": list(found.messages),
+                }
+                for name, found in self.findings.items()
+            },
+        }
+
+
+def judge(
+    members: Members, table: ExperimentTable, settings: Settings | None = None, messages: tuple[str, ...] = ()
+) -> Judgement:
+    """Judge the members of a sweep by all metrics.
+
+    Raises InvalidInputError where members lack a measured block or quantity, UnavailableError without scipy.
+    """
+    settings = settings or Settings()
+    table.refuse_unknown(members.blocks, "the sweep")
+    evidence, finished = evidence_of(members, table, settings.u_num), int(members.finished.sum())
+    incomplete = (  # measured quantities of which finished samples have no value
+        f"{finished - pair.known.size} finished samples have no {pair.name}: they count as outside"
+        for pair in evidence.pairs
+        if pair.known.size < finished
+    )
+    return Judgement(
+        sweep=members.source,
+        source=table.source,
+        members=members.count,
+        inside_all=int(evidence.inside.sum()),
+        failures=members.failures,
+        settings=settings,
+        findings={name: metric.find(evidence) for name, metric in METRICS.items()},
+        messages=(*messages, *table.messages, *table.unmeasured(members.blocks), *incomplete),
+    )

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 from blocksim.analysis import compare, evidence, metrics
-from blocksim.analysis.judgement import THRESHOLD, U_NUM, Judgement, Settings
 from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import number, table_lines, width_of_screen
 from blocksim.errors import ExitCode
@@ -38,11 +37,11 @@ def compare_command(
     experiment: ExperimentTablePath = None,
     threshold: Annotated[
         float, Option("For sweeps: share of samples that must be within all measured ranges.", least=0.0, most=1.0)
-    ] = THRESHOLD,
+    ] = metrics.THRESHOLD,
     u_num: Annotated[
         float,
         Option("For sweeps: standard uncertainty of the numerical solution, in mm.", metavar="MM", least=0.0, most=1e6),
-    ] = U_NUM,
+    ] = metrics.U_NUM,
     screen: Screen,
 ) -> Report:
     """Compare runs with measured repeats.
@@ -60,7 +59,7 @@ def compare_command(
     judged: list[bool] = []
     for place in runs:
         if manifest.is_sweep(place):
-            judgement = compare_sweep(place, experiment, Settings(threshold, u_num))
+            judgement = compare_sweep(place, experiment, metrics.Settings(threshold, u_num))
             head, source, lines = place, judgement.source, list(_judgement_lines(judgement))
             data.append(judgement.to_dict())
             judged.append(judgement.inside)
@@ -117,7 +116,7 @@ def verdict_lines(comparison: compare.Comparison) -> list[str]:
     return [*comparison.messages, *(outside or ["all inside"])]
 
 
-def _judgement_lines(judgement: Judgement) -> Iterator[str]:
+def _judgement_lines(judgement: metrics.Judgement) -> Iterator[str]:
     """Yield all tables and their notes, after the first samples that failed."""
     for one in judgement.failures[:MOST_FAILURES]:
         yield textwrap.shorten(f"row {one.row}, case {one.case}: {one.status}: {one.reason}", width_of_screen())

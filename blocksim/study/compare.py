@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, overload
 from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import load_table
-from blocksim.analysis.judgement import Judgement, Settings, judge
+from blocksim.analysis.metrics import Judgement, Settings, judge
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
 from blocksim.scenario import load_scenario, load_stored

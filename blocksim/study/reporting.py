@@ -7,7 +7,7 @@ from typing import Any
 from blocksim import __version__
 from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import load_table
-from blocksim.analysis.judgement import Judgement
+from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import load_stored
 from blocksim.scenario.input_files import MEGABYTE

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from blocksim.analysis.experiment import load_table
-from blocksim.analysis.judgement import Judgement, Settings, judge
-from blocksim.analysis.metrics import METRICS
+from blocksim.analysis.metrics import METRICS, Judgement, Settings, judge
 from blocksim.errors import InvalidInputError, UnavailableError
 from tests.analysis.metrics.conftest import members_of, table_of
 

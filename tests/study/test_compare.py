@@ -7,7 +7,7 @@ import pytest
 
 import blocksim
 from blocksim.analysis.compare import Comparison
-from blocksim.analysis.judgement import Judgement, Settings
+from blocksim.analysis.metrics import Judgement, Settings
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document
 from blocksim.study.compare import compare, compare_sweep

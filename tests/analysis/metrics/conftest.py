@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from blocksim.analysis.evidence import Evidence, Findings, Members
+from blocksim.analysis.evidence import evidence_of as joined
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Measurement
 from blocksim.analysis.metrics import METRICS
 
@@ -42,7 +43,7 @@ def evidence_of(
     u_num: float = 0.0,
 ) -> Evidence:
     """Return what metrics are computed from."""
-    return Evidence(members_of(members, statuses), table_of(repeats), u_num)
+    return joined(members_of(members, statuses), table_of(repeats), u_num)
 
 
 def found_by(metric: str, *arguments: object, **options: object) -> Findings:
