@@ -10,11 +10,10 @@ from typing import get_args
 from pydantic import ValidationError
 
 from blocksim.scenario import geometry, overrides
-from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, mistakes_of
+from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, mistakes_of, unknown
 from blocksim.scenario.models import base, contact, stepping, study
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import SYNONYMS, Data, KeyPath, UnfitOverrideError, with_value
-from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.start import impossible_starts, soil_tables, unfit_soils
 from blocksim.scenario.structures import PolygonStructure, polygons
 from blocksim.scenario.units import toml
@@ -42,11 +41,9 @@ def wrong_names(data: Data) -> Iterator[Mistake]:
 
 
 def _unknown(data: Data, path: KeyPath, group: str) -> Iterator[Mistake]:
-    name = overrides.follow(data, path)
     known = data.get(group, {} if group == "blocks" else None)  # materials that are missing are told of by themselves
-    if isinstance(name, str) and isinstance(known, Mapping) and name not in known:
-        hint = did_you_mean_or_list(name, known)
-        yield Mistake(path, f"unknown {group.removesuffix('s')} {toml(name)}, {hint}")
+    if isinstance(known, Mapping):
+        yield from unknown(path, group.removesuffix("s"), known, overrides.follow(data, path))
 
 
 def _wrong_pairs(data: Data) -> Iterator[Mistake]:
@@ -57,8 +54,7 @@ def _wrong_pairs(data: Data) -> Iterator[Mistake]:
         yield Mistake(("materials", contact.GROUND), message, at="key")
     found: set[frozenset[str]] = set()
     for one, partners in pairs.items() if isinstance(pairs, Mapping) else ():
-        if known and one not in known:
-            yield Mistake(("pairs", one), f"unknown material {toml(one)}, {did_you_mean_or_list(one, known)}", at="key")
+        yield from unknown(("pairs", one), "material", known, one if known else None, "key")
         missing = f"name the other material too, as in [{overrides.format_key(('pairs', one, contact.GROUND))}]"
         if partners == {}:
             yield Mistake(("pairs", one), missing, at="key")
@@ -66,8 +62,8 @@ def _wrong_pairs(data: Data) -> Iterator[Mistake]:
             path = ("pairs", one, other)
             if other in contact.Pair.model_fields and other not in known:
                 yield Mistake(path, missing, at="key")
-            elif known and other not in known:
-                yield Mistake(path, f"unknown material {toml(other)}, {did_you_mean_or_list(other, known)}", at="key")
+            else:
+                yield from unknown(path, "material", known, other if known else None, "key")
             if one == other == contact.GROUND:
                 yield Mistake(path, "the ground is not in contact with itself", at="key")
             elif frozenset((one, other)) in found:

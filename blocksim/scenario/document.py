@@ -260,7 +260,7 @@ class Document:
     source: ScenarioText
     folder: Path = Path()
     overrides: tuple[Override, ...] = ()
-    allow_outside: bool = field(default_factory=input_files.is_anywhere)
+    allow_outside: bool = field(default_factory=lambda: input_files.access.get()[0])
     is_stored: bool = False
 
     @classmethod

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.scenario.geometry import Corner, edges_of
-from blocksim.scenario.mistakes import Mistake
+from blocksim.scenario.mistakes import Mistake, repeated, unknown
 from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Event, ForceProbe, JointProbe, PointProbe
@@ -138,43 +138,30 @@ def probe_names(scenario: Scenario) -> list[str]:
 
 def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find names given twice, bodies and supports that do not exist, and bodies without a joint."""
-    seen: set[str] = set()
-    for number, name in enumerate(probe_names(scenario)):
-        if name in seen:
-            yield Mistake(("probes", number, "name"), f"two probes are named {toml(name)}")
-        seen.add(name)
+    names = probe_names(scenario)
+    for number in repeated(names):
+        yield Mistake(("probes", number, "name"), f"two probes are named {toml(names[number])}")
     bodies = {body.name: body for body in placed}
     others = [str(name) for tables in scenario.systems.values() for one in tables if (name := getattr(one, "name", ""))]
-    known = [*bodies, *support_words(scenario), *others]
+    known = [*bodies, GROUND, SUPPORTS, *([WALLS] if scenario.walls else []), *wall_names(scenario), *others]
     for number, probe in enumerate(scenario.probes):
         path = ("probes", number)
         match probe:
             case ForceProbe():
-                named = {"on": probe.on} if probe.by is None else {"on": probe.on, "by": probe.by}
-                yield from _unknown([((*path, key), name) for key, name in named.items()], known)
+                for key in ("on", "by"):
+                    yield from unknown((*path, key), "body", known, getattr(probe, key))
                 if probe.by == probe.on:
                     yield Mistake((*path, "by"), f"{toml(probe.by)} exerts no force on itself")
             case PointProbe():
-                yield from _unknown([((*path, "body"), probe.body)], [*bodies])
+                yield from unknown((*path, "body"), "body", bodies, probe.body)
             case JointProbe():
-                unknown = [*_unknown([((*path, "bodies", i), name) for i, name in enumerate(probe.bodies)], [*bodies])]
-                yield from unknown
-                if not unknown and joint_between(*(bodies[name] for name in probe.bodies)) is None:
+                for place, name in enumerate(probe.bodies):
+                    yield from unknown((*path, "bodies", place), "body", bodies, name)
+                if bodies.keys() >= {*probe.bodies} and joint_between(*(bodies[name] for name in probe.bodies)) is None:
                     message = (
                         f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no faces that lie opposite each other"
                     )
                     yield Mistake((*path, "bodies"), f"{message} at the start, parallel within {LEAST_ANGLE:g} deg")
-
-
-def support_words(scenario: Scenario) -> list[str]:
-    """Return the words that mean supports: ground, walls together and one by one, all supports."""
-    return [GROUND, SUPPORTS, *([WALLS] if scenario.walls else []), *wall_names(scenario)]
-
-
-def _unknown(named: Sequence[tuple[KeyPath, str]], known: Sequence[str]) -> Iterator[Mistake]:
-    for path, name in named:
-        if name not in known:
-            yield Mistake(path, f"unknown body {toml(name)}, {did_you_mean_or_list(name, known)}")
 
 
 class Joint(NamedTuple):

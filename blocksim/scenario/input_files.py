@@ -107,7 +107,7 @@ def read_error(path: Path, error: OSError | ValueError) -> InputMissingError | I
     return InputMissingError(f"{path}: cannot be read: {reason}")
 
 
-_access = ContextVar("_access", default=(False, True))  # whether any file may be named, whether links are followed
+access = ContextVar("access", default=(False, True))  # whether any file may be named, whether links are followed
 
 
 class UserPath(str):
@@ -120,19 +120,14 @@ class OutOfReachError(ValueError):
     """A path that leads outside, or to no file; the text has the reason."""
 
 
-def is_anywhere() -> bool:
-    """Return True if scenarios may name any file at present."""
-    return _access.get()[0]
-
-
 @contextmanager
 def file_access(*, anywhere: bool, links: bool = True) -> Iterator[None]:
     """Let scenarios that are read meanwhile name any file, or only those within reach; and links or not."""
-    before = _access.set((anywhere, links))
+    before = access.set((anywhere, links))
     try:
         yield
     finally:
-        _access.reset(before)
+        access.reset(before)
 
 
 def user_value(key: str | Sequence[str | int], value: object) -> object:
@@ -144,7 +139,7 @@ def user_value(key: str | Sequence[str | int], value: object) -> object:
 def table_in(folder: Path | str, text: str) -> Path:
     """Return the file that a scenario in `folder` names, all links followed. Raises OutOfReachError."""
     is_by_hand = isinstance(text, UserPath)
-    is_anything_allowed, follows_links = _access.get()
+    is_anything_allowed, follows_links = access.get()
     if not follows_links and not is_by_hand and Path(folder, text).is_symlink():
         raise OutOfReachError(f"{toml(text)}: {IS_LINK}")
     try:
@@ -245,7 +240,12 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
     needed = f"its first line must be {','.join(columns)}"
     if not content:
         raise_problems([Problem(str(path), "the table is empty" + (f", {needed}" if columns else ""))])
-    line, heads = content[0], _header(content[0])
+    line, places = content[0], _cells(content[0])
+    if ";" in line.text and "," not in line.text:  # as in spreadsheets' tables where decimals have a comma
+        raise_problems([line.problem(f"columns are separated by semicolons; {DIALECT}")])
+    if places is None:
+        raise_problems([line.problem(_shape_complaint(line, places, 0))])
+    heads = tuple(Cell("", *place) for place in places)
     names = [head.text for head in heads]
     problems = []
     for index, head in enumerate(heads):
@@ -350,16 +350,3 @@ def _shape_complaint(line: Line, cells: list[tuple[str, Line, int, int]] | None,
         return "quotes do not match"
     hint = " (decimals are written with a point)" if len(cells) > count else ""
     return f"{len(cells)} cells where the header has {count} columns{hint}" if len(cells) != count else ""
-
-
-def _header(line: Line) -> tuple[Cell, ...]:
-    """Return the cells of the line with the names of columns.
-
-    Raises InvalidInputError where they cannot be told apart, as in spreadsheets' tables where decimals have a comma.
-    """
-    if ";" in line.text and "," not in line.text:
-        raise_problems([line.problem(f"columns are separated by semicolons; {DIALECT}")])
-    places = _cells(line)
-    if places is None:
-        raise_problems([line.problem(_shape_complaint(line, places, 0))])
-    return tuple(Cell("", *place) for place in places)

@@ -1,6 +1,6 @@
 """Mistakes in the data of a scenario, in plain words, with the path of the key concerned."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 
 from blocksim.scenario.models import base, loads, motion, record, scenario, stepping
 from blocksim.scenario.overrides import MISSING, NAMED, KeyPath, field_at, fields_of, follow, marks_of, table_at
-from blocksim.scenario.spelling import did_you_mean, meant_word, nearest
+from blocksim.scenario.spelling import did_you_mean, did_you_mean_or_list, meant_word, nearest
 from blocksim.scenario.structures import KINDS
 from blocksim.scenario.units import toml
 
@@ -26,6 +26,9 @@ KINDS_IN: dict[str | int, Iterable[str]] = {
 }
 
 
+Place = Literal["key", "value"]
+
+
 @dataclass(frozen=True, slots=True)
 class Mistake:
     """One mistake: its place in the data, its message, and the part of the line to mark with a caret.
@@ -36,9 +39,24 @@ class Mistake:
 
     path: KeyPath
     message: str
-    at: Literal["key", "value"] = "value"
+    at: Place = "value"
     relation: bool = False
     meant: KeyPath = ()
+
+
+def unknown(path: KeyPath, what: str, known: Iterable[str], name: object, at: Place = "value") -> Iterator[Mistake]:
+    """Find a name that is none of those known, of what there is."""
+    if isinstance(name, str) and name not in (names := [*known]):
+        yield Mistake(path, f"unknown {what} {toml(name)}, {did_you_mean_or_list(name, names)}", at=at)
+
+
+def repeated(names: Iterable[str | None]) -> Iterator[int]:
+    """Yield the numbers of names that came before."""
+    seen: set[str | None] = {None}
+    for number, name in enumerate(names):
+        if name is not None and name in seen:
+            yield number
+        seen.add(name)
 
 
 def mistakes_of(error: ValidationError, data: object) -> list[Mistake]:

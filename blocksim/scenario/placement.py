@@ -106,7 +106,7 @@ def length_beside(of_blocks: float) -> float:
     return of_blocks if math.isfinite(of_blocks) else LENGTH_WITHOUT_BLOCKS
 
 
-class _Placement(NamedTuple):
+class Placement(NamedTuple):
     """All bodies of a scenario and their origin."""
 
     scenario: weakref.ref[Scenario]
@@ -114,7 +114,7 @@ class _Placement(NamedTuple):
     origins: list[overrides.KeyPath]  # of every body the structure or single body that it comes from
 
 
-_latest: list[_Placement] = []  # at most one, for as long as its scenario lives: a million bodies take seconds to place
+_latest: list[Placement] = []  # at most one, for as long as its scenario lives: a million bodies take seconds to place
 
 
 def place_bodies(scenario: Scenario) -> tuple[PlacedBody, ...]:
@@ -123,7 +123,7 @@ def place_bodies(scenario: Scenario) -> tuple[PlacedBody, ...]:
     The same scenario object gives the same bodies again. Raises UnfitError where a structure does
     not suit its block; loading a scenario has checked that.
     """
-    return _placement(scenario).bodies
+    return placement_of(scenario).bodies
 
 
 def has_outlines(scenario: Scenario) -> bool:
@@ -132,18 +132,14 @@ def has_outlines(scenario: Scenario) -> bool:
     return shaped or any(block.polygon for block in scenario.blocks.values())
 
 
-def origins_of(scenario: Scenario) -> list[overrides.KeyPath]:
-    """Return for every placed body the path of the structure or body that it comes from."""
-    return _placement(scenario).origins
-
-
-def _placement(scenario: Scenario) -> _Placement:
+def placement_of(scenario: Scenario) -> Placement:
+    """Return all bodies of a scenario and where each comes from; raises as `place_bodies`."""
     if not _latest or _latest[0].scenario() is not scenario:
         _latest[:] = [_placed(scenario)]
     return _latest[0]
 
 
-def _placed(scenario: Scenario) -> _Placement:
+def _placed(scenario: Scenario) -> Placement:
     freed = {name for event in scenario.events for name in event.free}
     bodies: list[PlacedBody] = []
     origins: list[overrides.KeyPath] = []
@@ -158,7 +154,7 @@ def _placed(scenario: Scenario) -> _Placement:
         body = _placed_block(scenario, spec.block, [(name, pose)], fixed=spec.fixed or is_driven)[0]
         bodies.append(body._replace(driven=is_driven, freed=name in freed) if is_driven or freed else body)
         origins.append(("bodies", number))
-    return _Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins)
+    return Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins)
 
 
 def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedBody]:

@@ -7,8 +7,8 @@ from operator import attrgetter
 
 import numpy as np
 
-from blocksim.scenario import events, geometry, overlap, placement, resolved, spelling
-from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake
+from blocksim.scenario import events, geometry, overlap, placement, resolved
+from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repeated, unknown
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
@@ -35,33 +35,25 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mi
         yield Mistake(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
         return
     by_name = {body.name: body for body in bodies} if loads or scenario.start.hold else {}
-    names: set[str] = set()
-    turns = False
+    for number in repeated(load.name for load in loads):
+        yield Mistake(("loads", number, "name"), f"two loads are named {toml(loads[number].name)}")
+    for number in [number for number, load in enumerate(loads) if isinstance(load, Gravity)][1:]:
+        yield Mistake(("loads", number), "gravity turns already; one load of this kind is allowed")
     for number, load in enumerate(loads):
-        if load.name is not None and load.name in names:
-            yield Mistake(("loads", number, "name"), f"two loads are named {toml(load.name)}")
-        names.add(load.name or "")
-        if isinstance(load, Gravity):
-            if turns:
-                yield Mistake(("loads", number), "gravity turns already; one load of this kind is allowed")
-            turns = True
-        elif isinstance(load, OnBody):
-            yield from _on_body(scenario, number, load, by_name)
+        if isinstance(load, OnBody):
+            yield from unknown(("loads", number, "body"), "body", by_name, load.body)
+            if load.body in by_name:
+                yield from _on_body(scenario, number, load, by_name)
     for number, name in enumerate(scenario.start.hold):
-        if name not in by_name:
-            hint = spelling.did_you_mean_or_list(name, by_name)
-            yield Mistake(("start", "hold", number), f"unknown body {toml(name)}, {hint}")
-        elif by_name[name].fixed:
+        yield from unknown(("start", "hold", number), "body", by_name, name)
+        if name in by_name and by_name[name].fixed:
             yield Mistake(("start", "hold", number), f"body {toml(name)} is fixed and cannot be released")
 
 
 def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str, PlacedBody]) -> Iterator[Mistake]:
     path = ("loads", number)
-    body = bodies.get(load.body)
-    if body is None:
-        hint = spelling.did_you_mean_or_list(load.body, bodies)
-        yield Mistake((*path, "body"), f"unknown body {toml(load.body)}, {hint}")
-    elif body.fixed:
+    body = bodies[load.body]
+    if body.fixed:
         yield Mistake((*path, "body"), f"body {toml(load.body)} is fixed; a load has no effect on it")
     elif isinstance(load, Force):
         half = (0.5 * body.size_x, 0.5 * body.size_y)
@@ -218,7 +210,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
                 yield Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
     yield from _impossible_masses(scenario)
     try:
-        bodies, origins = placement.place_bodies(scenario), placement.origins_of(scenario)
+        bodies, origins = placement.place_bodies(scenario), placement.placement_of(scenario).origins
     except UnfitError:
         for number, structure in enumerate(scenario.structures):
             try:
@@ -232,12 +224,9 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
         return
     smallest = placement.smallest_width({(body.size_x, body.size_y, body.outline): body for body in bodies}.values())
     yield from _unfit_lengths(scenario, smallest, max((max(abs(b.x), abs(b.y)) for b in bodies), default=0.0))
-    seen: set[str] = set()
-    for origin, body in zip(origins, bodies, strict=True):
-        if body.name in seen:
-            message = f"two bodies are named {toml(body.name)}; a body without a name is called by its number"
-            yield Mistake((*origin, "name"), message)
-        seen.add(body.name)
+    for number in repeated(body.name for body in bodies):
+        message = f"two bodies are named {toml(bodies[number].name)}; a body without a name is called by its number"
+        yield Mistake((*origins[number], "name"), message)
     yield from _overlaps(scenario, origins, bodies)
     yield from unfit_loads(scenario, bodies)
     for name, tables in scenario.systems.items():
@@ -269,10 +258,7 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
         if not isinstance(structure, PolygonStructure):
             needing.append((("structures", number, "block"), structure.block))
         for place, cell in enumerate(structure.divide() if isinstance(structure, Polygons) else ()):
-            if cell.block is not None and cell.block not in scenario.blocks:
-                hint = spelling.did_you_mean_or_list(cell.block, scenario.blocks)
-                where = ("structures", number, "cells", place, "block")
-                yield Mistake(where, f"unknown block {toml(cell.block)}, {hint}")
+            yield from unknown(("structures", number, "cells", place, "block"), "block", scenario.blocks, cell.block)
     for path, block in needing:
         if not scenario.blocks[block].is_shaped:
             yield Mistake(path, f"block {toml(block)} has no shape; {SHAPES}")
