@@ -1,6 +1,6 @@
 """Mistakes in the data of a scenario, in plain words, with the path of the key concerned."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
@@ -44,10 +44,10 @@ class Mistake:
     meant: KeyPath = ()
 
 
-def unknown(path: KeyPath, what: str, known: Iterable[str], name: object, at: Place = "value") -> Iterator[Mistake]:
+def unknown(path: KeyPath, what: str, known: Collection[str], name: object, at: Place = "value") -> Iterator[Mistake]:
     """Find a name that is none of those known, of what there is."""
-    if isinstance(name, str) and name not in (names := [*known]):
-        yield Mistake(path, f"unknown {what} {toml(name)}, {did_you_mean_or_list(name, names)}", at=at)
+    if isinstance(name, str) and name not in known:
+        yield Mistake(path, f"unknown {what} {toml(name)}, {did_you_mean_or_list(name, known)}", at=at)
 
 
 def repeated(names: Iterable[str | None]) -> Iterator[int]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario.models.motion import FromTable, Harmonic, Pulse, Ramp, Rotation
-from blocksim.scenario.models.record import Baseline, Record
+from blocksim.scenario.models.record import Baseline
 from blocksim.scenario.models.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -34,15 +34,6 @@ def pulse_samples(pulse: Pulse) -> tuple[Floats, Floats, Floats]:
     if pulse.shape == "cosine":
         return pulse.start + t, a / w**2 * versine, a / w * np.sin(w * t)
     return pulse.start + t, a / w * (t - np.sin(w * t) / w), a / w * versine
-
-
-def record_samples(record: Record) -> tuple[Floats, Floats]:
-    """Return times (s) and accelerations (m/s²) of a record, corrected and scaled; straight lines join them."""
-    times = np.array(record.table.times)
-    values = correct_baseline(times, record.factor * np.array(record.table.values), record.baseline)
-    peak = float(np.abs(values).max())
-    scale = record.scale if record.pga is None else record.pga / peak if peak > 0.0 else 0.0
-    return record.start + times, scale * values
 
 
 def correct_baseline(times: Floats, acceleration: Floats, baseline: Baseline) -> Floats:
@@ -121,7 +112,11 @@ def motion_pieces(scenario: Scenario) -> MotionPieces:
         case Pulse():
             pieces = hermite_pieces(*pulse_samples(motion))
         case _:
-            pieces = _integrated(*record_samples(motion))
+            acceleration = motion.factor * np.array(motion.table.values)
+            acceleration = correct_baseline(np.array(motion.table.times), acceleration, motion.baseline)
+            peak = float(np.abs(acceleration).max())
+            scale = motion.scale if motion.pga is None else motion.pga / peak if peak > 0.0 else 0.0
+            pieces = _integrated(motion.start + np.array(motion.table.times), scale * acceleration)
     return extend_pieces(end, pieces)
 
 
@@ -312,7 +307,12 @@ class Drive(NamedTuple):
     @property
     def rest_time(self) -> float:
         """Time (s) from when on the body rests, infinite where it never does."""
-        return max(_end(self.shift), _end(self.turn))
+        ends = [0.0]
+        for pieces in (self.shift, self.turn):
+            moving = np.flatnonzero(pieces.coefficients[:, 1:].any(axis=1))
+            is_endless = moving.size > 0 and moving[-1] == len(pieces.coefficients) - 1
+            ends += [math.inf] if is_endless else pieces.times[moving[-1:] + 1].tolist()
+        return max(ends)
 
 
 def drives_of(scenario: Scenario) -> tuple[Drive, ...]:
@@ -350,14 +350,6 @@ def _course(motion: Ramp | Rotation, way: float, end: float) -> MotionPieces:
     if not last[1:].any():  # constant: exactly at the end of the way
         last[0] = way
     return pieces
-
-
-def _end(pieces: MotionPieces) -> float:
-    is_moving = np.asarray(pieces.coefficients[:, 1:].any(axis=1))
-    if not is_moving.any():
-        return 0.0
-    last = int(np.flatnonzero(is_moving)[-1])
-    return np.inf if last == is_moving.size - 1 else float(pieces.times[last + 1])
 
 
 def greatest_rate(pieces: MotionPieces) -> float:

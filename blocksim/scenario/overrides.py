@@ -156,12 +156,7 @@ def fields_of(table: type[base.Table]) -> dict[str, FieldInfo]:
         name: FieldInfo(annotation=tuple[entry, ...], default=(), description=entry.__doc__)  # type: ignore[valid-type]
         for name, entry in (base.SYSTEMS.items() if table is Scenario else ())
     }
-    return {**_own_fields(table), **systems}
-
-
-@functools.cache
-def _own_fields(table: type[base.Table]) -> dict[str, FieldInfo]:
-    return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != base.HELD}
+    return {info.alias or name: info for name, info in table.model_fields.items() if info.alias != base.HELD} | systems
 
 
 def _table(annotation: object, node: object) -> type[base.Table] | None:

@@ -97,9 +97,9 @@ def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], l
     unit, is_named = _named_unit(kept[0]) if kept else (None, False)
     rows = []
     for number, text in kept[is_named:]:
-        cells = _cells(text)
+        cells = re.findall(r"[^,;\s]+", text)
         if len(cells) != COLUMNS:  # as in 0,01;0,12 or 0,01,0,12, whose numbers have a comma where a point belongs
-            by_others = [cell for cell in re.split(r"[;\s]+", text.strip(" ;\t")) if cell]
+            by_others = re.findall(r"[^;\s]+", text)
             is_pair = len(by_others) == COLUMNS and 0 < text.count(",") <= COLUMNS
             has_commas = is_pair or (len(by_others) == 1 and text.count(",") == 1 + COLUMNS)
             hint = "; decimals are written with a point" if has_commas else ""
@@ -113,14 +113,10 @@ def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], l
     return unit, (times[0] + place * step for place in range(len(times))), [value for *_, value in rows]
 
 
-def _cells(text: str) -> list[str]:
-    return [cell for cell in re.split(r"[,;\s]+", text.strip()) if cell]
-
-
 def _named_unit(line: Line) -> tuple[Unit | None, bool]:
     """Return the unit that the first line says, and whether it names columns at all."""
     try:
-        float(_cells(line.text)[0])
+        float(re.findall(r"[^,;\s]+", line.text)[0])
     except (ValueError, IndexError):
         pass
     else:
@@ -148,16 +144,16 @@ def _check_steps(lines: Sequence[int], times: Sequence[float], mean: float) -> N
     """Raise MotionTableError at the first time that does not increase, after a gap, or off a constant step (s)."""
     steps = [after - before for before, after in pairwise(times)]
     usual = statistics.median(steps)
+    back = next((number for number, step in enumerate(steps, start=1) if step <= 0.0), 0)
     gap = next((number for number, step in enumerate(steps, start=1) if step > GAP * usual), 0)
     uneven = (number for number, time in enumerate(times) if abs(time - times[0] - number * mean) > UNEVEN * mean)
     place, why = 0, ""
     if times[0] < 0.0:
         why = "times must increase from 0 or later"
-    elif min(steps) <= 0.0:  # before gaps: where times are repeated, the usual step means nothing
-        place = next(number for number, step in enumerate(steps, start=1) if step <= 0.0)
-        before = f"line {lines[place - 1]}"
-        again = f"the time of {before} is repeated"
-        why = f"times must increase, {before} has {times[place - 1]:g} s" if steps[place - 1] < 0.0 else again
+    elif back:  # before gaps: where times are repeated, the usual step means nothing
+        place, before = back, f"line {lines[back - 1]}"
+        why = f"times must increase, {before} has {times[back - 1]:g} s"
+        why = why if steps[back - 1] < 0.0 else f"the time of {before} is repeated"
     elif max(steps) > GAP * usual:
         place, why = gap, f"a gap of {steps[gap - 1]:g} s, the step is {usual:g} s"
     elif (place := next(uneven, 0)) > 0:

@@ -335,7 +335,8 @@ class Sweep(Table):
         if not isinstance(value, Mapping) or "vary" in value:
             return value
         own = {key: entry for key, entry in value.items() if key in OWN_KEYS}
-        keys = {key: _Slip(meant) if (meant := slip_of(key)) else value[key] for key in value if key not in own}
+        slips = {key: spelling.nearest(str(key), OWN_KEYS, most=2) for key in value if key not in own}
+        keys = {key: _Slip(meant) if meant else value[key] for key, meant in slips.items()}
         if not keys and own.get("mode") != "table":
             raise q.invalid('nothing to vary; add a line such as "contact.stiffness_scale" = [0.1, 1.0]')
         return {**own, "vary": keys}
@@ -381,8 +382,3 @@ class Sweep(Table):
 
 
 OWN_KEYS = tuple(name for name in Sweep.model_fields if name != "vary")
-
-
-def slip_of(key: object) -> str | None:
-    """Return the key of [sweep] itself that a word was probably meant to be."""
-    return spelling.nearest(str(key), OWN_KEYS, most=2)

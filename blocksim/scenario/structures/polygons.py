@@ -231,15 +231,16 @@ class Polygons(PolygonStructure):
             most = f"at most {MOST_SHRINK:g} of the least width of a block, {1e3 * MOST_SHRINK * width:.4g} mm"
             raise q.invalid(f"{1e3 * self.shrink:g} mm is too much; {most}", "shrink")
         for number, one in enumerate(self.cells_given):
-            if any(geometry.faults(self._outline(one))):
+            if any(geometry.faults(geometry.shrink_outline(one.outline, self.shrink))):
                 raise q.invalid(f"block {number + 1} loses an edge; shrink less", "shrink")
 
     def divide(self) -> Sequence[Cell]:
         """Return all blocks in their order."""
-        return [Cell(self._outline(one), one.fixed, one.block, one.name) for one in self.cells_given]
-
-    def _outline(self, one: DrawnBlock) -> Sequence[Point]:
-        return geometry.shrink_outline(one.outline, self.shrink) if self.shrink else one.outline
+        outlines: list[Sequence[geometry.Corner]] = [one.outline for one in self.cells_given]
+        if self.shrink:
+            outlines = [geometry.shrink_outline(one, self.shrink) for one in outlines]
+        named = zip(outlines, self.cells_given, strict=True)
+        return [Cell(outline, one.fixed, one.block, one.name) for outline, one in named]
 
     def shift(self, cells: Sequence[Cell]) -> geometry.Corner:
         """Return how far all blocks move (m)."""
