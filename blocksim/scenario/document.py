@@ -271,7 +271,15 @@ class Document:
         is not a regular file.
         """
         path = Path(path)
-        content = _content(path, is_stored=is_stored)
+        if input_files.is_folder(path):
+            similar = _similar_file(path / path.name)
+            raise InputMissingError(f"{path}: this is a folder; a scenario file is needed{similar}")
+        try:
+            content = input_files.read_head(path, MAX_BYTES + 1, links=not is_stored)
+        except input_files.NoSuchFileError as error:
+            raise InputMissingError(f"{error}{_similar_file(path)}") from None
+        if len(content) > MAX_BYTES:
+            raise _unusable(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
@@ -441,19 +449,6 @@ def document_of(source: Source) -> Document:
 
 def _unusable(where: str, message: str) -> ScenarioError:
     return ScenarioError([Problem(where, message)])
-
-
-def _content(path: Path, *, is_stored: bool) -> bytes:
-    """Read a file, but never much more than a scenario may have."""
-    if input_files.is_folder(path):
-        raise InputMissingError(f"{path}: this is a folder; a scenario file is needed{_similar_file(path / path.name)}")
-    try:
-        content = input_files.read_head(path, MAX_BYTES + 1, links=not is_stored)
-    except input_files.NoSuchFileError as error:
-        raise InputMissingError(f"{error}{_similar_file(path)}") from None
-    if len(content) > MAX_BYTES:
-        raise _unusable(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")
-    return content
 
 
 def _similar_file(path: Path) -> str:

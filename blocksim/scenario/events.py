@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from blocksim.scenario.geometry import Corner, edges_of
+from blocksim.scenario.geometry import Corner, dot, edges_of
 from blocksim.scenario.mistakes import Mistake, repeated, unknown
 from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
@@ -191,13 +191,13 @@ def joint_between(a: PlacedBody, b: PlacedBody) -> Joint | None:
 def _facing(a: PlacedBody, b: PlacedBody, begin: Corner, end: Corner, normal: Corner) -> tuple[float, Joint] | None:
     """Return the least gap (m) and the joint between a face of a and the face of b opposite it."""
     faces = edges_of([a.own_point(*b.ground_point(*corner)) for corner in b.corners])
-    *opposite, (nx, ny) = min(faces, key=lambda edge: _dot(edge[2], normal))
+    *opposite, (nx, ny) = min(faces, key=lambda edge: dot(edge[2], normal))
     if abs(nx * normal[1] - ny * normal[0]) > PARALLEL:
         return None
     tangent = (normal[1], -normal[0])
     across, along = np.array(opposite) @ np.array(normal), np.array(opposite) @ np.array(tangent)
-    half = _dot(begin, normal)
-    first, last = max(float(along.min()), _dot(end, tangent)), min(float(along.max()), _dot(begin, tangent))
+    half = dot(begin, normal)
+    first, last = max(float(along.min()), dot(end, tangent)), min(float(along.max()), dot(begin, tangent))
     smallest = min(a.least_width, b.least_width)
     order = np.argsort(along)
     gaps = (np.interp((first, last), along[order], across[order]) - half).tolist()
@@ -207,7 +207,3 @@ def _facing(a: PlacedBody, b: PlacedBody, begin: Corner, end: Corner, normal: Co
     places = [(x + gap * normal[0], y + gap * normal[1]) for (x, y), gap in zip(ends, gaps, strict=True)]
     of_b = [b.own_point(*a.ground_point(*point)) for point in places]
     return min(gaps), Joint((ends[0], ends[1]), (of_b[0], of_b[1]), normal, tangent)
-
-
-def _dot(one: Corner, other: Corner) -> float:
-    return one[0] * other[0] + one[1] * other[1]

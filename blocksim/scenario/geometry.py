@@ -183,7 +183,7 @@ def section_of(corners: Corners) -> tuple[float, float]:
 
     The moment is the sum over triangles from the centroid: 1/12 Σ (a × b) (a·a + a·b + b·b).
     """
-    polar = math.fsum(_cross(a, b) * (_dot(a, a) + _dot(a, b) + _dot(b, b)) for a, b in _edges(corners)) / 12.0
+    polar = math.fsum(_cross(a, b) * (dot(a, a) + dot(a, b) + dot(b, b)) for a, b in _edges(corners)) / 12.0
     return area_of(corners), polar
 
 
@@ -241,7 +241,7 @@ def shrink_outline(points: Sequence[Corner], way: float) -> list[Corner]:
     normals = [(-sense * y / length, sense * x / length) for (x, y), length in ways]
     moved = []
     for (x, y), n, m in zip(points, (normals[-1], *normals), normals, strict=False):
-        share = way / (1.0 + _dot(n, m))
+        share = way / (1.0 + dot(n, m))
         moved.append((x + share * (n[0] + m[0]), y + share * (n[1] + m[1])))
     return moved
 
@@ -274,7 +274,7 @@ def faults(points: Sequence[Corner]) -> Iterator[tuple[int | None, str]]:
             yield number, f"this corner is only {1e3 * edge * extent:.3g} mm from the one before; leave one of them out"
     sense = math.copysign(1.0, area_of(local))
     ways = [_minus(b, a) for a, b in _edges(local)]
-    turns = [sense * math.atan2(_cross(a, b), _dot(a, b)) for a, b in zip((ways[-1], *ways), ways, strict=False)]
+    turns = [sense * math.atan2(_cross(a, b), dot(a, b)) for a, b in zip((ways[-1], *ways), ways, strict=False)]
     if min(turns) <= 0.0 or sum(turns) > 1.5 * 2.0 * math.pi:  # slow, and cannot happen to others
         for edges in self_crossings(corners_of(local)):  # of the counter-clockwise outline, here in the file's order
             first, second = sorted(one if sense > 0.0 else (len(local) - 2 - one) % len(local) for one in edges)
@@ -306,7 +306,8 @@ def _cross(a: Corner, b: Corner) -> float:
     return a[0] * b[1] - a[1] * b[0]
 
 
-def _dot(a: Corner, b: Corner) -> float:
+def dot(a: Corner, b: Corner) -> float:
+    """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1]
 
 
@@ -379,7 +380,7 @@ def clean_cell(cell: Sequence[Corner], least: float) -> list[Corner]:
         for number, here in enumerate(corners):
             before, after = corners[number - 1], corners[(number + 1) % len(corners)]
             one, other = _minus(here, before), _minus(after, here)
-            turn = math.atan2(_cross(one, other), _dot(one, other))
+            turn = math.atan2(_cross(one, other), dot(one, other))
             is_short = min(math.dist(before, here), math.dist(here, after)) < shortest
             needless += [number] if is_short or turn < 2.0 * STRAIGHT else []
             losses.append(_cross(one, _minus(after, before)))

@@ -57,7 +57,7 @@ class Time(Table):
     @property
     def parts(self) -> int:
         """The number of substeps in a step."""
-        return 1
+        return int(getattr(self, "substeps", 1))
 
 
 class Explicit(Time):
@@ -94,11 +94,6 @@ class Nonsmooth(Time):
     restitution_threshold: q.NonNegativeSpeed = Field(
         default=0.01, description="approach speed below which impacts do not rebound"
     )
-
-    @property
-    def parts(self) -> int:
-        """The number of substeps in a step."""
-        return self.substeps
 
 
 def scheme_of(value: object) -> str:

@@ -1,9 +1,10 @@
 """Common base of all kinds of structure, and of those that shape their blocks."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,10 +57,12 @@ class Structure(Table, ABC):
         default=0.0, description="additional velocity along x at full height, in proportion to the height of the centre"
     )
 
+    counted_by: ClassVar[tuple[str, ...]] = ("count",)
+
     @property
-    @abstractmethod
     def size(self) -> int:
-        """Number of bodies, without placing them."""
+        """Number of bodies, without placing them: the product of the keys `counted_by`."""
+        return math.prod(getattr(self, key) for key in self.counted_by)
 
     @abstractmethod
     def height(self, block: Block) -> float:

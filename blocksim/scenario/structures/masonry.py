@@ -19,11 +19,6 @@ class Stack(Structure):
     count: Count = Field(description="number of blocks")
     offset: q.Length = Field(default=0.0, description="shift of each block relative to the one below")
 
-    @property
-    def size(self) -> int:
-        """Number of blocks."""
-        return self.count
-
     def height(self, block: geometry.Block) -> float:
         """All blocks on top of each other."""
         return self.count * block.size_y
@@ -40,11 +35,6 @@ class Staircase(Structure):
     kind: Literal["staircase"] = Field(description="kind of structure")
     count: Count = Field(description="number of blocks")
     overlap: q.PositiveLength = Field(description="length over which a block lies on the one below")
-
-    @property
-    def size(self) -> int:
-        """Number of blocks."""
-        return self.count
 
     def height(self, block: geometry.Block) -> float:
         """All blocks on top of each other."""
@@ -176,11 +166,6 @@ class Dominoes(Structure):
         description="speed along x of the centre of the first domino, which turns about its lower edge",
     )
 
-    @property
-    def size(self) -> int:
-        """Number of blocks."""
-        return self.count
-
     def height(self, block: geometry.Block) -> float:
         """One block."""
         return block.size_y
@@ -204,6 +189,7 @@ class Grid(Courses):
     Each block is shifted along x and along y and turned by random amounts of up to `offset` and `turn`, to either side.
     """
 
+    counted_by = ("rows", "columns")
     kind: Literal["grid"] = Field(description="kind of structure")
     columns: Count = Field(description="number of blocks in a row")
     gap_x: q.NonNegativeLength = Field(description="gap between neighbours along x, before they are shifted and turned")
@@ -213,11 +199,6 @@ class Grid(Courses):
     )
     turn: q.HalfTurn = Field(default=0.0, description="largest random angle of a block, to either side")
     seed: Seed = Field(default=0, description="random seed of shifts and angles")
-
-    @property
-    def size(self) -> int:
-        """Number of blocks."""
-        return self.rows * self.columns
 
     def height(self, block: geometry.Block) -> float:
         """All rows, before blocks are shifted and turned."""
