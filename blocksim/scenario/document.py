@@ -100,9 +100,7 @@ class ScenarioText:
         """Make the problem with its line."""
         if span is None:
             return Problem(self.where, message, key)
-        line, start = clip_line(self.lines[span.line - 1], span.column)
-        length = max(1, min(span.length, len(line) - start))
-        return Problem(self.where, message, key, span.line, line, start, length)
+        return Problem(self.where, message, key, span.line, *clip_line(self.lines[span.line - 1], *span[1:]))
 
     def syntax_problem(self, error: tomllib.TOMLDecodeError) -> Problem:
         """Show where tomllib stopped."""
@@ -132,25 +130,22 @@ def override_problem(override: Override, path: KeyPath, message: str, at: str) -
     value = len(text) - len(text[equals + 1 :].lstrip())
     in_key = equals < 0 or (at == "key" and len(path) <= len(override.path))
     start, stop = (0, end) if in_key else (value, len(text))
-    line, shift = clip_line(text, start)
-    length = max(1, min(stop - start, len(line) - shift))
     depth, key = len(override.path), format_key(path)
     if path == override.path:
         key = ""  # it stands in the text
     elif path[0] == "sweep" and path[:depth] == override.path:  # what lies below a key that a study varies
         key = "" if isinstance(path[depth], int) else format_key(path[depth:])
-    return Problem(override.label, message, key, None, line, shift, length)
+    return Problem(override.label, message, key, None, *clip_line(text, start, stop - start))
 
 
-def clip_line(line: str, start: int) -> tuple[str, int]:
-    """Return a line for the screen and the place of the caret: no control characters, no endless lines."""
+def clip_line(line: str, start: int, length: int = 1) -> tuple[str, int, int]:
+    """Return a line for the screen, place and length of what is marked: no control characters, no endless lines."""
     clean = "".join(c if c.isprintable() else " " if c == "\t" else "\ufffd" for c in line)
-    if len(clean) <= MAX_SHOWN:
-        return clean, start
-    first = max(0, min(start - MAX_SHOWN // 3, len(clean) - MAX_SHOWN))
-    left = "…" if first else ""
-    right = "…" if first + MAX_SHOWN < len(clean) else ""
-    return left + clean[first : first + MAX_SHOWN] + right, start - first + len(left)
+    if len(clean) > MAX_SHOWN:
+        first = max(0, min(start - MAX_SHOWN // 3, len(clean) - MAX_SHOWN))
+        left, right = "…" if first else "", "…" if first + MAX_SHOWN < len(clean) else ""
+        clean, start = left + clean[first : first + MAX_SHOWN] + right, start - first + len(left)
+    return clean, start, max(1, min(length, len(clean) - start))
 
 
 def locate(text: str) -> dict[KeyPath, Place]:
@@ -397,10 +392,7 @@ def load_stored(path: Path | str) -> Scenario:
 
 
 def load_scenario(
-    source: Source,
-    overrides: Mapping[str, object] | Sequence[str] = (),
-    *,
-    allow_outside: bool = False,
+    source: Source, overrides: Mapping[str, object] | Sequence[str] = (), *, allow_outside: bool = False
 ) -> Scenario:
     """Read and check a scenario: a file, nested dictionaries in the form of the file, or an existing scenario.
 

@@ -156,8 +156,7 @@ class Contact(Table):
         default=None, description="smoothing length of the kernel (kernel only; default: 1.3 particle_spacing)"
     )
     kernel: Annotated[Kernel, OneOf(get_args(Kernel))] = Field(
-        default="wendland-c2",
-        description="kernel function (kernel only): wendland-c2, cubic-spline or quintic-spline",
+        default="wendland-c2", description="kernel function (kernel only): wendland-c2, cubic-spline or quintic-spline"
     )
 
     @property

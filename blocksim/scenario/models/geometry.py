@@ -16,7 +16,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticKnownError
 
-from blocksim.scenario import geometry, units
+from blocksim.scenario import geometry
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole, require_one
 from blocksim.scenario.models.motion import AnyDrive
@@ -75,7 +75,7 @@ class Material(Table):
         """Mass per volume in kg/m³."""
         if self.given_density is not None:
             return self.given_density
-        return (self.unit_weight or math.nan) / units.USUAL_GRAVITY
+        return (self.unit_weight or math.nan) / q.USUAL_GRAVITY
 
 
 class Block(Table):

@@ -27,7 +27,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from blocksim.errors import BlocksimError
-from blocksim.scenario import input_files, units
+from blocksim.scenario import input_files
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf, Table, require_one, table_path
 
@@ -38,7 +38,7 @@ COLUMNS: dict[str, tuple[Literal["displacement", "acceleration"], float]] = {
     "displacement_m": ("displacement", 1.0),
     "displacement_mm": ("displacement", 1e-3),
     "acceleration_m_s2": ("acceleration", 1.0),
-    "acceleration_g": ("acceleration", units.STANDARD_GRAVITY),
+    "acceleration_g": ("acceleration", q.STANDARD_GRAVITY),
 }
 """Possible names of the second column: the quantity, and its unit in SI."""
 MAX_BYTES = 20_000_000

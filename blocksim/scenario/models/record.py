@@ -15,16 +15,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, get_args
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
 from blocksim.scenario import units as q
 from blocksim.scenario.models import base, motion
-from blocksim.scenario.units import STANDARD_GRAVITY, toml
 
 Unit = Literal["g", "m/s^2", "cm/s^2"]
-UNITS: dict[Unit, float] = {"g": STANDARD_GRAVITY, "m/s^2": 1.0, "cm/s^2": 0.01}
+UNITS: dict[Unit, float] = {"g": q.STANDARD_GRAVITY, "m/s^2": 1.0, "cm/s^2": 0.01}
 """Units of acceleration in SI."""
 _PER_S2 = r"(?:[/_ ]?\s?s(?:ec)?\s?(?:2|\^2|²|\*\*2|[/_]s(?:ec)?\b))"
 _UNIT_WORDS: tuple[tuple[Unit, re.Pattern[str]], ...] = (
@@ -42,14 +41,8 @@ GAP = 1.5
 """Steps between two samples above which some are missing."""
 UNEVEN = 0.25
 """Steps by which a time may be off from a constant step: files round them."""
-COLUMNS = 2
-
-
-class Line(NamedTuple):
-    """A line of the file."""
-
-    number: int  # from 1
-    text: str
+Line = tuple[int, str]
+"""Number (from 1) and text of a line of the file."""
 
 
 @dataclass(frozen=True)
@@ -63,48 +56,48 @@ def read_record(path: Path) -> RecordTable:
     """Read an accelerogram; raises MotionTableError with the line of the first mistake."""
     content = motion.content_of(path)
     text = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    lines = [Line(number, line) for number, line in enumerate(text.split("\n"), start=1)]
-    sizes = (_AT2.search(line.text) or _OLD_AT2.search(line.text) for line in lines[:HEAD_LINES])
-    head = next(((line, size) for line, size in zip(lines, sizes, strict=False) if size), None)
+    lines = [*enumerate(text.split("\n"), start=1)]
+    sizes = (_AT2.search(line) or _OLD_AT2.search(line) for _, line in lines[:HEAD_LINES])
+    head = next(((number, size) for number, size in enumerate(sizes, start=1) if size), None)
     unit, times, values = _two_columns(lines) if head is None else _at2(lines, *head)
     factor = 1.0 if unit is None else UNITS[unit]
     return RecordTable(path, "acceleration", tuple(times), tuple(factor * one for one in values), content, unit=unit)
 
 
-def _at2(lines: Sequence[Line], head: Line, found: re.Match[str]) -> tuple[Unit | None, Iterable[float], list[float]]:
-    """Return unit, times and values of an AT2 file, in whose line `head` number and step were found."""
-    before = lines[: head.number - 1]
-    other = next((line for line in before if _OTHER.search(line.text)), None)
+def _at2(lines: Sequence[Line], head: int, found: re.Match[str]) -> tuple[Unit | None, Iterable[float], list[float]]:
+    """Return unit, times and values of an AT2 file, in whose line `head` number and step stand."""
+    before = lines[: head - 1]
+    other = next((line for line in before if _OTHER.search(line[1])), None)
     if other is not None:
-        raise motion.MotionTableError(f"line {other.number}: {toml(other.text.strip())}: an acceleration is needed")
-    count, step = int(found[1]), _number(head.number, found[2])
+        raise motion.MotionTableError(f"line {other[0]}: {q.toml(other[1].strip())}: an acceleration is needed")
+    count, step = int(found[1]), _number(head, found[2])
     if step <= 0.0:
-        raise motion.MotionTableError(f"line {head.number}: step {found[2]} s: it must be above 0")
-    values = [_number(line.number, word) for line in lines[head.number :] for word in line.text.split()]
+        raise motion.MotionTableError(f"line {head}: step {found[2]} s: it must be above 0")
+    values = [_number(number, word) for number, line in lines[head:] for word in line.split()]
     if len(values) != count:
-        last = max((line.number for line in lines if line.text.strip()), default=head.number)
-        message = f"line {last}: the file ends after {len(values)} samples; line {head.number} has NPTS = {count}"
+        last = max((number for number, line in lines if line.strip()), default=head)
+        message = f"line {last}: the file ends after {len(values)} samples; line {head} has NPTS = {count}"
         raise motion.MotionTableError(message)
     _check_count(count)
-    said = (_IN_UNITS.search(line.text) for line in before)
+    said = (_IN_UNITS.search(line) for _, line in before)
     unit = next((_unit_in(one[1]) for one in said if one is not None and one[1]), None)
     return unit, (number * step for number in range(count)), values
 
 
 def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], list[float]]:
     """Return unit, times and values of a file with two columns."""
-    kept = [line for line in lines if line.text.strip() and line.text.lstrip()[0] not in "#%"]
+    kept = [line for line in lines if line[1].strip() and line[1].lstrip()[0] not in "#%"]
     unit, is_named = _named_unit(kept[0]) if kept else (None, False)
     rows = []
     for number, text in kept[is_named:]:
         cells = re.findall(r"[^,;\s]+", text)
-        if len(cells) != COLUMNS:  # as in 0,01;0,12 or 0,01,0,12, whose numbers have a comma where a point belongs
+        if len(cells) != 2:  # as in 0,01;0,12 or 0,01,0,12, whose numbers have a comma where a point belongs
             by_others = re.findall(r"[^;\s]+", text)
-            is_pair = len(by_others) == COLUMNS and 0 < text.count(",") <= COLUMNS
-            has_commas = is_pair or (len(by_others) == 1 and text.count(",") == 1 + COLUMNS)
+            is_pair = len(by_others) == 2 and 0 < text.count(",") <= 2
+            has_commas = is_pair or (len(by_others) == 1 and text.count(",") == 1 + 2)
             hint = "; decimals are written with a point" if has_commas else ""
             why = f"a time and an acceleration are needed{hint}"
-            raise motion.MotionTableError(f"line {number}: {toml(text.strip())}: {why}")
+            raise motion.MotionTableError(f"line {number}: {q.toml(text.strip())}: {why}")
         rows.append((number, _number(number, cells[0]), _number(number, cells[1])))
     _check_count(len(rows))
     times = [time for _, time, _ in rows]
@@ -116,17 +109,17 @@ def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], l
 def _named_unit(line: Line) -> tuple[Unit | None, bool]:
     """Return the unit that the first line says, and whether it names columns at all."""
     try:
-        float(re.findall(r"[^,;\s]+", line.text)[0])
+        float(re.findall(r"[^,;\s]+", line[1])[0])
     except (ValueError, IndexError):
         pass
     else:
         return None, False
-    text = line.text.strip()
+    text = line[1].strip()
     if not re.match(r"\W*t", text, re.IGNORECASE):
-        message = f"line {line.number}: {toml(text)}: neither numbers nor columns of time and acceleration"
+        message = f"line {line[0]}: {q.toml(text)}: neither numbers nor columns of time and acceleration"
         raise motion.MotionTableError(message)
     if re.match(r"[^,;]*(?<![a-z])ms(?![a-z/])", text, re.IGNORECASE):
-        raise motion.MotionTableError(f"line {line.number}: {toml(text)}: times in s are needed")
+        raise motion.MotionTableError(f"line {line[0]}: {q.toml(text)}: times in s are needed")
     first = re.split(r"[,;]", text, maxsplit=1) if re.search(r"[,;]", text) else text.split(maxsplit=1)
     return _unit_in(first[-1]), True
 

@@ -23,7 +23,6 @@ from blocksim.scenario.models.record import AnyMotion
 from blocksim.scenario.models.stepping import AnyProbe, AnyTime, Event, Explicit, Output, Start
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
-from blocksim.scenario.units import USUAL_GRAVITY
 
 SCHEMA_VERSION = 1
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -41,7 +40,7 @@ class Scenario(Table):
     )
     name: Identifier = Field(description="name of the scenario and of its results folder")
     description: str = Field(default="", description="free text")
-    gravity: q.NonNegativeAcceleration = Field(default=USUAL_GRAVITY, description="acceleration of gravity")
+    gravity: q.NonNegativeAcceleration = Field(default=q.USUAL_GRAVITY, description="acceleration of gravity")
     materials: dict[Identifier, Material] = Field(description="materials by name, as in [materials.aluminium]")
     blocks: dict[Identifier, Block] = Field(default={}, description="blocks by name, as in [blocks.brick]")
     structures: tuple[AnyStructure, ...] = Field(default=(), description="generators of bodies")
@@ -63,8 +62,7 @@ class Scenario(Table):
     experiment: Experiment | None = Field(default=None, description="measurements to compare with")
     sweep: Sweep | None = Field(default=None, description="what `blocksim sweep` varies")
     provenance: dict[str, str] = Field(
-        default={},
-        description="where values come from: dotted key and text, for calibrated or assumed values",
+        default={}, description="where values come from: dotted key and text, for calibrated or assumed values"
     )
 
     systems: SkipJsonSchema[

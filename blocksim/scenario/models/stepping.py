@@ -44,8 +44,7 @@ class Time(Table):
     contacts: ClassVar[str] = "contacts"  # in words
     models_of_outlines: ClassVar[tuple[str, ...]] = ()  # contact models that know blocks with an outline
     scheme: Annotated[Scheme, _WORDS] = Field(
-        default="explicit",
-        description="time stepping: explicit (springs and dashpots) or nonsmooth (impulses)",
+        default="explicit", description="time stepping: explicit (springs and dashpots) or nonsmooth (impulses)"
     )
     end: q.PositiveTime = Field(default=2.0, description="simulated time")
     step: Step = Field(default="auto", description='time step, or "auto" for the largest safe one')

@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from blocksim.scenario import spelling, units
+from blocksim.scenario import spelling
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import OneOf, Table, Whole, table_path
 
@@ -86,7 +86,7 @@ def _table_of(values: Distribution, ends: Mapping[str, float], scale: Scale = "l
         if math.isfinite(number):
             table[key] = toml_number(number, angle=values.angle)
             if values.unit:
-                text = f"{number / float(units.parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
+                text = f"{number / float(q.parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
                 table[key] = text if q.parse_quantity(text)[0] == number else table[key]
     return table if scale == "linear" else {**table, "scale": scale}
 

@@ -44,8 +44,7 @@ class Staircase(Structure):
         """Return the poses from the ground up."""
         if self.overlap > block.size_x:
             raise UnfitError(
-                "overlap",
-                f"{self.overlap * 1e3:g} mm is more than the block's {block.size_x * 1e3:g} mm along x",
+                "overlap", f"{self.overlap * 1e3:g} mm is more than the block's {block.size_x * 1e3:g} mm along x"
             )
         step = block.size_x - self.overlap
         first = self.left + block.size_x / 2
@@ -162,8 +161,7 @@ class Dominoes(Structure):
     count: Count = Field(description="number of blocks")
     spacing: q.PositiveLength = Field(description="clear distance between neighbours")
     push: q.Speed = Field(
-        default=0.0,
-        description="speed along x of the centre of the first domino, which turns about its lower edge",
+        default=0.0, description="speed along x of the centre of the first domino, which turns about its lower edge"
     )
 
     def height(self, block: geometry.Block) -> float:

@@ -13,7 +13,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from blocksim.errors import BlocksimError
 from blocksim.extras import load_module
-from blocksim.scenario import geometry, input_files, units
+from blocksim.scenario import geometry, input_files
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import Identifier, Table, table_path
 from blocksim.scenario.models.geometry import Point
@@ -124,7 +124,7 @@ def _polygons(node: Any, name: str, properties: Mapping[str, Any], depth: int) -
                 raise DrawingError(f"{place}a polygon with {holes}; blocks have none")
             yield DrawingOutline([_point(point) for point in rings[0]], name or "polygon", properties)
     else:
-        raise DrawingError(f"{place}{units.toml(kind)} is not a polygon")
+        raise DrawingError(f"{place}{q.toml(kind)} is not a polygon")
 
 
 def _part(node: Mapping[str, Any], key: str, kind: type, place: str) -> Any:
