@@ -19,6 +19,7 @@ from blocksim.simulation.folder import PROBE, keep_scenario, probe_tables, read_
 from blocksim.simulation.frames import Columns, Frames, as_frame, csv_text, data_set, read_table, tidy_table
 from blocksim.simulation.probes import ProbeSeries
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
+from blocksim.world.systems import systems_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -165,6 +166,8 @@ class Result:
     @cached_property
     def endings(self) -> dict[str, Columns]:
         """Where the systems beside the blocks ended, by their names: tables as in NAME.csv of a run folder."""
+        if all(system.ending is None for system in systems_of(self.scenario)):
+            return {}  # frames are many, and nothing of them is asked for
         return {
             track.system.name: track.system.ending(self.scenario, track)
             for track in self.frames.others

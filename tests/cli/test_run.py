@@ -173,3 +173,15 @@ def test_frames_closer_than_a_step_are_warned_of(blocksim: Command) -> None:
     answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--set", "output.every=1e-9 s", "--set", "time.end=1e-4")
     assert answer.code == 0
     assert "warning: output.every = 1e-09 s is shorter than a step: a frame at every step" in answer.err
+
+
+def test_the_end_of_a_run_reads_none_of_its_frames(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are as many as the run is long, and a limit of wall time has no room for them."""
+
+    def read(*_: object) -> None:
+        pytest.fail("frames are read again")
+
+    monkeypatch.setattr("blocksim.simulation.result.read_frames", read)
+    answer = blocksim("run", "scenarios/three_blocks_nonsmooth.toml", "--set", "time.end=0.02", "--out", "run")
+    assert answer.code in {0, 1}
+    assert "results: run" in answer.err
