@@ -62,10 +62,8 @@ def fitted_text(
                 text = _edited(text, path, data, note if path in fitted and path[0] != "provenance" else "")
         text = f"# {head}\n{text}"
         found = replace(Document.parse(text, folder=folder), allow_outside=True).build()
-        one, other = (
-            each.model_copy(update={"motion": None}) for each in (found, scenario)
-        )  # the hash has its content
-        if scenario_hash(found) == scenario_hash(scenario) and one == other:
+        same = [one.model_copy(update={"motion": None}) for one in (found, scenario)]  # the hash has its content
+        if scenario_hash(found) == scenario_hash(scenario) and same[0] == same[1]:
             return text
     experiment, motion = (follow(data, path) for path in TABLES[:2])
     resolved = scenario_to_toml(

@@ -22,22 +22,8 @@ from blocksim.silence import silent
 from blocksim.simulation import compilation, provenance, stopping
 from blocksim.simulation import folder as files
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.study import rows, sweep_folder
+from blocksim.study import manifest, rows, sweep_folder
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
-from blocksim.study.manifest import (
-    ENDED_BADLY,
-    MANIFEST,
-    MISSING,
-    WHOLE,
-    CaseIndex,
-    Entry,
-    Manifest,
-    Shard,
-    SweepResult,
-    note_timings,
-    table_rows,
-    values_hash,
-)
 from blocksim.study.plan import Cases, Settings, Values, cases_of, levels_of, plan_of, table_digests, with_sweep
 from blocksim.study.vary import variations_option
 
@@ -49,7 +35,8 @@ OnRow = Callable[[int, int, rows.Row], None]
 SHARDED = re.compile(r"manifest-\d+-of-(\d+)\.jsonl")
 MOST_SHARDS = 20
 SharedCases = Annotated[
-    Shard, Option("Run only cases I, I + N, ... (job arrays); then --merge.", metavar="I/N", read=Shard.parse)
+    manifest.Shard,
+    Option("Run only cases I, I + N, ... (job arrays); then --merge.", metavar="I/N", read=manifest.Shard.parse),
 ]
 
 
@@ -82,7 +69,7 @@ class SweepOptions(Execution):
         Path | str | None,
         Option("Folder for the results (default: results/NAME/sweep-HASH).", metavar="DIR"),
     ] = None
-    shard: SharedCases = WHOLE
+    shard: SharedCases = manifest.WHOLE
     keep_cases: Annotated[bool, Option("Keep a run folder with all frames for every case.")] = False
     fail_fast: Annotated[bool, Option("Stop at the first case that fails.")] = False
     retry_failed: Annotated[bool, Option("Run failed cases again.")] = False
@@ -95,7 +82,7 @@ class SweepOptions(Execution):
 
 
 @takes(SweepOptions)
-def sweep(scenario: Source, options: SweepOptions) -> SweepResult:
+def sweep(scenario: Source, options: SweepOptions) -> manifest.SweepResult:
     """Run every case of a sweep that has no row yet.
 
     `vary`, `mode`, `samples` and `seed` replace what the scenario's [sweep] table says. `executor` is by default
@@ -111,7 +98,7 @@ def sweep(scenario: Source, options: SweepOptions) -> SweepResult:
     return run_sweep(options.document(scenario), options)
 
 
-def run_sweep(document: Document, options: SweepOptions) -> SweepResult:
+def run_sweep(document: Document, options: SweepOptions) -> manifest.SweepResult:
     """Run the cases of a document that has its [sweep] table; see `sweep`."""
     shard = options.shard
     refuse_loss(shard, overwrite=options.overwrite)
@@ -125,17 +112,17 @@ def run_sweep(document: Document, options: SweepOptions) -> SweepResult:
     sweep_folder.keep_varied(folder, document, plan.vary, overwrite=options.overwrite)
     for kernels in kernels_for(document):
         compilation.compile_kernels(kernels)
-    with closing(Manifest(folder / shard.file(MANIFEST))) as manifest:
-        share = SweepRun(cases, shard, manifest, options.on_row, measured_ranges(base))
+    with closing(manifest.Manifest(folder / shard.file(manifest.MANIFEST))) as kept:
+        share = SweepRun(cases, shard, kept, options.on_row, measured_ranges(base))
         if options.retry_failed:
             share.forget_failed()
         share.run(run, setting, fail_fast=options.fail_fast)
-    return SweepResult(folder, shard.file(rows.TABLE), share.count)
+    return manifest.SweepResult(folder, shard.file(rows.TABLE), share.count)
 
 
-def refuse_loss(shard: Shard, *, overwrite: bool) -> None:
+def refuse_loss(shard: manifest.Shard, *, overwrite: bool) -> None:
     """Refuse that every job of an array removes what the others have done."""
-    if overwrite and shard != WHOLE:
+    if overwrite and shard != manifest.WHOLE:
         raise InvalidInputError("a shard cannot overwrite what other shards have done; remove the folder first")
 
 
@@ -169,27 +156,27 @@ class SweepRun:
     def __init__(
         self,
         cases: Cases,
-        shard: Shard,
-        manifest: Manifest,
+        shard: manifest.Shard,
+        kept: manifest.Manifest,
         on_row: OnRow,
         ranges: rows.Ranges | None = None,
         kind: sweep_folder.FolderKind = sweep_folder.SWEEP,
         table: str = rows.TABLE,
     ) -> None:
         """Take what is in the folder already; rows go into `table`, judged by `ranges` where these are given."""
-        self.cases, self.shard, self.manifest, self.on_row = cases, shard, manifest, on_row
-        self.ranges, self.kind, self.folder = ranges, kind, manifest.path.parent
+        self.cases, self.shard, self.manifest, self.on_row = cases, shard, kept, on_row
+        self.ranges, self.kind, self.folder = ranges, kind, kept.path.parent
         self.table = self.folder / shard.file(table)
-        self.done = CaseIndex(self.folder, len(cases))
+        self.done = manifest.CaseIndex(self.folder, len(cases))
         self.count = len(self.done.state[shard.slice])  # cases of this share
         self.new = 0  # rows of this call
-        self.invalid: list[tuple[Entry, Settings]] = []  # cases that cannot be run, until they are written
+        self.invalid: list[tuple[manifest.Entry, Settings]] = []  # cases that cannot be run, until they are written
         self.next_at = time.monotonic() + SOONEST
 
     def forget_failed(self) -> None:
         """Have those cases run again that did not end well."""
         state = self.done.state[self.shard.slice]
-        state[state == ENDED_BADLY] = MISSING
+        state[state == manifest.ENDED_BADLY] = manifest.MISSING
 
     def run(self, executor: Run, setting: Setting, *, fail_fast: bool = False) -> None:
         """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
@@ -222,7 +209,9 @@ class SweepRun:
         """Write the table; the more rows, the longer the while until it is worth it again."""
         began = time.monotonic()
         self.next_at = began + SOONEST
-        sweep_folder.write_table(self.table, self.kind, table_rows(self.cases, self.done, self.ranges, self.shard))
+        sweep_folder.write_table(
+            self.table, self.kind, manifest.table_rows(self.cases, self.done, self.ranges, self.shard)
+        )
         ended = time.monotonic()
         self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
 
@@ -235,7 +224,9 @@ class SweepRun:
             if case.scenario is not None:
                 yield Task(number, case.name, case.settings, case.scenario)
                 continue
-            entry = Entry(number, case.name, values_hash(case.settings), rows.invalid_row(case.problem))
+            entry = manifest.Entry(
+                number, case.name, manifest.values_hash(case.settings), rows.invalid_row(case.problem)
+            )
             self.invalid.append((entry, case.settings))
             if len(self.invalid) >= MOST_INVALID:
                 self._keep()
@@ -243,16 +234,16 @@ class SweepRun:
     def _keep_batch(self, batch: Batch, executor: str) -> bool:
         """Keep rows, and return whether one of them is of a case that failed."""
         ended = [
-            (Entry(task.number, task.name, values_hash(task.settings), row), task.settings)
+            (manifest.Entry(task.number, task.name, manifest.values_hash(task.settings), row), task.settings)
             for task, row in zip(batch.tasks, batch.rows, strict=True)
         ]
         has_failed = bool(self.invalid) or any(row["status"] != rows.FINISHED for row in batch.rows)
         self._keep(ended)
         names = [task.name for task in batch.tasks]
-        note_timings(self.folder / self.shard.file(TIMINGS), executor, names, batch.seconds, batch.host)
+        manifest.note_timings(self.folder / self.shard.file(TIMINGS), executor, names, batch.seconds, batch.host)
         return has_failed
 
-    def _keep(self, ended: Sequence[tuple[Entry, Settings]] = ()) -> None:
+    def _keep(self, ended: Sequence[tuple[manifest.Entry, Settings]] = ()) -> None:
         """Bring rows to the disk, with those of cases that cannot be run, and then report them."""
         ended, self.invalid = [*ended, *self.invalid], []
         if not ended:
@@ -266,7 +257,7 @@ class SweepRun:
             self.on_row(before + position, self.count, {"case": entry.case, **settings, **entry.row})
 
 
-def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
+def merge(folder: Path | str, *, allow_missing: bool = False) -> manifest.SweepResult:
     """Write sweep.csv from everything that has been run in a folder, by shards or not.
 
     Raises InputMissingError where no sweep is there, and InvalidInputError, with a list of shards, where cases are
@@ -276,7 +267,7 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
     document = sweep_folder.read_plan(folder)
     base = document.build()
     cases = cases_of(document, plan_of(base))
-    done = CaseIndex(folder, len(cases))
+    done = manifest.CaseIndex(folder, len(cases))
     if not done.paths:
         raise InputMissingError(f"{folder}: no case of this sweep has run yet")
     for number, settings in enumerate(cases.design):
@@ -285,12 +276,14 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> SweepResult:
     if done.count() < count and not allow_missing:
         lines = [f"{folder}: {count - done.count()} of {count} cases are missing; --allow-missing merges the others"]
         of = max((int(match[1]) for path in done.paths if (match := SHARDED.fullmatch(path.name))), default=1)
-        shards = [(shard, len(shard.numbers(count))) for shard in (Shard(index, of) for index in range(of))]
+        shards = [(shard, len(shard.numbers(count))) for shard in (manifest.Shard(index, of) for index in range(of))]
         missing = [(shard, size - done.count(shard), size) for shard, size in shards if done.count(shard) < size]
         if of > 1:  # by shards, those of the job array with the most jobs where there were several
             lines += [f"  --shard {shard}: {left} of {size} missing" for shard, left, size in missing[:MOST_SHARDS]]
         if of > 1 and len(missing) > MOST_SHARDS:
             lines.append(f"  and {len(missing) - MOST_SHARDS} more shards")
         raise InvalidInputError("\n".join(lines))
-    sweep_folder.write_table(folder / rows.TABLE, sweep_folder.SWEEP, table_rows(cases, done, measured_ranges(base)))
-    return SweepResult(folder, planned=len(cases))
+    sweep_folder.write_table(
+        folder / rows.TABLE, sweep_folder.SWEEP, manifest.table_rows(cases, done, measured_ranges(base))
+    )
+    return manifest.SweepResult(folder, planned=len(cases))
