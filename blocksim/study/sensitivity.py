@@ -147,7 +147,7 @@ def outputs_of(finals: Sequence[frames.Columns], table: ExperimentTable | None) 
     """Return every measured quantity (without a table: x of the first blocks), and indicators of the outcome."""
     blocks = finals[0]["block"]
     outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
-    are_in: list[bool] = []
+    inside: dict[str, list[bool]] = {}
     means: dict[str, float] = {}
     if table is None:
         places = np.array([final["x_mm"] for final in finals])
@@ -161,19 +161,15 @@ def outputs_of(finals: Sequence[frames.Columns], table: ExperimentTable | None) 
         ]
         means = {row.block: row.mean for row in summaries if row.quantity == "rotation"}
         are_in = [all(one.holds(value) for one, value in zip(ranges, row, strict=True)) for row in values]
+        inside = {"inside all measured ranges": are_in}
     if set(blocks) <= set(means):
         name, wanted = "measured outcome", quarter_turns([means[block] for block in blocks])
     else:
         name, wanted = "most frequent outcome", Counter(outcomes).most_common(1)[0][0]
-    if len(wanted) <= MOST_BLOCKS:
-        shown = "/".join(map(str, wanted))
-    else:
-        shown = f"({sum(angle != 0 for angle in wanted)} of {len(wanted)} blocks turned)"
-    hits = np.array([outcome == wanted for outcome in outcomes], dtype=np.float64)
-    found.append(Output(f"{name} {shown}", INDICATOR, hits))
-    if table is not None:
-        found.append(Output("inside all measured ranges", INDICATOR, np.array(are_in, dtype=np.float64)))
-    return found
+    turned = f"({sum(angle != 0 for angle in wanted)} of {len(wanted)} blocks turned)"
+    shown = "/".join(map(str, wanted)) if len(wanted) <= MOST_BLOCKS else turned
+    indicators = {f"{name} {shown}": [outcome == wanted for outcome in outcomes], **inside}
+    return found + [Output(name, INDICATOR, np.array(hits, dtype=np.float64)) for name, hits in indicators.items()]
 
 
 class TooManyFailuresError(BlocksimError):
