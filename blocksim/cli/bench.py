@@ -6,16 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.bench.measurement import REPEATS, Outcome, Setting, machine_lines, report, this_machine
-from blocksim.bench.measurements import choose
-from blocksim.cli.command_line import Replace, Report, Screen
-from blocksim.cli.output import grouped_lines
-from blocksim.cli.prepare import announce_compilation
-from blocksim.cli.progress import one_by_one
+from blocksim.bench import measurement, measurements
+from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import OutputError
 from blocksim.options import Option
-from blocksim.simulation.atomic import write_text
-from blocksim.simulation.folder import refuse_foreign
+from blocksim.simulation import atomic, folder
 from blocksim.verification.case import number
 
 COLUMNS = ("quantity", "unit", "median", "smallest", "largest")
@@ -35,10 +30,10 @@ def bench_command(
         ),
     ] = None,
     quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,
-    repeats: Annotated[int, Option("Samples of each number.", metavar="N", least=1)] = REPEATS,
+    repeats: Annotated[int, Option("Samples of each number.", metavar="N", least=1)] = measurement.REPEATS,
     out: Annotated[Path | None, Option("Write everything as JSON.", metavar="FILE")] = None,
-    overwrite: Replace = False,
-    screen: Screen,
+    overwrite: command_line.Replace = False,
+    screen: command_line.Screen,
 ) -> None:
     """Measure speed and memory, and show the table.
 
@@ -47,34 +42,34 @@ def bench_command(
 
     Example: blocksim bench walls --out bench.json
     """
-    wanted = choose(names or [])
+    wanted = measurements.choose(names or [])
     if out is not None:  # checked before minutes of measuring
         if out.is_dir() or not out.absolute().parent.is_dir():
             message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}"
             raise OutputError(message)
-        refuse_foreign(out, overwrite=overwrite)
-    machine = this_machine()
-    announce_compilation("surface", quiet=screen.silent)
-    outcomes: list[Outcome] = []
+        folder.refuse_foreign(out, overwrite=overwrite)
+    machine = measurement.this_machine()
+    prepare.announce_compilation("surface", quiet=screen.silent)
+    outcomes: list[measurement.Outcome] = []
     try:
-        under_way = one_by_one(wanted, lambda one: f"{one.name}: {one.title}", quiet=screen.silent)
-        outcomes.extend(one.run(Setting(quick, repeats)) for one in under_way)
+        under_way = progress.one_by_one(wanted, lambda one: f"{one.name}: {one.title}", quiet=screen.silent)
+        outcomes.extend(one.run(measurement.Setting(quick, repeats)) for one in under_way)
     finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
         if outcomes:
-            data = report(machine, outcomes)
+            data = measurement.report(machine, outcomes)
             if out is not None:
-                write_text(out, json.dumps(data, indent=2) + "\n")
+                atomic.write_text(out, json.dumps(data, indent=2) + "\n")
             written = [] if out is None else [f"written: {out}"]
             notes = [
                 *_notes(outcomes),
-                *machine_lines(machine),
+                *measurement.machine_lines(machine),
                 f"{sum(one.seconds for one in outcomes):.0f} s",
                 *written,
             ]
-            screen.print(Report(grouped_lines(COLUMNS, _groups(outcomes), left=2), data, notes))
+            screen.print(command_line.Report(output.grouped_lines(COLUMNS, _groups(outcomes), left=2), data, notes))
 
 
-def _groups(outcomes: list[Outcome]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+def _groups(outcomes: list[measurement.Outcome]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
     """Yield the name and the rows of each measurement."""
 
     def shown(value: float) -> str:
@@ -88,7 +83,7 @@ def _groups(outcomes: list[Outcome]) -> Iterator[tuple[str, list[tuple[str, ...]
         yield f"{one.measurement.name}: {one.measurement.title}", rows
 
 
-def _notes(outcomes: list[Outcome]) -> Iterator[str]:
+def _notes(outcomes: list[measurement.Outcome]) -> Iterator[str]:
     for outcome in outcomes:
         yield from (f"{outcome.measurement.name}: {text}" for text in outcome.findings.notes)
         if outcome.shortened:

@@ -101,14 +101,14 @@ class TextScreen(Screen):
 
 def report_of(answers: "Sequence[Answer]", data: object) -> Report:
     """Return what studies have come to: a table of each with its title and lines below it; their notes."""
+    overviews = [one.overview() for one in answers]
     texts = []
-    for one in answers:
-        table, below = one.overview(), one.lines()
-        lines = table_lines(table.heads, table.texts(), left=table.left)
-        title = textwrap.wrap(one.title, width_of_screen())
-        texts.append("\n".join([*title, "", *lines, *(["", *below] if below else [])]))
-    notes = dict.fromkeys(text for one in answers for text in one.notes())
-    return Report(["\n\n".join(texts)], data, notes, code=max(one.code for one in answers))
+    for one in overviews:
+        table = table_lines(one.heads, one.texts(), left=one.left)
+        below = ["", *one.lines] if one.lines else []
+        texts.append("\n".join([*textwrap.wrap(one.title, width_of_screen()), "", *table, *below]))
+    notes = dict.fromkeys(text for one in overviews for text in one.notes)
+    return Report(["\n\n".join(texts)], data, notes, code=max(one.code for one in overviews))
 
 
 def _allow_outside(context: typer.Context, asked: bool) -> None:

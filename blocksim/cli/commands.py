@@ -15,8 +15,7 @@ import typer
 from typer.core import TyperGroup
 
 from blocksim import __version__
-from blocksim.cli.output import abandon, note
-from blocksim.cli.process import cleanup_state, pause_collector
+from blocksim.cli import output, process
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError
 
 PATH_TROUBLE = {errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES}
@@ -41,15 +40,15 @@ def errors_as_messages() -> Iterator[None]:
         yield
         sys.stdout.flush()
     except BlocksimError as error:
-        note(str(error))
+        output.note(str(error))
         raise typer.Exit(error.exit_code) from None
     except KeyboardInterrupt:
-        note("stopped")
+        output.note("stopped")
         raise typer.Exit(ExitCode.STOPPED_EARLY) from None
     except Exception as error:
         missing = _shortage(error)
         if missing:
-            note(f"the system has run out of {missing}")
+            output.note(f"the system has run out of {missing}")
             raise typer.Exit(ExitCode.INPUT_OUTPUT) from None
         if not isinstance(error, OSError):
             raise
@@ -75,17 +74,17 @@ def _shortage(error: BaseException | None) -> str:
 def _tell_trouble(error: OSError) -> ExitCode:
     """Report an input or output error; raise it again where the user did not cause it."""
     if isinstance(error, BrokenPipeError):  # the reader of our answer has gone: nothing to report
-        abandon(sys.stdout)
+        output.abandon(sys.stdout)
         return ExitCode.INPUT_OUTPUT
     if error.errno in PATH_TROUBLE and error.filename is not None:
         name = "".join(c if c.isprintable() else "\ufffd" for c in str(error.filename))
         name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}…"
-        note(f"{name}: cannot be reached: {error.strerror}")
+        output.note(f"{name}: cannot be reached: {error.strerror}")
         return ExitCode.INPUT_OUTPUT
     if error.errno not in DISK_TROUBLE:
         raise error
-    note(f"{error.filename or 'the answer'}: cannot be written: {error.strerror}")
-    abandon(sys.stdout)
+    output.note(f"{error.filename or 'the answer'}: cannot be written: {error.strerror}")
+    output.abandon(sys.stdout)
     return ExitCode.INPUT_OUTPUT
 
 
@@ -96,9 +95,9 @@ def report_internal_error(error: Exception) -> None:
         with tempfile.NamedTemporaryFile("w", prefix="blocksim-error-", suffix=".txt", delete=False) as file:
             traceback.print_exception(error, file=file)
     except OSError:
-        note(f"internal error: {what}; please report it (a file with the details could not be written)")
+        output.note(f"internal error: {what}; please report it (a file with the details could not be written)")
     else:
-        note(f"internal error: {what}; please report it with the file {file.name}")
+        output.note(f"internal error: {what}; please report it with the file {file.name}")
 
 
 COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command, in verify_run.py unless in MODULES
@@ -157,7 +156,7 @@ class CommandGroup(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
-        with errors_as_messages(), cleanup_state(wanted=True):
+        with errors_as_messages(), process.cleanup_state(wanted=True):
             try:
                 return super().invoke(ctx)
             except UsageError as error:
@@ -179,7 +178,7 @@ def function_of(name: str) -> Any:
 
 def load_command(name: str) -> Any:
     """Return the command of a name, ready to be called."""
-    with pause_collector(), cleanup_state(wanted=False):
+    with process.pause_collector(), process.cleanup_state(wanted=False):
         from blocksim.cli.command_line import as_typer_command
 
         function = function_of(name)

@@ -14,8 +14,8 @@ from blocksim.cli.prepare import ScenarioInput, announce_compilation
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.spelling import list_names
-from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.folder import RESULTS, refuse_foreign
+from blocksim.simulation import compilation, folder
+from blocksim.study import pictures, rows
 from blocksim.study.converge import (
     TOLERANCE_MM,
     Convergence,
@@ -26,10 +26,7 @@ from blocksim.study.converge import (
     converge,
     refinements_of,
 )
-from blocksim.study.pictures import draw_convergence
-from blocksim.study.rows import Row
-from blocksim.view.levels import refuse_small_page
-from blocksim.view.style import PageOptions, picture_path
+from blocksim.view import levels, style
 
 MOST_BLOCKS = 3
 LONGEST_NAME = 10
@@ -45,7 +42,7 @@ def converge_command(
         Path | None, Option("Picture: .png, .svg or .pdf (default: results/NAME/converge.png).", metavar="FILE")
     ] = None,
     picture: Annotated[bool, Option("Draw a picture.", flags=("--picture/--no-picture",))] = True,
-    page: PageOptions,
+    page: style.PageOptions,
     overwrite: Replace = False,
     screen: Screen,
 ) -> Report:
@@ -60,20 +57,20 @@ def converge_command(
     Example: blocksim converge scenarios/three_blocks_nominal.toml
     """
 
-    def tell(label: str, row: Row) -> None:
+    def tell(label: str, row: rows.Row) -> None:
         screen.note(f"{label}: {row['status']} ({row['reason']}), {float(str(row['seconds'])):.2f} s")
 
     paper = page.paper
     with source.built() as ready:
-        path = out or RESULTS / ready.name / "converge.png"
-        picture_path(path)
+        path = out or folder.RESULTS / ready.name / "converge.png"
+        style.picture_path(path)
         if picture:
-            refuse_small_page(len(refinements_of(ready, options.studies)), paper)
+            levels.refuse_small_page(len(refinements_of(ready, options.studies)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture
-                refuse_foreign(path, overwrite=overwrite)
-        announce_compilation(kernels_of(ready), quiet=screen.silent)
+                folder.refuse_foreign(path, overwrite=overwrite)
+        announce_compilation(compilation.kernels_of(ready), quiet=screen.silent)
         result = converge(ready, replace(options, jobs=jobs, on_run=tell))
-        drawn = path if picture and draw_convergence(result, ready, path, paper) else None
+        drawn = path if picture and pictures.draw_convergence(result, ready, path, paper) else None
     lines = []
     for study in result.studies:
         lines += [f"{study.title}: {study.key}", *_table(result, study), *_verdict(study), ""]

@@ -2,15 +2,14 @@
 
 from dataclasses import replace
 
-from blocksim.cli.command_line import Report, Screen, report_of
-from blocksim.cli.prepare import ScenarioInput, announce_compilation, warn_of_values
-from blocksim.cli.progress import case_progress, exit_when_stopped
+from blocksim.cli import command_line, prepare, progress
 from blocksim.simulation.compilation import kernels_of
-from blocksim.study.fragility import run_fragility
-from blocksim.study.fragility_plan import FragilityOptions, read_fragility
+from blocksim.study import fragility, fragility_plan
 
 
-def fragility_command(source: ScenarioInput, options: FragilityOptions, screen: Screen) -> Report:
+def fragility_command(
+    source: prepare.ScenarioInput, options: fragility_plan.FragilityOptions, screen: command_line.Screen
+) -> command_line.Report:
     """Find the probability of collapse over an intensity.
 
     Draws samples at every intensity, independently, counts those that fail with exact (Clopper-Pearson) limits, and
@@ -21,12 +20,12 @@ def fragility_command(source: ScenarioInput, options: FragilityOptions, screen: 
 
     Example: blocksim fragility mine.toml --intensity motion.scale=0.5:2:7 --scatter friction.block_block=0.6+-0.05
     """
-    plan = read_fragility(source.document(), options)
+    plan = fragility_plan.read_fragility(source.document(), options)
     base = plan.document.build()
     if not screen.silent:
-        warn_of_values(base)
-    announce_compilation(kernels_of(base), quiet=screen.silent)
+        prepare.warn_of_values(base)
+    prepare.announce_compilation(kernels_of(base), quiet=screen.silent)
     heads = {head.key: head for head in plan.cases.heads}
-    with exit_when_stopped(), case_progress(heads.values(), quiet=screen.silent) as on_row:
-        found = run_fragility(plan, replace(options, on_row=on_row))
-    return report_of([found], {"folder": str(found.folder), **found.to_dict()})
+    with progress.exit_when_stopped(), progress.case_progress(heads.values(), quiet=screen.silent) as on_row:
+        found = fragility.run_fragility(plan, replace(options, on_row=on_row))
+    return command_line.report_of([found], {"folder": str(found.folder), **found.to_dict()})

@@ -8,31 +8,12 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli.command_line import Report, Screen, report_of
-from blocksim.cli.prepare import ScenarioInput, announce_compilation
-from blocksim.cli.progress import exit_when_stopped
+from blocksim.cli import command_line, prepare, progress
 from blocksim.options import Option
 from blocksim.scenario.check import implausible_values
 from blocksim.scenario.models.stepping import SPRINGS
 from blocksim.simulation.compilation import kernels_of
-from blocksim.study.answer import with_unit
-from blocksim.study.criterion import Verdict
-from blocksim.study.limit import STEP, find_curve, find_limit
-from blocksim.study.limit_answer import LimitAnswer
-from blocksim.study.limit_margin import STIFFNESS, refuse_without_springs
-from blocksim.study.limit_plan import (
-    NAMES,
-    OVER,
-    CurveOptions,
-    LimitOptions,
-    LimitPlan,
-    OtherKey,
-    comes_at_once,
-    read_curve,
-    read_limit,
-    variants,
-)
-from blocksim.study.rows import Row
+from blocksim.study import answer, criterion, limit, limit_answer, limit_margin, limit_plan, rows
 
 AT_ONCE = (
     "start.settle = false: loads that come at once shift limits of arches and walls by 0.2 to 4 %; leave it out, and "
@@ -41,14 +22,14 @@ AT_ONCE = (
 
 
 def limit_command(
-    source: ScenarioInput,
-    options: LimitOptions,
+    source: prepare.ScenarioInput,
+    options: limit_plan.LimitOptions,
     *,
-    over: OtherKey = None,
+    over: limit_plan.OtherKey = None,
     both_laws: Annotated[bool, Option("Search with springs and with rigid contacts, and compare.")] = False,
     no_runs: Annotated[bool, Option("Keep no runs of both sides of a bracket, which plot and report show.")] = False,
-    screen: Screen,
-) -> Report:
+    screen: command_line.Screen,
+) -> command_line.Report:
     """Find the critical value of a parameter (collapse threshold).
 
     Scans the range, as there may be more than one change, and then narrows every change between neighbours to a
@@ -62,66 +43,69 @@ def limit_command(
     if over is not None:
         if both_laws:
             raise typer.BadParameter(
-                "a curve of limits is searched with one law; leave --both-laws out", param_hint=OVER
+                "a curve of limits is searched with one law; leave --both-laws out", param_hint=limit_plan.OVER
             )
-        of_curve = CurveOptions(**options.shared, over=over)
-        curve = read_curve(document, of_curve)
+        of_curve = limit_plan.CurveOptions(**options.shared, over=over)
+        curve = limit_plan.read_curve(document, of_curve)
         _warn(next(iter(curve.searches.values())), screen)
 
-        def tell_limit(value: float, search: LimitAnswer) -> None:
-            at = f"{curve.head.key} = {with_unit(value, curve.head.unit, 6)}"
+        def tell_limit(value: float, search: limit_answer.LimitAnswer) -> None:
+            at = f"{curve.head.key} = {answer.with_unit(value, curve.head.unit, 6)}"
             screen.note(f"{at}: {search.runs} runs, {search.run} of them now")
 
-        with exit_when_stopped():
-            points = find_curve(curve, of_curve, tell_limit)
-        return report_of([points], {"folder": str(points.folder), **points.to_dict()})
-    documents = variants(document, both_laws=both_laws)
-    plans = {name: read_limit(one, options) for name, one in documents.items()}
+        with progress.exit_when_stopped():
+            points = limit.find_curve(curve, of_curve, tell_limit)
+        return command_line.report_of([points], {"folder": str(points.folder), **points.to_dict()})
+    documents = limit_plan.variants(document, both_laws=both_laws)
+    plans = {name: limit_plan.read_limit(one, options) for name, one in documents.items()}
     if options.stiffer:
-        refuse_without_springs(*plans.values())
+        limit_margin.refuse_without_springs(*plans.values())
     _warn(next(iter(plans.values())), screen)
     found = {}
     for name, plan in plans.items():
-        announce_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=screen.silent)
+        prepare.announce_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=screen.silent)
 
-        def tell_run(value: float, verdict: Verdict, row: Row, plan: LimitPlan = plan) -> None:
+        def tell_run(
+            value: float, verdict: criterion.Verdict, row: rows.Row, plan: limit_plan.LimitPlan = plan
+        ) -> None:
             screen.note(f"{plan.text(value)}: {verdict.value} ({row['reason']})")
 
-        def tell_search(plan: LimitPlan) -> None:
-            if STIFFNESS in plan.apart:
-                changed = f"springs shift this limit, or may: once more with {STIFFNESS} = {plan.apart[STIFFNESS]:g}"
+        def tell_search(plan: limit_plan.LimitPlan) -> None:
+            scale, step = (plan.apart.get(key) for key in (limit_margin.STIFFNESS, limit.STEP))
+            if scale is not None:
+                changed = f"springs shift this limit, or may: once more with {limit_margin.STIFFNESS} = {scale:g}"
             else:
-                changed = f"both sides once more with half the time step, {STEP} = {plan.apart[STEP]:.3g} s"
+                changed = f"both sides once more with half the time step, {limit.STEP} = {step:.3g} s"
             screen.note(changed)
 
         out, stiffer = options.out, options.stiffer
         if out is not None and len(plans) > 1:
             out = Path(out) / re.sub(r"[^a-z0-9.]+", "-", name)  # needs no quotes in a shell
-        if stiffer and name != NAMES[SPRINGS]:
+        if stiffer and name != limit_plan.NAMES[SPRINGS]:
             stiffer = None
         of_plan = replace(options, out=out, stiffer=stiffer, keep_runs=not no_runs, on_run=tell_run)
-        with exit_when_stopped():
-            found[name] = find_limit(plan, of_plan, on_other=tell_search)
+        with progress.exit_when_stopped():
+            found[name] = limit.find_limit(plan, of_plan, on_other=tell_search)
     searches = [{"contacts": name, "folder": str(one.folder), **one.to_dict()} for name, one in found.items()]
-    report = report_of(list(found.values()), searches)
+    report = command_line.report_of(list(found.values()), searches)
     return replace(report, lines=[*report.lines, *_comparison(*found.values())]) if len(found) == 2 else report
 
 
-def _warn(plan: LimitPlan, screen: Screen) -> None:
+def _warn(plan: limit_plan.LimitPlan, screen: command_line.Screen) -> None:
     """Warn of implausible values of the scenario, and of those at both ends of the range; compile what it needs."""
     ends = [plan.scenario_at(value) for value in (plan.span.low, plan.span.high)]
-    announce_compilation(kernels_of(ends[0]), quiet=screen.silent)
+    prepare.announce_compilation(kernels_of(ends[0]), quiet=screen.silent)
     if screen.silent:
         return
     for text in dict.fromkeys(text for scenario in ends for text in implausible_values(scenario)):
         screen.note(f"warning: {text}")
-    if all(map(comes_at_once, ends)):
+    if all(map(limit_plan.comes_at_once, ends)):
         screen.note(AT_ONCE)
 
 
-def _comparison(one: LimitAnswer, other: LimitAnswer) -> Iterator[str]:
+def _comparison(one: limit_answer.LimitAnswer, other: limit_answer.LimitAnswer) -> Iterator[str]:
     """Yield how far the limits of two laws lie apart, where they have as many."""
-    first, second = NAMES[one.scheme], NAMES[other.scheme]
+    first, second = limit_plan.NAMES[one.scheme], limit_plan.NAMES[other.scheme]
     if len(one.limits) != len(other.limits):
         yield f"\n{first} has {len(one.limits)} limits, {second} {len(other.limits)}"
         return

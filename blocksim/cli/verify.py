@@ -4,10 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated
 
-from blocksim.cli.command_line import Report, Screen
-from blocksim.cli.output import grouped_lines
-from blocksim.cli.prepare import announce_compilation
-from blocksim.cli.progress import one_by_one
+from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
@@ -29,8 +26,8 @@ def verify_command(
     scheme: Annotated[str, Option("Stepping: springs or impulses.", choices=(SPRINGS, IMPULSES))] = SPRINGS,
     soil: Annotated[bool, Option("The cases of soil, S1 to S11.")] = False,
     quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,
-    screen: Screen,
-) -> Report:
+    screen: command_line.Screen,
+) -> command_line.Report:
     """Run the verification cases and show the table.
 
     Exit code 1: a number is out of tolerance. All cases take about four minutes on one core, half a minute with
@@ -40,10 +37,10 @@ def verify_command(
     """
     setting = Setting(model, law, quick, scheme)
     wanted = choose_cases(cases or [], setting, soil=soil)
-    announce_compilation(SCHEMES[setting.scheme].kernels(setting.model), quiet=screen.silent)
+    prepare.announce_compilation(SCHEMES[setting.scheme].kernels(setting.model), quiet=screen.silent)
     outcomes: list[Outcome] = []
     try:
-        under_way = one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=screen.silent)
+        under_way = progress.one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=screen.silent)
         outcomes.extend(run_case(case, setting) for case in under_way)
     except BaseException:  # minutes of measuring must not be lost; the list has what was measured
         if outcomes:
@@ -54,14 +51,14 @@ def verify_command(
     return replace(report, notes=[*report.notes, f"left out: {'; '.join(missing)}"]) if missing else report
 
 
-def _report(outcomes: list[Outcome]) -> Report:
+def _report(outcomes: list[Outcome]) -> command_line.Report:
     groups = []
     for outcome in outcomes:
         case, texts = outcome.case, [row.texts for row in outcome.rows]
         heading = f"{case.id} {case.title} ({case.source}): {outcome.seconds:.1f} s"
         groups.append((heading, [(f"  {row['quantity']}", *(row[key] for key in COLUMNS[1:])) for row in texts]))
-    return Report(
-        grouped_lines(COLUMNS, groups),
+    return command_line.Report(
+        output.grouped_lines(COLUMNS, groups),
         [row for outcome in outcomes for row in outcome.to_dicts()],
         list(_notes(outcomes)),
         code=ExitCode.SUCCESS if all(outcome.inside for outcome in outcomes) else ExitCode.OUTSIDE,

@@ -5,10 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli.command_line import Report, Screen
-from blocksim.cli.output import note
-from blocksim.cli.prepare import announce_compilation
-from blocksim.cli.progress import run_progress
+from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.options import Option
 from blocksim.scenario import load_stored
@@ -45,8 +42,8 @@ def verify_run_command(
     threads: Threads = 1,
     sample: Annotated[int, Option("Number of rows of a sweep or study to run again.", metavar="N", least=1)] = SAMPLE,
     seed: Annotated[int, Option("Random seed for the choice of rows.", metavar="S", least=0)] = 0,
-    screen: Screen,
-) -> Report:
+    screen: command_line.Screen,
+) -> command_line.Report:
     """Run stored results again and check bitwise reproducibility.
 
     Of a run: checksums of all files, final state, every frame of run.h5, final.csv, and the steps, times, energies,
@@ -60,10 +57,10 @@ def verify_run_command(
     reports = [_verified(place, threads, sample, seed, screen) for place in places]
     lines = [line for one in reports for line in one.lines]
     # of several codes the most severe: 65, 66 before 1 before 0
-    return Report(lines, [one.data for one in reports], code=max(one.code for one in reports))
+    return command_line.Report(lines, [one.data for one in reports], code=max(one.code for one in reports))
 
 
-def _verified(place: Path, threads: int, sample: int, seed: int, screen: Screen) -> Report:
+def _verified(place: Path, threads: int, sample: int, seed: int, screen: command_line.Screen) -> command_line.Report:
     """Verify one place; an error in it does not stop the others."""
     try:
         study = study_in(place)
@@ -72,12 +69,12 @@ def _verified(place: Path, threads: int, sample: int, seed: int, screen: Screen)
         else:
             kernels = [*kernels_for(read_plan(place))] if is_sweep(place) else [kernels_of(scenario_of(place))]
         for one in kernels:
-            announce_compilation(one, quiet=screen.silent)
+            prepare.announce_compilation(one, quiet=screen.silent)
         if study is not None:
             return _of_study(verify_study(place, study, sample, seed))
         if is_sweep(place):
             return _of_sweep(verify_sweep(place, sample, seed))
-        with run_progress(quiet=screen.silent) as on_progress:
+        with progress.run_progress(quiet=screen.silent) as on_progress:
             verdict = verify_run(place, threads=threads, on_progress=on_progress)
         if verdict.agrees and verdict.origins:
             screen.note("\n".join(_changes(verdict.origins)))
@@ -85,13 +82,13 @@ def _verified(place: Path, threads: int, sample: int, seed: int, screen: Screen)
     except StoppedEarlyError:
         raise
     except BlocksimError as error:
-        note(str(error))
+        output.note(str(error))
         kind = "missing" if isinstance(error, InputMissingError) else "damaged"
         data = {"agrees": False, "kind": kind, "folder": str(place), "error": str(error)}
-        return Report([f"{place}: {kind}"], data, code=error.exit_code)
+        return command_line.Report([f"{place}: {kind}"], data, code=error.exit_code)
 
 
-def _of_study(verdicts: tuple[SweepVerdict, ...]) -> Report:
+def _of_study(verdicts: tuple[SweepVerdict, ...]) -> command_line.Report:
     """Report a study, of a curve of limits every search and then the curve."""
     reports = [_of_sweep(one, "runs", "table and answer follow from the runs; ") for one in verdicts]
     agrees = all(one.agrees for one in verdicts)
@@ -101,17 +98,17 @@ def _of_study(verdicts: tuple[SweepVerdict, ...]) -> Report:
         if verdicts[-1].agrees:
             follows = f"{verdicts[-1].folder}: table and answer follow from the searches"
             reports[-1] = replace(reports[-1], lines=[follows])
-    return Report([line for one in reports for line in one.lines], data, code=ExitCode(not agrees))
+    return command_line.Report([line for one in reports for line in one.lines], data, code=ExitCode(not agrees))
 
 
-def _of_run(verdict: RunVerdict) -> Report:
+def _of_run(verdict: RunVerdict) -> command_line.Report:
     lines = [f"{verdict.folder}: bit-identical: final state, {verdict.frames.frames[0]} frames, final.csv"]
     if not verdict.agrees:
         lines = [f"{verdict.folder}: differs", *(INDENT + line for line in _reasons(verdict))]
-    return Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))
+    return command_line.Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))
 
 
-def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> Report:
+def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> command_line.Report:
     count = f"{len(verdict.checked)} of {verdict.rows} {what}"
     if verdict.agrees:
         kept = f", bit-identical in {len(verdict.runs)} kept runs" if verdict.runs else ""
@@ -122,7 +119,7 @@ def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> Rep
         runs = (line for run in verdict.runs if not run.agrees for line in _of_run(run).lines)
         reasons = (*_cells(verdict), *_entries(verdict.entries), *runs)
         lines = [f"{verdict.folder}: differs{where}", *(INDENT + line for line in reasons)]
-    return Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))
+    return command_line.Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))
 
 
 def _reasons(verdict: RunVerdict) -> Iterator[str]:

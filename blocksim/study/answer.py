@@ -24,13 +24,21 @@ def with_unit(number: float, unit: str, digits: int = 7) -> str:
     return f"{number:.{digits}g} {unit}".rstrip()
 
 
-class Table(NamedTuple):
-    """A table for people: texts, and numbers with so many digits, which a screen has on the right of `left` columns."""
+class Overview(NamedTuple):
+    """What an answer is for people, on the screen and in a report: a table, what belongs to it, and an exit code.
 
+    Numbers have so many digits, and stand on the right of `left` columns of text on a screen.
+    """
+
+    title: str
     heads: Sequence[str]
     rows: Sequence[Sequence[str | float]]
     left: int = 1
     digits: int = 2
+    lines: Sequence[str] = ()  # below the table
+    notes: Sequence[str] = ()  # remarks that are no part of the answer, with where the files are
+    summary: Sequence[tuple[str, str]] = ()  # above the table of a report
+    code: ExitCode = ExitCode.SUCCESS
 
     def texts(self) -> list[list[str]]:
         """Return the cells of all rows: fixed digits, no minus sign on zero, a dash where there is no number."""
@@ -87,31 +95,9 @@ class Answer(BaseModel, frozen=True):
 
         return pd.DataFrame(list(self.cells), columns=list(self.heads))
 
-    @property
-    def code(self) -> ExitCode:
-        """With which a command ends."""
-        return ExitCode.SUCCESS
-
-    @property
-    def title(self) -> str:
-        """What the table for people is about."""
+    def overview(self) -> Overview:
+        """Return what it is for people."""
         raise NotImplementedError
-
-    def overview(self) -> Table:
-        """Return the table for people, on the screen and in a report."""
-        raise NotImplementedError
-
-    def lines(self) -> list[str]:
-        """Return what is said below that table; nothing where it says all."""
-        return []
-
-    def notes(self) -> list[str]:
-        """Return remarks that are no part of the answer, with where the files are."""
-        return [f"table: {self.folder / Path(self.files.plan).with_suffix('.csv')}"]
-
-    def summary(self) -> list[tuple[str, str]]:
-        """Return what a report says above the table."""
-        return []
 
     def draw(self, path: Path, title: str, paper: Paper) -> None:
         """Draw the picture of an answer that was read. Raises InvalidInputError where there is nothing to draw."""

@@ -18,8 +18,7 @@ from enum import StrEnum
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import units as q
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.simulation.observables import MOVES_ON, OBSERVABLES
-from blocksim.simulation.result import NOT_AT_REST
+from blocksim.simulation import observables, result
 from blocksim.study.rows import FINISHED
 
 STANDS = "--stands"
@@ -68,12 +67,12 @@ class Criterion:
             return Verdict.FAILED
         if not self.holds(row):
             return Verdict.FALLS
-        return Verdict.UNDECIDED if row.get(MOVES_ON) else Verdict.STANDS
+        return Verdict.UNDECIDED if row.get(observables.MOVES_ON) else Verdict.STANDS
 
 
 def falls_before_zero(row: Mapping[str, object]) -> bool:
     """Return True for the row of a run that did not come to rest before time zero (`start.settle`)."""
-    return NOT_AT_REST in str(row.get("reason", ""))
+    return result.NOT_AT_REST in str(row.get("reason", ""))
 
 
 def read_criterion(text: str, option: str = STANDS) -> Criterion:
@@ -96,7 +95,7 @@ def _condition(text: str) -> tuple[Callable[[Mapping[str, object]], bool], list[
     if match is None:
         raise ValueError('write for example "moved < 5 mm" or "outcome != fell"')
     word, sign, value = match[1], match[2].replace("==", "="), match[3]
-    known = {one.word: one for one in OBSERVABLES.values() if one.word}
+    known = {one.word: one for one in observables.OBSERVABLES.values() if one.word}
     if word not in known:
         raise ValueError(f"unknown quantity '{word}', {did_you_mean_or_list(word, known)}")
     name = known[word].name

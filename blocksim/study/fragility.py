@@ -21,18 +21,12 @@ from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.extras import load_module
 from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of
-from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.observables import MOVES_ON
-from blocksim.study.answer import Answer, Table, with_unit
-from blocksim.study.criterion import falls_before_zero
+from blocksim.simulation import compilation, observables
+from blocksim.study import criterion, fragility_plan, manifest, study, sweep, sweep_folder
+from blocksim.study.answer import Answer, Overview, with_unit
 from blocksim.study.executors import Execution
-from blocksim.study.fragility_plan import FragilityOptions, FragilityPlan, read_fragility
-from blocksim.study.manifest import MANIFEST, WHOLE, Manifest
-from blocksim.study.rows import FINISHED, Head, Row, check_experiment
-from blocksim.study.runs import Replay, folder_for
-from blocksim.study.study import Study
-from blocksim.study.sweep import SweepRun, refuse_loss
-from blocksim.study.sweep_folder import SHARD, FolderKind, prepare
+from blocksim.study.rows import FINISHED, Head, Row
+from blocksim.study.runs import Replay, make_folder
 from blocksim.view import studies as view
 from blocksim.view.style import Paper
 
@@ -64,12 +58,12 @@ class Point(BaseModel, frozen=True):
 class FragilityAnswer(Answer, frozen=True):
     """Counts at every intensity, and the curve through them."""
 
-    files: ClassVar[FolderKind] = FolderKind(
+    files: ClassVar[sweep_folder.FolderKind] = sweep_folder.FolderKind(
         "fragility",
         "a fragility study",
         "fragility",
         {
-            rf"members{SHARD}\.csv": r"case,(?:.*,)?status,reason,seconds(?:,.*)?",
+            rf"members{sweep_folder.SHARD}\.csv": r"case,(?:.*,)?status,reason,seconds(?:,.*)?",
             r"fragility\.csv": r"intensity(?: \[[^\[\]]*\])?,members,failures,.*",
         },
     )
@@ -86,7 +80,7 @@ class FragilityAnswer(Answer, frozen=True):
     left: int = Field(alias="missing")  # members that have not run: those of other shards
     fitted: dict[str, Any] = Field(alias="curve")
     inflation: float | None = Field(default=None, ge=1.0, lt=1e6)  # of variance: intensities share their records
-    plan: InstanceOf[FragilityPlan] | None = Field(default=None, exclude=True, repr=False)
+    plan: InstanceOf[fragility_plan.FragilityPlan] | None = Field(default=None, exclude=True, repr=False)
 
     @cached_property
     def curve(self) -> Curve | NoCurve:
@@ -113,36 +107,33 @@ class FragilityAnswer(Answer, frozen=True):
         """Return the curve at intensities in the unit of the study, None where there is no curve."""
         return self.curve.probability(intensity) if isinstance(self.curve, Curve) else None
 
-    @property
-    def code(self) -> ExitCode:
-        """77 where runs did not finish, 1 without a curve, unless that of a shard."""
-        if self.failed:
-            return ExitCode.SWEEP_HAS_FAILURES
-        return ExitCode.SUCCESS if isinstance(self.curve, Curve) or self.left else ExitCode.OUTSIDE
+    def overview(self) -> Overview:
+        """Return the counts of every intensity, the curve beside and below them; columns without news are left out.
 
-    @property
-    def title(self) -> str:
-        """Key and criterion."""
-        return f'{self.key}: failure means "{self.fails}"'
-
-    def overview(self) -> Table:
-        """Return the counts of every intensity, with the curve beside them; columns without news are left out."""
-        rows: list[list[str | float]] = [
-            [
-                f"{one.intensity:.6g}",
-                str(one.members),
-                str(one.failures),
-                *(math.nan if value is None else value for value in (one.share, one.low, one.high, one.curve)),
-                str(one.moving_on),
-                str(one.no_result),
-            ]
-            for one in self.points
-        ]
+        The code is 77 where runs did not finish, 1 without a curve, unless that of a shard.
+        """
+        rows: list[list[str | float]] = []
+        for one in self.points:
+            shares = (math.nan if share is None else share for share in (one.share, one.low, one.high, one.curve))
+            counts = (f"{one.intensity:.6g}", str(one.members), str(one.failures))
+            rows.append([*counts, *shares, str(one.moving_on), str(one.no_result)])
         heads = (self.unit or "value", *HEADS)
         places = [i for i in range(len(heads)) if i < len(heads) - 2 or any(row[i] != "0" for row in rows)]
-        return Table([heads[i] for i in places], [[row[i] for i in places] for row in rows], left=0, digits=DIGITS)
+        code = ExitCode.SUCCESS if isinstance(self.curve, Curve) or self.left else ExitCode.OUTSIDE
+        samples = str(sum(one.members for one in self.points))
+        return Overview(
+            f'{self.key}: failure means "{self.fails}"',
+            [heads[i] for i in places],
+            [[row[i] for i in places] for row in rows],
+            left=0,
+            digits=DIGITS,
+            lines=self._lines(),
+            notes=self._notes(),
+            summary=[("intensity", self.key), ("failure", self.fails), ("samples", samples)],
+            code=ExitCode.SWEEP_HAS_FAILURES if self.failed else code,
+        )
 
-    def lines(self) -> list[str]:
+    def _lines(self) -> list[str]:
         """Return the curve in words, or why there is none and what the counts still say of the median."""
         curve = self.curve
         if isinstance(curve, NoCurve):
@@ -170,7 +161,7 @@ class FragilityAnswer(Answer, frozen=True):
             lines.append(f"intervals   {wider}: {self.records} records shared")
         return lines
 
-    def notes(self) -> list[str]:
+    def _notes(self) -> list[str]:
         """Say what is undecided or missing, and where the runs are."""
         notes, moving = [], sum(one.moving_on for one in self.points)
         if moving:
@@ -188,11 +179,6 @@ class FragilityAnswer(Answer, frozen=True):
             notes.append(f"{self.left} samples have not run; after all shards, rerun without --shard")
         runs = sum(one.members + one.no_result for one in self.points)
         return [*notes, f"{runs} runs, {self.run} of them now: {self.folder}"]
-
-    def summary(self) -> list[tuple[str, str]]:
-        """Return key, criterion and the number of samples."""
-        samples = str(sum(one.members for one in self.points))
-        return [("intensity", self.key), ("failure", self.fails), ("samples", samples)]
 
     def picture_of(self) -> view.Fragility:
         """Return counts and curve as they are drawn. Raises InvalidInputError where there are none."""
@@ -225,8 +211,8 @@ def _span(ends: tuple[float, float], unit: str = "") -> str:
     return (f"{low:.5g} to {high:.5g} {unit}" if low else f"up to {high:.5g} {unit}").rstrip()
 
 
-@takes(FragilityOptions)
-def fragility(scenario: Source, options: FragilityOptions) -> FragilityAnswer:
+@takes(fragility_plan.FragilityOptions)
+def fragility(scenario: Source, options: fragility_plan.FragilityOptions) -> FragilityAnswer:
     """Return how probable failure is at each intensity, and the lognormal curve that is most likely.
 
     Samples are drawn independently at every intensity, so that limits and intervals hold. Runs are kept; the same call,
@@ -235,35 +221,33 @@ def fragility(scenario: Source, options: FragilityOptions) -> FragilityAnswer:
     OutputExistsError where the folder is not free, UnavailableError without scipy (extra `study`), StoppedEarlyError on
     Ctrl-C.
     """
-    return run_fragility(read_fragility(document_of(scenario), options), options)
+    return run_fragility(fragility_plan.read_fragility(document_of(scenario), options), options)
 
 
 def run_fragility(
-    plan: FragilityPlan, options: FragilityOptions, execution: Execution | None = None
+    plan: fragility_plan.FragilityPlan, options: fragility_plan.FragilityOptions, execution: Execution | None = None
 ) -> FragilityAnswer:
     """Run what is planned, with the executor of the options unless there is another; see `fragility`."""
     load_module("scipy.special", PURPOSE)
     shard, execution = options.shard, execution or options
-    refuse_loss(shard, overwrite=options.overwrite)
+    sweep.refuse_loss(shard, overwrite=options.overwrite)
     run, setting = execution.ready()
     base = plan.document.build()
-    check_experiment(base)
     cases, kind = plan.cases, FragilityAnswer.files
-    folder = folder_for(options.out, base, kind, plan.name)
-    prepare(folder, base, plan.name, overwrite=options.overwrite, kind=kind)
-    compile_kernels(kernels_of(base))
-    with closing(Manifest(folder / shard.file(MANIFEST), "fragility study")) as kept:
-        share = SweepRun(cases, shard, kept, options.on_row, kind=kind, table=MEMBERS_TABLE)
+    folder = make_folder(options.out, base, kind, plan.name, overwrite=options.overwrite)
+    compilation.compile_kernels(compilation.kernels_of(base))
+    with closing(manifest.Manifest(folder / shard.file(manifest.MANIFEST), "fragility study")) as kept:
+        share = sweep.SweepRun(cases, shard, kept, options.on_row, kind=kind, table=MEMBERS_TABLE)
         if options.retry_failed:
             share.forget_failed()
         share.run(run, setting)
         answer = _answer(plan, folder, share)
-        if shard == WHOLE:
+        if shard == manifest.WHOLE:
             answer.write()
     return answer
 
 
-def _answer(plan: FragilityPlan, folder: Path, share: SweepRun) -> FragilityAnswer:
+def _answer(plan: fragility_plan.FragilityPlan, folder: Path, share: sweep.SweepRun) -> FragilityAnswer:
     """Make the answer of all rows that there are."""
     numbers = list(plan.levels)
     rows: dict[float, dict[int, Row]] = {number: {} for number in numbers}  # by intensity and number of the member
@@ -271,9 +255,9 @@ def _answer(plan: FragilityPlan, folder: Path, share: SweepRun) -> FragilityAnsw
         rows[numbers[case % len(numbers)]][case // len(numbers)] = entry.row
     failed = {  # members with a result, and whether they have failed
         number: {
-            member: falls_before_zero(row) or any(one.holds(row) for one in plan.fails)
+            member: criterion.falls_before_zero(row) or any(one.holds(row) for one in plan.fails)
             for member, row in found.items()
-            if row["status"] == FINISHED or falls_before_zero(row)
+            if row["status"] == FINISHED or criterion.falls_before_zero(row)
         }
         for number, found in rows.items()
     }
@@ -288,7 +272,7 @@ def _answer(plan: FragilityPlan, folder: Path, share: SweepRun) -> FragilityAnsw
         ended = failed[number]
         failures, members = sum(ended.values()), len(ended)
         limits = interval(failures, members)
-        moving = sum(bool(found[member].get(MOVES_ON)) for member, fails in ended.items() if not fails)
+        moving = sum(bool(found[member].get(observables.MOVES_ON)) for member, fails in ended.items() if not fails)
         points.append(
             Point(
                 intensity=number,
@@ -370,7 +354,7 @@ def repeat_fragility(answer: FragilityAnswer, execution: Replay, out: Path) -> F
             break
         stripes[key] = spread.pop(key)
     intensities = [f"{one.intensity!r} {answer.unit}" if answer.unit else one.intensity for one in answer.points]
-    options = FragilityOptions(
+    options = fragility_plan.FragilityOptions(
         {answer.key: intensities},
         spread,
         stripes=stripes,
@@ -379,8 +363,8 @@ def repeat_fragility(answer: FragilityAnswer, execution: Replay, out: Path) -> F
         seed=answer.seed,
         out=out,
     )
-    plan = read_fragility(Document.read(answer.folder / answer.files.plan, is_stored=True), options)
+    plan = fragility_plan.read_fragility(Document.read(answer.folder / answer.files.plan, is_stored=True), options)
     return run_fragility(plan, options, execution)
 
 
-FRAGILITY = Study(FragilityAnswer, repeat_fragility, is_design=True)
+FRAGILITY = study.Study(FragilityAnswer, repeat_fragility, is_design=True)

@@ -18,33 +18,12 @@ from typing import Annotated
 
 from blocksim.errors import InvalidInputError
 from blocksim.options import Option, takes
-from blocksim.scenario import Document, Sweep, scenario_hash
+from blocksim.scenario import Document, Sweep, overrides, scenario_hash
 from blocksim.scenario.models.study import Uniform, Variation
-from blocksim.scenario.overrides import format_key, parse_key
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
-from blocksim.study.answer import with_unit
-from blocksim.study.criterion import Criterion, read_criterion
+from blocksim.study import answer, criterion, limit_plan, manifest, plan, rows, runs
 from blocksim.study.executors import Execution
-from blocksim.study.limit_plan import takes_whole, typed_levels
-from blocksim.study.manifest import WHOLE, Shard
-from blocksim.study.plan import (
-    MOST_CASES,
-    Cases,
-    Design,
-    Values,
-    Variations,
-    build_distributions,
-    cases_of,
-    draw_values,
-    generator,
-    levels_of,
-    open_interval,
-    refuse_wrong_draws,
-    table_digests,
-)
-from blocksim.study.rows import Head, Row, heads_of, si_number
-from blocksim.study.runs import short_hash
 from blocksim.study.vary import variations_option
 
 INTENSITY, SCATTER, STRIPES, FAILS = "--intensity", "--scatter", "--stripes", "--fails"
@@ -55,7 +34,7 @@ NO_SCATTER = (
     "no scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO, KEY=a,b,c), --stripes KEY=a,b,c, or a [sweep] table with "
     "distributions"
 )
-OnRow = Callable[[int, int, Row], None]
+OnRow = Callable[[int, int, rows.Row], None]
 
 
 @dataclass(frozen=True)
@@ -63,7 +42,7 @@ class FragilityOptions(Execution):
     """Intensities, what scatters at each of them, what counts as failure, and how members are run and kept."""
 
     intensity: Annotated[
-        Mapping[str, Values],
+        Mapping[str, plan.Values],
         variations_option(
             "The key that is the intensity: KEY=a,b,c or KEY=FROM:TO:COUNT (:log at the end spaces them "
             "logarithmically).",
@@ -74,7 +53,7 @@ class FragilityOptions(Execution):
         ),
     ]
     scatter: Annotated[
-        Mapping[str, Values] | None,
+        Mapping[str, plan.Values] | None,
         variations_option(
             "Quantity to sample: KEY=MEAN+-SD, KEY=FROM:TO or equally likely values, KEY=a,b,c. Repeatable. Default: "
             "the distributions of [sweep].",
@@ -86,7 +65,7 @@ class FragilityOptions(Execution):
     ] = None
     _: KW_ONLY
     stripes: Annotated[
-        Mapping[str, Values] | None,
+        Mapping[str, plan.Values] | None,
         variations_option(
             "Records that all intensities share, each once at each of them, such as motion.table=a.csv,b.csv. "
             "Repeatable: keys whose values go together.",
@@ -118,13 +97,13 @@ class FragilityOptions(Execution):
     ] = COLLAPSE
     seed: Annotated[int, Option("Random seed.", metavar="S", least=0)] = 0
     shard: Annotated[
-        Shard,
+        manifest.Shard,
         Option(
             "Run only samples I, I + N, ... (job arrays); then once without, for the curve.",
             metavar="I/N",
-            read=Shard.parse,
+            read=manifest.Shard.parse,
         ),
-    ] = WHOLE
+    ] = manifest.WHOLE
     retry_failed: Annotated[bool, Option("Rerun samples that did not finish.")] = False
     out: Annotated[
         Path | str | None, Option("Folder to write (default: results/NAME/fragility-HASH).", metavar="DIR")
@@ -138,12 +117,12 @@ class FragilityPlan:
     """One study: intensities that increase, and what scatters at each of them."""
 
     document: Document  # without [sweep]
-    head: Head  # key and unit of the intensity
+    head: rows.Head  # key and unit of the intensity
     levels: Mapping[float, object]  # value of the key by its number in that unit
     scatter: Sweep | None  # None where there are stripes alone
     members: int  # at every intensity
     seed: int
-    fails: tuple[Criterion, ...]  # any of them
+    fails: tuple[criterion.Criterion, ...]  # any of them
     stripes: Mapping[str, tuple[object, ...]] = field(default_factory=dict)  # values of a key by record
 
     @property
@@ -164,11 +143,11 @@ class FragilityPlan:
         about = [scenario_hash(self.document.build()), levels, scatter, self.seed, code_hash()]
         if self.stripes:
             about.append({key: list(map(str, values)) for key, values in self.stripes.items()})
-        tables = table_digests(self.document, self.spread)
-        return short_hash([*about, tables] if tables else about)
+        tables = plan.table_digests(self.document, self.spread)
+        return runs.short_hash([*about, tables] if tables else about)
 
     @cached_property
-    def cases(self) -> Cases:
+    def cases(self) -> plan.Cases:
         """All members: the first of every intensity, the second of every intensity, and so on.
 
         More members come after those that are there. Raises ScenarioError where a distribution gave a value that its
@@ -180,27 +159,30 @@ class FragilityPlan:
             key: tuple(values[member % len(values)] for member in range(self.members) for _ in self.levels)
             for key, values in self.stripes.items()
         }
-        design = Design({self.head.key: tuple(self.levels.values()) * self.members, **shared, **draws})
+        design = plan.Design({self.head.key: tuple(self.levels.values()) * self.members, **shared, **draws})
         if self.scatter is not None:
-            refuse_wrong_draws(self.document, self.scatter, design)
+            plan.refuse_wrong_draws(self.document, self.scatter, design)
         striped = Sweep.model_validate({"mode": "list", **design.columns})
-        heads = {head.key: head for head in (*heads_of(striped), *(heads_of(self.scatter) if self.scatter else ()))}
-        cases = cases_of(self.document, striped)
+        heads = {
+            head.key: head for head in (*rows.heads_of(striped), *(rows.heads_of(self.scatter) if self.scatter else ()))
+        }
+        cases = plan.cases_of(self.document, striped)
         return replace(cases, heads=(self.head, *(heads[key] for key in self.spread)))
 
     def _draws(self, key: str, values: Variation) -> tuple[object, ...]:
         """Return the values of a key in the order of the cases."""
-        is_whole = takes_whole(self.document, key) and not isinstance(values, tuple)
+        is_whole = limit_plan.takes_whole(self.document, key) and not isinstance(values, tuple)
         if is_whole and isinstance(values, Uniform):
             values = replace(values, low=values.low - 0.5, high=values.high + 0.5)  # so that its ends are as likely
         by_level = []
         for number in self.levels:
-            level = with_unit(number, self.head.unit, 6)
-            name = f"{format_key(parse_key(key))} where {format_key(parse_key(self.head.key))} = {level}"
-            places = open_interval(generator(self.seed, name).random(self.members))
-            by_level.append(draw_values(values, places))
+            level = answer.with_unit(number, self.head.unit, 6)
+            names = (overrides.format_key(overrides.parse_key(one)) for one in (key, self.head.key))
+            name = f"{' where '.join(names)} = {level}"
+            places = plan.open_interval(plan.generator(self.seed, name).random(self.members))
+            by_level.append(plan.draw_values(values, places))
         together = [value for member in zip(*by_level, strict=True) for value in member]
-        return tuple(round(si_number(value)) for value in together) if is_whole else tuple(together)
+        return tuple(round(rows.si_number(value)) for value in together) if is_whole else tuple(together)
 
 
 @takes(FragilityOptions)
@@ -212,23 +194,23 @@ def read_fragility(document: Document, options: FragilityOptions) -> FragilityPl
     nothing that scatters, stripes that are not all equally often there, and too many members.
     """
     fails, seed = options.fails, options.seed
-    criteria = tuple(read_criterion(text, FAILS) for text in ([fails] if isinstance(fails, str) else fails))
+    criteria = tuple(criterion.read_criterion(text, FAILS) for text in ([fails] if isinstance(fails, str) else fails))
     bare = document.without_sweep()
-    given = Variations.of(options.intensity)
+    given = plan.Variations.of(options.intensity)
     if len(given) != 1:
         message = f"one key is the intensity, not {len(given)}: give {INTENSITY} KEY=a,b,c or KEY=FROM:TO:COUNT once"
         raise InvalidInputError(message)
-    head, levels = typed_levels(bare, given, INTENSITY)
+    head, levels = limit_plan.typed_levels(bare, given, INTENSITY)
     wrong = [value for number, value in levels.items() if number <= 0.0]
     if wrong:
         message = f"{INTENSITY} {given.texts[head.key]}: {wrong[0]} is not above 0, as a lognormal curve needs"
         raise InvalidInputError(message)
-    shared = _stripes(bare, Variations.of(options.stripes or {}))
+    shared = _stripes(bare, plan.Variations.of(options.stripes or {}))
     records = len(next(iter(shared.values()), ()))
     members = (records or MEMBERS) if options.members is None else options.members
-    if members < 1 or members * len(levels) > MOST_CASES or not 0 <= seed <= MOST_SEED:
+    if members < 1 or members * len(levels) > plan.MOST_CASES or not 0 <= seed <= MOST_SEED:
         message = (
-            f"{members} samples at {len(levels)} intensities with seed {seed}: 1 to {MOST_CASES} runs are possible"
+            f"{members} samples at {len(levels)} intensities with seed {seed}: 1 to {plan.MOST_CASES} runs are possible"
         )
         raise InvalidInputError(message)
     if records and members % records:
@@ -236,24 +218,25 @@ def read_fragility(document: Document, options: FragilityOptions) -> FragilityPl
             f"{members} samples of {records} records: each must be there equally often; give a multiple of {records}"
         )
         raise InvalidInputError(message)
-    spread = _scatter(document, Variations.of(options.scatter or {}), needed=not shared)
-    keys = [parse_key(key) for key in (head.key, *shared, *(spread.vary if spread is not None else ()))]
+    spread = _scatter(document, plan.Variations.of(options.scatter or {}), needed=not shared)
+    keys = [overrides.parse_key(key) for key in (head.key, *shared, *(spread.vary if spread is not None else ()))]
     twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
     if twice == keys[0]:
         message = f"{head.key} is the intensity; it cannot scatter too"
         raise InvalidInputError(message)
     if twice is not None:
-        message = f"{format_key(twice)} is given as stripes; it cannot be drawn too"
+        message = f"{overrides.format_key(twice)} is given as stripes; it cannot be drawn too"
         raise InvalidInputError(message)
     return FragilityPlan(bare, head, levels, spread, members, seed, criteria, shared)
 
 
-def _stripes(document: Document, given: Variations) -> dict[str, tuple[object, ...]]:
+def _stripes(document: Document, given: plan.Variations) -> dict[str, tuple[object, ...]]:
     """Return the values of each key by record."""
     if not given:
         return {}
     shared = {
-        key: levels_of(values) for key, values in build_distributions(document, given, STRIPES, "list").vary.items()
+        key: plan.levels_of(values)
+        for key, values in plan.build_distributions(document, given, STRIPES, "list").vary.items()
     }
     for key, values in shared.items():
         if len(set(map(str, values))) < len(values) or len(values) == 1:
@@ -263,11 +246,11 @@ def _stripes(document: Document, given: Variations) -> dict[str, tuple[object, .
     return shared
 
 
-def _scatter(document: Document, given: Variations, *, needed: bool) -> Sweep | None:
+def _scatter(document: Document, given: plan.Variations, *, needed: bool) -> Sweep | None:
     if given:
-        spread = build_distributions(document.without_sweep(), given, SCATTER, "normal")
+        spread = plan.build_distributions(document.without_sweep(), given, SCATTER, "normal")
         constant = next(
-            (key for key, values in spread.vary.items() if len(set(map(str, levels_of(values)))) == 1), None
+            (key for key, values in spread.vary.items() if len(set(map(str, plan.levels_of(values)))) == 1), None
         )
         if constant is not None:
             message = f"{SCATTER} {given.texts[constant]}: one value does not scatter; set it with --set"

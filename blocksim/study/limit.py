@@ -18,36 +18,16 @@ from pathlib import Path
 
 from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.options import takes
-from blocksim.scenario import Document, Source, document_of
-from blocksim.scenario.motion import settles
+from blocksim.scenario import Document, Source, document_of, motion
 from blocksim.silence import silent
 from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import build
+from blocksim.study import criterion, limit_answer, limit_margin, limit_plan, study, sweep_folder
 from blocksim.study import limit_margin as margins
-from blocksim.study.criterion import Verdict, falls_before_zero
-from blocksim.study.executors import Execution
-from blocksim.study.executors.ensemble import INTERRUPTED, run_case
-from blocksim.study.limit_answer import Bracket, CurveAnswer, HalfStep, LimitAnswer, Side, place_of
-from blocksim.study.limit_margin import STIFFNESS, Level, Levels, StandingSide
-from blocksim.study.limit_plan import (
-    Change,
-    CurveOptions,
-    CurvePlan,
-    LimitOptions,
-    LimitPlan,
-    Number,
-    OnRun,
-    changes_in,
-    next_near,
-    next_values,
-    read_curve,
-    read_limit,
-)
+from blocksim.study.executors import Execution, ensemble
 from blocksim.study.rows import FINISHED, Head, Row
-from blocksim.study.runs import Replay, Runs, folder_for, runs_of, short_hash
-from blocksim.study.study import Study
-from blocksim.study.sweep_folder import CASES, prepare
+from blocksim.study.runs import Replay, Runs, make_folder, runs_of, short_hash
 
 SHIFT = 2.5e-3  # share of a limit by which springs may shift it unasked: half of what is warned of, as it is foretold
 MOST_LEVELS = 4  # stiffnesses
@@ -58,14 +38,14 @@ STEP = "time.step"
 NO_STIFFER = "with springs {ratio:g} times as stiff there is no such limit in the range"
 NO_FINER = "with half the time step there is no such limit in the range"
 STILL_FAR = "limits of the last two stiffnesses are too far apart to be extrapolated well; give stiffer springs"
-BOTH = {Verdict.STANDS, Verdict.FALLS}
-OnOther = Callable[[LimitPlan], None]
-OnLimit = Callable[[float, LimitAnswer], None]
-Rows = Mapping[Number, Row]
+BOTH = {criterion.Verdict.STANDS, criterion.Verdict.FALLS}
+OnOther = Callable[[limit_plan.LimitPlan], None]
+OnLimit = Callable[[float, limit_answer.LimitAnswer], None]
+Rows = Mapping[limit_plan.Number, Row]
 
 
-@takes(LimitOptions)
-def limit(scenario: Source, options: LimitOptions) -> LimitAnswer:
+@takes(limit_plan.LimitOptions)
+def limit(scenario: Source, options: limit_plan.LimitOptions) -> limit_answer.LimitAnswer:
     """Find the values of a key at which a structure stops, or begins, to stand.
 
     There may be several changes, but those of an island between two scanned values are not seen. `stands`: see
@@ -75,33 +55,34 @@ def limit(scenario: Source, options: LimitOptions) -> LimitAnswer:
     with each value, verdict and row. Raises ScenarioError, InvalidInputError, OutputExistsError where the folder is not
     free, UnavailableError, StoppedEarlyError on Ctrl-C.
     """
-    return find_limit(read_limit(document_of(scenario), options), options)
+    return find_limit(limit_plan.read_limit(document_of(scenario), options), options)
 
 
-@takes(CurveOptions)
-def limit_curve(scenario: Source, options: CurveOptions) -> CurveAnswer:
+@takes(limit_plan.CurveOptions)
+def limit_curve(scenario: Source, options: limit_plan.CurveOptions) -> limit_answer.CurveAnswer:
     """Find the limits of a key at each value of another one: `limit` with `over`, {"friction.block_block": [0.3, 0.5]}.
 
     Searches are kept in `out` (default: results/NAME/limits-HASH). Raises as `limit`.
     """
-    return find_curve(read_curve(document_of(scenario), options), options)
+    return find_curve(limit_plan.read_curve(document_of(scenario), options), options)
 
 
 def find_limit(
-    plan: LimitPlan, options: LimitOptions, execution: Execution | None = None, on_other: OnOther = silent
-) -> LimitAnswer:
+    plan: limit_plan.LimitPlan,
+    options: limit_plan.LimitOptions,
+    execution: Execution | None = None,
+    on_other: OnOther = silent,
+) -> limit_answer.LimitAnswer:
     """Search as planned, with the executor of the options unless there is another; see `limit`.
 
     `on_other` is called before the first run of another stiffness or step.
     """
     if options.stiffer:
         margins.refuse_without_springs(plan)
-    base, kind, execution = plan.scenario_at(plan.span.low), LimitAnswer.files, execution or options
-    folder = folder_for(options.out, base, kind, plan.name)
-    with runs_of(
-        plan.document, base, folder, kind, plan.name, execution, overwrite=options.overwrite, peaks=True
-    ) as runs:
-        answer = _Search(plan, runs, options.stiffer, options.on_run, on_other).answer(folder)
+    base, kind, execution = plan.scenario_at(plan.span.low), limit_answer.LimitAnswer.files, execution or options
+    overwrite = options.overwrite
+    with runs_of(plan.document, base, options.out, kind, plan.name, execution, overwrite=overwrite, peaks=True) as runs:
+        answer = _Search(plan, runs, options.stiffer, options.on_run, on_other).answer()
         answer.write()  # first: the runs beside it may not fit on the disk
         if options.keep_runs:
             answer = with_sides(answer)
@@ -109,22 +90,25 @@ def find_limit(
     return answer
 
 
-def find_curve(plan: CurvePlan, options: CurveOptions, on_limit: OnLimit = silent) -> CurveAnswer:
+def find_curve(
+    plan: limit_plan.CurvePlan, options: limit_plan.CurveOptions, on_limit: OnLimit = silent
+) -> limit_answer.CurveAnswer:
     """Search as planned, one value after the other, each in a folder of its own; see `limit_curve`."""
     options.ready()
     if options.stiffer:
         margins.refuse_without_springs(*plan.searches.values())
     one = next(iter(plan.searches.values()))
-    base, kind = one.scenario_at(one.span.low), CurveAnswer.files
+    base, kind = one.scenario_at(one.span.low), limit_answer.CurveAnswer.files
     name = short_hash([plan.head.key, *(search.name for search in plan.searches.values())])
-    folder = folder_for(options.out, base, kind, name)
-    prepare(folder, base, name, overwrite=options.overwrite, kind=kind)
-    found: dict[float, LimitAnswer] = {}
+    folder = make_folder(options.out, base, kind, name, overwrite=options.overwrite)
+    found: dict[float, limit_answer.LimitAnswer] = {}
     for number, search in plan.searches.items():
-        place = folder / place_of(number, plan.head.unit)
-        found[number] = find_limit(search, LimitOptions(**{**options.shared, "out": place, "keep_runs": False}))
+        place = folder / limit_answer.place_of(number, plan.head.unit)
+        found[number] = find_limit(
+            search, limit_plan.LimitOptions(**{**options.shared, "out": place, "keep_runs": False})
+        )
         on_limit(number, found[number])
-    answer = CurveAnswer.of(plan.head, folder, found)
+    answer = limit_answer.CurveAnswer.of(plan.head, folder, found)
     answer.write()
     return answer
 
@@ -133,45 +117,49 @@ def find_curve(plan: CurvePlan, options: CurveOptions, on_limit: OnLimit = silen
 class _Search:
     """The runs of a search, as planned and with other stiffnesses or steps."""
 
-    plan: LimitPlan
+    plan: limit_plan.LimitPlan
     runs: Runs
     stiffer: bool | None
-    on_run: OnRun
+    on_run: limit_plan.OnRun
     on_other: OnOther
-    stiff_rows: dict[float, dict[Number, Row]] = field(default_factory=dict)  # by stiffness scale
-    step_rows: dict[float, dict[Number, Row]] = field(default_factory=dict)  # by time step (s)
+    stiff_rows: dict[float, dict[limit_plan.Number, Row]] = field(default_factory=dict)  # by stiffness scale
+    step_rows: dict[float, dict[limit_plan.Number, Row]] = field(default_factory=dict)  # by time step (s)
 
-    def answer(self, folder: Path) -> LimitAnswer:
+    def answer(self) -> limit_answer.LimitAnswer:
         """Return the answer, after all runs that it takes."""
-        plan = self.plan
+        plan, folder = self.plan, self.runs.manifest.path.parent
         has_islands = plan.scenario.motion is not None  # a value may fall between others that stand: supports move
 
-        def choose(rows: Rows) -> list[Number]:
+        def choose(rows: Rows) -> list[limit_plan.Number]:
             peaks = {at: float(str(row[PEAK])) for at, row in rows.items() if has_islands and PEAK in row}
-            return next_values(plan.span, plan.verdicts(rows), plan.tolerance, peaks)
+            return limit_plan.next_values(plan.span, plan.verdicts(rows), plan.tolerance, peaks)
 
         rows = self._searched(plan, choose)
-        brackets = [self._bracket(change, rows) for change in changes_in(plan.verdicts(rows))]
+        brackets = [self._bracket(change, rows) for change in limit_plan.changes_in(plan.verdicts(rows))]
         others, is_as_given = (self.stiff_rows, self.step_rows), self.stiffer is False
-        return LimitAnswer.of(plan, folder, rows, brackets, *others, run=self.runs.new, is_as_given=is_as_given)
+        return limit_answer.LimitAnswer.of(
+            plan, folder, rows, brackets, *others, run=self.runs.new, is_as_given=is_as_given
+        )
 
-    def _searched(self, plan: LimitPlan, choose: Callable[[Rows], list[Number]]) -> dict[Number, Row]:
+    def _searched(
+        self, plan: limit_plan.LimitPlan, choose: Callable[[Rows], list[limit_plan.Number]]
+    ) -> dict[limit_plan.Number, Row]:
         """Go from round to round and return what it needed; rows of an earlier search are taken as they are."""
-        rows: dict[Number, Row] = {}
+        rows: dict[limit_plan.Number, Row] = {}
         while values := choose(rows):
             wanted = {value: plan.settings(value) for value in values}
             rows |= self.runs.rows(wanted, lambda at, row: self.on_run(at, plan.criterion.verdict(row), row))
         return rows
 
-    def _bracket(self, change: Change[Verdict], rows: Rows) -> Bracket:
+    def _bracket(self, change: limit_plan.Change[criterion.Verdict], rows: Rows) -> limit_answer.Bracket:
         """Return a change as it is with stiff contacts and short steps, as far as known, and as wide as is unknown."""
         plan, is_corrected = self.plan, self.stiffer is not False
-        below, above = (Side.of(value, verdict, rows[value]) for value, verdict in
+        below, above = (limit_answer.Side.of(value, verdict, rows[value]) for value, verdict in
                         ((change.low, change.below), (change.high, change.above)))  # fmt: skip
-        given = Bracket(low=change.low, high=change.high, below=below, above=above)
-        if not BOTH | {Verdict.UNDECIDED} >= {change.below, change.above} > {Verdict.FALLS}:
+        given = limit_answer.Bracket(low=change.low, high=change.high, below=below, above=above)
+        if not BOTH | {criterion.Verdict.UNDECIDED} >= {change.below, change.above} > {criterion.Verdict.FALLS}:
             return given
-        side = StandingSide(plan, change, rows)
+        side = limit_margin.StandingSide(plan, change, rows)
         least, levels, half = max(SHIFT, plan.tolerance), None, None
         if is_corrected and margins.can_be_stiffer(plan):
             levels = self._levels(side, least) if self.stiffer or side.most_shift > least else None
@@ -183,13 +171,13 @@ class _Search:
 
     def _again(
         self,
-        plan: LimitPlan,
-        near: Change[Verdict],
-        known: dict[float, dict[Number, Row]],
+        plan: limit_plan.LimitPlan,
+        near: limit_plan.Change[criterion.Verdict],
+        known: dict[float, dict[limit_plan.Number, Row]],
         place: float,
         *,
         may_stay: bool = False,
-    ) -> Change[Verdict] | None:
+    ) -> limit_plan.Change[criterion.Verdict] | None:
         """Search the limit once more near a bracket with other settings, and return it if there is one.
 
         Its rows are kept as `known[place]`. With `may_stay` nothing more is run where both ends came to the same again.
@@ -197,46 +185,48 @@ class _Search:
         if place not in known:
             self.on_other(plan)
 
-        def choose(rows: Rows) -> list[Number]:
+        def choose(rows: Rows) -> list[limit_plan.Number]:
             verdicts = _fallen(plan.verdicts(rows))
-            is_same = may_stay and changes_in(verdicts) == [near]
-            return [] if is_same else next_near(plan.span, verdicts, near, plan.tolerance)
+            is_same = may_stay and limit_plan.changes_in(verdicts) == [near]
+            return [] if is_same else limit_plan.next_near(plan.span, verdicts, near, plan.tolerance)
 
         rows = self._searched(plan, choose)
         known.setdefault(place, {}).update(rows)
-        changes = changes_in(_fallen(self.plan.verdicts(rows)))
+        changes = limit_plan.changes_in(_fallen(self.plan.verdicts(rows)))
         return changes[0] if len(changes) == 1 and {changes[0].below, changes[0].above} == BOTH else None
 
-    def _half(self, change: Change[Verdict]) -> HalfStep:
+    def _half(self, change: limit_plan.Change[criterion.Verdict]) -> limit_answer.HalfStep:
         """Search a limit with half the time step."""
         ends = (change.low, change.high)
         steps = (build(self.plan.scenario_at(value)).scene.world.controls[0].step for value in ends)
         step = HALF * float(min(steps))
         found = self._again(replace(self.plan, apart={STEP: step}), _fallen_change(change), self.step_rows, step)
         if found is None:
-            return HalfStep(step=step, low=change.low, high=change.high, problem=NO_FINER)
-        return HalfStep(step=step, low=found.low, high=found.high)
+            return limit_answer.HalfStep(step=step, low=change.low, high=change.high, problem=NO_FINER)
+        return limit_answer.HalfStep(step=step, low=found.low, high=found.high)
 
-    def _levels(self, side: StandingSide, least: float) -> Levels:
+    def _levels(self, side: limit_margin.StandingSide, least: float) -> limit_margin.Levels:
         """Search one limit at one stiffness after the other, until two are near enough to be extrapolated.
 
         A step given by hand is shorter with stiffer springs, in proportion.
         """
         change, scenario = side.change, self.plan.scenario_at(side.change.low)
         first = scale = scenario.contact.stiffness_scale
-        given = Level(stiffness_scale=scale, low=change.low, high=change.high)
-        levels = Levels((given,), margins.ratio_of(scenario), is_at_rest=settles(scenario))
+        given = limit_margin.Level(stiffness_scale=scale, low=change.low, high=change.high)
+        levels = limit_margin.Levels((given,), margins.ratio_of(scenario), is_at_rest=motion.settles(scenario))
         share = side.give.share if side.give is not None else 0.0
         while levels.is_far and len(levels.levels) < MOST_LEVELS:
             scale *= margins.RATIO
             is_foretold = len(levels.levels) > 1 or share > least
             if is_foretold:
-                low, high = levels.aim(-share if change.below is Verdict.FALLS else share, self.plan.tolerance)
+                low, high = levels.aim(
+                    -share if change.below is criterion.Verdict.FALLS else share, self.plan.tolerance
+                )
             else:
                 beyond = least * max(abs(change.low), abs(change.high))
                 low, high = change.low - beyond, change.high + beyond
             near = replace(_fallen_change(change), low=self.plan.span.fitted(low), high=self.plan.span.fitted(high))
-            apart: dict[str, object] = {STIFFNESS: scale}
+            apart: dict[str, object] = {limit_margin.STIFFNESS: scale}
             if scenario.time.step != "auto":
                 apart[STEP] = scenario.time.step * (first / scale) ** 0.5
             plan = replace(self.plan, tolerance=SHARPER * self.plan.tolerance, apart=apart)
@@ -246,22 +236,25 @@ class _Search:
                 return replace(levels, problem=NO_STIFFER.format(ratio=scale / first))
             if may_stay and (found.low, found.high) == (near.low, near.high):
                 return levels
-            level = Level(stiffness_scale=scale, low=found.low, high=found.high)
+            level = limit_margin.Level(stiffness_scale=scale, low=found.low, high=found.high)
             levels = replace(levels, levels=(*levels.levels, level))
         return replace(levels, problem=STILL_FAR) if levels.is_far else levels
 
 
-def _fallen(verdicts: Mapping[Number, Verdict]) -> dict[Number, Verdict]:
+def _fallen(verdicts: Mapping[limit_plan.Number, criterion.Verdict]) -> dict[limit_plan.Number, criterion.Verdict]:
     """Return what runs came to, those that move on at the end without having fallen among those that stand."""
-    return {value: Verdict.STANDS if verdict is Verdict.UNDECIDED else verdict for value, verdict in verdicts.items()}
+    return {
+        value: criterion.Verdict.STANDS if verdict is criterion.Verdict.UNDECIDED else verdict
+        for value, verdict in verdicts.items()
+    }
 
 
-def _fallen_change(change: Change[Verdict]) -> Change[Verdict]:
+def _fallen_change(change: limit_plan.Change[criterion.Verdict]) -> limit_plan.Change[criterion.Verdict]:
     below, above = _fallen({0: change.below, 1: change.above}).values()
     return replace(change, below=below, above=above)
 
 
-def with_sides(answer: LimitAnswer) -> LimitAnswer:
+def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
     """Run both sides of the first brackets once more, into folders of their own, unless they are there.
 
     Returns the answer with the names of these folders; what pictures of mechanisms show lies there. The motion is that
@@ -270,9 +263,9 @@ def with_sides(answer: LimitAnswer) -> LimitAnswer:
     """
     plan = answer.plan
     assert plan is not None  # noqa: S101 - it was just searched
-    sides: dict[float, Side] = {}
+    sides: dict[float, limit_answer.Side] = {}
     for side in [one for bracket in answer.falls[:MOST_PICTURED] for one in bracket.sides.values()]:
-        falls = falls_before_zero(side.model_dump())
+        falls = criterion.falls_before_zero(side.model_dump())
         if side.value in sides or not (falls or side.status == FINISHED):
             continue
         scenario = plan.scenario_at(side.value)
@@ -281,8 +274,8 @@ def with_sides(answer: LimitAnswer) -> LimitAnswer:
         tables = {name: getattr(scenario, name).model_copy(update=update) for name, update in changed.items()}
         scenario = scenario.model_copy(update=tables)  # not stopped where it is slow: so it may begin
         name = run_hash(scenario)
-        row = run_case(scenario, answer.folder / CASES / name)
-        if row["status"] == INTERRUPTED:
+        row = ensemble.run_case(scenario, answer.folder / sweep_folder.CASES / name)
+        if row["status"] == ensemble.INTERRUPTED:
             raise StoppedEarlyError("stopped while the runs beside a limit were kept; rerun the command to finish")
         if row["status"] != FINISHED and not (falls and "outcome" in row):
             message = f"{row['reason']}; the limit is found, its runs are not kept: rerun the command, or --no-runs"
@@ -298,7 +291,7 @@ def with_sides(answer: LimitAnswer) -> LimitAnswer:
     return answer.model_copy(update={"brackets": tuple(brackets)})
 
 
-def repeat_limit(answer: LimitAnswer, execution: Replay, out: Path) -> LimitAnswer:
+def repeat_limit(answer: limit_answer.LimitAnswer, execution: Replay, out: Path) -> limit_answer.LimitAnswer:
     """Search again, with stiffer springs or not as in the first way that leads to the answer, or to any."""
     ends: dict[str, object] = {"from": answer.low, "to": answer.high}
     if answer.is_whole:
@@ -307,15 +300,17 @@ def repeat_limit(answer: LimitAnswer, execution: Replay, out: Path) -> LimitAnsw
         ends = {name: f"{value:.12g} {answer.unit}" for name, value in ends.items()}
     span = {**ends, "count": answer.count, **({"scale": "log"} if answer.is_log else {})}
     document = Document.read(answer.folder / answer.files.plan, is_stored=True)
-    options = LimitOptions({answer.key: span}, stands=answer.stands, tolerance=answer.tolerance, keep_runs=False)
-    plan = read_limit(document, options)
-    tried: list[LimitAnswer] = []
+    options = limit_plan.LimitOptions(
+        {answer.key: span}, stands=answer.stands, tolerance=answer.tolerance, keep_runs=False
+    )
+    plan = limit_plan.read_limit(document, options)
+    tried: list[limit_answer.LimitAnswer] = []
     for stiffer in (None, True, False):  # what was asked for is not kept
         with suppress(InvalidInputError):
             place = out / f"limit-{stiffer}"
             again = find_limit(plan, replace(options, out=place, stiffer=stiffer), execution.anew())
-            if (answer.folder / CASES).is_dir():  # what these runs show; they are not run again
-                shutil.copytree(answer.folder / CASES, place / CASES)
+            if (answer.folder / sweep_folder.CASES).is_dir():  # what these runs show; they are not run again
+                shutil.copytree(answer.folder / sweep_folder.CASES, place / sweep_folder.CASES)
                 again = with_sides(again)
                 again.write()
             tried.append(again)
@@ -327,16 +322,16 @@ def repeat_limit(answer: LimitAnswer, execution: Replay, out: Path) -> LimitAnsw
     return tried[0]
 
 
-def repeat_curve(answer: CurveAnswer, _: Replay, out: Path) -> CurveAnswer:
+def repeat_curve(answer: limit_answer.CurveAnswer, _: Replay, out: Path) -> limit_answer.CurveAnswer:
     """Repeat all searches of a curve, and put their answers together."""
     searches = {
-        over: repeat_limit(LimitAnswer.read(place), Replay.of(place), out / f"{number}")
+        over: repeat_limit(limit_answer.LimitAnswer.read(place), Replay.of(place), out / f"{number}")
         for number, (over, place) in enumerate(answer.places().items())
     }
-    again = CurveAnswer.of(Head(answer.over, answer.over_unit), out, searches)
+    again = limit_answer.CurveAnswer.of(Head(answer.over, answer.over_unit), out, searches)
     again.write()
     return again
 
 
-LIMIT = Study(LimitAnswer, repeat_limit)
-CURVE = Study(CurveAnswer, repeat_curve, parts=lambda answer: list(answer.places().values()))
+LIMIT = study.Study(limit_answer.LimitAnswer, repeat_limit)
+CURVE = study.Study(limit_answer.CurveAnswer, repeat_curve, parts=lambda answer: list(answer.places().values()))

@@ -15,16 +15,14 @@ from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_valid
 from blocksim.errors import ExitCode, InvalidInputError, Problem
 from blocksim.scenario.input_files import raise_problems, read_table
 from blocksim.simulation.observables import PEAK, Response, table_columns
-from blocksim.study.answer import Answer, Table, with_unit
+from blocksim.study.answer import Answer, Overview, with_unit
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
 from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
 from blocksim.study.rows import Head, Row, as_cell
 from blocksim.study.stored_run import load_stored_run
 from blocksim.study.sweep_folder import CASES, FolderKind, case_folder
-from blocksim.view import mechanism, studies
-from blocksim.view.run_data import support_of
-from blocksim.view.style import Paper
+from blocksim.view import mechanism, run_data, studies, style
 
 UNIT = r"(?: \[[^\[\]]*\])?"
 STEP = "time.step"
@@ -273,26 +271,43 @@ class LimitAnswer(Answer, frozen=True):
         sides = (side for one in self.brackets for side in one.sides.values())
         return {side.value: side.case for side in sides if side.case is not None}
 
-    @property
-    def code(self) -> ExitCode:
-        """1 where nothing changes."""
-        return ExitCode.SUCCESS if self.brackets else ExitCode.OUTSIDE
+    def overview(self) -> Overview:
+        """Return both sides of every change, where there is none both ends of the range; brackets below them.
 
-    @property
-    def title(self) -> str:
-        """Key, contacts and criterion."""
-        return f'{self.key}, {NAMES.get(self.scheme, self.scheme)}: stands means "{self.stands}"'
-
-    def overview(self) -> Table:
-        """Return both sides of every change; where there is none, both ends of the range."""
+        The notes say what is undecided, what springs shift, what is not seen, and where the runs are.
+        """
+        plan, notes = self.plan, []
         sides = [side for one in self.brackets for side in one.sides.values()]
-        if not sides and self.plan is not None:
-            verdicts = list(self.plan.verdicts(self.rows).items())
+        if not sides and plan is not None:
+            verdicts = list(plan.verdicts(self.rows).items())
             sides = [Side.of(value, verdict, self.rows[value]) for value, verdict in (verdicts[0], verdicts[-1])]
         unique = {(side.value, side.verdict): side for side in sides}
-        return Table((f"value {self.unit}".rstrip(), *HEADS), [side.cells() for side in unique.values()], left=4)
+        if plan is not None and Verdict.UNDECIDED in plan.verdicts(self.rows).values():
+            notes.append("undecided: blocks were still moving at the end; increase time.end to decide")
+        notes += self.warnings()
+        if plan is not None and not self.is_whole and (plan.scenario.motion is not None or not self.brackets):
+            spacing = with_unit((self.high - self.low) / (self.count - 1), self.unit)
+            spacing = f"a {self.count - 1}th of the range" if self.is_log else spacing
+            which = f"islands narrower than {spacing}, between values of the scan, are not seen"
+            notes.append(f"{which}: --scan N for more values")
+        notes.append(f"{self.runs} runs, {self.run} of them now: {self.folder / 'limit.csv'}")
+        if any({side.value for side in one.sides.values()} <= self.kept.keys() for one in self.falls):
+            notes.append(f"picture of the mechanism: blocksim plot {self.folder}")
+        contacts, lines = NAMES.get(self.scheme, self.scheme), self._lines()
+        about = {"key": self.key, "stands means": self.stands, "contacts": contacts, "runs": str(self.runs)}
+        found = lines if self.brackets else ["nothing changes within the range"]
+        return Overview(
+            f'{self.key}, {contacts}: stands means "{self.stands}"',
+            (f"value {self.unit}".rstrip(), *HEADS),
+            [side.cells() for side in unique.values()],
+            left=4,
+            lines=lines,
+            notes=notes,
+            summary=[*about.items(), *(("limit", line) for line in found)],
+            code=ExitCode.SUCCESS if self.brackets else ExitCode.OUTSIDE,
+        )
 
-    def lines(self) -> list[str]:
+    def _lines(self) -> list[str]:
         """Return every bracket, and what it is made from."""
         if self.brackets:
             return [line for one in self.brackets for line in one.lines(self.unit)]
@@ -306,29 +321,7 @@ class LimitAnswer(Answer, frozen=True):
         """Return what springs do to limits that are not those of stiff contacts."""
         return [text for one in self.brackets for text in one.warnings(self.unit, is_as_given=self.is_as_given)]
 
-    def notes(self) -> list[str]:
-        """Say what is undecided, what springs shift, what is not seen, and where the runs are."""
-        plan, notes = self.plan, []
-        if plan is not None and Verdict.UNDECIDED in plan.verdicts(self.rows).values():
-            notes.append("undecided: blocks were still moving at the end; increase time.end to decide")
-        notes += self.warnings()
-        if plan is not None and not self.is_whole and (plan.scenario.motion is not None or not self.brackets):
-            spacing = with_unit(plan.span.width / (self.count - 1), self.unit)
-            spacing = f"a {self.count - 1}th of the range" if self.is_log else spacing
-            which = f"islands narrower than {spacing}, between values of the scan, are not seen"
-            notes.append(f"{which}: --scan N for more values")
-        notes.append(f"{self.runs} runs, {self.run} of them now: {self.folder / 'limit.csv'}")
-        if any({one.below.value, one.above.value} <= self.kept.keys() for one in self.falls):
-            notes.append(f"picture of the mechanism: blocksim plot {self.folder}")
-        return notes
-
-    def summary(self) -> list[tuple[str, str]]:
-        """Return key, criterion and brackets."""
-        lines = self.lines() if self.brackets else ["nothing changes within the range"]
-        about = {"key": self.key, "stands means": self.stands, "contacts": NAMES.get(self.scheme, self.scheme)}
-        return [*about.items(), ("runs", str(self.runs)), *(("limit", line) for line in lines)]
-
-    def draw(self, path: Path, title: str, paper: Paper) -> None:
+    def draw(self, path: Path, title: str, paper: style.Paper) -> None:
         """Draw both sides of the brackets whose runs were kept, what stands on the left."""
         brackets = []
         for one in self.brackets:
@@ -351,7 +344,7 @@ class LimitAnswer(Answer, frozen=True):
         came = side.outcome or ""
         if first is not None:
             came = f"{came}; first to move: block {first} at {side.first_moved_s or 0.0:.3g} s"
-        support, is_mechanism = support_of(run.scenario, run.events), side.verdict is not Verdict.STANDS
+        support, is_mechanism = run_data.support_of(run.scenario, run.events), side.verdict is not Verdict.STANDS
         picture = mechanism.Side(run.frames, support, first, head, is_mechanism=is_mechanism)
         return replace(picture, caption=f"{head}\n{came} (drawn at {float(run.frames.time[picture.frame]):.3g} s)")
 
@@ -426,34 +419,24 @@ class CurveAnswer(Answer, frozen=True):
         """The answers of the searches by the value of the other key."""
         return {point.over: point.search for point in self.points}
 
-    @property
-    def code(self) -> ExitCode:
-        """1 where nothing changes at some value."""
-        return ExitCode.SUCCESS if all(point.search.brackets for point in self.points) else ExitCode.OUTSIDE
-
-    @property
-    def title(self) -> str:
-        """Both keys and the criterion."""
-        return f'{self.key} over {self.over}: stands means "{self.stands}"'
-
-    def overview(self) -> Table:
-        """Return a row for every bracket, and one for a value at which nothing changes."""
+    def overview(self) -> Overview:
+        """Return a row for every bracket, and one for a value at which nothing changes; notes on what springs shift."""
         rows: list[list[str | float]] = []
         for over, low, high, *verdicts in (row for point in self.points for row in point.rows()):
             ends = ("–" if end is None else f"{end:.7g}" for end in (low, high))
             rows.append([with_unit(over, self.over_unit, 6), *ends, *map(str, verdicts)])
-        return Table((self.over, f"from {self.unit}".rstrip(), f"to {self.unit}".rstrip(), "below", "above"), rows)
-
-    def notes(self) -> list[str]:
-        """Say what springs shift, and where the table is."""
         warnings = [text for point in self.points for text in point.search.warnings()]
-        return [*warnings, f"limits: {self.folder / 'limits.csv'}; picture: blocksim plot {self.folder}"]
+        is_whole = all(point.search.brackets for point in self.points)
+        return Overview(
+            f'{self.key} over {self.over}: stands means "{self.stands}"',
+            (self.over, f"from {self.unit}".rstrip(), f"to {self.unit}".rstrip(), "below", "above"),
+            rows,
+            notes=[*warnings, f"limits: {self.folder / 'limits.csv'}; picture: blocksim plot {self.folder}"],
+            summary=[("key", self.key), ("over", self.over), ("stands means", self.stands)],
+            code=ExitCode.SUCCESS if is_whole else ExitCode.OUTSIDE,
+        )
 
-    def summary(self) -> list[tuple[str, str]]:
-        """Return both keys and the criterion."""
-        return [("key", self.key), ("over", self.over), ("stands means", self.stands)]
-
-    def draw(self, path: Path, title: str, paper: Paper) -> None:
+    def draw(self, path: Path, title: str, paper: style.Paper) -> None:
         """Draw limits over the other key, with a table of published or measured ones beside them."""
         points = [
             (point.over, [studies.Bracket(one.low, one.high, one.below.value, one.above.value)

@@ -33,11 +33,9 @@ from typing import NamedTuple
 from pydantic import BaseModel
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import Scenario, place_bodies
-from blocksim.scenario.models.motion import Pulse
-from blocksim.scenario.models.stepping import SPRINGS
+from blocksim.scenario import Scenario, place_bodies, placement
+from blocksim.scenario.models import motion, stepping
 from blocksim.scenario.motion import settles
-from blocksim.scenario.placement import smallest_width
 from blocksim.simulation.observables import FURTHER, MOVED_SHARE, Response
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
@@ -56,7 +54,7 @@ COEFFICIENTS = ("friction.", ".friction")
 HORIZONTAL = "loads."
 STIFFNESS = "contact.stiffness_scale"
 OF_STIFFNESS = ("stiffness", "young_modulus", "poisson_ratio", "contact_radius", "time.")
-NO_SPRINGS = f"rigid contacts have no stiffness: --stiffer is for springs (time.scheme {SPRINGS})"
+NO_SPRINGS = f"rigid contacts have no stiffness: --stiffer is for springs (time.scheme {stepping.SPRINGS})"
 
 
 class Level(BaseModel, frozen=True):
@@ -152,7 +150,7 @@ def refuse_without_springs(*plans: LimitPlan) -> None:
         return
     if not any(plan.scenario.time.has_springs for plan in plans):
         raise InvalidInputError(NO_SPRINGS)
-    message = f"--stiffer: {NAMES[SPRINGS]} are not made stiffer for a limit of {plans[0].key}, or beside soil"
+    message = f"--stiffer: {NAMES[stepping.SPRINGS]} are not made stiffer for a limit of {plans[0].key}, or beside soil"
     raise InvalidInputError(message)
 
 
@@ -180,7 +178,7 @@ class StandingSide:
         """A bound of the share of a limit that springs take away, by their load and how slender blocks are."""
         scenario = self.scenario
         slender = slenderness(scenario)
-        is_late = isinstance(scenario.motion, Pulse) and scenario.motion.is_abrupt and not settles(scenario)
+        is_late = isinstance(scenario.motion, motion.Pulse) and scenario.motion.is_abrupt and not settles(scenario)
         if self.give is not None and not is_late:
             return max(self.give.share, 2.0 * math.radians(self.give.turn) / slender)
         if is_late or (scenario.motion is not None and scenario.contact.stiffness_scale < 1.0):
@@ -244,7 +242,7 @@ def undecided_acceleration(scenario: Scenario, least_moved: float | None) -> flo
     time = scenario.time
     if settles(scenario) or scenario.motion is not None or not scenario.gravity > 0.0:
         return 0.0
-    moved = MOVED_SHARE * smallest_width(body for body in place_bodies(scenario) if not body.fixed)
+    moved = MOVED_SHARE * placement.smallest_width(body for body in place_bodies(scenario) if not body.fixed)
     way = moved if least_moved is None else least_moved
     of_end = min(2.0 * way, moved / FURTHER) / time.end**2
     hold = max(time.rest_hold, 0.0)

@@ -25,21 +25,17 @@ import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, takes
-from blocksim.scenario import Document, Scenario, overrides, place_bodies, place_segments, scenario_hash
-from blocksim.scenario.models.loads import stretches_of
-from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
-from blocksim.scenario.models.study import Uniform, is_descending
-from blocksim.scenario.overlap import Outlines, penetration
+from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, place_segments, scenario_hash
+from blocksim.scenario.models import loads, stepping, study
 from blocksim.scenario.placement import smallest_width
 from blocksim.scenario.units import parse_unit
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
-from blocksim.study import criterion
+from blocksim.study import criterion, runs
 from blocksim.study.criterion import Criterion, Verdict
 from blocksim.study.executors import Execution
 from blocksim.study.plan import Values, Variations, build_distributions, levels_of
 from blocksim.study.rows import Head, Row, heads_of
-from blocksim.study.runs import short_hash
 from blocksim.study.vary import RANGE, variations_option
 
 Kind = TypeVar("Kind")
@@ -54,7 +50,7 @@ MOST_SCANNED = MOST_VALUES = 1000
 TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
 OPTION, OVER = "--vary", "--over"
-NAMES = {name: time.contacts for name, time in SCHEMES.items()}
+NAMES = {name: time.contacts for name, time in stepping.SCHEMES.items()}
 SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
 PERCENT = 100.0
 Number = float  # in the unit of the range
@@ -289,16 +285,16 @@ def is_sustained(scenario: Scenario) -> bool:
     if any(body.driven or body.vx or body.vy or body.spin for body in placed):
         return False
     for load in scenario.loads:
-        stretches = stretches_of(load, scenario.ground.tilt)
+        stretches = loads.stretches_of(load, scenario.ground.tilt)
         if any(stretch.rate != 0.0 or stretch.value != stretches[0].value for stretch in stretches):
             return False
-    outlines = Outlines.of(placed)
+    outlines = overlap.Outlines.of(placed)
     if segments:
-        outlines = outlines.and_pieces(Outlines.along(segments))
+        outlines = outlines.and_pieces(overlap.Outlines.along(segments))
     near = NEAR * smallest_width(placed)
     for number in (number for number, body in enumerate(placed) if not body.fixed):
         others = np.delete(np.arange(outlines.kinds.size), number)
-        depth = penetration(outlines.some(np.full(others.size, number)), outlines.some(others))
+        depth = overlap.penetration(outlines.some(np.full(others.size, number)), outlines.some(others))
         if not (depth > -near).any() and outlines.bottom[number] > near:
             return False
     return True
@@ -367,7 +363,7 @@ class LimitPlan:
     def name(self) -> str:
         """A hash of everything that decides the answer."""
         ends = [self.key, self.unit, *vars(self.span).values(), self.criterion.text, self.tolerance]
-        return short_hash([scenario_hash(self.scenario), ends, code_hash()])
+        return runs.short_hash([scenario_hash(self.scenario), ends, code_hash()])
 
 
 class CurvePlan(NamedTuple):
@@ -419,10 +415,10 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
         message = f"{count} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed"
         raise InvalidInputError(message)
     ends: dict[str, Any] = {name: table[name] for name in table if name != "count"}
-    if is_descending(ends):
+    if study.is_descending(ends):
         ends |= {"from": ends["to"], "to": ends["from"]}
     values = build_distributions(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
-    assert isinstance(values, Uniform)  # noqa: S101 - it has two ends
+    assert isinstance(values, study.Uniform)  # noqa: S101 - it has two ends
     unit = values.unit or ("rad" if values.angle else "")
     factor = float(parse_unit(unit).factor) if unit else 1.0
     low, high = (float(f"{end / factor:.{DIGITS}g}") for end in (values.low, values.high))
@@ -453,7 +449,7 @@ def takes_whole(document: Document, key: str) -> bool:
 def variants(document: Document, *, both_laws: bool = False) -> dict[str, Document]:
     """Return the scenarios whose limits are compared, by what distinguishes them: both laws, or the present one."""
     if both_laws:
-        return {time.contacts: with_scheme(document, name) for name, time in SCHEMES.items()}
+        return {time.contacts: with_scheme(document, name) for name, time in stepping.SCHEMES.items()}
     return {document.build().time.contacts: document}
 
 
@@ -464,7 +460,7 @@ def with_scheme(document: Document, scheme: str) -> Document:
     """
     table = document.data.get("time")
     present = dict(table) if isinstance(table, Mapping) else {}
-    others = set() if present.get("scheme", SPRINGS) == scheme else {"step", "force_step"}
-    known = set(SCHEMES[scheme].model_fields) - others
+    others = set() if present.get("scheme", stepping.SPRINGS) == scheme else {"step", "force_step"}
+    known = set(stepping.SCHEMES[scheme].model_fields) - others
     kept = {key: value for key, value in present.items() if key in known}
     return replace(document, data={**document.data, "time": {**kept, "scheme": scheme}})

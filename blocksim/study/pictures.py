@@ -14,33 +14,21 @@ from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.options import Option, takes
-from blocksim.scenario import Scenario, load_scenario, load_stored
+from blocksim.scenario import Scenario, input_files, load_scenario, load_stored, overrides, spelling, units
 from blocksim.scenario import units as q
-from blocksim.scenario.input_files import Cell, raise_problems, read_table
 from blocksim.scenario.models.study import Normal, Uniform, Variation
-from blocksim.scenario.overrides import field_of, si_unit
-from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.scenario.units import TIME, Quantity
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
 from blocksim.simulation.stores.hdf5 import read_probes
-from blocksim.study.compare import ExperimentTablePath
-from blocksim.study.manifest import is_sweep, read_sweep
+from blocksim.study import compare, manifest, stored_run, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
-from blocksim.study.stored_run import Place, find_run, folder_of, load_stored_run
 from blocksim.study.study import draw_study, study_in
-from blocksim.study.sweep_folder import PLAN
-from blocksim.view.animation import Look, Pace, draw_animation, writer_of
-from blocksim.view.history import Choice
+from blocksim.view import animation, history, run_data, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
 from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import COLOURS, paint_named
-from blocksim.view.run_data import support_of
-from blocksim.view.studies import Bars, draw_tornado
-from blocksim.view.style import OWN, PageOptions, Paper, picture_path
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
-from blocksim.view.time_panels import draw_probes, draw_support_motion
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,8 +46,8 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
     Raises InputMissingError or InvalidInputError: where files are missing or damaged, no case has finished, or the
     table measures what the sweep does not have.
     """
-    table = read_sweep(folder).table
-    scenario = load_stored(folder / PLAN)
+    table = manifest.read_sweep(folder).table
+    scenario = load_stored(folder / sweep_folder.PLAN)
     blocks = blocks_in(map(str, table.columns))
     finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
     if not blocks or not finished.any():
@@ -113,7 +101,7 @@ def _inputs(scenario: Scenario, table: "pd.DataFrame") -> tuple[Input, ...]:
     heads = [head for name in table.columns if (head := Head.read(str(name))).key in vary]
     missing = [key for key in vary if key not in {head.key for head in heads}]
     if missing or not heads:
-        message = f"{TABLE} has no column {missing[0]}" if missing else f"{PLAN} varies no key"
+        message = f"{TABLE} has no column {missing[0]}" if missing else f"{sweep_folder.PLAN} varies no key"
         raise InvalidInputError(f"{message}; table and plan do not belong together")
     inputs = [_input(scenario, head, table[str(head)], vary[head.key]) for head in heads]
     return tuple([one for one in inputs if one.count > 1] or inputs[:1])
@@ -141,8 +129,8 @@ def _input(scenario: Scenario, head: Head, column: "pd.Series", vary: Variation)
 
 def unit_of(scenario: Scenario, key: str) -> str:
     """Return the SI unit of a key's values, empty for plain numbers."""
-    field = field_of(key, scenario)
-    return "" if field is None else si_unit(field)
+    field = overrides.field_of(key, scenario)
+    return "" if field is None else overrides.si_unit(field)
 
 
 TORNADO = "tornado"
@@ -177,24 +165,24 @@ def _draw_indices(table: Path, options: "PlotOptions") -> Path:
         raise InvalidInputError(message)
     panels, labels = read_indices(table)
     path = options.picture(f"{table.stem}.png")
-    draw_tornado(panels, labels, path, title="Which inputs matter", paper=options.paper)
+    studies.draw_tornado(panels, labels, path, title="Which inputs matter", paper=options.paper)
     return path
 
 
-def read_indices(path: Path) -> tuple[list[Bars], tuple[str, str]]:
+def read_indices(path: Path) -> tuple[list[studies.Bars], tuple[str, str]]:
     """Return the bars of every result and what they mean.
 
     Raises InputMissingError or InvalidInputError, with every mistake located.
     """
-    table = read_table(path, limit=LARGEST_FILE)
+    table = input_files.read_table(path, limit=LARGEST_FILE)
     names = [head.text for head in table.heads]
     shown = next((one for one in METHODS if {*HEAD, one.value, one.half_width} <= set(names)), None)
     if shown is None:
         message = "not the table of `blocksim sensitivity --out`: no columns output, unit, key and ST or mu*"
-        raise_problems([table.header.problem(message)])
+        input_files.raise_problems([table.header.problem(message)])
     rows = [{name: _read(cell, table.problems) for name, cell in row.items()} for row in table.rows]
     if table.problems:
-        raise_problems(table.problems)
+        input_files.raise_problems(table.problems)
     if not rows:
         message = f"{path}: no result varies; nothing to draw"
         raise InvalidInputError(message)
@@ -206,11 +194,11 @@ def read_indices(path: Path) -> tuple[list[Bars], tuple[str, str]]:
         bracket = f" ({unit})" if shown.has_unit and unit not in UNITLESS else ""
         keys = tuple(str(row["key"]) for row in own)
         value, half_width = columns[shown.value], columns[shown.half_width]
-        panels.append(Bars(f"{output}{bracket}", keys, value, half_width, columns.get(shown.part)))
+        panels.append(studies.Bars(f"{output}{bracket}", keys, value, half_width, columns.get(shown.part)))
     return panels, shown.labels
 
 
-def _read(cell: Cell, problems: list[Problem]) -> str | float:
+def _read(cell: input_files.Cell, problems: list[Problem]) -> str | float:
     """Return the text of a name or the number of an index; 0 after noting a problem."""
     if cell.column in HEAD:
         return cell.text
@@ -247,7 +235,7 @@ def _moments(text: str) -> tuple[float, ...]:
     """Return times in s, separated by commas, with or without their unit. Raises ValueError."""
     times = []
     for part in text.split(","):
-        for read in (float, Quantity(TIME, above=0.0).read):
+        for read in (float, units.Quantity(units.TIME, above=0.0).read):
             with suppress(ValueError):
                 times.append(read(part))
                 break
@@ -279,7 +267,7 @@ Replace = Annotated[bool, Option("Replace a file that blocksim did not write.")]
 
 
 @dataclass(frozen=True)
-class PlotOptions(PageOptions):
+class PlotOptions(style.PageOptions):
     """What is drawn of a run, a sweep, a study or a table, how, and where."""
 
     out: Annotated[
@@ -326,7 +314,7 @@ class PlotOptions(PageOptions):
     ] = None
     relative: Annotated[bool, Option("Plot a history relative to the moving ground.")] = False
     colour: Colour = "block"
-    experiment: ExperimentTablePath = None
+    experiment: compare.ExperimentTablePath = None
     forces: Forces = False
     overwrite: Replace = False
 
@@ -341,7 +329,7 @@ class PlotOptions(PageOptions):
 
         Raises InvalidInputError for an unknown format, OutputExistsError, OutputError where it may not go there.
         """
-        path = picture_path(self.out or default)
+        path = style.picture_path(self.out or default)
         refuse_foreign(path, overwrite=self.overwrite)
         return path
 
@@ -360,19 +348,19 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
     kind = options.kind or STRIP
     draw = None if kind == PROBE else run_kind(kind)
     options.refuse(kind, f"this picture is of kind {kind}")
-    stored = load_stored_run(run)
+    stored = stored_run.load_stored_run(run)
     scenario = stored.scenario
     table = options.table or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None or draw is None else load_table(table)
     picture = options.picture(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
     if draw is None:
         probes = read_probes(stored.folder / files.FRAMES, scenario)
-        draw_probes(probes, picture, f"{scenario.name}: probes", tuple(options.probes or ()), options.paper)
+        time_panels.draw_probes(probes, picture, f"{scenario.name}: probes", tuple(options.probes or ()), options.paper)
         return picture, stored.remark
     chosen: dict[str, Any] = {"times": options.times}
     if kind == HISTORY:
         names = tuple(options.panels or ()), tuple(options.blocks or ())
-        chosen = {"choice": Choice(*names, options.relative)}
+        chosen = {"choice": history.Choice(*names, options.relative)}
     elif kind == STRIP:
         chosen["count"] = options.frames
     draw(
@@ -380,7 +368,7 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
         picture,
         title=scenario.name,
         measured=measured,
-        support=support_of(scenario, stored.events),
+        support=run_data.support_of(scenario, stored.events),
         forces=options.forces,
         paint=paint_named(options.colour, stored.frames, scenario),
         paper=options.paper,
@@ -398,10 +386,10 @@ def _draw_motion(place: Path, options: PlotOptions) -> Path:
     if place.is_file():
         scenario = load_scenario(place)
     else:
-        scenario = load_stored(find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
+        scenario = load_stored(stored_run.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
     picture = options.picture(f"{scenario.name}_{MOTION}.png")
-    support = support_of(scenario)
-    draw_support_motion(support, scenario.time.end, picture, f"{scenario.name}: motion", options.paper)
+    support = run_data.support_of(scenario)
+    time_panels.draw_support_motion(support, scenario.time.end, picture, f"{scenario.name}: motion", options.paper)
     return picture
 
 
@@ -440,32 +428,32 @@ class Film(NamedTuple):
 def draw_film(place: Path, options: AnimateOptions) -> Film:
     """Write a run as an animation; see `animate`."""
     if options.out is not None:
-        writer_of(Path(options.out))
-    stored = load_stored_run(place)
+        animation.writer_of(Path(options.out))
+    stored = stored_run.load_stored_run(place)
     scenario = stored.scenario
     path = Path(options.out or f"{scenario.name}.gif")
     refuse_foreign(path, overwrite=options.overwrite)
     is_replaced = path.exists()
     paint = paint_named(options.colour, stored.frames, scenario)
-    look = Look(options.width, options.trails, scenario.name, options.forces, paint)
-    support, pace = support_of(scenario, stored.events), Pace(options.speed, options.fps)
-    count, beyond = draw_animation(stored.frames, path, pace, look, support, options.on_picture)
+    look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)
+    support, pace = run_data.support_of(scenario, stored.events), animation.Pace(options.speed, options.fps)
+    count, beyond = animation.draw_animation(stored.frames, path, pace, look, support, options.on_picture)
     return Film(path, is_replaced, count, beyond, stored.remark)
 
 
 @takes(AnimateOptions)
-def animate(place: Place, options: AnimateOptions) -> Path:
+def animate(place: stored_run.Place, options: AnimateOptions) -> Path:
     """Write a run as an animation, GIF or MP4, and return its path (default: NAME.gif in the current folder).
 
     Raises as `plot` does, and UnavailableError where nothing can write MP4.
     """
-    return draw_film(folder_of(place), options).path
+    return draw_film(stored_run.folder_of(place), options).path
 
 
 FEWEST_LEVELS = 2  # to show a distance
 
 
-def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, paper: Paper = OWN) -> bool:
+def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, paper: style.Paper = style.OWN) -> bool:
     """Draw a panel for each study with enough levels; return whether there was one.
 
     Raises InvalidInputError for an unknown picture format or too small a page, and OutputError when the file cannot be
@@ -510,19 +498,19 @@ def _draw_sweep(folder: Path, options: PlotOptions) -> Path:
         message = f"a {TORNADO} is drawn from a table of indices: blocksim sensitivity SCENARIO --out TABLE.csv"
         raise InvalidInputError(message)
     if kind is not None and kind not in SWEEP_KINDS:
-        message = f"--kind {kind}: unknown kind, {did_you_mean_or_list(kind, [*SWEEP_KINDS, TORNADO])}"
+        message = f"--kind {kind}: unknown kind, {spelling.did_you_mean_or_list(kind, [*SWEEP_KINDS, TORNADO])}"
         raise InvalidInputError(message)
     found = read_sweep_data(folder, options.table)
     chosen = kind_for(found) if kind is None else SWEEP_KINDS[kind]
     if kind is not None and (reason := chosen.refusal(found)):
         raise InvalidInputError(f"{folder}: {reason}")
-    path = options.picture(f"{load_stored(folder / PLAN).name}.png")
+    path = options.picture(f"{load_stored(folder / sweep_folder.PLAN).name}.png")
     chosen.draw(found, path, options.paper)
     return path
 
 
 @takes(PlotOptions)
-def plot(place: Place, options: PlotOptions) -> Path:
+def plot(place: stored_run.Place, options: PlotOptions) -> Path:
     """Draw a run, a sweep, a study or a table of sensitivities.
 
     `place` is a result that is kept in a folder, a sweep, or what the command takes. Returns the path of the picture
@@ -530,7 +518,7 @@ def plot(place: Place, options: PlotOptions) -> Path:
     and a result that was not kept, InputMissingError, OutputExistsError for a file of others unless `overwrite`,
     OutputError.
     """
-    return draw(folder_of(place), options)[0]
+    return draw(stored_run.folder_of(place), options)[0]
 
 
 def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
@@ -542,7 +530,7 @@ def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
     if study is not None:
         options.refuse(None, f"{place} is {study.answer.files.what}")
         return draw_study(place, study, options), ""
-    if is_sweep(place):
+    if manifest.is_sweep(place):
         options.refuse(None, f"{place} is a sweep")
         return _draw_sweep(place, options), ""
     if place.suffix.lower() == ".csv":

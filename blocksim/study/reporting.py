@@ -9,17 +9,13 @@ from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
-from blocksim.scenario import load_stored
-from blocksim.scenario.input_files import MEGABYTE
+from blocksim.scenario import input_files, load_stored
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
-from blocksim.study.compare import compare_sweep
-from blocksim.study.manifest import NEEDED, NO_COLUMNS, NO_TABLE, is_sweep, lines_in
+from blocksim.study import compare, manifest, stored_run, sweep_folder
 from blocksim.study.pictures import read_sweep_data
 from blocksim.study.rows import FINISHED, TABLE
-from blocksim.study.stored_run import Place, choice, find_run, folder_of
 from blocksim.study.study import study_in, study_page
-from blocksim.study.sweep_folder import PLAN, case_folder
 from blocksim.view.report.page import write_report
 from blocksim.view.report.pictures import pictures_of
 from blocksim.view.report.player import MOST_BYTES
@@ -36,11 +32,14 @@ from blocksim.view.report.subjects import (
 )
 
 MEMBERS = 50  # of a sweep in one page
-MOST_TABLE_BYTES = 200 * MEGABYTE  # of sweep.csv
+MOST_TABLE_BYTES = 200 * input_files.MEGABYTE  # of sweep.csv
 
 
 def report(
-    *places: Place, out: Path | str = "report.html", experiment: Path | str | None = None, overwrite: bool = False
+    *places: stored_run.Place,
+    out: Path | str = "report.html",
+    experiment: Path | str | None = None,
+    overwrite: bool = False,
 ) -> Path:
     """Write runs and sweeps into one self-contained HTML file with a player, and return its path.
 
@@ -49,7 +48,7 @@ def report(
     path = Path(out)
     refuse_foreign(path, overwrite=overwrite)
     table = None if experiment is None else Path(experiment)
-    _, problems = report_on([folder_of(place) for place in places], path, table)
+    _, problems = report_on([stored_run.folder_of(place) for place in places], path, table)
     if problems:
         raise InvalidInputError("\n".join(problems))
     return path
@@ -75,14 +74,14 @@ def report_on(
         if study is not None:
             shown.append(study_subject(key, study_page(place, study), str(place)))
             continue
-        if is_sweep(place):
+        if manifest.is_sweep(place):
             subjects, damage = _sweep(key, place, experiment, members)
         else:
             is_run = place.is_dir() and any((place / name).is_file() for name in files.OURS)  # even if files lack
-            folder = place if is_run else find_run(place)
+            folder = place if is_run else stored_run.find_run(place)
             run = read_stored(folder)
             subjects, damage = [run_subject(key, run, *_compared(run, experiment))], run.damage
-            remark = choice(place, folder)
+            remark = stored_run.choice(place, folder)
             if remark:
                 on_remark(remark)
         shown += subjects
@@ -119,21 +118,21 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
     Rows that are cut off are left out. Raises InvalidInputError for what is no table of a sweep.
     """
     path = place / TABLE
-    columns, *rows = list(filter(None, lines_in(path, MOST_TABLE_BYTES))) or [[]]
-    if not set(columns) >= NEEDED:
-        raise InvalidInputError(f"{path}: {NO_TABLE}: {NO_COLUMNS}")
+    columns, *rows = list(filter(None, manifest.lines_in(path, MOST_TABLE_BYTES))) or [[]]
+    if not set(columns) >= manifest.NEEDED:
+        raise InvalidInputError(f"{path}: {manifest.NO_TABLE}: {manifest.NO_COLUMNS}")
     table = CaseTable(place, tuple(columns), tuple(tuple(row) for row in rows if len(row) == len(columns)))
     problems: list[str] = []
     scenario, judged, pictures = None, None, []
     try:
-        scenario = load_stored(place / PLAN)
+        scenario = load_stored(place / sweep_folder.PLAN)
     except InputMissingError:
         pass
     except BlocksimError as error:
         problems.append(str(error))
     try:
         if experiment is not None or (scenario is not None and scenario.experiment is not None):
-            judged = _shown(compare_sweep(place, experiment))
+            judged = _shown(compare.compare_sweep(place, experiment))
     except BlocksimError as error:
         if experiment is not None and not isinstance(error, UnavailableError):
             raise
@@ -146,7 +145,7 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
         is_whole = len(sweep.finished) == len(table.rows)
         pictures = pictures_of(sweep) if is_whole else []
         problems += [] if is_whole else ["no picture of the sweep: its table is damaged"]
-    folders = {case: case_folder(table.folder, case) for case in table.column("case")}
+    folders = {case: sweep_folder.case_folder(table.folder, case) for case in table.column("case")}
     cases = {case: one for case, one in folders.items() if one is not None and (one / files.FRAMES).is_file()}
     found = [(case, read_stored(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}

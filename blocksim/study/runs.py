@@ -11,10 +11,8 @@ from typing import Self, TypeVar
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
 from blocksim.silence import silent
+from blocksim.simulation import compilation, provenance, stopping
 from blocksim.simulation import folder as files
-from blocksim.simulation.compilation import compile_kernels, kernels_of
-from blocksim.simulation.provenance import HASH_DIGITS, run_hash
-from blocksim.simulation.stopping import stop_requests
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.manifest import MANIFEST, PATTERN, Entry, Manifest, read_entries, values_hash
 from blocksim.study.rows import Row, check_experiment, invalid_row
@@ -55,10 +53,10 @@ class Runs:
                 except BlocksimError as error:
                     keep(wanted[key], "", invalid_row(str(error).splitlines()[0]))
                     continue
-                yield Task(number, run_hash(scenario), wanted[key], scenario)
+                yield Task(number, provenance.run_hash(scenario), wanted[key], scenario)
 
         try:
-            with stop_requests() as is_stopped:
+            with stopping.stop_requests() as is_stopped:
                 setting = replace(self._setting, is_stopped=is_stopped)
                 with closing(self._run(tasks(), setting)) as batches:
                     for batch in batches:
@@ -77,7 +75,7 @@ class Runs:
 def runs_of(
     document: Document,
     base: Scenario,
-    folder: Path,
+    out: Path | str | None,
     kind: FolderKind,
     name: str,
     execution: Execution,
@@ -85,29 +83,33 @@ def runs_of(
     overwrite: bool = False,
     peaks: bool = False,
 ) -> Iterator[Runs]:
-    """Make the folder of a study of this name, with `base` as its scenario, and give what runs the document.
+    """Make the folder of a study, see `make_folder`, and give what runs the document.
 
-    With `peaks` rows have the largest rotation on the way.
-
-    Raises OutputExistsError where the folder is not free, UnavailableError for an executor that is not there.
+    With `peaks` rows have the largest rotation on the way. Raises OutputExistsError where the folder is not free,
+    UnavailableError for an executor that is not there.
     """
     _, setting = execution.ready()
-    check_experiment(base)
-    prepare(folder, base, name, overwrite=overwrite, kind=kind)
-    compile_kernels(kernels_of(base))
+    folder = make_folder(out, base, kind, name, overwrite=overwrite)
+    compilation.compile_kernels(compilation.kernels_of(base))
     what = kind.what.split(" ", 1)[1]
     with closing(Manifest(folder / MANIFEST, what)) as manifest, execution.for_rounds() as run:
         yield Runs(manifest, document, run, replace(setting, peaks=peaks))
 
 
+def make_folder(out: Path | str | None, base: Scenario, kind: FolderKind, name: str, *, overwrite: bool) -> Path:
+    """Make the folder of a study of this name with its scenario: as given, or results/SCENARIO/STUDY-NAME.
+
+    Raises OutputExistsError where it is not free, and what is wrong with the scenario's experiment.
+    """
+    check_experiment(base)
+    folder = Path(out) if out is not None else files.RESULTS / base.name / f"{Path(kind.plan).stem}-{name}"
+    prepare(folder, base, name, overwrite=overwrite, kind=kind)
+    return folder
+
+
 def short_hash(data: object) -> str:
     """Return a hash of data that can be written as JSON, to name a study."""
-    return hashlib.sha256(json.dumps(data, default=str).encode()).hexdigest()[:HASH_DIGITS]
-
-
-def folder_for(out: Path | str | None, base: Scenario, kind: FolderKind, name: str) -> Path:
-    """Return the folder of a study: as given, or results/SCENARIO/STUDY-NAME."""
-    return Path(out) if out is not None else files.RESULTS / base.name / f"{Path(kind.plan).stem}-{name}"
+    return hashlib.sha256(json.dumps(data, default=str).encode()).hexdigest()[: provenance.HASH_DIGITS]
 
 
 @dataclass(frozen=True)

@@ -82,5 +82,5 @@ def study_page(folder: Path, study: Study) -> StudyPage:
             picture = path.read_bytes()
         except BlocksimError as error:
             problems = [str(error)]
-    summary, description = answer.summary(), scenario.description or ""
-    return StudyPage(scenario.name, description, summary, answer.caption, table.heads, table.texts(), picture, problems)
+    name, caption, description = scenario.name, answer.caption, scenario.description or ""
+    return StudyPage(name, description, table.summary, caption, table.heads, table.texts(), picture, problems)

@@ -16,14 +16,11 @@ from tempfile import TemporaryDirectory
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.observables import PEAK
+from blocksim.study import manifest, plan, sweep, sweep_folder
 from blocksim.study.executors.ensemble import rows_of
-from blocksim.study.manifest import NO_TABLE, OUTCOME, PATTERN, CaseIndex, lines_in, read_entries
-from blocksim.study.plan import Case, Cases, cases_of, plan_of
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row, varied_cells
 from blocksim.study.runs import Replay
 from blocksim.study.study import Study, study_in
-from blocksim.study.sweep import measured_ranges
-from blocksim.study.sweep_folder import CASES, SWEEP, FolderKind, case_folder, read_origin, read_plan
 from blocksim.study.verify_run import (
     EntryDifference,
     Origin,
@@ -90,17 +87,17 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
     Where the folders of these cases were kept, they are verified as runs.
     Raises InputMissingError, or InvalidInputError where table, plan and manifests do not go together.
     """
-    document = read_plan(folder)
+    document = sweep_folder.read_plan(folder)
     base = document.build()
-    cases = cases_of(document, plan_of(base))
+    cases = plan.cases_of(document, plan.plan_of(base))
     columns, lines = _read_table(folder / TABLE)
     numbers = _numbers(folder, cases, len(lines))
     rows = _chosen(len(lines), sample, seed)
     scenarios = [case.scenario for row in rows if (case := cases[numbers[row]]).scenario is not None]
     ends = iter(rows_of(scenarios, os.cpu_count() or 1))
-    ranges = measured_ranges(base)
-    origins, is_same_code = _origins(folder, SWEEP)
-    entries = (entry for path in sorted(folder.glob(PATTERN)) for _, entry in read_entries(path))
+    ranges = sweep.measured_ranges(base)
+    origins, is_same_code = _origins(folder, sweep_folder.SWEEP)
+    entries = (entry for path in sorted(folder.glob(manifest.PATTERN)) for _, entry in manifest.read_entries(path))
     names = {entry.number: entry.case for entry in entries}  # the last one of each
     if is_same_code:
         names |= {numbers[row]: cases[numbers[row]].name for row in rows}
@@ -119,7 +116,9 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
             if name != CASE and stored[name] != now[name]
         ]
     checked = tuple(row + 1 for row in rows)
-    kept = tuple(verify_run(place) for row in rows if (place := case_folder(folder, lines[row][0])) is not None)
+    kept = tuple(
+        verify_run(place) for row in rows if (place := sweep_folder.case_folder(folder, lines[row][0])) is not None
+    )
     return SweepVerdict(folder, len(lines), checked, tuple(found), origins, kept)
 
 
@@ -136,7 +135,7 @@ def verify_study(folder: Path, study: Study, sample: int = SAMPLE, seed: int = 0
         again = study.repeat(stored, replay, Path(place) / "study")
         entries = tuple(apart(kind.origin, "", stored.comparable(), again.comparable()))
         tables = [path for path in sorted(again.folder.glob("*.csv")) if kind.tables.fullmatch(path.name)]
-        cells = [one for path in tables for one in _cells_apart(folder / path.name, lines_in(path))]
+        cells = [one for path in tables for one in _cells_apart(folder / path.name, manifest.lines_in(path))]
     origins, is_same_code = _origins(folder, kind)
     tasks = replay.tasks
     chosen = _chosen(len(tasks), sample, seed)
@@ -148,7 +147,7 @@ def verify_study(folder: Path, study: Study, sample: int = SAMPLE, seed: int = 0
         now: Row = {CASE: tasks[number].name if is_same_code else entry.case, **row}
         texts = [(name, *(str(as_cell(one.get(name))) for one in (then, now))) for name in dict.fromkeys((*then, *now))]
         cells += [CellDifference(number + 1, entry.case, *text) for text in texts if text[1] != text[2]]
-    kept = tuple(verify_run(place) for place in sorted((folder / CASES).glob("*")) if place.is_dir())
+    kept = tuple(verify_run(place) for place in sorted((folder / sweep_folder.CASES).glob("*")) if place.is_dir())
     checked = tuple(number + 1 for number in chosen)
     return (*verdicts, SweepVerdict(folder, len(tasks) or len(parts), checked, tuple(cells), origins, kept, entries))
 
@@ -157,16 +156,16 @@ def _chosen(count: int, sample: int, seed: int) -> list[int]:
     return sorted(random.Random(seed).sample(range(count), min(sample, count)))  # noqa: S311 - no secret
 
 
-def _origins(folder: Path, kind: FolderKind) -> tuple[tuple[Origin, ...], bool]:
+def _origins(folder: Path, kind: sweep_folder.FolderKind) -> tuple[tuple[Origin, ...], bool]:
     """Return what is not the same as when a study was made, and whether its code is known to be."""
-    origin = read_origin(folder, kind)
+    origin = sweep_folder.read_origin(folder, kind)
     origins = () if origin is None else changed_origins(origin.environment)
     return origins, origin is not None and not tells_of_code(origins)
 
 
 def _cells_apart(path: Path, now: list[list[str]]) -> Iterator[CellDifference]:
     """Yield the cells of a stored table that are not those of the table as it comes out again."""
-    stored = lines_in(path)
+    stored = manifest.lines_in(path)
     heads = stored[0] if stored else []
     if [len(stored), *stored[:1]] != [len(now), *now[:1]]:
         shown = [f"{len(lines)} lines, {len(lines[0]) if lines else 0} columns" for lines in (stored, now)]
@@ -180,9 +179,9 @@ def _cells_apart(path: Path, now: list[list[str]]) -> Iterator[CellDifference]:
 
 def _read_table(path: Path) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows as texts: what a person cites. Raises InputMissingError or InvalidInputError."""
-    head, *lines = lines_in(path) or [[]]
-    if head[:1] != [CASE] or not set(OUTCOME) <= set(head) or len(set(head)) < len(head):
-        message = f"{path}: {NO_TABLE}: its columns are not case, ..., {', '.join(OUTCOME)}, ..."
+    head, *lines = manifest.lines_in(path) or [[]]
+    if head[:1] != [CASE] or not set(manifest.OUTCOME) <= set(head) or len(set(head)) < len(head):
+        message = f"{path}: {manifest.NO_TABLE}: its columns are not case, ..., {', '.join(manifest.OUTCOME)}, ..."
         raise InvalidInputError(message)
     short = next((number for number, line in enumerate(lines, start=2) if len(line) != len(head)), None)
     if short is not None:
@@ -191,11 +190,11 @@ def _read_table(path: Path) -> tuple[list[str], list[list[str]]]:
     return head, lines
 
 
-def _numbers(folder: Path, cases: Cases, count: int) -> Sequence[int]:
+def _numbers(folder: Path, cases: plan.Cases, count: int) -> Sequence[int]:
     """Return the number of the case of each of `count` rows. Raises InvalidInputError."""
     if count == len(cases):
         return range(count)
-    done = CaseIndex(folder, len(cases))
+    done = manifest.CaseIndex(folder, len(cases))
     held = [number for number in range(len(cases)) if done.holds(number, cases.design[number])]
     if len(held) != count:
         message = f"{folder / TABLE}: {count} rows of {len(cases)} cases, but the manifest has {len(held)}"
@@ -203,7 +202,7 @@ def _numbers(folder: Path, cases: Cases, count: int) -> Sequence[int]:
     return held
 
 
-def _cells(columns: Sequence[str], case: Case, row: Row, ranges: Ranges | None) -> dict[str, str]:
+def _cells(columns: Sequence[str], case: plan.Case, row: Row, ranges: Ranges | None) -> dict[str, str]:
     """Return the cells of a row as texts, as the table of a sweep has them."""
     heads = (head for head in map(Head.read, columns) if head.key in case.settings)
     values: Row = {CASE: case.name, **varied_cells(heads, case.settings), **row}

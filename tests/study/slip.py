@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from blocksim.scenario import Document
 from blocksim.silence import silent
-from blocksim.study.answer import Answer, Table
+from blocksim.study.answer import Answer, Overview
 from blocksim.study.executors import Execution
 from blocksim.study.rows import Row
 from blocksim.study.runs import Replay, runs_of
@@ -33,14 +33,10 @@ class SlipAnswer(Answer, frozen=True):
     caption: ClassVar[str] = "What every tilt came to"
     points: tuple[Point, ...]
 
-    @property
-    def title(self) -> str:
-        """Return the caption."""
-        return self.caption
-
-    def overview(self) -> Table:
+    def overview(self) -> Overview:
         """Return a row for every tilt."""
-        return Table(("tilt", "outcome"), [(f"{one.tilt:g}", one.outcome) for one in self.points], left=2)
+        rows = [(f"{one.tilt:g}", one.outcome) for one in self.points]
+        return Overview(self.caption, ("tilt", "outcome"), rows, left=2)
 
     def draw(self, path: Path, title: str, paper: Paper) -> None:  # noqa: ARG002 - no picture at all
         """Write a text in place of a picture."""
