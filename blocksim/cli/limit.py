@@ -68,7 +68,7 @@ def limit_command(
         def tell_run(
             value: float, verdict: criterion.Verdict, row: rows.Row, plan: limit_plan.LimitPlan = plan
         ) -> None:
-            screen.note(f"{plan.text(value)}: {verdict.value} ({row['reason']})")
+            screen.note(f"{answer.with_unit(value, plan.unit)}: {verdict.value} ({row['reason']})")
 
         def tell_search(plan: limit_plan.LimitPlan) -> None:
             scale, step = (plan.apart.get(key) for key in (limit_margin.STIFFNESS, limit.STEP))
@@ -99,7 +99,7 @@ def _warn(plan: limit_plan.LimitPlan, screen: command_line.Screen) -> None:
         return
     for text in dict.fromkeys(text for scenario in ends for text in implausible_values(scenario)):
         screen.note(f"warning: {text}")
-    if all(map(limit_plan.comes_at_once, ends)):
+    if not any(one.start.settle for one in ends) and all(map(limit_plan.is_sustained, ends)):
         screen.note(AT_ONCE)
 
 

@@ -14,7 +14,7 @@ from typing import TextIO
 NARROW = 80
 GAP = "  "
 SHORTEST = 8
-STEERING = re.compile(
+STEERING = re.compile(  # must not be printed: names, descriptions and reasons may come from files of others
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters of ASCII and Latin-1 but tab and newline
     r"\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff"  # marks that change the direction of the text that follows
     r"\ud800-\udfff]"  # halves of characters
@@ -25,7 +25,7 @@ LONG_TIMES = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))  # s
 def note(text: str) -> None:
     """Print a line to standard error; do nothing after its reader has gone."""
     try:
-        print(harmless(text), file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
+        print(STEERING.sub("\ufffd", text), file=sys.stderr, flush=True)  # noqa: T201 - this is the place for it
     except OSError:
         abandon(sys.stderr)
 
@@ -38,7 +38,7 @@ def abandon(stream: TextIO) -> None:
 
 def answer(text: str) -> None:
     """Print the answer to standard output."""
-    print(harmless(text))  # noqa: T201 - this is the place for it
+    print(STEERING.sub("\ufffd", text))  # noqa: T201 - this is the place for it
 
 
 def print_json(data: object) -> None:
@@ -106,11 +106,3 @@ def duration(seconds: float) -> str:
     """Return a time in the largest unit of which it has two or more."""
     worth, unit = next((entry for entry in LONG_TIMES if seconds >= 2.0 * entry[0]), (1.0, "s"))
     return f"{seconds / worth:.1f} {unit}"
-
-
-def harmless(text: str) -> str:
-    """Return a text without control characters and marks that change the order of a line.
-
-    Names, descriptions and reasons may come from files of others.
-    """
-    return STEERING.sub("\ufffd", text)

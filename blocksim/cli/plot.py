@@ -14,7 +14,6 @@ from blocksim.simulation.stores.exports import format_named
 from blocksim.study import compare, pictures, reporting, stored_run
 
 MEGABYTE = 1e6
-OLDER = "replaces an older file, "
 RunPath = Annotated[
     Path,
     Option("Run folder, results/NAME (its newest finished run) or scenario file.", metavar="RUN", is_argument=True),
@@ -69,10 +68,8 @@ def animate_command(
     Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
     """
     with progress.count_progress("frames", quiet=screen.quiet) as on_picture:
-        film = pictures.draw_film(run, replace(options, on_picture=on_picture))
-    older, beyond = OLDER if film.is_replaced else "", f"; {film.beyond}" if film.beyond else ""
-    told = f"animation: {film.path} ({older}{film.pictures} frames{beyond})"
-    return command_line.Report(notes=[told], always=[film.remark] if film.remark else [])
+        path, what, remark = pictures.draw_film(run, replace(options, on_picture=on_picture))
+    return command_line.Report(notes=[f"animation: {path} ({what})"], always=[remark] if remark else [])
 
 
 def report_command(
@@ -144,9 +141,9 @@ def export_command(
     refuse_foreign(file, overwrite=overwrite)
     if form.write_contacts is not None and contacts is not None:
         refuse_foreign(beside, overwrite=overwrite)
-    older = OLDER if file.exists() else ""
+    older = pictures.OLDER if file.exists() else ""
     notes = [f"file: {file} ({older}{form.write(file, stored.frames, stored.scenario)} {form.counted})"]
     if form.write_contacts is not None and contacts is not None:
-        older = OLDER if beside.exists() else ""
+        older = pictures.OLDER if beside.exists() else ""
         notes.append(f"file: {beside} ({older}{form.write_contacts(beside, stored.frames, contacts)} contacts)")
     return command_line.Report(notes=notes, always=[stored.remark] if stored.remark else [])

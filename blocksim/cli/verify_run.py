@@ -19,8 +19,7 @@ from blocksim.study.verify_run import EntryDifference, Origin, RunVerdict, scena
 from blocksim.study.verify_study import DEGREES, MM, SAMPLE, SweepVerdict, verify_study, verify_sweep
 
 INDENT = "  "
-MOST_CELLS = 5
-MOST_ENTRIES = 5
+MOST_LINES = 5
 LONGEST = 60  # characters of an entry of the provenance
 MOST_WORDS = 12
 UNITS = {  # by the ends of names of quantities; the longer of two that fit first
@@ -139,10 +138,16 @@ def _reasons(verdict: RunVerdict) -> Iterator[str]:
 
 def _entries(found: Sequence[EntryDifference]) -> Iterator[str]:
     """Report which entries of a summary differ."""
-    for one in found[:MOST_ENTRIES]:
-        yield f"{one.file}: {one.entry}: {one.stored!r} stored, {one.now!r} now"
-    if len(found) > MOST_ENTRIES:
-        yield f"and {len(found) - MOST_ENTRIES} entries more"
+    yield from first_of(
+        [f"{one.file}: {one.entry}: {one.stored!r} stored, {one.now!r} now" for one in found], "entries"
+    )
+
+
+def first_of(lines: Sequence[str], what: str) -> Iterator[str]:
+    """Yield the first of many lines, and how many there are more."""
+    yield from lines[:MOST_LINES]
+    if len(lines) > MOST_LINES:
+        yield f"and {len(lines) - MOST_LINES} {what} more"
 
 
 def _parting(verdict: RunVerdict) -> Iterator[str]:
@@ -167,11 +172,9 @@ def _parting(verdict: RunVerdict) -> Iterator[str]:
 
 def _cells(verdict: SweepVerdict) -> Iterator[str]:
     """Report which cells of a sweep differ."""
-    for one in verdict.cells[:MOST_CELLS]:
-        values = f"{one.stored or 'nothing'} stored, {one.now or 'nothing'} now"
-        yield f"row {one.row}, case {one.case}, {one.column}: {values}"
-    if len(verdict.cells) > MOST_CELLS:
-        yield f"and {len(verdict.cells) - MOST_CELLS} cells more"
+    values = (f"{one.stored or 'nothing'} stored, {one.now or 'nothing'} now" for one in verdict.cells)
+    places = (f"row {one.row}, case {one.case}, {one.column}" for one in verdict.cells)
+    yield from first_of(list(map(": ".join, zip(places, values, strict=True))), "cells")
     if verdict.cells:
         yield f"largest difference: {verdict.largest(MM):.3g} mm, {verdict.largest(DEGREES):.3g}°"
     yield from _changes(verdict.origins)

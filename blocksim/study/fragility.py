@@ -85,23 +85,14 @@ class FragilityAnswer(Answer, frozen=True):
     @cached_property
     def curve(self) -> Curve | NoCurve:
         """The curve that is most likely, or why there is none."""
-        return fit(self.counts, inflation=self.inflation)
-
-    @property
-    def counts(self) -> Counts:
-        """The counts of all intensities."""
         points = [one for one in self.points if one.failures <= one.members]
-        return Counts.of(*zip(*((one.intensity, one.failures, one.members) for one in points), strict=True))
+        counts = Counts.of(*zip(*((one.intensity, one.failures, one.members) for one in points), strict=True))
+        return fit(counts, inflation=self.inflation)
 
     @property
     def failed(self) -> int:
         """How many runs did not finish."""
         return sum(point.no_result for point in self.points)
-
-    @property
-    def is_extrapolated(self) -> bool:
-        """True where the median lies beyond all intensities that have been run."""
-        return bool(self.fitted.get("median_extrapolated"))
 
     def probability(self, intensity: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
         """Return the curve at intensities in the unit of the study, None where there is no curve."""
@@ -166,7 +157,7 @@ class FragilityAnswer(Answer, frozen=True):
         notes, moving = [], sum(one.moving_on for one in self.points)
         if moving:
             notes.append(f"{moving} surviving samples were still moving at the end; increase time.end to decide them")
-        if isinstance(self.curve, Curve) and self.is_extrapolated:
+        if isinstance(self.curve, Curve) and self.fitted.get("median_extrapolated"):
             x = [one.intensity for one in self.points if one.members]
             side, end = ("above", max(x)) if self.curve.median > max(x) else ("below", min(x))
             notes.append(

@@ -23,9 +23,10 @@ from blocksim.silence import silent
 from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import build
-from blocksim.study import criterion, limit_answer, limit_margin, limit_plan, study, sweep_folder
-from blocksim.study import limit_margin as margins
+from blocksim.study import limit_answer, limit_margin, limit_plan, study, sweep_folder
+from blocksim.study.criterion import Verdict, falls_before_zero
 from blocksim.study.executors import Execution, ensemble
+from blocksim.study.limit_plan import Change, LimitPlan, Number
 from blocksim.study.rows import FINISHED, Head, Row
 from blocksim.study.runs import Replay, Runs, make_folder, runs_of, short_hash
 
@@ -38,10 +39,10 @@ STEP = "time.step"
 NO_STIFFER = "with springs {ratio:g} times as stiff there is no such limit in the range"
 NO_FINER = "with half the time step there is no such limit in the range"
 STILL_FAR = "limits of the last two stiffnesses are too far apart to be extrapolated well; give stiffer springs"
-BOTH = {criterion.Verdict.STANDS, criterion.Verdict.FALLS}
-OnOther = Callable[[limit_plan.LimitPlan], None]
+BOTH = {Verdict.STANDS, Verdict.FALLS}
+OnOther = Callable[[LimitPlan], None]
 OnLimit = Callable[[float, limit_answer.LimitAnswer], None]
-Rows = Mapping[limit_plan.Number, Row]
+Rows = Mapping[Number, Row]
 
 
 @takes(limit_plan.LimitOptions)
@@ -68,7 +69,7 @@ def limit_curve(scenario: Source, options: limit_plan.CurveOptions) -> limit_ans
 
 
 def find_limit(
-    plan: limit_plan.LimitPlan,
+    plan: LimitPlan,
     options: limit_plan.LimitOptions,
     execution: Execution | None = None,
     on_other: OnOther = silent,
@@ -78,7 +79,7 @@ def find_limit(
     `on_other` is called before the first run of another stiffness or step.
     """
     if options.stiffer:
-        margins.refuse_without_springs(plan)
+        limit_margin.refuse_without_springs(plan)
     base, kind, execution = plan.scenario_at(plan.span.low), limit_answer.LimitAnswer.files, execution or options
     overwrite = options.overwrite
     with runs_of(plan.document, base, options.out, kind, plan.name, execution, overwrite=overwrite, peaks=True) as runs:
@@ -96,7 +97,7 @@ def find_curve(
     """Search as planned, one value after the other, each in a folder of its own; see `limit_curve`."""
     options.ready()
     if options.stiffer:
-        margins.refuse_without_springs(*plan.searches.values())
+        limit_margin.refuse_without_springs(*plan.searches.values())
     one = next(iter(plan.searches.values()))
     base, kind = one.scenario_at(one.span.low), limit_answer.CurveAnswer.files
     name = short_hash([plan.head.key, *(search.name for search in plan.searches.values())])
@@ -117,20 +118,20 @@ def find_curve(
 class _Search:
     """The runs of a search, as planned and with other stiffnesses or steps."""
 
-    plan: limit_plan.LimitPlan
+    plan: LimitPlan
     runs: Runs
     stiffer: bool | None
     on_run: limit_plan.OnRun
     on_other: OnOther
-    stiff_rows: dict[float, dict[limit_plan.Number, Row]] = field(default_factory=dict)  # by stiffness scale
-    step_rows: dict[float, dict[limit_plan.Number, Row]] = field(default_factory=dict)  # by time step (s)
+    stiff_rows: dict[float, dict[Number, Row]] = field(default_factory=dict)  # by stiffness scale
+    step_rows: dict[float, dict[Number, Row]] = field(default_factory=dict)  # by time step (s)
 
     def answer(self) -> limit_answer.LimitAnswer:
         """Return the answer, after all runs that it takes."""
         plan, folder = self.plan, self.runs.manifest.path.parent
         has_islands = plan.scenario.motion is not None  # a value may fall between others that stand: supports move
 
-        def choose(rows: Rows) -> list[limit_plan.Number]:
+        def choose(rows: Rows) -> list[Number]:
             peaks = {at: float(str(row[PEAK])) for at, row in rows.items() if has_islands and PEAK in row}
             return limit_plan.next_values(plan.span, plan.verdicts(rows), plan.tolerance, peaks)
 
@@ -141,27 +142,25 @@ class _Search:
             plan, folder, rows, brackets, *others, run=self.runs.new, is_as_given=is_as_given
         )
 
-    def _searched(
-        self, plan: limit_plan.LimitPlan, choose: Callable[[Rows], list[limit_plan.Number]]
-    ) -> dict[limit_plan.Number, Row]:
+    def _searched(self, plan: LimitPlan, choose: Callable[[Rows], list[Number]]) -> dict[Number, Row]:
         """Go from round to round and return what it needed; rows of an earlier search are taken as they are."""
-        rows: dict[limit_plan.Number, Row] = {}
+        rows: dict[Number, Row] = {}
         while values := choose(rows):
             wanted = {value: plan.settings(value) for value in values}
             rows |= self.runs.rows(wanted, lambda at, row: self.on_run(at, plan.criterion.verdict(row), row))
         return rows
 
-    def _bracket(self, change: limit_plan.Change[criterion.Verdict], rows: Rows) -> limit_answer.Bracket:
+    def _bracket(self, change: Change[Verdict], rows: Rows) -> limit_answer.Bracket:
         """Return a change as it is with stiff contacts and short steps, as far as known, and as wide as is unknown."""
         plan, is_corrected = self.plan, self.stiffer is not False
         below, above = (limit_answer.Side.of(value, verdict, rows[value]) for value, verdict in
                         ((change.low, change.below), (change.high, change.above)))  # fmt: skip
         given = limit_answer.Bracket(low=change.low, high=change.high, below=below, above=above)
-        if not BOTH | {criterion.Verdict.UNDECIDED} >= {change.below, change.above} > {criterion.Verdict.FALLS}:
+        if not BOTH | {Verdict.UNDECIDED} >= {change.below, change.above} > {Verdict.FALLS}:
             return given
         side = limit_margin.StandingSide(plan, change, rows)
         least, levels, half = max(SHIFT, plan.tolerance), None, None
-        if is_corrected and margins.can_be_stiffer(plan):
+        if is_corrected and limit_margin.can_be_stiffer(plan):
             levels = self._levels(side, least) if self.stiffer or side.most_shift > least else None
         elif is_corrected and not plan.scenario.time.has_springs and not plan.key.startswith("time."):
             half = self._half(change)
@@ -171,13 +170,13 @@ class _Search:
 
     def _again(
         self,
-        plan: limit_plan.LimitPlan,
-        near: limit_plan.Change[criterion.Verdict],
-        known: dict[float, dict[limit_plan.Number, Row]],
+        plan: LimitPlan,
+        near: Change[Verdict],
+        known: dict[float, dict[Number, Row]],
         place: float,
         *,
         may_stay: bool = False,
-    ) -> limit_plan.Change[criterion.Verdict] | None:
+    ) -> Change[Verdict] | None:
         """Search the limit once more near a bracket with other settings, and return it if there is one.
 
         Its rows are kept as `known[place]`. With `may_stay` nothing more is run where both ends came to the same again.
@@ -185,7 +184,7 @@ class _Search:
         if place not in known:
             self.on_other(plan)
 
-        def choose(rows: Rows) -> list[limit_plan.Number]:
+        def choose(rows: Rows) -> list[Number]:
             verdicts = _fallen(plan.verdicts(rows))
             is_same = may_stay and limit_plan.changes_in(verdicts) == [near]
             return [] if is_same else limit_plan.next_near(plan.span, verdicts, near, plan.tolerance)
@@ -195,7 +194,7 @@ class _Search:
         changes = limit_plan.changes_in(_fallen(self.plan.verdicts(rows)))
         return changes[0] if len(changes) == 1 and {changes[0].below, changes[0].above} == BOTH else None
 
-    def _half(self, change: limit_plan.Change[criterion.Verdict]) -> limit_answer.HalfStep:
+    def _half(self, change: Change[Verdict]) -> limit_answer.HalfStep:
         """Search a limit with half the time step."""
         ends = (change.low, change.high)
         steps = (build(self.plan.scenario_at(value)).scene.world.controls[0].step for value in ends)
@@ -213,15 +212,13 @@ class _Search:
         change, scenario = side.change, self.plan.scenario_at(side.change.low)
         first = scale = scenario.contact.stiffness_scale
         given = limit_margin.Level(stiffness_scale=scale, low=change.low, high=change.high)
-        levels = limit_margin.Levels((given,), margins.ratio_of(scenario), is_at_rest=motion.settles(scenario))
+        levels = limit_margin.Levels((given,), limit_margin.ratio_of(scenario), is_at_rest=motion.settles(scenario))
         share = side.give.share if side.give is not None else 0.0
         while levels.is_far and len(levels.levels) < MOST_LEVELS:
-            scale *= margins.RATIO
+            scale *= limit_margin.RATIO
             is_foretold = len(levels.levels) > 1 or share > least
             if is_foretold:
-                low, high = levels.aim(
-                    -share if change.below is criterion.Verdict.FALLS else share, self.plan.tolerance
-                )
+                low, high = levels.aim(-share if change.below is Verdict.FALLS else share, self.plan.tolerance)
             else:
                 beyond = least * max(abs(change.low), abs(change.high))
                 low, high = change.low - beyond, change.high + beyond
@@ -241,15 +238,12 @@ class _Search:
         return replace(levels, problem=STILL_FAR) if levels.is_far else levels
 
 
-def _fallen(verdicts: Mapping[limit_plan.Number, criterion.Verdict]) -> dict[limit_plan.Number, criterion.Verdict]:
+def _fallen(verdicts: Mapping[Number, Verdict]) -> dict[Number, Verdict]:
     """Return what runs came to, those that move on at the end without having fallen among those that stand."""
-    return {
-        value: criterion.Verdict.STANDS if verdict is criterion.Verdict.UNDECIDED else verdict
-        for value, verdict in verdicts.items()
-    }
+    return {value: Verdict.STANDS if verdict is Verdict.UNDECIDED else verdict for value, verdict in verdicts.items()}
 
 
-def _fallen_change(change: limit_plan.Change[criterion.Verdict]) -> limit_plan.Change[criterion.Verdict]:
+def _fallen_change(change: Change[Verdict]) -> Change[Verdict]:
     below, above = _fallen({0: change.below, 1: change.above}).values()
     return replace(change, below=below, above=above)
 
@@ -265,7 +259,7 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
     assert plan is not None  # noqa: S101 - it was just searched
     sides: dict[float, limit_answer.Side] = {}
     for side in [one for bracket in answer.falls[:MOST_PICTURED] for one in bracket.sides.values()]:
-        falls = criterion.falls_before_zero(side.model_dump())
+        falls = falls_before_zero(side.model_dump())
         if side.value in sides or not (falls or side.status == FINISHED):
             continue
         scenario = plan.scenario_at(side.value)

@@ -13,7 +13,6 @@ it comes to rest before time zero (`start.settle`), unless the scenario says whe
 """
 
 import math
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from functools import cached_property
@@ -32,6 +31,7 @@ from blocksim.scenario.units import parse_unit
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
 from blocksim.study import criterion, runs
+from blocksim.study.answer import with_unit
 from blocksim.study.criterion import Criterion, Verdict
 from blocksim.study.executors import Execution
 from blocksim.study.plan import Values, Variations, build_distributions, levels_of
@@ -51,22 +51,17 @@ TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
 OPTION, OVER = "--vary", "--over"
 NAMES = {name: time.contacts for name, time in stepping.SCHEMES.items()}
-SHARE = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(%?)")
-PERCENT = 100.0
 Number = float  # in the unit of the range
 OnRun = Callable[[Number, Verdict, Row], None]
 
 
 def read_share(text: str) -> float:
     """Return a share that is written as 0.1% or 0.001. Raises ValueError."""
-    match = SHARE.fullmatch(text.strip())
-    if match is None:
-        raise ValueError(f"{text[:40]!r} is not a share; write it as in 0.1% or 0.001")
+    number = text.strip().removesuffix("%")
     try:
-        value = float(match[1])
+        return float(number) / (100.0 if "%" in text else 1.0)
     except ValueError:
-        raise ValueError(f"{match[1]!r} is not a number") from None
-    return value / PERCENT if match[2] else value
+        raise ValueError(f"{text[:40]!r} is not a share; write it as in 0.1% or 0.001") from None
 
 
 OtherKey = Annotated[
@@ -178,7 +173,9 @@ class Span:
         """Return the values of the first round, ends included; whole numbers each once."""
         values = []
         for share in (i / (self.count - 1) for i in range(self.count)):
-            value = self.low * (self.high / self.low) ** share if self.is_log else self.low + self.width * share
+            value = (
+                self.low * (self.high / self.low) ** share if self.is_log else self.low + (self.high - self.low) * share
+            )
             value = {0.0: self.low, 1.0: self.high}.get(share, value)
             values.append(float(round(value)) if self.is_whole else float(f"{value:.{DIGITS}g}"))
         return list(dict.fromkeys(values))
@@ -186,11 +183,6 @@ class Span:
     def between(self, low: Number, high: Number, parts: int = PARTS) -> list[Number]:
         """Return the values that divide a bracket, without its ends."""
         return [value for value in replace(self, low=low, high=high, count=parts + 1).grid() if low < value < high]
-
-    @property
-    def width(self) -> float:
-        """Length of the range."""
-        return self.high - self.low
 
     def fitted(self, value: float) -> Number:
         """Return a value as it is tried, the nearest within the range."""
@@ -200,7 +192,7 @@ class Span:
         """Return True if a bracket is as narrow as wanted, relative to its ends; of whole numbers: neighbours."""
         if self.is_whole:
             return high - low <= 1.0
-        size = max(abs(low), abs(high), FLOOR * self.width / tolerance)
+        size = max(abs(low), abs(high), FLOOR * (self.high - self.low) / tolerance)
         return high - low <= tolerance * size or not self.between(low, high)
 
 
@@ -239,7 +231,7 @@ def next_values(
         if is_alike and peaks[low] < peaks[here] > peaks[high]:
             for ends in ((low, here), (here, high)):
                 length = math.log(ends[1] / ends[0]) if span.is_log else ends[1] - ends[0]
-                whole = math.log(span.high / span.low) if span.is_log else span.width
+                whole = math.log(span.high / span.low) if span.is_log else (span.high - span.low)
                 is_near = length / whole * (span.count - 1) < 1.5 * 0.5**HALVINGS
                 if not (is_near or (span.is_whole and ends[1] - ends[0] <= 1.0)):
                     scan += span.between(*ends, parts=2)
@@ -267,11 +259,6 @@ def next_near(span: Span, known: Mapping[Number, Kind], near: Change[Kind], tole
     width = OUTWARD * ((high - low) or tolerance * abs(high))
     beyond = span.fitted(high + width if known[low] == near.below else low - width)
     return [] if known[low] not in (near.below, near.above) or beyond in known else [beyond]
-
-
-def comes_at_once(scenario: Scenario) -> bool:
-    """Return True for a scenario with sustained loads that does not begin at rest."""
-    return not scenario.start.settle and is_sustained(scenario)
 
 
 def is_sustained(scenario: Scenario) -> bool:
@@ -346,10 +333,6 @@ class LimitPlan:
         """Return what distinguishes the run of a value from the document."""
         value = int(number) if self.span.is_whole else f"{number:.12g} {self.unit}" if self.unit else number
         return {self.key: value, **self.apart}
-
-    def text(self, number: Number) -> str:
-        """Return a value for people."""
-        return f"{number:.7g} {self.unit}".rstrip()
 
     def scenario_at(self, number: Number) -> Scenario:
         """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
@@ -431,7 +414,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
         try:
             at_ends.append(plan.scenario_at(number))
         except BlocksimError as error:
-            message = f"{key} = {plan.text(number)}: {str(error).splitlines()[0]}"
+            message = f"{key} = {with_unit(number, unit)}: {str(error).splitlines()[0]}"
             raise InvalidInputError(message) from error
     start = bare.data.get("start")
     if (isinstance(start, Mapping) and "settle" in start) or not all(map(is_sustained, at_ends)):

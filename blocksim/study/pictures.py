@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,6 +220,7 @@ LOOKS = {  # options of the pictures of runs, by field: their flag, what they do
     "forces": ("--forces", "shows contacts of a run", (*OF_SCENES, HISTORY)),
     "colour": ("--colour", "colours the blocks of a run", (*OF_SCENES, HISTORY)),
 }
+OLDER = "replaces an older file, "
 MOST_SHOWN = 40  # letters of a value in a message
 
 
@@ -415,30 +416,20 @@ class AnimateOptions:
     on_picture: Callable[[int, int], None] = silent
 
 
-class Film(NamedTuple):
-    """An animation that was written."""
-
-    path: Path
-    is_replaced: bool  # an older one
-    pictures: int
-    beyond: str  # which blocks leave the view
-    remark: str  # on an unfinished run
-
-
-def draw_film(place: Path, options: AnimateOptions) -> Film:
-    """Write a run as an animation; see `animate`."""
+def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
+    """Write a run as an animation, see `animate`; return its path, what it is, and a remark on an unfinished run."""
     if options.out is not None:
         animation.writer_of(Path(options.out))
     stored = stored_run.load_stored_run(place)
     scenario = stored.scenario
     path = Path(options.out or f"{scenario.name}.gif")
     refuse_foreign(path, overwrite=options.overwrite)
-    is_replaced = path.exists()
+    older = OLDER if path.exists() else ""
     paint = paint_named(options.colour, stored.frames, scenario)
     look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)
     support, pace = run_data.support_of(scenario, stored.events), animation.Pace(options.speed, options.fps)
     count, beyond = animation.draw_animation(stored.frames, path, pace, look, support, options.on_picture)
-    return Film(path, is_replaced, count, beyond, stored.remark)
+    return path, f"{older}{count} frames{f'; {beyond}' if beyond else ''}", stored.remark
 
 
 @takes(AnimateOptions)
@@ -447,7 +438,7 @@ def animate(place: stored_run.Place, options: AnimateOptions) -> Path:
 
     Raises as `plot` does, and UnavailableError where nothing can write MP4.
     """
-    return draw_film(stored_run.folder_of(place), options).path
+    return draw_film(stored_run.folder_of(place), options)[0]
 
 
 FEWEST_LEVELS = 2  # to show a distance
