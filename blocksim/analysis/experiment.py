@@ -1,11 +1,11 @@
 """Measured tables: the repeats of a laboratory experiment, and sizes and materials of its blocks."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import fsum, inf, isfinite, nan, pi, sqrt
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from blocksim.errors import InvalidInputError, Problem
 from blocksim.scenario import input_files, spelling, units
@@ -80,7 +80,9 @@ class ExperimentTable:
     @property
     def data(self) -> "pd.DataFrame":
         """Block, quantity, unit (mm or deg), replicate and value, one row a measurement."""
-        return _frame(self.measurements)
+        import pandas as pd
+
+        return pd.DataFrame(list(self.measurements))
 
     @property
     def blocks(self) -> tuple[str, ...]:
@@ -136,7 +138,9 @@ class ExperimentTable:
 
     def statistics(self) -> "pd.DataFrame":
         """Return `summaries` as a table, a row a pair."""
-        return _frame(self.summaries())
+        import pandas as pd
+
+        return pd.DataFrame(list(self.summaries()))
 
     def summaries(self) -> tuple[Statistics, ...]:
         """Return the statistics of every pair of block and quantity, in order of first appearance."""
@@ -154,13 +158,6 @@ class ExperimentTable:
 def quote_names(names: Sequence[str]) -> str:
     """List names for a message, a long list cut short."""
     return spelling.list_names([f"'{name}'" for name in names], MOST_NAMES)
-
-
-def _frame(rows: Iterable[Any]) -> "pd.DataFrame":
-    """Return rows with names as a table of pandas."""
-    import pandas as pd
-
-    return pd.DataFrame(list(rows))
 
 
 def load_table(path: Path | str) -> ExperimentTable:

@@ -337,17 +337,12 @@ def _greatest_forces(frame: _Frame, forces: Floats) -> Floats:
     carry more than the arch between them, and count only where there are no others.
     """
     structure = {body: body for body in frame.blocks}
-
-    def first(body: int) -> int:
-        while structure[body] != body:
-            body = structure[body]
-        return body
-
     inner = [joint.one in structure and joint.other in structure for joint in frame.joints]
     for joint, is_inner in zip(frame.joints, inner, strict=True):
         if is_inner:
-            structure[first(joint.one)] = first(joint.other)
-    labels = [first(joint.one if joint.one in structure else joint.other) for joint in frame.joints]
+            old, new = structure[joint.one], structure[joint.other]
+            structure = {body: new if label == old else label for body, label in structure.items()}
+    labels = [structure[joint.one if joint.one in structure else joint.other] for joint in frame.joints]
     most = np.zeros(len(frame.joints))
     for label in set(labels):
         own = np.array([one == label for one in labels])

@@ -300,30 +300,21 @@ def _smoothed(x: system.Floats, y: system.Floats, values: system.Floats, spacing
     known = np.isfinite(x + y + values)
     if not known.any():
         return values
-    u, v = ((one - one[known].min()) / spacing + SMOOTHED for one in (x, y))
-    i, j = (np.clip(np.nan_to_num(one), SMOOTHED, 1e7).astype(np.int64) for one in (u, v))
-    cells, at = np.unique(np.stack([i, j], axis=-1)[known], axis=0, return_inverse=True)
-    at = at.ravel()
-    count: system.Floats = np.bincount(at).astype(np.float64)
-    total: system.Floats = np.bincount(at, values[known]).astype(np.float64)
+    places = ((one[known] - one[known].min()) / spacing + SMOOTHED for one in (x, y))
+    i, j = (np.clip(one, SMOOTHED, 1e7).astype(np.int64) for one in places)
+    row = int(j.max()) + 3
+    cells, at = np.unique(i * row + j, return_inverse=True)
+    held: system.Floats = np.stack([np.bincount(at), np.bincount(at, values[known])]).astype(np.float64)
     for _ in range(SMOOTHED):
-        count, total = _shared(cells, count, total)
+        more = held.copy()
+        for step in (row, -row, 1, -1):  # every cell gives a half to the four next to it, where they are
+            place = np.searchsorted(cells, cells + step).clip(max=len(cells) - 1)
+            there = cells[place] == cells + step
+            more[:, there] += 0.5 * held[:, place[there]]
+        held = more
     result = values.copy()
-    result[known] = (total / count)[at]
+    result[known] = (held[1] / held[0])[at]
     return result
-
-
-def _shared(cells: Any, count: system.Floats, total: system.Floats) -> tuple[system.Floats, system.Floats]:
-    """Return what cells hold, (k, 2) of them, after each has given a half to the four next to it, where they are."""
-    keys = cells[:, 0] * (cells[:, 1].max() + 3) + cells[:, 1]  # in order, as cells are
-    own = np.arange(len(cells))
-    found = [count.copy(), total.copy()]
-    for step in (cells[:, 1].max() + 3, -(cells[:, 1].max() + 3), 1, -1):
-        place = np.searchsorted(keys, keys + step).clip(max=len(keys) - 1)
-        there = keys[place] == keys + step
-        for held, gets in zip((count, total), found, strict=True):
-            gets[own[there]] += 0.5 * held[place[there]]
-    return found[0], found[1]
 
 
 SHADES = (
