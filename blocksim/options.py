@@ -61,6 +61,10 @@ class Option:
     is_argument: bool = False  # by its place, without a flag
 
 
+Overwrite = Annotated[bool, Option("Run again and replace the existing results.")]
+Replace = Annotated[bool, Option("Replace a file that blocksim did not write.")]
+
+
 class OptionField(NamedTuple):
     """A field of a dataclass of options; `kind` is its type, without what says that it is an option."""
 

@@ -9,7 +9,7 @@ from typing import Annotated
 from blocksim.bench import measurement, measurements
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import OutputError
-from blocksim.options import Option
+from blocksim.options import Option, Replace
 from blocksim.simulation import atomic, folder
 from blocksim.verification.case import number
 
@@ -32,7 +32,7 @@ def bench_command(
     quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,
     repeats: Annotated[int, Option("Samples of each number.", metavar="N", least=1)] = measurement.REPEATS,
     out: Annotated[Path | None, Option("Write everything as JSON.", metavar="FILE")] = None,
-    overwrite: command_line.Replace = False,
+    overwrite: Replace = False,
     screen: command_line.Screen,
 ) -> None:
     """Measure speed and memory, and show the table.

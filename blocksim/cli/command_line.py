@@ -37,7 +37,6 @@ Settings = Annotated[
         complete="scenario_keys",
     ),
 ]
-Replace = Annotated[bool, Option("Replace a file that blocksim did not write.")]
 Json = Annotated[bool, Option("Print the answer as JSON, for programs.", flags=("--json",))]
 Quiet = Annotated[bool, Option("Print only the answer.", flags=("--quiet", "-q"))]
 

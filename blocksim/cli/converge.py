@@ -8,11 +8,11 @@ from typing import Annotated
 
 import numpy as np
 
-from blocksim.cli.command_line import Replace, Report, Screen
+from blocksim.cli.command_line import Report, Screen
 from blocksim.cli.output import number, table_lines
 from blocksim.cli.prepare import ScenarioInput, announce_compilation
 from blocksim.errors import ExitCode
-from blocksim.options import Option
+from blocksim.options import Option, Replace
 from blocksim.scenario.spelling import list_names
 from blocksim.simulation import compilation, folder
 from blocksim.study import pictures, rows

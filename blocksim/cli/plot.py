@@ -6,7 +6,7 @@ from typing import Annotated
 
 from blocksim.cli import command_line, output, progress
 from blocksim.errors import InvalidInputError, OutputExistsError
-from blocksim.options import Option
+from blocksim.options import Option, Replace
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
@@ -88,7 +88,7 @@ def report_command(
         int,
         Option("Maximum number of runs of a sweep in the page.", flags=("--runs", "--members"), metavar="N", least=0),
     ] = reporting.MEMBERS,
-    overwrite: pictures.Replace = False,
+    overwrite: Replace = False,
     screen: command_line.TextScreen,
 ) -> command_line.Report:
     """Write runs and sweeps into one HTML file.
@@ -117,7 +117,7 @@ def export_command(
         str, Option("csv, vtkhdf for ParaView, geojson or dxf.", flags=("--format",), metavar="FORMAT")
     ] = "csv",
     out: Annotated[Path | None, Option("File to write (default: NAME.csv, NAME.vtkhdf).", metavar="FILE")] = None,
-    overwrite: pictures.Replace = False,
+    overwrite: Replace = False,
 ) -> command_line.Report:
     """Write all frames as CSV or VTKHDF, or final outlines as GeoJSON or DXF.
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Annotated
 
 from blocksim.errors import InvalidInputError
-from blocksim.options import Option, takes
+from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Document, Sweep, overrides, scenario_hash
 from blocksim.scenario.models.study import Uniform, Variation
 from blocksim.silence import silent
@@ -108,7 +108,7 @@ class FragilityOptions(Execution):
     out: Annotated[
         Path | str | None, Option("Folder to write (default: results/NAME/fragility-HASH).", metavar="DIR")
     ] = None
-    overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
+    overwrite: Overwrite = False
     on_row: OnRow = silent
 
 

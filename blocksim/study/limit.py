@@ -181,6 +181,8 @@ class _Search:
 
         Its rows are kept as `known[place]`. With `may_stay` nothing more is run where both ends came to the same again.
         """
+        below, above = _fallen({0: near.below, 1: near.above}).values()
+        near = replace(near, below=below, above=above)
         if place not in known:
             self.on_other(plan)
 
@@ -199,7 +201,7 @@ class _Search:
         ends = (change.low, change.high)
         steps = (build(self.plan.scenario_at(value)).scene.world.controls[0].step for value in ends)
         step = HALF * float(min(steps))
-        found = self._again(replace(self.plan, apart={STEP: step}), _fallen_change(change), self.step_rows, step)
+        found = self._again(replace(self.plan, apart={STEP: step}), change, self.step_rows, step)
         if found is None:
             return limit_answer.HalfStep(step=step, low=change.low, high=change.high, problem=NO_FINER)
         return limit_answer.HalfStep(step=step, low=found.low, high=found.high)
@@ -222,7 +224,7 @@ class _Search:
             else:
                 beyond = least * max(abs(change.low), abs(change.high))
                 low, high = change.low - beyond, change.high + beyond
-            near = replace(_fallen_change(change), low=self.plan.span.fitted(low), high=self.plan.span.fitted(high))
+            near = replace(change, low=self.plan.span.fitted(low), high=self.plan.span.fitted(high))
             apart: dict[str, object] = {limit_margin.STIFFNESS: scale}
             if scenario.time.step != "auto":
                 apart[STEP] = scenario.time.step * (first / scale) ** 0.5
@@ -241,11 +243,6 @@ class _Search:
 def _fallen(verdicts: Mapping[Number, Verdict]) -> dict[Number, Verdict]:
     """Return what runs came to, those that move on at the end without having fallen among those that stand."""
     return {value: Verdict.STANDS if verdict is Verdict.UNDECIDED else verdict for value, verdict in verdicts.items()}
-
-
-def _fallen_change(change: Change[Verdict]) -> Change[Verdict]:
-    below, above = _fallen({0: change.below, 1: change.above}).values()
-    return replace(change, below=below, above=above)
 
 
 def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.options import Option, takes
+from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, place_segments, scenario_hash
 from blocksim.scenario.models import loads, stepping, study
 from blocksim.scenario.placement import smallest_width
@@ -135,7 +135,7 @@ class SearchOptions(Execution):
     out: Annotated[Path | str | None, Option("Folder to write (default: results/NAME/limit-HASH).", metavar="DIR")] = (
         None
     )
-    overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
+    overwrite: Overwrite = False
 
     @property
     def shared(self) -> dict[str, Any]:

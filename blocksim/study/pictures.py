@@ -13,7 +13,7 @@ from blocksim.analysis.compare import limits, prediction_half_width
 from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
-from blocksim.options import Option, takes
+from blocksim.options import Option, Replace, takes
 from blocksim.scenario import Scenario, input_files, load_scenario, load_stored, overrides, spelling, units
 from blocksim.scenario import units as q
 from blocksim.scenario.models.study import Normal, Uniform, Variation
@@ -264,7 +264,6 @@ Colour = Annotated[
     ),
 ]
 Forces = Annotated[bool, Option("Draw contact forces, if the run has stored them.")]
-Replace = Annotated[bool, Option("Replace a file that blocksim did not write.")]
 
 
 @dataclass(frozen=True)

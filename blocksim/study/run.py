@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
-from blocksim.options import Option, takes
+from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.silence import silent
 from blocksim.simulation import Result, Watcher, checkpoint, read_result, renew_copies, simulate, simulate_into
@@ -33,7 +33,7 @@ class RunOptions:
             metavar="DIR",
         ),
     ] = None
-    overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
+    overwrite: Overwrite = False
     resume: Annotated[bool, Option("Resume a run that was stopped or killed.")] = False
     precautions: checkpoint.CheckpointPolicy = checkpoint.DEFAULTS
     threads: Threads = 1

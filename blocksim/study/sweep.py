@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError, UnavailableError
-from blocksim.options import Option, takes
+from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.silence import silent
@@ -73,7 +73,7 @@ class SweepOptions(Execution):
     keep_cases: Annotated[bool, Option("Keep a run folder with all frames for every case.")] = False
     fail_fast: Annotated[bool, Option("Stop at the first case that fails.")] = False
     retry_failed: Annotated[bool, Option("Run failed cases again.")] = False
-    overwrite: Annotated[bool, Option("Run again and replace the existing results.")] = False
+    overwrite: Overwrite = False
     on_row: OnRow = silent
 
     def document(self, scenario: Source) -> Document:
