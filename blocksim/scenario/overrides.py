@@ -6,7 +6,6 @@ import tomllib
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
@@ -282,42 +281,19 @@ def with_value(data: Data, key: str | Sequence[str | int], value: object) -> tup
         turned = (parts[0], parts[2], parts[1])  # pairs.B.A is the pair that the data may have as pairs.A.B
         parts = parts if follow(data, turned) is MISSING else (*turned, *parts[3:])
     path: list[str | int] = []
-    start = _with_list_to_change(_with_own_friction(data, parts), parts)
-    result = _put(start, parts, freeze(value), path)
+    result = _put(data, data, parts, freeze(value), path)
     assert isinstance(result, Mapping)  # noqa: S101 - data is a mapping, so is its copy
     return result, tuple(path)
 
 
-def _with_own_friction(data: Data, parts: Sequence[str | int]) -> Data:
-    """Give a pair of materials the general friction to start from, before a value in its own is set."""
-    inside_friction = parts[0] == "pairs" and tuple(parts[3:4]) == ("friction",) and len(parts) > 4
-    if not inside_friction or follow(data, parts[:4]) is not MISSING:
-        return data
-    side = "block_ground" if contact.GROUND in parts[1:3] else "block_block"
-    general = follow(data, ("friction", side))
-    return with_value(data, parts[:4], getattr(_FRICTION, side).static if general is MISSING else general)[0]
-
-
-def _with_list_to_change(data: Data, parts: Sequence[str | int]) -> Data:
-    """Write out the default of a missing list before one of its entries is set (bodies.0.velocity.1)."""
-    path: KeyPath = ()
-    for part, following in pairwise(parts):
-        path = (*path, int(part) if isinstance(follow(data, path), tuple) and str(part).isdecimal() else part)
-        if str(following).isdecimal() and follow(data, path) is MISSING:
-            field = field_at(path, data)
-            default = () if field is None or not isinstance(field.default, tuple) else field.default
-            return with_value(data, path, default)[0] if default else data
-    return data
-
-
-def _put(node: object, parts: Sequence[str | int], value: object, done: list[str | int]) -> object:
+def _put(data: Data, node: object, parts: Sequence[str | int], value: object, done: list[str | int]) -> object:
     """Copy `node` with the value at `parts` below it; `done` collects the path that was taken."""
     if not parts:
         return value
     if isinstance(node, tuple | list):
         index = _index(node, parts[0], done)
         done.append(index)
-        return (*node[:index], _put(node[index], parts[1:], value, done), *node[index + 1 :])
+        return (*node[:index], _put(data, node[index], parts[1:], value, done), *node[index + 1 :])
     if not isinstance(node, Mapping):
         raise UnfitOverrideError(f"{format_key(done)} is {toml(node)}, not a table")
     part = str(parts[0])
@@ -330,10 +306,10 @@ def _put(node: object, parts: Sequence[str | int], value: object, done: list[str
         if field is not None and isinstance(field.default, tuple):
             raise UnfitOverrideError(f"this scenario has no [[{part}]], so no {toml(str(parts[1]))} among them")
     done.append(part)
-    child = _opened(tuple(done), child) if len(parts) > 1 else child
+    child = _opened(data, tuple(done), child, str(parts[1])) if len(parts) > 1 else child
     synonym = SYNONYMS.get(part)  # another way to write what is going to be set
     others = {key: entry for key, entry in node.items() if key != synonym}
-    return {**others, part: _put(child, parts[1:], value, done)}
+    return {**others, part: _put(data, child, parts[1:], value, done)}
 
 
 def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]) -> int:
@@ -349,15 +325,22 @@ def _index(entries: Sequence[object], part: str | int, done: Sequence[str | int]
     raise UnfitOverrideError(message)
 
 
-def _opened(path: KeyPath, child: object) -> object:
-    """Turn a bare number, or nothing, into the table that it stands for, before something inside is set."""
-    bare = child is not MISSING and not isinstance(child, Mapping | tuple | list)
-    if path == ("contact", "restitution") and bare:
+def _opened(data: Data, path: KeyPath, child: object, following: str) -> object:
+    """Return what a bare number, or nothing, stands for, before something inside is set.
+
+    A pair of materials starts from the general friction, a missing list from its default (bodies.0.velocity.1).
+    """
+    is_bare = child is not MISSING and not isinstance(child, Mapping | tuple | list)
+    if path == ("contact", "restitution") and is_bare:
         return {"block_block": child, "block_ground": child}
-    if path[:-1] == ("friction",) and path[-1] in contact.Friction.model_fields:
+    is_of_pair = path[0] == "pairs" and path[3:] == ("friction",)
+    if is_of_pair or (path[:-1] == ("friction",) and path[-1] in contact.Friction.model_fields):
         if child is MISSING:
-            return {"static": getattr(_FRICTION, str(path[-1])).static}
-        return {"static": child} if bare else child
-    if path[:1] == ("pairs",) and path[3:] == ("friction",) and bare:
-        return {"static": child}
+            side = str(path[-1]) if not is_of_pair else "block_ground" if contact.GROUND in path else "block_block"
+            general = follow(data, ("friction", side))
+            child = getattr(_FRICTION, side).static if general is MISSING else general
+        return child if isinstance(child, Mapping | tuple | list) else {"static": child}
+    field = field_at(path, data) if child is MISSING and following.isdecimal() else None
+    if field is not None and isinstance(field.default, tuple) and field.default:
+        return field.default
     return {} if child is MISSING else child
