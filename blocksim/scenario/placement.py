@@ -2,7 +2,7 @@
 
 import math
 import weakref
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -238,11 +238,6 @@ def place_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     return (*profile_segments(scenario), *wall_segments(scenario))
 
 
-def surface_height(scenario: Scenario, x: float) -> float:
-    """Return the height (m) of the ground at x, the upper one at a vertical segment."""
-    return float(surface_heights(scenario, np.array([x]))[0])
-
-
 def surface_heights(scenario: Scenario, x: Floats) -> Floats:
     """Return the heights (m) of the ground at many places x (n,)."""
     points = scenario.ground.profile
@@ -262,7 +257,11 @@ def profile_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     if points is None:
         return ()
     (x_first, y_first), (x_last, y_last) = points[0], points[-1]
-    line = _corners([(x_first - ENDLESS, y_first), *points, (x_last + ENDLESS, y_last)])
+    line = [(x_first - ENDLESS, y_first)]
+    for middle, other in pairwise([*points, (x_last + ENDLESS, y_last)]):
+        if abs(_turn(line[-1], middle, other)) > STRAIGHT:
+            line.append(middle)
+    line.append((x_last + ENDLESS, y_last))
     joints = list(zip(line, line[1:], line[2:], strict=False))
     turns = [0.0, *(_turn(*joint) for joint in joints), 0.0]
     sharp = [*(_is_sharp(*joint) for joint in joints), False]
@@ -279,15 +278,6 @@ def profile_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
         )
         for (one, other), (before, after), is_sharp in zip(pairwise(line), pairwise(turns), sharp, strict=True)
     )
-
-
-def _corners(points: Sequence[geometry.Corner]) -> list[geometry.Corner]:
-    """Leave out the points where the line does not turn."""
-    kept = [points[0]]
-    for middle, other in pairwise(points[1:]):
-        if abs(_turn(kept[-1], middle, other)) > STRAIGHT:
-            kept.append(middle)
-    return [*kept, points[-1]]
 
 
 def _turn(before: geometry.Corner, joint: geometry.Corner, after: geometry.Corner) -> float:
@@ -316,7 +306,8 @@ def wall_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
         onwards = None if after is None else _turn(wall.start, wall.end, walls[after].end)
         # ends without a neighbour: covered by the ground or the middle of another wall, or not
         is_start_free, is_end_free = (
-            end[1] > surface_height(scenario, end[0]) + TOLERANCE and not _touches(end, starts[others], ends[others])
+            end[1] > surface_heights(scenario, np.array(end))[0] + TOLERANCE
+            and not _touches(end, starts[others], ends[others])
             for end in (wall.start, wall.end)
         )
         piece = PlacedSegment(

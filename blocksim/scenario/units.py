@@ -262,14 +262,11 @@ class Quantity(FieldReader):
                 raise invalid(f'{toml(value)} has no unit; write "{number:g} deg" (or "{number:g} rad")')
         if not math.isfinite(number):
             raise invalid(f"{toml(value)} is not a finite number; {self.wanted} is needed")
-        too_small = (self.above is not None and number <= self.above) or (
-            self.at_least is not None and number < self.at_least
-        )
-        too_large = (self.below is not None and number >= self.below) or (
-            self.at_most is not None and number > self.at_most
-        )
-        if too_small or too_large:
-            raise invalid(f"{toml(value)} is too {'small' if too_small else 'large'}; {self.wanted} is needed")
+        low, least, high, most = self.above, self.at_least, self.below, self.at_most
+        if (low is not None and number <= low) or (least is not None and number < least):
+            raise invalid(f"{toml(value)} is too small; {self.wanted} is needed")
+        if (high is not None and number >= high) or (most is not None and number > most):
+            raise invalid(f"{toml(value)} is too large; {self.wanted} is needed")
         if abs(number) > MOST:
             raise invalid(f"{toml(value)} is too large to compute with; at most {MOST:g} (SI) is allowed")
         if self.above == 0.0 and number < LEAST:
@@ -364,13 +361,11 @@ def parse_quantity(text: str, wanted: Kind = NUMBER) -> tuple[float, Dimension]:
 def unit_in(text: str) -> str:
     """Return the unit in a text such as "9.5 mm"; empty if it is not a number with a known unit."""
     found = _TEXT.fullmatch(text) if len(text) <= _MAX_LENGTH_QUANTITIES else None
-    if found is None or found[2] is None:
-        return ""
     try:
-        parse_unit(found[2])
+        parse_unit((found and found[2]) or "")
     except UnitError:
         return ""
-    return found[2].strip()
+    return found[2].strip() if found else ""
 
 
 Number = Annotated[float, Quantity(NUMBER)]

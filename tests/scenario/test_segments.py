@@ -5,12 +5,13 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.scenario import PlacedSegment, Scenario, place_segments, scenario_from_mapping
-from blocksim.scenario.placement import ENDLESS, surface_height
+from blocksim.scenario.placement import ENDLESS, surface_heights
 from tests.scenario.conftest import data_of
 
 Point = tuple[float, float]
@@ -94,11 +95,11 @@ def test_every_joint_is_a_valley_of_both_pieces_or_an_edge_of_one(steps: list[tu
 )
 def test_the_height_of_the_surface(x: float, height: float) -> None:
     made = scenario([(0, 1), (2, 2), (2, 3), (2, 4), (3, 2)])
-    assert surface_height(made, x) == height
+    assert surface_heights(made, np.array([x]))[0] == height
 
 
 def test_the_flat_ground_is_at_zero() -> None:
-    assert surface_height(scenario(), 3.0) == 0.0
+    assert surface_heights(scenario(), np.array([3.0]))[0] == 0.0
 
 
 def wall(start: Point, end: Point, **keys: str) -> dict[str, Any]:
