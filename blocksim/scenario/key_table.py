@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from blocksim.scenario.models import contact, geometry, loads, motion, record, scenario, stepping, study
+from blocksim.scenario.models import contact, geometry, loads, motion, scenario, stepping, study
 from blocksim.scenario.models.base import HELD, SYSTEMS
 from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS, Structure
@@ -34,7 +34,7 @@ def key_table() -> str:
         *((f'bodies.motion, kind = "{kind}"', model) for kind, model in motion.OWN_DRIVES.items()),
         ("ground", geometry.Ground),
         ("walls", geometry.Wall),
-        *((f'motion, kind = "{kind}"', model) for kind, model in record.MOTIONS.items()),
+        *((f'motion, kind = "{kind}"', model) for kind, model in motion.MOTIONS.items()),
         ("events", stepping.Event),
         ("events.velocity", stepping.NewVelocity),
         ("loads, every kind", loads.Load),

@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from blocksim.scenario.models import base, loads, motion, record, scenario, stepping
+from blocksim.scenario.models import base, loads, motion, scenario, stepping
 from blocksim.scenario.overrides import MISSING, NAMED, KeyPath, field_at, fields_of, follow, marks_of, table_at
 from blocksim.scenario.spelling import did_you_mean, did_you_mean_or_list, meant_word, nearest
 from blocksim.scenario.structures import KINDS
@@ -18,7 +18,7 @@ MAX_MISTAKES = 200
 """Mistakes that are examined; a file of a million mistakes must not take minutes."""
 KINDS_IN: dict[str | int, Iterable[str]] = {
     "structures": KINDS,
-    "motion": record.MOTIONS,
+    "motion": motion.MOTIONS,
     "probes": stepping.PROBES,
     "bodies": motion.DRIVES,
     "loads": loads.LOADS,

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.models.motion import FromTable, Harmonic, Pulse, Ramp, Rotation
-from blocksim.scenario.models.record import Baseline
+from blocksim.scenario.models.motion import Baseline, FromTable, Harmonic, Pulse, Ramp, Rotation
 from blocksim.scenario.models.scenario import Scenario
 
 Floats = NDArray[np.float64]

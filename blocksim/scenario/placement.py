@@ -306,7 +306,7 @@ def wall_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
         onwards = None if after is None else _turn(wall.start, wall.end, walls[after].end)
         # ends without a neighbour: covered by the ground or the middle of another wall, or not
         is_start_free, is_end_free = (
-            end[1] > surface_heights(scenario, np.array(end))[0] + TOLERANCE
+            end[1] > float(surface_heights(scenario, np.array(end[:1]))[0]) + TOLERANCE
             and not _touches(end, starts[others], ends[others])
             for end in (wall.start, wall.end)
         )

@@ -11,7 +11,7 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
-from blocksim.scenario.models import base, geometry, motion, record, stepping, study
+from blocksim.scenario.models import base, geometry, motion, stepping, study
 from blocksim.scenario.models.contact import GROUND, Friction, PairFriction
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import format_key, si_unit
@@ -106,7 +106,7 @@ def scenario_to_toml(
         data["time"] = {key: value for key, value in data["time"].items() if key in stepping.Time.model_fields}
     if experiment_table is not None and "experiment" in data:
         data["experiment"] = {"table": experiment_table}
-    if motion_table is not None and isinstance(scenario.motion, record.TABLED):
+    if motion_table is not None and isinstance(scenario.motion, motion.TABLED):
         data["motion"]["table"] = motion_table
     for number, table in _body_tables(scenario):
         name = (body_tables or {}).get(table.digest)
@@ -118,7 +118,7 @@ def scenario_to_toml(
 def deciding_values(scenario: Scenario) -> dict[str, Any]:
     """Return everything that determines the motion and the output, as for JSON; of a table of motion its digest."""
     data = scenario.model_dump(mode="json", exclude=UNHASHED)
-    if isinstance(scenario.motion, record.TABLED):
+    if isinstance(scenario.motion, motion.TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
     for number, table in _body_tables(scenario):
         data["bodies"][number]["motion"]["table"] = table.digest
@@ -145,7 +145,7 @@ def scenario_hash(scenario: Scenario) -> str:
 
 def motion_table_content(scenario: Scenario) -> bytes | None:
     """Return the table of motion as it was read, for a copy, or None without one."""
-    return scenario.motion.table.content if isinstance(scenario.motion, record.TABLED) else None
+    return scenario.motion.table.content if isinstance(scenario.motion, motion.TABLED) else None
 
 
 def _plain(table: BaseModel) -> dict[str, Any]:

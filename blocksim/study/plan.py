@@ -21,7 +21,7 @@ from blocksim.scenario import Document, Scenario, Sweep, scenario_hash, units
 from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fault
 from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
-from blocksim.scenario.models.record import TABLED
+from blocksim.scenario.models.motion import TABLED
 from blocksim.scenario.models.study import Normal, Uniform, Variation, round_digits, toml_number
 from blocksim.scenario.overrides import Override, format_key, freeze, parse_key, parse_value, with_value
 from blocksim.simulation.provenance import run_hash

@@ -7,8 +7,7 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
-from blocksim.scenario.models.motion import MotionTableError
-from blocksim.scenario.models.record import read_record
+from blocksim.scenario.models.motion import MotionTableError, read_record
 from tests.scenario.conftest import VALID, data_of
 
 G = 9.80665

@@ -8,7 +8,7 @@ import pytest
 from blocksim.analysis import Verdict
 from blocksim.analysis.compare import Comparison
 from blocksim.scenario import Document, load_scenario
-from blocksim.scenario.models.record import read_record
+from blocksim.scenario.models.motion import read_record
 from blocksim.scenario.units import STANDARD_GRAVITY
 from blocksim.simulation import Frames, Result
 from blocksim.study.compare import compare_run

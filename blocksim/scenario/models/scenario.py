@@ -19,7 +19,7 @@ from blocksim.scenario.models.base import HELD, SYSTEMS, Identifier, OneOf, Syst
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.loads import AnyLoad
-from blocksim.scenario.models.record import AnyMotion
+from blocksim.scenario.models.motion import AnyMotion
 from blocksim.scenario.models.stepping import AnyProbe, AnyTime, Event, Explicit, Output, Start
 from blocksim.scenario.models.study import Experiment, Sweep
 from blocksim.scenario.structures import AnyStructure
