@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -166,14 +167,42 @@ def write_vtkhdf(path: Path, frames: Frames, scenario: Scenario) -> int:
     """
     chosen = _finite(frames)
     tracks = (*frames.tracks, supports_track(scenario, frames.tracks[0], frames.time))
-    content = io.BytesIO()
-    with h5py.File(content, "w") as file:
-        _write_grid(file.create_group("VTKHDF"), tracks, frames.time[chosen], chosen)
-        _write_names(file["VTKHDF"], frames.names, len(chosen))
-        names = [name.encode() for name in frames.names]
-        file.create_dataset("blocksim/block_names", data=names, dtype=h5py.string_dtype())
-    atomic.write_bytes(path, content.getbuffer())
-    return len(chosen)
+    corners = np.concatenate([_corners_of(one) for one in tracks])
+    cells, points, blocks, count = len(corners), int(corners.sum()), len(frames.names), len(chosen)
+    others = (one for track in tracks for one in track.system.outputs if one.name not in (*PLACE, *VELOCITY))
+    sizes = {VELOCITY_DATA: 3, WAY_DATA: 3, **{one.column: 1 for one in others}}  # data of cells: components
+    with _grid(path, frames, chosen) as group:
+        for name, number in (("Points", points), ("Cells", cells), ("ConnectivityIds", points)):
+            group[f"NumberOf{name}"] = np.array([number], dtype=np.int64)
+        group["Connectivity"] = np.arange(points, dtype=np.int64)
+        group["Offsets"] = np.concatenate([[0], np.cumsum(corners)]).astype(np.int64)
+        group["Types"] = np.where(corners == 4, QUAD, POLYGON).astype(np.uint8)
+        group["CellData/block"] = np.pad(np.arange(1, blocks + 1, dtype=np.int64), (0, cells - blocks))
+        steps, first, zero = group["Steps"], np.arange(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+        steps["PartOffsets"] = zero
+        steps["PointOffsets"] = points * first
+        steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = zero[:, None]
+        steps["CellDataOffsets/block"] = zero
+        for name in sizes:
+            steps[f"CellDataOffsets/{name}"] = len(corners) * first
+        data = {}
+        for name, rows, size in (("Points", points, 3), *((f"CellData/{name}", cells, sizes[name]) for name in sizes)):
+            shape = (rows * count,) if size == 1 else (rows * count, size)
+            chunks = (min(rows * count, CHUNK), *shape[1:])
+            data[name] = group.create_dataset(name, shape, dtype=np.float64, chunks=chunks, **PACKED)
+        at_once = max(1, BATCH // cells)
+        for start in range(0, count, at_once):
+            some = chosen[start : start + at_once]
+            for name, values in data.items():
+                rows = points if name == "Points" else cells
+                parts = [_cell_data(one, name.removeprefix("CellData/"), some) for one in tracks]
+                joined = np.concatenate(parts, axis=1)
+                if values.ndim == 2:  # in space
+                    joined = np.pad(joined, ((0, 0), (0, 0), (0, 1)))
+                values[start * rows : (start + len(some)) * rows] = joined.reshape(-1, *values.shape[1:])
+        text = [name.encode() for name in frames.names]
+        group.file.create_dataset("blocksim/block_names", data=text, dtype=h5py.string_dtype())
+    return count
 
 
 def write_contacts_vtkhdf(path: Path, frames: Frames, contacts: Contacts) -> int:
@@ -192,30 +221,45 @@ def write_contacts_vtkhdf(path: Path, frames: Frames, contacts: Contacts) -> int
     for name in CONTACT_NUMBERS:
         suffix, factor = probes.TABLE_UNITS[UNITS[name]]
         data[f"{name}{suffix}"] = factor * rows[name]
-    content = io.BytesIO()
-    with h5py.File(content, "w") as file:
-        group = file.create_group("VTKHDF")
-        group.attrs["Version"] = np.array(VERSION, dtype=np.int64)
-        group.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
+    with _grid(path, frames, chosen) as group:
         for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
             group[name] = counts
         group["Points"] = np.stack([rows["x"], rows["y"], 0.0 * rows["x"]], axis=-1)
         group["Connectivity"] = np.arange(len(rows)) - np.repeat(first, counts)
         group["Offsets"] = np.concatenate([np.arange(count + 1) for count in counts.tolist()])
         group["Types"] = np.full(len(rows), VERTEX, dtype=np.uint8)
-        steps = group.create_group("Steps")
-        steps.attrs["NSteps"] = np.int64(len(chosen))
-        steps["Values"] = frames.time[chosen]
-        steps["NumberOfParts"] = np.ones(len(chosen), dtype=np.int64)
+        steps = group["Steps"]
         steps["PartOffsets"] = np.arange(len(chosen), dtype=np.int64)
         steps["PointOffsets"] = first
         steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = first[:, None]
         for name, values in data.items():
             group.create_dataset(f"PointData/{name}", data=values, **(PACKED if len(values) else {}))
             steps[f"PointDataOffsets/{name}"] = first
-        _write_names(group, frames.names, len(chosen))
-    atomic.write_bytes(path, content.getbuffer())
     return len(rows)
+
+
+@contextmanager
+def _grid(path: Path, frames: Frames, chosen: Indices) -> Iterator[Any]:
+    """Give the group of a grid at the times of some frames, which is written to a file in the end. Raises OutputError.
+
+    The names of the blocks are field data of every time; no blocks, no field data. VTK reads strings of variable
+    length, and takes them for UTF-8, where HDF5 says that they are ASCII.
+    """
+    content, times, names = io.BytesIO(), len(chosen), [name.encode() for name in frames.names]
+    with h5py.File(content, "w") as file:
+        group = file.create_group("VTKHDF")
+        group.attrs["Version"] = np.array(VERSION, dtype=np.int64)
+        group.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
+        steps = group.create_group("Steps")
+        steps.attrs["NSteps"] = np.int64(times)
+        steps["Values"] = frames.time[chosen]
+        steps["NumberOfParts"] = np.ones(times, dtype=np.int64)
+        yield group
+        if names:
+            group.create_dataset("FieldData/block_names", data=names, dtype=h5py.string_dtype("ascii"))
+            steps["FieldDataOffsets/block_names"] = np.zeros(times, dtype=np.int64)
+            steps["FieldDataSizes/block_names"] = np.array([[1, len(names)]] * times, dtype=np.int64)
+    atomic.write_bytes(path, content.getbuffer())
 
 
 def _finite(frames: Frames) -> Indices:
@@ -227,61 +271,6 @@ def _finite(frames: Frames) -> Indices:
     if len(chosen) == 0 or not any(track.values.size for track in frames.tracks):
         raise InvalidInputError("no frame to export")
     return chosen
-
-
-def _write_names(group: Any, names: Sequence[str], times: int) -> None:
-    """Write the names of the blocks as field data of every time; no blocks, no field data.
-
-    VTK reads strings of variable length, and takes them for UTF-8, where HDF5 says that they are ASCII.
-    """
-    if names:
-        text = [name.encode() for name in names]
-        group.create_dataset("FieldData/block_names", data=text, dtype=h5py.string_dtype("ascii"))
-        group["Steps/FieldDataOffsets/block_names"] = np.zeros(times, dtype=np.int64)
-        group["Steps/FieldDataSizes/block_names"] = np.array([[1, len(names)]] * times, dtype=np.int64)
-
-
-def _write_grid(group: Any, tracks: Sequence[Track], times: Floats, chosen: Indices) -> None:
-    """Write how points make cells, where the parts of each time (s) begin, and what changes."""
-    corners = np.concatenate([_corners_of(one) for one in tracks])
-    cells, points, count = len(corners), int(corners.sum()), len(times)
-    others = (one for track in tracks for one in track.system.outputs if one.name not in (*PLACE, *VELOCITY))
-    sizes = {VELOCITY_DATA: 3, WAY_DATA: 3, **{one.column: 1 for one in others}}  # data of cells: components
-    group.attrs["Version"] = np.array(VERSION, dtype=np.int64)
-    group.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
-    for name, number in (("Points", points), ("Cells", cells), ("ConnectivityIds", points)):
-        group[f"NumberOf{name}"] = np.array([number], dtype=np.int64)
-    group["Connectivity"] = np.arange(points, dtype=np.int64)
-    group["Offsets"] = np.concatenate([[0], np.cumsum(corners)]).astype(np.int64)
-    group["Types"] = np.where(corners == 4, QUAD, POLYGON).astype(np.uint8)
-    numbers = np.zeros(cells, dtype=np.int64)  # of blocks; 0 for what is none
-    numbers[: len(tracks[0].names)] = np.arange(1, len(tracks[0].names) + 1)
-    group["CellData/block"] = numbers
-    steps, first, zero = group.create_group("Steps"), np.arange(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
-    steps.attrs["NSteps"] = np.int64(count)
-    steps["Values"] = times
-    steps["NumberOfParts"] = zero + 1
-    steps["PartOffsets"] = zero
-    steps["PointOffsets"] = points * first
-    steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = zero[:, None]
-    steps["CellDataOffsets/block"] = zero
-    for name in sizes:
-        steps[f"CellDataOffsets/{name}"] = len(corners) * first
-    data = {}
-    for name, rows, size in (("Points", points, 3), *((f"CellData/{name}", cells, sizes[name]) for name in sizes)):
-        shape = (rows * count,) if size == 1 else (rows * count, size)
-        chunks = (min(rows * count, CHUNK), *shape[1:])
-        data[name] = group.create_dataset(name, shape, dtype=np.float64, chunks=chunks, **PACKED)
-    at_once = max(1, BATCH // cells)
-    for start in range(0, count, at_once):
-        some = chosen[start : start + at_once]
-        for name, values in data.items():
-            rows = points if name == "Points" else cells
-            parts = [_cell_data(one, name.removeprefix("CellData/"), some) for one in tracks]
-            joined = np.concatenate(parts, axis=1)
-            if values.ndim == 2:  # in space
-                joined = np.pad(joined, ((0, 0), (0, 0), (0, 1)))
-            values[start * rows : (start + len(some)) * rows] = joined.reshape(-1, *values.shape[1:])
 
 
 def _corners_of(track: Track) -> NDArray[np.int64]:
