@@ -19,7 +19,6 @@ from blocksim.simulation import compilation, events, loop, probes, recorder, set
 from blocksim.simulation.frames import COLUMNS, Columns, Frames, as_frame, final_values
 from blocksim.simulation.ledger import (
     EnergyLedger,
-    InPlay,
     adds_up,
     energy_ledger,
     ledger_of,
@@ -77,14 +76,14 @@ class MemberFailure:
 EnsembleEnd = MemberEnd | MemberFailure
 
 
-def in_play_of(scenes: AnyScene | systems.Coupled, members: Sequence[int]) -> list[InPlay]:
-    """Return what decides the energy in play, of some members of a stack."""
+def in_play_of(scenes: AnyScene | systems.Coupled, members: Sequence[int]) -> list[tuple[float, float]]:
+    """Return mass (kg) and energy moved (J), which decide the energy in play, of some members of a stack."""
     further = mass_of_systems(member(scenes, 0)) if isinstance(scenes, systems.Coupled) else 0.0  # in a stack of one
     mass = scenes.world.bodies.view(np.ndarray)["mass"]
     masses = [float(np.sum(mass[m])) + further for m in members]  # one by one: the order matters
     book = scenes.world.ledger[:, 0]
     moved = book["largest_kinetic"] + book["travel_work"]
-    return [*map(InPlay, masses, moved[list(members)].tolist())]
+    return [*zip(masses, moved[list(members)].tolist(), strict=True)]
 
 
 def member_ends(
@@ -118,7 +117,7 @@ def member_ends(
     for m, (code, in_play) in enumerate(zip(codes, in_play_of(scenes, range(count)), strict=True)):
         if code == arrays.PAIRS_FULL:
             continue
-        some, ledger = slice(m, m + 1), ledger_of(names, measured[m], starts[m], in_play)
+        some, ledger = slice(m, m + 1), ledger_of(names, measured[m], starts[m], *in_play)
         outcome = loop.outcome_of(code, ledger)
         if not outcome.is_finished:
             outcome = loop.diagnose(outcome, code, member(scenes, m), placed[m])
@@ -180,7 +179,23 @@ def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: b
         for batch in _batches(scenarios, most):
             for kernels in dict.fromkeys(map(compilation.kernels_of, batch)):
                 compilation.compile_kernels(kernels)
-            yield _run_batch(batch, pool, threads, peaks=peaks)
+            ends: dict[int, EnsembleEnd] = {}
+            for one in build_stacks(batch):
+                if isinstance(one, Refusal):
+                    ends[one.number] = MemberFailure(one.error)
+                    continue
+                first, stack = batch[one.numbers[0]], one
+                try:
+                    if settles(first):  # it has one scene
+                        scene, _ = settling.initial_scene(member(one.scenes, 0), first, one.placed[0], team.ALONE)
+                        stack = one._replace(scenes=stack_of_one(scene))
+                except BlocksimError as error:
+                    ends[one.numbers[0]] = MemberFailure(error)
+                    continue
+                ensemble = Ensemble(batch, stack, peaks=peaks)
+                ensemble.advance(pool, threads)
+                ends.update(zip(one.numbers, ensemble.ends(), strict=True))
+            yield [ends[i] for i in range(len(batch))]
 
 
 def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario]]:
@@ -197,28 +212,6 @@ def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario
         yield batch
 
 
-def _run_batch(
-    scenarios: Sequence[Scenario], pool: ThreadPoolExecutor, threads: int, *, peaks: bool
-) -> list[EnsembleEnd]:
-    ends: dict[int, EnsembleEnd] = {}
-    for one in build_stacks(scenarios):
-        if isinstance(one, Refusal):
-            ends[one.number] = MemberFailure(one.error)
-            continue
-        first, stack = scenarios[one.numbers[0]], one
-        try:
-            if settles(first):  # it has one scene
-                scene, _ = settling.initial_scene(member(one.scenes, 0), first, one.placed[0], team.ALONE)
-                stack = one._replace(scenes=stack_of_one(scene))
-        except BlocksimError as error:
-            ends[one.numbers[0]] = MemberFailure(error)
-            continue
-        ensemble = Ensemble(scenarios, stack, peaks=peaks)
-        ensemble.advance(pool, threads)
-        ends.update(zip(one.numbers, ensemble.ends(), strict=True))
-    return [ends[i] for i in range(len(scenarios))]
-
-
 class Ensemble:
     """Scenes of one scheme and shape, stacked, to be advanced together once."""
 
@@ -233,23 +226,22 @@ class Ensemble:
         self.scheme, self.names = scheme_of(self.scenes), ledger_names(self.scenes)
         self.bodies = int(self.scenes.world.bodies.shape[1]) - 1
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
-        own = zip([scenarios[number] for number in stack.numbers], self.placed, self.time_steps, strict=True)
-        self.timelines = [events.Timeline(one, placed, step) if one.events else None for one, placed, step in own]
-        ends = [scenarios[number].time.end for number in stack.numbers]
-        self.last_steps = np.array([*map(loop.last_step_of, ends, self.time_steps)], dtype=np.int64)
-        self.starts = np.zeros((len(ends), len(self.scheme.measured)))
-        self.codes = np.zeros(len(ends), dtype=np.int64)
-        every = [scenarios[number].output.every for number in stack.numbers]
-        self.periods = np.array([max(one / step, 1.0) for one, step in zip(every, self.time_steps, strict=True)])
+        own = [scenarios[number] for number in stack.numbers]
+        whole = [*zip(own, self.placed, self.time_steps, strict=True)]
+        self.timelines = [events.Timeline(*one) if one[0].events else None for one in whole]
+        self.last_steps = np.array([loop.last_step_of(one.time.end, step) for one, _, step in whole], dtype=np.int64)
+        self.starts = np.zeros((len(own), len(self.scheme.measured)))
+        self.codes = np.zeros(len(own), dtype=np.int64)
+        self.periods = np.array([max(one.output.every / step, 1.0) for one, _, step in whole])
         start = self._positions(self.scenes, slice(None))
-        self.supports = [probes.MovingSupport(scenarios[number]) for number in stack.numbers]
+        self.supports = [probes.MovingSupport(one) for one in own]
         self.watch = Watch(self.placed, self.supports, start)
-        steps, places = np.zeros(len(ends), dtype=np.int64), np.zeros_like(start)
+        steps, places = np.zeros(len(own), dtype=np.int64), np.zeros_like(start)
         reach, thresholds = self.watch.shapes.reach, self.watch.thresholds
         # compiled code sees no motion relative to a support that moves
         periods = np.where([support.moves for support in self.supports], 0.0, self.periods)
-        frames = self.periods if peaks else np.zeros(len(ends))
-        self.watched = Watched(frames, periods, steps, places, start, reach, thresholds, np.zeros(len(ends)))
+        frames = self.periods if peaks else np.zeros(len(own))
+        self.watched = Watched(frames, periods, steps, places, start, reach, thresholds, np.zeros(len(own)))
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
@@ -281,7 +273,7 @@ class Ensemble:
             if members.size:
                 measured, which = self._measured(members), members.tolist()
                 ledgers = (
-                    ledger_of(self.names, measured[m], self._start(m), own)
+                    ledger_of(self.names, measured[m], self._start(m), *own)
                     for m, own in zip(which, in_play_of(self.scenes, which), strict=True)
                 )
                 members = members[[*map(adds_up, ledgers)]]

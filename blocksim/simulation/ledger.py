@@ -7,7 +7,7 @@ alone: where outputs, checkpoints and signals interrupt a run must not decide wh
 import math
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,31 +91,23 @@ def start_energy(scene: "AnyScene") -> float:
     return float(schemes.measure_row(scene)[: len(schemes.ledger_names(scene))].sum())
 
 
-class InPlay(NamedTuple):
-    """What the energy in play of a scene follows from, beside the work of its support and loads."""
-
-    mass: float  # kg, of all bodies
-    moved: float  # J: largest kinetic energy + sum of the weights' travel |m g v| dt
-
-
 def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start."""
     schemes, book = compiled("simulation.schemes"), scene.world.ledger[0]
     mass = float(np.sum(scene.world.bodies.mass)) + schemes.mass_of_systems(scene)
-    in_play = InPlay(mass, float(book.largest_kinetic + book.travel_work))
-    return ledger_of(schemes.ledger_names(scene), schemes.measure_row(scene), start, in_play)
+    moved = float(book.largest_kinetic + book.travel_work)
+    return ledger_of(schemes.ledger_names(scene), schemes.measure_row(scene), start, mass, moved)
 
 
-def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, in_play: InPlay) -> EnergyLedger:
-    """Return the ledger of a state in which energies (J) of these names were measured.
+def ledger_of(names: Sequence[str], row: NDArray[np.float64], start: float, mass: float, moved: float) -> EnergyLedger:
+    """Return the ledger of a state in which energies (J) of these names were measured; `mass` (kg) is of all bodies.
 
-    Energy in play: largest kinetic energy + sum of the weights' travel |m g v| dt + |work of support and loads|, at
-    least m_total g 1 mm.
+    Energy in play: `moved` (J), the largest kinetic energy + sum of the weights' travel |m g v| dt, and |work of
+    support and loads|, at least m_total g 1 mm.
     """
     entries = dict(zip(names, row.tolist(), strict=False))
-    driven = in_play.moved + abs(entries.get("to_support", 0.0)) + abs(entries.get("to_loads", 0.0))
-    weight = in_play.mass * USUAL_GRAVITY
-    return EnergyLedger(**entries, start=start, in_play=max(driven, weight * SMALLEST_HEIGHT))
+    driven = moved + abs(entries.get("to_support", 0.0)) + abs(entries.get("to_loads", 0.0))
+    return EnergyLedger(**entries, start=start, in_play=max(driven, mass * USUAL_GRAVITY * SMALLEST_HEIGHT))
 
 
 def next_energy_check(done: int, bodies: int) -> int:

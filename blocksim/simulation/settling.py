@@ -9,8 +9,7 @@ stands still for loads. Bodies that are held have no weight and no inverse mass 
 
 Supports that accelerate from time zero on (a pulse that begins at its peak) load the contacts at once. Springs would
 need a time of sqrt(m/k) to take that up, in which a block that is about to slip gains a velocity of a sqrt(m/k) that it
-keeps: 2 to 4 % of the slip of a slab of stone of 1 m under 0.8 g. So the inertial force of that acceleration is loaded
-too, after gravity, as far as the scene carries it at rest: all of it, or up to where something slips, rocks or falls.
+keeps. So the inertial force of that acceleration is loaded too, after gravity, as far as the scene carries it at rest.
 With springs a scene under a pulse that begins at its peak at time zero settles unasked, if it rests as it was placed.
 
 A scene at rest is one whose blocks have no acceleration (springs), or move no further (rigid contacts). One that fails
