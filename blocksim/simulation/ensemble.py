@@ -17,14 +17,7 @@ from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
 from blocksim.simulation import compilation, events, loop, probes, recorder, settling, team
 from blocksim.simulation.frames import COLUMNS, Columns, Frames, as_frame, final_values
-from blocksim.simulation.ledger import (
-    EnergyLedger,
-    adds_up,
-    energy_ledger,
-    ledger_of,
-    next_energy_check,
-    start_energy,
-)
+from blocksim.simulation.ledger import EnergyLedger, adds_up, energy_ledger, ledger_of, next_energy_check, start_energy
 from blocksim.simulation.observables import OBSERVABLES, Value, Watch, observe
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measure_row, scheme_of
 from blocksim.world.build import Refusal, Stack, member, stack_of_one
