@@ -75,52 +75,27 @@ CHUNK_ROWS = 1024  # of a column in run.h5
 DIGITS = 20  # characters of a number in CSV
 
 
-@dataclass(frozen=True)
-class Column:
-    """A quantity that a probe records."""
-
-    name: str
-    unit: str  # SI
-    meaning: str
-
-
-COLUMNS: Mapping[str, tuple[Column, ...]] = {
-    FORCE: (
-        Column("fx", "N", "force along x"),
-        Column("fy", "N", "force along y"),
-        Column("x", "m", "point of application, weighted by normal forces"),
-        Column("y", "m", "point of application"),
-        Column("mobilised", "1", "shear forces over normal forces times static friction"),
-        Column("contacts", "1", "number of contacts"),
-    ),
-    POINT: (
-        Column("x", "m", "place along x"),
-        Column("y", "m", "place along y"),
-        Column("dx", "m", "displacement from the start"),
-        Column("dy", "m", "displacement from the start"),
-        Column("relative_dx", "m", "displacement from the start relative to the support"),
-        Column("relative_dy", "m", "displacement from the start relative to the support"),
-        Column("vx", "m/s", "velocity"),
-        Column("vy", "m/s", "velocity"),
-        Column("relative_vx", "m/s", "velocity relative to the support"),
-        Column("relative_vy", "m/s", "velocity relative to the support"),
-        Column("rotation", "rad", "angle turned since the start"),
-    ),
-    JOINT: (
-        Column("opening", "m", "gap in the middle of the joint"),
-        Column("opening_first", "m", "gap at its first end: on the left, seen from the first body"),
-        Column("opening_last", "m", "gap at its last end: on the right, seen from the first body"),
-        Column("slip", "m", "displacement of the second body along the joint, towards +x where it lies on the first"),
-        Column("rotation", "rad", "angle that the second body has turned relative to the first"),
-    ),
+COLUMNS: Mapping[str, Mapping[str, str]] = {
+    # x, y: point of application, weighted by normal forces; mobilised: shear forces over normal forces times static
+    # friction; contacts: their number
+    FORCE: {"fx": "N", "fy": "N", "x": "m", "y": "m", "mobilised": "1", "contacts": "1"},
+    # x, y: place; dx, dy: displacement from the start; relative: to the support; rotation: angle turned since the start
+    POINT: {
+        **dict.fromkeys(("x", "y", "dx", "dy", "relative_dx", "relative_dy"), "m"),
+        **dict.fromkeys(("vx", "vy", "relative_vx", "relative_vy"), "m/s"),
+        "rotation": "rad",
+    },
+    # opening: gap in the middle of the joint, at its first end (on the left, seen from the first body) and at its last;
+    # slip: displacement of the second body along the joint, towards +x where it lies on the first; rotation: angle that
+    # the second body has turned relative to the first
+    JOINT: {"opening": "m", "opening_first": "m", "opening_last": "m", "slip": "m", "rotation": "rad"},
 }
+"""What each kind of probe records, by name: the unit (SI)."""
 
 
-def columns_of(kind: str, ledger: Sequence[str]) -> tuple[Column, ...]:
-    """Return the columns of a kind of probe; `ledger` names the energies of a run."""
-    if kind == ENERGY:
-        return tuple(Column(name, "J", name.replace("_", " ")) for name in ledger)
-    return COLUMNS[kind]
+def columns_of(kind: str, ledger: Sequence[str]) -> Mapping[str, str]:
+    """Return the columns of a kind of probe with their units; `ledger` names the energies (J) of a run."""
+    return dict.fromkeys(ledger, "J") if kind == ENERGY else COLUMNS[kind]
 
 
 @dataclass(frozen=True, repr=False)
@@ -182,18 +157,18 @@ def bytes_of_series(scenario: Scenario, steps: int, step: float, energies: int) 
 
 
 def series_of(
-    name: str, kind: str, columns: Sequence[Column], rows: Sequence[tuple[int, Sequence[float]]], time_step: float
+    name: str, kind: str, units: Mapping[str, str], rows: Sequence[tuple[int, Sequence[float]]], time_step: float
 ) -> ProbeSeries:
     """Return samples from rows of step and values; `time_step` in s."""
     steps = np.array([step for step, _ in rows], dtype=np.int64)
-    values = np.array([row for _, row in rows], dtype=np.float64).reshape(len(rows), len(columns))
+    values = np.array([row for _, row in rows], dtype=np.float64).reshape(len(rows), len(units))
     return ProbeSeries(
         name,
         kind,
         steps,
         np.multiply(steps, time_step, dtype=np.float64),
-        {one.name: np.ascontiguousarray(values[:, place]) for place, one in enumerate(columns)},
-        {one.name: one.unit for one in columns},
+        {name: np.ascontiguousarray(values[:, place]) for place, name in enumerate(units)},
+        dict(units),
     )
 
 
@@ -318,9 +293,9 @@ def _arm(angle: float, at: tuple[float, float]) -> tuple[float, float]:
 class Probe:
     """One probe and its samples that are held: a row each, step and values."""
 
-    def __init__(self, name: str, kind: str, columns: tuple[Column, ...], period: float, sampler: Sampler) -> None:
+    def __init__(self, name: str, kind: str, units: Mapping[str, str], period: float, sampler: Sampler) -> None:
         """Begin without samples; `period` is the number of steps between two of them, not rounded."""
-        self.name, self.kind, self.columns, self.period, self.sampler = name, kind, columns, period, sampler
+        self.name, self.kind, self.units, self.period, self.sampler = name, kind, units, period, sampler
         self.rows: list[tuple[int, Values]] = []
         self.last = -1  # step of the last sample
 
@@ -385,7 +360,7 @@ class Probes:
 
     def series(self) -> dict[str, ProbeSeries]:
         """Return the samples that are held by the names of their probes."""
-        return {one.name: series_of(one.name, one.kind, one.columns, one.rows, self.time_step) for one in self.all}
+        return {one.name: series_of(one.name, one.kind, one.units, one.rows, self.time_step) for one in self.all}
 
     def drain(self) -> dict[str, ProbeSeries]:
         """Return the samples that are held, and hold them no more."""
