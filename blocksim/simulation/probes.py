@@ -362,13 +362,6 @@ class Probes:
         """Return the samples that are held by the names of their probes."""
         return {one.name: series_of(one.name, one.kind, one.units, one.rows, self.time_step) for one in self.all}
 
-    def drain(self) -> dict[str, ProbeSeries]:
-        """Return the samples that are held, and hold them no more."""
-        found = self.series()
-        for probe in self.all:
-            probe.rows.clear()
-        return found
-
 
 NO_PROBES = Probes((), AT_REST, 1.0)
 

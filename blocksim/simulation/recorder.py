@@ -63,7 +63,7 @@ class Recorder:
         self.placed = tuple(placed)
         self.systems = (blocks_placed(placed), *others)
         self.time_step = step
-        self.sink: FrameFile | None = None
+        self.sink: FrameFile | None = None  # where frames go but the last, from when on it is there
         self.steps_per_frame = max(every / step, 1.0)
         self.steps: list[int] = []
         self.digests: list[bytes] = []  # of each frame and all before it
@@ -101,11 +101,6 @@ class Recorder:
         for frame in self.held:
             self.watch.follow([0], frame.states[0][None], [frame.step * self.time_step])
             self.digests.append(frame.digest(self.digests[-1] if self.digests else b""))
-
-    def pour_into(self, sink: "FrameFile") -> None:
-        """Hold no more than the last frame from now on; `sink` has those so far, and gets all others."""
-        self.sink = sink
-        del self.held[:-1]
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already: then look whether that is the same."""

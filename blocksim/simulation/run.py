@@ -179,7 +179,8 @@ def simulate_into(
                 checkpoint.take_over(stored, scenario, recorder)
             toml = keep_scenario(scenario, tables, folder)
             with FrameFile(folder / files.FRAMES, recorder, toml, ledger_names(scene)) as sink:
-                recorder.pour_into(sink)
+                recorder.sink = sink
+                del recorder.held[:-1]  # the file has them
                 # of the part before
                 files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(scenario)))
                 periods = precautions.periods(recorder.time_step)

@@ -39,22 +39,16 @@ def explicit_contacts(world: arrays.World, blocks: int) -> Rows:
     rows["normal_force"] = contacts["normal_force"]
     rows["shear_force"] = -contacts["shear_force"]  # kept as the resistance to slip of a along the tangent
     if "nx" not in (contacts.dtype.names or ()):
-        _add_bearing(rows, world, pairs[pair])
+        # what a stiffness does that changes by slip and tilt: a force along the tangent, and a couple, that of a normal
+        # force that acts a little beside its corner; without a normal force there is no such place
+        factor, power = ENERGIES[int(world.controls[0].law)]
+        energy = factor * rows["overlap"] ** power
+        rows["shear_force"] -= pairs["slide"][pair] * energy
+        normal = rows["normal_force"]
+        way = np.divide(pairs["turn"][pair] * energy, normal, out=np.zeros_like(normal), where=normal > 0.0)
+        rows["x"] -= way * rows["normal_y"]
+        rows["y"] += way * rows["normal_x"]
     return rows
-
-
-def _add_bearing(rows: Rows, world: arrays.World, pairs: Any) -> None:
-    """Add what a stiffness does that changes by slip and tilt: a force along the tangent, and a couple.
-
-    The couple is a normal force that acts a little beside its corner. Without a normal force there is no such place.
-    """
-    factor, power = ENERGIES[int(world.controls[0].law)]
-    energy = factor * rows["overlap"] ** power
-    rows["shear_force"] -= pairs["slide"] * energy
-    normal = rows["normal_force"]
-    way = np.divide(pairs["turn"] * energy, normal, out=np.zeros_like(normal), where=normal > 0.0)
-    rows["x"] -= way * rows["normal_y"]
-    rows["y"] += way * rows["normal_x"]
 
 
 def _places(world: arrays.World, contacts: Any, a: Indices, b: Indices) -> list[Any]:

@@ -4,7 +4,6 @@ Normals, arms and overlaps in the table are those with which the step that has j
 manifold lie on one face and share one friction impulse; it is divided as the normal ones are.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import REMOVED, Records
 from blocksim.kernels.nonsmooth import arrays, energy, ensemble, step
-from blocksim.scenario import PlacedBody, Scenario
 from blocksim.simulation import schemes
 from blocksim.simulation.frames import SUPPORT, Rows, empty_rows
 from blocksim.world import nonsmooth, sag
@@ -111,10 +109,6 @@ def overlaps_of_constraints(scene: arrays.Nonsmooth) -> schemes.Overlaps:
     )
 
 
-def _variant(kernels: str, scenario: Scenario, placed: Sequence[PlacedBody] | None) -> str:
-    return IN_ROUNDS[kernels] if nonsmooth.needs_repeated_impacts(scenario, placed) else kernels
-
-
 RATES = ("vx", "vy", "spin")
 STILL = 1e-10  # of the smallest side of a block: way in a step at rest
 STILL_BALANCE = 1e-8  # what that counts as, beside accelerations over gravity
@@ -140,7 +134,9 @@ NONSMOOTH = schemes.Scheme(
     after_event=renew,
     kernels=lambda _: RIGID,
     of_outlines={RIGID: OF_OUTLINES},
-    kernel_variant=_variant,
+    kernel_variant=lambda kernels, scenario, placed: (
+        IN_ROUNDS[kernels] if nonsmooth.needs_repeated_impacts(scenario, placed) else kernels
+    ),
     kernel_sets={
         RIGID: PLAIN,
         OF_OUTLINES: {**PLAIN, "blocks": POLYGON},

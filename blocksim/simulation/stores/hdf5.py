@@ -188,20 +188,15 @@ def lookup3(data: bytes) -> int:
     for place in range(0, len(words), 3):
         a, b, c = ((one + two) & WORD for one, two in zip((a, b, c), words[place : place + 3], strict=True))
         if place + 3 < len(words):
-            a, b, c = _mixed(a, b, c)
+            for turns in ((4, 6, 8), (16, 19, 4)):
+                a, c = ((a - c) & WORD) ^ _turned(c, turns[0]), (c + b) & WORD
+                b, a = ((b - a) & WORD) ^ _turned(a, turns[1]), (a + c) & WORD
+                c, b = ((c - b) & WORD) ^ _turned(b, turns[2]), (b + a) & WORD
     for turn_b, turn_c, turn_a in ((14, 11, 25), (16, 4, 14)):
         c = ((c ^ b) - _turned(b, turn_b)) & WORD
         a = ((a ^ c) - _turned(c, turn_c)) & WORD
         b = ((b ^ a) - _turned(a, turn_a)) & WORD
     return ((c ^ b) - _turned(b, 24)) & WORD
-
-
-def _mixed(a: int, b: int, c: int) -> tuple[int, int, int]:
-    for turns in ((4, 6, 8), (16, 19, 4)):
-        a, c = ((a - c) & WORD) ^ _turned(c, turns[0]), (c + b) & WORD
-        b, a = ((b - a) & WORD) ^ _turned(a, turns[1]), (a + c) & WORD
-        c, b = ((c - b) & WORD) ^ _turned(b, turns[2]), (b + a) & WORD
-    return a, b, c
 
 
 def _turned(word: int, bits: int) -> int:
@@ -473,7 +468,9 @@ class FrameFile:
     def commit(self) -> None:
         """Bring all frames so far to the disk and then say how many there are. Raises OutputError (disk full …)."""
         began = time.monotonic()
-        samples = {name: series for name, series in self.probes.drain().items() if len(series)}
+        samples = {name: series for name, series in self.probes.series().items() if len(series)}
+        for probe in self.probes.all:
+            probe.rows.clear()
         with self._locate_errors():
             added = [(one, one.of(self.waiting)) for one in self.sets if self.waiting]
             for name, series in samples.items():
