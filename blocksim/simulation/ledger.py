@@ -6,6 +6,7 @@ alone: where outputs, checkpoints and signals interrupt a run must not decide wh
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -80,6 +81,7 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
         return abs(self.residual) / self.in_play if self.in_play else abs(self.residual)
 
 
+@cache
 def compiled(module: str) -> Any:
     """Return a module of blocksim that needs the compiler: who reads stored runs never asks for it."""
     return import_module(f"blocksim.{module}")
