@@ -16,7 +16,7 @@ from blocksim.scenario import Scenario
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import SystemTable, Whole
 from blocksim.world.systems import Function
-from blocksim.world.systems.system import Elements, Indices, Output, Quantity, System, Track, discs, quantity_as_stored
+from blocksim.world.systems.system import Elements, Indices, Output, Quantity, System, Track, discs
 
 POINT = record_type("x y vx vy fx fy mass stiffness tie reach")  # m, m/s, N, kg, N/m, N/m, m
 RADIUS = 0.004  # m, in pictures
@@ -168,10 +168,10 @@ MASSES = System(
     quantities=(Quantity("x", "m"), Quantity("y", "m"), Quantity("vx", "m/s"), Quantity("vy", "m/s")),
     constants=(Quantity("mass", "kg"),),
     outputs=(
-        Output("x", "m", "place along the ground", "x_mm", quantity_as_stored("x"), 1e3),
-        Output("y", "m", "place above the ground", "y_mm", quantity_as_stored("y"), 1e3),
-        Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", quantity_as_stored("vy"), 1e3),
-        Output("height", "m", "height above the start", "height_mm", lambda one: one["y"] - one.at_start("y"), 1e3),
+        Output("x", "m", "place along the ground", "x_mm", 1e3),
+        Output("y", "m", "place above the ground", "y_mm", 1e3),
+        Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", 1e3),
+        Output("height", "m", "height above the start", "height_mm", 1e3, lambda one: one["y"] - one.at_start("y")),
     ),
     elements=_elements,
     state=_state,

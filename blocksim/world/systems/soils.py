@@ -40,10 +40,8 @@ SHOCK_TIME, SHOCK_DAMPING = 60.0, 0.1
 SMOOTHING = 1.5  # smoothing length in spacings
 USUAL_DEPTH = 1.0  # m, out of the plane, where there are no blocks
 TOLERATED = 0.03  # of the thrust
-LACK = {
-    "raw": (2.2, 0.0),
-    "corrected": (1.0, 0.035),
-}  # calibrated with a smooth wall drawn back from 8 to 40 rows: a, b of the share a/rows - b
+# calibrated with a smooth wall drawn back from 8 to 40 rows: a, b of the share a/rows - b
+LACK = {"raw": (2.2, 0.0), "corrected": (1.0, 0.035)}
 COURANT = 0.4  # step in smoothing lengths that a wave passes
 # J, as kernels/soil/energy.py measures them; the last six are losses
 ENERGIES = (
@@ -361,9 +359,8 @@ def _state(soils: Any, count: int) -> system.Floats:
 def _largest_step(scenario: Scenario) -> float:
     tables = soil_tables(scenario)
     usual = float(stepping.Explicit.model_fields["safety"].default)
-    courant = COURANT * min(
-        1.0, float(getattr(scenario.time, "safety", usual)) / usual
-    )  # a finer step is finer for all
+    finer = min(1.0, float(getattr(scenario.time, "safety", usual)) / usual)  # a finer step is finer for all
+    courant = COURANT * finer
     return min(courant * SMOOTHING * table.spacing / wave_speed(scenario.materials[table.material]) for table in tables)
 
 
@@ -387,25 +384,17 @@ SOILS = system.System(
     quantities=QUANTITIES,
     constants=CONSTANTS,
     outputs=(
-        system.Output("x", "m", "place along the ground", "x_mm", system.quantity_as_stored("x"), MILLI),
-        system.Output("y", "m", "place above the ground", "y_mm", system.quantity_as_stored("y"), MILLI),
-        system.Output("vx", "m/s", "velocity along the ground", "vx_mm_s", system.quantity_as_stored("vx"), MILLI),
-        system.Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", system.quantity_as_stored("vy"), MILLI),
-        system.Output("displacement", "m", "distance from where it began", "displacement_mm", displacement, MILLI),
-        system.Output(
-            "sxx", "Pa", "stress along the ground, tension positive", "sxx_Pa", system.quantity_as_stored("sxx")
-        ),
-        system.Output(
-            "syy", "Pa", "stress normal to the ground, tension positive", "syy_Pa", system.quantity_as_stored("syy")
-        ),
-        system.Output(
-            "szz", "Pa", "stress out of the plane, tension positive", "szz_Pa", system.quantity_as_stored("szz")
-        ),
-        system.Output("sxy", "Pa", "shear stress", "sxy_Pa", system.quantity_as_stored("sxy")),
-        system.Output("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", pressure),
-        system.Output(
-            "plastic", "1", "accumulated plastic shear strain", "plastic_strain", system.quantity_as_stored("plastic")
-        ),
+        system.Output("x", "m", "place along the ground", "x_mm", MILLI),
+        system.Output("y", "m", "place above the ground", "y_mm", MILLI),
+        system.Output("vx", "m/s", "velocity along the ground", "vx_mm_s", MILLI),
+        system.Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", MILLI),
+        system.Output("displacement", "m", "distance from where it began", "displacement_mm", MILLI, displacement),
+        system.Output("sxx", "Pa", "stress along the ground, tension positive", "sxx_Pa"),
+        system.Output("syy", "Pa", "stress normal to the ground, tension positive", "syy_Pa"),
+        system.Output("szz", "Pa", "stress out of the plane, tension positive", "szz_Pa"),
+        system.Output("sxy", "Pa", "shear stress", "sxy_Pa"),
+        system.Output("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", formula=pressure),
+        system.Output("plastic", "1", "accumulated plastic shear strain", "plastic_strain"),
     ),
     elements=elements_of,
     state=_state,

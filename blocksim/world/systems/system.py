@@ -42,8 +42,12 @@ class Output:
     unit: str  # SI
     meaning: str
     column: str  # in tables, with its unit there
-    of: Callable[["Track"], Floats]  # (n, b), SI
     factor: float = 1.0  # from SI to the unit of the column
+    formula: Callable[["Track"], Floats] | None = None  # (n, b), SI; None: the quantity of this name as it is stored
+
+    def of(self, track: "Track") -> Floats:
+        """Return it for all elements in all frames, (n, b), SI."""
+        return track[self.name] if self.formula is None else self.formula(track)
 
 
 @dataclass(frozen=True)
@@ -171,11 +175,6 @@ class Track:
     def columns(self) -> dict[str, Floats]:
         """Return what tables show, (n, b) by the name of the column."""
         return {one.column: one.factor * one.of(self) for one in self.system.outputs}
-
-
-def quantity_as_stored(name: str) -> Callable[[Track], Floats]:
-    """Return an output that is a quantity as it is stored."""
-    return lambda track: track[name]
 
 
 def discs(track: Track, chosen: Indices, radius: Floats, corners: int = 8) -> Floats:
