@@ -94,9 +94,9 @@ class ScenarioText:
             span = place.key if at == "key" else place.value
         elif self.text:
             span = Span(1, 0, len(self.lines[0]))
-        return self.shown(message, format_key(path), span)
+        return self.problem_in(message, format_key(path), span)
 
-    def shown(self, message: str, key: str, span: Span | None) -> Problem:
+    def problem_in(self, message: str, key: str, span: Span | None) -> Problem:
         """Make the problem with its line."""
         if span is None:
             return Problem(self.where, message, key)
@@ -114,9 +114,9 @@ class ScenarioText:
         if message.startswith(_TWICE):
             head = re.match(r"\s*(\[*)([^=\]]*[^=\]\s])?", line)
             start, end = (head.start(2), head.end(2)) if head is not None and head[2] else (0, len(line))
-            return self.shown("this key or table is defined further up", "", Span(number, start, end - start))
+            return self.problem_in("this key or table is defined further up", "", Span(number, start, end - start))
         message = _CLEARER.get(message) or f"not valid TOML: {message[:1].lower()}{message[1:]}"
-        return self.shown(message, "", Span(number, column, 1))
+        return self.problem_in(message, "", Span(number, column, 1))
 
 
 def override_problem(override: Override, path: KeyPath, message: str, at: str) -> Problem:
@@ -294,7 +294,7 @@ class Document:
         if endless is not None:
             before = source.text[: endless.start()]
             span = Span(before.count("\n") + 1, len(before) - (before.rfind("\n") + 1), 1)
-            raise ScenarioError([source.shown(TOO_DEEP, "", span)])
+            raise ScenarioError([source.problem_in(TOO_DEEP, "", span)])
         try:
             data = cast("Data", freeze(tomllib.loads(source.text)))
         except tomllib.TOMLDecodeError as error:

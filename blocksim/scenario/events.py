@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.scenario.geometry import Corner, dot, edges_of
-from blocksim.scenario.mistakes import Mistake, repeated, unknown
+from blocksim.scenario.mistakes import Mistake, repetitions, unknown
 from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.stepping import Event, ForceProbe, JointProbe, PointProbe
@@ -139,7 +139,7 @@ def probe_names(scenario: Scenario) -> list[str]:
 def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find names given twice, bodies and supports that do not exist, and bodies without a joint."""
     names = probe_names(scenario)
-    for number in repeated(names):
+    for number in repetitions(names):
         yield Mistake(("probes", number, "name"), f"two probes are named {toml(names[number])}")
     bodies = {body.name: body for body in placed}
     others = [str(name) for tables in scenario.systems.values() for one in tables if (name := getattr(one, "name", ""))]

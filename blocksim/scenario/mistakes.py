@@ -50,7 +50,7 @@ def unknown(path: KeyPath, what: str, known: Collection[str], name: object, at: 
         yield Mistake(path, f"unknown {what} {toml(name)}, {did_you_mean_or_list(name, known)}", at=at)
 
 
-def repeated(names: Iterable[str | None]) -> Iterator[int]:
+def repetitions(names: Iterable[str | None]) -> Iterator[int]:
     """Yield the numbers of names that came before."""
     seen: set[str | None] = {None}
     for number, name in enumerate(names):

@@ -54,10 +54,8 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
     side = "block_ground" if ground else "block_block"
     contact = scenario.contact
     general: dict[str, tuple[object, str]] = {}
-    for name, table, place in (
-        ("friction", scenario.friction, "friction"),
-        ("restitution", contact.restitution, "contact.restitution"),
-    ):
+    tables = {"friction": (scenario.friction, "friction"), "restitution": (contact.restitution, "contact.restitution")}
+    for name, (table, place) in tables.items():
         general[name] = getattr(table, side), f"{place}.{side}" if side in table.model_fields_set else DEFAULT
     for name in ("normal_stiffness", "shear_stiffness_ratio", "shear_damping_ratio"):
         otherwise = DEFAULT if name == "shear_damping_ratio" else MATERIALS

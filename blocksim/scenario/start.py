@@ -8,7 +8,7 @@ from operator import attrgetter
 import numpy as np
 
 from blocksim.scenario import events, geometry, overlap, placement, resolved
-from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repeated, unknown
+from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
@@ -35,7 +35,7 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mi
         yield Mistake(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
         return
     by_name = {body.name: body for body in bodies} if loads or scenario.start.hold else {}
-    for number in repeated(load.name for load in loads):
+    for number in repetitions(load.name for load in loads):
         yield Mistake(("loads", number, "name"), f"two loads are named {toml(loads[number].name)}")
     for number in [number for number, load in enumerate(loads) if isinstance(load, Gravity)][1:]:
         yield Mistake(("loads", number), "gravity turns already; one load of this kind is allowed")
@@ -224,7 +224,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
         return
     smallest = placement.smallest_width({(body.size_x, body.size_y, body.outline): body for body in bodies}.values())
     yield from _unfit_lengths(scenario, smallest, max((max(abs(b.x), abs(b.y)) for b in bodies), default=0.0))
-    for number in repeated(body.name for body in bodies):
+    for number in repetitions(body.name for body in bodies):
         message = f"two bodies are named {toml(bodies[number].name)}; a body without a name is called by its number"
         yield Mistake((*origins[number], "name"), message)
     yield from _overlaps(scenario, origins, bodies)

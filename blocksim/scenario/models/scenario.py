@@ -94,16 +94,11 @@ class Scenario(Table):
         """Return the same line, blocks and materials, and all values as they stand in a file, for notebooks."""
         from blocksim.scenario.resolved import scenario_to_toml  # noqa: PLC0415 - needs this model
 
-        blocks = [
-            (
-                name,
-                "shaped by its structure" if block.size_x == 0.0 else f"{block.size_x:g} × {block.size_y:g} m",
-                f"{block.depth:g} m deep",
-                block.material,
-            )
-            for name, block in self.blocks.items()
-        ]
-        rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in blocks)
+        rows = ""
+        for name, block in self.blocks.items():
+            size = "shaped by its structure" if block.size_x == 0.0 else f"{block.size_x:g} × {block.size_y:g} m"
+            cells = name, size, f"{block.depth:g} m deep", block.material
+            rows += f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
         values = f"<details><summary>all values</summary><pre>{escape(scenario_to_toml(self))}</pre></details>"
         return f"<p>{escape(repr(self)[1:-1])}</p><table>{rows}</table>{values}"
 

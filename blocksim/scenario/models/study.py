@@ -102,7 +102,7 @@ def round_digits(number: float) -> float:
     return float(f"{number:.{SIGNIFICANT - 1}e}")
 
 
-def read_spread(value: object) -> tuple[Any, ...]:
+def _read_spread(value: object) -> tuple[Any, ...]:
     """Return the values of a list or of { from, to, count }; raises a pydantic error for anything else.
 
     `count` values are evenly spaced: both ends as written, between them SI numbers, angles as texts in rad. Between
@@ -133,7 +133,7 @@ def read_spread(value: object) -> tuple[Any, ...]:
     return (ends[0], *(toml_number(number, angle=angle) for number in inner), ends[1])
 
 
-def read_sampled(value: object) -> Variation:
+def _read_distribution(value: object) -> Variation:
     """Return the levels of a list, or the distribution of a table; raises a pydantic error."""
     if not isinstance(value, Mapping):
         return _levels(value, "{ from, to } or { mean, sd }")
@@ -290,7 +290,7 @@ def _variation(value: object, info: ValidationInfo) -> Variation:
     is_sampled = mode in SAMPLED
     if mode is None and isinstance(value, Mapping):
         is_sampled = "count" not in value and bool({"from", "to", "mean", "sd"} & set(value))
-    return read_sampled(value) if is_sampled else read_spread(value)
+    return _read_distribution(value) if is_sampled else _read_spread(value)
 
 
 def _of_the_mode(value: object, info: ValidationInfo) -> object:
