@@ -26,7 +26,6 @@ from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarte
 from blocksim.study.study import draw_study, study_in
 from blocksim.view import animation, history, run_data, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
-from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import COLOURS, paint_named
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 
@@ -456,7 +455,7 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, pape
             continue
         x, unit = np.array([level.x_mm for level in levels]), unit_of(scenario, study.key)
         panels.append(
-            Panel(
+            studies.LevelPanel(
                 title=study.title,
                 key=f"{study.key} ({unit})" if unit else study.key,
                 verdict=study.verdict.value,
@@ -473,7 +472,9 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, pape
         table = None if scenario.experiment is None else load_table(scenario.experiment.table)
         rows = [] if table is None else [row for row in table.summaries() if row.quantity == "x"]
         widths = {row.block: row.maximum - row.minimum for row in rows}  # of the measured ranges
-        draw_levels(panels, path, title=f"{result.name}: distance from the finest level", measured=widths, paper=paper)
+        studies.draw_levels(
+            panels, path, title=f"{result.name}: distance from the finest level", measured=widths, paper=paper
+        )
     return bool(panels)
 
 

@@ -17,12 +17,12 @@ from blocksim.study.pictures import read_sweep_data
 from blocksim.study.rows import FINISHED, TABLE
 from blocksim.study.study import study_in, study_page
 from blocksim.view.report.page import write_report
-from blocksim.view.report.pictures import pictures_of
 from blocksim.view.report.player import MOST_BYTES
 from blocksim.view.report.subjects import (
     CaseTable,
     PartialRun,
     Subject,
+    pictures_of,
     read_stored,
     run_subject,
     shared_path,

@@ -205,7 +205,7 @@ def draw_animation(
     """
     path = Path(path)
     write = writer_of(path)
-    chosen, seconds = timed(frames, run_data.drawable_frames(frames), pace or Pace())
+    chosen, seconds = frame_times(frames, run_data.drawable_frames(frames), pace or Pace())
     animation = Animation(frames, support or Support(), look or Look())
 
     def pictures() -> Iterator[Pixels]:
@@ -226,7 +226,7 @@ def writer_of(path: Path) -> Writer:
         raise InvalidInputError(unknown) from None
 
 
-def timed(frames: Frames, drawable: Indices, pace: Pace) -> tuple[Indices, Floats]:
+def frame_times(frames: Frames, drawable: Indices, pace: Pace) -> tuple[Indices, Floats]:
     """Return which frame each picture shows and how long (s of animation): even in time, the last one held.
 
     Every picture shows the frame nearest to its time. Raises InvalidInputError for more than MOST_PICTURES.
@@ -276,10 +276,10 @@ class Animation:
         self.scene = scene.Scene(frames, support, paint)
         across = look.width / DOTS_PER_INCH
         side, head, foot = MARGINS
-        self.seen = run_data.together(frames, self.drawable, support)
+        self.seen = run_data.blocks_in_view(frames, self.drawable, support)
         self.beyond = beyond_view(frames.names, self.seen)
         extent = run_data.extent_of(frames, self.drawable, support, self.seen)
-        self.acts, self.length = arrows.outside(frames, self.drawable, support), arrows.length_in(extent)
+        self.acts, self.length = arrows.actions_on(frames, self.drawable, support), arrows.length_in(extent)
         self.page = page = scene.page_for(
             arrows.with_room(extent, self.acts, self.length),
             across,
@@ -340,7 +340,7 @@ class Animation:
             lines = LineCollection(list(ways.swapaxes(0, 1)), colors=style.INK, **TRAIL, transform=canvas.scene)
             canvas.axes.add_collection(lines)
         index = int(np.searchsorted(self.drawable, frame))
-        arrows.draw_outside(canvas, self.acts, index, self.length)
+        arrows.draw_actions(canvas, self.acts, index, self.length)
         arrows.draw_marks(canvas, self.acts.marks[index], TIME_ROOM)
         if self.forces is not None:
             arrows.draw_forces(canvas, frames, frame, self.forces)

@@ -50,7 +50,7 @@ class ForceScale:
     @property
     def example(self) -> str:
         """Length of the arrow of a round force."""
-        force = rounded(0.5 * self.longest / self.mm_per_newton)
+        force = round_down(0.5 * self.longest / self.mm_per_newton)
         return f"{force:g} N is {force * self.mm_per_newton:.3g} mm"
 
 
@@ -70,13 +70,13 @@ def force_scale(frames: Frames) -> ForceScale:
     return ForceScale(length / usual, LONGEST * length)
 
 
-def rounded(value: float) -> float:
+def round_down(value: float) -> float:
     """Return the largest of 1, 2, 5, 10, 20 ... that is not larger."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(part * power for part in ROUND if part * power <= value * (1.0 + 1e-9)))
 
 
-def pushing_up(rows: Rows, tilt: float) -> Floats:
+def forces_on_upper(rows: Rows, tilt: float) -> Floats:
     """Return the forces (N, (k, 2)) of contacts on the body that they push up in the picture, turned by `tilt`."""
     forces = forces_on_a(rows)
     up = forces @ np.array([np.sin(tilt), np.cos(tilt)])
@@ -86,7 +86,7 @@ def pushing_up(rows: Rows, tilt: float) -> Floats:
 def arrows(rows: Rows, scale: ForceScale, tilt: float) -> Floats:
     """Return start and end (mm, scene, (k, 2, 2)) of the arrow of every contact; those not finite are left out."""
     starts = MILLIMETRES * np.stack([rows["x"], rows["y"]], axis=-1)
-    ways = scale.mm_per_newton * pushing_up(rows, tilt)
+    ways = scale.mm_per_newton * forces_on_upper(rows, tilt)
     shown = np.isfinite(starts).all(axis=1) & np.isfinite(ways).all(axis=1)
     starts, ways = starts[shown], ways[shown]
     lengths = np.hypot(*ways.T)
@@ -178,7 +178,7 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Outside:
+class Actions:
     """All that acts from outside in f frames; `largest` of each kind there is, in SI."""
 
     arrows: tuple[Arrows, ...] = ()
@@ -212,7 +212,7 @@ class Outside:
         return self.largest.get(kind, 0.0) > 0.0
 
 
-def outside(frames: Frames, chosen: Indices, support: Support) -> Outside:
+def actions_on(frames: Frames, chosen: Indices, support: Support) -> Actions:
     """Return what acts from outside in the chosen frames."""
     poses = _Poses(frames, chosen)
     raw = [*_forces(poses, support), *_speeds(poses, support)]
@@ -232,7 +232,7 @@ def outside(frames: Frames, chosen: Indices, support: Support) -> Outside:
         bodies = [body for body, _ in found]
         radius = MILLIMETRES * RADIUS * np.minimum(frames.size_x, frames.size_y)[bodies]
         turns = Turns(MILLIMETRES * poses.places[:, bodies], radius, SWEEP * moments / (largest[MOMENT] or 1.0))
-    return Outside(scaled, turns, _marks(poses.time, support), largest)
+    return Actions(scaled, turns, _marks(poses.time, support), largest)
 
 
 def in_words(value: float, unit: str) -> str:
@@ -246,7 +246,7 @@ def length_in(extent: Extent) -> float:
     return LENGTH * max(extent.width, extent.height)
 
 
-def with_room(extent: Extent, found: Outside, length: float) -> Extent:
+def with_room(extent: Extent, found: Actions, length: float) -> Extent:
     """Return an extent that also holds all arrows, but for what is below it."""
     lines = [rotate_points(one.lines(length), extent.tilt).reshape(-1, 2) for one in found.arrows if one.way.any()]
     if not lines:
@@ -348,7 +348,7 @@ MARK_LETTER = 5.0  # points
 MARK_GAP = 8.0  # points between two marks
 
 
-def draw_outside(canvas: Canvas, found: Outside, index: int, length: float) -> None:
+def draw_actions(canvas: Canvas, found: Actions, index: int, length: float) -> None:
     """Draw the arrows of the frame with this index among the chosen ones; `length` is of the longest (mm)."""
     for one in found.arrows:
         lines = one.lines(length)[index]

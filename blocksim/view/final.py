@@ -60,7 +60,7 @@ def rows_of(ranges: Sequence[MeasuredRange]) -> int:
     return 1 + max((item.row for item in ranges), default=-1)
 
 
-def widened(extent: Extent, ranges: Sequence[MeasuredRange]) -> Extent:
+def widen(extent: Extent, ranges: Sequence[MeasuredRange]) -> Extent:
     """Return an extent that also holds the measured ranges, and is wide enough for the time above a tower."""
     margin = RANGE_GAP * extent.width
     missing = max(NARROWEST * extent.height - extent.width, 0.0)
@@ -116,7 +116,7 @@ def labels_of(frames: Frames, frame: int, page: Page, ranges: Sequence[MeasuredR
         if name in measured:
             one = measured[name]
             texts.append(f"measured {one.mean:.2f} [{one.minimum:.2f}, {one.maximum:.2f}]".replace("-", "−"))
-        lines.append([style.shortened(name, LETTERS), *texts])
+        lines.append([style.shorten(name, LETTERS), *texts])
     room = page.panel_width * style.POINTS_PER_INCH
     half = np.array([0.5 * style.LETTER[0] * FONT * max(map(len, texts)) for texts in lines])
     below = (rotate_points(centres, page.extent.tilt)[:, 0] - page.extent.left) * page.points_per_mm
@@ -159,13 +159,13 @@ def draw_final(
     chosen = drawable[-1:] if times is None else moments_at(frames, drawable, times)[-1:]
     frame = int(chosen[0])
     scale = arrows.force_scale(frames) if forces else None
-    acts = arrows.outside(frames, chosen, support)
+    acts = arrows.actions_on(frames, chosen, support)
     extent = extent_of(frames, chosen, support)
     length = arrows.length_in(extent)
     extent = arrows.with_room(extent, acts, length)
     is_measured = measured is not None and frame == drawable[-1]
     ranges = measured_ranges(measured, frames.names, extent.width) if measured is not None and is_measured else []
-    extent, rows = widened(extent, ranges), rows_of(ranges)
+    extent, rows = widen(extent, ranges), rows_of(ranges)
     width, tallest = paper.width(WIDTH, LEAST_WIDTH), TALLEST
     margins = SIDE, HEAD + MARKS * any(acts.marks), AXIS
     explanations = [] if scale is None else [scale.explanation]
@@ -173,7 +173,7 @@ def draw_final(
         page = scene.page_for(extent, width, tallest, margins, rows)
         labels = labels_of(frames, frame, page, ranges)
         texts = [_notes(labels, is_measured=bool(ranges)), *explanations, acts.explanation]
-        notes = style.broken(" ".join(filter(None, texts)), width - 2.0 * SIDE)
+        notes = style.break_lines(" ".join(filter(None, texts)), width - 2.0 * SIDE)
         room = labels.row_count * labels.row_height / style.POINTS_PER_INCH
         foot = FOOT + len(notes) * style.LINE + paint.height
         height = page.height + room + foot
@@ -193,7 +193,7 @@ def draw_final(
             scene.draw_centres(canvas, frames, frame)
             scene.draw_measured(canvas, ranges, scene.ROW_HEIGHT)
             _draw_labels(style.add_axes(figure, SIDE, height - page.height - room, page.panel_width, room), labels)
-        arrows.draw_outside(canvas, acts, 0, length)
+        arrows.draw_actions(canvas, acts, 0, length)
         arrows.draw_marks(canvas, acts.marks[0])
         if scale is not None:
             arrows.draw_forces(canvas, frames, frame, scale)

@@ -22,7 +22,7 @@ from blocksim.view.time_panels import (
     PANEL,
     TimePanel,
     draw_time_panel,
-    drawn_energies,
+    energy_groups,
     limits_of,
     open_time_panels,
     unit_for,
@@ -315,7 +315,7 @@ def _draw_measured(
 
 def _energies(seen: FramesInView) -> TimePanel:
     """Return energies (J) by name, each in its own colour and dashes."""
-    energies = drawn_energies(seen.frames.energy, seen.chosen)
+    energies = energy_groups(seen.frames.energy, seen.chosen)
     factor, unit = unit_for(max((float(np.abs(values).max()) for values in energies.values()), default=0.0), "J")
     looks = {name: ENERGY_LOOKS.get(name, OTHER_ENERGY) for name in energies}
     return TimePanel(

@@ -12,7 +12,7 @@ import numpy as np
 from blocksim.simulation.frames import SUPPORT, Frames, Rows
 from blocksim.simulation.observables import MOVED_SHARE
 from blocksim.view import arrows, scene, style
-from blocksim.view.arrows import Outside
+from blocksim.view.arrows import Actions
 from blocksim.view.paint import by_displacement, displacements, draw_key
 from blocksim.view.run_data import (
     MILLIMETRES,
@@ -156,9 +156,9 @@ class Side:
     is_mechanism: bool
 
     @cached_property
-    def acts(self) -> Outside:
+    def acts(self) -> Actions:
         """What acts on the blocks in the frame that is drawn."""
-        return arrows.outside(self.frames, np.array([self.frame]), self.support)
+        return arrows.actions_on(self.frames, np.array([self.frame]), self.support)
 
     @cached_property
     def frame(self) -> int:
@@ -189,7 +189,7 @@ def draw_mechanisms(
     paint = by_displacement(sides[0].frames, sides[0].support, most)
     texts = [ARROWS_OF_LOADS] if any(side.acts.sizes for side in sides) else []
     texts += [ARROWS_OF_SPEED] if any(side.acts.largest.get(arrows.SPEED, 0.0) > 0.0 for side in sides) else []
-    notes = style.broken(" ".join(texts), width - 2.0 * SIDE) if texts else []
+    notes = style.break_lines(" ".join(texts), width - 2.0 * SIDE) if texts else []
     columns = ENTRIES if width >= ENTRIES_WIDTH else 1
     legend = LINE * (len(notes) + ENTRIES // columns)
     foot, rows = AXIS + paint.height + legend, len(brackets)
@@ -233,7 +233,7 @@ def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, fl
     paint = by_displacement(side.frames, side.support, most)
     shown = scene.Scene(side.frames, side.support, paint, with_tops=False)  # tops read as joints
     scene.draw_scene(canvas, shown, side.frame)
-    arrows.draw_outside(canvas, side.acts, 0, arrows.length_in(page.extent))
+    arrows.draw_actions(canvas, side.acts, 0, arrows.length_in(page.extent))
     if side.first in side.frames.names:
         outline = scene.corners(side.frames, side.frame)[side.frames.names.index(side.first)]
         canvas.axes.plot(*np.concatenate([outline, outline[:2]]).T, transform=canvas.scene, **FIRST)

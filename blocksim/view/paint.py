@@ -82,7 +82,7 @@ def by_material(_: object, scenario: Scenario) -> Paint:
     materials = list(dict.fromkeys(body.material for body in bodies))
     colours = {name: style.block_colour(index) for index, name in enumerate(materials)}
     fills = [colours[body.material] for body in bodies]
-    return Paint(lambda _: fills, tuple((style.shortened(name, LETTERS), colours[name]) for name in materials))
+    return Paint(lambda _: fills, tuple((style.shorten(name, LETTERS), colours[name]) for name in materials))
 
 
 def by_speed(frames: Frames) -> Paint:
@@ -102,7 +102,7 @@ def capped_scale(label: str, values: Floats, colours: str = ELEMENT_COLOURS) -> 
     return Scale(label, colours, 0.0, high, "max" if is_cut else "neither")
 
 
-def with_shade(paint: Paint, frames: Frames, name: str) -> Paint:
+def shade_elements(paint: Paint, frames: Frames, name: str) -> Paint:
     """Return a paint of blocks that also colours the elements of other systems, by a shade of this name."""
     found = [next((one for one in track.system.shades if one.name == name), None) for track in frames.others]
     values = [None if shade is None else shade.of(track) for shade, track in zip(found, frames.others, strict=True)]
@@ -162,9 +162,9 @@ def paint_named(name: str, frames: Frames, scenario: Scenario) -> Paint:
     if name not in known:
         raise InvalidInputError(f"unknown colour {name!r} in this run; choose {', '.join(known)}")
     if name in shades:
-        return with_shade(by_block(frames), frames, name)
+        return shade_elements(by_block(frames), frames, name)
     paint = PAINTS[name](frames, scenario)
-    return with_shade(paint, frames, shades[0]) if shades and paint.scale is None else paint
+    return shade_elements(paint, frames, shades[0]) if shades and paint.scale is None else paint
 
 
 def _scaled(values: Floats, scale: Scale) -> Paint:

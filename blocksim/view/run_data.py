@@ -306,7 +306,7 @@ def extent_of(frames: Frames, chosen: Indices, support: Support | None = None, b
     return Extent(float(left), float(right), float(bottom), float(top), base, tilt)
 
 
-def together(frames: Frames, chosen: Indices, support: Support | None = None) -> Flags:
+def blocks_in_view(frames: Frames, chosen: Indices, support: Support | None = None) -> Flags:
     """Return True for every block that stays with the others, (b,); those that fly far off would make a window vast.
 
     Far off is what leaves a gap to the reach of all others, to a side or upwards, of a fifth of their width or height;

@@ -384,7 +384,7 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
         font = style.fitting_font(item.block, (30.0, row_height), 6.0)
         if font:
             look = canvas.along | {"fontsize": font, "color": style.MEASURED_COLOUR, "va": "center"}
-            canvas.axes.text(item.maximum + 3.0 * point, y, style.shortened(item.block, LETTERS), **look)
+            canvas.axes.text(item.maximum + 3.0 * point, y, style.shorten(item.block, LETTERS), **look)
 
 
 def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: Flags, fills: Sequence[str]) -> None:
@@ -406,7 +406,7 @@ def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: Flags, fills
         places = corners(frames, frame).mean(axis=1)
     at: dict[str, Any] = {"ha": "center", "va": "center_baseline", "clip_on": True, "transform": canvas.scene}
     for index, font in fonts.items():
-        fill, name = fills[index], style.shortened(frames.names[index], LETTERS)
+        fill, name = fills[index], style.shorten(frames.names[index], LETTERS)
         box = {"facecolor": fill, "linewidth": 0.0, "pad": 0.8} if fill == style.GROUND_COLOUR else None
         halo = [withStroke(linewidth=HALO, foreground=fill)]
         look: dict[str, Any] = {"fontsize": font, "color": style.text_colour(fill), "path_effects": halo, "bbox": box}

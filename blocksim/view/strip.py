@@ -9,7 +9,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.frames import Frames
 from blocksim.view import arrows, run_data, scene, style
-from blocksim.view.final import MeasuredTable, measured_ranges, rows_of, widened
+from blocksim.view.final import MeasuredTable, measured_ranges, rows_of, widen
 from blocksim.view.paint import Paint, by_block, draw_key
 from blocksim.view.run_data import MILLIMETRES, Extent, Support
 from blocksim.view.style import OWN, Paper
@@ -135,9 +135,9 @@ def draw_strip(
     scale = arrows.force_scale(frames) if forces else None
     extent = run_data.extent_of(frames, drawable, support)
     length = arrows.length_in(extent)
-    extent = arrows.with_room(extent, arrows.outside(frames, drawable, support), length)
+    extent = arrows.with_room(extent, arrows.actions_on(frames, drawable, support), length)
     ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
-    extent = widened(extent, ranges)
+    extent = widen(extent, ranges)
     columns, usual = arrangement(extent, scene.readable_scale(frames))
     if times is None:
         carried = support.offset(frames.time[drawable])
@@ -146,10 +146,10 @@ def draw_strip(
         chosen = run_data.moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
     rows = rows_of(ranges)
-    acts = arrows.outside(frames, chosen, support)
+    acts = arrows.actions_on(frames, chosen, support)
     texts = [*([scene.TOP] if frames.names else []), _notes(support, is_measured=bool(ranges))]
     texts += ["" if scale is None else scale.explanation, acts.explanation]
-    notes = style.broken(" ".join(filter(None, texts)), paper.width(WIDTH, LEAST_WIDTH) - 2.0 * SIDE)
+    notes = style.break_lines(" ".join(filter(None, texts)), paper.width(WIDTH, LEAST_WIDTH) - 2.0 * SIDE)
     captions = 1 + (support.motion is not None) + any(acts.marks)
     layout = plan(paper, extent, columns, len(chosen), Lines(captions, len(notes), rows, paint.height))
     with style.styled_figure(*layout.size, paper.dots) as figure:
@@ -160,7 +160,7 @@ def draw_strip(
                 scene.draw_centres(canvas, frames, frame)
                 scene.draw_measured(canvas, ranges, scene.ROW_HEIGHT)
             scene.finish_panel(canvas, labelled=index + layout.columns >= len(chosen), rows=rows)
-            arrows.draw_outside(canvas, acts, index, length)
+            arrows.draw_actions(canvas, acts, index, length)
             arrows.draw_marks(canvas, acts.marks[index], up=2.0)
             pad = CAPTION + (LINE * style.POINTS_PER_INCH if acts.marks[index] else 0.0)  # marks stand below the time
             canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=pad)

@@ -141,7 +141,7 @@ def silence_missing_glyphs() -> Iterator[None]:
         yield
 
 
-def shortened(text: str, letters: int) -> str:
+def shorten(text: str, letters: int) -> str:
     """Return a name in one line, no wider than this many letters; signs that are no letters become boxes."""
     line = "".join(sign if sign.isprintable() else "\N{WHITE SQUARE}" for sign in text)
     ends = list(accumulate(1 + (east_asian_width(sign) in "WF") for sign in line))
@@ -163,14 +163,14 @@ def width_of(text: str, size: float, *, bold: bool = False) -> float:
 def cut_to(text: str, room: float, size: float, *, bold: bool = False) -> str:
     """Return a text in one line that is no wider than `room` (points), with an ellipsis where it is cut."""
     room *= SURE
-    line = shortened(text, max(1, int(room / (NARROWEST * size))))
+    line = shorten(text, max(1, int(room / (NARROWEST * size))))
     if width_of(line, size, bold=bold) <= room:
         return line
     fits = bisect_left(range(len(line)), 1, key=lambda count: width_of(f"{line[:count]}…", size, bold=bold) > room)
     return f"{line[: max(fits - 1, 0)]}…"
 
 
-def broken(text: str, room: float, size: float = FONT_SIZE, *, bold: bool = False) -> list[str]:
+def break_lines(text: str, room: float, size: float = FONT_SIZE, *, bold: bool = False) -> list[str]:
     """Return a text in lines no wider than `room` (inches), broken after spaces and the dots of names.
 
     A part that is too wide by itself is broken after hyphens and underscores; what is still too wide is cut.
@@ -181,7 +181,7 @@ def broken(text: str, room: float, size: float = FONT_SIZE, *, bold: bool = Fals
         return width_of(line.rstrip(), size, bold=bold) > points
 
     lines = [""]
-    for part in PARTS.findall(shortened(text, MOST_LETTERS)):
+    for part in PARTS.findall(shorten(text, MOST_LETTERS)):
         for piece in PIECES.findall(part) if is_wide(part) else [part]:
             if lines[-1] and is_wide(f"{lines[-1]}{piece}"):
                 lines.append("")
@@ -366,8 +366,8 @@ def open_panels(
     beside = left + right + (across - 1) * gaps[0]
     width = paper.width(beside + across * panel[0], beside + across * least[0])
     inside = SURE * (width - 2.0 * EDGE)
-    heading = broken(title, inside, TITLE_SIZE) if title else []
-    lines = broken(notes, inside) if notes else []
+    heading = break_lines(title, inside, TITLE_SIZE) if title else []
+    lines = break_lines(notes, inside) if notes else []
     head, foot = head + EDGE, foot + EDGE + LINE * (len(lines) - (-len(handles) // columns))
     others = head + foot + (rows - 1) * gaps[1]
     if paper.size is not None and heading:  # no more lines than leave room for the panels
@@ -396,9 +396,9 @@ def name_axes(figure: "Figure", panels: list[list["Axes"]], x: str, y: str, dept
     """Write the names of both axes once: `depth` inches below all panels, and at the left edge of the figure."""
     across, up = (float(size) for size in figure.get_size_inches())
     first, last = panels[0][0].get_position(), panels[-1][-1].get_position()
-    lines = "\n".join(broken(x, across * (1.0 - first.x0)))
+    lines = "\n".join(break_lines(x, across * (1.0 - first.x0)))
     write_text(figure, 0.5 * across * (first.x0 + last.x1), up * last.y0 - depth, lines, ha="center", va="top")
-    lines = "\n".join(broken(y, up * (first.y1 - last.y0)))
+    lines = "\n".join(break_lines(y, up * (first.y1 - last.y0)))
     write_text(figure, EDGE, 0.5 * up * (first.y1 + last.y0), lines, va="center", rotation=90.0)
 
 
@@ -411,18 +411,11 @@ def write_heading(figure: "Figure", title: str | None, left: float, right: float
         write_text(figure, left, up - EDGE, shown, va="top", fontsize=TITLE_SIZE)
 
 
-def plain_numbers(side: "Axis") -> None:
+def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None:
     """Write numbers along an axis as they are, with a proper minus sign, and not in powers of ten."""
-    from matplotlib.ticker import FuncFormatter
+    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
     side.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}".replace("-", "−")))
-
-
-def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None:
-    """Write plain numbers along an axis."""
-    from matplotlib.ticker import MaxNLocator, NullFormatter
-
-    plain_numbers(side)
     side.set_minor_formatter(NullFormatter())
     if not is_log:
         side.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]))

@@ -93,7 +93,7 @@ def draw_time_panel(axes: "Axes", panel: TimePanel) -> None:
         dashes = DASHES[number // len(COLOURS) % len(DASHES)]
         look: dict[str, Any] = {"color": COLOURS[number % len(COLOURS)], "linestyle": dashes, "linewidth": 1.0}
         look |= panel.looks.get(name, {})
-        handles += axes.plot(*thinned(time, values), **look, label=name)
+        handles += axes.plot(*thin_line(time, values), **look, label=name)
         if style.brightness(look["color"]) > PALE:
             handles[-1].set_path_effects([Stroke(linewidth=2.0, foreground=style.FAINT_INK), Normal()])
     for moment, value in panel.marks:
@@ -109,7 +109,7 @@ def draw_time_panel(axes: "Axes", panel: TimePanel) -> None:
     axes.text(1.04, 1.0, panel.note, transform=axes.transAxes, va="top")
     if panel.legend is not None:
         below = style.LINE * (panel.note.count("\n") + 1 if panel.note else 0) / style.size_of(axes)[1]
-        room, names = NAME_ROOM * style.POINTS_PER_INCH, [style.shortened(name, LETTERS) for name in panel.lines]
+        room, names = NAME_ROOM * style.POINTS_PER_INCH, [style.shorten(name, LETTERS) for name in panel.lines]
         names = [style.cut_to(name, room, style.FONT_SIZE) for name in names]
         place: dict[str, Any] = {**BESIDE, "bbox_to_anchor": (1.04, 1.0 - below)}
         axes.legend(handles, names, **place, title=panel.legend, alignment="left")
@@ -127,7 +127,7 @@ def _opened(panels: Sequence[TimePanel], title: str | None, note: str, paper: Pa
         yield figure
 
 
-def thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+def thin_line(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return at most MOST_POINTS points of a line: of each stretch the first, least, greatest and last one."""
     if len(time) <= MOST_POINTS:
         return time, values
@@ -148,7 +148,7 @@ def limits_of(values: Floats) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def drawn_energies(energy: Entries, chosen: Indices) -> Entries:
+def energy_groups(energy: Entries, chosen: Indices) -> Entries:
     """Return the energies (J) to draw by name: all that matter, potential relative to its minimum."""
     known = {entry for entries in ENERGIES.values() for entry in entries}
     groups = {**ENERGIES, **{name.replace("_", " "): (name,) for name in energy if name not in known}}
@@ -230,7 +230,7 @@ def panels_of(probe: ProbeSeries) -> list[TimePanel]:
         ends = {f"opening at {one} end": probe[f"opening_{one}"] for one in ("first", "last")}  # not in time
         return [panel("joint", "mm", MILLIMETRES, {**ends, "slip": probe["slip"]})]
     if probe.kind == probes.ENERGY:
-        energies = drawn_energies(probe.columns, np.arange(len(probe)))
+        energies = energy_groups(probe.columns, np.arange(len(probe)))
         factor, unit = unit_for(max((_largest(one) for one in energies.values()), default=0.0), "J")
         return [panel("energy", unit, factor, energies)] if energies else []
     if probe.kind == probes.POINT:

@@ -16,11 +16,10 @@ from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import Choice, draw_history
 from blocksim.view.kinds import SWEEP_KINDS
-from blocksim.view.levels import Panel, draw_levels
 from blocksim.view.paint import by_speed, by_turn
 from blocksim.view.run_data import ActingLoad, Support
 from blocksim.view.strip import draw_strip
-from blocksim.view.studies import Bars, draw_tornado
+from blocksim.view.studies import Bars, LevelPanel, draw_levels, draw_tornado
 from blocksim.view.sweeps.lines import Series, draw_series
 from tests.bench.peers.work_precision import Curve, draw_work_precision
 from tests.bench.peers.work_precision import Panel as Work
@@ -56,11 +55,11 @@ LOADED = Support(
 )
 
 
-def panel(blocks: int = 3, levels: int = 4, size_mm: float = 1.0, **more: Any) -> Panel:
+def panel(blocks: int = 3, levels: int = 4, size_mm: float = 1.0, **more: Any) -> LevelPanel:
     """Return distances that fall by ten from level to level and grow with the block; the first block stays."""
     off = size_mm * 10.0 ** -np.arange(levels)[:, None] * np.arange(blocks) / max(blocks - 1, 1)
     off[-1] = 0.0
-    made = Panel(
+    made = LevelPanel(
         title="time step",
         key="time.safety",
         verdict="converged",

@@ -13,7 +13,7 @@ from blocksim.errors import InvalidInputError, OutputError, UnavailableError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.frames import Frames
-from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, draw_animation, ticks, timed
+from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, draw_animation, frame_times, ticks
 from blocksim.view.paint import PAINTS
 from blocksim.view.run_data import Support
 from blocksim.view.style import BLOCK_COLOURS
@@ -82,7 +82,7 @@ def test_sides_are_even_the_width_is_the_one_asked_for_and_a_tower_stays_within_
 
 def test_pictures_are_even_in_time_and_the_last_frame_is_shown_and_held() -> None:
     frames = toppling(1, steps=601)  # a millisecond apart
-    chosen, seconds = timed(frames, np.arange(601), Pace(speed=0.25, rate=30.0))
+    chosen, seconds = frame_times(frames, np.arange(601), Pace(speed=0.25, rate=30.0))
     assert chosen[:4].tolist() == [0, 8, 17, 25]  # 8.33 ms apart
     assert chosen[-1] == 600
     assert len(chosen) == 73
@@ -92,8 +92,8 @@ def test_pictures_are_even_in_time_and_the_last_frame_is_shown_and_held() -> Non
 
 def test_uneven_frames_are_shown_at_their_times_and_a_single_one_is_an_animation() -> None:
     frames = replace(toppling(1, steps=4), time=np.array([0.0, 0.1, 0.11, 0.5]))
-    assert timed(frames, np.arange(4), Pace(1.0, 10.0))[0].tolist() == [0, 1, 2, 2, 3, 3]
-    chosen, seconds = timed(frames, np.array([3]), FAST)
+    assert frame_times(frames, np.arange(4), Pace(1.0, 10.0))[0].tolist() == [0, 1, 2, 2, 3, 3]
+    chosen, seconds = frame_times(frames, np.array([3]), FAST)
     assert chosen.tolist() == [3]
     assert len(seconds) == 1
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.frames import Contacts, empty_rows
 from blocksim.view.animation import Look, Pace, draw_animation
-from blocksim.view.arrows import FORCES, ForceScale, arrows, force_scale, rounded
+from blocksim.view.arrows import FORCES, ForceScale, arrows, force_scale, round_down
 from blocksim.view.kinds import RUN_KINDS
 from tests.view.made_up import pressed, toppling
 
@@ -52,7 +52,7 @@ def test_run_without_a_single_contact_has_a_scale() -> None:
 
 @pytest.mark.parametrize(("value", "expected"), [(1.0, 1.0), (0.0199, 0.01), (7.3, 5.0), (0.2, 0.2), (999.0, 500.0)])
 def test_round_numbers_are_not_larger(value: float, expected: float) -> None:
-    assert rounded(value) == pytest.approx(expected)
+    assert round_down(value) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("kind", ["strip", "final"])

@@ -13,7 +13,7 @@ from blocksim.view import style
 from blocksim.view.history import ENERGY_LOOKS, Choice, draw_history, line_looks
 from blocksim.view.paint import by_speed
 from blocksim.view.run_data import Support
-from blocksim.view.time_panels import LEAST_SPAN, drawn_energies, unit_for
+from blocksim.view.time_panels import LEAST_SPAN, energy_groups, unit_for
 from tests.golden import Golden
 from tests.view.drawings import MOVING
 from tests.view.made_up import overlapping, pressed, toppling
@@ -39,7 +39,7 @@ def test_lines_are_what_was_recorded_in_millimetres_and_degrees(caught: list[Fig
 
 def test_energies_are_grouped_and_small_ones_left_out() -> None:
     frames = toppling(1)
-    drawn = drawn_energies(frames.energy, np.arange(len(frames)))
+    drawn = energy_groups(frames.energy, np.arange(len(frames)))
     assert list(drawn) == ["kinetic", "potential", "lost in impacts", "elf"]  # friction is zero, elf is unknown
     assert float(drawn["potential"].min()) == 0.0
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.view.levels import MOST_BLOCKS, chosen_blocks, draw_levels, limits_of, refuse_small_page
+from blocksim.view.studies import MOST_BLOCKS, chosen_blocks, distance_limits, draw_levels, refuse_small_page
 from blocksim.view.style import Paper
 from tests.view.drawings import panel
 
@@ -16,10 +16,10 @@ def test_many_blocks_are_cut_to_the_farthest() -> None:
 
 
 def test_limits_hold_the_tolerance_and_what_is_worth_showing() -> None:
-    low, high = limits_of([panel(size_mm=1e-6), panel(size_mm=20.0)], [50.0])
+    low, high = distance_limits([panel(size_mm=1e-6), panel(size_mm=20.0)], [50.0])
     assert low == pytest.approx(1e-4)
     assert high == 100.0
-    low, high = limits_of([panel(size_mm=1e-5)], [])
+    low, high = distance_limits([panel(size_mm=1e-5)], [])
     assert low < 1e-6
     assert high == pytest.approx(0.2)
 

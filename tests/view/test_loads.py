@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.result import EventRecord
-from blocksim.view.arrows import FORCE, PRESSURE, SPEED, Arrows, Outside, outside, with_room
+from blocksim.view.arrows import FORCE, PRESSURE, SPEED, Actions, Arrows, actions_on, with_room
 from blocksim.view.run_data import Support, extent_of, support_of
 from tests.view.made_up import blocks_at
 
@@ -26,9 +26,9 @@ STRONGER = {"kind": "force", "name": "pull", "body": "1", "magnitude": 12.0, "po
 
 def acting(
     loads: Sequence[Mapping[str, object]], frames: Frames, happened: Sequence[EventRecord] = (), **tables: Any
-) -> Outside:
+) -> Actions:
     """Return what acts in all frames of one block."""
-    return outside(frames, np.arange(len(frames.time)), support(loads, happened, **tables))
+    return actions_on(frames, np.arange(len(frames.time)), support(loads, happened, **tables))
 
 
 def support(loads: Sequence[Mapping[str, object]], happened: Sequence[EventRecord] = (), **tables: Any) -> Support:
@@ -51,7 +51,7 @@ def block(angles: Sequence[float], x: float = 0.0) -> Frames:
     return blocks_at(np.full(len(angles), x), 0.2, angles, size=(WIDTH, HEIGHT))
 
 
-def only(found: Outside, kind: str) -> list[Arrows]:
+def only(found: Actions, kind: str) -> list[Arrows]:
     return [one for one in found.arrows if one.kind == kind]
 
 
@@ -141,12 +141,12 @@ def test_arrows_are_inside_the_picture_and_nothing_changes_without_loads() -> No
     frames, chosen = block([0.0, QUARTER]), np.arange(2)
     loaded = support([PUSH, STRONGER])
     extent = extent_of(frames, chosen, loaded)
-    found = outside(frames, chosen, loaded)
+    found = actions_on(frames, chosen, loaded)
     room = with_room(extent, found, 300.0)
     for lines in (one.lines(300.0).reshape(-1, 2) for one in found.arrows):
         assert ([room.left, room.bottom] < lines.min(axis=0)).all()
         assert (lines.max(axis=0) < [room.right, room.top]).all()
-    nothing = outside(frames, chosen, Support())
+    nothing = actions_on(frames, chosen, Support())
     assert nothing.is_empty
     assert with_room(extent, nothing, 300.0) == extent
     assert nothing.explanation == ""

@@ -8,7 +8,7 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.motion import motion_pieces
 from blocksim.view.run_data import Support
-from blocksim.view.time_panels import MOST_POINTS, draw_support_motion, thinned
+from blocksim.view.time_panels import MOST_POINTS, draw_support_motion, thin_line
 from tests.scenario.test_motion import END, scenario
 
 PULSE = {"kind": "pulse", "shape": "rectangular", "amplitude": "0.5 g", "duration": 0.1, "start": 0.2}
@@ -31,7 +31,7 @@ def test_a_thinned_line_keeps_its_peaks() -> None:
     time = np.arange(100_000.0)
     values = np.sin(time)
     values[[123, 77_777]] = 5.0, -7.0
-    kept, drawn = thinned(time, values)
+    kept, drawn = thin_line(time, values)
     assert len(kept) <= MOST_POINTS
     assert (drawn.max(), drawn.min()) == (5.0, -7.0)
     assert (kept[0], kept[-1]) == (0.0, 99_999.0)

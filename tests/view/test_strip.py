@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from blocksim.view import final, strip
-from blocksim.view.final import measured_ranges, widened
+from blocksim.view.final import measured_ranges, widen
 from blocksim.view.run_data import Extent
 from blocksim.view.strip import Lines, arrangement, plan
 from blocksim.view.style import OWN
@@ -72,10 +72,10 @@ def test_overlapping_measured_ranges_get_rows_of_their_own() -> None:
 
 
 def test_a_scene_is_widened_to_hold_what_was_measured_and_a_tower_s_caption() -> None:
-    wide = widened(Extent(0.0, 100.0, 0.0, 100.0), measured_ranges(Table(b1=(-50.0, 5.0, 400.0)), ("1",), width=100.0))
+    wide = widen(Extent(0.0, 100.0, 0.0, 100.0), measured_ranges(Table(b1=(-50.0, 5.0, 400.0)), ("1",), width=100.0))
     assert wide.left < -50.0
     assert wide.right > 400.0
-    tower = widened(Extent(0.0, 30.0, 0.0, 1000.0), [])
+    tower = widen(Extent(0.0, 30.0, 0.0, 1000.0), [])
     assert tower.width == pytest.approx(final.NARROWEST * 1000.0)
 
 

@@ -12,11 +12,11 @@ from blocksim.view.style import (
     MEASURED_COLOUR,
     SMALLEST_FONT,
     block_colour,
-    broken,
+    break_lines,
     cut_to,
     fitting_font,
     save_figure,
-    shortened,
+    shorten,
     styled_figure,
     text_colour,
     width_of,
@@ -53,12 +53,12 @@ def test_text_shrinks_to_its_room_and_vanishes_when_unreadable() -> None:
     [("block", "block"), ("exactly 12 l", "exactly 12 l"), ("more than 12 letters", "more than 1…"), ("", "")],
 )
 def test_long_names_are_cut(name: str, shown: str) -> None:
-    assert shortened(name, 12) == shown
+    assert shorten(name, 12) == shown
 
 
 def test_signs_that_are_no_letters_become_boxes_and_wide_ones_count_twice() -> None:
-    assert shortened("a\nb\u202e", 12) == "a□b□"
-    assert shortened("\N{GRINNING FACE}" * 9, 12) == "\N{GRINNING FACE}" * 5 + "…"
+    assert shorten("a\nb\u202e", 12) == "a□b□"
+    assert shorten("\N{GRINNING FACE}" * 9, 12) == "\N{GRINNING FACE}" * 5 + "…"
 
 
 @pytest.mark.parametrize("text", ["W" * 200, "i" * 2000, "\u202e" * 50, "\N{GRINNING FACE}" * 40, "Sturz", ""])
@@ -85,9 +85,9 @@ def test_full_disk_leaves_the_older_picture(tmp_path: Path, monkeypatch: pytest.
 def test_long_names_are_broken_where_they_read_best_and_no_letter_is_lost() -> None:
     text = "contact.stiffness_scale = 0.001"
     wide = width_of(text, 8.0) / 72.0
-    assert broken(text, wide * 1.01) == [text]
-    assert broken(text, 0.8 * wide) == ["contact.stiffness_scale =", "0.001"]
-    assert broken(text, 0.35 * wide) == ["contact.", "stiffness_", "scale =", "0.001"]
-    assert "10.25 mm" in broken("structures.0.overlap − 10.25 mm (µm)", 0.65)
-    assert broken("x" * 100, 0.5)[0].endswith("…")
-    assert broken("", 1.0) == [""]
+    assert break_lines(text, wide * 1.01) == [text]
+    assert break_lines(text, 0.8 * wide) == ["contact.stiffness_scale =", "0.001"]
+    assert break_lines(text, 0.35 * wide) == ["contact.", "stiffness_", "scale =", "0.001"]
+    assert "10.25 mm" in break_lines("structures.0.overlap − 10.25 mm (µm)", 0.65)
+    assert break_lines("x" * 100, 0.5)[0].endswith("…")
+    assert break_lines("", 1.0) == [""]

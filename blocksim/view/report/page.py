@@ -41,27 +41,12 @@ def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
     style = _part("style.css")
     # all scripts as one, whose names are seen by nothing else in the page
     script = '\n(() => {\n"use strict";\n' + "\n".join(_part(f"{name}.js") for name in SCRIPTS) + "\n})();\n"
-    return (
-        _environment()
-        .get_template("page.html")
-        .render(
-            title=title,
-            version=version,
-            subjects=subjects,
-            listed=listed,
-            labels=labels(listed),
-            policy=_policy(style, script),
-            style=style,
-            script=script,
-        )
-    )
-
-
-def _policy(style: str, script: str) -> str:
-    """Return what the page may load and run: its own style and script and pictures within it, nothing else."""
-    nothing = ("default-src", "base-uri", "form-action")
+    # what the page may load and run: its own style and script and pictures within it, nothing else
+    nothing = (f"{name} 'none'" for name in ("default-src", "base-uri", "form-action"))
     own = (f"{kind}-src {_source(text)}" for kind, text in (("style", style), ("script", script)))
-    return "; ".join((*(f"{name} 'none'" for name in nothing), *own, "img-src data:"))
+    policy = "; ".join((*nothing, *own, "img-src data:"))
+    told = {"title": title, "version": version, "subjects": subjects, "listed": listed, "labels": labels(listed)}
+    return _environment().get_template("page.html").render(**told, policy=policy, style=style, script=script)
 
 
 def _source(text: str) -> str:
@@ -95,34 +80,32 @@ def _part(name: str) -> str:
 
 
 def labels(subjects: Sequence[Subject]) -> dict[str, str]:
-    """Return a label for each run that shares its name with another one, by the keys of the subjects."""
+    """Return a label for each run that shares its name with another one, by the keys of the subjects.
+
+    A kinetic friction that equals the static one in all runs is left out: one of the two suffices.
+    """
     counts = Counter(subject.name for subject in subjects if subject.page.get("values") is not None)
-    return {
-        subject.key: text
-        for name in (name for name, count in counts.items() if count > 1)
-        for subject, text in _labelled([one for one in subjects if one.name == name and one.page.get("values")])
-    }
-
-
-def _labelled(subjects: Sequence[Subject]) -> Iterator[tuple[Subject, str]]:
-    flat = [dict(_leaves(subject.page["values"])) for subject in subjects]
-    known = dict.fromkeys(key for values in flat for key in values)
-    keys = [key for key in known if any(values.get(key) != flat[0].get(key) for values in flat)]
-    kept = [key for key in keys if not _follows(key, keys, flat)]
-    for subject, values in zip(subjects, flat, strict=True):
-        found = [(key, values.get(key)) for key in kept[:MOST_KEYS]]
-        parts = [
-            f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {'–' if value is None else value}"
-            for key, value in found
+    found = {}
+    for name in (name for name, count in counts.items() if count > 1):
+        runs = [one for one in subjects if one.name == name and one.page.get("values")]
+        flat = [dict(_leaves(subject.page["values"])) for subject in runs]
+        known = dict.fromkeys(key for values in flat for key in values)
+        keys = [key for key in known if any(values.get(key) != flat[0].get(key) for values in flat)]
+        statics = {key: f"{key.removesuffix('.kinetic')}.static" for key in keys if key.endswith(".kinetic")}
+        kept = [
+            key
+            for key in keys
+            if statics.get(key) not in keys or any(one.get(key) != one.get(statics[key]) for one in flat)
         ]
-        more = len(kept) - MOST_KEYS
-        yield subject, ", ".join([*parts, *([f"{more} more"] if more > 0 else [])])
-
-
-def _follows(key: str, keys: Sequence[str], flat: Sequence[Mapping[str, object]]) -> bool:
-    """Return True for a kinetic friction that equals the static one in all runs: one of the two suffices."""
-    static = f"{key.removesuffix('.kinetic')}.static"
-    return key.endswith(".kinetic") and static in keys and all(one.get(key) == one.get(static) for one in flat)
+        for subject, values in zip(runs, flat, strict=True):
+            parts = []
+            for key in kept[:MOST_KEYS]:
+                value = values.get(key)
+                shown = f"{value:.4g}" if isinstance(value, float) else "–" if value is None else value
+                parts.append(f"{key} = {shown}")
+            more = len(kept) - MOST_KEYS
+            found[subject.key] = ", ".join([*parts, *([f"{more} more"] if more > 0 else [])])
+    return found
 
 
 def _leaves(node: object, path: KeyPath = ()) -> Iterator[tuple[str, object]]:

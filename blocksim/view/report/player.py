@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,21 +11,9 @@ from numpy.typing import NDArray
 from blocksim.scenario import Scenario
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.result import EventRecord
-from blocksim.view import style
-from blocksim.view.arrows import SPEED, Arrows, Mark, Turns, force_scale, length_in, outside, pushing_up, with_room
+from blocksim.view import arrows, run_data, style
 from blocksim.view.paint import ELEMENT_COLOURS, capped_scale
-from blocksim.view.run_data import (
-    MILLIMETRES,
-    Extent,
-    Floats,
-    Indices,
-    Support,
-    drawable_frames,
-    extent_of,
-    rotate_points,
-    shortest_sides,
-    support_of,
-)
+from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices
 from blocksim.view.scene import upper_sides
 from blocksim.world.systems.blocks import are_removed, distinct
 from blocksim.world.systems.system import Track
@@ -42,13 +30,23 @@ def pack(values: Floats, *, exact: bool = False) -> tuple[dict[str, Any], float]
     Values that are not finite stay what they are, or become 0 in steps.
     """
     if exact or values.size <= EXACT_VALUES:
-        floats = values.astype("<f4")
-        return {"type": "f4", "data": _text(floats)}, _largest(floats.astype(float) - values)
-    finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
-    low, high = float(finite.min()), float(finite.max())
-    step = (high - low) / LEVELS or 1.0
-    steps = np.rint((finite - low) / step).astype("<u2")
-    return {"type": "u2", "low": low, "step": step, "data": _text(steps)}, _largest(low + step * steps - values)
+        kept: NDArray[Any] = values.astype("<f4")
+        kind: dict[str, Any] = {"type": "f4"}
+        back = kept.astype(float)
+    else:
+        finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+        low, high = float(finite.min()), float(finite.max())
+        step = (high - low) / LEVELS or 1.0
+        kept = np.rint((finite - low) / step).astype("<u2")
+        kind, back = {"type": "u2", "low": low, "step": step}, low + step * kept
+    errors = np.abs(back - values)
+    text = base64.b64encode(np.ascontiguousarray(kept).tobytes()).decode("ascii")
+    return {**kind, "data": text}, float(errors[np.isfinite(errors)].max(initial=0.0))
+
+
+def _exact(**columns: Floats) -> dict[str, Any]:
+    """Return columns by name as 32-bit floats."""
+    return {name: pack(values, exact=True)[0] for name, values in columns.items()}
 
 
 def listed(values: Floats) -> list[float]:
@@ -56,30 +54,18 @@ def listed(values: Floats) -> list[float]:
     return [float(f"{value:.7g}") for value in values]
 
 
-def _largest(errors: Floats) -> float:
-    finite = np.abs(errors[np.isfinite(errors)])
-    return float(finite.max()) if finite.size else 0.0
-
-
-def _text(values: NDArray[Any]) -> str:
-    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
-
-
 STEPS = 24  # of the colours of elements: each is one path of the canvas
 SAME_SHAPE = 1e-6  # of its size, by which corners of an outline that only moves may be off
 
 
 def element_bytes(frames: Frames, drawable: Indices) -> int:
-    """Return about how many bytes the elements of all systems take in one frame."""
-    ends = drawable[[0, -1]]
-    tracks = frames.others
-    return sum(SHORT_BYTES * (_numbers(track, ends) + len(track.system.shades)) * len(track.names) for track in tracks)
-
-
-def _numbers(track: Track, ends: Indices) -> int:
-    """Return how many numbers an element has in a frame, judged by two of them."""
-    outlines = np.concatenate([_outlines(track, frame) for frame in ends])
-    return 2 if _only_move(outlines.reshape(len(ends), -1, *outlines.shape[1:])) else 2 * outlines.shape[1]
+    """Return about how many bytes the elements of all systems take in one frame, judged by two of them."""
+    total = 0
+    for track in frames.others:
+        outlines = np.stack([_outlines(track, int(frame)) for frame in drawable[[0, -1]]])
+        numbers = 2 if _only_move(outlines) else 2 * outlines.shape[2]
+        total += SHORT_BYTES * (numbers + len(track.system.shades)) * len(track.names)
+    return total
 
 
 def _outlines(track: Track, frame: int) -> Floats:
@@ -101,47 +87,37 @@ def pack_systems(frames: Frames, kept: Indices) -> list[dict[str, Any]]:
     those of all corners (f, b, k). `shades` are what elements can be coloured by: labels, values (f, b), and the value
     of the last of the `palette`.
     """
-    return [
-        {
-            "name": track.system.name,
-            "colour": style.block_colour(number),
-            **_packed(track, kept),
-            "shades": [
-                {"label": shade.label, "high": capped_scale(shade.label, values).high, "values": pack(values)[0]}
-                for shade in track.system.shades
-                for values in [shade.of(track.some(kept))]
-            ],
-            "palette": palette() if track.system.shades else [],
-        }
-        for number, track in enumerate(frames.others, start=1)
-    ]
-
-
-def palette() -> list[str]:
-    """Return the colours of elements, in even steps from none to most."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    return [to_hex(colour) for colour in colormaps[ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
+    palette = [to_hex(colour) for colour in colormaps[ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
+    systems = []
+    for number, track in enumerate(frames.others, start=1):
+        shades = []
+        for shade in track.system.shades:
+            values = shade.of(track.some(kept))
+            high = capped_scale(shade.label, values).high
+            shades.append({"label": shade.label, "high": high, "values": pack(values)[0]})
+        look = {"name": track.system.name, "colour": style.block_colour(number)}
+        systems.append({**look, **_places(track, kept), "shades": shades, "palette": palette if shades else []})
+    return systems
 
 
-def _packed(track: Track, kept: Indices) -> dict[str, Any]:
+def _places(track: Track, kept: Indices) -> dict[str, Any]:
     first = _outlines(track, int(kept[0]))
-    sizes = {"count": first.shape[0], "corners": first.shape[1]}
-    places = np.empty((len(kept), *first.shape[:1], 2))
-    for number, frame in enumerate(kept):
-        outlines = _outlines(track, int(frame))
+    shape, places = None, np.empty((len(kept), len(first), 2))
+    for number, frame in enumerate(kept.tolist()):
+        outlines = _outlines(track, frame)
         if not _only_move(np.stack([first, outlines])):
-            every = np.stack([_outlines(track, int(one)) for one in kept])
-            return {**sizes, "shape": None, **_axes(every)}
+            places = np.stack([_outlines(track, one) for one in kept.tolist()])
+            break
         places[number] = outlines.mean(axis=1)
-    shapes = first - first.mean(axis=1, keepdims=True)
-    is_one = _only_move(np.stack([shapes, np.broadcast_to(shapes[:1], shapes.shape)]))
-    return {**sizes, "shape": pack(shapes[:1] if is_one else shapes, exact=True)[0], **_axes(places)}
-
-
-def _axes(places: Floats) -> dict[str, Any]:
-    return {axis: pack(places[..., number])[0] for number, axis in enumerate(("x", "y"))}
+    else:
+        shapes = first - first.mean(axis=1, keepdims=True)
+        is_one = _only_move(np.stack([shapes, np.broadcast_to(shapes[:1], shapes.shape)]))
+        shape = pack(shapes[:1] if is_one else shapes, exact=True)[0]
+    axes = {axis: pack(places[..., number])[0] for number, axis in enumerate(("x", "y"))}
+    return {"count": first.shape[0], "corners": first.shape[1], "shape": shape, **axes}
 
 
 MOST_ARROWS = 200_000  # in all frames of a run
@@ -162,44 +138,31 @@ def pack_loads(
 
     The support's displacement is told beside loads on all blocks, as level ground looks the same wherever it is.
     """
-    support = support_of(scenario, happened)
-    acts, extent = outside(frames, kept, support), extent_of(frames, kept, support)
-    length = length_in(extent)
-    marks = [*map(list, acts.marks)]
+    support = run_data.support_of(scenario, happened)
+    acts, extent = arrows.actions_on(frames, kept, support), run_data.extent_of(frames, kept, support)
+    length = arrows.length_in(extent)
+    marks = [[[mark.text, *mark.way] for mark in row] for row in acts.marks]
     for row, moved in zip(marks, support.displacement(frames.time[kept]) if support.motion else (), strict=False):
-        row.append(_mark_of_support(float(moved), support))
+        text = f"support {MILLIMETRES * moved:+.2f} mm".replace("-", "−")
+        row.append([text, *run_data.rotate_points(np.sign(moved) * np.array(support.direction), support.tilt).tolist()])
     if acts.is_empty and not any(marks):
         return None
-    notes = list(filter(None, [replace(acts, marks=()).explanation]))
-    arrows = acts.arrows
-    if sum(one.ends_there.size for one in arrows) > MOST_ARROWS:
-        arrows, notes = (), ["Loads on blocks are not drawn in this page: there are too many."]
-    data = {
-        "arrows": [_arrows(one, length) for one in arrows if one.way.any()],
-        "turns": None if acts.turns is None else _turns(acts.turns),
-        "marks": [[[mark.text, *mark.way] for mark in row] for row in marks],
+    notes = [note for note in [replace(acts, marks=()).explanation] if note]
+    if sum(one.ends_there.size for one in acts.arrows) > MOST_ARROWS:
+        acts, notes = replace(acts, arrows=()), ["Loads on blocks are not drawn in this page: there are too many."]
+    shown: list[dict[str, Any]] = []
+    for one in acts.arrows:
+        if one.way.any():
+            lines = one.lines(length)
+            (x0, y0), (x1, y1) = np.moveaxis(lines, (2, 3), (0, 1))
+            colour = "ink" if one.kind == arrows.SPEED else "load"
+            shown.append({"colour": colour, "count": lines.shape[1], **_exact(x0=x0, y0=y0, x1=x1, y1=y1)})
+    turns = acts.turns and {
+        "radius": listed(acts.turns.radius),
+        **_exact(x=acts.turns.at[..., 0], y=acts.turns.at[..., 1], sweep=acts.turns.sweep),
     }
-    return PackedLoads(data, with_room(extent, replace(acts, arrows=arrows), length), notes)
-
-
-def _mark_of_support(moved: float, support: Support) -> Mark:
-    """Return the displacement (m) of the support and its direction in the picture."""
-    text = f"support {MILLIMETRES * moved:+.2f} mm".replace("-", "−")
-    x, y = rotate_points(np.sign(moved) * np.array(support.direction), support.tilt).tolist()
-    return Mark(text, (x, y))
-
-
-def _arrows(one: Arrows, length: float) -> dict[str, Any]:
-    lines = one.lines(length)
-    ends = {"x0": lines[..., 0, 0], "y0": lines[..., 0, 1], "x1": lines[..., 1, 0], "y1": lines[..., 1, 1]}
-    packed = {name: pack(values, exact=True)[0] for name, values in ends.items()}
-    return {"colour": "ink" if one.kind == SPEED else "load", "count": lines.shape[1], **packed}
-
-
-def _turns(turns: Turns) -> dict[str, Any]:
-    columns = {"x": turns.at[..., 0], "y": turns.at[..., 1], "sweep": turns.sweep}
-    packed = {name: pack(values, exact=True)[0] for name, values in columns.items()}
-    return {"radius": listed(turns.radius), **packed}
+    extent = arrows.with_room(extent, acts, length)
+    return PackedLoads({"arrows": shown, "turns": turns, "marks": marks}, extent, notes)
 
 
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
@@ -211,54 +174,54 @@ ENDLESS_WIDTHS = 20.0  # of the shown part; how far level ground is drawn to eit
 ROUND_OFF = 1e-12
 
 
-@dataclass(frozen=True)
-class PackedFrames:
-    """Frames for the page: `data` is plain values for JSON; the errors are the largest of rounding, by channel."""
+class PackedFrames(NamedTuple):
+    """Frames for the page: `data` is plain values for JSON, `kept` are those chosen, `notes` say what was lost."""
 
     data: dict[str, Any]
-    kept: int
-    recorded: int
-    errors: dict[str, float]
-
-    @property
-    def notes(self) -> list[str]:
-        """Losses of thinning and rounding, in sentences."""
-        errors = [f"{name} {error:.1g} {CHANNELS[name]}" for name, error in self.errors.items()]
-        thinned = "all" if self.kept == self.recorded else "evenly thinned"
-        return [
-            f"{self.kept} of {self.recorded} recorded frames are in this page ({thinned}).",
-            f"Largest rounding error of a value: {', '.join(errors)}.",
-        ]
+    kept: Indices
+    notes: list[str]
 
 
 def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> PackedFrames:
-    """Return the drawable frames in mm and degrees. Raises InvalidInputError when there is none."""
-    kept = frame_indices(frames, most_bytes)
-    lengths = {name: MILLIMETRES * getattr(frames, name)[kept] for name in ("x", "y", "vx", "vy")}
-    turns = {name: np.degrees(getattr(frames, name)[kept]) for name in ("rotation", "spin")}
-    packed = {name: pack({**lengths, **turns}[name]) for name in CHANNELS}
+    """Return the drawable frames in mm and degrees: evenly chosen, first and last included, as many as fit.
+
+    Raises InvalidInputError when there is none.
+    """
+    contacts, blocks, kept = frames.contacts, len(frames.names), run_data.drawable_frames(frames)
+    more = 0 if contacts is None else CONTACT_BYTES * len(contacts.rows) // len(contacts)
+    bytes_each = (4 if len(kept) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS)
+    most = max(2, most_bytes // max(1, bytes_each + more + element_bytes(frames, kept)))
+    if len(kept) > most and blocks:
+        kept = kept[np.unique(np.rint(np.linspace(0.0, len(kept) - 1.0, most)).astype(np.intp))]
+    factors = {name: MILLIMETRES if unit.startswith("mm") else np.degrees(1.0) for name, unit in CHANNELS.items()}
+    packed = {name: pack(factor * getattr(frames, name)[kept]) for name, factor in factors.items()}
+    outlines = None
+    if frames.outlines is not None:  # of every shape, and which of them each block has
+        kinds, first, which = np.unique(frames.outlines, axis=0, return_index=True, return_inverse=True)
+        uppers, widths = MILLIMETRES * upper_sides(frames)[first], MILLIMETRES * run_data.shortest_sides(frames)[first]
+        outlines = {
+            "corners": [[listed(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
+            "upper": [[listed(end) for end in upper] for upper in uppers],
+            "width": listed(widths),
+            "which": which.ravel().tolist(),
+        }
     data = {
         "time": pack(frames.time[kept], exact=True)[0],
         "names": list(frames.names),
         "size_x": listed(MILLIMETRES * frames.size_x),
         "size_y": listed(MILLIMETRES * frames.size_y),
-        "outlines": _outlines_player(frames),
+        "outlines": outlines,
         "start_angle": listed(np.degrees(frames.start_angle)),
         "channels": {name: part for name, (part, _) in packed.items()},
         "systems": pack_systems(frames, kept),
     }
-    return PackedFrames(data, len(kept), len(frames), {name: error for name, (_, error) in packed.items()})
-
-
-def frame_indices(frames: Frames, most_bytes: int = MOST_BYTES) -> Indices:
-    """Return the frames that `pack_frames` keeps: evenly chosen, first and last included, as many as fit."""
-    contacts, blocks, drawable = frames.contacts, len(frames.names), drawable_frames(frames)
-    more = 0 if contacts is None else CONTACT_BYTES * len(contacts.rows) // len(contacts)
-    bytes_each = (4 if len(drawable) * blocks <= EXACT_VALUES else SHORT_BYTES) * blocks * len(CHANNELS)
-    most = max(2, most_bytes // max(1, bytes_each + more + element_bytes(frames, drawable)))
-    if len(drawable) <= most or not blocks:
-        return drawable
-    return drawable[np.unique(np.rint(np.linspace(0.0, len(drawable) - 1.0, most)).astype(np.intp))]
+    errors = [f"{name} {error:.1g} {CHANNELS[name]}" for name, (_, error) in packed.items()]
+    thinned = "all" if len(kept) == len(frames) else "evenly thinned"
+    notes = [
+        f"{len(kept)} of {len(frames)} recorded frames are in this page ({thinned}).",
+        f"Largest rounding error of a value: {', '.join(errors)}.",
+    ]
+    return PackedFrames(data, kept, notes)
 
 
 def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | None:
@@ -271,31 +234,13 @@ def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | 
         return None
     tables = [frames.contacts.at(int(frame)) for frame in kept]
     rows, ends = np.concatenate(tables), np.cumsum([len(table) for table in tables]).tolist()
-    forces, scale = pushing_up(rows, tilt), force_scale(frames)
-    columns = {"x": MILLIMETRES * rows["x"], "y": MILLIMETRES * rows["y"], "fx": forces[:, 0], "fy": forces[:, 1]}
+    forces, scale = arrows.forces_on_upper(rows, tilt), arrows.force_scale(frames)
     return {
         "ends": ends,
         "scale": float(f"{scale.mm_per_newton:.5g}"),
         "longest": float(f"{scale.longest:.5g}"),
         "told": scale.explanation,
-        **{name: pack(values, exact=True)[0] for name, values in columns.items()},
-    }
-
-
-def _outlines_player(frames: Frames) -> dict[str, Any] | None:
-    """Return corners, upper side and least width (mm) of every shape, and which of them each block has.
-
-    None where all blocks are rectangles, whose sides tell the same.
-    """
-    if frames.outlines is None:
-        return None
-    kinds, first, which = np.unique(frames.outlines, axis=0, return_index=True, return_inverse=True)
-    uppers, widths = MILLIMETRES * upper_sides(frames)[first], MILLIMETRES * shortest_sides(frames)[first]
-    return {
-        "corners": [[listed(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
-        "upper": [[listed(end) for end in upper] for upper in uppers],
-        "width": listed(widths),
-        "which": which.ravel().tolist(),
+        **_exact(x=MILLIMETRES * rows["x"], y=MILLIMETRES * rows["y"], fx=forces[:, 0], fy=forces[:, 1]),
     }
 
 
@@ -306,10 +251,12 @@ def scene_data(
 
     `gone` and `walls_gone` say from which of the kept frames on a block or wall is not there any more, None for never.
     """
-    support = support_of(scenario, happened)
-    extent = extent_of(frames, kept, support)
+    support = run_data.support_of(scenario, happened)
+    extent = run_data.extent_of(frames, kept, support)
     reach = ENDLESS_WIDTHS * (extent.width + extent.height) / MILLIMETRES
-    fixed = support.fixed or (False,) * len(frames.names)
+    sides = np.stack([frames.size_x, frames.size_y], axis=-1)
+    kinds, which = np.unique(sides, axis=0, return_inverse=True)
+    outlines = [(MILLIMETRES * boundary_particles(scenario, *map(float, kind))).round(4).tolist() for kind in kinds]
     return {
         "extent": [extent.left, extent.right, extent.bottom, extent.top],
         "tilt": support.tilt,
@@ -318,9 +265,9 @@ def scene_data(
         "gone": _first(are_removed(frames.vx[kept])),
         "walls_gone": _first(frames.time[kept][:, None] >= np.array(support.gone).reshape(1, -1)),
         "offset": (MILLIMETRES * support.offset(frames.time[kept])).round(4).tolist() if support.motion else None,
-        "fixed": [bool(flag) for flag in fixed],
+        "fixed": run_data.is_fixed(frames, support).tolist(),
         "colours": list(style.BLOCK_COLOURS),
-        "particles": _particles(frames, scenario),
+        "particles": {"outlines": outlines, "which": which.ravel().tolist()} if any(outlines) else None,
     }
 
 
@@ -328,14 +275,6 @@ def _first(flags: NDArray[np.bool_]) -> list[int | None]:
     """Return the first frame with a flag for each column of (n, b), None where there is none."""
     firsts = np.where(flags.any(axis=0), flags.argmax(axis=0), -1).tolist()
     return [None if first < 0 else first for first in firsts]
-
-
-def _particles(frames: Frames, scenario: Scenario) -> dict[str, Any] | None:
-    """Return the outlines by particles, one for each pair of sides, and which of them every block has."""
-    sides = np.stack([frames.size_x, frames.size_y], axis=-1)
-    kinds, which = np.unique(sides, axis=0, return_inverse=True)
-    outlines = [(MILLIMETRES * boundary_particles(scenario, *map(float, kind))).round(4).tolist() for kind in kinds]
-    return {"outlines": outlines, "which": which.ravel().tolist()} if any(outlines) else None
 
 
 def boundary_particles(scenario: Scenario, size_x: float, size_y: float) -> Floats:

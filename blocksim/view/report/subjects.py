@@ -1,12 +1,19 @@
-"""The parts of a report: runs, sweeps and studies, as far as their folders can be read."""
+"""The parts of a report: runs, sweeps and studies, as far as their folders can be read.
+
+Pictures are those of `view` as SVG, with the places of their panels for cursor and pointer.
+"""
 
 import math
 import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from itertools import combinations
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_stored
@@ -18,10 +25,21 @@ from blocksim.simulation.observables import OBSERVABLES
 from blocksim.simulation.probes import ProbeSeries
 from blocksim.simulation.result import Summary, read_summary
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
-from blocksim.view.report.pictures import Repeats, history_of
-from blocksim.view.report.player import MOST_BYTES, frame_indices, pack_forces, pack_frames, pack_loads, scene_data
-from blocksim.view.run_data import support_of
+from blocksim.view import style
+from blocksim.view.history import draw_history_page
+from blocksim.view.kinds import SWEEP_KINDS
+from blocksim.view.report.player import MOST_BYTES, pack_forces, pack_frames, pack_loads, scene_data
+from blocksim.view.run_data import Support, support_of
+from blocksim.view.style import OWN
+from blocksim.view.sweeps import outcome_map
+from blocksim.view.sweeps.data import SweepData, short_names
+from blocksim.view.sweeps.outcome_map import OutcomeMap
 from blocksim.view.time_panels import probe_picture
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 ROOT = r"(?:/|[A-Za-z]:[\\/])"
 ABSOLUTE = re.compile(rf"'(?P<quoted>{ROOT}[^']+)'|(?<![^\s=,(\"])(?P<bare>{ROOT}[^\s'\",:;()]+)")
@@ -98,45 +116,112 @@ class PartialRun:
         return "unfinished" if self.summary is None else self.summary.status
 
 
-class _Attempts:
-    """Reads one part after the other and records errors."""
+def read_stored(folder: Path) -> PartialRun:
+    """Return what a run's folder holds. Raises InvalidInputError where nothing of it can be read."""
+    problems: list[str] = []
+    damage: list[str] = []
 
-    def __init__(self) -> None:
-        self.problems: list[str] = []
-        self.damage: list[str] = []
-
-    def at(self, read: Callable[[], Part]) -> Part | None:
+    def attempt(read: Callable[[], Part]) -> Part | None:
         """Return what `read` returns, None where it raises an error of the input."""
         try:
             return read()
         except BlocksimError as error:
-            self.problems.append(str(error))
+            problems.append(str(error))
             if not isinstance(error, InputMissingError):
-                self.damage.append(str(error))
+                damage.append(str(error))
             return None
 
-
-def read_stored(folder: Path) -> PartialRun:
-    """Return what a run's folder holds. Raises InvalidInputError where nothing of it can be read."""
-    attempts = _Attempts()
-    scenario = attempts.at(lambda: load_stored(folder / files.SCENARIO))
-    summary = attempts.at(lambda: read_summary(folder / files.SUMMARY))
-    frames = None if scenario is None else attempts.at(lambda: read_frames(folder / files.FRAMES, scenario))
-    final = attempts.at(lambda: read_table(folder / files.FINAL))
-    try:
-        text = read_limited(folder / files.SCENARIO, MAX_BYTES).decode(errors="replace")
-    except BlocksimError:
-        text = None
+    scenario = attempt(lambda: load_stored(folder / files.SCENARIO))
+    summary = attempt(lambda: read_summary(folder / files.SUMMARY))
+    frames = None if scenario is None else attempt(lambda: read_frames(folder / files.FRAMES, scenario))
+    final = attempt(lambda: read_table(folder / files.FINAL))
     if scenario is None and summary is None and final is None:
-        message = "\n".join([f"{folder}: nothing of this run can be read", *attempts.problems])
-        raise InvalidInputError(message)
-    probes = (
-        None
-        if scenario is None or frames is None
-        else attempts.at(lambda: read_probes(folder / files.FRAMES, scenario))
-    )
-    problems, damage = tuple(attempts.problems), tuple(attempts.damage)
-    return PartialRun(folder, scenario, text, summary, frames, final, problems, damage, probes or {})
+        raise InvalidInputError("\n".join([f"{folder}: nothing of this run can be read", *problems]))
+    probes = None
+    if scenario is not None and frames is not None:
+        probes = attempt(lambda: read_probes(folder / files.FRAMES, scenario))
+    text = None
+    with suppress(BlocksimError):
+        text = read_limited(folder / files.SCENARIO, MAX_BYTES).decode(errors="replace")
+    return PartialRun(folder, scenario, text, summary, frames, final, tuple(problems), tuple(damage), probes or {})
+
+
+MOST_MAPS = 6  # of a sweep, each over two of its inputs
+COORDINATES = re.compile(r'(?<= (?:d|x|y)=")[^"]*')
+DIGITS = re.compile(r"(\.\d\d)\d+")
+
+
+class Repeats:
+    """The measured ranges of a comparison, as pictures want them."""
+
+    def __init__(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Take the rows of `Comparison.to_dict`."""
+        self.rows = [row for row in rows if row["mean"] is not None]
+
+    def statistics(self) -> "pd.DataFrame":
+        """Return one row a block and quantity."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows, columns=["block", "quantity", "mean", "minimum", "maximum"])
+
+
+def embedded(figure: "Figure") -> str:
+    """Return a figure as the address of an SVG within the page; coordinates to a hundredth of a point."""
+    svg = style.figure_bytes(figure, ".svg").decode()
+    short = COORDINATES.sub(lambda found: DIGITS.sub(r"\1", found[0]).replace("\n", ""), svg)
+    return f"data:image/svg+xml;base64,{b64encode(short.encode()).decode()}"
+
+
+def history_of(frames: Frames, support: Support, measured: Repeats | None) -> tuple[str, list[dict[str, Any]]]:
+    """Return the histories of a run, and of each panel its name, place and the ends of its axes."""
+    with draw_history_page(frames, None, measured, support) as (figure, panels):
+        places = [
+            {"name": name, "place": _place(axes), "time": axes.get_xlim(), "values": axes.get_ylim()}
+            for name, axes in panels.items()
+        ]
+        return embedded(figure), places
+
+
+def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
+    """Return the pictures of a sweep: maps over every two inputs, and all other kinds that suit it.
+
+    A map has where its panels lie, row by row, and for every case the column that it is in and its place there.
+    """
+    pairs = [] if SWEEP_KINDS["map"].refusal(sweep) else combinations([one for one in sweep.inputs if one.is_number], 2)
+    names = dict(zip((one.key for one in sweep.inputs), short_names([one.key for one in sweep.inputs]), strict=True))
+    maps = []
+    for x, y in [*pairs][:MOST_MAPS]:
+        with outcome_map.draw_map(sweep, OWN, (x, y), by_manner=any(sweep.manners)) as (figure, found):
+            label = f"map of {names[y.key]} over {names[x.key]}"
+            maps.append({"label": label, "source": embedded(figure), "data": _cases(found)})
+    others = []
+    for name, kind in SWEEP_KINDS.items():
+        if name != "map" and not kind.refusal(sweep) and kind.suits(sweep):
+            with kind.drawn(sweep, OWN) as figure:
+                others.append({"label": name, "source": embedded(figure), "data": None})
+    return maps + others
+
+
+def _cases(found: OutcomeMap) -> dict[str, Any]:
+    count = len(found.sweep.finished)
+    column, places = np.full(count, -1), np.zeros((count, 2))
+    for number, (axes, (_, cases)) in enumerate(zip(found.panels[0], found.columns, strict=True)):
+        plane = found.plane(cases)
+        points = axes.transData.transform(np.stack([plane.x, plane.y], axis=-1))
+        column[cases], places[cases] = number, axes.transAxes.inverted().transform(points)
+    x, y = places.round(4).T.tolist()
+    return {
+        "panels": [[_place(axes) for axes in row] for row in found.panels],
+        "column": column.tolist(),
+        "x": x,
+        "y": y,
+    }
+
+
+def _place(axes: "Axes") -> list[float]:
+    """Return left, top, width and height of a panel as shares of the page, y down."""
+    box = axes.get_position()
+    return [round(float(share), 5) for share in (box.x0, 1.0 - box.y1, box.width, box.height)]
 
 
 @dataclass(frozen=True)
@@ -186,7 +271,7 @@ def run_subject(
         "comparison": comparison,
         "ledger": _ledger(run),
         "provenance": _provenance(run),
-        "probes": [] if parent is not None else [_probe(one) for one in run.probes.values() if len(one)],
+        "probes": [] if parent is not None else _probes(run),
         "has_player": data is not None,
         "history": history,
         "names": data["names"] if data else [],
@@ -207,7 +292,7 @@ def _moving(run: PartialRun, most_bytes: int) -> tuple[dict[str, Any] | None, li
         packed = pack_frames(run.frames, most_bytes)
     except InvalidInputError as error:
         return None, [], [str(error)]
-    kept = frame_indices(run.frames, most_bytes)
+    kept = packed.kept
     happened = () if run.summary is None else run.summary.events
     scene = scene_data(run.frames, run.scenario, kept, happened)
     forces, loads = pack_forces(run.frames, kept, scene["tilt"]), pack_loads(run.frames, run.scenario, kept, happened)
@@ -260,11 +345,16 @@ def _ledger(run: PartialRun) -> list[tuple[str, str]]:
     return [(LEDGER.get(name, name.replace("_", " ")), text) for name, text in texts.items()]
 
 
-def _probe(probe: ProbeSeries) -> dict[str, str]:
-    """Return a line about a probe, and its picture (PNG, base64)."""
-    picture = b64encode(probe_picture(probe)).decode()
-    text = f"{probe.name}: {probe.kind}, {len(probe)} samples to {probe.time[-1]:.4g} s, in probe-{probe.name}.csv"
-    return {"text": text, "picture": picture}
+def _probes(run: PartialRun) -> list[dict[str, str]]:
+    """Return a line about each probe that has samples, and its picture (PNG, base64)."""
+    return [
+        {
+            "text": f"{name}: {one.kind}, {len(one)} samples to {one.time[-1]:.4g} s, in probe-{name}.csv",
+            "picture": b64encode(probe_picture(one)).decode(),
+        }
+        for name, one in run.probes.items()
+        if len(one)
+    ]
 
 
 def _provenance(run: PartialRun) -> list[tuple[str, str]]:
@@ -334,6 +424,7 @@ def sweep_subject(
     `pictures` what `pictures_of` does.
     """
     name = table.folder.name if scenario is None else scenario.name
+    inside = [value for value in table.column("inside") if value]
     shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
     rows = [] if judged is None else judged["metrics"]["inside"]["rows"]
     limits = {  # of inside, by the column of the table
@@ -344,7 +435,13 @@ def sweep_subject(
     page = {
         "place": shared_path(str(table.folder)),
         "description": None if scenario is None else scenario.description,
-        "summary": _summary_sweeps(table, len(members)),
+        "summary": [
+            ("cases", str(len(table.rows))),
+            ("finished", f"{table.column(STATUS).count('finished')} of {len(table.rows)}"),
+            *([("inside all measured ranges", f"{inside.count('True')} of {len(inside)}")] if inside else []),
+            ("varied", ", ".join(table.varied) or "nothing"),
+            ("runs in this page", str(len(members))),
+        ],
         "problems": [shared_text(text) for text in problems],
         "hidden_blocks": len(table.blocks) - len(shown),
         "has_members": bool(members),
@@ -376,42 +473,20 @@ def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
             "name": name,
             **labels.get(name, {}),
             "role": role[name],
-            "values": _values(table.column(name), is_text=name == CASE),
+            "values": table.column(name) if name == CASE else _values(table.column(name)),
         }
         for name in order
         if name in table.columns
     ]
 
 
-def _values(texts: Sequence[str], *, is_text: bool) -> list[Any]:
-    if is_text:
-        return list(texts)
-    numbers = [_number(text) for text in texts]
-    if all(number is not None or not text for number, text in zip(numbers, texts, strict=True)):
-        return numbers
-    return [text or None for text in texts]
-
-
-def _number(text: str) -> float | None:
+def _values(texts: Sequence[str]) -> list[Any]:
+    """Return the numbers of a column whose values are all finite numbers, else its texts; None for an empty cell."""
     try:
-        value = float(text)
+        numbers = [float(text) if text else None for text in texts]
     except ValueError:
-        return None
-    return value if math.isfinite(value) else None
-
-
-def _summary_sweeps(table: CaseTable, members: int) -> list[tuple[str, str]]:
-    cases = len(table.rows)
-    finished = table.column("status").count("finished")
-    judged = [value for value in table.column("inside") if value]
-    inside = [] if not judged else [("inside all measured ranges", f"{judged.count('True')} of {len(judged)}")]
-    return [
-        ("cases", str(cases)),
-        ("finished", f"{finished} of {cases}"),
-        *inside,
-        ("varied", ", ".join(table.varied) or "nothing"),
-        ("runs in this page", str(members)),
-    ]
+        numbers = [math.nan]
+    return numbers if all(one is None or math.isfinite(one) for one in numbers) else [text or None for text in texts]
 
 
 @dataclass(frozen=True)
@@ -431,14 +506,8 @@ class StudyPage:
 def study_subject(key: str, study: StudyPage, place: str) -> Subject:
     """Return a study for a report."""
     picture = None if study.picture is None else f"data:image/png;base64,{b64encode(study.picture).decode()}"
-    page = {
-        "place": shared_path(place),
-        "description": study.description,
-        "summary": list(study.summary),
-        "title": study.title,
-        "heads": list(study.heads),
-        "rows": [list(row) for row in study.rows],
-        "picture": picture,
-        "problems": [shared_text(text) for text in study.problems],
-    }
-    return Subject(key, "study", study.name, page, {"kind": "study", "name": study.name, "place": shared_path(place)})
+    page = asdict(study) | {"picture": picture, "problems": [shared_text(text) for text in study.problems]}
+    where = shared_path(place)
+    return Subject(
+        key, "study", study.name, page | {"place": where}, {"kind": "study", "name": study.name, "place": where}
+    )

@@ -107,15 +107,15 @@ def draw_series(
     beside = LEFT + RIGHT + (count - 1) * COLUMN_GAP
     width = paper.width(WIDTH, beside + count * NARROWEST)
     panel = (width - beside) / count
-    headings = [style.broken(one.label, panel, bold=True) for one in shown]
+    headings = [style.break_lines(one.label, panel, bold=True) for one in shown]
     names = [style.cut_to(f"block {blocks[block]}", panel * style.POINTS_PER_INCH, style.FONT_SIZE) for block in rows]
     captions = [
-        [style.broken(f"{name}: {_extent(one.x_mm[:, block])}", panel) for one in shown]
+        [style.break_lines(f"{name}: {_extent(one.x_mm[:, block])}", panel) for one in shown]
         for block, name in zip(rows, names, strict=True)
     ]
     lines = max(len(caption) for row in captions for caption in row)
     head = HEAD + LINE * lines + (LINE * max(map(len, headings)) + 0.08 if headings[0] != [""] else 0.0)
-    foot = FOOT + LINE * (len(style.broken(axis.label, width - LEFT)) - 1)
+    foot = FOOT + LINE * (len(style.break_lines(axis.label, width - LEFT)) - 1)
     joined = all(is_smooth(one.x_mm[:, block]) for one in shown for block in rows)
     texts = ["One point: one run."]
     texts += ["Band: smallest to largest of the measured repeats."] if measured else []

@@ -243,9 +243,9 @@ def draw_map(
     beside = LEFT + RIGHT + (count - 1) * COLUMN_GAP
     own = style.COLUMN_WIDTH - beside if count == 1 else min(WIDEST, (style.PAGE_WIDTH - beside) / count)
     width = paper.width(beside + count * own, beside + count * LEAST)
-    headings = [style.broken(heading, (width - beside) / count, bold=True) for heading, _ in found.columns]
+    headings = [style.break_lines(heading, (width - beside) / count, bold=True) for heading, _ in found.columns]
     head = HEADING + (style.LINE * max(map(len, headings)) + 0.05 if count > 1 else 0.0)
-    foot = FOOT + style.LINE * (len(style.broken(found.axes[0].label, width - LEFT)) - 1)
+    foot = FOOT + style.LINE * (len(style.break_lines(found.axes[0].label, width - LEFT)) - 1)
     shape, gaps = (len(found.blocks) + 1, count), (COLUMN_GAP, ROW_GAP)
     opened = style.open_panels(
         paper,

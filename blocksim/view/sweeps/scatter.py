@@ -128,7 +128,7 @@ def _of_input(one: Input, name: str) -> Variable:
 
 
 def _in_lines(name: str) -> str:
-    return "\n".join(style.broken(name, NAME_ROOM, NAME_FONT))
+    return "\n".join(style.break_lines(name, NAME_ROOM, NAME_FONT))
 
 
 def _around(values: Floats, axis: ValueAxis | None) -> tuple[float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blocksim.study.pictures import read_sweep_data
-from blocksim.view.report.pictures import history_of, pictures_of
+from blocksim.view.report.subjects import history_of, pictures_of
 from blocksim.view.run_data import Support
 from tests.view.made_up import toppling
 from tests.view.report.folders import write_sweep

@@ -20,7 +20,7 @@ from tests.view.report.folders import SCENARIOS, numbers, write_run
 def test_too_many_frames_are_thinned_and_that_is_reported(tmp_path: Path) -> None:
     frames = write_run(tmp_path / "run", count=41)
     packed = pack_frames(frames, most_bytes=5 * 3 * 6 * 4)
-    assert (packed.kept, packed.recorded) == (5, 41)
+    assert packed.kept.tolist() == [0, 10, 20, 30, 40]
     assert numbers(packed.data["time"]) == pytest.approx(frames.time[[0, 10, 20, 30, 40]])
     assert "5 of 41 recorded frames are in this page (evenly thinned)." in packed.notes
 
@@ -29,7 +29,7 @@ def test_frames_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
     frames = write_run(tmp_path / "run", count=4)
     x = frames.x.copy()
     x[3, 1] = np.nan
-    assert pack_frames(replace(frames, x=x)).kept == 3
+    assert len(pack_frames(replace(frames, x=x)).kept) == 3
     with pytest.raises(InvalidInputError, match="no frame to draw"):
         pack_frames(replace(frames, x=np.full_like(x, np.nan)))
 
@@ -44,7 +44,7 @@ def test_thousand_blocks_and_many_frames_stay_below_the_limit(tmp_path: Path) ->
     energy = {name: values[rows] for name, values in frames.energy.items()}
     packed = pack_frames(replace(frames, time=np.arange(600.0), energy=energy, **many))
     size = sum(len(part["data"]) for part in packed.data["channels"].values())
-    assert 300 < packed.kept < 1700
+    assert 300 < len(packed.kept) < 1700
     assert size < 17_000_000
 
 
