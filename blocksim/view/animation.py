@@ -19,14 +19,13 @@ from blocksim.simulation.folder import NAME
 from blocksim.simulation.frames import Frames
 from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.paint import Paint, by_block, draw_key
-from blocksim.view.run_data import MILLIMETRES, Flags, Floats, Indices, Support
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
 
 Pixels = NDArray[np.uint8]  # (height, width, 3), red, green, blue
-Writer = Callable[[Path, Iterator[Pixels], Floats], None]
+Writer = Callable[[Path, Iterator[Pixels], run_data.Floats], None]
 
 TICK = 0.01  # s, of a GIF's clock
 SHORTEST = 2  # ticks; browsers slow down what is shorter
@@ -45,7 +44,7 @@ CODECS = {  # of ffmpeg, the best first; builds without H.264 have MPEG-4
 OPTIONS = ["-movflags", "+faststart", "-metadata", f"comment={NAME.decode()}"]  # a browser may begin before it has all
 
 
-def write_gif(path: Path, pictures: Iterator[Pixels], seconds: Floats) -> None:
+def write_gif(path: Path, pictures: Iterator[Pixels], seconds: run_data.Floats) -> None:
     """Write pictures (height, width, 3) that are shown for the given seconds each; the GIF repeats for ever.
 
     Raises InvalidInputError for more than 50 pictures a second or more pictures than fit into memory, OutputError.
@@ -72,7 +71,7 @@ def write_gif(path: Path, pictures: Iterator[Pixels], seconds: Floats) -> None:
     write_bytes(path, buffer.getvalue())
 
 
-def ticks(seconds: Floats) -> NDArray[np.int64]:
+def ticks(seconds: run_data.Floats) -> NDArray[np.int64]:
     """Return how many hundredths of a second each picture stays, so that they add up to the length of the animation."""
     ends = np.round(np.cumsum(seconds) / TICK).astype(np.int64)
     return np.diff(ends, prepend=0)
@@ -107,7 +106,7 @@ def palette_of(picture: Pixels) -> "Callable[[Pixels], Image]":
     return reduce
 
 
-def write_mp4(path: Path, pictures: Iterator[Pixels], seconds: Floats) -> None:
+def write_mp4(path: Path, pictures: Iterator[Pixels], seconds: run_data.Floats) -> None:
     """Write pictures (height, width, 3), both sides even, at the pace of the first one; held ones are repeated.
 
     Raises UnavailableError with neither the package nor ffmpeg, OutputError.
@@ -193,7 +192,7 @@ def draw_animation(
     path: Path | str,
     pace: Pace | None = None,
     look: Look | None = None,
-    support: Support | None = None,
+    support: run_data.Support | None = None,
     on_picture: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[int, str]:
     """Write a run as GIF or MP4; the last frame is held.
@@ -206,7 +205,7 @@ def draw_animation(
     path = Path(path)
     write = writer_of(path)
     chosen, seconds = frame_times(frames, run_data.drawable_frames(frames), pace or Pace())
-    animation = Animation(frames, support or Support(), look or Look())
+    animation = Animation(frames, support or run_data.Support(), look or Look())
 
     def pictures() -> Iterator[Pixels]:
         for number, frame in enumerate(chosen, start=1):
@@ -226,7 +225,7 @@ def writer_of(path: Path) -> Writer:
         raise InvalidInputError(unknown) from None
 
 
-def frame_times(frames: Frames, drawable: Indices, pace: Pace) -> tuple[Indices, Floats]:
+def frame_times(frames: Frames, drawable: run_data.Indices, pace: Pace) -> tuple[run_data.Indices, run_data.Floats]:
     """Return which frame each picture shows and how long (s of animation): even in time, the last one held.
 
     Every picture shows the frame nearest to its time. Raises InvalidInputError for more than MOST_PICTURES.
@@ -247,7 +246,7 @@ def frame_times(frames: Frames, drawable: Indices, pace: Pace) -> tuple[Indices,
     return drawable[nearest], seconds
 
 
-def beyond_view(names: Sequence[str], seen: Flags) -> str:
+def beyond_view(names: Sequence[str], seen: run_data.Flags) -> str:
     """Return which blocks leave the view, by name where they are few; empty where all stay."""
     gone = [name for name, is_seen in zip(names, seen, strict=True) if not is_seen]
     if not gone:
@@ -261,7 +260,7 @@ def beyond_view(names: Sequence[str], seen: Flags) -> str:
 class Animation:
     """Draws one frame after the other on the same page; fixed parts are drawn once."""
 
-    def __init__(self, frames: Frames, support: Support, look: Look) -> None:
+    def __init__(self, frames: Frames, support: run_data.Support, look: Look) -> None:
         """Draw what is fixed: title, axis, and the support unless it moves, on a page as high as the run needs.
 
         Raises InvalidInputError for forces that were not stored.
@@ -336,7 +335,7 @@ class Animation:
         if self.has_trails:
             past = self.drawable[self.drawable <= frame]
             free = ~run_data.is_fixed(frames, self.support)
-            ways = MILLIMETRES * np.stack([frames.x[past], frames.y[past]], axis=-1)[:, free]
+            ways = run_data.MILLIMETRES * np.stack([frames.x[past], frames.y[past]], axis=-1)[:, free]
             lines = LineCollection(list(ways.swapaxes(0, 1)), colors=style.INK, **TRAIL, transform=canvas.scene)
             canvas.axes.add_collection(lines)
         index = int(np.searchsorted(self.drawable, frame))

@@ -9,20 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.simulation.frames import Frames
-from blocksim.view import arrows, scene, style
+from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.paint import Paint, by_block, draw_key
-from blocksim.view.run_data import (
-    MILLIMETRES,
-    Extent,
-    Floats,
-    Support,
-    drawable_frames,
-    extent_of,
-    moments_at,
-    rotate_points,
-)
-from blocksim.view.scene import MeasuredRange, Page
-from blocksim.view.style import OWN, Paper
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +29,7 @@ class MeasuredTable(Protocol):
         ...
 
 
-def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float) -> list[MeasuredRange]:
+def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float) -> list[scene.MeasuredRange]:
     """Return the measured centres (mm) of the blocks, in rows without overlap; `width` (mm) is shown."""
     statistics = measured.statistics()
     centres = statistics[(statistics["quantity"] == "x") & statistics["block"].isin(names)]
@@ -51,16 +39,16 @@ def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float)
         mean, minimum, maximum = (float(getattr(line, key)) for key in ("mean", "minimum", "maximum"))
         row = next((row for row, end in enumerate(row_ends) if end < minimum), len(row_ends))
         row_ends[row : row + 1] = [maximum + RANGE_GAP * width]
-        ranges.append(MeasuredRange(str(line.block), mean, minimum, maximum, row))
+        ranges.append(scene.MeasuredRange(str(line.block), mean, minimum, maximum, row))
     return ranges
 
 
-def rows_of(ranges: Sequence[MeasuredRange]) -> int:
+def rows_of(ranges: Sequence[scene.MeasuredRange]) -> int:
     """Return the number of rows that measured ranges take."""
     return 1 + max((item.row for item in ranges), default=-1)
 
 
-def widen(extent: Extent, ranges: Sequence[MeasuredRange]) -> Extent:
+def widen(extent: run_data.Extent, ranges: Sequence[scene.MeasuredRange]) -> run_data.Extent:
     """Return an extent that also holds the measured ranges, and is wide enough for the time above a tower."""
     margin = RANGE_GAP * extent.width
     missing = max(NARROWEST * extent.height - extent.width, 0.0)
@@ -87,7 +75,7 @@ class Labels(NamedTuple):
     """The lines of n labels, where their middles are (points from the panel's left end), and in which rows."""
 
     lines: list[list[str]]
-    middles: Floats
+    middles: run_data.Floats
     rows: NDArray[np.intp]
     is_listed: bool  # in the order of the blocks, and not each below its own
 
@@ -103,13 +91,13 @@ class Labels(NamedTuple):
         return rows if rows * max(map(len, self.lines), default=0) <= MOST_LINES else 0
 
 
-def labels_of(frames: Frames, frame: int, page: Page, ranges: Sequence[MeasuredRange]) -> Labels:
+def labels_of(frames: Frames, frame: int, page: scene.Page, ranges: Sequence[scene.MeasuredRange]) -> Labels:
     """Return a label for every block, centred below it as far as the page allows.
 
     Where too many blocks are above one another, all are listed in rows as wide as the page.
     """
     measured = {one.block: one for one in ranges}
-    centres = MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
+    centres = run_data.MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
     lines = []
     for name, (x, _), turn in zip(frames.names, centres, np.degrees(frames.rotation[frame]), strict=True):
         texts = [f"x {x:.2f} mm", f"{turn + 0.0:.2f}°".replace("-0.00", "0.00").replace("-", "−")]
@@ -119,7 +107,7 @@ def labels_of(frames: Frames, frame: int, page: Page, ranges: Sequence[MeasuredR
         lines.append([style.shorten(name, LETTERS), *texts])
     room = page.panel_width * style.POINTS_PER_INCH
     half = np.array([0.5 * style.LETTER[0] * FONT * max(map(len, texts)) for texts in lines])
-    below = (rotate_points(centres, page.extent.tilt)[:, 0] - page.extent.left) * page.points_per_mm
+    below = (run_data.rotate_points(centres, page.extent.tilt)[:, 0] - page.extent.left) * page.points_per_mm
     middles = np.clip(below, half, np.maximum(room - half, half))
     rows, ends = np.zeros(len(lines), dtype=np.intp), list[float]()
     for number in np.argsort(middles - half, kind="stable").tolist():
@@ -139,12 +127,12 @@ def draw_final(
     path: Path | str,
     title: str | None = None,
     measured: MeasuredTable | None = None,
-    support: Support | None = None,
+    support: run_data.Support | None = None,
     *,
     forces: bool = False,
     times: Sequence[float] | None = None,
     paint: Paint | None = None,
-    paper: Paper = OWN,
+    paper: style.Paper = style.OWN,
 ) -> None:
     """Draw the last frame, or the one nearest to the last of `times` (s).
 
@@ -154,13 +142,13 @@ def draw_final(
     that is too small or nothing to draw, and OutputError when the file cannot be written.
     """
     path = style.picture_path(path)
-    support, paint = support or Support(), paint or by_block(frames)
-    drawable = drawable_frames(frames)
-    chosen = drawable[-1:] if times is None else moments_at(frames, drawable, times)[-1:]
+    support, paint = support or run_data.Support(), paint or by_block(frames)
+    drawable = run_data.drawable_frames(frames)
+    chosen = drawable[-1:] if times is None else run_data.moments_at(frames, drawable, times)[-1:]
     frame = int(chosen[0])
     scale = arrows.force_scale(frames) if forces else None
     acts = arrows.actions_on(frames, chosen, support)
-    extent = extent_of(frames, chosen, support)
+    extent = run_data.extent_of(frames, chosen, support)
     length = arrows.length_in(extent)
     extent = arrows.with_room(extent, acts, length)
     is_measured = measured is not None and frame == drawable[-1]

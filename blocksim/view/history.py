@@ -11,22 +11,8 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
 from blocksim.simulation.frames import Frames, force_on_supports
-from blocksim.view import style
-from blocksim.view.arrows import contacts_of
-from blocksim.view.final import MeasuredTable
+from blocksim.view import arrows, final, run_data, style, time_panels
 from blocksim.view.paint import Paint, by_block
-from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support, drawable_frames, is_fixed
-from blocksim.view.style import OWN, Paper
-from blocksim.view.time_panels import (
-    GAP,
-    PANEL,
-    TimePanel,
-    draw_time_panel,
-    energy_groups,
-    limits_of,
-    open_time_panels,
-    unit_for,
-)
 from blocksim.world.systems.blocks import BLOCKS
 from blocksim.world.systems.system import Output
 
@@ -78,7 +64,7 @@ class Motion:
     """One quantity of all blocks: n values of b blocks, and the column of the measured table that goes with it."""
 
     label: str
-    values: Floats
+    values: run_data.Floats
     quantity: str = ""
 
 
@@ -87,12 +73,12 @@ class FramesInView:
     """Chosen frames as seen from where the ground was at the start, or from the moving ground."""
 
     frames: Frames
-    chosen: Indices
-    support: Support
+    chosen: run_data.Indices
+    support: run_data.Support
     relative: bool = False
 
     @property
-    def time(self) -> Floats:
+    def time(self) -> run_data.Floats:
         """Times (s), (n,)."""
         return self.frames.time[self.chosen]
 
@@ -101,21 +87,21 @@ class FramesInView:
         """Suffix of the labels of positions and velocities."""
         return " − ground" if self.relative and self.support.motion is not None else ""
 
-    def place(self, axis: int) -> Floats:
+    def place(self, axis: int) -> run_data.Floats:
         """Return centres (mm) along x (0) or y (1)."""
         places = (self.frames.x, self.frames.y)[axis][self.chosen]
         carried = self.support.offset(self.time) * bool(self.from_ground)
-        return np.asarray(MILLIMETRES * (places - carried[:, axis, None]))
+        return np.asarray(run_data.MILLIMETRES * (places - carried[:, axis, None]))
 
-    def displacement(self, axis: int) -> Floats:
+    def displacement(self, axis: int) -> run_data.Floats:
         """Return displacements (mm) from the first frame of the run."""
-        return np.asarray(self.place(axis) - MILLIMETRES * (self.frames.x, self.frames.y)[axis][0])
+        return np.asarray(self.place(axis) - run_data.MILLIMETRES * (self.frames.x, self.frames.y)[axis][0])
 
-    def velocity(self, axis: int) -> Floats:
+    def velocity(self, axis: int) -> run_data.Floats:
         """Return velocities (mm/s) along x (0) or y (1)."""
         velocities = (self.frames.vx, self.frames.vy)[axis][self.chosen]
         carried = np.multiply.outer(self.support.velocity(self.time), self.support.direction)
-        return np.asarray(MILLIMETRES * (velocities - carried[:, axis, None] * bool(self.from_ground)))
+        return np.asarray(run_data.MILLIMETRES * (velocities - carried[:, axis, None] * bool(self.from_ground)))
 
 
 MOTIONS: dict[str, Callable[[FramesInView], Motion]] = {
@@ -138,7 +124,7 @@ def _shown(output: Output) -> Callable[[FramesInView], Motion]:
 
     def motion(seen: FramesInView) -> Motion:
         values = output.of(seen.frames.tracks[0].some(seen.chosen))
-        factor, unit = unit_for(float(np.abs(values).max(initial=0.0)), output.unit)
+        factor, unit = time_panels.unit_for(float(np.abs(values).max(initial=0.0)), output.unit)
         return Motion(f"{output.meaning} ({unit})", factor * values)
 
     return motion
@@ -152,8 +138,8 @@ def draw_history(
     frames: Frames,
     path: Path | str,
     title: str | None = None,
-    measured: MeasuredTable | None = None,
-    support: Support | None = None,
+    measured: final.MeasuredTable | None = None,
+    support: run_data.Support | None = None,
     **asked: Any,
 ) -> None:
     """Draw a history as `draw_history_page` gives it and write PNG, SVG or PDF; the same input gives the same bytes.
@@ -170,13 +156,13 @@ def draw_history(
 def draw_history_page(
     frames: Frames,
     title: str | None = None,
-    measured: MeasuredTable | None = None,
-    support: Support | None = None,
+    measured: final.MeasuredTable | None = None,
+    support: run_data.Support | None = None,
     *,
     forces: bool = False,
     choice: Choice | None = None,
     paint: Paint | None = None,
-    paper: Paper = OWN,
+    paper: style.Paper = style.OWN,
 ) -> "Iterator[tuple[Figure, dict[str, Axes]]]":
     """Give x, y, rotation, energies and contacts over time, or the panels of `choice`, by the name of each.
 
@@ -186,12 +172,12 @@ def draw_history_page(
     InvalidInputError for unknown panels or blocks, forces that were not stored, a page that is too small or nothing to
     draw.
     """
-    choice, support, paint = choice or Choice(), support or Support(), paint or by_block(frames)
+    choice, support, paint = choice or Choice(), support or run_data.Support(), paint or by_block(frames)
     if not paint.is_lasting:
         raise InvalidInputError("a history is coloured by block or material; speed and rotation are separate panels")
     if not frames.names:
         raise InvalidInputError("no block to draw: a history is that of blocks, and a probe shows the thrust of soil")
-    chosen = drawable_frames(frames)
+    chosen = run_data.drawable_frames(frames)
     if len(chosen) > MOST_POINTS:
         chosen = chosen[np.linspace(0, len(chosen) - 1, MOST_POINTS).round().astype(np.intp)]
     seen = FramesInView(frames, chosen, support, choice.relative)
@@ -203,18 +189,20 @@ def draw_history_page(
     span = float(seen.time[0]), float(seen.time[0] + LATER * (seen.time[-1] - seen.time[0]))
     own = _panel_height(names, len(shown))
     first = next((name for name in names if name in MOTIONS), None)
-    with open_time_panels(len(names), span, title, notes, paper, own) as (figure, rows):
+    with time_panels.open_time_panels(len(names), span, title, notes, paper, own) as (figure, rows):
         panels = dict(zip(names, rows, strict=True))
         for name, axes in panels.items():
             if name not in MOTIONS:
-                draw_time_panel(axes, SCENE_PANELS[name](seen))
+                time_panels.draw_time_panel(axes, SCENE_PANELS[name](seen))
                 continue
             motion = MOTIONS[name](seen)
             drawn = motion.values[:, shown] if blocks else motion.values
             lines = {frames.names[block]: (seen.time, motion.values[:, block]) for block in shown}
             legend = "block" if shown and name == first else None
-            limits = limits_of(drawn)
-            draw_time_panel(axes, TimePanel(motion.label, lines, limits=limits, looks=looks, legend=legend))
+            limits = time_panels.limits_of(drawn)
+            time_panels.draw_time_panel(
+                axes, time_panels.TimePanel(motion.label, lines, limits=limits, looks=looks, legend=legend)
+            )
             if not blocks:
                 _draw_others(axes, seen.time, np.delete(motion.values, shown, axis=1))
             if measured is not None and motion.quantity:
@@ -254,7 +242,7 @@ def _farthest_blocks(seen: FramesInView) -> list[int]:
     """Return the blocks to colour, in their order: free ones; of many, those that end farthest from their start."""
     frames, last = seen.frames, seen.chosen[-1]
     away = np.hypot(frames.x[last] - frames.x[0], frames.y[last] - frames.y[0])
-    fixed = is_fixed(frames, seen.support)
+    fixed = run_data.is_fixed(frames, seen.support)
     ordered = [int(block) for block in np.argsort(-away, kind="stable") if not fixed[block]]
     return sorted(ordered[:MOST_BLOCKS])
 
@@ -275,7 +263,7 @@ def _panel_names(seen: FramesInView, choice: Choice, *, forces: bool) -> tuple[s
     if not choice.panels and seen.support.motion is not None:
         names.append(GROUND)
     if FORCE in names or forces:
-        contacts_of(seen.frames)  # has advice where none were stored
+        arrows.contacts_of(seen.frames)  # has advice where none were stored
     return tuple(dict.fromkeys([*names, *([FORCE] if forces else [])]))
 
 
@@ -284,10 +272,10 @@ def _panel_height(names: Sequence[str], blocks: int) -> float:
     legend = LEGEND + blocks * style.LINE
     first = next((row for row, name in enumerate(names) if name in MOTIONS), 0)
     end = next((row for row, name in enumerate(names) if row > first and name not in {*MOTIONS, CONTACTS}), len(names))
-    return max(PANEL, (legend + GAP) / (end - first) - GAP)
+    return max(time_panels.PANEL, (legend + time_panels.GAP) / (end - first) - time_panels.GAP)
 
 
-def _draw_others(axes: "Axes", time: Floats, values: Floats) -> None:
+def _draw_others(axes: "Axes", time: run_data.Floats, values: run_data.Floats) -> None:
     """Draw the blocks that have no line of their own in grey, (n, k)."""
     from matplotlib.collections import LineCollection
 
@@ -298,7 +286,7 @@ def _draw_others(axes: "Axes", time: Floats, values: Floats) -> None:
 
 
 def _draw_measured(
-    axes: "Axes", seen: FramesInView, motion: Motion, measured: MeasuredTable, names: Sequence[str]
+    axes: "Axes", seen: FramesInView, motion: Motion, measured: final.MeasuredTable, names: Sequence[str]
 ) -> None:
     """Draw mean and range of the repeats at the end of the lines of blocks."""
     statistics = measured.statistics()
@@ -310,15 +298,17 @@ def _draw_measured(
         axes.plot([x, x], [low, high], marker="_", markersize=4.0, **line)
         axes.plot(x, mean, marker="o", markersize=3.2, **line)
         known.append(np.array([low, high]))
-    axes.set_ylim(*limits_of(np.concatenate(known)))
+    axes.set_ylim(*time_panels.limits_of(np.concatenate(known)))
 
 
-def _energies(seen: FramesInView) -> TimePanel:
+def _energies(seen: FramesInView) -> time_panels.TimePanel:
     """Return energies (J) by name, each in its own colour and dashes."""
-    energies = energy_groups(seen.frames.energy, seen.chosen)
-    factor, unit = unit_for(max((float(np.abs(values).max()) for values in energies.values()), default=0.0), "J")
+    energies = time_panels.energy_groups(seen.frames.energy, seen.chosen)
+    factor, unit = time_panels.unit_for(
+        max((float(np.abs(values).max()) for values in energies.values()), default=0.0), "J"
+    )
     looks = {name: ENERGY_LOOKS.get(name, OTHER_ENERGY) for name in energies}
-    return TimePanel(
+    return time_panels.TimePanel(
         f"energy ({unit})",
         {name: (seen.time, factor * values) for name, values in energies.items()},
         looks={
@@ -328,25 +318,25 @@ def _energies(seen: FramesInView) -> TimePanel:
     )
 
 
-def _contacts(seen: FramesInView) -> TimePanel:
+def _contacts(seen: FramesInView) -> time_panels.TimePanel:
     line = {"": (seen.time, seen.frames.contact_count[seen.chosen])}
-    return TimePanel("contacts", line, limits=(0.0, None), looks={"": {**INK, "drawstyle": "steps-post"}})
+    return time_panels.TimePanel("contacts", line, limits=(0.0, None), looks={"": {**INK, "drawstyle": "steps-post"}})
 
 
-def _support_force(seen: FramesInView) -> TimePanel:
+def _support_force(seen: FramesInView) -> time_panels.TimePanel:
     """Return the upward force (N) of the supports on all free blocks, with the weight; where it is cut, its largest.
 
     Raises InvalidInputError where contacts were not stored.
     """
     support = seen.support
     up = float(np.sin(support.tilt)), float(np.cos(support.tilt))
-    force = force_on_supports(contacts_of(seen.frames), up, support.fixed)[seen.chosen]
+    force = force_on_supports(arrows.contacts_of(seen.frames), up, support.fixed)[seen.chosen]
     largest, reference = float(force.max(initial=0.0)), support.weight or float(np.median(force)) or 1.0
-    factor, unit = unit_for(reference, "N")
+    factor, unit = time_panels.unit_for(reference, "N")
     note = f"upwards, from ground,\nwalls and fixed bodies\ndashed: weight {factor * support.weight:.3g} {unit}"
     if largest > MOST_WEIGHTS * reference:
         note += f"\nlargest: {factor * largest:.3g} {unit}"
-    return TimePanel(
+    return time_panels.TimePanel(
         f"support force ({unit})",
         {"": (seen.time, factor * force)},
         note,
@@ -356,14 +346,16 @@ def _support_force(seen: FramesInView) -> TimePanel:
     )
 
 
-def _ground(seen: FramesInView) -> TimePanel:
+def _ground(seen: FramesInView) -> time_panels.TimePanel:
     """Return the displacement of ground, walls and fixed bodies."""
-    moved = MILLIMETRES * seen.support.displacement(seen.time)
+    moved = run_data.MILLIMETRES * seen.support.displacement(seen.time)
     note = f"displacement of\nthe ground {seen.support.way}" if seen.support.motion is not None else "at rest"
-    return TimePanel("ground (mm)", {"": (seen.time, moved)}, note, limits=limits_of(moved), looks={"": INK})
+    return time_panels.TimePanel(
+        "ground (mm)", {"": (seen.time, moved)}, note, limits=time_panels.limits_of(moved), looks={"": INK}
+    )
 
 
-SCENE_PANELS: dict[str, Callable[[FramesInView], TimePanel]] = {
+SCENE_PANELS: dict[str, Callable[[FramesInView], time_panels.TimePanel]] = {
     ENERGY: _energies,
     CONTACTS: _contacts,
     FORCE: _support_force,

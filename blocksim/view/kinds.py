@@ -8,14 +8,10 @@ from typing import TYPE_CHECKING
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
-from blocksim.view import style
-from blocksim.view.final import draw_final
-from blocksim.view.history import draw_history
-from blocksim.view.strip import draw_profile, draw_strip
-from blocksim.view.style import OWN, Paper
-from blocksim.view.sweeps import lines, outcome_map
+from blocksim.view import final, history, strip, style
+from blocksim.view.style import Paper
+from blocksim.view.sweeps import lines, outcome_map, scatter
 from blocksim.view.sweeps.data import SweepData
-from blocksim.view.sweeps.scatter import draw_histogram, draw_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,10 +23,10 @@ MOTION = "motion"  # of the supports; needs no run
 PROBE = "probe"
 # Each draws frames to a path, with title, measured table and support.
 RUN_KINDS: dict[str, Callable[..., None]] = {
-    STRIP: draw_strip,
-    FINAL: draw_final,
-    HISTORY: draw_history,
-    PROFILE: draw_profile,
+    STRIP: strip.draw_strip,
+    FINAL: final.draw_final,
+    HISTORY: history.draw_history,
+    PROFILE: strip.draw_profile,
 }
 MOST_SLIPS = 2
 
@@ -43,7 +39,7 @@ class Kind:
     suits: Callable[[SweepData], bool]
     drawn: "Callable[[SweepData, Paper], AbstractContextManager[Figure]]"
 
-    def draw(self, sweep: SweepData, path: Path, paper: Paper = OWN) -> None:
+    def draw(self, sweep: SweepData, path: Path, paper: Paper = style.OWN) -> None:
         """Draw a sweep and write PNG, SVG or PDF; the same input gives the same bytes.
 
         Raises InvalidInputError for an unknown picture format or too small a page, OutputError.
@@ -62,8 +58,8 @@ def _map(sweep: SweepData, paper: Paper) -> "Iterator[Figure]":
 SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
     "lines": Kind(lines.refusal, lines.suits, lines.draw_lines),
     "map": Kind(outcome_map.refusal, outcome_map.suits, _map),
-    "matrix": Kind(lambda _: "", lambda sweep: len(sweep.inputs) > 1, draw_matrix),
-    "histogram": Kind(lambda _: "", lambda _: True, draw_histogram),
+    "matrix": Kind(lambda _: "", lambda sweep: len(sweep.inputs) > 1, scatter.draw_matrix),
+    "histogram": Kind(lambda _: "", lambda _: True, scatter.draw_histogram),
 }
 
 

@@ -11,21 +11,8 @@ import numpy as np
 
 from blocksim.simulation.frames import SUPPORT, Frames, Rows
 from blocksim.simulation.observables import MOVED_SHARE
-from blocksim.view import arrows, scene, style
-from blocksim.view.arrows import Actions
+from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.paint import by_displacement, displacements, draw_key
-from blocksim.view.run_data import (
-    MILLIMETRES,
-    Extent,
-    Floats,
-    Support,
-    drawable_frames,
-    extent_of,
-    rotate_points,
-    shortest_sides,
-)
-from blocksim.view.scene import Page
-from blocksim.view.style import EDGE, LINE, OWN, Paper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,20 +24,20 @@ Pair = tuple[int, int]  # bodies a and b
 class Joint(NamedTuple):
     """A joint in a frame: its points (m, scene, (k, 2)), whether it slides, and the point about which it rocks."""
 
-    points: Floats
+    points: run_data.Floats
     slides: bool
-    hinges: Floats  # (1, 2), or (0, 2) where it does not rock
+    hinges: run_data.Floats  # (1, 2), or (0, 2) where it does not rock
 
 
 class _Followed(NamedTuple):
     """Points of a joint in the frame that is drawn."""
 
-    points: Floats  # (k, 2), on body b
-    opening: Floats  # (k,), normal to the joint
-    slip: Floats  # (k,), since the beginning
+    points: run_data.Floats  # (k, 2), on body b
+    opening: run_data.Floats  # (k,), normal to the joint
+    slip: run_data.Floats  # (k,), since the beginning
 
 
-def joints(frames: Frames, frame: int, support: Support) -> list[Joint]:
+def joints(frames: Frames, frame: int, support: run_data.Support) -> list[Joint]:
     """Return the joints that slide or rock in a frame; none where no contact was recorded."""
     now = _by_pair(arrows.contacts_of(frames).at(frame))
     found = [
@@ -60,13 +47,13 @@ def joints(frames: Frames, frame: int, support: Support) -> list[Joint]:
     return [one for one in found if one.slides or len(one.hinges)]
 
 
-def _at_the_start(frames: Frames, frame: int, support: Support) -> dict[Pair, tuple[int, Rows]]:
+def _at_the_start(frames: Frames, frame: int, support: run_data.Support) -> dict[Pair, tuple[int, Rows]]:
     """Return for each joint a frame before its bodies moved, and its points then: the most that it ever had."""
     contacts = arrows.contacts_of(frames)
     pressed = next((found for found in range(frame + 1) if len(contacts.at(found))), None)
     if pressed is None:
         return {}
-    share = displacements(frames, support)[: frame + 1] / shortest_sides(frames)
+    share = displacements(frames, support)[: frame + 1] / run_data.shortest_sides(frames)
     moved = np.column_stack([share > MOVED_SHARE, np.zeros(frame + 1, dtype=bool)])  # the last is the support, SUPPORT
     has_moved = np.maximum.accumulate(moved, axis=0)
     found: dict[Pair, tuple[int, Rows]] = {}
@@ -88,10 +75,10 @@ def _by_pair(rows: Rows) -> dict[Pair, Rows]:
     return {pair: rows[chosen] for pair, chosen in pairs.items() if (rows["normal_force"][chosen] > 0.0).any()}
 
 
-def _joint(frames: Frames, times: tuple[int, int], support: Support, then: Rows, now: Rows) -> Joint:
+def _joint(frames: Frames, times: tuple[int, int], support: run_data.Support, then: Rows, now: Rows) -> Joint:
     """Judge a joint by its points at the beginning and in the frame that is drawn."""
     pair = int(then["body_a"][0]), int(then["body_b"][0])
-    least = MOVED_SHARE * min(float(shortest_sides(frames)[body]) for body in pair if body != SUPPORT)
+    least = MOVED_SHARE * min(float(run_data.shortest_sides(frames)[body]) for body in pair if body != SUPPORT)
     early = _followed(frames, times, support, then)
     # how far apart on both bodies in the first frame the points were where they touch in the second
     slip = _followed(frames, times[::-1], support, now).slip
@@ -105,14 +92,16 @@ def _joint(frames: Frames, times: tuple[int, int], support: Support, then: Rows,
     return Joint(both.points, bool((both.slip[is_closed] > least).any()), hinges)
 
 
-def _followed(frames: Frames, times: tuple[int, int], support: Support, rows: Rows) -> _Followed:
+def _followed(frames: Frames, times: tuple[int, int], support: run_data.Support, rows: Rows) -> _Followed:
     """Follow the points of a joint on both bodies from one frame to the other."""
     if not len(rows):
         return _Followed(np.empty((0, 2)), np.empty(0), np.empty(0))
     pair = int(rows["body_a"][0]), int(rows["body_b"][0])
     points = np.stack([rows["x"], rows["y"]], axis=-1)
     on_a, on_b = (_carried(frames, body, times, points, support) for body in pair)
-    normal = rotate_points(np.stack([rows["normal_x"], rows["normal_y"]], axis=-1), _turned(frames, pair[1], times))
+    normal = run_data.rotate_points(
+        np.stack([rows["normal_x"], rows["normal_y"]], axis=-1), _turned(frames, pair[1], times)
+    )
     apart = on_a - on_b
     slip = np.abs(apart[:, 1] * normal[:, 0] - apart[:, 0] * normal[:, 1])
     return _Followed(on_b, (apart * normal).sum(axis=1), slip)
@@ -123,13 +112,15 @@ def _turned(frames: Frames, body: int, times: tuple[int, int]) -> float:
     return 0.0 if body == SUPPORT else float(frames.angle[times[1], body] - frames.angle[times[0], body])
 
 
-def _carried(frames: Frames, body: int, times: tuple[int, int], points: Floats, support: Support) -> Floats:
+def _carried(
+    frames: Frames, body: int, times: tuple[int, int], points: run_data.Floats, support: run_data.Support
+) -> run_data.Floats:
     """Return where points (k, 2) of a body are at another frame."""
     if body == SUPPORT:
         before, after = support.offset(frames.time[list(times)])
         return np.asarray(points + after - before)
     before, after = (np.array([frames.x[time, body], frames.y[time, body]]) for time in times)
-    return np.asarray(rotate_points(points - before, _turned(frames, body, times)) + after)
+    return np.asarray(run_data.rotate_points(points - before, _turned(frames, body, times)) + after)
 
 
 WIDTH, TALLEST, LEAST_WIDTH, LOWEST = 7.2, 3.6, 3.0, 0.5  # inches
@@ -150,29 +141,29 @@ class Side:
     """One side of a bracket: a run, its support, the block that moved first if any, and what is said above it."""
 
     frames: Frames
-    support: Support
+    support: run_data.Support
     first: str | None
     caption: str
     is_mechanism: bool
 
     @cached_property
-    def acts(self) -> Actions:
+    def acts(self) -> arrows.Actions:
         """What acts on the blocks in the frame that is drawn."""
         return arrows.actions_on(self.frames, np.array([self.frame]), self.support)
 
     @cached_property
     def frame(self) -> int:
         """The last frame; of a mechanism the first in which it is seen."""
-        drawable = drawable_frames(self.frames)
+        drawable = run_data.drawable_frames(self.frames)
         if not self.is_mechanism:
             return int(drawable[-1])
-        shortest = shortest_sides(self.frames)
+        shortest = run_data.shortest_sides(self.frames)
         seen = (displacements(self.frames, self.support)[drawable] > VISIBLE * shortest).any(axis=1)
         return int(drawable[int(np.argmax(seen))] if seen.any() else drawable[-1])
 
 
 def draw_mechanisms(
-    brackets: Sequence[tuple[Side, Side]], path: Path | str, title: str | None = None, paper: Paper = OWN
+    brackets: Sequence[tuple[Side, Side]], path: Path | str, title: str | None = None, paper: style.Paper = style.OWN
 ) -> None:
     """Draw both sides of every bracket, a row each, and write PNG, SVG or PDF; the same input gives the same bytes.
 
@@ -191,7 +182,7 @@ def draw_mechanisms(
     texts += [ARROWS_OF_SPEED] if any(side.acts.largest.get(arrows.SPEED, 0.0) > 0.0 for side in sides) else []
     notes = style.break_lines(" ".join(texts), width - 2.0 * SIDE) if texts else []
     columns = ENTRIES if width >= ENTRIES_WIDTH else 1
-    legend = LINE * (len(notes) + ENTRIES // columns)
+    legend = style.LINE * (len(notes) + ENTRIES // columns)
     foot, rows = AXIS + paint.height + legend, len(brackets)
     tallest = min(paper.panel(TALLEST, rows, HEAD + foot + rows * (HEAD + ROW_GAP), LOWEST), TALLEST)
     pages = [scene.page_for(_extent(pair), across, tallest, (SIDE, HEAD, ROW_GAP)) for pair in brackets]
@@ -208,16 +199,16 @@ def draw_mechanisms(
             for column, side in enumerate(pair):
                 _draw_side(figure, side, page, (column * (across + GAP) + SIDE, top), most)
             top -= page.height
-        draw_key(figure, paint, SIDE, EDGE + legend)
-        style.write_legend(figure, handles, SIDE, EDGE + LINE * len(notes), ncols=columns, handlelength=1.6)
-        style.write_text(figure, SIDE, EDGE, "\n".join(notes), color=style.FAINT_INK, va="bottom")
+        draw_key(figure, paint, SIDE, style.EDGE + legend)
+        style.write_legend(figure, handles, SIDE, style.EDGE + style.LINE * len(notes), ncols=columns, handlelength=1.6)
+        style.write_text(figure, SIDE, style.EDGE, "\n".join(notes), color=style.FAINT_INK, va="bottom")
         style.write_heading(figure, title, SIDE)
         style.save_figure(figure, path)
 
 
-def _extent(pair: tuple[Side, Side]) -> Extent:
+def _extent(pair: tuple[Side, Side]) -> run_data.Extent:
     """Return what both panels of a row show: on one scale, all blocks of either."""
-    found = [extent_of(side.frames, np.array([side.frame]), side.support) for side in pair]
+    found = [run_data.extent_of(side.frames, np.array([side.frame]), side.support) for side in pair]
     one, other = (
         arrows.with_room(extent, side.acts, arrows.length_in(extent)) for extent, side in zip(found, pair, strict=True)
     )
@@ -225,7 +216,7 @@ def _extent(pair: tuple[Side, Side]) -> Extent:
     return replace(one, right=max(one.right, other.right), top=max(one.top, other.top), **least)
 
 
-def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, float], most: float) -> None:
+def _draw_side(figure: "Figure", side: Side, page: scene.Page, corner: tuple[float, float], most: float) -> None:
     """Draw a panel with its upper left corner at a place in inches; ground is tilted as it is on that side."""
     left, top = corner
     page = replace(page, extent=replace(page.extent, tilt=side.support.tilt))
@@ -239,12 +230,14 @@ def _draw_side(figure: "Figure", side: Side, page: Page, corner: tuple[float, fl
         canvas.axes.plot(*np.concatenate([outline, outline[:2]]).T, transform=canvas.scene, **FIRST)
     for joint in joints(side.frames, side.frame, side.support):
         if joint.slides:
-            canvas.axes.plot(*MILLIMETRES * joint.points.T, transform=canvas.scene, solid_capstyle="butt", **SLIDING)
-        for x, y in MILLIMETRES * joint.hinges:
+            canvas.axes.plot(
+                *run_data.MILLIMETRES * joint.points.T, transform=canvas.scene, solid_capstyle="butt", **SLIDING
+            )
+        for x, y in run_data.MILLIMETRES * joint.hinges:
             canvas.axes.plot(x, y, transform=canvas.scene, **HINGE)
     scene.finish_panel(canvas, labelled=False, is_numbered=False)
     room = page.panel_width * style.POINTS_PER_INCH
     for number, line in enumerate(side.caption.split("\n")):
         text = style.cut_to(line, room, style.FONT_SIZE)
         colour = style.FAINT_INK if number else style.INK
-        style.write_text(figure, left, top - LINE * (number + 1), text, color=colour)
+        style.write_text(figure, left, top - style.LINE * (number + 1), text, color=colour)

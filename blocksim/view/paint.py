@@ -12,8 +12,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation.frames import Frames
-from blocksim.view import style
-from blocksim.view.run_data import Floats, Support, drawable_frames
+from blocksim.view import run_data, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -88,13 +87,13 @@ def by_material(_: object, scenario: Scenario) -> Paint:
 def by_speed(frames: Frames) -> Paint:
     """Return a scale from rest to the largest speed; to that of all but the rarest where a few are far beyond."""
     speeds = np.hypot(frames.vx, frames.vy)
-    known = speeds[drawable_frames(frames)]
+    known = speeds[run_data.drawable_frames(frames)]
     factor, unit = (1.0, "m/s") if (float(known.max()) or 1.0) >= 1.0 else (1e3, "mm/s")
     moving = known[known > 0.0] if known.any() else np.ones(1)
     return _scaled(factor * speeds, capped_scale(f"speed ({unit})", factor * moving, SPEED_COLOURS))
 
 
-def capped_scale(label: str, values: Floats, colours: str = ELEMENT_COLOURS) -> Scale:
+def capped_scale(label: str, values: run_data.Floats, colours: str = ELEMENT_COLOURS) -> Scale:
     """Return a scale from 0 to the largest value; where a few are far beyond all others, these lie beyond its end."""
     usual, largest = (float(np.quantile(values, share)) for share in (RARE, 1.0))
     is_cut = largest > PEAK * usual > 0.0
@@ -106,7 +105,7 @@ def shade_elements(paint: Paint, frames: Frames, name: str) -> Paint:
     """Return a paint of blocks that also colours the elements of other systems, by a shade of this name."""
     found = [next((one for one in track.system.shades if one.name == name), None) for track in frames.others]
     values = [None if shade is None else shade.of(track) for shade, track in zip(found, frames.others, strict=True)]
-    known = np.concatenate([one[drawable_frames(frames)].ravel() for one in values if one is not None])
+    known = np.concatenate([one[run_data.drawable_frames(frames)].ravel() for one in values if one is not None])
     scale = capped_scale(next(shade.label for shade in found if shade is not None), known)
     fills = tuple(None if one is None else _scaled(one, scale).fills for one in values)
     return replace(paint, entries=(), scale=scale, elements=fills)
@@ -115,13 +114,13 @@ def shade_elements(paint: Paint, frames: Frames, name: str) -> Paint:
 def by_turn(frames: Frames) -> Paint:
     """Return a scale of the angle turned since the blocks were placed, the same to both sides."""
     turns = np.degrees(frames.rotation)
-    farthest = float(np.abs(turns[drawable_frames(frames)]).max())
+    farthest = float(np.abs(turns[run_data.drawable_frames(frames)]).max())
     most = min(max(farthest, LEAST_TURN), HALF_TURN)
     extend = "both" if farthest > most * 1.001 else "neither"
     return _scaled(turns, Scale("rotation (°)", TURN_COLOURS, -most, most, extend))
 
 
-def displacements(frames: Frames, support: Support) -> Floats:
+def displacements(frames: Frames, support: run_data.Support) -> run_data.Floats:
     """Return how far the centres of all blocks are from where they began (m), relative to the support, (n, b)."""
     carried = support.offset(frames.time)
     dx = frames.x - frames.x[0] - (carried[:, :1] - carried[0, 0])
@@ -129,7 +128,7 @@ def displacements(frames: Frames, support: Support) -> Floats:
     return np.asarray(np.hypot(dx, dy))
 
 
-def by_displacement(frames: Frames, support: Support, most: float) -> Paint:
+def by_displacement(frames: Frames, support: run_data.Support, most: float) -> Paint:
     """Return a scale of the displacement since the start, from none to `most` (m)."""
     high = 1e3 * most or 1.0
     factor, unit = (1.0, "mm") if high < METRE else (1e-3, "m")
@@ -167,7 +166,7 @@ def paint_named(name: str, frames: Frames, scenario: Scenario) -> Paint:
     return shade_elements(paint, frames, shades[0]) if shades and paint.scale is None else paint
 
 
-def _scaled(values: Floats, scale: Scale) -> Paint:
+def _scaled(values: run_data.Floats, scale: Scale) -> Paint:
     """Return fills from a map of colours; `values` are (n, b)."""
 
     def fills(frame: int) -> list[str]:

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import PlacedSegment, Scenario, place_bodies
+from blocksim.scenario import PlacedSegment, Scenario, place_bodies, placement
 from blocksim.scenario.events import wall_names
 from blocksim.scenario.models.loads import AnyLoad, OnBody, Stretch, stretches_of
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
-from blocksim.scenario.placement import ENDLESS, wall_segments
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.result import EventRecord
 from blocksim.world.systems.blocks import boxes_around, least_widths, radii
@@ -212,7 +211,7 @@ def support_of(scenario: Scenario, happened: Sequence[EventRecord] = ()) -> Supp
     )
     return Support(
         profile=scenario.ground.profile or Support.profile,
-        walls=wall_segments(scenario),
+        walls=placement.wall_segments(scenario),
         fixed=tuple(body.fixed and not body.freed for body in placed),
         driven=tuple(body.driven for body in placed) if any(body.driven for body in placed) else (),
         gone=tuple(
@@ -299,7 +298,7 @@ def extent_of(frames: Frames, chosen: Indices, support: Support | None = None, b
     low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
     margin = MARGIN * float((high - low).max())
     low, high = low - margin, high + margin
-    line = support.line(ENDLESS)
+    line = support.line(placement.ENDLESS)
     ground = np.concatenate([parts_within(rotate_points(line + shift, tilt), low, high) for shift in shifts])
     base = MILLIMETRES * float(rotate_points(ground, -tilt)[..., 1].min())
     (left, bottom), (right, top) = MILLIMETRES * low, MILLIMETRES * high

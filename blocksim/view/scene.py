@@ -7,22 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.scenario import PlacedSegment
-from blocksim.scenario.placement import TOLERANCE
+from blocksim.scenario import PlacedSegment, placement
 from blocksim.simulation.frames import Frames
-from blocksim.view import style
+from blocksim.view import run_data, style
 from blocksim.view.paint import Paint
-from blocksim.view.run_data import (
-    MILLIMETRES,
-    Extent,
-    Flags,
-    Floats,
-    Support,
-    is_fixed,
-    parts_within,
-    rotate_points,
-    shortest_sides,
-)
 from blocksim.world.systems.blocks import are_removed, local_corners, placed_points
 
 if TYPE_CHECKING:
@@ -45,7 +33,7 @@ class Canvas:
     """Canvas of one moment: axes in the picture's millimetres, all on one scale."""
 
     axes: "Axes"
-    extent: Extent
+    extent: run_data.Extent
     points_per_mm: float
 
     @cached_property
@@ -66,10 +54,10 @@ class Canvas:
         """Where the drawn ground ends (mm, scene)."""
         return self.extent.base - GROUND_THICKNESS / self.points_per_mm
 
-    def box(self) -> tuple[Floats, Floats]:
+    def box(self) -> tuple[run_data.Floats, run_data.Floats]:
         """Return lower left and upper right (mm, scene) of all that can be seen, and a little more."""
         sides, ends = (self.extent.left, self.extent.right), (self.extent.lowest, self.extent.top)
-        corners = rotate_points(np.array([[x, y] for x in sides for y in ends]), -self.extent.tilt)
+        corners = run_data.rotate_points(np.array([[x, y] for x in sides for y in ends]), -self.extent.tilt)
         more = 0.1 * (self.extent.width + self.extent.height)
         low, high = corners.min(axis=0) - more, corners.max(axis=0) + more
         return np.array([low[0], self.floor]), high
@@ -85,7 +73,7 @@ class Page:
     side: float
     foot: float
     points_per_mm: float
-    extent: Extent
+    extent: run_data.Extent
 
     @property
     def panel_width(self) -> float:
@@ -99,7 +87,9 @@ class Page:
         return Canvas(axes, self.extent, self.points_per_mm)
 
 
-def page_for(extent: Extent, width: float, tallest: float, margins: tuple[float, float, float], rows: int = 0) -> Page:
+def page_for(
+    extent: run_data.Extent, width: float, tallest: float, margins: tuple[float, float, float], rows: int = 0
+) -> Page:
     """Return a page of this width for an extent, which is widened where the panel would be higher than `tallest`.
 
     `margins` are those at the sides, above and below the panel; `rows` of measured ranges lie in it. All in inches.
@@ -113,7 +103,7 @@ def page_for(extent: Extent, width: float, tallest: float, margins: tuple[float,
     return Page(width, head + height + foot, height, side, foot, scale * style.POINTS_PER_INCH, extent)
 
 
-def panel_height(extent: Extent, scale: float, rows: int) -> float:
+def panel_height(extent: run_data.Extent, scale: float, rows: int) -> float:
     """Return the height (inches) of a panel at a scale (inches per mm), with room for what stands below the ground."""
     below = max((extent.lowest - extent.bottom) * scale, room_below(extent, rows) / style.POINTS_PER_INCH)
     return (extent.top - extent.lowest) * scale + below
@@ -124,7 +114,7 @@ def depth_of(rows: int) -> float:
     return GROUND_THICKNESS + (rows + 0.4) * ROW_HEIGHT
 
 
-def room_below(extent: Extent, rows: int) -> float:
+def room_below(extent: run_data.Extent, rows: int) -> float:
     """Return how far the picture continues below the lowest ground (points)."""
     depth = depth_of(rows)
     return (depth + RULER_HEIGHT) / float(np.cos(extent.tilt)) if extent.tilt else depth
@@ -176,7 +166,7 @@ ARROW_LENGTH = 3.0  # points; a displacement along the ground gets an arrow from
 MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a mitre would be a needle
 
 
-def draw_support(canvas: Canvas, support: Support, offset: Floats) -> None:
+def draw_support(canvas: Canvas, support: run_data.Support, offset: run_data.Floats) -> None:
     """Draw the part of ground and walls that can be seen, displaced by `offset` (mm) along x and y."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import PathPatch
@@ -191,12 +181,12 @@ def draw_support(canvas: Canvas, support: Support, offset: Floats) -> None:
         seen = Path(np.concatenate([outline, outline[:1]]), closed=True).clip_to_bbox(Bbox([low, high]))
         patch = PathPatch(seen, facecolor=style.GROUND_COLOUR, linewidth=0.0, zorder=zorder, transform=canvas.scene)
         canvas.axes.add_artist(patch)
-    lines = np.concatenate([parts_within(line + offset, low, high) for line in (ground, *faces)])
+    lines = np.concatenate([run_data.parts_within(line + offset, low, high) for line in (ground, *faces)])
     look: dict[str, Any] = {"colors": style.INK, "linewidths": style.LINE_WIDTH}
     canvas.axes.add_collection(LineCollection(list(lines), **look, transform=canvas.scene))
 
 
-def draw_start(canvas: Canvas, support: Support, offset: Floats, outlines: Floats) -> None:
+def draw_start(canvas: Canvas, support: run_data.Support, offset: run_data.Floats, outlines: run_data.Floats) -> None:
     """Draw dashed where ground, walls and fixed bodies (outlines in mm, (f, 4, 2)) were before they moved.
 
     Pieces that have moved along themselves, such as level ground on a shaking table, look the same and are left out.
@@ -207,7 +197,7 @@ def draw_start(canvas: Canvas, support: Support, offset: Floats, outlines: Float
     if float(np.hypot(*offset)) < least:
         return
     low, high = canvas.box()
-    parts = np.concatenate([parts_within(line, low, high) for line in _faces(support, canvas)])
+    parts = np.concatenate([run_data.parts_within(line, low, high) for line in _faces(support, canvas)])
     ways = parts[:, 1] - parts[:, 0]
     apart = np.abs(ways[:, 0] * offset[1] - ways[:, 1] * offset[0]) > least * np.hypot(*ways.T)
     closed = [np.concatenate([outline, outline[:1]]) - offset for outline in outlines]
@@ -215,11 +205,11 @@ def draw_start(canvas: Canvas, support: Support, offset: Floats, outlines: Float
     canvas.axes.add_collection(LineCollection(lines, **START_LINE, zorder=START, transform=canvas.scene))
 
 
-def draw_shift(canvas: Canvas, support: Support, offset: Floats, x: float) -> None:
+def draw_shift(canvas: Canvas, support: run_data.Support, offset: run_data.Floats, x: float) -> None:
     """Draw an arrow within the ground from x (mm) to the x at which this place of the ground is now."""
     if abs(float(offset[0])) * canvas.points_per_mm < ARROW_LENGTH:
         return
-    surface = MILLIMETRES * float(support.height(np.array([x / MILLIMETRES]))[0]) + offset[1]
+    surface = run_data.MILLIMETRES * float(support.height(np.array([x / run_data.MILLIMETRES]))[0]) + offset[1]
     y = surface - 0.5 * GROUND_THICKNESS / canvas.points_per_mm
     canvas.axes.annotate(
         "",
@@ -232,19 +222,24 @@ def draw_shift(canvas: Canvas, support: Support, offset: Floats, x: float) -> No
     )
 
 
-def _faces(support: Support, canvas: Canvas) -> list[Floats]:
+def _faces(support: run_data.Support, canvas: Canvas) -> list[run_data.Floats]:
     """Return the lines (mm) of ground, with level ends beyond all that can be seen, and of walls at rest, (k, 2)."""
     low, high = canvas.box()
-    line = MILLIMETRES * support.line(0.0)
+    line = run_data.MILLIMETRES * support.line(0.0)
     shown = np.abs(np.concatenate([low, high, line[0], line[-1]])).max() + canvas.extent.width
     line[0, 0] -= 2.0 * shown
     line[-1, 0] += 2.0 * shown
-    return [line, *(MILLIMETRES * np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) for wall in support.walls)]
+    return [
+        line,
+        *(run_data.MILLIMETRES * np.array([[wall.x0, wall.y0], [wall.x1, wall.y1]]) for wall in support.walls),
+    ]
 
 
-def wall_outlines(walls: tuple[PlacedSegment, ...], thickness: float) -> list[Floats]:
+def wall_outlines(walls: tuple[PlacedSegment, ...], thickness: float) -> list[run_data.Floats]:
     """Return the outline (mm, (4, 2)) of each wall, `thickness` (mm) on the right of its face, mitred at joints."""
-    faces = MILLIMETRES * np.array([[[wall.x0, wall.y0], [wall.x1, wall.y1]] for wall in walls]).reshape(-1, 2, 2)
+    faces = run_data.MILLIMETRES * np.array([[[wall.x0, wall.y0], [wall.x1, wall.y1]] for wall in walls]).reshape(
+        -1, 2, 2
+    )
     ways = np.diff(faces, axis=1)[:, 0]
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     rights = np.stack([ways[:, 1], -ways[:, 0]], axis=-1)
@@ -252,7 +247,7 @@ def wall_outlines(walls: tuple[PlacedSegment, ...], thickness: float) -> list[Fl
     for number, (wall, face) in enumerate(zip(walls, faces, strict=True)):
         backs = []  # the way from each end to the wall's back, for a thickness of 1
         for end, beyond in ((0, -ways[number] * wall.extends_start), (1, ways[number] * wall.extends_end)):
-            others = rights[np.hypot(*(faces[:, 1 - end] - face[end]).T) <= MILLIMETRES * TOLERANCE]
+            others = rights[np.hypot(*(faces[:, 1 - end] - face[end]).T) <= run_data.MILLIMETRES * placement.TOLERANCE]
             is_mitred = len(others) and float(rights[number] @ others[0]) > MOST_ALIGNED
             back = rights[number] + (others[0] if is_mitred else beyond)
             backs.append(back / (1.0 + rights[number] @ others[0]) if is_mitred else back)
@@ -282,16 +277,18 @@ class MeasuredRange:
     row: int
 
 
-def corners(frames: Frames, frame: int) -> Floats:
+def corners(frames: Frames, frame: int) -> run_data.Floats:
     """Return the corners (mm) of every block in one frame, (b, k, 2), counter-clockwise, the last one repeated."""
     local = local_corners(frames.size_x, frames.size_y, frames.outlines)
-    return np.asarray(MILLIMETRES * placed_points(local, frames.x[frame], frames.y[frame], frames.angle[frame]))
+    return np.asarray(
+        run_data.MILLIMETRES * placed_points(local, frames.x[frame], frames.y[frame], frames.angle[frame])
+    )
 
 
 def readable_scale(frames: Frames) -> float:
     """Return the least scale (points a mm) at which the name of every block fits into it."""
     wide, tall = (letter * style.SMALLEST_FONT / room for letter, room in zip(style.LETTER, NAME_ROOM, strict=True))
-    sizes = MILLIMETRES * shortest_sides(frames)
+    sizes = run_data.MILLIMETRES * run_data.shortest_sides(frames)
     lengths = np.array([len(name) for name in frames.names])
     return float((np.maximum(wide * lengths, tall) / sizes).max(initial=0.0))
 
@@ -304,7 +301,7 @@ class Scene:
     """
 
     frames: Frames
-    support: Support
+    support: run_data.Support
     paint: Paint
     with_tops: bool = True
     with_others: bool = True
@@ -318,13 +315,13 @@ def draw_scene(canvas: Canvas, scene: Scene, frame: int) -> None:
 
 def draw_standing(canvas: Canvas, scene: Scene, frame: int) -> None:
     """Draw ground and walls at the time of one frame, and where they were at the start."""
-    frames, fixed = scene.frames, is_fixed(scene.frames, scene.support)
-    offset = MILLIMETRES * scene.support.offset(frames.time[frame : frame + 1])[0]
+    frames, fixed = scene.frames, run_data.is_fixed(scene.frames, scene.support)
+    offset = run_data.MILLIMETRES * scene.support.offset(frames.time[frame : frame + 1])[0]
     support = scene.support.at(float(frames.time[frame]))
     draw_support(canvas, support, offset)
     carried = fixed & ~np.array(support.driven or (False,) * len(frames.names), dtype=bool)
     draw_start(canvas, support, offset, corners(frames, frame)[carried & ~are_removed(frames.vx[frame])])
-    draw_shift(canvas, support, offset, MILLIMETRES * (float(frames.x[0].mean()) if frames.names else 0.0))
+    draw_shift(canvas, support, offset, run_data.MILLIMETRES * (float(frames.x[0].mean()) if frames.names else 0.0))
 
 
 def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
@@ -337,7 +334,7 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
     frames, paint = scene.frames, scene.paint
     for number, track in enumerate(frames.others if scene.with_others else ()):
         fills = paint.elements[number] if number < len(paint.elements) else None
-        (shapes,) = MILLIMETRES * track.system.outlines(track, np.array([frame]))
+        (shapes,) = run_data.MILLIMETRES * track.system.outlines(track, np.array([frame]))
         size = canvas.points_per_mm * float(np.ptp(shapes[:, :, 0], axis=1).min(initial=1.0))
         thin = min(style.LINE_WIDTH, 0.05 * size)
         if fills is not None and size < SMALL:  # gaps between small discs make a pattern that is none of the soil
@@ -345,11 +342,11 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
         colours: dict[str, Any] = {"facecolors": style.block_colour(number + 1), "edgecolors": style.INK}
         colours = colours if fills is None else {"facecolors": fills(frame), "edgecolors": "face"}
         canvas.axes.add_collection(PolyCollection(list(shapes), **colours, linewidths=thin, transform=canvas.scene))
-    there, fixed = ~are_removed(frames.vx[frame]), is_fixed(frames, scene.support)
+    there, fixed = ~are_removed(frames.vx[frame]), run_data.is_fixed(frames, scene.support)
     held, free = fixed & there, ~fixed & there
     own = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, paint.fills(frame), strict=True)]
     outlines = corners(frames, frame)
-    smallest = MILLIMETRES * canvas.points_per_mm * float(shortest_sides(frames).min(initial=np.inf))
+    smallest = run_data.MILLIMETRES * canvas.points_per_mm * float(run_data.shortest_sides(frames).min(initial=np.inf))
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     edge: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
     hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
@@ -359,7 +356,7 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
     if scene.with_tops:
         tops = placed_points(upper_sides(frames), frames.x[frame], frames.y[frame], frames.angle[frame])
         line: dict[str, Any] = {"colors": style.INK, "linewidths": 2.0 * thin, "transform": canvas.scene}
-        canvas.axes.add_collection(LineCollection(list(MILLIMETRES * tops[free]), **line))
+        canvas.axes.add_collection(LineCollection(list(run_data.MILLIMETRES * tops[free]), **line))
     for kind in (held, free):
         _draw_names(canvas, frames, frame, kind, own)
 
@@ -367,7 +364,7 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
 def draw_centres(canvas: Canvas, frames: Frames, frame: int) -> None:
     """Mark the centre of every block by a line through the ground below it."""
     ends = [canvas.floor, canvas.extent.base]
-    for x in MILLIMETRES * frames.x[frame, ~are_removed(frames.vx[frame])]:
+    for x in run_data.MILLIMETRES * frames.x[frame, ~are_removed(frames.vx[frame])]:
         canvas.axes.plot([x, x], ends, color=style.INK, linewidth=1.2, transform=canvas.scene)
 
 
@@ -387,21 +384,21 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
             canvas.axes.text(item.maximum + 3.0 * point, y, style.shorten(item.block, LETTERS), **look)
 
 
-def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: Flags, fills: Sequence[str]) -> None:
+def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: run_data.Flags, fills: Sequence[str]) -> None:
     """Write the names of some blocks at their middles, of polygons their centroids, where there is room for all.
 
     Names on some blocks only would look like a difference between the blocks.
     """
     from matplotlib.patheffects import withStroke
 
-    sizes = MILLIMETRES * canvas.points_per_mm * shortest_sides(frames)
+    sizes = run_data.MILLIMETRES * canvas.points_per_mm * run_data.shortest_sides(frames)
     fonts = {
         int(index): style.fitting_font(frames.names[index], (NAME_ROOM[0] * sizes[index], NAME_ROOM[1] * sizes[index]))
         for index in np.flatnonzero(chosen)
     }
     if not all(fonts.values()):
         return
-    places = MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
+    places = run_data.MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
     if frames.outlines is None:
         places = corners(frames, frame).mean(axis=1)
     at: dict[str, Any] = {"ha": "center", "va": "center_baseline", "clip_on": True, "transform": canvas.scene}
@@ -413,17 +410,17 @@ def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: Flags, fills
         canvas.axes.text(float(places[index, 0]), float(places[index, 1]), name, **look, **at)
 
 
-def upper_sides(frames: Frames) -> Floats:
+def upper_sides(frames: Frames) -> run_data.Floats:
     """Return a line inside each block along its upper side, which shows turns, in its own axes (m, (b, 2, 2))."""
     if frames.outlines is not None:
-        return _upper_sides_of_polygons(frames.outlines, 0.5 * (1.0 - EDGE_INSET) * shortest_sides(frames))
+        return _upper_sides_of_polygons(frames.outlines, 0.5 * (1.0 - EDGE_INSET) * run_data.shortest_sides(frames))
     half_x, half_y = 0.5 * frames.size_x, 0.5 * frames.size_y
     inset = half_y - (1.0 - EDGE_INSET) * np.minimum(half_x, half_y)
     reach = half_x - (half_y - inset)
     return np.stack([np.stack([-reach, inset], axis=-1), np.stack([reach, inset], axis=-1)], axis=1)
 
 
-def _upper_sides_of_polygons(outlines: Floats, inset: Floats) -> Floats:
+def _upper_sides_of_polygons(outlines: run_data.Floats, inset: run_data.Floats) -> run_data.Floats:
     """Return the lines (m) that are an inset (m, (b,)) inside the edges whose normals point up most, and all others."""
     edges = np.roll(outlines, -1, axis=1) - outlines
     lengths = np.hypot(edges[..., 0], edges[..., 1])

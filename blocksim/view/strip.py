@@ -8,11 +8,8 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.frames import Frames
-from blocksim.view import arrows, run_data, scene, style
-from blocksim.view.final import MeasuredTable, measured_ranges, rows_of, widen
+from blocksim.view import arrows, final, run_data, scene, style
 from blocksim.view.paint import Paint, by_block, draw_key
-from blocksim.view.run_data import MILLIMETRES, Extent, Support
-from blocksim.view.style import OWN, Paper
 
 WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
@@ -46,7 +43,7 @@ class Layout:
     panel: tuple[float, float]
     points_per_mm: float
     size: tuple[float, float]  # of the page
-    extent: Extent
+    extent: run_data.Extent
     step: float  # from a row of panels to the next
     foot: float
 
@@ -56,7 +53,7 @@ class Layout:
         return SIDE + column * (self.panel[0] + GAP), self.foot + (self.rows - 1 - row) * self.step, *self.panel
 
 
-def arrangement(extent: Extent, readable: float = 0.0) -> tuple[int, int]:
+def arrangement(extent: run_data.Extent, readable: float = 0.0) -> tuple[int, int]:
     """Return the number of columns and the number of panels: flat and long scenes get few columns.
 
     So do scenes in between where names are `readable`, from that many points a mm on, in two columns but not in four.
@@ -68,7 +65,7 @@ def arrangement(extent: Extent, readable: float = 0.0) -> tuple[int, int]:
     return (2, 8) if aspect <= WIDEST_IN_PAIRS else (1, 6)
 
 
-def plan(paper: Paper, extent: Extent, columns: int, panels: int, lines: Lines) -> Layout:
+def plan(paper: style.Paper, extent: run_data.Extent, columns: int, panels: int, lines: Lines) -> Layout:
     """Fit the panels into a page. Where its size was asked for, as many columns as make them largest.
 
     Raises InvalidInputError for a page that is too small.
@@ -113,13 +110,13 @@ def draw_strip(
     path: Path | str,
     times: Sequence[float] | None = None,
     title: str | None = None,
-    measured: MeasuredTable | None = None,
-    support: Support | None = None,
+    measured: final.MeasuredTable | None = None,
+    support: run_data.Support | None = None,
     *,
     forces: bool = False,
     count: int | None = None,
     paint: Paint | None = None,
-    paper: Paper = OWN,
+    paper: style.Paper = style.OWN,
 ) -> None:
     """Draw the run as 6 to 8 panels from release to the final state and write them as PNG, SVG or PDF.
 
@@ -130,14 +127,14 @@ def draw_strip(
     page that is too small or nothing to draw, and OutputError when the file cannot be written.
     """
     path = style.picture_path(path)
-    support, paint = support or Support(), paint or by_block(frames)
+    support, paint = support or run_data.Support(), paint or by_block(frames)
     drawable = run_data.drawable_frames(frames)
     scale = arrows.force_scale(frames) if forces else None
     extent = run_data.extent_of(frames, drawable, support)
     length = arrows.length_in(extent)
     extent = arrows.with_room(extent, arrows.actions_on(frames, drawable, support), length)
-    ranges = [] if measured is None else measured_ranges(measured, frames.names, extent.width)
-    extent = widen(extent, ranges)
+    ranges = [] if measured is None else final.measured_ranges(measured, frames.names, extent.width)
+    extent = final.widen(extent, ranges)
     columns, usual = arrangement(extent, scene.readable_scale(frames))
     if times is None:
         carried = support.offset(frames.time[drawable])
@@ -145,7 +142,7 @@ def draw_strip(
     else:
         chosen = run_data.moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
-    rows = rows_of(ranges)
+    rows = final.rows_of(ranges)
     acts = arrows.actions_on(frames, chosen, support)
     texts = [*([scene.TOP] if frames.names else []), _notes(support, is_measured=bool(ranges))]
     texts += ["" if scale is None else scale.explanation, acts.explanation]
@@ -172,7 +169,7 @@ def draw_strip(
         style.save_figure(figure, path)
 
 
-def _caption(frames: Frames, frame: int, support: Support) -> str:
+def _caption(frames: Frames, frame: int, support: run_data.Support) -> str:
     """Return the time of a frame and the displacement of the support; the two ends of a run are named."""
     time = f"{float(frames.time[frame]):.3f} s"
     if frame == 0:
@@ -181,12 +178,12 @@ def _caption(frames: Frames, frame: int, support: Support) -> str:
         time = f"{time}, final"
     if support.motion is None:
         return time
-    moved = MILLIMETRES * float(support.displacement(frames.time[frame : frame + 1])[0])
+    moved = run_data.MILLIMETRES * float(support.displacement(frames.time[frame : frame + 1])[0])
     shown = f"{moved:+.2f}".replace("-", "−") if abs(moved) >= LEAST_MOVED else "0.00"
     return f"{time}\nsupport {shown} mm"
 
 
-def _notes(support: Support, *, is_measured: bool) -> str:
+def _notes(support: run_data.Support, *, is_measured: bool) -> str:
     texts = ["Grey: fixed."] if any(support.fixed) else []
     if support.motion is not None:
         texts.append(f"The support moves {support.way}; dashes and arrow: from where it was at the start.")
@@ -210,13 +207,13 @@ def draw_profile(
     frames: Frames,
     path: Path | str,
     title: str | None = None,
-    measured: MeasuredTable | None = None,  # noqa: ARG001 - of blocks
-    support: Support | None = None,
+    measured: final.MeasuredTable | None = None,  # noqa: ARG001 - of blocks
+    support: run_data.Support | None = None,
     *,
     forces: bool = False,  # noqa: ARG001 - of blocks
     times: Sequence[float] | None = None,
     paint: Paint | None = None,  # noqa: ARG001 - lines are coloured by time
-    paper: Paper = OWN,
+    paper: style.Paper = style.OWN,
 ) -> None:
     """Draw the surface of soil at these times (s), by default at six that are even in motion.
 
@@ -227,7 +224,7 @@ def draw_profile(
     from matplotlib.colors import to_hex
 
     path = style.picture_path(path)
-    support, drawable = support or Support(), run_data.drawable_frames(frames)
+    support, drawable = support or run_data.Support(), run_data.drawable_frames(frames)
     if times is None:
         chosen = np.unique(run_data.moments_by_motion(frames, drawable, LINES))
     else:
@@ -247,7 +244,7 @@ def draw_profile(
         scene.draw_scene(canvas, scene.Scene(frames, support, key, with_others=False), int(chosen[-1]))
         for shade, of_frame in zip(shades, lines, strict=True):
             for line in of_frame:
-                canvas.axes.plot(*(MILLIMETRES * line).T, color=shade, linewidth=THICK, transform=canvas.scene)
+                canvas.axes.plot(*(run_data.MILLIMETRES * line).T, color=shade, linewidth=THICK, transform=canvas.scene)
         scene.finish_panel(canvas, labelled=True)
         draw_key(figure, key, side, 0.06)
         style.write_heading(figure, title and f"{title}: surface", side)

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from blocksim.view import style
-from blocksim.view.run_data import Floats
+from blocksim.view import run_data, style
 from blocksim.view.style import OWN, Paper
 from blocksim.view.sweeps.data import short_names
 from blocksim.view.time_panels import limits_of
@@ -58,9 +57,9 @@ class Law:
     quantity: str
     unit: str
     formula: str
-    time: Floats  # (n,) s
-    simulated: Floats  # (n,)
-    expected: Floats  # (n,)
+    time: run_data.Floats  # (n,) s
+    simulated: run_data.Floats  # (n,)
+    expected: run_data.Floats  # (n,)
     marks: Sequence[float] = ()
 
     @property
@@ -188,10 +187,10 @@ POINTS = 200
 class Band:
     """A curve and its limits at intensities, (n,) each."""
 
-    x: Floats
-    probability: Floats
-    low: Floats
-    high: Floats
+    x: run_data.Floats
+    probability: run_data.Floats
+    low: run_data.Floats
+    high: run_data.Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,15 +199,15 @@ class Fragility:
 
     key: str
     unit: str
-    x: Floats
-    share: Floats
-    low: Floats
-    high: Floats
+    x: run_data.Floats
+    share: run_data.Floats
+    low: run_data.Floats
+    high: run_data.Floats
     band: Band | None
     notes: tuple[str, ...] = ()
 
 
-def axis_of(x: Floats) -> tuple[float, float, bool]:
+def axis_of(x: run_data.Floats) -> tuple[float, float, bool]:
     """Return the ends of the axis of intensities, and whether it is logarithmic."""
     low, high = float(x.min()), float(x.max())
     if high > WIDE * low:
@@ -218,7 +217,7 @@ def axis_of(x: Floats) -> tuple[float, float, bool]:
     return max(low - margin, 0.5 * low), high + margin, False
 
 
-def places(x: Floats) -> Floats:
+def places(x: run_data.Floats) -> run_data.Floats:
     """Return intensities over the whole axis, at which a curve is drawn."""
     low, high, is_log = axis_of(x)
     return np.asarray(np.geomspace(low, high, POINTS) if is_log else np.linspace(low, high, POINTS))
@@ -262,9 +261,9 @@ class Bars:
 
     title: str
     keys: tuple[str, ...]
-    values: Floats  # (k,)
-    half_widths: Floats  # (k,) of the intervals of `values`
-    part: Floats | None = None  # (k,)
+    values: run_data.Floats  # (k,)
+    half_widths: run_data.Floats  # (k,) of the intervals of `values`
+    part: run_data.Floats | None = None  # (k,)
 
 
 def draw_tornado(
@@ -303,7 +302,7 @@ def draw_tornado(
         style.save_figure(figure, path)
 
 
-def order_of(values: Floats) -> list[int]:
+def order_of(values: run_data.Floats) -> list[int]:
     """Return the numbers of the keys to draw, the largest index first."""
     return [int(key) for key in np.argsort(-np.abs(values), kind="stable")[:MOST_KEYS]]
 
@@ -361,10 +360,10 @@ class LevelPanel:
     title: str
     key: str
     verdict: str
-    values: Floats  # (n,)
+    values: run_data.Floats  # (n,)
     blocks: tuple[str, ...]
-    off_mm: Floats  # (n, b) |x - x at the finest level|
-    largest_off_mm: Floats  # (n,) over all blocks, rotation included
+    off_mm: run_data.Floats  # (n, b) |x - x at the finest level|
+    largest_off_mm: run_data.Floats  # (n,) over all blocks, rotation included
     tolerance_mm: float
     own: float
     recommended: float | None

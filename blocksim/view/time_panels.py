@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.motion import Peak, acceleration_ends, displacement_and_velocity, motion_peaks
-from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.scenario.units import STANDARD_GRAVITY
+from blocksim.scenario import motion, spelling, units
 from blocksim.simulation import probes
-from blocksim.simulation.probes import ProbeSeries
 from blocksim.view import style
 from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support
 from blocksim.view.style import OWN, Paper
@@ -177,7 +174,7 @@ MOST_USUAL, CUT = 3.0, 1.5  # times what they hardly exceed: forces beyond are c
 
 
 def draw_probes(
-    series: Mapping[str, ProbeSeries],
+    series: Mapping[str, probes.ProbeSeries],
     path: Path,
     title: str | None = None,
     names: Sequence[str] = (),
@@ -190,7 +187,7 @@ def draw_probes(
     """
     unknown = next((name for name in names if name not in series), None)
     if unknown is not None:
-        hint = did_you_mean_or_list(unknown, series)
+        hint = spelling.did_you_mean_or_list(unknown, series)
         raise InvalidInputError(f"--probe {unknown}: no such probe in this run, {hint}")
     panels = [panel for name in names or series for panel in panels_of(series[name])]
     if not panels:
@@ -203,7 +200,7 @@ def draw_probes(
         style.save_figure(figure, path)
 
 
-def probe_picture(probe: ProbeSeries) -> bytes:
+def probe_picture(probe: probes.ProbeSeries) -> bytes:
     """Return the picture (PNG) of one probe, for a report; nothing of one without samples."""
     panels = panels_of(probe)
     if not panels:
@@ -212,7 +209,7 @@ def probe_picture(probe: ProbeSeries) -> bytes:
         return style.figure_bytes(figure, ".png")
 
 
-def panels_of(probe: ProbeSeries) -> list[TimePanel]:
+def panels_of(probe: probes.ProbeSeries) -> list[TimePanel]:
     """Return the panels of a probe; none of one without samples."""
 
     def panel(quantity: str, unit: str, factor: float, columns: Mapping[str, Floats]) -> TimePanel:
@@ -277,8 +274,8 @@ def draw_support_motion(support: Support, end: float, path: Path, title: str | N
     pieces = support.motion
     if pieces is None:
         raise InvalidInputError("the supports of this scenario do not move: it has no table [motion]")
-    peaks = motion_peaks(pieces, end)
-    ends, acceleration = acceleration_ends(pieces)
+    peaks = motion.motion_peaks(pieces, end)
+    ends, acceleration = motion.acceleration_ends(pieces)
     last = int(np.count_nonzero(ends < end))  # the line of straight pieces is cut at the end
     share = (end - ends[last - 1]) / max(ends[last] - ends[last - 1], 1e-300)
     value = acceleration[last - 1] + share * (acceleration[last] - acceleration[last - 1])
@@ -286,12 +283,14 @@ def draw_support_motion(support: Support, end: float, path: Path, title: str | N
     count = len(pieces.times) - 1
     times = np.interp(np.linspace(0.0, count, BETWEEN * count + 1), np.arange(count + 1), pieces.times)
     times = np.append(times[times < end], end)
-    displacement, velocity = displacement_and_velocity(pieces, times)
+    displacement, velocity = motion.displacement_and_velocity(pieces, times)
 
-    def panel(name: str, quantity: str, unit: str, factor: float, line: tuple[Floats, Floats], peak: Peak) -> TimePanel:
+    def panel(
+        name: str, quantity: str, unit: str, factor: float, line: tuple[Floats, Floats], peak: motion.Peak
+    ) -> TimePanel:
         at, values = line
         near = int(np.argmin(np.abs(at - peak.time) - 1e-9 * np.abs(values)))
-        in_g = f"= {peak.value / STANDARD_GRAVITY:.4g} g\n" if name == "PGA" else ""
+        in_g = f"= {peak.value / units.STANDARD_GRAVITY:.4g} g\n" if name == "PGA" else ""
         note = f"{name} {factor * peak.value:.4g} {unit}\n{in_g}at {peak.time:.4g} s"
         mark = peak.time, (-factor if values[near] < 0.0 else factor) * peak.value
         return TimePanel(f"{quantity} ({unit})", {name: (at, factor * values)}, note, [mark], level=0.0)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from blocksim.scenario import Scenario
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.result import EventRecord
-from blocksim.view import arrows, run_data, style
-from blocksim.view.paint import ELEMENT_COLOURS, capped_scale
+from blocksim.view import arrows, paint, run_data, style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices
 from blocksim.view.scene import upper_sides
 from blocksim.world.systems.blocks import are_removed, distinct
@@ -90,13 +89,13 @@ def pack_systems(frames: Frames, kept: Indices) -> list[dict[str, Any]]:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    palette = [to_hex(colour) for colour in colormaps[ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
+    palette = [to_hex(colour) for colour in colormaps[paint.ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
     systems = []
     for number, track in enumerate(frames.others, start=1):
         shades = []
         for shade in track.system.shades:
             values = shade.of(track.some(kept))
-            high = capped_scale(shade.label, values).high
+            high = paint.capped_scale(shade.label, values).high
             shades.append({"label": shade.label, "high": high, "values": pack(values)[0]})
         look = {"name": track.system.name, "colour": style.block_colour(number)}
         systems.append({**look, **_places(track, kept), "shades": shades, "palette": palette if shades else []})

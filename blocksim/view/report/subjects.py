@@ -16,25 +16,17 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, load_stored
-from blocksim.scenario.document import MAX_BYTES
-from blocksim.scenario.input_files import read_limited, relative_path
+from blocksim.scenario import Scenario, document, input_files, load_stored
 from blocksim.simulation import folder as files
+from blocksim.simulation import observables, result
 from blocksim.simulation.frames import Columns, Frames, read_table, rows_of
-from blocksim.simulation.observables import OBSERVABLES
 from blocksim.simulation.probes import ProbeSeries
-from blocksim.simulation.result import Summary, read_summary
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
-from blocksim.view import style
+from blocksim.view import kinds, run_data, style, time_panels
 from blocksim.view.history import draw_history_page
-from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.report.player import MOST_BYTES, pack_forces, pack_frames, pack_loads, scene_data
-from blocksim.view.run_data import Support, support_of
-from blocksim.view.style import OWN
 from blocksim.view.sweeps import outcome_map
 from blocksim.view.sweeps.data import SweepData, short_names
-from blocksim.view.sweeps.outcome_map import OutcomeMap
-from blocksim.view.time_panels import probe_picture
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,7 +39,7 @@ ABSOLUTE = re.compile(rf"'(?P<quoted>{ROOT}[^']+)'|(?<![^\s=,(\"])(?P<bare>{ROOT
 
 def shared_path(path: str) -> str:
     """Return an absolute path as seen from the current folder, or its last name where it lies elsewhere."""
-    below = relative_path(path)
+    below = input_files.relative_path(path)
     is_elsewhere = below == path and re.match(ROOT, path) is not None
     return re.split(r"[\\/]", path.rstrip("\\/"))[-1] if is_elsewhere else below
 
@@ -96,7 +88,7 @@ class PartialRun:
     folder: Path
     scenario: Scenario | None
     scenario_text: str | None
-    summary: Summary | None
+    summary: result.Summary | None
     frames: Frames | None
     final: Columns | None
     problems: tuple[str, ...] = ()
@@ -132,7 +124,7 @@ def read_stored(folder: Path) -> PartialRun:
             return None
 
     scenario = attempt(lambda: load_stored(folder / files.SCENARIO))
-    summary = attempt(lambda: read_summary(folder / files.SUMMARY))
+    summary = attempt(lambda: result.read_summary(folder / files.SUMMARY))
     frames = None if scenario is None else attempt(lambda: read_frames(folder / files.FRAMES, scenario))
     final = attempt(lambda: read_table(folder / files.FINAL))
     if scenario is None and summary is None and final is None:
@@ -142,7 +134,7 @@ def read_stored(folder: Path) -> PartialRun:
         probes = attempt(lambda: read_probes(folder / files.FRAMES, scenario))
     text = None
     with suppress(BlocksimError):
-        text = read_limited(folder / files.SCENARIO, MAX_BYTES).decode(errors="replace")
+        text = input_files.read_limited(folder / files.SCENARIO, document.MAX_BYTES).decode(errors="replace")
     return PartialRun(folder, scenario, text, summary, frames, final, tuple(problems), tuple(damage), probes or {})
 
 
@@ -172,7 +164,7 @@ def embedded(figure: "Figure") -> str:
     return f"data:image/svg+xml;base64,{b64encode(short.encode()).decode()}"
 
 
-def history_of(frames: Frames, support: Support, measured: Repeats | None) -> tuple[str, list[dict[str, Any]]]:
+def history_of(frames: Frames, support: run_data.Support, measured: Repeats | None) -> tuple[str, list[dict[str, Any]]]:
     """Return the histories of a run, and of each panel its name, place and the ends of its axes."""
     with draw_history_page(frames, None, measured, support) as (figure, panels):
         places = [
@@ -187,22 +179,26 @@ def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
 
     A map has where its panels lie, row by row, and for every case the column that it is in and its place there.
     """
-    pairs = [] if SWEEP_KINDS["map"].refusal(sweep) else combinations([one for one in sweep.inputs if one.is_number], 2)
+    pairs = (
+        []
+        if kinds.SWEEP_KINDS["map"].refusal(sweep)
+        else combinations([one for one in sweep.inputs if one.is_number], 2)
+    )
     names = dict(zip((one.key for one in sweep.inputs), short_names([one.key for one in sweep.inputs]), strict=True))
     maps = []
     for x, y in [*pairs][:MOST_MAPS]:
-        with outcome_map.draw_map(sweep, OWN, (x, y), by_manner=any(sweep.manners)) as (figure, found):
+        with outcome_map.draw_map(sweep, style.OWN, (x, y), by_manner=any(sweep.manners)) as (figure, found):
             label = f"map of {names[y.key]} over {names[x.key]}"
             maps.append({"label": label, "source": embedded(figure), "data": _cases(found)})
     others = []
-    for name, kind in SWEEP_KINDS.items():
+    for name, kind in kinds.SWEEP_KINDS.items():
         if name != "map" and not kind.refusal(sweep) and kind.suits(sweep):
-            with kind.drawn(sweep, OWN) as figure:
+            with kind.drawn(sweep, style.OWN) as figure:
                 others.append({"label": name, "source": embedded(figure), "data": None})
     return maps + others
 
 
-def _cases(found: OutcomeMap) -> dict[str, Any]:
+def _cases(found: outcome_map.OutcomeMap) -> dict[str, Any]:
     count = len(found.sweep.finished)
     column, places = np.full(count, -1), np.zeros((count, 2))
     for number, (axes, (_, cases)) in enumerate(zip(found.panels[0], found.columns, strict=True)):
@@ -254,7 +250,7 @@ def run_subject(
         data["measured"] = _measured(data["names"], comparison)
         repeats = None if comparison is None else Repeats(comparison["rows"])
         if data["names"]:
-            support = support_of(run.scenario, () if run.summary is None else run.summary.events)
+            support = run_data.support_of(run.scenario, () if run.summary is None else run.summary.events)
             history, data["histories"] = history_of(run.frames, support, repeats)
     page = {
         "parent": parent,
@@ -350,7 +346,7 @@ def _probes(run: PartialRun) -> list[dict[str, str]]:
     return [
         {
             "text": f"{name}: {one.kind}, {len(one)} samples to {one.time[-1]:.4g} s, in probe-{name}.csv",
-            "picture": b64encode(probe_picture(one)).decode(),
+            "picture": b64encode(time_panels.probe_picture(one)).decode(),
         }
         for name, one in run.probes.items()
         if len(one)
@@ -467,7 +463,7 @@ def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
     roles = {"varied": table.varied, "case": (CASE,), "outcome": table.results, "block": ends}
     order = [CASE, *table.varied, *table.results, *ends]
     role = {name: kind for kind, names in roles.items() for name in names}
-    labels = {one.name: {"label": one.label} for one in OBSERVABLES.values() if one.title}
+    labels = {one.name: {"label": one.label} for one in observables.OBSERVABLES.values() if one.title}
     return [
         {
             "name": name,

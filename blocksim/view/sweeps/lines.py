@@ -7,11 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.view import style
-from blocksim.view.run_data import Flags, Floats
-from blocksim.view.style import LINE, OWN, Paper
+from blocksim.view import run_data, style
 from blocksim.view.sweeps import data
-from blocksim.view.sweeps.data import STAYS_MM, Input, InputUnit, SweepData
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,11 +30,11 @@ class Series:
     """Final centres of b blocks in n finished runs that differ in one input only, in the order of its values."""
 
     label: str  # input and value that all runs of this series share; empty where there is one series only
-    values: Floats  # (n,) SI
-    x_mm: Floats  # (n, b)
+    values: run_data.Floats  # (n,) SI
+    x_mm: run_data.Floats  # (n, b)
 
 
-def refusal(sweep: SweepData) -> str:
+def refusal(sweep: data.SweepData) -> str:
     """Return why a sweep cannot be shown."""
     if len(sweep.inputs) > MOST_INPUTS:
         return f"{len(sweep.inputs)} keys are varied; lines can show one or two"
@@ -47,7 +44,7 @@ def refusal(sweep: SweepData) -> str:
     return ""
 
 
-def suits(sweep: SweepData) -> bool:
+def suits(sweep: data.SweepData) -> bool:
     """Return True if all combinations exist, and the columns for the values of the second input are not too many."""
     if refusal(sweep) or (sweep.is_sampled and len(sweep.inputs) > 1):
         return False
@@ -55,7 +52,7 @@ def suits(sweep: SweepData) -> bool:
     return other is None or other.count <= data.MOST_COLUMNS
 
 
-def draw_lines(sweep: SweepData, paper: Paper = OWN) -> "AbstractContextManager[Figure]":
+def draw_lines(sweep: data.SweepData, paper: style.Paper = style.OWN) -> "AbstractContextManager[Figure]":
     """Give the drawn lines."""
     axis, _ = _axis_and_other(sweep)
     ranges = {block: (float(x.min()), float(x.max())) for block, x in sweep.measured.x_mm.items()}
@@ -63,10 +60,10 @@ def draw_lines(sweep: SweepData, paper: Paper = OWN) -> "AbstractContextManager[
     return draw_series(series, sweep.blocks, key, sweep.title, ranges, typed=axis.typed, paper=paper)
 
 
-def series_of(sweep: SweepData) -> Iterator[Series]:
+def series_of(sweep: data.SweepData) -> Iterator[Series]:
     """Yield the series of the finished cases, one for each value of the second input of a grid."""
     axis, other = _axis_and_other(sweep)
-    groups: list[tuple[str, Flags]] = [("", sweep.finished)]
+    groups: list[tuple[str, run_data.Flags]] = [("", sweep.finished)]
     if other is not None:
         groups = [
             (f"{other.key} = {other.label(value)}", sweep.finished & (other.values == value))
@@ -77,7 +74,7 @@ def series_of(sweep: SweepData) -> Iterator[Series]:
         yield Series(label, axis.values[cases][order], sweep.x_mm[cases][order])
 
 
-def _axis_and_other(sweep: SweepData) -> tuple[Input, Input | None]:
+def _axis_and_other(sweep: data.SweepData) -> tuple[data.Input, data.Input | None]:
     """Return the number with the most values, and the other input where both go through all combinations."""
     axis = max((one for one in sweep.inputs if one.is_number), key=lambda one: one.count)
     others = [one for one in sweep.inputs if one is not axis]
@@ -92,8 +89,8 @@ def draw_series(
     title: str | None = None,
     measured: Mapping[str, tuple[float, float]] | None = None,
     *,
-    typed: InputUnit | None = None,
-    paper: Paper = OWN,
+    typed: data.InputUnit | None = None,
+    paper: style.Paper = style.OWN,
 ) -> "Iterator[Figure]":
     """Give final x drawn over a key, that is given with its SI unit.
 
@@ -114,8 +111,8 @@ def draw_series(
         for block, name in zip(rows, names, strict=True)
     ]
     lines = max(len(caption) for row in captions for caption in row)
-    head = HEAD + LINE * lines + (LINE * max(map(len, headings)) + 0.08 if headings[0] != [""] else 0.0)
-    foot = FOOT + LINE * (len(style.break_lines(axis.label, width - LEFT)) - 1)
+    head = HEAD + style.LINE * lines + (style.LINE * max(map(len, headings)) + 0.08 if headings[0] != [""] else 0.0)
+    foot = FOOT + style.LINE * (len(style.break_lines(axis.label, width - LEFT)) - 1)
     joined = all(is_smooth(one.x_mm[:, block]) for one in shown for block in rows)
     texts = ["One point: one run."]
     texts += ["Band: smallest to largest of the measured repeats."] if measured else []
@@ -123,7 +120,7 @@ def draw_series(
     texts += [f"Not shown: {hidden} of {len(blocks)} blocks, whose final x varies least."] if hidden else []
     texts += [f"{len(series) - count} more series."] if len(series) > count else []
     own, least = (panel, ROW_HEIGHT), (NARROWEST, LOWEST)
-    sides, gaps = (LEFT, RIGHT, head, foot), (COLUMN_GAP, ROW_GAP + LINE * (lines - 1))
+    sides, gaps = (LEFT, RIGHT, head, foot), (COLUMN_GAP, ROW_GAP + style.LINE * (lines - 1))
     shape = len(rows), count
     with style.open_panels(paper, shape, own, least, sides, gaps, title=title, notes=" ".join(texts)) as opened:
         figure, panels = opened
@@ -145,7 +142,7 @@ def draw_series(
                 axes.set_title("\n".join(caption), loc="left", pad=3.0)
             of_block[0].set_ylabel("final x (mm)")
         for axes, heading in zip(panels[0], headings, strict=True):
-            up = 1.0 + (LINE * lines + 0.1) / style.size_of(axes)[1]
+            up = 1.0 + (style.LINE * lines + 0.1) / style.size_of(axes)[1]
             axes.text(0.0, up, "\n".join(heading), transform=axes.transAxes, va="bottom", weight="bold")
         style.name_axes(figure, panels, axis.label, "", LABEL_DEPTH)
         yield figure
@@ -156,10 +153,10 @@ def moving_blocks(series: Sequence[Series]) -> list[int]:
     return data.most_moving(np.max([np.ptp(one.x_mm, axis=0) for one in series], axis=0))
 
 
-def is_smooth(values: Floats) -> bool:
+def is_smooth(values: run_data.Floats) -> bool:
     """Return True if values go up and down so little that a line through them is justified."""
     spread = float(np.ptp(values))
-    return spread < STAYS_MM or float(np.abs(np.diff(values)).sum()) <= WAVERING * spread
+    return spread < data.STAYS_MM or float(np.abs(np.diff(values)).sum()) <= WAVERING * spread
 
 
 def _limits(series: Sequence[Series], block: int, band: tuple[float, float] | None) -> tuple[float, float]:
@@ -170,7 +167,7 @@ def _limits(series: Sequence[Series], block: int, band: tuple[float, float] | No
     return low - margin, high + margin
 
 
-def _extent(x: Floats) -> str:
+def _extent(x: run_data.Floats) -> str:
     """Return the final places of a block in all runs of a series."""
     ends = [f"{end:.2f}".replace("-0.00", "0.00").replace("-", "−") for end in (x.min(), x.max())]
     return f"{' to '.join(ends)}\N{NO-BREAK SPACE}mm, {np.ptp(x):.2f}\N{NO-BREAK SPACE}mm apart"

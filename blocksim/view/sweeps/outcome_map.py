@@ -8,18 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.view import style
-from blocksim.view.run_data import Flags, Floats
-from blocksim.view.style import OWN, Paper
-from blocksim.view.sweeps.data import (
-    MOST_COLUMNS,
-    Input,
-    SweepData,
-    ValueAxis,
-    outcome_label,
-    percent,
-    value_axis,
-)
+from blocksim.view import run_data, style
+from blocksim.view.sweeps import data
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,13 +36,13 @@ MARGIN = 0.03  # of an axis around dots
 class Classes:
     """Numbers of classes by case, and their meaning: the measured one first, then the most frequent."""
 
-    numbers: Floats  # (n,)
+    numbers: run_data.Floats  # (n,)
     labels: tuple[str, ...]
     colours: tuple[str, ...]
     title: str = "final rotations of all blocks"
 
 
-def run_out_scale(x_mm: Floats) -> "tuple[Colormap, BoundaryNorm]":
+def run_out_scale(x_mm: run_data.Floats) -> "tuple[Colormap, BoundaryNorm]":
     """Return a map of colours in round steps over all but the rarest run-outs (mm)."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm
@@ -65,7 +55,7 @@ def run_out_scale(x_mm: Floats) -> "tuple[Colormap, BoundaryNorm]":
     return colours, BoundaryNorm(edges, colours.N, extend="both")
 
 
-def classes_of(sweep: SweepData) -> Classes:
+def classes_of(sweep: data.SweepData) -> Classes:
     """Return the outcomes of all cases as numbers; classes beyond the colours are taken together."""
     outcomes, measured = sweep.outcomes, sweep.measured.outcome
     counts = Counter(one for one in outcomes if one is not None)
@@ -73,12 +63,12 @@ def classes_of(sweep: SweepData) -> Classes:
     known = {outcome: number for number, outcome in enumerate(order)}
     other, failed = len(order), len(order) + 1
     numbers = np.array([failed if one is None else known.get(one, other) for one in outcomes], dtype=np.float64)
-    names = [outcome_label(one) + (" (measured)" if one == measured else "") for one in order]
+    names = [data.outcome_label(one) + (" (measured)" if one == measured else "") for one in order]
     colours = (*CLASS_COLOURS[: len(order)], OTHER_COLOUR, FAILED_COLOUR)
     return Classes(numbers, _with_shares([*names, "others", "failed"], numbers), colours)
 
 
-def manners_of(sweep: SweepData) -> Classes:
+def manners_of(sweep: data.SweepData) -> Classes:
     """Return how all cases ended as numbers, in the order of `MANNERS`."""
     names = [name for name in MANNERS if name in sweep.manners]
     ends = zip(sweep.manners, sweep.finished, strict=True)
@@ -87,21 +77,23 @@ def manners_of(sweep: SweepData) -> Classes:
     return Classes(numbers, _with_shares([*names, "failed"], numbers), colours, "outcome")
 
 
-def _with_shares(names: Sequence[str], numbers: Floats) -> tuple[str, ...]:
-    return tuple(f"{name}: {percent(float((numbers == number).mean()))}" for number, name in enumerate(names))
+def _with_shares(names: Sequence[str], numbers: run_data.Floats) -> tuple[str, ...]:
+    return tuple(f"{name}: {data.percent(float((numbers == number).mean()))}" for number, name in enumerate(names))
 
 
 @dataclass(frozen=True, eq=False)
 class Plane:
     """Two inputs of n cases, as shown on their axes."""
 
-    x: Floats  # (n,)
-    y: Floats  # (n,)
-    axes: tuple[ValueAxis, ValueAxis]
+    x: run_data.Floats  # (n,)
+    y: run_data.Floats  # (n,)
+    axes: tuple[data.ValueAxis, data.ValueAxis]
     is_grid: bool
 
 
-def draw_panel(axes: "Axes", plane: Plane, numbers: Floats, look: dict[str, Any], agrees: Flags | None) -> None:
+def draw_panel(
+    axes: "Axes", plane: Plane, numbers: run_data.Floats, look: dict[str, Any], agrees: run_data.Flags | None
+) -> None:
     """Colour the cases by their numbers (NaN: none), with the map and norm of `look`; outline those that agree."""
     from matplotlib.collections import LineCollection
 
@@ -123,7 +115,7 @@ def draw_panel(axes: "Axes", plane: Plane, numbers: Floats, look: dict[str, Any]
     axes.margins(MARGIN)
 
 
-def edges_of(centres: Floats, *, is_log: bool) -> Floats:
+def edges_of(centres: run_data.Floats, *, is_log: bool) -> run_data.Floats:
     """Return the edges between ascending centres, (n,) to (n + 1,), midway on the axis; the outer cells are whole."""
     places = np.log(centres) if is_log else centres
     if len(places) == 1:
@@ -135,7 +127,7 @@ def edges_of(centres: Floats, *, is_log: bool) -> Floats:
     return np.exp(edges) if is_log else edges
 
 
-def outline_of(agrees: Flags, x: Floats, y: Floats) -> list[list[tuple[float, float]]]:
+def outline_of(agrees: run_data.Flags, x: run_data.Floats, y: run_data.Floats) -> list[list[tuple[float, float]]]:
     """Return the sides between cells that agree and others; `agrees` is (rows, columns), x and y are cell edges."""
     framed = np.pad(agrees, 1)
     rows, columns = np.nonzero(framed[1:-1, 1:] != framed[1:-1, :-1])
@@ -144,7 +136,7 @@ def outline_of(agrees: Flags, x: Floats, y: Floats) -> list[list[tuple[float, fl
     return [*upright, *([(x[i], y[j]), (x[i + 1], y[j])] for j, i in zip(rows, columns, strict=True))]
 
 
-def on_grid(plane: Plane, numbers: Floats) -> tuple[Floats, Floats, Floats]:
+def on_grid(plane: Plane, numbers: run_data.Floats) -> tuple[run_data.Floats, run_data.Floats, run_data.Floats]:
     """Return the ascending centres along x and y, and the numbers on them, (rows, columns); NaN where there is none."""
     x, columns = np.unique(plane.x, return_inverse=True)
     y, rows = np.unique(plane.y, return_inverse=True)
@@ -169,56 +161,60 @@ FEWEST = 3  # values of an input that is an axis
 class OutcomeMap:
     """Contents; `panels` are the axes that are drawn, row by row."""
 
-    sweep: SweepData
-    x: Input
-    y: Input
-    columns: tuple[tuple[str, Flags], ...]  # heading, and the cases (n,)
+    sweep: data.SweepData
+    x: data.Input
+    y: data.Input
+    columns: tuple[tuple[str, run_data.Flags], ...]  # heading, and the cases (n,)
     blocks: list[int]
-    axes: tuple[ValueAxis, ValueAxis]
+    axes: tuple[data.ValueAxis, data.ValueAxis]
     panels: "list[list[Axes]]" = field(default_factory=list)
 
-    def plane(self, cases: Flags) -> Plane:
+    def plane(self, cases: run_data.Flags) -> Plane:
         """Return the inputs of some cases."""
         x, y = (axis.shown(one.values[cases]) for axis, one in zip(self.axes, (self.x, self.y), strict=True))
         return Plane(x, y, self.axes, self.sweep.is_grid)
 
 
-def suits(sweep: SweepData) -> bool:
+def suits(sweep: data.SweepData) -> bool:
     """Return True if two inputs can be axes and the others, at most one, columns."""
     if refusal(sweep):
         return False
     axes = _axes_of(sweep)
     others = [one for one in sweep.inputs if one not in axes]
     spread = all(one.count >= FEWEST for one in axes)
-    return spread and len(others) <= 1 and all(one.count <= MOST_COLUMNS for one in others)
+    return spread and len(others) <= 1 and all(one.count <= data.MOST_COLUMNS for one in others)
 
 
-def refusal(sweep: SweepData) -> str:
+def refusal(sweep: data.SweepData) -> str:
     """Return why a sweep cannot be shown."""
     return "a map needs two numeric inputs" if len(_axes_of(sweep)) < AXES else ""
 
 
-def _axes_of(sweep: SweepData) -> tuple[Input, ...]:
+def _axes_of(sweep: data.SweepData) -> tuple[data.Input, ...]:
     """Return the two inputs with the most values; of equal ones the first."""
     return tuple(sorted((one for one in sweep.inputs if one.is_number), key=lambda one: -one.count)[:AXES])
 
 
-def map_of(sweep: SweepData, axes: tuple[Input, ...] | None = None) -> OutcomeMap:
+def map_of(sweep: data.SweepData, axes: tuple[data.Input, ...] | None = None) -> OutcomeMap:
     """Return the contents of a map over two inputs, by default those with the most values."""
     x, y = axes = axes or _axes_of(sweep)
-    others = [one for one in sweep.inputs if one not in axes and one.count <= MOST_COLUMNS]
-    columns: list[tuple[str, Flags]] = [("", np.ones(len(sweep.finished), dtype=bool))]
+    others = [one for one in sweep.inputs if one not in axes and one.count <= data.MOST_COLUMNS]
+    columns: list[tuple[str, run_data.Flags]] = [("", np.ones(len(sweep.finished), dtype=bool))]
     if others:
         name = others[0].key.rpartition(".")[2]
         values = np.unique(others[0].values)
         columns = [(f"{name} = {others[0].label(value)}", others[0].values == value) for value in values]
-    shown = tuple(value_axis(one.values, one.key, one.unit, is_even=one.is_even, typed=one.typed) for one in axes)
+    shown = tuple(data.value_axis(one.values, one.key, one.unit, is_even=one.is_even, typed=one.typed) for one in axes)
     return OutcomeMap(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]))
 
 
 @contextmanager
 def draw_map(
-    sweep: SweepData, paper: Paper = OWN, axes: tuple[Input, Input] | None = None, *, by_manner: bool = False
+    sweep: data.SweepData,
+    paper: style.Paper = style.OWN,
+    axes: tuple[data.Input, data.Input] | None = None,
+    *,
+    by_manner: bool = False,
 ) -> Iterator[tuple["Figure", OutcomeMap]]:
     """Give the drawn map. Samples over more than two inputs are seen along all others.
 
@@ -277,9 +273,9 @@ def _draw_row(
     row: Sequence["Axes"],
     found: OutcomeMap,
     caption: str,
-    numbers: Floats,
+    numbers: run_data.Floats,
     look: dict[str, Any],
-    agrees: Flags | None,
+    agrees: run_data.Flags | None,
 ) -> None:
     """Draw a row of panels, in which cases that did not finish are crossed out."""
     for axes, (_, cases) in zip(row, found.columns, strict=True):

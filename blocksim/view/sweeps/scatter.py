@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.view import style
-from blocksim.view.run_data import Floats
-from blocksim.view.style import OWN, Paper
+from blocksim.view import run_data, style
 from blocksim.view.sweeps.data import Input, SweepData, ValueAxis, percent, short_names, value_axis
 
 if TYPE_CHECKING:
@@ -45,11 +43,11 @@ class Variable:
     """Variable of one row and one column of the matrix, n cases; `repeats` are measured values of it."""
 
     name: str
-    values: Floats  # (n,) as shown on the axis; NaN where there is none
+    values: run_data.Floats  # (n,) as shown on the axis; NaN where there is none
     limits: tuple[float, float]
     is_log: bool = False
     levels: tuple[str, ...] = ()
-    repeats: Floats | None = None
+    repeats: run_data.Floats | None = None
 
 
 def variables_of(sweep: SweepData) -> list[Variable]:
@@ -66,7 +64,7 @@ def variables_of(sweep: SweepData) -> list[Variable]:
 
 
 @contextmanager
-def draw_matrix(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
+def draw_matrix(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[Figure]":
     """Give the lower half of the matrix, with histograms on its diagonal and names beside that."""
     variables = variables_of(sweep)
     count, levels = len(variables), [level for one in variables for level in one.levels]
@@ -131,7 +129,7 @@ def _in_lines(name: str) -> str:
     return "\n".join(style.break_lines(name, NAME_ROOM, NAME_FONT))
 
 
-def _around(values: Floats, axis: ValueAxis | None) -> tuple[float, float]:
+def _around(values: run_data.Floats, axis: ValueAxis | None) -> tuple[float, float]:
     """Return limits a little outside of all values."""
     low, high = float(values.min()), float(values.max())
     if axis is not None and axis.is_log:
@@ -249,7 +247,7 @@ _INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 
 
 @contextmanager
-def draw_histogram(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
+def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[Figure]":
     """Give a panel for each block that moves."""
     blocks = sweep.moving[-MOST_HISTOGRAMS:]
     own = style.COLUMN_WIDTH - sum(SIDES[:2]), PANEL_HEIGHT
@@ -261,7 +259,7 @@ def draw_histogram(sweep: SweepData, paper: Paper = OWN) -> "Iterator[Figure]":
         yield figure
 
 
-def limits_of(x_mm: Floats, others: Floats) -> tuple[float, float]:
+def limits_of(x_mm: run_data.Floats, others: run_data.Floats) -> tuple[float, float]:
     """Return the ends of an axis (mm) around all but the rarest run-outs and everything measured."""
     ends = np.concatenate([np.percentile(x_mm, [RARE_RUN_OUTS, 100.0 - RARE_RUN_OUTS]), others])
     low, high = float(ends.min()), float(ends.max())
