@@ -311,11 +311,26 @@ class Animation:
             self.still = self.paper.copy_from_bbox(figure.bbox)
 
     def picture(self, frame: int) -> Pixels:
-        """Return the picture of one frame."""
-        axes = self.canvas.axes
-        there = set(axes.get_children())
+        """Return the picture of one frame: the fixed parts, and what has moved."""
+        from matplotlib.collections import LineCollection
+
+        canvas, frames, axes = self.canvas, self.frames, self.canvas.axes
+        there, index = set(axes.get_children()), int(np.searchsorted(self.drawable, frame))
         with style.in_style(), style.silence_missing_glyphs():
-            self._draw(frame)
+            if not self.is_still:
+                scene.draw_standing(canvas, self.scene, frame)
+            scene.draw_blocks(canvas, self.scene, frame)
+            if self.has_trails:  # the paths of all free centres
+                past, free = self.drawable[: index + 1], ~run_data.is_fixed(frames, self.support)
+                ways = run_data.MILLIMETRES * np.stack([frames.x[past], frames.y[past]], axis=-1)[:, free]
+                lines = LineCollection(list(ways.swapaxes(0, 1)), colors=style.INK, **TRAIL, transform=canvas.scene)
+                axes.add_collection(lines)
+            arrows.draw_actions(canvas, self.acts, index, self.length)
+            arrows.draw_marks(canvas, self.acts.marks[index], TIME_ROOM)
+            if self.forces is not None:
+                arrows.draw_forces(canvas, frames, frame, self.forces)
+            top = canvas.extent.top + 4.0 / canvas.points_per_mm
+            axes.text(canvas.extent.left, top, f"{float(frames.time[frame]):.3f} s", va="bottom")
             moving = sorted((one for one in axes.get_children() if one not in there), key=lambda one: one.get_zorder())
             self.paper.restore_region(self.still)
             for artist in moving:
@@ -323,25 +338,3 @@ class Animation:
         for artist in moving:
             artist.remove()
         return np.array(self.paper.buffer_rgba())[..., :3]
-
-    def _draw(self, frame: int) -> None:
-        """Add to the panel what has moved since the last picture; trails are the paths of all free centres."""
-        from matplotlib.collections import LineCollection
-
-        canvas, frames = self.canvas, self.frames
-        if not self.is_still:
-            scene.draw_standing(canvas, self.scene, frame)
-        scene.draw_blocks(canvas, self.scene, frame)
-        if self.has_trails:
-            past = self.drawable[self.drawable <= frame]
-            free = ~run_data.is_fixed(frames, self.support)
-            ways = run_data.MILLIMETRES * np.stack([frames.x[past], frames.y[past]], axis=-1)[:, free]
-            lines = LineCollection(list(ways.swapaxes(0, 1)), colors=style.INK, **TRAIL, transform=canvas.scene)
-            canvas.axes.add_collection(lines)
-        index = int(np.searchsorted(self.drawable, frame))
-        arrows.draw_actions(canvas, self.acts, index, self.length)
-        arrows.draw_marks(canvas, self.acts.marks[index], TIME_ROOM)
-        if self.forces is not None:
-            arrows.draw_forces(canvas, frames, frame, self.forces)
-        top = canvas.extent.top + 4.0 / canvas.points_per_mm
-        canvas.axes.text(canvas.extent.left, top, f"{float(frames.time[frame]):.3f} s", va="bottom")

@@ -14,7 +14,6 @@ from blocksim.view.paint import Paint, by_block, draw_key
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 NARROWEST = 0.35  # width over height
@@ -100,7 +99,7 @@ def labels_of(frames: Frames, frame: int, page: scene.Page, ranges: Sequence[sce
     centres = run_data.MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
     lines = []
     for name, (x, _), turn in zip(frames.names, centres, np.degrees(frames.rotation[frame]), strict=True):
-        texts = [f"x {x:.2f} mm", f"{turn + 0.0:.2f}°".replace("-0.00", "0.00").replace("-", "−")]
+        texts = [f"x {x:.2f} mm", f"{turn:z.2f}°".replace("-", "−")]
         if name in measured:
             one = measured[name]
             texts.append(f"measured {one.mean:.2f} [{one.minimum:.2f}, {one.maximum:.2f}]".replace("-", "−"))
@@ -194,7 +193,7 @@ def draw_final(
         style.save_figure(figure, path)
 
 
-def _draw_labels(axes: "Axes", labels: Labels) -> None:
+def _draw_labels(axes: "style.Axes", labels: Labels) -> None:
     """Draw the labels below the axis, on a scale of points."""
     axes.set_axis_off()
     axes.set_xlim(0.0, style.size_of(axes)[0] * style.POINTS_PER_INCH)

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,11 +15,6 @@ from blocksim.view import arrows, final, run_data, style, time_panels
 from blocksim.view.paint import Paint, by_block
 from blocksim.world.systems.blocks import BLOCKS
 from blocksim.world.systems.system import Output
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own, unless they are chosen
 MOST_POINTS = 2000  # of a line
@@ -163,7 +158,7 @@ def draw_history_page(
     choice: Choice | None = None,
     paint: Paint | None = None,
     paper: style.Paper = style.OWN,
-) -> "Iterator[tuple[Figure, dict[str, Axes]]]":
+) -> "Iterator[tuple[style.Figure, dict[str, style.Axes]]]":
     """Give x, y, rotation, energies and contacts over time, or the panels of `choice`, by the name of each.
 
     Measured means and ranges are drawn at the end. If contacts were stored, a panel shows the force of ground and walls
@@ -186,31 +181,30 @@ def draw_history_page(
     looks = {frames.names[block]: look for block, look in line_looks(paint.fills(0), shown).items()}
     names = _panel_names(seen, choice, forces=forces)
     notes = _notes(seen, names, len(shown), is_measured=measured is not None, is_chosen=bool(blocks))
-    span = float(seen.time[0]), float(seen.time[0] + LATER * (seen.time[-1] - seen.time[0]))
-    own = _panel_height(names, len(shown))
-    first = next((name for name in names if name in MOTIONS), None)
-    with time_panels.open_time_panels(len(names), span, title, notes, paper, own) as (figure, rows):
-        panels = dict(zip(names, rows, strict=True))
-        for name, axes in panels.items():
-            if name not in MOTIONS:
-                time_panels.draw_time_panel(axes, SCENE_PANELS[name](seen))
-                continue
-            motion = MOTIONS[name](seen)
-            drawn = motion.values[:, shown] if blocks else motion.values
-            lines = {frames.names[block]: (seen.time, motion.values[:, block]) for block in shown}
-            legend = "block" if shown and name == first else None
-            limits = time_panels.limits_of(drawn)
-            time_panels.draw_time_panel(
-                axes, time_panels.TimePanel(motion.label, lines, limits=limits, looks=looks, legend=legend)
-            )
+    motions = {name: MOTIONS[name](seen) for name in names if name in MOTIONS}
+    panels = []
+    for name in names:
+        if name not in motions:
+            panels.append(SCENE_PANELS[name](seen))
+            continue
+        values = motions[name].values
+        lines = {frames.names[block]: (seen.time, values[:, block]) for block in shown}
+        limits = time_panels.limits_of(values[:, shown] if blocks else values)
+        legend = "block" if shown and name == next(iter(motions)) else None
+        panels.append(time_panels.TimePanel(motions[name].label, lines, limits=limits, looks=looks, legend=legend))
+    own, start = _panel_height(names, len(shown)), float(seen.time[0])
+    span = start, start + LATER * (float(seen.time[-1]) - start)
+    with time_panels.open_time_panels(panels, title, notes, paper, own, span) as (figure, rows):
+        axes_of = dict(zip(names, rows, strict=True))
+        for name, motion in motions.items():
             if not blocks:
-                _draw_others(axes, seen.time, np.delete(motion.values, shown, axis=1))
+                _draw_others(axes_of[name], seen.time, np.delete(motion.values, shown, axis=1))
             if measured is not None and motion.quantity:
-                names_shown = [frames.names[block] for block in shown]
-                _draw_measured(axes, seen, Motion(motion.label, drawn, motion.quantity), measured, names_shown)
-        if CONTACTS in panels:
-            panels[CONTACTS].locator_params("y", integer=True)
-        yield figure, panels
+                drawn = replace(motion, values=motion.values[:, shown]) if blocks else motion
+                _draw_measured(axes_of[name], seen, drawn, measured, [frames.names[block] for block in shown])
+        if CONTACTS in axes_of:
+            axes_of[CONTACTS].locator_params("y", integer=True)
+        yield figure, axes_of
 
 
 def line_looks(fills: Sequence[str], shown: Sequence[int]) -> dict[int, dict[str, Any]]:
@@ -275,7 +269,7 @@ def _panel_height(names: Sequence[str], blocks: int) -> float:
     return max(time_panels.PANEL, (legend + time_panels.GAP) / (end - first) - time_panels.GAP)
 
 
-def _draw_others(axes: "Axes", time: run_data.Floats, values: run_data.Floats) -> None:
+def _draw_others(axes: "style.Axes", time: run_data.Floats, values: run_data.Floats) -> None:
     """Draw the blocks that have no line of their own in grey, (n, k)."""
     from matplotlib.collections import LineCollection
 
@@ -286,7 +280,7 @@ def _draw_others(axes: "Axes", time: run_data.Floats, values: run_data.Floats) -
 
 
 def _draw_measured(
-    axes: "Axes", seen: FramesInView, motion: Motion, measured: final.MeasuredTable, names: Sequence[str]
+    axes: "style.Axes", seen: FramesInView, motion: Motion, measured: final.MeasuredTable, names: Sequence[str]
 ) -> None:
     """Draw mean and range of the repeats at the end of the lines of blocks."""
     statistics = measured.statistics()

@@ -1,10 +1,9 @@
 """The kinds of pictures of runs and of sweeps, by name; a kind is one file and one line here."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
@@ -12,11 +11,6 @@ from blocksim.view import final, history, strip, style
 from blocksim.view.style import Paper
 from blocksim.view.sweeps import lines, outcome_map, scatter
 from blocksim.view.sweeps.data import SweepData
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from matplotlib.figure import Figure
 
 STRIP, FINAL, HISTORY, PROFILE = "strip", "final", "history", "profile"
 MOTION = "motion"  # of the supports; needs no run
@@ -37,7 +31,7 @@ class Kind:
 
     refusal: Callable[[SweepData], str]  # why it cannot show a sweep; empty where it can
     suits: Callable[[SweepData], bool]
-    drawn: "Callable[[SweepData, Paper], AbstractContextManager[Figure]]"
+    drawn: "Callable[[SweepData, Paper], AbstractContextManager[style.Figure]]"
 
     def draw(self, sweep: SweepData, path: Path, paper: Paper = style.OWN) -> None:
         """Draw a sweep and write PNG, SVG or PDF; the same input gives the same bytes.
@@ -50,7 +44,7 @@ class Kind:
 
 
 @contextmanager
-def _map(sweep: SweepData, paper: Paper) -> "Iterator[Figure]":
+def _map(sweep: SweepData, paper: Paper) -> Iterator["style.Figure"]:
     with outcome_map.draw_map(sweep, paper) as (figure, _):
         yield figure
 

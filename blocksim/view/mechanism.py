@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,6 @@ from blocksim.simulation.frames import SUPPORT, Frames, Rows
 from blocksim.simulation.observables import MOVED_SHARE
 from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.paint import by_displacement, displacements, draw_key
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 Pair = tuple[int, int]  # bodies a and b
 
@@ -216,7 +212,7 @@ def _extent(pair: tuple[Side, Side]) -> run_data.Extent:
     return replace(one, right=max(one.right, other.right), top=max(one.top, other.top), **least)
 
 
-def _draw_side(figure: "Figure", side: Side, page: scene.Page, corner: tuple[float, float], most: float) -> None:
+def _draw_side(figure: "style.Figure", side: Side, page: scene.Page, corner: tuple[float, float], most: float) -> None:
     """Draw a panel with its upper left corner at a place in inches; ground is tilted as it is on that side."""
     left, top = corner
     page = replace(page, extent=replace(page.extent, tilt=side.support.tilt))

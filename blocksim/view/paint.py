@@ -5,7 +5,7 @@ A block has the same colour in every picture: strip, final state, history, anima
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation.frames import Frames
 from blocksim.view import run_data, style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SPEED_COLOURS = "YlGnBu"  # light at rest; darker in steps that are seen in grey as well
 ELEMENT_COLOURS = "viridis"  # of the elements of systems beside the blocks: seen on white at rest too
@@ -179,7 +176,7 @@ def _scaled(values: run_data.Floats, scale: Scale) -> Paint:
     return Paint(fills, scale=scale)
 
 
-def draw_key(figure: "Figure", paint: Paint, left: float, bottom: float) -> None:
+def draw_key(figure: "style.Figure", paint: Paint, left: float, bottom: float) -> None:
     """Draw what explains the colours, its lower left corner at a place given in inches."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

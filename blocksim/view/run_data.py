@@ -15,7 +15,7 @@ from blocksim.scenario.models.loads import AnyLoad, OnBody, Stretch, stretches_o
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.simulation.frames import Frames
 from blocksim.simulation.result import EventRecord
-from blocksim.world.systems.blocks import boxes_around, least_widths, radii
+from blocksim.world.systems.blocks import boxes_around, least_widths, local_corners, radii
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -357,10 +357,5 @@ def _reached(frames: Frames, chosen: Indices, support: Support) -> Floats:
     below = np.stack([x, support.height(x - offsets[..., 0]) + offsets[..., 1]], axis=-1)
     centres, below = rotate_points(centres, support.tilt), rotate_points(below, support.tilt)
     angle = frames.angle[chosen] + support.tilt
-    if frames.outlines is not None:
-        return np.concatenate([*boxes_around(frames.outlines, centres[..., 0], centres[..., 1], angle), below])
-    cosine, sine = np.abs(np.cos(angle)), np.abs(np.sin(angle))
-    wide = cosine * frames.size_x + sine * frames.size_y
-    tall = sine * frames.size_x + cosine * frames.size_y
-    half = 0.5 * np.stack([wide, tall], axis=-1)
-    return np.concatenate([centres - half, centres + half, below])
+    outlines = local_corners(frames.size_x, frames.size_y, frames.outlines)
+    return np.concatenate([*boxes_around(outlines, centres[..., 0], centres[..., 1], angle), below])

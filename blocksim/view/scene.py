@@ -14,8 +14,6 @@ from blocksim.view.paint import Paint
 from blocksim.world.systems.blocks import are_removed, local_corners, placed_points
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.transforms import Transform
 
 
@@ -32,7 +30,7 @@ ROW_HEIGHT = 9.0  # points, of one row of measured ranges
 class Canvas:
     """Canvas of one moment: axes in the picture's millimetres, all on one scale."""
 
-    axes: "Axes"
+    axes: "style.Axes"
     extent: run_data.Extent
     points_per_mm: float
 
@@ -80,7 +78,7 @@ class Page:
         """Width of the panel."""
         return self.width - 2.0 * self.side
 
-    def canvas(self, figure: "Figure", left: float | None = None, bottom: float | None = None) -> Canvas:
+    def canvas(self, figure: "style.Figure", left: float | None = None, bottom: float | None = None) -> Canvas:
         """Return the panel in a figure; `left` and `bottom` are its lower left corner where it is not the page's."""
         place = self.side if left is None else left, self.foot if bottom is None else bottom
         axes = style.add_axes(figure, *place, self.panel_width, self.panel_height)
@@ -385,7 +383,7 @@ def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: flo
 
 
 def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: run_data.Flags, fills: Sequence[str]) -> None:
-    """Write the names of some blocks at their middles, of polygons their centroids, where there is room for all.
+    """Write the names of some blocks at their centroids, where there is room for all.
 
     Names on some blocks only would look like a difference between the blocks.
     """
@@ -399,8 +397,6 @@ def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: run_data.Fla
     if not all(fonts.values()):
         return
     places = run_data.MILLIMETRES * np.stack([frames.x[frame], frames.y[frame]], axis=-1)
-    if frames.outlines is None:
-        places = corners(frames, frame).mean(axis=1)
     at: dict[str, Any] = {"ha": "center", "va": "center_baseline", "clip_on": True, "transform": canvas.scene}
     for index, font in fonts.items():
         fill, name = fills[index], style.shorten(frames.names[index], LETTERS)
@@ -411,17 +407,12 @@ def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: run_data.Fla
 
 
 def upper_sides(frames: Frames) -> run_data.Floats:
-    """Return a line inside each block along its upper side, which shows turns, in its own axes (m, (b, 2, 2))."""
-    if frames.outlines is not None:
-        return _upper_sides_of_polygons(frames.outlines, 0.5 * (1.0 - EDGE_INSET) * run_data.shortest_sides(frames))
-    half_x, half_y = 0.5 * frames.size_x, 0.5 * frames.size_y
-    inset = half_y - (1.0 - EDGE_INSET) * np.minimum(half_x, half_y)
-    reach = half_x - (half_y - inset)
-    return np.stack([np.stack([-reach, inset], axis=-1), np.stack([reach, inset], axis=-1)], axis=1)
+    """Return a line inside each block along its upper side, which shows turns, in its own axes (m, (b, 2, 2)).
 
-
-def _upper_sides_of_polygons(outlines: run_data.Floats, inset: run_data.Floats) -> run_data.Floats:
-    """Return the lines (m) that are an inset (m, (b,)) inside the edges whose normals point up most, and all others."""
+    It is a share of the width inside the edge whose normal points up most, and all others.
+    """
+    outlines = local_corners(frames.size_x, frames.size_y, frames.outlines)
+    inset = 0.5 * (1.0 - EDGE_INSET) * run_data.shortest_sides(frames)
     edges = np.roll(outlines, -1, axis=1) - outlines
     lengths = np.hypot(edges[..., 0], edges[..., 1])
     is_edge = lengths > 0.0

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,17 +17,14 @@ from blocksim.view.style import OWN, Paper
 from blocksim.view.sweeps.data import short_names
 from blocksim.view.time_panels import limits_of
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
 PANEL, LEAST = (4.4, 3.0), (1.8, 1.0)  # inches, of the panel, and on a page whose size was asked for
 SIDES = 0.65, 0.15, 0.11, 0.42  # inches
 
 
 @contextmanager
-def open_study_figure(path: Path | str, title: str | None, notes: Sequence[str], paper: Paper) -> "Iterator[Axes]":
+def open_study_figure(
+    path: Path | str, title: str | None, notes: Sequence[str], paper: Paper
+) -> "Iterator[style.Axes]":
     """Give the panel; then write the picture as PNG, SVG or PDF.
 
     The same input gives the same bytes. Raises InvalidInputError for an unknown picture format or too small a page,
@@ -257,7 +254,7 @@ MAIN_COLOUR, FIRST_COLOUR = "#B5D6EA", "#0072B2"
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Indices of k keys for one result; `low` and `high` are the ends of their intervals, `part` a share of them."""
+    """Indices of k keys for one result, with half the widths of their intervals; `part` is a share of them."""
 
     title: str
     keys: tuple[str, ...]
@@ -312,7 +309,7 @@ def _in_lines(name: str) -> str:
     return "\n".join(style.break_lines(name, MOST_ROOM))
 
 
-def _draw_bars(axes: "Axes", panel: Bars, font: float) -> None:
+def _draw_bars(axes: "style.Axes", panel: Bars, font: float) -> None:
     order = order_of(panel.values)
     places = np.arange(len(order))[::-1]
     intervals = np.nan_to_num(panel.half_widths[order])
@@ -408,7 +405,7 @@ def refuse_small_page(panels: int, paper: Paper) -> None:
 @contextmanager
 def _open_levels(
     panels: int, blocks: Sequence[str], shown: Sequence[int], title: str | None, paper: Paper
-) -> Iterator[tuple["Figure", list["Axes"]]]:
+) -> Iterator[tuple["style.Figure", list["style.Axes"]]]:
     """Give panels side by side, and a legend that names the lines of some blocks."""
     from matplotlib.lines import Line2D
 
@@ -460,7 +457,7 @@ def _line_look(shown: Sequence[int], block: int) -> dict[str, Any]:
     }
 
 
-def _draw_level(axes: "Axes", panel: LevelPanel, shown: Sequence[int], width: float) -> None:
+def _draw_level(axes: "style.Axes", panel: LevelPanel, shown: Sequence[int], width: float) -> None:
     from matplotlib.ticker import FuncFormatter, NullLocator
 
     low, _ = axes.get_ylim()
@@ -493,7 +490,7 @@ def _draw_level(axes: "Axes", panel: LevelPanel, shown: Sequence[int], width: fl
     axes.set_title(heading, loc="left", pad=4.0 + 2.0 * style.LINE * style.POINTS_PER_INCH)
 
 
-def _draw_limits(axes: "Axes", tolerance: float, repeats: float | None, *, named: bool) -> None:
+def _draw_limits(axes: "style.Axes", tolerance: float, repeats: float | None, *, named: bool) -> None:
     """Draw the tolerance and the least measured range (mm), named to the right of the last panel."""
     lines = [(tolerance, f"tolerance\n{tolerance:g} mm", style.INK)]
     if repeats is not None:

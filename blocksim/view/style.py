@@ -19,10 +19,11 @@ from blocksim.simulation.atomic import write_bytes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
+    from matplotlib import artist, axes, axis, figure
+
+    Axes = axes.Axes  # all files of this room annotate with these
+    Axis = axis.Axis
+    Figure = figure.Figure
 
 
 # Okabe & Ito (2008), distinguishable with every common colour blindness; vermilion is for measured values.
@@ -325,18 +326,17 @@ def size_of(axes: "Axes") -> tuple[float, float]:
     return float(width), float(height)
 
 
-def write_text(figure: "Figure", left: float, bottom: float, text: str, **look: object) -> None:
+def write_text(figure: "Figure", left: float, bottom: float, text: str, **look: Any) -> None:
     """Write text at a place given in inches."""
-    across, up = (float(size) for size in figure.get_size_inches())
-    figure.text(left / across, bottom / up, text, **look)  # type: ignore[arg-type]
+    figure.text(left, bottom, text, transform=figure.dpi_scale_trans, **look)
 
 
-def write_legend(figure: "Figure", handles: "Sequence[Artist]", left: float, bottom: float, **look: Any) -> None:
+def write_legend(figure: "Figure", handles: "Sequence[artist.Artist]", left: float, bottom: float, **look: Any) -> None:
     """Draw a legend without a frame, its lower left corner at a place given in inches."""
-    across, up = (float(size) for size in figure.get_size_inches())
     own: dict[str, Any] = {"loc": "lower left", "frameon": False, "borderpad": 0.0, "borderaxespad": 0.0}
     own |= {"labelspacing": 0.25, "handlelength": 1.4, "columnspacing": 1.2}
-    figure.legend(handles=handles, bbox_to_anchor=(left / across, bottom / up), **{**own, **look})
+    place = {"bbox_to_anchor": (left, bottom), "bbox_transform": figure.dpi_scale_trans}
+    figure.legend(handles=handles, **own | place | look)
 
 
 Sides = tuple[float, float, float, float]
@@ -354,7 +354,7 @@ def open_panels(
     *,
     title: str | None = None,
     notes: str = "",
-    handles: "Sequence[Artist]" = (),
+    handles: "Sequence[artist.Artist]" = (),
     columns: int = 1,
 ) -> Iterator[tuple["Figure", list[list["Axes"]]]]:
     """Give a figure with rows and columns of panels, a title above them, a legend and notes below them.
@@ -409,6 +409,13 @@ def write_heading(figure: "Figure", title: str | None, left: float, right: float
         room = across - left - (left if right is None else right)
         shown = cut_to(title, room * POINTS_PER_INCH, TITLE_SIZE)
         write_text(figure, left, up - EDGE, shown, va="top", fontsize=TITLE_SIZE)
+
+
+def limits_around(values: Any, share: float, least: float) -> tuple[float, float]:
+    """Return the ends of an axis around values: a share of their span beyond them, and at least so far apart."""
+    low, high = float(values.min()), float(values.max())
+    margin = max(share * (high - low), 0.5 * (least - (high - low)))
+    return low - margin, high + margin
 
 
 def number_axis(side: "Axis", most: int = MANY, *, is_log: bool = False) -> None:

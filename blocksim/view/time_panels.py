@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,6 @@ from blocksim.simulation import probes
 from blocksim.view import style
 from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support
 from blocksim.view.style import OWN, Paper
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 WIDTH = 7.2  # inches
 SIDES = 0.78, 1.70, 0.12, 0.36  # inches, around the panels; texts stand on the right
@@ -63,25 +58,34 @@ class TimePanel:
 
 @contextmanager
 def open_time_panels(
-    count: int, span: tuple[float, float], title: str | None, notes: str, paper: Paper, own: float = PANEL
-) -> Iterator[tuple["Figure", list["Axes"]]]:
-    """Give so many panels, each `own` inches high, one below the other over an axis of time (s).
+    panels: Sequence[TimePanel],
+    title: str | None,
+    notes: str = "",
+    paper: Paper = OWN,
+    own: float | None = None,
+    span: tuple[float, float] | None = None,
+) -> Iterator[tuple["style.Figure", list["style.Axes"]]]:
+    """Give panels that are drawn one below the other over an axis of time, by default as long as their lines.
 
-    Raises InvalidInputError for too small a page.
+    Each is `own` inches high, by default as high as its texts need. Raises InvalidInputError for too small a page.
     """
-    panel, least = (WIDTH - sum(SIDES[:2]), own), (NARROWEST, LOWEST)
-    with style.open_panels(paper, (count, 1), panel, least, SIDES, (0.0, GAP), title=title, notes=notes) as opened:
-        figure, rows = opened
-        for (axes,) in rows:
+    times = [float(time[end]) for panel in panels for time, _ in panel.lines.values() if len(time) for end in (0, -1)]
+    start, end = span or (min(times), max(times))
+    texts = (panel.note.count("\n") + 2 + len(panel.lines) * (panel.legend is not None) for panel in panels)
+    size = WIDTH - sum(SIDES[:2]), own or max(PANEL, style.LINE * max(texts))
+    shape, least = (len(panels), 1), (NARROWEST, LOWEST)
+    with style.open_panels(paper, shape, size, least, SIDES, (0.0, GAP), title=title, notes=notes) as (figure, rows):
+        for panel, (axes,) in zip(panels, rows, strict=True):
             axes.spines[["right", "top"]].set_visible(False)
             axes.tick_params(axis="x", labelbottom=axes is rows[-1][0])
             axes.yaxis.set_label_coords((LABEL - SIDES[0]) / style.size_of(axes)[0], 0.5)
-            axes.set_xlim(span[0], span[0] + max(span[1] - span[0], 1e-9))
+            axes.set_xlim(start, max(end, start + 1e-9))
+            _draw_panel(axes, panel)
         rows[-1][0].set_xlabel("time (s)", labelpad=2.0)
         yield figure, [axes for (axes,) in rows]
 
 
-def draw_time_panel(axes: "Axes", panel: TimePanel) -> None:
+def _draw_panel(axes: "style.Axes", panel: TimePanel) -> None:
     """Draw the lines of a panel, and write what belongs to them at its right."""
     from matplotlib.patheffects import Normal, Stroke
 
@@ -112,18 +116,6 @@ def draw_time_panel(axes: "Axes", panel: TimePanel) -> None:
         axes.legend(handles, names, **place, title=panel.legend, alignment="left")
 
 
-@contextmanager
-def _opened(panels: Sequence[TimePanel], title: str | None, note: str, paper: Paper) -> Iterator["Figure"]:
-    times = [time for panel in panels for time, _ in panel.lines.values() if len(time)]
-    span = min(float(time[0]) for time in times), max(float(time[-1]) for time in times)
-    texts = (panel.note.count("\n") + 2 + len(panel.lines) * (panel.legend is not None) for panel in panels)
-    own = max(PANEL, style.LINE * max(texts))
-    with open_time_panels(len(panels), span, title, note, paper, own) as (figure, rows):
-        for axes, panel in zip(rows, panels, strict=True):
-            draw_time_panel(axes, panel)
-        yield figure
-
-
 def thin_line(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return at most MOST_POINTS points of a line: of each stretch the first, least, greatest and last one."""
     if len(time) <= MOST_POINTS:
@@ -139,10 +131,7 @@ def thin_line(time: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def limits_of(values: Floats) -> tuple[float, float]:
     """Return the ends of an axis around values, with a margin, never so near to each other that round-off is seen."""
-    low, high = float(values.min()), float(values.max())
-    least = max(LEAST_SPAN, LEAST_SHARE * max(abs(low), abs(high)))
-    margin = max(0.05 * (high - low), 0.5 * (least - (high - low)))
-    return low - margin, high + margin
+    return style.limits_around(values, 0.05, max(LEAST_SPAN, LEAST_SHARE * float(np.abs(values).max())))
 
 
 def energy_groups(energy: Entries, chosen: Indices) -> Entries:
@@ -196,7 +185,7 @@ def draw_probes(
         message = f"{len(panels)} panels are too many for one picture, at most {MOST_PANELS}; choose with --probe"
         raise InvalidInputError(message)
     path = style.picture_path(path)
-    with _opened(panels, title, "", paper) as figure:
+    with open_time_panels(panels, title, paper=paper) as (figure, _):
         style.save_figure(figure, path)
 
 
@@ -205,7 +194,7 @@ def probe_picture(probe: probes.ProbeSeries) -> bytes:
     panels = panels_of(probe)
     if not panels:
         return b""
-    with _opened(panels, None, "", OWN) as figure:
+    with open_time_panels(panels, None) as (figure, _):
         return style.figure_bytes(figure, ".png")
 
 
@@ -304,5 +293,6 @@ def draw_support_motion(support: Support, end: float, path: Path, title: str | N
     speed, place = (MILLIMETRES * one if abs(one) > ROUND_OFF * peak.value else 0.0 for one, peak in final)
     left = f"At the end: {speed:.4g} mm/s, {place:.4g} mm.".replace("-", "−")
     path = style.picture_path(path)
-    with _opened(panels, title, f"Ground, walls and fixed bodies, {support.way}. {left}", paper) as figure:
+    notes = f"Ground, walls and fixed bodies, {support.way}. {left}"
+    with open_time_panels(panels, title, notes, paper) as (figure, _):
         style.save_figure(figure, path)

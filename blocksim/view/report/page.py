@@ -64,15 +64,9 @@ def _environment() -> "Environment":
         loader=DictLoader(texts), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
     environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}
-    environment.filters["fixed"] = _fixed
+    environment.filters["fixed"] = lambda value, digits: f"{value:z.{digits}f}".replace("-", "−")  # for people
     environment.filters["own"] = Markup  # for our own style and scripts, never for what comes from a scenario
     return environment
-
-
-def _fixed(value: float, digits: int) -> str:
-    """Return a number for people, no minus sign on zero."""
-    text = f"{value:.{digits}f}"
-    return text[1:] if text.startswith("-") and not text.strip("-0.") else text.replace("-", "−")
 
 
 def _part(name: str) -> str:

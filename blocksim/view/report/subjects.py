@@ -30,8 +30,6 @@ from blocksim.view.sweeps.data import SweepData, short_names
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 ROOT = r"(?:/|[A-Za-z]:[\\/])"
 ABSOLUTE = re.compile(rf"'(?P<quoted>{ROOT}[^']+)'|(?<![^\s=,(\"])(?P<bare>{ROOT}[^\s'\",:;()]+)")
@@ -157,7 +155,7 @@ class Repeats:
         return pd.DataFrame(self.rows, columns=["block", "quantity", "mean", "minimum", "maximum"])
 
 
-def embedded(figure: "Figure") -> str:
+def embedded(figure: "style.Figure") -> str:
     """Return a figure as the address of an SVG within the page; coordinates to a hundredth of a point."""
     svg = style.figure_bytes(figure, ".svg").decode()
     short = COORDINATES.sub(lambda found: DIGITS.sub(r"\1", found[0]).replace("\n", ""), svg)
@@ -214,7 +212,7 @@ def _cases(found: outcome_map.OutcomeMap) -> dict[str, Any]:
     }
 
 
-def _place(axes: "Axes") -> list[float]:
+def _place(axes: "style.Axes") -> list[float]:
     """Return left, top, width and height of a panel as shares of the page, y down."""
     box = axes.get_position()
     return [round(float(share), 5) for share in (box.x0, 1.0 - box.y1, box.width, box.height)]
@@ -244,14 +242,7 @@ def run_subject(
 
     `parent` is the key of the sweep that it is a member of.
     """
-    data, notes, problems = _moving(run, most_bytes)
-    history = None
-    if data is not None and run.frames is not None and run.scenario is not None:
-        data["measured"] = _measured(data["names"], comparison)
-        repeats = None if comparison is None else Repeats(comparison["rows"])
-        if data["names"]:
-            support = run_data.support_of(run.scenario, () if run.summary is None else run.summary.events)
-            history, data["histories"] = history_of(run.frames, support, repeats)
+    data, notes, problems, history = _player_data(run, comparison, most_bytes)
     page = {
         "parent": parent,
         "place": shared_path(str(run.folder)),
@@ -280,34 +271,36 @@ def run_subject(
     return Subject(key, "run", run.name, page, {"kind": "run", "name": run.name, "frames": data})
 
 
-def _moving(run: PartialRun, most_bytes: int) -> tuple[dict[str, Any] | None, list[str], list[str]]:
-    """Return frames and scene for the player, notes on them, and problems with them."""
-    if run.frames is None or run.scenario is None:
-        return None, [], []
+def _player_data(
+    run: PartialRun, comparison: Mapping[str, Any] | None, most_bytes: int
+) -> tuple[dict[str, Any] | None, list[str], list[str], str | None]:
+    """Return frames and scene for the player, notes on them, problems with them, and the histories as a picture."""
+    frames, scenario = run.frames, run.scenario
+    if frames is None or scenario is None:
+        return None, [], [], None
     try:
-        packed = pack_frames(run.frames, most_bytes)
+        data, kept, notes = pack_frames(frames, most_bytes)
     except InvalidInputError as error:
-        return None, [], [str(error)]
-    kept = packed.kept
+        return None, [], [str(error)], None
     happened = () if run.summary is None else run.summary.events
-    scene = scene_data(run.frames, run.scenario, kept, happened)
-    forces, loads = pack_forces(run.frames, kept, scene["tilt"]), pack_loads(run.frames, run.scenario, kept, happened)
+    scene = scene_data(frames, scenario, kept, happened)
+    forces, loads = pack_forces(frames, kept, scene["tilt"]), pack_loads(frames, scenario, kept, happened)
     if loads is not None:
         scene["extent"] = [loads.extent.left, loads.extent.right, loads.extent.bottom, loads.extent.top]
-    notes = [*packed.notes, NO_FORCES if forces is None else forces["told"], *(loads.notes if loads else ())]
-    moving = {"scene": scene, "forces": forces, "loads": loads.data if loads else None}
-    return {**packed.data, **moving}, notes, []
-
-
-def _measured(names: Sequence[str], comparison: Mapping[str, Any] | None) -> list[dict[str, Any]]:
-    """Return mean and range of the repeats (mm or degrees) by the number of the block, for player and curves."""
+    notes = [*notes, NO_FORCES if forces is None else forces["told"], *(loads.notes if loads else ())]
     rows = [] if comparison is None else comparison["rows"]
-    numbers = {name: number for number, name in enumerate(names)}
-    return [
+    numbers = {name: number for number, name in enumerate(data["names"])}
+    measured = [  # mean and range of the repeats (mm or degrees) by the number of the block
         {"block": numbers[row["block"]], **{key: row[key] for key in ("quantity", "minimum", "mean", "maximum")}}
         for row in rows
         if row["block"] in numbers and row["quantity"] in DRAWN and row["mean"] is not None
     ]
+    data |= {"scene": scene, "forces": forces, "loads": loads.data if loads else None, "measured": measured}
+    history = None
+    if data["names"]:
+        repeats = None if comparison is None else Repeats(rows)
+        history, data["histories"] = history_of(frames, run_data.support_of(scenario, happened), repeats)
+    return data, notes, [], history
 
 
 def _summary(run: PartialRun) -> list[tuple[str, str]]:

@@ -3,15 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from blocksim.view import run_data, style
 from blocksim.view.sweeps import data
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 MOST_INPUTS = 2
 WIDTH = 7.6  # inches
@@ -52,7 +49,7 @@ def suits(sweep: data.SweepData) -> bool:
     return other is None or other.count <= data.MOST_COLUMNS
 
 
-def draw_lines(sweep: data.SweepData, paper: style.Paper = style.OWN) -> "AbstractContextManager[Figure]":
+def draw_lines(sweep: data.SweepData, paper: style.Paper = style.OWN) -> "AbstractContextManager[style.Figure]":
     """Give the drawn lines."""
     axis, _ = _axis_and_other(sweep)
     ranges = {block: (float(x.min()), float(x.max())) for block, x in sweep.measured.x_mm.items()}
@@ -91,7 +88,7 @@ def draw_series(
     *,
     typed: data.InputUnit | None = None,
     paper: style.Paper = style.OWN,
-) -> "Iterator[Figure]":
+) -> "Iterator[style.Figure]":
     """Give final x drawn over a key, that is given with its SI unit.
 
     The axis has the `typed` unit, or where there is none that in which the values are best read.
@@ -126,8 +123,9 @@ def draw_series(
         figure, panels = opened
         for row, (block, of_block) in enumerate(zip(rows, panels, strict=True)):
             band = measured.get(blocks[block])
+            ends = np.concatenate([one.x_mm[:, block] for one in shown] + [np.array(band or ())])
             for one, axes, caption in zip(shown, of_block, captions[row], strict=True):
-                axes.set_ylim(*_limits(shown, block, band))
+                axes.set_ylim(*style.limits_around(ends, 0.1, LEAST_SPAN_MM))
                 if band is not None:  # a line where all repeats are equal
                     axes.axhspan(*band, color=style.MEASURED_COLOUR, alpha=0.15, linewidth=0, zorder=0)
                     for end in set(band):
@@ -159,15 +157,7 @@ def is_smooth(values: run_data.Floats) -> bool:
     return spread < data.STAYS_MM or float(np.abs(np.diff(values)).sum()) <= WAVERING * spread
 
 
-def _limits(series: Sequence[Series], block: int, band: tuple[float, float] | None) -> tuple[float, float]:
-    """Return the range of a row's axis (mm), the same for all series."""
-    ends = np.concatenate([one.x_mm[:, block] for one in series] + ([] if band is None else [np.array(band)]))
-    low, high = float(ends.min()), float(ends.max())
-    margin = 0.1 * (high - low) + 0.5 * max(LEAST_SPAN_MM - (high - low), 0.0)
-    return low - margin, high + margin
-
-
 def _extent(x: run_data.Floats) -> str:
     """Return the final places of a block in all runs of a series."""
-    ends = [f"{end:.2f}".replace("-0.00", "0.00").replace("-", "−") for end in (x.min(), x.max())]
+    ends = [f"{end:z.2f}".replace("-", "−") for end in (x.min(), x.max())]
     return f"{' to '.join(ends)}\N{NO-BREAK SPACE}mm, {np.ptp(x):.2f}\N{NO-BREAK SPACE}mm apart"

@@ -12,9 +12,7 @@ from blocksim.view import run_data, style
 from blocksim.view.sweeps import data
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.colors import BoundaryNorm, Colormap
-    from matplotlib.figure import Figure
 
 
 STEPS = 8  # of run-out, at most
@@ -92,7 +90,7 @@ class Plane:
 
 
 def draw_panel(
-    axes: "Axes", plane: Plane, numbers: run_data.Floats, look: dict[str, Any], agrees: run_data.Flags | None
+    axes: "style.Axes", plane: Plane, numbers: run_data.Floats, look: dict[str, Any], agrees: run_data.Flags | None
 ) -> None:
     """Colour the cases by their numbers (NaN: none), with the map and norm of `look`; outline those that agree."""
     from matplotlib.collections import LineCollection
@@ -167,7 +165,7 @@ class OutcomeMap:
     columns: tuple[tuple[str, run_data.Flags], ...]  # heading, and the cases (n,)
     blocks: list[int]
     axes: tuple[data.ValueAxis, data.ValueAxis]
-    panels: "list[list[Axes]]" = field(default_factory=list)
+    panels: "list[list[style.Axes]]" = field(default_factory=list)
 
     def plane(self, cases: run_data.Flags) -> Plane:
         """Return the inputs of some cases."""
@@ -215,7 +213,7 @@ def draw_map(
     axes: tuple[data.Input, data.Input] | None = None,
     *,
     by_manner: bool = False,
-) -> Iterator[tuple["Figure", OutcomeMap]]:
+) -> Iterator[tuple["style.Figure", OutcomeMap]]:
     """Give the drawn map. Samples over more than two inputs are seen along all others.
 
     `axes` are the inputs along x and y, by default the two with the most values. `by_manner` shows in the last row how
@@ -270,7 +268,7 @@ def draw_map(
 
 
 def _draw_row(
-    row: Sequence["Axes"],
+    row: Sequence["style.Axes"],
     found: OutcomeMap,
     caption: str,
     numbers: run_data.Floats,
@@ -288,7 +286,7 @@ def _draw_row(
     row[0].set_title(caption, loc="left", pad=3.6)
 
 
-def _draw_block(figure: "Figure", row: Sequence["Axes"], found: OutcomeMap, block: int) -> None:
+def _draw_block(figure: "style.Figure", row: Sequence["style.Axes"], found: OutcomeMap, block: int) -> None:
     """Draw the run-out of a block, with the measured range outlined and marked at the colour bar."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colorbar import Colorbar

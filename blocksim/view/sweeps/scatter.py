@@ -3,18 +3,12 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from blocksim.view import run_data, style
 from blocksim.view.sweeps.data import Input, SweepData, ValueAxis, percent, short_names, value_axis
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
-
 
 LEFT, HEAD, FOOT = 0.46, 0.12, 0.34  # inches; more where names of levels stand at the left and below
 GAP = 0.05  # inches, between panels
@@ -64,7 +58,7 @@ def variables_of(sweep: SweepData) -> list[Variable]:
 
 
 @contextmanager
-def draw_matrix(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[Figure]":
+def draw_matrix(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[style.Figure]":
     """Give the lower half of the matrix, with histograms on its diagonal and names beside that."""
     variables = variables_of(sweep)
     count, levels = len(variables), [level for one in variables for level in one.levels]
@@ -139,10 +133,21 @@ def _around(values: run_data.Floats, axis: ValueAxis | None) -> tuple[float, flo
     return low - margin, high + margin
 
 
-def _draw_panel(axes: "Axes", sweep: SweepData, up: Variable, across: Variable) -> None:
-    """Draw repeats as dots where both variables are measured together, else as lines over their range."""
+def _draw_panel(axes: "style.Axes", sweep: SweepData, up: Variable, across: Variable) -> None:
+    """Draw cases as dots, on the diagonal how many have which value, and of those that agree, each to the full height.
+
+    Repeats are dots where both variables are measured together, else lines over their range.
+    """
     if up is across:
-        _draw_histogram(axes, sweep, up)
+        spread = np.geomspace if up.is_log else np.linspace
+        edges = spread(*up.limits, BINS + 1)
+        for cases, colour in ((sweep.finished, OUTSIDE["color"]), (sweep.inside, INSIDE["color"])):
+            if cases is not None:
+                counts, _ = np.histogram(up.values[cases], edges)
+                look = {"fill": cases is sweep.finished, "color": colour, "linewidth": 1.0}
+                axes.stairs(counts / max(int(counts.max()), 1), edges, **look)
+        if up.repeats is not None:
+            axes.axvspan(up.repeats.min(), up.repeats.max(), **BAND)
         return
     inside = sweep.finished if sweep.inside is None else sweep.inside
     outside = sweep.finished & ~inside
@@ -158,21 +163,7 @@ def _draw_panel(axes: "Axes", sweep: SweepData, up: Variable, across: Variable) 
                 line(repeat, **REPEAT_LINE)
 
 
-def _draw_histogram(axes: "Axes", sweep: SweepData, one: Variable) -> None:
-    """Draw how many cases have which value, and the same of those that agree, both to the height of the panel."""
-    spread = np.geomspace if one.is_log else np.linspace
-    edges = spread(*one.limits, BINS + 1)
-    drawn = [(sweep.finished, OUTSIDE["color"], True)]
-    if sweep.inside is not None:
-        drawn.append((sweep.inside, INSIDE["color"], False))
-    for cases, colour, fill in drawn:
-        counts, _ = np.histogram(one.values[cases], edges)
-        axes.stairs(counts / max(int(counts.max()), 1), edges, fill=fill, color=colour, linewidth=1.0)
-    if one.repeats is not None:
-        axes.axvspan(one.repeats.min(), one.repeats.max(), **BAND)
-
-
-def _finish(axes: "Axes", up: Variable, across: Variable, *, is_left: bool, is_last: bool) -> None:
+def _finish(axes: "style.Axes", up: Variable, across: Variable, *, is_left: bool, is_last: bool) -> None:
     """Set the limits and write numbers at the outer panels only."""
     axes.tick_params(labelsize=SMALL_FONT, length=2.0, pad=1.5, labelleft=is_left, labelbottom=is_last)
     axes.tick_params(which="minor", length=1.0)
@@ -190,7 +181,7 @@ def _finish(axes: "Axes", up: Variable, across: Variable, *, is_left: bool, is_l
     axes.set_ylim(*up.limits)
 
 
-def _number(side: "Axis", one: Variable) -> None:
+def _number(side: "style.Axis", one: Variable) -> None:
     """Write two numbers along an axis, below none so near to its start that it runs into the panel before."""
     from matplotlib.ticker import LogLocator, MaxNLocator
 
@@ -247,7 +238,7 @@ _INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 
 
 @contextmanager
-def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[Figure]":
+def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[style.Figure]":
     """Give a panel for each block that moves."""
     blocks = sweep.moving[-MOST_HISTOGRAMS:]
     own = style.COLUMN_WIDTH - sum(SIDES[:2]), PANEL_HEIGHT
@@ -262,12 +253,10 @@ def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterato
 def limits_of(x_mm: run_data.Floats, others: run_data.Floats) -> tuple[float, float]:
     """Return the ends of an axis (mm) around all but the rarest run-outs and everything measured."""
     ends = np.concatenate([np.percentile(x_mm, [RARE_RUN_OUTS, 100.0 - RARE_RUN_OUTS]), others])
-    low, high = float(ends.min()), float(ends.max())
-    margin = max(0.04 * (high - low), 0.5 * MANY_BINS * LEAST_BIN_MM)
-    return low - margin, high + margin
+    return style.limits_around(ends, 0.04, MANY_BINS * LEAST_BIN_MM)
 
 
-def _draw_block(axes: "Axes", sweep: SweepData, block: int, room: float) -> None:
+def _draw_block(axes: "style.Axes", sweep: SweepData, block: int, room: float) -> None:
     """Draw the shares of all cases (%) over final x; `room` is that above the bars, over their height."""
     name, count = sweep.blocks[block], len(sweep.finished)
     x = sweep.x_mm[sweep.finished, block]
