@@ -187,11 +187,6 @@ class Actions:
     largest: dict[str, float] = field(default_factory=dict)
 
     @property
-    def is_empty(self) -> bool:
-        """Whether there is nothing to draw."""
-        return not self.arrows and self.turns is None and not any(self.marks)
-
-    @property
     def sizes(self) -> str:
         """The largest load of each kind that has arrows, in words; empty where there is none."""
         straight = ", ".join(in_words(self.largest[kind], UNITS[kind]) for kind in (FORCE, PRESSURE) if self._has(kind))

@@ -168,7 +168,7 @@ def draw_history_page(
     draw.
     """
     choice, support, paint = choice or Choice(), support or run_data.Support(), paint or by_block(frames)
-    if not paint.is_lasting:
+    if paint.scale is not None and not any(paint.elements):  # a block does not keep its colour throughout the run
         raise InvalidInputError("a history is coloured by block or material; speed and rotation are separate panels")
     if not frames.names:
         raise InvalidInputError("no block to draw: a history is that of blocks, and a probe shows the thrust of soil")

@@ -1,7 +1,7 @@
 """The kinds of pictures of runs and of sweeps, by name; a kind is one file and one line here."""
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,7 +31,7 @@ class Kind:
 
     refusal: Callable[[SweepData], str]  # why it cannot show a sweep; empty where it can
     suits: Callable[[SweepData], bool]
-    drawn: "Callable[[SweepData, Paper], AbstractContextManager[style.Figure]]"
+    drawn: Callable[[SweepData, Paper], AbstractContextManager["style.Figure"]]
 
     def draw(self, sweep: SweepData, path: Path, paper: Paper = style.OWN) -> None:
         """Draw a sweep and write PNG, SVG or PDF; the same input gives the same bytes.
@@ -43,15 +43,9 @@ class Kind:
             style.save_figure(figure, path)
 
 
-@contextmanager
-def _map(sweep: SweepData, paper: Paper) -> Iterator["style.Figure"]:
-    with outcome_map.draw_map(sweep, paper) as (figure, _):
-        yield figure
-
-
 SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
     "lines": Kind(lines.refusal, lines.suits, lines.draw_lines),
-    "map": Kind(outcome_map.refusal, outcome_map.suits, _map),
+    "map": Kind(outcome_map.refusal, outcome_map.suits, outcome_map.draw_map),
     "matrix": Kind(lambda _: "", lambda sweep: len(sweep.inputs) > 1, scatter.draw_matrix),
     "histogram": Kind(lambda _: "", lambda _: True, scatter.draw_histogram),
 }

@@ -60,11 +60,6 @@ class Paint:
             return BAR_HEIGHT
         return ENTRIES_HEIGHT if self.entries else 0.0
 
-    @property
-    def is_lasting(self) -> bool:
-        """Whether a block keeps its colour throughout the run."""
-        return self.scale is None or any(self.elements)
-
 
 def by_block(frames: Frames) -> Paint:
     """Return the default: blocks take turns in six colours."""

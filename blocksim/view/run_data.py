@@ -105,8 +105,7 @@ def moments_at(frames: Frames, chosen: Indices, times: Sequence[float]) -> Indic
     """Return, for every time (s), the chosen frame nearest to it.
 
     The last frame's time as pictures print it, rounded to milliseconds, means the last frame, though it may lie outside
-    or another frame may be nearer. Raises InvalidInputError when there is no
-    time or one lies outside the recorded span.
+    or another frame may be nearer. Raises InvalidInputError where there is no time, or one outside the recorded span.
     """
     recorded = frames.time[chosen]
     first, last = float(recorded[0]), float(recorded[-1])
@@ -150,8 +149,8 @@ class Support:
         """Return the support with the walls that are there at a time (s)."""
         if not np.isfinite(self.gone).any():
             return self
-        there = [time < gone for gone in self.gone]
-        return replace(self, walls=tuple(wall for wall, stays in zip(self.walls, there, strict=True) if stays), gone=())
+        walls = (wall for wall, gone in zip(self.walls, self.gone, strict=True) if time < gone)
+        return replace(self, walls=tuple(walls), gone=())
 
     def displacement(self, times: Floats) -> Floats:
         """Return the displacement (m) along `direction` at these times (s)."""

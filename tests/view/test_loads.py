@@ -147,6 +147,6 @@ def test_arrows_are_inside_the_picture_and_nothing_changes_without_loads() -> No
         assert ([room.left, room.bottom] < lines.min(axis=0)).all()
         assert (lines.max(axis=0) < [room.right, room.top]).all()
     nothing = actions_on(frames, chosen, Support())
-    assert nothing.is_empty
+    assert (nothing.arrows, nothing.turns, any(nothing.marks)) == ((), None, False)
     assert with_room(extent, nothing, 300.0) == extent
     assert nothing.explanation == ""

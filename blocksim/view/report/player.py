@@ -144,7 +144,7 @@ def pack_loads(
     for row, moved in zip(marks, support.displacement(frames.time[kept]) if support.motion else (), strict=False):
         text = f"support {MILLIMETRES * moved:+.2f} mm".replace("-", "−")
         row.append([text, *run_data.rotate_points(np.sign(moved) * np.array(support.direction), support.tilt).tolist()])
-    if acts.is_empty and not any(marks):
+    if not acts.arrows and acts.turns is None and not any(marks):
         return None
     notes = [note for note in [replace(acts, marks=()).explanation] if note]
     if sum(one.ends_there.size for one in acts.arrows) > MOST_ARROWS:

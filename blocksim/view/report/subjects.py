@@ -185,7 +185,8 @@ def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
     names = dict(zip((one.key for one in sweep.inputs), short_names([one.key for one in sweep.inputs]), strict=True))
     maps = []
     for x, y in [*pairs][:MOST_MAPS]:
-        with outcome_map.draw_map(sweep, style.OWN, (x, y), by_manner=any(sweep.manners)) as (figure, found):
+        found = outcome_map.map_of(sweep, (x, y))
+        with outcome_map.draw_map(sweep, style.OWN, found, by_manner=any(sweep.manners)) as figure:
             label = f"map of {names[y.key]} over {names[x.key]}"
             maps.append({"label": label, "source": embedded(figure), "data": _cases(found)})
     others = []
@@ -243,6 +244,14 @@ def run_subject(
     `parent` is the key of the sweep that it is a member of.
     """
     data, notes, problems, history = _player_data(run, comparison, most_bytes)
+    probes = [
+        {
+            "text": f"{name}: {one.kind}, {len(one)} samples to {one.time[-1]:.4g} s, in probe-{name}.csv",
+            "picture": b64encode(time_panels.probe_picture(one)).decode(),
+        }
+        for name, one in (() if parent is not None else run.probes.items())
+        if len(one)
+    ]
     page = {
         "parent": parent,
         "place": shared_path(str(run.folder)),
@@ -258,7 +267,7 @@ def run_subject(
         "comparison": comparison,
         "ledger": _ledger(run),
         "provenance": _provenance(run),
-        "probes": [] if parent is not None else _probes(run),
+        "probes": probes,
         "has_player": data is not None,
         "history": history,
         "names": data["names"] if data else [],
@@ -332,18 +341,6 @@ def _ledger(run: PartialRun) -> list[tuple[str, str]]:
     shown = [name for name in names if name in ALWAYS or not abs(values[name]) <= least]
     texts = {name: f"{values[name]:.6g}".replace("-", "−") if math.isfinite(values[name]) else "–" for name in shown}
     return [(LEDGER.get(name, name.replace("_", " ")), text) for name, text in texts.items()]
-
-
-def _probes(run: PartialRun) -> list[dict[str, str]]:
-    """Return a line about each probe that has samples, and its picture (PNG, base64)."""
-    return [
-        {
-            "text": f"{name}: {one.kind}, {len(one)} samples to {one.time[-1]:.4g} s, in probe-{name}.csv",
-            "picture": b64encode(time_panels.probe_picture(one)).decode(),
-        }
-        for name, one in run.probes.items()
-        if len(one)
-    ]
 
 
 def _provenance(run: PartialRun) -> list[tuple[str, str]]:

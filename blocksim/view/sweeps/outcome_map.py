@@ -208,22 +208,18 @@ def map_of(sweep: data.SweepData, axes: tuple[data.Input, ...] | None = None) ->
 
 @contextmanager
 def draw_map(
-    sweep: data.SweepData,
-    paper: style.Paper = style.OWN,
-    axes: tuple[data.Input, data.Input] | None = None,
-    *,
-    by_manner: bool = False,
-) -> Iterator[tuple["style.Figure", OutcomeMap]]:
+    sweep: data.SweepData, paper: style.Paper = style.OWN, found: OutcomeMap | None = None, *, by_manner: bool = False
+) -> Iterator["style.Figure"]:
     """Give the drawn map. Samples over more than two inputs are seen along all others.
 
-    `axes` are the inputs along x and y, by default the two with the most values. `by_manner` shows in the last row how
-    cases ended in place of their final rotations. Raises InvalidInputError for a page that is too small.
+    `found` are its contents, by default over the two inputs with the most values; it gets the panels. `by_manner` shows
+    in the last row how cases ended in place of their final rotations. Raises InvalidInputError for too small a page.
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    found = map_of(sweep, axes)
+    found = found or map_of(sweep)
     count = len(found.columns)
     classes = manners_of(sweep) if by_manner else classes_of(sweep)
     handles: list[Any] = []
@@ -241,18 +237,9 @@ def draw_map(
     head = HEADING + (style.LINE * max(map(len, headings)) + 0.05 if count > 1 else 0.0)
     foot = FOOT + style.LINE * (len(style.break_lines(found.axes[0].label, width - LEFT)) - 1)
     shape, gaps = (len(found.blocks) + 1, count), (COLUMN_GAP, ROW_GAP)
-    opened = style.open_panels(
-        paper,
-        shape,
-        (own, ROW_HEIGHT),
-        (LEAST, LOWEST),
-        (LEFT, RIGHT, head, foot),
-        gaps,
-        title=sweep.title,
-        notes=_notes(found),
-        handles=handles,
-        columns=1 if count == 1 else 2,
-    )
+    own_size, least, sides = (own, ROW_HEIGHT), (LEAST, LOWEST), (LEFT, RIGHT, head, foot)
+    more: dict[str, Any] = {"notes": _notes(found), "handles": handles, "columns": 1 if count == 1 else 2}
+    opened = style.open_panels(paper, shape, own_size, least, sides, gaps, title=sweep.title, **more)
     with opened as (figure, panels):
         found.panels.extend(panels)
         for block, row in zip(found.blocks, panels[:-1], strict=True):
@@ -264,7 +251,7 @@ def draw_map(
         for one, heading in zip(panels[0], headings, strict=True):
             up = 1.0 + HEADING / style.size_of(one)[1]
             one.text(0.0, up, "\n".join(heading), transform=one.transAxes, va="bottom", weight="bold")
-        yield figure, found
+        yield figure
 
 
 def _draw_row(

@@ -71,18 +71,9 @@ def draw_matrix(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[s
     size = max(size, LOWEST)
     room = style.COLUMN_WIDTH if paper.size is None else width
     right = max(_right_of(variables, size), room - left - _grid(count, size))
-    opened = style.open_panels(
-        paper,
-        (count, count),
-        (size, size),
-        (LOWEST, LOWEST),
-        (left, right, HEAD, foot),
-        (GAP, GAP),
-        title=sweep.title,
-        handles=_entries(sweep),
-        columns=4,
-    )
-    with opened as (figure, panels):
+    own, least, sides = (size, size), (LOWEST, LOWEST), (left, right, HEAD, foot)
+    more: dict[str, Any] = {"title": sweep.title, "handles": _entries(sweep), "columns": 4}
+    with style.open_panels(paper, (count, count), own, least, sides, (GAP, GAP), **more) as (figure, panels):
         for row, (up, axes_of_row) in enumerate(zip(variables, panels, strict=True)):
             for axes in axes_of_row[row + 1 :]:
                 axes.remove()
