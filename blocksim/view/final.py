@@ -150,8 +150,9 @@ def draw_final(
     extent = run_data.extent_of(frames, chosen, support)
     length = arrows.length_in(extent)
     extent = arrows.with_room(extent, acts, length)
-    is_measured = measured is not None and frame == drawable[-1]
-    ranges = measured_ranges(measured, frames.names, extent.width) if measured is not None and is_measured else []
+    ranges = []
+    if measured is not None and frame == drawable[-1]:  # measurements are of the final state
+        ranges = measured_ranges(measured, frames.names, extent.width)
     extent, rows = widen(extent, ranges), rows_of(ranges)
     width, tallest = paper.width(WIDTH, LEAST_WIDTH), TALLEST
     margins = SIDE, HEAD + MARKS * any(acts.marks), AXIS
@@ -169,7 +170,7 @@ def draw_final(
         if excess <= 0.0 or not remaining:
             break
         tallest = max(min(tallest, page.panel_height) - excess, LOWEST)
-    else:
+    else:  # for the type checker: the last round breaks
         raise AssertionError
     height = paper.height(height)
     with style.styled_figure(width, height, paper.dots) as figure:
