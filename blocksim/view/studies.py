@@ -346,6 +346,7 @@ DEPTH = 1e-3  # of the tolerance, or of the farthest level where that is less: w
 MARKERS = "osD^vP"
 MOST_BLOCKS = 4
 LARGEST: dict[str, Any] = {"color": style.INK, "linewidth": 2.5, "alpha": 0.25}
+DISTANCE, SHORT_DISTANCE = "distance from the finest level (mm)", "distance (mm)"
 NUMBER_ROOM = 0.5  # inches, for a number below an axis
 
 
@@ -390,7 +391,8 @@ def draw_levels(
             _draw_level(axes, panel, shown, width)
             _draw_limits(axes, panel.tolerance_mm, least, named=axes is row[-1])
             axes.tick_params(axis="y", which="both", labelleft=axes is row[0])
-        row[0].set_ylabel("\n".join(style.break_lines("distance from the finest level (mm)", height)))
+        has_room = style.width_of(DISTANCE, style.FONT_SIZE) <= height * style.POINTS_PER_INCH
+        row[0].set_ylabel(DISTANCE if has_room else SHORT_DISTANCE)
         style.save_figure(figure, path)
 
 
