@@ -26,7 +26,8 @@ from blocksim.study.converge import (
     converge,
     refinements_of,
 )
-from blocksim.view import studies, style
+from blocksim.view import style
+from blocksim.view.studies import refuse_small_page
 
 MOST_BLOCKS = 3
 LONGEST_NAME = 10
@@ -65,7 +66,7 @@ def converge_command(
         path = out or folder.RESULTS / ready.name / "converge.png"
         style.picture_path(path)
         if picture:
-            studies.refuse_small_page(len(refinements_of(ready, options.studies)), paper)
+            refuse_small_page(len(refinements_of(ready, options.studies)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture
                 folder.refuse_foreign(path, overwrite=overwrite)
         announce_compilation(compilation.kernels_of(ready), quiet=screen.silent)
