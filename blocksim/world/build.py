@@ -98,7 +98,11 @@ class Refusal(NamedTuple):
 
 
 def build_one(scenario: Scenario, construction: Construction) -> Built:
-    """Build the scene of one scenario. Raises what refuses its step, its skin or its size."""
+    """Build the scene of one scenario.
+
+    Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
+    inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
+    """
     stack = only_stack(build_stacks([scenario], construction))
     return Built(stack.placed[0], member(stack.scenes, 0))
 
@@ -255,11 +259,7 @@ def with_parts(scene: Any, parts: list[Any]) -> Any:
 
 
 def build_world(scenario: Scenario) -> arrays.World:
-    """Return the world at time zero: arrays as described in blocksim.kernels.common.arrays, pair lists still empty.
-
-    Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
-    inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
-    """
+    """Return the world at time zero, pair lists still empty. Raises as `build_one`."""
     world: arrays.World = build_one(scenario, EXPLICIT).scene
     return world
 

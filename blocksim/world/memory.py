@@ -91,7 +91,7 @@ def run_bytes(bodies: int, frames: int, contacts: int = 0, others: Sequence[Syst
     """Return the bytes of run.h5 with so many frames, the room of the last chunk included, and contacts in each."""
     rows = chunk_rows(max([bodies, *(one.count for one in others)]))
     whole = -(-frames // rows) * rows
-    values = FRAME_VALUES + MOTION_VALUES * bodies + sum(one.values for one in others)
+    values = FRAME_VALUES + MOTION_VALUES * bodies + sum(one.count * len(one.system.quantities) for one in others)
     return FILE_BYTES + VALUE * (whole * values + frames * CONTACT_VALUES * contacts)
 
 

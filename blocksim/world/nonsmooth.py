@@ -106,11 +106,7 @@ def needs_repeated_impacts(scenario: Scenario, placed: Sequence[PlacedBody] | No
 
 
 def build_nonsmooth(scenario: Scenario) -> arrays.Nonsmooth:
-    """Return a world at time zero with all that stepping it without springs needs.
-
-    Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
-    inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
-    """
+    """Return a world at time zero with all that stepping it without springs needs. Raises as `build_one`."""
     scene: arrays.Nonsmooth = build.build_one(scenario, NONSMOOTH).scene
     return scene
 

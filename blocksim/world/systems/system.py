@@ -130,11 +130,6 @@ class SystemInScene:
         """Number of elements."""
         return len(self.elements.names)
 
-    @property
-    def values(self) -> int:
-        """Number of quantities that a frame keeps."""
-        return self.count * len(self.system.quantities)
-
 
 @dataclass(frozen=True)
 class Track:
