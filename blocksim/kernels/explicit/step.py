@@ -15,6 +15,7 @@ from blocksim.kernels.common.arrays import (
     STATUS,
     TEAM_SIZE,
     TOO_FAST,
+    Floats,
     Integers,
     Record,
     Records,
@@ -33,6 +34,7 @@ from blocksim.kernels.common.integrate import (
 )
 from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.common.loads import are_loads_steady, push_bodies
+from blocksim.kernels.common.members import Watched, frame_to_watch, member, watch
 from blocksim.kernels.common.supports import (
     has_motion,
     is_support_at_rest,
@@ -44,6 +46,7 @@ from blocksim.kernels.common.supports import (
 from blocksim.kernels.common.systems import Coupled, Systems, step_systems, survey_systems
 from blocksim.kernels.explicit.broad_phase import outruns_lists, update_pairs
 from blocksim.kernels.explicit.contact import pair_forces
+from blocksim.kernels.explicit.energy import measure
 from blocksim.kernels.explicit.inertia import note_contacts, share_out
 from blocksim.kernels.explicit.partition import add_from_before, add_kept, add_to_first, add_to_second, keep, partition
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
@@ -401,3 +404,34 @@ def advance_coupled_alone(scene: Coupled, last_step: int) -> int:
 def advance_coupled_in_team(scene: Coupled, last_step: int, k: int) -> int:
     """Be thread k of those that advance a world and further systems together; see advance_in_team."""
     return advance_thread(scene.world, last_step, k, scene.world.team, scene.systems)
+
+
+@rare_kernel
+def advance_member(world: World, last_step: int) -> int:
+    """Step one member; see advance."""
+    return advance_single(world, last_step)
+
+
+@entry_kernel
+def advance_members(
+    worlds: World, members: Integers, last_steps: Integers, starts: Floats, codes: Integers, watched: Watched
+) -> None:
+    """Advance some members from their start to their last step, or to what ends them before.
+
+    `members` (k,) are the numbers of those to advance; by number, last_steps (n,) are steps, starts (n, r) gets the
+    row of `measure` at the start, and codes (n,) the status codes. `watched` gets the first frame in
+    which a block had moved. PAIRS_FULL leaves a member to the caller, who can give it more room. A member is advanced
+    by the code that advances a single world, so the bits are the same.
+    """
+    for m in members:
+        world = member(worlds, m)
+        codes[m] = advance_member(world, 0)
+        if codes[m] != PAIRS_FULL:
+            measure(world, starts[m])
+        clock = world.clock[0]
+        while codes[m] == REACHED and clock.steps < last_steps[m]:
+            frame = frame_to_watch(watched, m, clock.steps)
+            stop = min(frame, last_steps[m]) if frame > 0 else last_steps[m]
+            codes[m] = advance_member(world, stop)
+            if clock.steps == frame:
+                watch(world.bodies, watched, m, frame)

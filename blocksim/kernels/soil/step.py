@@ -63,7 +63,7 @@ from blocksim.kernels.soil.neighbours import (
     travelled,
 )
 from blocksim.kernels.soil.stress import balance_rows, strain
-from blocksim.kernels.sph.wendland_c2 import fading, steepness
+from blocksim.kernels.sph.functions import wendland_fading, wendland_steepness
 
 # Smallest eigenvalue of M with which a particle is corrected: 1 inside, 0.5 on a flat surface, above 0.1 in a corner.
 # What lies beyond is no surface but a few particles that fly.
@@ -81,13 +81,13 @@ def raw_gradient(
         other = points[near[k]]
         du, dw = vx - other.vx, vy - other.vy
         dx, dy = x - other.x - lag * du, y - other.y - lag * dw
-        f = fading(root(dx * dx + dy * dy), inverse)
+        f = wendland_fading(root(dx * dx + dy * dy), inverse)
         fu, fw = f * du, f * dw
         ux = ux + fu * dx
         uy = uy + fu * dy
         wx = wx + fw * dx
         wy = wy + fw * dy
-    scale = controls.area * steepness(controls.smoothing)
+    scale = controls.area * wendland_steepness(controls.smoothing)
     return scale * ux, scale * uy, scale * wx, scale * wy
 
 
@@ -96,12 +96,12 @@ def correction(
     controls: Record, points: Records, near: Integers, x: Lanes, y: Lanes, vx: Lanes, vy: Lanes, lag: float
 ) -> tuple[Lanes, Lanes, Lanes]:
     """Return xx, xy and yy of the symmetric B (-) at the same places; one where neighbours are too few."""
-    inverse, scale = 1.0 / controls.reach, controls.area * steepness(controls.smoothing)
+    inverse, scale = 1.0 / controls.reach, controls.area * wendland_steepness(controls.smoothing)
     xx, xy, yy = spread(0.0), spread(0.0), spread(0.0)
     for k in range(near.size):
         other = points[near[k]]
         dx, dy = other.x - x - lag * (other.vx - vx), other.y - y - lag * (other.vy - vy)
-        f = scale * fading(root(dx * dx + dy * dy), inverse)
+        f = scale * wendland_fading(root(dx * dx + dy * dy), inverse)
         xx = xx + f * dx * dx
         xy = xy + f * dx * dy
         yy = yy + f * dy * dy
@@ -145,7 +145,7 @@ def forces_on(soils: Soils, near: Integers, places: tuple[int, int, int, int]) -
         other = points[near[e]]
         dx, dy = x - other.x, y - other.y
         r2 = dx * dx + dy * dy
-        f = fading(root(r2), inverse)
+        f = wendland_fading(root(r2), inverse)
         gx, gy = f * dx, f * dy
         fx = fx - ((pxx + other.pxx) * gx + (pxy + other.pxy) * gy)
         fy = fy - ((pyx + other.pyx) * gx + (pyy + other.pyy) * gy)
@@ -154,7 +154,7 @@ def forces_on(soils: Soils, near: Integers, places: tuple[int, int, int, int]) -
         q = mean * closing / (r2 + soft)
         drag_x = drag_x - q * gx
         drag_y = drag_y - q * gy
-    both = controls.area * steepness(controls.smoothing)
+    both = controls.area * wendland_steepness(controls.smoothing)
     stiff = both * controls.viscosity * controls.smoothing
     return both * fx, both * fy, stiff * drag_x, stiff * drag_y
 

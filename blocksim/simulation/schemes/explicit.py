@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common import arrays, systems
-from blocksim.kernels.explicit import depth, ensemble, step
+from blocksim.kernels.explicit import depth, step
 from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
 from blocksim.kernels.explicit.models import KERNEL
@@ -148,7 +148,7 @@ WORLDS = Scheme(
     construction=build.EXPLICIT,
     advance=step.advance,
     advance_in_team=step.advance_in_team,
-    advance_members=ensemble.advance_members,
+    advance_members=step.advance_members,
     least_bodies=BODIES_A_THREAD,
     with_more_room=build.with_more_room,
     with_threads=build.with_threads,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import REMOVED, Records
-from blocksim.kernels.nonsmooth import arrays, energy, ensemble, step
+from blocksim.kernels.nonsmooth import arrays, energy, step
 from blocksim.simulation import schemes
 from blocksim.simulation.frames import SUPPORT, Rows, empty_rows
 from blocksim.world import nonsmooth, sag
@@ -126,7 +126,7 @@ NONSMOOTH = schemes.Scheme(
     construction=nonsmooth.NONSMOOTH,
     advance=step.advance_nonsmooth,
     advance_in_team=step.advance_nonsmooth_in_team,
-    advance_members=ensemble.advance_nonsmooth_members,
+    advance_members=step.advance_nonsmooth_members,
     least_bodies=schemes.BODIES_A_THREAD,
     with_more_room=nonsmooth.with_more_constraints,
     with_threads=nonsmooth.with_more_threads,

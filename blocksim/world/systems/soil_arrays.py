@@ -8,7 +8,7 @@ import numpy as np
 from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.systems import Stages
 from blocksim.kernels.soil import arrays, contact, energy, step
-from blocksim.kernels.sph.wendland_c2 import SUPPORT
+from blocksim.kernels.sph.functions import WENDLAND_SUPPORT
 from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.start import soil_tables
@@ -43,7 +43,7 @@ def build_soils(scenario: Scenario) -> arrays.Soils:
     one = controls[0]
     one.area = spacing**2
     one.smoothing = soils.SMOOTHING * spacing
-    one.reach = SUPPORT * one.smoothing
+    one.reach = WENDLAND_SUPPORT * one.smoothing
     one.skin = SKIN * spacing
     one.radius = 0.5 * spacing
     one.viscosity = VISCOSITY

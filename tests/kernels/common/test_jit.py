@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 PACKAGE = Path(jit.__file__).parents[2]
 SCENARIO = Path(__file__).parents[3] / "scenarios" / "three_blocks.toml"
 
-# a kernel of contact.py, which knows the law in laws/linear.py by two imports only
+# a kernel of contact.py, which knows the law in laws.py by an import only
 PUSH = """
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.arrays import CONTACT, POINT, zeros
@@ -97,7 +97,7 @@ def test_second_process_takes_kernels_from_the_cache_until_a_law_in_another_file
     assert second[1:3] == ["1", "0"]
     assert first[3].startswith(str(tmp_path / "cache"))
     assert float(first[0]) == float(second[0]) == pytest.approx(2e3)
-    law = copied_kernels / "blocksim" / "kernels" / "explicit" / "laws" / "linear.py"
+    law = copied_kernels / "blocksim" / "kernels" / "explicit" / "laws.py"
     law.write_text(law.read_text().replace("return stiffness * depth", "return 3.0 * stiffness * depth"))
     assert float(run()[0]) == pytest.approx(6e3)
 
@@ -241,10 +241,11 @@ def test_hash_sees_every_source_below_the_folder(copied_kernels: Path) -> None:
     folder = copied_kernels / "blocksim" / "kernels"
     assert jit.source_hash(folder) == jit.source_hash()
     seen = {jit.source_hash(folder)}
-    for path in (folder / "common" / "shapes.py", folder / "explicit" / "laws" / "linear.py"):
+    deepest = folder / "explicit" / "models" / "smoothed.py"
+    for path in (folder / "common" / "shapes.py", deepest):
         path.write_text(path.read_text() + "# edited\n")
         seen.add(jit.source_hash(folder))
-    (folder / "explicit" / "laws" / "linear.py").rename(folder / "explicit" / "laws" / "straight.py")
+    deepest.rename(deepest.with_name("smooth.py"))
     seen.add(jit.source_hash(folder))
     assert len(seen) == 4
 

@@ -15,8 +15,7 @@ from blocksim.kernels.common.arrays import AT_REST, REACHED, TEAM_SIZE
 from blocksim.kernels.common.members import Watched
 from blocksim.kernels.nonsmooth.cone import solve_two
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
-from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
-from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team
+from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team, advance_nonsmooth_members
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world.build import build_stacks, only_stack
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads

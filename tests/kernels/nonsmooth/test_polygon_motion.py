@@ -12,8 +12,7 @@ import pytest
 from blocksim.kernels.common.arrays import TEAM_SIZE
 from blocksim.kernels.common.members import Watched
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
-from blocksim.kernels.nonsmooth.ensemble import advance_nonsmooth_members
-from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team
+from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team, advance_nonsmooth_members
 from blocksim.scenario.geometry import centre_outline, regular, section_of
 from blocksim.verification.collapse import SIZES, staircase
 from blocksim.verification.scene import Scene, Simulation

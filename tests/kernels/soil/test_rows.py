@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.soil.stress import DECAY, ROWS, part_of_kernel, share_of_row
-from blocksim.kernels.sph.wendland_c2 import slope
+from blocksim.kernels.sph.functions import wendland_slope
 from blocksim.scenario import Scenario
 from blocksim.world.systems.soils import SMOOTHING, earth_pressure_at_rest
 from tests.soils import BLOCKS, DEPTH, FAR, LEFT, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, Soil, column, right, scene
@@ -20,7 +20,7 @@ def weight_of_row(k: int) -> float:
     total = 0.0
     for along in range(-4, 5):
         away = math.hypot(k, along)
-        total -= slope(away, SMOOTHING) / away * k * k
+        total -= wendland_slope(away, SMOOTHING) / away * k * k
     return total
 
 
