@@ -136,35 +136,24 @@ def lowest_corner(width: float, height: float, tilt: float) -> tuple[float, floa
     return min(turned, key=lambda corner: corner[1])
 
 
-def frictionless_impact(
-    mass: float, inertia: float, arm: tuple[float, float], before: Motion, restitution: float
+def corner_impact(
+    mass: float, inertia: float, arm: tuple[float, float], before: Motion, restitution: float, *, sticks: bool
 ) -> Motion:
-    """Return the motion after a frictionless impact at the corner `arm` (m from the centre).
+    """Return the motion after an impact at the corner `arm` (m from the centre), without friction or where it sticks.
 
-    The impulse J along y changes the corner's normal velocity by J (1/m + r_x^2/I), which must be -(1 + e)
-    times what it was before; for a block falling with v that is J = (1 + e) v/(1/m + r_x^2/I).
-    """
-    approach = before.vy + before.spin * arm[0]
-    impulse = -(1.0 + restitution) * approach / (1.0 / mass + arm[0] ** 2 / inertia)
-    return Motion(before.vx, before.vy + impulse / mass, before.spin + arm[0] * impulse / inertia)
-
-
-def sticking_impact(
-    mass: float, inertia: float, arm: tuple[float, float], before: Motion, restitution: float
-) -> Motion:
-    """Return the motion after an impact at the corner `arm` (m) with enough friction to stop the corner.
-
-    The impulse solves W J = u' - u: W is the corner's 2 x 2 inverse-mass matrix, u and u' = (0, -e u_y) are
-    its velocities before and after. With e > 0 and a fast tangential approach Newton's rule can gain energy
-    here (Kane 1984); with e = 0 it cannot.
+    Without friction the impulse J along y changes the corner's normal velocity by J (1/m + r_x^2/I), which must be
+    -(1 + e) times what it was before; for a block falling with v that is J = (1 + e) v/(1/m + r_x^2/I). With enough
+    friction to stop the corner the impulse solves W J = u' - u: W is the corner's 2 x 2 inverse-mass matrix, u and
+    u' = (0, -e u_y) are its velocities before and after. With e > 0 and a fast tangential approach Newton's rule can
+    gain energy there (Kane 1984); with e = 0 it cannot.
     """
     x, y = arm
     corner = np.array([before.vx - before.spin * y, before.vy + before.spin * x])
-    inverse_mass = np.array(
-        [[1.0 / mass + y * y / inertia, -x * y / inertia], [-x * y / inertia, 1.0 / mass + x * x / inertia]]
-    )
-    wanted = np.array([0.0, -restitution * corner[1]])
-    along, up = (float(part) for part in np.linalg.solve(inverse_mass, wanted - corner))
+    along, up = 0.0, -(1.0 + restitution) * float(corner[1]) / (1.0 / mass + x**2 / inertia)
+    if sticks:
+        coupling = -x * y / inertia
+        inverse_mass = np.array([[1.0 / mass + y * y / inertia, coupling], [coupling, 1.0 / mass + x * x / inertia]])
+        along, up = np.linalg.solve(inverse_mass, np.array([0.0, -restitution * corner[1]]) - corner).tolist()
     return Motion(before.vx + along / mass, before.vy + up / mass, before.spin + (x * up - y * along) / inertia)
 
 

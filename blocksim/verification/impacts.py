@@ -102,7 +102,7 @@ def frictionless_corner(setting: Setting) -> Iterator[Row]:
     block, arm = PaperBlock(), forms.lowest_corner(WIDTH, HEIGHT, TILT)
     for e in (0.0, 0.5):
         body = Thrower(setting, e).throw(Throw(TILT), POLL if setting.has_springs else 1)
-        expected = forms.frictionless_impact(block.mass, block.inertia, arm, FALLING, e)
+        expected = forms.corner_impact(block.mass, block.inertia, arm, FALLING, e, sticks=False)
         yield absolute(f"v_y at e = {e:g}", "m/s", expected.vy, body.vy, 0.01 if setting.has_springs else EXACT)
         yield absolute(f"spin at e = {e:g}", "rad/s", expected.spin, body.spin, 0.5 if setting.has_springs else EXACT)
 
@@ -111,7 +111,7 @@ def sticking_corner(setting: Setting) -> Iterator[Row]:
     """Let a corner stop by friction, so that the block turns about it."""
     block, arm = PaperBlock(), forms.lowest_corner(WIDTH, HEIGHT, TILT)
     body = Thrower(setting, 0.0).throw(Throw(TILT, friction=STICKING), POLL if setting.has_springs else 1)
-    expected = forms.sticking_impact(block.mass, block.inertia, arm, FALLING, 0.0)
+    expected = forms.corner_impact(block.mass, block.inertia, arm, FALLING, 0.0, sticks=True)
     yield relative("spin", "rad/s", expected.spin, body.spin, 0.02)
 
 

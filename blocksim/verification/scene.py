@@ -142,7 +142,7 @@ class Scene:
         return scenario_of(
             self.bodies,
             gravity=self.gravity,
-            ground={"tilt": _in_radians(self.tilt), **self.ground},
+            ground={"tilt": f"{float(self.tilt)!r} rad", **self.ground},
             friction={"block_block": self.friction, "block_ground": self.ground_friction},
             contact={"restitution": self.restitution, **self.contact},
             time={"stop_at_rest": False, **self.time},
@@ -160,7 +160,7 @@ def scenario_of(bodies: Sequence[Mapping[str, object]], **tables: Any) -> Scenar
             shape = {key: body.get(key, size) for key, size in SIZES.items()}
         blocks[name] = {**shape, "material": "aluminium"}
         place = {key: value for key, value in body.items() if key not in {*SIZES, "outline"}}
-        angle = {"angle": _in_radians(body["angle"])} if "angle" in body else {}
+        angle = {"angle": f"{float(str(body['angle']))!r} rad"} if "angle" in body else {}
         placed.append({"x": 0.0, "block": name, **place, **angle})
     material = {"unit_weight": UNIT_WEIGHT, "young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
     return scenario_from_mapping(
@@ -173,11 +173,6 @@ def scenario_of(bodies: Sequence[Mapping[str, object]], **tables: Any) -> Scenar
             **tables,
         }
     )
-
-
-def _in_radians(angle: object) -> object:
-    """Return an angle (rad) as in scenarios: with its unit, unless it is zero."""
-    return f"{float(str(angle))!r} rad" if angle else angle
 
 
 POLL = 40  # steps; an impact on springs takes thirty and more; a rigid one a part of one, so that others may follow

@@ -1,6 +1,7 @@
 """Closed forms against numerical integration, balances of energy and momentum, and limits."""
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from math import atan, cos, hypot, pi, radians, sin, sqrt
 
@@ -139,6 +140,8 @@ def test_lowest_corner_is_the_lowest_of_four() -> None:
 
 
 Impact = Callable[[float, float, tuple[float, float], forms.Motion, float], forms.Motion]
+FRICTIONLESS = partial(forms.corner_impact, sticks=False)
+STICKING = partial(forms.corner_impact, sticks=True)
 ARM = forms.lowest_corner(0.032, 0.025, radians(30))
 FALLING = forms.Motion(0.0, -1.0, 0.0)
 
@@ -158,9 +161,9 @@ def test_frictionless_impact_is_that_of_a_stiff_spring() -> None:
         return float(state[1] + state[2] * ARM[0])
 
     contact = solve_ivp(spring, (0.0, 1.0), [1e-15, -1.0, 0.0], events=[separating, deepest], **TIGHT)
-    elastic = forms.frictionless_impact(MASS, INERTIA, ARM, FALLING, 1.0)
+    elastic = FRICTIONLESS(MASS, INERTIA, ARM, FALLING, 1.0)
     assert list(contact.y_events[0][0][1:]) == pytest.approx([elastic.vy, elastic.spin], rel=1e-7)
-    plastic = forms.frictionless_impact(MASS, INERTIA, ARM, FALLING, 0.0)
+    plastic = FRICTIONLESS(MASS, INERTIA, ARM, FALLING, 0.0)
     assert list(contact.y_events[1][0][1:]) == pytest.approx([plastic.vy, plastic.spin], rel=1e-7)
 
 
@@ -174,7 +177,7 @@ def test_sticking_impact_is_that_of_a_strong_dashpot_at_the_corner() -> None:
 
     start = [before.vx, before.vy, before.spin]
     stopped = solve_ivp(dashpot, (0.0, 10.0), start, method="Radau", rtol=1e-10, atol=1e-12).y[:, -1]
-    after = forms.sticking_impact(MASS, INERTIA, ARM, before, 0.0)
+    after = STICKING(MASS, INERTIA, ARM, before, 0.0)
     assert [after.vx, after.vy, after.spin] == pytest.approx(list(stopped), rel=1e-6)
 
 
@@ -187,7 +190,7 @@ def angular_momentum_about_corner(motion: forms.Motion) -> float:
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 1.0])
-@pytest.mark.parametrize("impact", [forms.frictionless_impact, forms.sticking_impact])
+@pytest.mark.parametrize("impact", [FRICTIONLESS, STICKING])
 def test_impacts_keep_angular_momentum_about_the_corner_and_obey_restitution(
     impact: Impact, restitution: float
 ) -> None:
@@ -199,12 +202,12 @@ def test_impacts_keep_angular_momentum_about_the_corner_and_obey_restitution(
 
 @pytest.mark.parametrize(
     ("impact", "restitution"),
-    [(forms.frictionless_impact, 0.0), (forms.frictionless_impact, 0.6), (forms.sticking_impact, 0.0)],
+    [(FRICTIONLESS, 0.0), (FRICTIONLESS, 0.6), (STICKING, 0.0)],
 )
 def test_impacts_lose_energy_but_the_elastic_one(impact: Impact, restitution: float) -> None:
     before = forms.Motion(0.4, -1.0, 20.0)
     assert kinetic_energy(impact(MASS, INERTIA, ARM, before, restitution)) < 0.99 * kinetic_energy(before)
-    elastic = forms.frictionless_impact(MASS, INERTIA, ARM, before, 1.0)
+    elastic = FRICTIONLESS(MASS, INERTIA, ARM, before, 1.0)
     assert kinetic_energy(elastic) == pytest.approx(kinetic_energy(before), rel=1e-14)
 
 
