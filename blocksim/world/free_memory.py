@@ -1,4 +1,4 @@
-"""Available memory, and numbers of bytes as text. Independent of scenes and the solver."""
+"""Available memory, bytes as text, and the chunks in which run.h5 takes room. Independent of scenes and the solver."""
 
 import os
 from pathlib import Path
@@ -7,6 +7,8 @@ UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
 THOUSAND = 1000
 MOST_SHOWN = 999.5  # rounds to four digits
 KIBI = 1024
+MOST_CHUNK_ROWS = 64  # frames in a chunk of run.h5
+CHUNK_VALUES = 1 << 17  # a megabyte
 # Of control groups of version 1 and 2, by their controllers: where they are mounted, their limit and usage, and the
 # entry of memory.stat for cached files that are given up when memory runs short.
 GROUP_FILES = {
@@ -21,6 +23,11 @@ def readable(count: int) -> str:
     while value >= MOST_SHOWN and unit + 1 < len(UNITS):
         value, unit = value / THOUSAND, unit + 1
     return f"{value:.3g} {UNITS[unit]}"
+
+
+def chunk_rows(elements: int) -> int:
+    """Return how many frames of so many elements, the most of any system, run.h5 takes room for at a time."""
+    return min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(elements, 1)))
 
 
 def available_bytes(root: Path = Path("/")) -> int | None:

@@ -12,7 +12,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, CONSTRAINT, GROUP, IMPACT, KEPT, LISTED, PART, STATE, TALLY
-from blocksim.world.free_memory import available_bytes, readable
+from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems.system import SystemInScene
 
 LISTS = 2  # of candidate pairs: the present one and the one being built
@@ -26,8 +26,6 @@ CONTACT_VALUES = 8  # of a recorded contact: two bodies in one, place, normal, o
 CONTACTS_OF_A_BODY = 4  # recorded in a frame, of corners and rigid faces: hardly ever more
 PROCESS_BYTES = 210_000_000  # Python, packages and compiled kernels; measured 207 to 210 MB
 FILE_BYTES = 35_000  # of run.h5 beside its values; measured 25 to 39 kB
-MOST_CHUNK_ROWS = 64  # frames in a chunk of run.h5
-CHUNK_VALUES = 1 << 17  # a megabyte
 ROUNDING = 1e-9  # of a step, by which the time between frames may miss it
 
 
@@ -80,11 +78,6 @@ def output_count(steps: int, end: float, every: float) -> int:
 def is_shorter_than_step(every: float, step: float) -> bool:
     """Return True if frames every `every` (s) would be closer than steps (s), so that there is one at every step."""
     return every < (1.0 - ROUNDING) * step
-
-
-def chunk_rows(elements: int) -> int:
-    """Return how many frames of so many elements, the most of any system, run.h5 takes room for at a time."""
-    return min(MOST_CHUNK_ROWS, max(1, CHUNK_VALUES // max(elements, 1)))
 
 
 def run_bytes(bodies: int, frames: int, contacts: int = 0, others: Sequence[SystemInScene] = ()) -> int:

@@ -209,7 +209,7 @@ def test_blocks_are_placed_once_from_loading_to_the_result(tmp_path: Path, monke
     times: list[str] = []
     place = placement._placed
 
-    def counted(scenario: Scenario) -> placement._Placement:
+    def counted(scenario: Scenario) -> placement.Placement:
         times.append(scenario.name)
         return place(scenario)
 

@@ -31,7 +31,7 @@ from blocksim.view.report.subjects import read_stored, run_subject
 from blocksim.view.run_data import Support, drawable_frames, extent_of
 from blocksim.view.strip import draw_strip
 from blocksim.world.describe import describe
-from blocksim.world.memory import chunk_rows
+from blocksim.world.free_memory import chunk_rows
 from blocksim.world.systems import INTERACTIONS
 from blocksim.world.systems.system import Indices, Track, discs
 from tests.simulation.masses import MASSES, RADIUS, MassTable, ground, tie

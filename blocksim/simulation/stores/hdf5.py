@@ -30,8 +30,7 @@ from blocksim.simulation import atomic
 from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames, empty_rows
 from blocksim.simulation.probes import CHUNK_ROWS, ProbeSeries
 from blocksim.simulation.recorder import Frame, Recorder, Rows, frames_from_rows
-from blocksim.world.free_memory import available_bytes, readable
-from blocksim.world.memory import chunk_rows
+from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems import blocks, others_of
 from blocksim.world.systems.system import System, SystemInScene
 
