@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import (
     BeforeValidator,
@@ -33,41 +33,50 @@ NO_DIMENSION = q.NUMBER.dimension
 Scale = Literal["linear", "log"]
 
 
+class _Spread:
+    """What distributions have in common: SI, radians where `angle`; `unit` is the one that the file has, if any."""
+
+    __slots__ = ()
+    ends: ClassVar[Mapping[str, str]]  # names of fields by the keys of the file
+    angle: bool
+    unit: str
+
+    def as_table(self) -> dict[str, object]:
+        """Return the table of the file that says this: finite numbers, with its unit if that gives them again."""
+        table: dict[str, object] = {}
+        for key, name in self.ends.items():
+            number: float = getattr(self, name)
+            if math.isfinite(number):
+                table[key] = toml_number(number, angle=self.angle)
+                if self.unit:
+                    text = f"{number / float(q.parse_unit(self.unit).factor):.{SIGNIFICANT}g} {self.unit}"
+                    table[key] = text if q.parse_quantity(text)[0] == number else table[key]
+        return {**table, "scale": "log"} if getattr(self, "scale", "linear") == "log" else table
+
+
 @dataclass(frozen=True, slots=True)
-class Uniform:
-    """Evenly distributed from `low` to `high`, or their logarithms are; SI, radians where `angle`.
+class Uniform(_Spread):
+    """Evenly distributed from `low` to `high`, or their logarithms are."""
 
-    `unit` is the one that the file has, if any.
-    """
-
+    ends: ClassVar = {"from": "low", "to": "high"}
     low: float
     high: float
     scale: Scale = "linear"
     angle: bool = False
     unit: str = ""
 
-    def as_table(self) -> dict[str, object]:
-        """Return the table of the file that says this."""
-        return _table_of(self, {"from": self.low, "to": self.high}, self.scale)
-
 
 @dataclass(frozen=True, slots=True)
-class Normal:
-    """Normally distributed, with nothing below `low` or above `high`; SI, radians where `angle`.
+class Normal(_Spread):
+    """Normally distributed, with nothing below `low` or above `high`."""
 
-    `unit` is the one that the file has, if any.
-    """
-
+    ends: ClassVar = {"mean": "mean", "sd": "sd", "from": "low", "to": "high"}
     mean: float
     sd: float
     low: float = -math.inf
     high: float = math.inf
     angle: bool = False
     unit: str = ""
-
-    def as_table(self) -> dict[str, object]:
-        """Return the table of the file that says this."""
-        return _table_of(self, {"mean": self.mean, "sd": self.sd, "from": self.low, "to": self.high})
 
 
 Distribution = Uniform | Normal
@@ -77,18 +86,6 @@ Variation = tuple[Any, ...] | Distribution
 def toml_number(number: float, *, angle: bool) -> object:
     """Return a number as in a scenario: an angle as a string with its unit."""
     return f"{number!r} rad" if angle else number
-
-
-def _table_of(values: Distribution, ends: Mapping[str, float], scale: Scale = "linear") -> dict[str, object]:
-    """Return the finite ones of some numbers with the unit of the file, if that gives the same numbers again."""
-    table: dict[str, object] = {}
-    for key, number in ends.items():
-        if math.isfinite(number):
-            table[key] = toml_number(number, angle=values.angle)
-            if values.unit:
-                text = f"{number / float(q.parse_unit(values.unit).factor):.{SIGNIFICANT}g} {values.unit}"
-                table[key] = text if q.parse_quantity(text)[0] == number else table[key]
-    return table if scale == "linear" else {**table, "scale": scale}
 
 
 def _unit(value: Mapping[str, Any], *names: str) -> str:
@@ -140,7 +137,18 @@ def _read_distribution(value: object) -> Variation:
     if "count" in value:
         raise q.invalid('count belongs to the modes "grid" and "list"; here `samples` sets the number', "count")
     if "mean" in value or "sd" in value:
-        return _normal(value)
+        _refuse_slips(value, ("mean", "sd", "from", "to"), needed=("mean", "sd"))
+        bounds = [name for name in ("from", "to") if name in value]
+        (mean, sd, *given), angle = _numbers(value, "mean", "sd", *bounds)
+        if sd <= 0.0:
+            raise q.invalid(f"the standard deviation {q.toml(value['sd'])} is not above 0", "sd")
+        ends = dict(zip(bounds, given, strict=True))
+        low, high = ends.get("from", -math.inf), ends.get("to", math.inf)
+        _refuse_empty(value, low, high)
+        if low > mean + FARTHEST * sd or high < mean - FARTHEST * sd:
+            message = f"the bounds exclude everything within {FARTHEST:g} standard deviations of the mean"
+            raise q.invalid(message, "from" if low > mean else "to")
+        return Normal(mean, sd, low, high, angle, _unit(value, "mean", "sd"))
     _refuse_slips(value, ("from", "to", "scale", "mean", "sd"), needed=("from", "to"))
     (low, high), angle = _numbers(value, "from", "to")
     scale = _scale(value, low, high)
@@ -180,22 +188,6 @@ def is_descending(value: Mapping[str, Any]) -> bool:
     except PydanticCustomError:
         return False
     return first > last
-
-
-def _normal(value: Mapping[str, Any]) -> Normal:
-    _refuse_slips(value, ("mean", "sd", "from", "to"), needed=("mean", "sd"))
-    bounds = [name for name in ("from", "to") if name in value]
-    (mean, sd, *given), angle = _numbers(value, "mean", "sd", *bounds)
-    if sd <= 0.0:
-        raise q.invalid(f"the standard deviation {q.toml(value['sd'])} is not above 0", "sd")
-    ends = dict(zip(bounds, given, strict=True))
-    low, high = ends.get("from", -math.inf), ends.get("to", math.inf)
-    if len(bounds) == 2:
-        _refuse_empty(value, low, high)
-    if low > mean + FARTHEST * sd or high < mean - FARTHEST * sd:
-        message = f"the bounds exclude everything within {FARTHEST:g} standard deviations of the mean"
-        raise q.invalid(message, "from" if low > mean else "to")
-    return Normal(mean, sd, low, high, angle, _unit(value, "mean", "sd"))
 
 
 def _refuse_empty(value: Mapping[str, Any], low: float, high: float) -> None:
