@@ -58,15 +58,16 @@ class Structure(Table, ABC):
     )
 
     counted_by: ClassVar[tuple[str, ...]] = ("count",)
+    stacked_by: ClassVar[str | None] = "count"  # key whose blocks stand one above the other; None: a single course
 
     @property
     def size(self) -> int:
         """Number of bodies, without placing them: the product of the keys `counted_by`."""
         return math.prod(getattr(self, key) for key in self.counted_by)
 
-    @abstractmethod
     def height(self, block: Block) -> float:
-        """Height (m) from the bottom to the upper edge of the highest block."""
+        """Height (m) from the bottom to the upper edge of the highest course, whether or not it has a block left."""
+        return block.size_y if self.stacked_by is None else getattr(self, self.stacked_by) * block.size_y
 
     @abstractmethod
     def place(self, block: Block) -> Sequence[Pose]:
@@ -92,11 +93,8 @@ class Structure(Table, ABC):
 class Courses(Structure):
     """A structure of several courses, one above the other."""
 
+    stacked_by = "rows"
     rows: Count = Field(description="number of courses, one above the other")
-
-    def height(self, block: Block) -> float:
-        """All courses, whether or not the highest has a block left."""
-        return self.rows * block.size_y
 
     def _check(self) -> None:
         if self.size > MAX_BLOCKS:

@@ -19,10 +19,6 @@ class Stack(Structure):
     count: Count = Field(description="number of blocks")
     offset: q.Length = Field(default=0.0, description="shift of each block relative to the one below")
 
-    def height(self, block: geometry.Block) -> float:
-        """All blocks on top of each other."""
-        return self.count * block.size_y
-
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
         first = self.left + block.size_x / 2
@@ -35,10 +31,6 @@ class Staircase(Structure):
     kind: Literal["staircase"] = Field(description="kind of structure")
     count: Count = Field(description="number of blocks")
     overlap: q.PositiveLength = Field(description="length over which a block lies on the one below")
-
-    def height(self, block: geometry.Block) -> float:
-        """All blocks on top of each other."""
-        return self.count * block.size_y
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
@@ -157,16 +149,13 @@ class Dominoes(Structure):
     along x at the speed of the push and rises at push size_x / size_y, its spin is 2 push / size_y.
     """
 
+    stacked_by = None
     kind: Literal["dominoes"] = Field(description="kind of structure")
     count: Count = Field(description="number of blocks")
     spacing: q.PositiveLength = Field(description="clear distance between neighbours")
     push: q.Speed = Field(
         default=0.0, description="speed along x of the centre of the first domino, which turns about its lower edge"
     )
-
-    def height(self, block: geometry.Block) -> float:
-        """One block."""
-        return block.size_y
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from left to right."""
