@@ -73,7 +73,7 @@ def check_regular(path: Path, *, links: bool = False) -> int:
 def read_limited(path: Path, limit: int, *, links: bool = False) -> bytes:
     """Return what a file holds, at most `limit` bytes. Raises as `open_regular`, InvalidInputError for a larger one."""
     content = read_head(path, limit + 1, links=links)
-    _refuse_above(limit, len(content), path)
+    refuse_large(path, limit, len(content))
     return content
 
 
@@ -86,13 +86,9 @@ def read_head(path: Path, count: int, *, links: bool = False) -> bytes:
             raise read_error(path, error) from None
 
 
-def refuse_large(path: Path, limit: int) -> None:
-    """Check that a file that a library will open by itself is regular, and not too large. Raises as `read_limited`."""
-    _refuse_above(limit, check_regular(path), path)
-
-
-def _refuse_above(limit: int, size: int, path: Path) -> None:
-    if size > limit:
+def refuse_large(path: Path, limit: int, size: int | None = None) -> None:
+    """Check a size, or that of a file that a library will open by itself. Raises as `read_limited`."""
+    if (check_regular(path) if size is None else size) > limit:
         raise InvalidInputError(f"{path}: larger than {limit / MEGABYTE:g} MB, the limit for this file")
 
 
@@ -236,7 +232,7 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
     file or its header is wrong.
     """
     lines = _lines(path, limit)
-    content = [line for line in lines if line.text.strip() and not _is_comment(line.text)]
+    content = [line for line in lines if line.text.strip() and not line.text.lstrip().startswith("#")]
     needed = f"its first line must be {','.join(columns)}"
     if not content:
         raise_problems([Problem(str(path), "the table is empty" + (f", {needed}" if columns else ""))])
@@ -264,7 +260,7 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
     meant = [name if name in columns else nearest(name, missing, most=len(name)) or name for name in names]
     if problems and sorted(meant) != sorted(columns):
         raise_problems(problems)
-    notes = tuple(line.text.strip()[1:].strip() for line in lines if _is_comment(line.text))
+    notes = tuple(line.text.strip()[1:].strip() for line in lines if line.text.lstrip().startswith("#"))
     table = Table(str(path), notes, line, heads, problems=problems)
     for row in content[1:]:
         cells = _cells(row)
@@ -283,8 +279,8 @@ def bare_rows(content: bytes) -> list[tuple[int, list[str]]]:
     """
     return [
         (number, [QUOTED.sub(r"\1", cell.strip()) for cell in line.split(",")])
-        for number, line in _numbered(content.decode("utf-8-sig"))
-        if line.strip() and not _is_comment(line)
+        for number, line in numbered_lines(content.decode("utf-8-sig"))
+        if line.strip() and not line.lstrip().startswith("#")
     ]
 
 
@@ -312,17 +308,13 @@ def _lines(path: Path, limit: int) -> list[Line]:
         raise_problems([Problem(str(path), "not a text file (a table is UTF-8 text)")])
     return [
         Line(str(path), number, "".join(letter if letter.isprintable() else " " for letter in line))
-        for number, line in _numbered(text)
+        for number, line in numbered_lines(text)
     ]
 
 
-def _numbered(text: str) -> Iterator[tuple[int, str]]:
+def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
     """Yield number (from 1) and text of every line, whatever system wrote it."""
     return enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
-
-
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith("#")
 
 
 def _cells(line: Line) -> list[tuple[str, Line, int, int]] | None:

@@ -377,17 +377,17 @@ class RecordTable(MotionTable):
 def read_record(path: Path) -> RecordTable:
     """Read an accelerogram; raises MotionTableError with the line of the first mistake."""
     content = content_of(path)
-    text = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    lines = [*enumerate(text.split("\n"), start=1)]
+    lines = [*input_files.numbered_lines(content.decode("utf-8-sig", errors="replace"))]
     sizes = (_AT2.search(line) or _OLD_AT2.search(line) for _, line in lines[:HEAD_LINES])
     head = next(((number, size) for number, size in enumerate(sizes, start=1) if size), None)
-    unit, times, values = _two_columns(lines) if head is None else _at2(lines, *head)
+    said, times, values = _two_columns(lines) if head is None else _at2(lines, *head)
+    unit = next((unit for unit, word in _UNIT_WORDS if word.search(said)), None)
     factor = 1.0 if unit is None else UNITS[unit]
     return RecordTable(path, "acceleration", tuple(times), tuple(factor * one for one in values), content, unit=unit)
 
 
-def _at2(lines: Sequence[Line], head: int, found: re.Match[str]) -> tuple[Unit | None, Iterable[float], list[float]]:
-    """Return unit, times and values of an AT2 file, in whose line `head` number and step stand."""
+def _at2(lines: Sequence[Line], head: int, found: re.Match[str]) -> tuple[str, Iterable[float], list[float]]:
+    """Return where the unit stands, times and values of an AT2 file, in whose line `head` number and step stand."""
     before = lines[: head - 1]
     other = next((line for line in before if _OTHER.search(line[1])), None)
     if other is not None:
@@ -402,14 +402,17 @@ def _at2(lines: Sequence[Line], head: int, found: re.Match[str]) -> tuple[Unit |
         raise MotionTableError(message)
     _check_count(count)
     said = (_IN_UNITS.search(line) for _, line in before)
-    unit = next((_unit_in(one[1]) for one in said if one is not None and one[1]), None)
-    return unit, (number * step for number in range(count)), values
+    return (
+        next((one[1] for one in said if one is not None and one[1]), ""),
+        (number * step for number in range(count)),
+        values,
+    )
 
 
-def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], list[float]]:
-    """Return unit, times and values of a file with two columns."""
+def _two_columns(lines: Sequence[Line]) -> tuple[str, Iterable[float], list[float]]:
+    """Return where the unit stands, times and values of a file with two columns."""
     kept = [line for line in lines if line[1].strip() and line[1].lstrip()[0] not in "#%"]
-    unit, is_named = _named_unit(kept[0]) if kept else (None, False)
+    said, is_named = _second_name(kept[0]) if kept else ("", False)
     rows = []
     for number, text in kept[is_named:]:
         cells = re.findall(r"[^,;\s]+", text)
@@ -425,17 +428,17 @@ def _two_columns(lines: Sequence[Line]) -> tuple[Unit | None, Iterable[float], l
     times = [time for _, time, _ in rows]
     step = (times[-1] - times[0]) / (len(times) - 1)
     _check_steps([number for number, *_ in rows], times, step)
-    return unit, (times[0] + place * step for place in range(len(times))), [value for *_, value in rows]
+    return said, (times[0] + place * step for place in range(len(times))), [value for *_, value in rows]
 
 
-def _named_unit(line: Line) -> tuple[Unit | None, bool]:
-    """Return the unit that the first line says, and whether it names columns at all."""
+def _second_name(line: Line) -> tuple[str, bool]:
+    """Return the name of the second column, which may say the unit, and whether the line names columns at all."""
     try:
         float(re.findall(r"[^,;\s]+", line[1])[0])
     except (ValueError, IndexError):
         pass
     else:
-        return None, False
+        return "", False
     text = line[1].strip()
     if not re.match(r"\W*t", text, re.IGNORECASE):
         message = f"line {line[0]}: {q.toml(text)}: neither numbers nor columns of time and acceleration"
@@ -443,11 +446,7 @@ def _named_unit(line: Line) -> tuple[Unit | None, bool]:
     if re.match(r"[^,;]*(?<![a-z])ms(?![a-z/])", text, re.IGNORECASE):
         raise MotionTableError(f"line {line[0]}: {q.toml(text)}: times in s are needed")
     first = re.split(r"[,;]", text, maxsplit=1) if re.search(r"[,;]", text) else text.split(maxsplit=1)
-    return _unit_in(first[-1]), True
-
-
-def _unit_in(text: str) -> Unit | None:
-    return next((unit for unit, word in _UNIT_WORDS if word.search(text)), None)
+    return first[-1], True
 
 
 def _check_count(count: int) -> None:
