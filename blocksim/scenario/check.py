@@ -210,7 +210,6 @@ def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
     Mistakes of placement, such as overlapping bodies, can only be found once everything else is right.
     """
     scenario, findings = _validated(data, folder)
-    findings += islice(wrong_names(data), MAX_MISTAKES)
     findings += [*_sweep(data, folder), *_unknown_provenance(data)]
     if scenario is not None and not findings:
         findings += [*unfit_choices(scenario), *impossible_starts(scenario)]
@@ -218,10 +217,12 @@ def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
 
 
 def _validated(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
+    """Return the scenario, None where pydantic has errors, and the mistakes of values and of names."""
     try:
-        return Scenario.model_validate(data, context={"folder": folder}), []
+        scenario, findings = Scenario.model_validate(data, context={"folder": folder}), []
     except ValidationError as error:
-        return None, mistakes_of(error, data)
+        scenario, findings = None, mistakes_of(error, data)
+    return scenario, [*findings, *islice(wrong_names(data), MAX_MISTAKES)]
 
 
 def _sweep(data: Data, folder: Path) -> Iterator[Mistake]:
@@ -277,7 +278,7 @@ def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list
 def _trial(data: Data, folder: Path) -> Trial:
     """Return what finds the mistakes that setting one value adds to data, without its sweep and experiment."""
     bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
-    before = _single_mistakes(bare, folder)
+    _, before = _validated(bare, folder)
 
     def tried(path: KeyPath, value: object, place: KeyPath) -> Iterator[Mistake]:
         try:
@@ -285,14 +286,8 @@ def _trial(data: Data, folder: Path) -> Trial:
         except UnfitOverrideError as error:
             yield Mistake(place[:2], str(error), at="key")
             return
-        for finding in _single_mistakes(changed, folder):
-            if finding not in before:
+        for finding in _validated(changed, folder)[1]:
+            if not finding.relation and finding not in before:
                 yield Mistake(place[:2] if finding.at == "key" else place, finding.message, at=finding.at)
 
     return tried
-
-
-def _single_mistakes(data: Data, folder: Path) -> list[Mistake]:
-    """List the mistakes of values by themselves."""
-    _, findings = _validated(data, folder)
-    return [finding for finding in (*findings, *islice(wrong_names(data), MAX_MISTAKES)) if not finding.relation]

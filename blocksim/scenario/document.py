@@ -274,13 +274,15 @@ class Document:
         except input_files.NoSuchFileError as error:
             raise InputMissingError(f"{error}{_similar_file(path)}") from None
         if len(content) > MAX_BYTES:
-            raise _unusable(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")
+            raise ScenarioError(
+                [Problem(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")]
+            )
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
-            raise _unusable(str(path), "not a text file in UTF-8") from None
+            raise ScenarioError([Problem(str(path), "not a text file in UTF-8")]) from None
         if "\0" in text:
-            raise _unusable(str(path), "not a text file")
+            raise ScenarioError([Problem(str(path), "not a text file")])
         return replace(cls.parse(text, str(path), path.parent), is_stored=is_stored)
 
     @classmethod
@@ -300,11 +302,11 @@ class Document:
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError([source.syntax_problem(error)]) from None
         except (RecursionError, TooDeepError):
-            raise _unusable(where, TOO_DEEP) from None
+            raise ScenarioError([Problem(where, TOO_DEEP)]) from None
         except ValueError as error:  # whole numbers with thousands of digits
-            raise _unusable(where, f"not valid TOML: {error}") from None
+            raise ScenarioError([Problem(where, f"not valid TOML: {error}")]) from None
         if not data:
-            raise _unusable(where, "the file is empty; a scenario starts with schema = 1 and a name")
+            raise ScenarioError([Problem(where, "the file is empty; a scenario starts with schema = 1 and a name")])
         return cls(data, source, folder)
 
     @classmethod
@@ -313,7 +315,7 @@ class Document:
         try:
             return cls(cast("Data", freeze(data)), ScenarioText("scenario"), folder)
         except TooDeepError:
-            raise _unusable("scenario", TOO_DEEP) from None
+            raise ScenarioError([Problem("scenario", TOO_DEEP)]) from None
 
     def with_values(self, values: Mapping[str, object]) -> Self:
         """Set values by dotted key; raises ScenarioError where a key leads nowhere."""
@@ -437,10 +439,6 @@ def document_of(source: Source) -> Document:
     if isinstance(source, Scenario):
         return replace(Document.parse(resolved.scenario_to_toml(source), source.name), allow_outside=True)
     return Document.from_mapping(source) if isinstance(source, Mapping) else Document.read(source)
-
-
-def _unusable(where: str, message: str) -> ScenarioError:
-    return ScenarioError([Problem(where, message)])
 
 
 def _similar_file(path: Path) -> str:

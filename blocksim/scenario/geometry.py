@@ -105,16 +105,13 @@ def height_above(corners: Floats, points: Floats) -> Floats:
 
 def self_crossings(corners: Floats) -> Iterator[tuple[int, int]]:
     """Yield pairs of edges of a polygon that cross or touch although they are no neighbours."""
-
-    def side(p: Floats, q: Floats, r: Floats) -> float:
-        return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
-
     edges = [*_edges(corners)]
     for i, (a0, a1) in enumerate(edges):
         for j, (b0, b1) in enumerate(edges[i + 2 :], start=i + 2):
             low = np.maximum(np.minimum(a0, a1), np.minimum(b0, b1))
             high = np.minimum(np.maximum(a0, a1), np.maximum(b0, b1))
-            crosses = side(a0, a1, b0) * side(a0, a1, b1) <= 0.0 and side(b0, b1, a0) * side(b0, b1, a1) <= 0.0
+            a, b = a1 - a0, b1 - b0
+            crosses = _cross(a, b0 - a0) * _cross(a, b1 - a0) <= 0.0 and _cross(b, a0 - b0) * _cross(b, a1 - b0) <= 0.0
             if (j + 1) % len(edges) != i and crosses and bool((low <= high).all()):
                 yield i, j
 

@@ -73,11 +73,12 @@ def _finding(entry: ErrorDetails, data: object) -> Mistake:
         case "missing":
             return _missing(path, data)
         case "union_tag_not_found":
-            return Mistake((*path, "kind"), f"this key is missing: {_kinds(path)} is needed", at="key")
+            return Mistake((*path, "kind"), f"this key is missing: {_kinds(path)[1]} is needed", at="key")
         case "union_tag_invalid":
             kind = follow(data, (*path, "kind"))
-            what = "motion" if path[-1] == "motion" else _table_of_kinds(path).removesuffix("s")
-            hint = did_you_mean(str(kind), KINDS_IN[_table_of_kinds(path)]) or f"choose {_kinds(path)}"
+            table, kinds = _kinds(path)
+            what = "motion" if path[-1] == "motion" else table.removesuffix("s")
+            hint = did_you_mean(str(kind), KINDS_IN[table]) or f"choose {kinds}"
             return Mistake((*path, "kind"), f"unknown {what} kind {toml(kind)}; {hint}")
         case "extra_forbidden":
             return _unknown_key(path, data)
@@ -155,14 +156,11 @@ def _unknown_key(path: KeyPath, data: object) -> Mistake:
     return Mistake(path, f"unknown key, {hint}", at="key", meant=(*path[:-1], meant) if meant else ())
 
 
-def _table_of_kinds(path: KeyPath) -> str:
-    """Return the table whose kinds are known: that of bodies, or the last one of these on the way."""
-    return "bodies" if path[0] == "bodies" else next(str(part) for part in reversed(path) if part in KINDS_IN)
-
-
-def _kinds(path: KeyPath) -> str:
-    *others, last = (toml(kind) for kind in KINDS_IN[_table_of_kinds(path)])
-    return f"{', '.join(others)} or {last}"
+def _kinds(path: KeyPath) -> tuple[str, str]:
+    """Return the table whose kinds are known, that of bodies or the last one on the way, and these kinds in words."""
+    table = "bodies" if path[0] == "bodies" else next(str(part) for part in reversed(path) if part in KINDS_IN)
+    *others, last = (toml(kind) for kind in KINDS_IN[table])
+    return table, f"{', '.join(others)} or {last}"
 
 
 def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:

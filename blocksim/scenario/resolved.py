@@ -3,7 +3,7 @@
 import functools
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -106,7 +106,7 @@ def scenario_to_toml(
         data["experiment"] = {"table": experiment_table}
     if motion_table is not None and isinstance(scenario.motion, motion.TABLED):
         data["motion"]["table"] = motion_table
-    for number, table in _body_tables(scenario):
+    for number, table in tables_of_bodies(scenario).items():
         name = (body_tables or {}).get(table.digest)
         if name is not None:
             data["bodies"][number]["motion"]["table"] = name
@@ -118,21 +118,15 @@ def deciding_values(scenario: Scenario) -> dict[str, Any]:
     data = scenario.model_dump(mode="json", exclude=UNHASHED)
     if isinstance(scenario.motion, motion.TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
-    for number, table in _body_tables(scenario):
+    for number, table in tables_of_bodies(scenario).items():
         data["bodies"][number]["motion"]["table"] = table.digest
     return data
 
 
-def _body_tables(scenario: Scenario) -> Iterator[tuple[int, motion.MotionTable]]:
-    """Yield the numbers of bodies whose motion is a table, and the tables."""
-    for number, body in enumerate(scenario.bodies):
-        if isinstance(body.motion, motion.FromTable):
-            yield number, body.motion.table
-
-
-def body_table_contents(scenario: Scenario) -> dict[str, bytes]:
-    """Return the tables of the motions of bodies as they were read, for copies, each once by its digest."""
-    return {table.digest: table.content for _, table in _body_tables(scenario)}
+def tables_of_bodies(scenario: Scenario) -> dict[int, motion.MotionTable]:
+    """Return the tables of motion of bodies by the numbers of these, for copies as they were read."""
+    moved = ((number, body.motion) for number, body in enumerate(scenario.bodies))
+    return {number: one.table for number, one in moved if isinstance(one, motion.FromTable)}
 
 
 def scenario_hash(scenario: Scenario) -> str:

@@ -168,7 +168,7 @@ def unfit_soils(scenario: Scenario) -> Iterator[Mistake]:
     """Find blocks of soil, and a contact model that soil does not go with."""
     for name, block in scenario.blocks.items():
         material = scenario.materials.get(block.material)
-        if material is not None and material.is_soil:
+        if material is not None and material.friction_angle is not None:
             message = f"{toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
             yield Mistake(("blocks", name, "material"), message, relation=True)
     if scenario.systems.get("soils") and scenario.contact.model != "surface":
@@ -273,7 +273,7 @@ def _endless_motion(scenario: Scenario) -> Iterator[Mistake]:
         if pieces > MAX_PIECES:
             message = f"{pieces / PIECES_PER_CYCLE:.6g} cycles are too many; at most {MAX_PIECES // PIECES_PER_CYCLE}"
             yield Mistake((*path, "motion", "frequency"), f"{message} are allowed")
-    if len(tables := resolved.body_table_contents(scenario)) > MOST_BODY_TABLES:
+    if len(tables := {one.digest for one in resolved.tables_of_bodies(scenario).values()}) > MOST_BODY_TABLES:
         message = f"{len(tables)} different tables of motion of bodies are too many; at most {MOST_BODY_TABLES}"
         yield Mistake(("bodies",), f"{message} are allowed")
 

@@ -141,6 +141,7 @@ def unit_factor(unit: str, target: str) -> float | None:
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*(\S.*?)?\s*", re.DOTALL)
+_TEXT_SCHEMA = {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-zµμ°]"}
 _DECIMAL_COMMA = re.compile(r"\s*([+-]?[0-9]+),([0-9]+)(?![0-9]*,)(.*)", re.DOTALL)
 _MAX_LENGTH_QUANTITIES = 80
 _MAX_SHOWN = 40
@@ -296,7 +297,7 @@ class Quantity(FieldReader):
             return number
         if self.kind is ANGLE:
             number = {"const": 0}
-        return {"anyOf": [number, _text_schema(self.kind.example)]}
+        return {"anyOf": [number, {**_TEXT_SCHEMA, "examples": [self.kind.example]}]}
 
 
 @dataclass(frozen=True)
@@ -315,11 +316,7 @@ class FrictionCoefficient(FieldReader):
 
     def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
         """Return the JSON Schema of a number or an angle with its unit."""
-        return {"anyOf": [{**usual, "minimum": 0}, _text_schema("21 deg")]}
-
-
-def _text_schema(example: str) -> dict[str, Any]:
-    return {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*[A-Za-zµμ°]", "examples": [example]}
+        return {"anyOf": [{**usual, "minimum": 0}, {**_TEXT_SCHEMA, "examples": ["21 deg"]}]}
 
 
 @functools.lru_cache(maxsize=1024)

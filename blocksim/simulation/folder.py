@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, events, input_files, scenario_to_toml
 from blocksim.scenario.models.motion import MOST_BODY_TABLES
-from blocksim.scenario.resolved import MARK, body_table_contents, motion_table_content
+from blocksim.scenario.resolved import MARK, motion_table_content, tables_of_bodies
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.provenance import run_hash
 
@@ -185,7 +185,8 @@ def read_tables(scenario: Scenario) -> dict[str, bytes]:
     tables = {}
     if scenario.experiment is not None:
         tables[EXPERIMENT] = input_files.read_limited(scenario.experiment.table, TABLE_BYTES, links=True)
-    tables |= dict(zip(BODY_MOTIONS, body_table_contents(scenario).values(), strict=False))
+    contents = {table.digest: table.content for table in tables_of_bodies(scenario).values()}
+    tables |= dict(zip(BODY_MOTIONS, contents.values(), strict=False))
     motion = motion_table_content(scenario)
     return tables if motion is None else {**tables, MOTION: motion}
 
@@ -203,7 +204,8 @@ def keep_scenario(
     if os.path.lexists(folder / plan) and not is_resolved(folder / plan):
         raise OutputExistsError(f"{folder / plan}: {CHANGED}")
     names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
-    of_bodies = dict(zip(body_table_contents(scenario), BODY_MOTIONS, strict=False))
+    digests = dict.fromkeys(table.digest for table in tables_of_bodies(scenario).values())
+    of_bodies = dict(zip(digests, BODY_MOTIONS, strict=False))
     is_varied = plan != SCENARIO  # the base of others
     text = head + scenario_to_toml(scenario, names[EXPERIMENT], names[MOTION], of_bodies, is_varied=is_varied)
     write_text(folder / plan, text)

@@ -57,18 +57,13 @@ class Material(Table):
     def _check(self) -> None:
         missing = 'the density is missing: give density (such as "2700 kg/m^3") or unit_weight'
         require_one(missing, density=self.given_density, unit_weight=self.unit_weight)
-        for key in () if self.is_soil else ("cohesion", "dilation", "yield_surface"):
+        for key in () if self.friction_angle is not None else ("cohesion", "dilation", "yield_surface"):
             if getattr(self, key) is not None:
                 raise q.invalid(
                     'only soil has this; give friction_angle too, "0 deg" where there is none', key, at="key"
                 )
         if self.dilation:
             raise q.invalid("soil that dilates is not available; leave dilation out", "dilation")
-
-    @property
-    def is_soil(self) -> bool:
-        """Return True for a soil."""
-        return self.friction_angle is not None
 
     @property
     def density(self) -> float:
@@ -133,7 +128,7 @@ class Block(Table):
         return value
 
     def _check(self) -> None:
-        shape = next((key for key in (*OUTLINE_KEYS, "width", "depth") if self._has(key)), "")
+        shape = next((key for key in (*OUTLINE_KEYS, "width") if getattr(self, key) is not None), "depth")
         fields = type(self).model_fields
         given = [fields[name].alias or name for name in fields if name in self.model_fields_set]
         own = {"width": RECTANGLE_KEYS, "depth": ("depth",)} | OUTLINE_KEYS
@@ -160,11 +155,8 @@ class Block(Table):
     def has_key(self, key: str) -> bool:
         """Return whether a key (or the name of its field) has a meaning for the shape of this block."""
         if self.width is None:
-            return key not in RECTANGLE_KEYS and self._has(key)
+            return key not in RECTANGLE_KEYS and getattr(self, "given_depth" if key == "depth" else key) is not None
         return key in {*RECTANGLE_KEYS, "material"}
-
-    def _has(self, key: str) -> bool:
-        return getattr(self, "given_depth" if key == "depth" else key) is not None
 
     @property
     def is_shaped(self) -> bool:

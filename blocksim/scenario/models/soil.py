@@ -106,7 +106,7 @@ class SoilTable(SystemTable):
         if self.material not in scenario.materials:
             hint = spelling.did_you_mean_or_list(self.material, scenario.materials)
             yield "material", f"unknown material {q.toml(self.material)}, {hint}"
-        elif not scenario.materials[self.material].is_soil:
+        elif scenario.materials[self.material].friction_angle is None:
             yield "material", f"{q.toml(self.material)} is no soil; give this material a friction_angle"
         if has_outlines(scenario):  # refused: they say nothing about spacing and place
             return
