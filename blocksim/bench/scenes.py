@@ -149,7 +149,7 @@ class Rerun:
         Raises RunFailedError: the time of a failed run is meaningless.
         """
         timed = self.attempt(last_step, team)
-        if not timed.outcome.is_finished:
+        if timed.outcome.status != "finished":
             raise RunFailedError(f"a run that was to be timed failed: {timed.outcome.reason}")
         return timed
 

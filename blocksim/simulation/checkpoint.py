@@ -83,11 +83,6 @@ class StoredCheckpoint(NamedTuple):
     head: CheckpointHead
     arrays: tuple[NDArray[np.uint8], ...]
 
-    @property
-    def position(self) -> Position:
-        """Where the run stood."""
-        return self.head.position
-
 
 def origin_of(scenario: Scenario) -> Origin:
     """Return what a run of a scenario comes from, here and now."""
@@ -308,11 +303,11 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
             whole.append(read_checkpoint(path))
         except InvalidInputError as error:
             remarks.append(str(error))
-    whole.sort(key=lambda stored: stored.position.step)
+    whole.sort(key=lambda stored: stored.head.position.step)
     if not whole:
         raise InvalidInputError("\n".join([*remarks, f"{folder}: no checkpoint is complete; {REMEDY}"]))
     newest, origin = whole[-1], origin_of(scenario)
-    was, position = newest.head.origin, newest.position
+    was, position = newest.head.origin, newest.head.position
     _refuse_other(newest.path, "scenario", was.scenario, origin.scenario)
     _refuse_other(newest.path, "version of the code", was.versions, origin.versions)
     rooms = [f"blocksim/{room}" for room in origin.rooms if was.rooms.get(room) != origin.rooms[room]]
@@ -333,7 +328,7 @@ def take_over(stored: StoredCheckpoint, scenario: Scenario, recorder: Recorder) 
     Raises what reading them raises, and InvalidInputError where some before the checkpoint are missing, or are not as
     they were recorded.
     """
-    position, path = stored.position, stored.path.parent / files.FRAMES
+    position, path = stored.head.position, stored.path.parent / files.FRAMES
     _, rows = read_rows(path, recorder.systems)
     recorder.take_over(rows)
     count = recorder.count_until(position.step)

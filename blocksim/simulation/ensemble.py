@@ -18,7 +18,7 @@ from blocksim.scenario.motion import settles
 from blocksim.simulation import compilation, events, loop, probes, recorder, settling, team
 from blocksim.simulation.frames import COLUMNS, Columns, Frames, as_frame, final_values
 from blocksim.simulation.ledger import EnergyLedger, adds_up, energy_ledger, ledger_of, next_energy_check, start_energy
-from blocksim.simulation.observables import OBSERVABLES, Value, Watch, observe
+from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measure_row, scheme_of
 from blocksim.world.build import Refusal, Stack, member, stack_of_one
 from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
@@ -112,7 +112,7 @@ def member_ends(
             continue
         some, ledger = slice(m, m + 1), ledger_of(names, measured[m], starts[m], *in_play)
         outcome = loop.outcome_of(code, ledger)
-        if not outcome.is_finished:
+        if outcome.status != "finished":
             outcome = loop.diagnose(outcome, code, member(scenes, m), placed[m])
         ends[m] = MemberEnd(
             outcome=outcome,
@@ -230,11 +230,14 @@ class Ensemble:
         self.supports = [probes.MovingSupport(one) for one in own]
         self.watch = Watch(self.placed, self.supports, start)
         steps, places = np.zeros(len(own), dtype=np.int64), np.zeros_like(start)
-        reach, thresholds = self.watch.shapes.reach, self.watch.thresholds
+        shapes = self.watch.shapes
+        thresholds = np.where(
+            shapes.is_free, MOVED_SHARE * shapes.shortest, np.inf
+        )  # m, beyond which a block has moved
         # compiled code sees no motion relative to a support that moves
         periods = np.where([support.moves for support in self.supports], 0.0, self.periods)
         frames = self.periods if peaks else np.zeros(len(own))
-        self.watched = Watched(frames, periods, steps, places, start, reach, thresholds, np.zeros(len(own)))
+        self.watched = Watched(frames, periods, steps, places, start, shapes.reach, thresholds, np.zeros(len(own)))
 
     def advance(self, pool: ThreadPoolExecutor, threads: int) -> None:
         """Advance all members to their ends; a thread that is done with some takes the next ones."""
@@ -266,7 +269,7 @@ class Ensemble:
             if members.size:
                 measured, which = self._measured(members), members.tolist()
                 ledgers = (
-                    ledger_of(self.names, measured[m], self._start(m), *own)
+                    ledger_of(self.names, measured[m], float(self.starts[m, : len(self.scheme.ledger)].sum()), *own)
                     for m, own in zip(which, in_play_of(self.scenes, which), strict=True)
                 )
                 members = members[[*map(adds_up, ledgers)]]
@@ -282,7 +285,8 @@ class Ensemble:
             rows = np.zeros_like(rows)  # what is measured at the start of a later call
             is_under_way = self.codes[m] == arrays.REACHED and frame < stop
             if self.codes[m] == arrays.REACHED and self._is_frame(m, frame):
-                self.watch.follow([m], self._motion([m]), [frame * self.time_steps[m]])
+                motion = motion_of(self.scenes.world.bodies[[m], : len(self.placed[0])])
+                self.watch.follow([m], motion, [frame * self.time_steps[m]])
 
     def _advance_members(self, members: Steps, stops: Steps, rows: NDArray[np.float64], codes: Steps) -> None:
         """Advance some members in compiled code, where the scheme can."""
@@ -296,14 +300,6 @@ class Ensemble:
         """Return x, y (m) and angle (rad) of the blocks of some scenes of a stack, (k, 3, b)."""
         bodies = scenes.world.bodies.view(np.ndarray)  # a record array takes five times as long for a field
         return np.stack([bodies[name][which, : len(self.placed[0])] for name in recorder.POSITION], axis=1)
-
-    def _motion(self, which: list[int]) -> NDArray[np.float64]:
-        """Return the states of the blocks of some members, (k, 6, b)."""
-        return motion_of(self.scenes.world.bodies[which, : len(self.placed[0])])
-
-    def _start(self, m: int) -> float:
-        """Return the energy (J) of a member at the start."""
-        return float(self.starts[m, : len(self.scheme.ledger)].sum())
 
     def _measured(self, members: Steps) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
@@ -319,13 +315,14 @@ class Ensemble:
         which = [m for m, code in enumerate(codes) if self.watch.first[m] is None and code != arrays.PAIRS_FULL]
         steps = self.scenes.world.clock["steps"][which, 0].tolist()
         times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
-        self.watch.follow(which, self._motion(which), times)
+        self.watch.follow(which, motion_of(self.scenes.world.bodies[which, : len(self.placed[0])]), times)
         turned = None
         if self.has_peaks:  # in frames and at the end
             turns = np.abs(self._positions(self.scenes, slice(None))[:, 2] - self.watched.start[:, 2])
             at_end = np.where(self.watch.shapes.is_free, turns, 0.0).max(axis=1, initial=0.0)
             turned = np.asarray(np.fmax(self.watched.peaks, at_end))[:, None]
-        measured, starts = self._measured(np.arange(len(codes))), [self._start(m) for m in range(len(codes))]
+        measured = self._measured(np.arange(len(codes)))
+        starts = [float(row.sum()) for row in self.starts[:, : len(self.scheme.ledger)]]
         ends = member_ends(self.scenes, self.placed, measured, self.watch, starts, codes, turned)
         return [ends.get(m) or self._run_alone(m, starts[m]) for m in range(len(codes))]
 

@@ -67,12 +67,7 @@ class Contacts:
 def join_contacts(tables: Sequence[Rows]) -> Contacts:
     """Return the contacts of frames from one table each."""
     ends = np.cumsum([len(table) for table in tables], dtype=np.int64)
-    return Contacts(ends, np.concatenate([empty_rows(0), *tables]))
-
-
-def empty_rows(count: int) -> Rows:
-    """Return a table of so many contacts, all zero."""
-    return np.zeros(count, dtype=CONTACT_ROW)
+    return Contacts(ends, np.concatenate([np.zeros(0, CONTACT_ROW), *tables]))
 
 
 def forces_on_a(rows: Rows) -> Floats:
@@ -251,11 +246,6 @@ def as_frame(columns: Columns) -> "pd.DataFrame":
     import pandas as pd
 
     return pd.DataFrame(columns)
-
-
-def final_table(frames: Frames) -> "pd.DataFrame":
-    """Return the table of the last frame for people who know pandas."""
-    return as_frame(final_columns(frames))
 
 
 def rows_of(columns: Columns) -> list[dict[str, Any]]:

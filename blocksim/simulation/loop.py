@@ -36,11 +36,6 @@ class Outcome:
     reason: str
     exit_code: ExitCode
 
-    @property
-    def is_finished(self) -> bool:
-        """Return True if the run came to its proper end."""
-        return self.status == "finished"
-
 
 END_OF_TIME = Outcome("finished", "end of simulated time", ExitCode.SUCCESS)
 REST = Outcome("finished", "at rest", ExitCode.SUCCESS)
@@ -159,9 +154,7 @@ def last_step_of(end: float, step: float) -> int:
 def outcome_of(code: int, ledger: EnergyLedger) -> Outcome:
     """Return what a run came to that was not interrupted: its status code, and whether its energy adds up."""
     outcome = BY_CODE[code]
-    if outcome.is_finished and not adds_up(ledger):
-        return RESIDUAL
-    return outcome
+    return RESIDUAL if outcome.status == "finished" and not adds_up(ledger) else outcome
 
 
 def run_loop(
@@ -194,21 +187,14 @@ def run_loop(
     return LoopResult(run.scene, outcome, ledger, run.seconds, team.threads, overlap, records, pending)
 
 
-class Pace:
-    """How many steps a compiled call may take, so that signals and limits take effect soon and progress is shown.
+def steps_of_call(before: int, steps: int, seconds: float) -> int:
+    """Return how many steps the next compiled call may take, after one that took so many and so long (s).
 
-    It follows from what earlier calls took, and decides no bits, as those do not depend on where calls end.
+    So that signals and limits take effect soon and progress is shown; `before` is what that call was allowed. No bits
+    depend on where calls end.
     """
-
-    def __init__(self, bodies: int) -> None:
-        """Begin with few for so many bodies."""
-        self.steps = max(1, BODY_STEPS_AT_FIRST // max(bodies, 1))
-
-    def learn(self, steps: int, seconds: float) -> None:
-        """Take account of a call of so many steps and seconds."""
-        if steps > 0:
-            fitting = CALL_SECONDS * steps / max(seconds, 1e-9)
-            self.steps = max(1, int(min(fitting, MOST_GROWTH * max(steps, self.steps))))
+    fitting = CALL_SECONDS * steps / max(seconds, 1e-9)
+    return max(1, int(min(fitting, MOST_GROWTH * max(steps, before)))) if steps > 0 else before
 
 
 class _Run:
@@ -228,7 +214,7 @@ class _Run:
         self.step = float(scene.world.controls[0].step)
         self.last = last_step_of(end, self.step)
         self.bodies = scene.world.bodies.size - 1
-        self.pace = Pace(self.bodies)
+        self.pace = max(1, BODY_STEPS_AT_FIRST // max(self.bodies, 1))
         self.status, self.is_lost = arrays.REACHED, False
         self.seconds = self.start = 0.0  # in compiled code; J
         self.timeline = control.timeline
@@ -254,8 +240,8 @@ class _Run:
         event = wanted if self.timeline is None else self.timeline.next_step(done)
         checkpoints = self.control.checkpoints
         due = checkpoint.NEVER if checkpoints is None else checkpoints.next_step(done)
-        self._advance_by_probes(min(wanted, look, event, done + self.pace.steps, due))
-        self.pace.learn(self.done - done, time.perf_counter() - before)
+        self._advance_by_probes(min(wanted, look, event, done + self.pace, due))
+        self.pace = steps_of_call(self.pace, self.done - done, time.perf_counter() - before)
         if self.timeline is not None:
             self.scene, self.status = self.timeline.act(self.scene, self.team, self.status)
         self.recorder.probes.sample(self.scene)  # like frames after what happens at this step

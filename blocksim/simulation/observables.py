@@ -288,11 +288,6 @@ class Watch:
         one.first, one.carried = self.first[m : m + 1], self.carried[m : m + 1]
         return one
 
-    @property
-    def thresholds(self) -> Floats:
-        """Distance (m) of every block, (m, b), beyond which it has moved; infinite for fixed ones."""
-        return np.where(self.shapes.is_free, MOVED_SHARE * self.shapes.shortest, np.inf)
-
     def follow(self, scenes: list[int], motion: Floats, times: Sequence[float]) -> None:
         """Examine some scenes: (k, 6, b) x, y, angle and their rates (SI), at times (s)."""
         if self.start is None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody, Scenario, events, motion, place_segments
 from blocksim.scenario.models.stepping import STEP, ForceProbe, JointProbe, PointProbe
-from blocksim.simulation.frames import empty_rows, forces_on_a
+from blocksim.simulation.frames import CONTACT_ROW, forces_on_a
 from blocksim.simulation.ledger import compiled
 from blocksim.world.systems import systems_of
 
@@ -91,11 +91,6 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
     JOINT: {"opening": "m", "opening_first": "m", "opening_last": "m", "slip": "m", "rotation": "rad"},
 }
 """What each kind of probe records, by name: the unit (SI)."""
-
-
-def columns_of(kind: str, ledger: Sequence[str]) -> Mapping[str, str]:
-    """Return the columns of a kind of probe with their units; `ledger` names the energies (J) of a run."""
-    return dict.fromkeys(ledger, "J") if kind == ENERGY else COLUMNS[kind]
 
 
 @dataclass(frozen=True, repr=False)
@@ -217,7 +212,7 @@ class Moment:
 
 def rows_of(touching: "BodyContacts") -> Any:
     """Return contacts of a system as those of bodies a with parts b."""
-    rows = empty_rows(len(touching.body))
+    rows = np.zeros(len(touching.body), CONTACT_ROW)
     rows["body_a"], rows["body_b"] = touching.body, touching.part
     (rows["x"], rows["y"]), (rows["normal_x"], rows["normal_y"]) = touching.place.T, touching.normal.T
     rows["normal_force"], rows["shear_force"] = touching.normal_force, touching.shear_force
@@ -394,7 +389,8 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
                 sampler = joint_sampler((first, second), (placed[first], placed[second]), joint)
         every = scenario.output.every if probe.every is None else probe.every
         period = 1.0 if every == STEP else max(float(every) / time_step, 1.0)
-        made.append(Probe(name, probe.kind, columns_of(probe.kind, ledger), period, sampler))
+        columns = dict.fromkeys(ledger, "J") if probe.kind == ENERGY else COLUMNS[probe.kind]
+        made.append(Probe(name, probe.kind, columns, period, sampler))
     systems = [(one, len(parts_of)) for one, parts_of in parts]
     return Probes(made, MovingSupport(scenario if made else None), time_step, systems)
 

@@ -173,7 +173,7 @@ def simulate_into(
                 past = checkpoint.Past(settled=settled)
                 files.prepare_folder(folder, overwrite=overwrite or resume)
             else:
-                scene, position = checkpoint.restore_scene(stored, built.scene), stored.position
+                scene, position = checkpoint.restore_scene(stored, built.scene), stored.head.position
                 settled, parts = position.settled, (*position.resumed_from, position.step)
                 past = checkpoint.Past(position.total_seconds, parts, stored.path, position.step, settled)
                 checkpoint.take_over(stored, scenario, recorder)
@@ -188,7 +188,7 @@ def simulate_into(
                 writer = checkpoint.CheckpointWriter(
                     folder, checkpoint.origin_of(scenario), sink.sync, periods, seconds, past
                 )
-                with_writer, since = replace(control, checkpoints=writer), stored and stored.position
+                with_writer, since = replace(control, checkpoints=writer), stored and stored.head.position
                 ended = loop.run_loop(scene, recorder, scenario.time.end, team=team, control=with_writer, since=since)
             result = _result(scenario, recorder, ended, time.perf_counter() - began, settled)
             altered, warnings = recorder.altered, (*resumption.remarks, *result.summary.warnings)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blocksim.analysis.bits import differences
-from blocksim.simulation.frames import SUPPORT, UNITS, Frames, empty_rows, join_contacts
+from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, UNITS, Frames, join_contacts
 
 COUNT, BLOCKS = 5, 3
 
@@ -99,7 +99,7 @@ def test_missing_frames_are_a_difference() -> None:
 
 def with_contacts(counts: Sequence[int] = (0, 2, 3, 1, 0)) -> Frames:
     """Return frames with so many contacts each, all numbers different."""
-    tables = [empty_rows(count) for count in counts]
+    tables = [np.zeros(count, CONTACT_ROW) for count in counts]
     for number, table in enumerate(tables):
         table["body_b"] = SUPPORT
         for column, name in enumerate(UNITS):

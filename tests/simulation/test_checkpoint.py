@@ -42,7 +42,7 @@ def test_scene_comes_back_to_the_last_bit_in_arrays_of_the_same_types(tmp_path: 
     write_checkpoint(path, scene, AT, origin_of(scenario))
     stored = read_checkpoint(path)
     back = restore_scene(stored, build_scene(scenario))
-    assert stored.position == AT
+    assert stored.head.position == AT
     assert type(back) is type(scene)
     for one, other in zip(arrays_of(back), arrays_of(scene), strict=True):
         assert (type(one), one.dtype, one.shape) == (type(other), other.dtype, other.shape)

@@ -40,7 +40,7 @@ def at(step: int) -> Position:
 
 
 def steps_in(folder: Path) -> dict[str, int]:
-    return {path.name: read_checkpoint(path).position.step for path in folder.glob("checkpoint.*")}
+    return {path.name: read_checkpoint(path).head.position.step for path in folder.glob("checkpoint.*")}
 
 
 def test_two_are_kept_by_turns_after_the_frames(tmp_path: Path) -> None:
@@ -62,7 +62,7 @@ def test_the_one_that_a_run_continues_from_is_replaced_last(tmp_path: Path, name
     writer.write(build_scene(SCENARIO), at(10))
     (written,) = steps_in(tmp_path)
     assert written != name
-    assert read_checkpoint(tmp_path / written).position.resumed_from == (7,)
+    assert read_checkpoint(tmp_path / written).head.position.resumed_from == (7,)
 
 
 def test_steps_and_simulated_time_are_due_at_their_multiples(tmp_path: Path) -> None:

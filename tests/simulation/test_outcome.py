@@ -51,7 +51,7 @@ def test_scene_that_blows_up_stops_and_names_step_block_and_checkpoint(soft: Shi
     last = result.summary.last_checkpoint
     assert last is not None
     assert 0 < last < result.summary.steps
-    positions = [read_checkpoint(path).position.step for path in (tmp_path / "run").glob("checkpoint.*")]
+    positions = [read_checkpoint(path).head.position.step for path in (tmp_path / "run").glob("checkpoint.*")]
     assert last == max(positions)
     assert json.loads((tmp_path / "run" / "run.json").read_text())["last_checkpoint"] == last
     assert not (tmp_path / "run" / "done.json").exists()

@@ -160,7 +160,7 @@ def begun(interrupted: Path, tmp_path: Path) -> Path:
 
 
 def newest(folder: Path) -> Path:
-    return max(folder.glob("checkpoint.*"), key=lambda path: read_checkpoint(path).position.step)
+    return max(folder.glob("checkpoint.*"), key=lambda path: read_checkpoint(path).head.position.step)
 
 
 @pytest.mark.parametrize("damage", ["flip", "cut", "empty"])
@@ -263,7 +263,7 @@ def test_times_of_all_parts_are_summed_and_told(begun: Path) -> None:
     told = json.loads((begun / "run.json").read_text())
     assert told["resumed_from"] == [500, 1000]
     assert told["solver_seconds"] > before["solver_seconds"] > 0.0
-    assert told["total_seconds"] > checkpoint.position.total_seconds > 0.0
+    assert told["total_seconds"] > checkpoint.head.position.total_seconds > 0.0
     assert before["last_checkpoint"] == 1000
     assert told["last_checkpoint"] is None
     assert {path.name for path in begun.iterdir()} == {"scenario.toml", "final.csv", "run.h5", "run.json", "done.json"}

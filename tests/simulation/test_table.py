@@ -10,7 +10,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.simulation import Frames, Result
-from blocksim.simulation.frames import COLUMNS, as_frame, csv_text, final_table, read_table
+from blocksim.simulation.frames import COLUMNS, as_frame, csv_text, final_columns, read_table
 
 
 def frames_of(angle: float, start_angle: float) -> Frames:
@@ -35,7 +35,7 @@ def frames_of(angle: float, start_angle: float) -> Frames:
 
 
 def test_extents_are_those_of_the_turned_block() -> None:
-    row = final_table(frames_of(-np.pi / 2, 0.0)).iloc[0]
+    row = as_frame(final_columns(frames_of(-np.pi / 2, 0.0))).iloc[0]
     assert row["rotation_deg"] == pytest.approx(-90.0)
     assert [row["left_mm"], row["right_mm"]] == pytest.approx([75.0, 125.0])
     assert [row["bottom_mm"], row["top_mm"]] == pytest.approx([184.0, 216.0])
@@ -44,13 +44,13 @@ def test_extents_are_those_of_the_turned_block() -> None:
 
 def test_extents_of_a_polygon_are_those_of_its_corners() -> None:
     wedge = np.array([[[-0.01, -0.01], [0.02, -0.01], [-0.01, 0.02], [-0.01, 0.02]]])
-    row = final_table(replace(frames_of(np.pi / 2, 0.0), outlines=wedge)).iloc[0]
+    row = as_frame(final_columns(replace(frames_of(np.pi / 2, 0.0), outlines=wedge))).iloc[0]
     assert [row["left_mm"], row["right_mm"]] == pytest.approx([80.0, 110.0])
     assert [row["bottom_mm"], row["top_mm"]] == pytest.approx([190.0, 220.0])
 
 
 def test_rotation_counts_from_the_start_and_is_not_wrapped() -> None:
-    row = final_table(frames_of(0.3 + 4 * np.pi, 0.3)).iloc[0]
+    row = as_frame(final_columns(frames_of(0.3 + 4 * np.pi, 0.3))).iloc[0]
     assert row["rotation_deg"] == pytest.approx(720.0)
     assert row["right_mm"] - row["left_mm"] == pytest.approx(1e3 * (0.032 * np.cos(0.3) + 0.05 * np.sin(0.3)))
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
-from blocksim.simulation.frames import SUPPORT, Contacts, Frames, empty_rows
+from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, Contacts, Frames
 
 HOSTILE = (
     "<script>alert(1)</script>",
@@ -68,7 +68,7 @@ def toppling(blocks: int, steps: int = 40, end: float = 0.6) -> Frames:
 def pressed(frames: Frames, force: float = 2.0) -> Frames:
     """Return the same frames with two contacts of each block with the ground, at its middle and right of it."""
     steps, blocks = frames.x.shape
-    rows = empty_rows(2 * steps * blocks)
+    rows = np.zeros(2 * steps * blocks, CONTACT_ROW)
     rows["body_a"], rows["body_b"] = np.tile(np.repeat(np.arange(blocks), 2), steps), SUPPORT
     rows["x"] = np.repeat(frames.x.ravel(), 2) + np.tile([0.0, 0.012], steps * blocks)
     rows["normal_y"], rows["normal_force"] = 1.0, force * (1.0 + rows["body_a"])

@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.frames import Contacts, empty_rows
+from blocksim.simulation.frames import CONTACT_ROW, Contacts
 from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.arrows import FORCES, ForceScale, arrows, force_scale, round_down
 from blocksim.view.kinds import RUN_KINDS
@@ -19,7 +19,7 @@ SCALE = ForceScale(mm_per_newton=10.0, longest=35.0)
 
 
 def test_arrow_is_that_of_the_force_on_the_block_that_it_pushes_up() -> None:
-    rows = empty_rows(2)
+    rows = np.zeros(2, CONTACT_ROW)
     rows["x"], rows["y"] = [0.1, 0.2], 0.05
     rows["normal_y"], rows["normal_force"] = [1.0, -1.0], 2.0  # body a above body b, and below it
     rows["shear_force"] = 0.5
@@ -29,7 +29,7 @@ def test_arrow_is_that_of_the_force_on_the_block_that_it_pushes_up() -> None:
 
 
 def test_long_arrows_are_cut_and_what_is_not_finite_is_left_out() -> None:
-    rows = empty_rows(3)
+    rows = np.zeros(3, CONTACT_ROW)
     rows["normal_x"], rows["normal_force"] = 1.0, [1.0, 100.0, np.nan]
     found = arrows(rows, SCALE, 0.0)
     assert (found[:, 1] - found[:, 0])[:, 0].tolist() == pytest.approx([10.0, 35.0])
@@ -46,7 +46,7 @@ def test_scale_is_that_of_usual_forces_not_of_impacts() -> None:
 
 
 def test_run_without_a_single_contact_has_a_scale() -> None:
-    frames = replace(toppling(1, steps=3), contacts=Contacts(np.zeros(3, dtype=np.int64), empty_rows(0)))
+    frames = replace(toppling(1, steps=3), contacts=Contacts(np.zeros(3, dtype=np.int64), np.zeros(0, CONTACT_ROW)))
     assert force_scale(frames).mm_per_newton > 0.0
 
 

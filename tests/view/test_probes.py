@@ -7,7 +7,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation import simulate_into
-from blocksim.simulation.probes import COLUMNS, ProbeSeries, columns_of, series_of
+from blocksim.simulation.probes import COLUMNS, ENERGY, ProbeSeries, series_of
 from blocksim.view.report.page import page_text
 from blocksim.view.report.subjects import read_stored, run_subject
 from blocksim.view.time_panels import draw_probes, panels_of
@@ -17,7 +17,7 @@ LEDGER = ("kinetic", "potential", "friction")
 
 
 def made_up(kind: str, name: str, count: int = 5) -> ProbeSeries:
-    columns = columns_of(kind, LEDGER)
+    columns = dict.fromkeys(LEDGER, "J") if kind == ENERGY else COLUMNS[kind]
     rows = [(step, [1e3 * (step + 1.0) * (place + 1) for place in range(len(columns))]) for step in range(count)]
     return series_of(name, kind, columns, rows, 0.1)
 

@@ -20,7 +20,8 @@ from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario, overlap
 from blocksim.scenario.models.stepping import SCHEMES as TABLES
 from blocksim.scenario.motion import settles
-from blocksim.simulation.frames import Rows, empty_rows
+from blocksim.silence import silent
+from blocksim.simulation.frames import CONTACT_ROW, Rows
 from blocksim.world import build as scenes
 from blocksim.world.build import Built, Construction, Refusal, Stack, build_one, couple, group_equal, stack_of_one
 from blocksim.world.systems import others_of
@@ -89,14 +90,6 @@ def corner_ways(change: Floats, radius: Floats) -> Floats:
     return np.asarray(np.hypot(dx, dy) + radius * np.abs(turned))
 
 
-def _same(scene: Any, *_: Any) -> Any:
-    return scene
-
-
-def _nothing(*_: Any) -> None:
-    """Do nothing."""
-
-
 def _unrest_of_accelerations(
     scene: Any, is_free: NDArray[np.bool_], _change: Floats, _side: float, scale: float
 ) -> float:
@@ -122,14 +115,14 @@ class Scheme:
 
     # advancing
     advance: Callable[[Any, int], int]  # to a step with one thread: status code
-    advance_in_team: Callable[[Any, int, int], int] = _same  # the same as thread k of several
+    advance_in_team: Callable[[Any, int, int], int] = lambda scene, *_: scene  # the same as thread k of several
     advance_members: Callable[..., None] | None = None
     # of stacked scenes: members, last steps, first rows (output), codes (output)
     least_bodies: int = sys.maxsize  # a thread; with fewer, threads wait for one another longer than they work
-    with_more_room: Callable[[Any], Any] = _same  # for pairs
-    with_threads: Callable[[Any, int], Any] = _same  # with room for what they exchange
+    with_more_room: Callable[[Any], Any] = lambda scene, *_: scene  # for pairs
+    with_threads: Callable[[Any, int], Any] = lambda scene, *_: scene  # with room for what they exchange
     threads_of: Callable[[Any], int] = lambda _: 1  # for how many threads there is such room
-    for_another_thread: Callable[[Any], Any] = _same  # the same scene with work space of its own
+    for_another_thread: Callable[[Any], Any] = lambda scene, *_: scene  # the same scene with work space of its own
     after_event: Callable[[Any, Records], bool] = lambda *_: False
     # brings its arrays up to date with bodies that an event has changed, given these before; whether a call that goes
     # to no further step is to evaluate contacts anew
@@ -137,13 +130,15 @@ class Scheme:
     # compiling: sets of machine code by name, see compilation.py
     kernels: Callable[[str], str]  # that it needs with a contact model
     of_outlines: Mapping[str, str] = field(default_factory=dict)  # the set instead of another, with any polygon
-    kernel_variant: Callable[[str, Scenario, Sequence[PlacedBody] | None], str] = _same  # of a set, for a scenario
+    kernel_variant: Callable[[str, Scenario, Sequence[PlacedBody] | None], str] = lambda scene, *_: (
+        scene
+    )  # of a set, for a scenario
     kernel_sets: Mapping[str, Mapping[str, object]] = field(default_factory=dict)  # changes of the smallest scene
 
     # settling before time zero
     settling: SettlingSteps = SHORT_STEPS
-    halt: Callable[[Any, int], None] = _nothing  # takes velocities of so many blocks from arrays beside the bodies
-    begin: Callable[[Any], None] = _nothing  # begins its own books anew, at rest
+    halt: Callable[[Any, int], None] = silent  # takes velocities of so many blocks from arrays beside the bodies
+    begin: Callable[[Any], None] = silent  # begins its own books anew, at rest
     unrest: Callable[[Any, NDArray[np.bool_], Floats, float, float], float] = _unrest_of_accelerations
     # how far a scene is from rest, over gravity and loads, given which blocks are free, (b,), their change of x, y,
     # angle by the last call, (3, b), the smallest side of a block (m), the acceleration by gravity and loads (m/s2)
@@ -152,7 +147,7 @@ class Scheme:
     # recording and diagnosis
     ledger: tuple[str, ...]  # energies (J) that are measured
     measure: Callable[[Any, Any], None]  # writes energies, number of contacts and largest overlap into a row
-    contacts: Callable[[Any, int], Rows] = lambda *_: empty_rows(0)  # of a scene with so many blocks
+    contacts: Callable[[Any, int], Rows] = lambda *_: np.zeros(0, CONTACT_ROW)  # of a scene with so many blocks
     overlaps: Callable[[Any], Overlaps] = lambda _: NO_OVERLAPS  # of a scene that an overlap has ended
     lost_contact: Callable[[Any, Overlaps], str] = lambda *_: ""
     # why it has ended, where not by contact.max_overlap

@@ -15,7 +15,7 @@ from blocksim.kernels.explicit.models import KERNEL
 from blocksim.kernels.explicit.models import SURFACE as SURFACE_MODEL
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.scenario.overlap import penetration
-from blocksim.simulation.frames import SUPPORT, UNITS, Rows, empty_rows
+from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, UNITS, Rows
 from blocksim.simulation.schemes import BODIES_A_THREAD, Overlaps, Scheme, outlines_of, smallest_sides
 from blocksim.world import build
 
@@ -31,7 +31,7 @@ def explicit_contacts(world: arrays.World, blocks: int) -> Rows:
     pair, place = np.nonzero(np.arange(world.contacts.shape[1]) < pairs["active"][:, None])
     contacts = world.contacts[pair, place]
     a, b = pairs["a"][pair].astype(np.intp), pairs["b"][pair].astype(np.intp)
-    rows = empty_rows(len(contacts))
+    rows = np.zeros(len(contacts), CONTACT_ROW)
     rows["body_a"], rows["body_b"] = a, np.where(b < blocks, b, SUPPORT)
     for name, values in zip(list(UNITS)[:4], _places(world, contacts, a, b), strict=True):
         rows[name] = values

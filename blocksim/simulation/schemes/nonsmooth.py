@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from blocksim.kernels.common.arrays import REMOVED, Records
 from blocksim.kernels.nonsmooth import arrays, energy, step
 from blocksim.simulation import schemes
-from blocksim.simulation.frames import SUPPORT, Rows, empty_rows
+from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, Rows
 from blocksim.world import nonsmooth, sag
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ def _points(scene: arrays.Nonsmooth, manifolds: Any, which: str, along: float) -
     body = scene.world.bodies[manifolds["a"]]
     above, beside = manifolds["shear_arm_a"], along * manifolds["width"] - manifolds["arm_a"]
     normal, total = manifolds[f"normal_{which}"], manifolds["normal_one"] + manifolds["normal_two"]
-    rows = empty_rows(len(manifolds))
+    rows = np.zeros(len(manifolds), CONTACT_ROW)
     rows["body_a"], rows["body_b"] = manifolds["a"], manifolds["b"]
     rows["x"], rows["y"] = body["x"] + above * nx - beside * ny, body["y"] + above * ny + beside * nx
     rows["normal_x"], rows["normal_y"] = nx, ny

@@ -21,7 +21,7 @@ from blocksim.scenario.structures.polygons import DXF, DXF_APPLICATION, DXF_INTE
 from blocksim.simulation import atomic, folder, probes
 from blocksim.simulation.frames import BODIES, UNITS, Contacts, Frames, forces_on_a, join_contacts
 from blocksim.world.systems.blocks import BLOCKS, are_removed, distinct, local_corners, placed_points, supports_track
-from blocksim.world.systems.system import Floats, System, Track
+from blocksim.world.systems.system import Floats, Track
 
 FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
 CONTACT_NUMBERS = sorted(UNITS, key=lambda name: "m1N".index(UNITS[name]))  # lengths, directions, forces
@@ -41,13 +41,9 @@ def write_frames_csv(path: Path, frames: Frames) -> int:
         heads = ("time_s", track.system.element, *columns)
         frames_of = zip(*columns.values(), strict=True)
         tables = (zip(track.names, *(one.tolist() for one in frame), strict=True) for frame in frames_of)
-        _write(table_of(path, track.system), heads, frames.time, tables)
+        name = path.name if track.system is BLOCKS else f"{path.stem}_{track.system.name}{path.suffix}"
+        _write(path.with_name(name), heads, frames.time, tables)
     return len(frames)
-
-
-def table_of(path: Path, system: System) -> Path:
-    """Return the table of a system: that which was named for the blocks, or one beside it."""
-    return path if system is BLOCKS else path.with_name(f"{path.stem}_{system.name}{path.suffix}")
 
 
 def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:

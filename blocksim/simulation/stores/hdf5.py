@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.scenario import Scenario, events, input_files, place_bodies
 from blocksim.simulation import atomic
-from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames, empty_rows
+from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames
 from blocksim.simulation.probes import CHUNK_ROWS, ProbeSeries
 from blocksim.simulation.recorder import Frame, Recorder, Rows, frames_from_rows
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
@@ -96,13 +96,19 @@ def sets_of_frames(
 
 def sets_of_contacts() -> Iterator[DataSet]:
     """Yield the data sets with a row a contact."""
-    none = empty_rows(0)
-
-    def column(name: str, frames: Sequence[Frame]) -> Values:
-        return np.concatenate([(none if one.contacts is None else one.contacts)[name] for one in frames])
-
+    none = np.zeros(0, CONTACT_ROW)
     for name, unit in {**dict.fromkeys(BODIES, "1"), **UNITS}.items():
-        yield DataSet(f"{CONTACTS}/{name}", unit, partial(column, name), CONTACT_ROW[name])
+        yield DataSet(
+            f"{CONTACTS}/{name}",
+            unit,
+            partial(
+                lambda name, frames: np.concatenate(
+                    [(none if one.contacts is None else one.contacts)[name] for one in frames]
+                ),
+                name,
+            ),
+            CONTACT_ROW[name],
+        )
 
 
 DAMAGE = (AttributeError, KeyError, MemoryError, OSError, OverflowError, RuntimeError, TypeError, ValueError)
@@ -361,7 +367,7 @@ def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | Non
     count = int(ends[-1]) if frames else 0
     sets = {one.name: data_set(file, one.name, 1) for one in sets_of_contacts()}
     refuse_too_many(path, sets, count, "contacts")
-    rows = empty_rows(count)
+    rows = np.zeros(count, CONTACT_ROW)
     for name, one in sets.items():
         rows[name.removeprefix(f"{CONTACTS}/")] = one[:count]
     for name, least in zip(BODIES, (0, SUPPORT), strict=True):

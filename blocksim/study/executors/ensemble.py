@@ -104,7 +104,7 @@ def run_members(document: Document, values: Iterable[Mapping[str, object]]) -> I
         for member in built:
             if isinstance(member, Member):
                 yield member
-            elif isinstance(end := next(ends), MemberFailure) or not end.outcome.is_finished:
+            elif isinstance(end := next(ends), MemberFailure) or end.outcome.status != "finished":
                 yield Member(None, end.outcome.reason.splitlines()[0])
             else:
                 yield Member(end.columns)

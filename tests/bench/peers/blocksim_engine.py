@@ -46,7 +46,7 @@ class Blocksim(ABC):
         start = self._started(scene, {"end": scene.end, "stop_at_rest": False})
         run = start.attempt(last_step_of(scene.end, start.step))
         places = np.array([run.bodies.x, run.bodies.y])
-        x, y = places if run.outcome.is_finished else np.full_like(places, np.nan)
+        x, y = places if run.outcome.status == "finished" else np.full_like(places, np.nan)
         return Final(x, y, run.seconds)
 
     def call_time(self, scene: Scene) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import OutputError
-from blocksim.simulation.frames import SUPPORT, Contacts, Frames, empty_rows
+from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, Contacts, Frames
 from blocksim.simulation.stores.exports import CONTACT_COLUMNS, FRAME_COLUMNS, write_contacts_csv, write_frames_csv
 from tests.view.made_up import HOSTILE, toppling
 
@@ -65,7 +65,7 @@ def test_trouble_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
 
 def test_every_contact_has_a_row_with_the_names_of_its_bodies(tmp_path: Path) -> None:
     frames = replace(toppling(2, steps=3), names=(HOSTILE[0], "two"))
-    rows = empty_rows(3)
+    rows = np.zeros(3, CONTACT_ROW)
     rows["body_a"], rows["body_b"] = [0, 0, 1], [1, SUPPORT, SUPPORT]
     rows["x"], rows["overlap"] = [0.1, 0.2, 0.3], 1e-6
     rows["normal_y"], rows["normal_force"], rows["shear_force"] = 1.0, [1.5, 2.5, np.nan], -0.5
@@ -81,7 +81,7 @@ def test_every_contact_has_a_row_with_the_names_of_its_bodies(tmp_path: Path) ->
 
 
 def test_trouble_with_contacts_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
-    contacts = Contacts(np.zeros(1, dtype=np.int64), empty_rows(0))
+    contacts = Contacts(np.zeros(1, dtype=np.int64), np.zeros(0, CONTACT_ROW))
     with pytest.raises(OutputError, match="cannot be written: No such file"):
         write_contacts_csv(tmp_path / "none" / "contacts.csv", toppling(1, steps=1), contacts)
     assert list(tmp_path.iterdir()) == []

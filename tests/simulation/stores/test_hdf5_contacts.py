@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from blocksim.scenario import place_bodies
-from blocksim.simulation.frames import Rows, empty_rows
+from blocksim.simulation.frames import CONTACT_ROW, Rows
 from blocksim.simulation.recorder import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
@@ -17,7 +17,7 @@ MEASURED = SCHEMES["explicit"].measured
 
 def table_of(step: int) -> Rows:
     """Return as many contacts as the step has digits of three, at places that tell them apart."""
-    rows = empty_rows(step % 3)
+    rows = np.zeros(step % 3, CONTACT_ROW)
     rows["x"] = step + 0.25 * np.arange(len(rows))
     rows["body_b"] = -1
     return rows

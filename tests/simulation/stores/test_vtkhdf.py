@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.geometry import regular
-from blocksim.simulation.frames import SUPPORT, UNITS, Frames, empty_rows, forces_on_a, join_contacts
+from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, UNITS, Frames, forces_on_a, join_contacts
 from blocksim.simulation.stores import exports
 from blocksim.simulation.stores.exports import write_contacts_vtkhdf, write_vtkhdf
 from blocksim.view.scene import corners
@@ -121,7 +121,7 @@ def test_vtk_shows_ground_and_walls_where_they_are(tmp_path: Path) -> None:
 def test_vtk_reads_back_names_and_the_contacts_of_every_time(tmp_path: Path) -> None:
     hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="reading back needs the extra paraview-check (vtk)")
     names = ("Stein ä", "b", *HOSTILE)
-    tables = [empty_rows(count) for count in (2, 0, 3, 1)]
+    tables = [np.zeros(count, CONTACT_ROW) for count in (2, 0, 3, 1)]
     for number, rows in enumerate(tables):
         for name in UNITS:
             rows[name] = 10.0 * number + np.arange(len(rows)) + len(name)

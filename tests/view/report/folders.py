@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from blocksim.scenario import Scenario, load_scenario, place_bodies
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import keep_scenario, read_tables
-from blocksim.simulation.frames import SUPPORT, Frames, Rows, csv_text, empty_rows, final_columns
+from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, Frames, Rows, csv_text, final_columns
 from blocksim.simulation.ledger import EnergyLedger
 from blocksim.simulation.recorder import Frame, Recorder
 from blocksim.simulation.result import Summary
@@ -54,7 +54,7 @@ def write_frames(path: Path, scenario: Scenario, count: int) -> None:
 
 def contacts_of(motion: NDArray[np.float64]) -> Rows:
     """Return four contacts of every block with the ground below its centre, 2 N upwards each."""
-    rows = empty_rows(4 * motion.shape[1])
+    rows = np.zeros(4 * motion.shape[1], CONTACT_ROW)
     rows["body_a"], rows["body_b"] = np.arange(len(rows)) // 4, SUPPORT
     rows["x"], rows["normal_y"], rows["normal_force"] = np.repeat(motion[0], 4), 1.0, 2.0
     return rows
