@@ -8,10 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli.command_line import Report, Screen
+from blocksim.cli import command_line, prepare, progress
 from blocksim.cli.output import number, table_lines
-from blocksim.cli.prepare import ScenarioInput, announce_compilation
-from blocksim.cli.progress import count_progress
 from blocksim.errors import OutputExistsError
 from blocksim.options import Option
 from blocksim.simulation.atomic import write_text
@@ -22,13 +20,13 @@ SIGNS = {"deg": "°", INDICATOR: ""}
 
 
 def sensitivity_command(
-    source: ScenarioInput,
+    source: prepare.ScenarioInput,
     options: SensitivityOptions,
     *,
     out: Annotated[Path | None, Option("Write all numbers to a table.", metavar="CSV")] = None,
     overwrite: Annotated[bool, Option("Replace the table.")] = False,
-    screen: Screen,
-) -> Report:
+    screen: command_line.Screen,
+) -> command_line.Report:
     """Rank the inputs by their effect on final positions.
 
     The results are all measured quantities (without an experiment, x of the blocks) and the class of the outcome:
@@ -43,8 +41,8 @@ def sensitivity_command(
             raise OutputExistsError(f"{out}: cannot be created: {reason}")
         if out.exists() and not overwrite:
             raise OutputExistsError(f"{out}: already exists; --overwrite replaces it")
-    start = partial(announce_compilation, quiet=screen.silent)
-    with count_progress("runs", quiet=screen.silent) as on_member:
+    start = partial(prepare.announce_compilation, quiet=screen.silent)
+    with progress.count_progress("runs", quiet=screen.silent) as on_member:
         found = sensitivity(source.document(), replace(options, on_start=start, on_member=on_member))
     if out is not None:
         text = io.StringIO()
@@ -56,7 +54,9 @@ def sensitivity_command(
     for output in found.outputs:
         if output.varies:
             lines += [*([""] if lines else []), *_table(found, output)]
-    return Report(lines or ["no result varies: none of these inputs matters"], found.to_dict(), _notes(found, out))
+    return command_line.Report(
+        lines or ["no result varies: none of these inputs matters"], found.to_dict(), _notes(found, out)
+    )
 
 
 def _table(found: Sensitivity, output: Indices) -> list[str]:

@@ -8,9 +8,7 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli.command_line import Report, Screen, Settings
-from blocksim.cli.output import GAP, duration, table_lines, width_of_screen
-from blocksim.cli.prepare import announce_compilation, warn_of_values
+from blocksim.cli import command_line, output, prepare
 from blocksim.cli.progress import case_progress, cell_text, exit_when_stopped
 from blocksim.errors import ExitCode
 from blocksim.options import Option
@@ -35,7 +33,7 @@ NOT_SHOWN_ENDS = ("rotation_deg", "y_mm", "left_mm", "right_mm")
 def sweep_command(
     *,
     scenario: Annotated[Path | None, Option("Scenario file (TOML).", metavar="SCENARIO", is_argument=True)] = None,
-    settings: Settings = None,
+    settings: command_line.Settings = None,
     options: SweepOptions,
     merged: Annotated[
         Path | None,
@@ -43,8 +41,8 @@ def sweep_command(
     ] = None,
     allow_missing: Annotated[bool, Option("Merge the cases finished so far.")] = False,
     dry_run: Annotated[bool, Option("Print number of cases, cost and size without running anything.")] = False,
-    screen: Screen,
-) -> Report:
+    screen: command_line.Screen,
+) -> command_line.Report:
     """Run a scenario many times with some keys varied.
 
     Every case gives a row in sweep.csv. The same command again, also after a kill, runs only the missing cases.
@@ -61,7 +59,7 @@ def sweep_command(
     document = options.document(Document.read(scenario).with_settings(settings or []))
     base = document.build()
     if not screen.silent:
-        warn_of_values(base)
+        prepare.warn_of_values(base)
     if dry_run:
         found = estimate(document, keep_cases=options.keep_cases)
         cores = options.jobs or os.cpu_count() or 1
@@ -69,7 +67,7 @@ def sweep_command(
         until_rest = "; less if they stop at rest" if found.stop_at_rest else ""
         lines = [
             f"cases      {found.cases}",
-            f"solving    at most about {duration(found.seconds / cores)} on {on}",
+            f"solving    at most about {output.duration(found.seconds / cores)} on {on}",
             f"results    at most about {readable(found.bytes)}",
             f"memory     about {readable(found.memory)} for a process that runs one case",
             f"from the steps of {found.looked_at} cases at the measured speed{until_rest}",
@@ -77,16 +75,18 @@ def sweep_command(
         if found.impossible:
             which = f"{found.impossible} of these {found.looked_at}"
             lines.append(f"{which} cannot be simulated; the first: {found.reason}")
-        return Report(lines, {**asdict(found), "jobs": cores}, always=() if screen.as_json else found.remarks)
+        return command_line.Report(
+            lines, {**asdict(found), "jobs": cores}, always=() if screen.as_json else found.remarks
+        )
     for kernels in kernels_for(document):
-        announce_compilation(kernels, quiet=screen.silent)
+        prepare.announce_compilation(kernels, quiet=screen.silent)
     heads = () if base.sweep is None else heads_of(base.sweep)
     with exit_when_stopped(), case_progress(heads, quiet=screen.silent) as on_row:
         result = run_sweep(document, replace(options, on_row=on_row))
     return _table_report(result)
 
 
-def _table_report(result: SweepResult) -> Report:
+def _table_report(result: SweepResult) -> command_line.Report:
     """Return the columns that vary as far as they fit on the screen, outcomes, failures and what is left to do."""
     table = result.table
     short = dict(zip(result.keys, short_names(result.keys), strict=True))
@@ -113,8 +113,8 @@ def _table_report(result: SweepResult) -> Report:
     notes += _failure_lines(result, short)
     if result.left:
         notes.append(f"{result.left} cases have not been run; rerun the command to finish")
-    return Report(
-        table_lines(heads[:fitting], [row[:fitting] for row in rows], left=0),
+    return command_line.Report(
+        output.table_lines(heads[:fitting], [row[:fitting] for row in rows], left=0),
         {"folder": str(result.folder), "rows": table.to_dict(orient="records")},
         [*notes, f"table: {result.folder / result.name}"],
         code=ExitCode.SWEEP_HAS_FAILURES if result.failed else ExitCode.SUCCESS,
@@ -125,10 +125,10 @@ def _texts(result: SweepResult, names: list[str], short: dict[str, str]) -> tupl
     """Return heads and rows of a table of some columns, and how many of these fit on the screen, at least one."""
     heads = [short.get(name, name) for name in names]
     rows = [[cell_text(value) for value in row] for row in result.table[names].head(MOST_ROWS).itertuples(index=False)]
-    width, fitting = -len(GAP), 0
+    width, fitting = -len(output.GAP), 0
     for column in zip(heads, *rows, strict=True):
-        width += len(GAP) + max(map(len, column))
-        if width > width_of_screen():
+        width += len(output.GAP) + max(map(len, column))
+        if width > output.width_of_screen():
             break
         fitting += 1
     return heads, rows, max(fitting, 1)

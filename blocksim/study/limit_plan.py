@@ -30,8 +30,7 @@ from blocksim.scenario.placement import smallest_width
 from blocksim.scenario.units import parse_unit
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
-from blocksim.study import criterion, runs
-from blocksim.study.answer import with_unit
+from blocksim.study import answer, criterion, runs
 from blocksim.study.criterion import Criterion, Verdict
 from blocksim.study.executors import Execution
 from blocksim.study.plan import Values, Variations, build_distributions, levels_of
@@ -414,7 +413,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
         try:
             at_ends.append(plan.scenario_at(number))
         except BlocksimError as error:
-            message = f"{key} = {with_unit(number, unit)}: {str(error).splitlines()[0]}"
+            message = f"{key} = {answer.with_unit(number, unit)}: {str(error).splitlines()[0]}"
             raise InvalidInputError(message) from error
     start = bare.data.get("start")
     if (isinstance(start, Mapping) and "settle" in start) or not all(map(is_sustained, at_ends)):
