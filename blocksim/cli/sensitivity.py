@@ -52,7 +52,7 @@ def sensitivity_command(
         write_text(out, text.getvalue())
     lines: list[str] = []
     for output in found.outputs:
-        if output.varies:
+        if output.numbers:
             lines += [*([""] if lines else []), *_table(found, output)]
     return command_line.Report(
         lines or ["no result varies: none of these inputs matters"], found.to_dict(), _notes(found, out)
@@ -73,7 +73,7 @@ def _table(found: Sensitivity, output: Indices) -> list[str]:
 
 def _notes(found: Sensitivity, out: Path | None) -> Iterator[str]:
     yield from (f"{column}: {meaning}" for column, meaning in found.meanings.items())
-    still = [output.name for output in found.outputs if not output.varies]
+    still = [output.name for output in found.outputs if not output.numbers]
     if still:
         yield f"does not vary: {', '.join(still)}"
     if found.failed:

@@ -10,13 +10,14 @@ from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedE
 from blocksim.options import Option
 from blocksim.scenario import load_stored
 from blocksim.simulation.compilation import kernels_of
+from blocksim.simulation.folder import SCENARIO
+from blocksim.study import verify
+from blocksim.study.answer import study_in
 from blocksim.study.manifest import is_sweep
 from blocksim.study.run import Threads
-from blocksim.study.study import study_in
+from blocksim.study.stored_run import find_run
 from blocksim.study.sweep import kernels_for
 from blocksim.study.sweep_folder import read_plan
-from blocksim.study.verify_run import EntryDifference, Origin, RunVerdict, scenario_of, verify_run
-from blocksim.study.verify_study import DEGREES, MM, SAMPLE, SweepVerdict, verify_study, verify_sweep
 
 INDENT = "  "
 MOST_LINES = 5
@@ -39,7 +40,9 @@ def verify_run_command(
         ),
     ],
     threads: Threads = 1,
-    sample: Annotated[int, Option("Number of rows of a sweep or study to run again.", metavar="N", least=1)] = SAMPLE,
+    sample: Annotated[
+        int, Option("Number of rows of a sweep or study to run again.", metavar="N", least=1)
+    ] = verify.SAMPLE,
     seed: Annotated[int, Option("Random seed for the choice of rows.", metavar="S", least=0)] = 0,
     screen: command_line.Screen,
 ) -> command_line.Report:
@@ -66,15 +69,19 @@ def _verified(place: Path, threads: int, sample: int, seed: int, screen: command
         if study is not None:
             kernels = [kernels_of(load_stored(place / study.answer.files.plan))]
         else:
-            kernels = [*kernels_for(read_plan(place))] if is_sweep(place) else [kernels_of(scenario_of(place))]
+            kernels = (
+                [*kernels_for(read_plan(place))]
+                if is_sweep(place)
+                else [kernels_of(load_stored(find_run(place) / SCENARIO))]
+            )
         for one in kernels:
             prepare.announce_compilation(one, quiet=screen.silent)
         if study is not None:
-            return _of_study(verify_study(place, study, sample, seed))
+            return _of_study(verify.verify_study(place, study, sample, seed))
         if is_sweep(place):
-            return _of_sweep(verify_sweep(place, sample, seed))
+            return _of_sweep(verify.verify_sweep(place, sample, seed))
         with progress.run_progress(quiet=screen.silent) as on_progress:
-            verdict = verify_run(place, threads=threads, on_progress=on_progress)
+            verdict = verify.verify_run(place, threads=threads, on_progress=on_progress)
         if verdict.agrees and verdict.origins:
             screen.note("\n".join(_changes(verdict.origins)))
         return _of_run(verdict)
@@ -87,7 +94,7 @@ def _verified(place: Path, threads: int, sample: int, seed: int, screen: command
         return command_line.Report([f"{place}: {kind}"], data, code=error.exit_code)
 
 
-def _of_study(verdicts: tuple[SweepVerdict, ...]) -> command_line.Report:
+def _of_study(verdicts: tuple[verify.SweepVerdict, ...]) -> command_line.Report:
     """Report a study, of a curve of limits every search and then the curve."""
     reports = [_of_sweep(one, "runs", "table and answer follow from the runs; ") for one in verdicts]
     agrees = all(one.agrees for one in verdicts)
@@ -100,14 +107,14 @@ def _of_study(verdicts: tuple[SweepVerdict, ...]) -> command_line.Report:
     return command_line.Report([line for one in reports for line in one.lines], data, code=ExitCode(not agrees))
 
 
-def _of_run(verdict: RunVerdict) -> command_line.Report:
+def _of_run(verdict: verify.RunVerdict) -> command_line.Report:
     lines = [f"{verdict.folder}: bit-identical: final state, {verdict.frames.frames[0]} frames, final.csv"]
     if not verdict.agrees:
         lines = [f"{verdict.folder}: differs", *(INDENT + line for line in _reasons(verdict))]
     return command_line.Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))
 
 
-def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> command_line.Report:
+def _of_sweep(verdict: verify.SweepVerdict, what: str = "rows", study: str = "") -> command_line.Report:
     count = f"{len(verdict.checked)} of {verdict.rows} {what}"
     if verdict.agrees:
         kept = f", bit-identical in {len(verdict.runs)} kept runs" if verdict.runs else ""
@@ -121,7 +128,7 @@ def _of_sweep(verdict: SweepVerdict, what: str = "rows", study: str = "") -> com
     return command_line.Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))
 
 
-def _reasons(verdict: RunVerdict) -> Iterator[str]:
+def _reasons(verdict: verify.RunVerdict) -> Iterator[str]:
     """Report in what a run differs."""
     yield from (f"{name} was changed after the run (SHA-256 in run.json)" for name in verdict.changed)
     then, now = verdict.status
@@ -136,7 +143,7 @@ def _reasons(verdict: RunVerdict) -> Iterator[str]:
     yield from _changes(verdict.origins)
 
 
-def _entries(found: Sequence[EntryDifference]) -> Iterator[str]:
+def _entries(found: Sequence[verify.EntryDifference]) -> Iterator[str]:
     """Report which entries of a summary differ."""
     yield from first_of(
         [f"{one.file}: {one.entry}: {one.stored!r} stored, {one.now!r} now" for one in found], "entries"
@@ -150,7 +157,7 @@ def first_of(lines: Sequence[str], what: str) -> Iterator[str]:
         yield f"and {len(lines) - MOST_LINES} {what} more"
 
 
-def _parting(verdict: RunVerdict) -> Iterator[str]:
+def _parting(verdict: verify.RunVerdict) -> Iterator[str]:
     """Report where the frames of a run differ from those of the new run."""
     frames = verdict.frames
     stored, now = frames.frames
@@ -170,17 +177,17 @@ def _parting(verdict: RunVerdict) -> Iterator[str]:
     yield f"largest difference: {frames.largest_mm:.3g} mm, {frames.largest_deg:.3g}°"
 
 
-def _cells(verdict: SweepVerdict) -> Iterator[str]:
+def _cells(verdict: verify.SweepVerdict) -> Iterator[str]:
     """Report which cells of a sweep differ."""
     values = (f"{one.stored or 'nothing'} stored, {one.now or 'nothing'} now" for one in verdict.cells)
     places = (f"row {one.row}, case {one.case}, {one.column}" for one in verdict.cells)
     yield from first_of(list(map(": ".join, zip(places, values, strict=True))), "cells")
     if verdict.cells:
-        yield f"largest difference: {verdict.largest(MM):.3g} mm, {verdict.largest(DEGREES):.3g}°"
+        yield f"largest difference: {verdict.largest(verify.MM):.3g} mm, {verdict.largest(verify.DEGREES):.3g}°"
     yield from _changes(verdict.origins)
 
 
-def _changes(origins: tuple[Origin, ...]) -> Iterator[str]:
+def _changes(origins: tuple[verify.Origin, ...]) -> Iterator[str]:
     """Yield what has changed since the results were made; of long lists only what was removed or added."""
     if not origins:
         yield "code, versions and processor are unchanged"

@@ -23,9 +23,9 @@ from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides,
 from blocksim.scenario.models.study import Normal, Uniform, toml_number
 from blocksim.silence import silent
 from blocksim.simulation import atomic, folder, provenance
-from blocksim.study import compare, vary
+from blocksim.study import compare
+from blocksim.study import plan as plans
 from blocksim.study.executors.ensemble import Member
-from blocksim.study.plan import Values, Variations, build_distributions, design_of
 from blocksim.study.rows import Range, check_experiment, ranges_of, si_number, values_at
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def members_of(
         return
     plan = scatter.model_copy(update={"mode": mode, "samples": count, "seed": seed})
     names = {overrides.parse_key(key): key for key in fitted}
-    for row in design_of(plan):
+    for row in plans.design_of(plan):
         values = dict(fitted)
         for key, value in row.items():
             name = names.get(overrides.parse_key(key), key)
@@ -217,25 +217,25 @@ class CalibrateOptions:
     """What is fitted under which scatter, how long it is searched, and where the answer goes."""
 
     fit: Annotated[
-        Mapping[str, Values],
-        vary.variations_option(
+        Mapping[str, plans.Values],
+        plans.variations_option(
             "A key to fit, and its prior. Repeatable.",
             "KEY=FROM:TO",
             'The priors by dotted key, as {"contact.restitution": {"from": 0.2, "to": 0.35}}.',
             FIT,
-            vary.RANGE,
+            plans.RANGE,
         ),
     ] = field(default_factory=dict)
     scatter: Annotated[
-        Mapping[str, Values] | None,
-        vary.variations_option(
+        Mapping[str, plans.Values] | None,
+        plans.variations_option(
             "Scatter of an input (KEY=FROM:TO: uniform); of a fitted key, about its fitted value. Repeatable. "
             "Default: the distributions of [sweep].",
             "KEY=MEAN+-SD",
             "The distributions of inputs, {mean, sd} or {from, to} (default: those of [sweep]); of a fitted "
             "key, about its fitted value.",
             SCATTER,
-            vary.SPREAD,
+            plans.SPREAD,
         ),
     ] = None
     _: KW_ONLY
@@ -267,16 +267,16 @@ def calibration_plan(document: Document, options: CalibrateOptions) -> Calibrati
     InvalidInputError where the table does not go with the blocks, nothing is fitted, or nothing scatters though there
     is more than one member.
     """
-    fit, scatter = Variations.of(options.fit), Variations.of(options.scatter or {})
+    fit, scatter = plans.Variations.of(options.fit), plans.Variations.of(options.scatter or {})
     if not fit:
         raise InvalidInputError("nothing to fit: give --fit KEY=FROM:TO")
     if options.experiment is not None:
         experiment = Path(options.experiment)
         load_table(experiment)  # so that its mistakes are reported of the option
         document = document.with_values({TABLE: input_files.user_value(TABLE, str(experiment.absolute()))})
-    fits = build_distributions(document, fit, FIT, MODE)
+    fits = plans.build_distributions(document, fit, FIT, MODE)
     if scatter:
-        scattered: Sweep | None = build_distributions(document, scatter, SCATTER, MODE)
+        scattered: Sweep | None = plans.build_distributions(document, scatter, SCATTER, MODE)
     else:
         own = document.build().sweep
         scattered = own if own is not None and own.is_sampled else None
@@ -297,7 +297,7 @@ def calibration_plan(document: Document, options: CalibrateOptions) -> Calibrati
     )
 
 
-def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: Variations, scatter: Variations) -> None:
+def _refuse_unfit(fits: Sweep, scattered: Sweep | None, fit: plans.Variations, scatter: plans.Variations) -> None:
     """Refuse priors that are no ranges, keys inside one another, and scatter that cannot be moved to a fitted value."""
     problems = []
     for key, values in fits.vary.items():

@@ -22,8 +22,8 @@ from blocksim.extras import load_module
 from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of
 from blocksim.simulation import compilation, observables
-from blocksim.study import criterion, fragility_plan, manifest, study, sweep, sweep_folder
-from blocksim.study.answer import Answer, Overview, with_unit
+from blocksim.study import criterion, fragility_plan, manifest, sweep, sweep_folder
+from blocksim.study.answer import Answer, Overview, Study, with_unit
 from blocksim.study.executors import Execution
 from blocksim.study.rows import FINISHED, Head, Row
 from blocksim.study.runs import Replay, make_folder
@@ -358,4 +358,4 @@ def repeat_fragility(answer: FragilityAnswer, execution: Replay, out: Path) -> F
     return run_fragility(plan, options, execution)
 
 
-FRAGILITY = study.Study(FragilityAnswer, repeat_fragility, is_design=True)
+FRAGILITY = Study(FragilityAnswer, repeat_fragility, is_design=True)

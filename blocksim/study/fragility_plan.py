@@ -24,7 +24,6 @@ from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
 from blocksim.study import answer, criterion, limit_plan, manifest, plan, rows, runs
 from blocksim.study.executors import Execution
-from blocksim.study.vary import variations_option
 
 INTENSITY, SCATTER, STRIPES, FAILS = "--intensity", "--scatter", "--stripes", "--fails"
 COLLAPSE = "outcome = fell"
@@ -43,7 +42,7 @@ class FragilityOptions(Execution):
 
     intensity: Annotated[
         Mapping[str, plan.Values],
-        variations_option(
+        plan.variations_option(
             "The key that is the intensity: KEY=a,b,c or KEY=FROM:TO:COUNT (:log at the end spaces them "
             "logarithmically).",
             "KEY=VALUES",
@@ -54,7 +53,7 @@ class FragilityOptions(Execution):
     ]
     scatter: Annotated[
         Mapping[str, plan.Values] | None,
-        variations_option(
+        plan.variations_option(
             "Quantity to sample: KEY=MEAN+-SD, KEY=FROM:TO or equally likely values, KEY=a,b,c. Repeatable. Default: "
             "the distributions of [sweep].",
             "KEY=MEAN+-SD",
@@ -66,7 +65,7 @@ class FragilityOptions(Execution):
     _: KW_ONLY
     stripes: Annotated[
         Mapping[str, plan.Values] | None,
-        variations_option(
+        plan.variations_option(
             "Records that all intensities share, each once at each of them, such as motion.table=a.csv,b.csv. "
             "Repeatable: keys whose values go together.",
             "KEY=a,b,c",

@@ -23,7 +23,8 @@ from blocksim.silence import silent
 from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import build
-from blocksim.study import limit_answer, limit_margin, limit_plan, study, sweep_folder
+from blocksim.study import limit_answer, limit_margin, limit_plan, sweep_folder
+from blocksim.study.answer import Study
 from blocksim.study.criterion import Verdict, falls_before_zero
 from blocksim.study.executors import Execution, ensemble
 from blocksim.study.limit_plan import Change, LimitPlan, Number
@@ -324,5 +325,5 @@ def repeat_curve(answer: limit_answer.CurveAnswer, _: Replay, out: Path) -> limi
     return again
 
 
-LIMIT = study.Study(limit_answer.LimitAnswer, repeat_limit)
-CURVE = study.Study(limit_answer.CurveAnswer, repeat_curve, parts=lambda answer: list(answer.places().values()))
+LIMIT = Study(limit_answer.LimitAnswer, repeat_limit)
+CURVE = Study(limit_answer.CurveAnswer, repeat_curve, parts=lambda answer: list(answer.places().values()))

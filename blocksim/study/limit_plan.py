@@ -33,9 +33,8 @@ from blocksim.simulation.provenance import code_hash
 from blocksim.study import answer, criterion, runs
 from blocksim.study.criterion import Criterion, Verdict
 from blocksim.study.executors import Execution
-from blocksim.study.plan import Values, Variations, build_distributions, levels_of
+from blocksim.study.plan import RANGE, Values, Variations, build_distributions, levels_of, variations_option
 from blocksim.study.rows import Head, Row, heads_of
-from blocksim.study.vary import RANGE, variations_option
 
 Kind = TypeVar("Kind")
 DIGITS = 12  # of a value that is tried: what people read is what was run

@@ -266,7 +266,7 @@ def table_rows(
         row = entry.row
         if ranges is not None:  # judged here and not when the case ended: the measured table may be mended
             row = {**row, "inside": ranges.hold(row) if row.get("status") == rows.FINISHED else None}
-        values = rows.varied_cells(cases.heads, settings).values()
+        values = [head.cell(settings[head.key]) for head in cases.heads]
         yield list(map(rows.as_cell, [entry.case, *values, *map(row.get, (*OUTCOME, *verdict, *ends))]))
 
 

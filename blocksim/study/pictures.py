@@ -22,8 +22,8 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import compare, manifest, stored_run, sweep_folder
+from blocksim.study.answer import draw_study, study_in
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
-from blocksim.study.study import draw_study, study_in
 from blocksim.view import animation, history, run_data, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
 from blocksim.view.paint import COLOURS, paint_named

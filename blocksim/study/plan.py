@@ -1,4 +1,4 @@
-"""What a sweep varies: values that are given or drawn, the scenario of each case, what all will cost."""
+"""What a sweep varies: values that are typed, given or drawn, the scenario of each case, what all will cost."""
 
 import functools
 import hashlib
@@ -17,13 +17,22 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError, Problem, ScenarioError
 from blocksim.extras import load_module
+from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, Sweep, scenario_hash, units
 from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fault
 from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.motion import TABLED
 from blocksim.scenario.models.study import Normal, Uniform, Variation, round_digits, toml_number
-from blocksim.scenario.overrides import Override, format_key, freeze, parse_key, parse_value, with_value
+from blocksim.scenario.overrides import (
+    Override,
+    UnfitOverrideError,
+    format_key,
+    freeze,
+    parse_key,
+    parse_value,
+    with_value,
+)
 from blocksim.simulation.provenance import run_hash
 from blocksim.study.rows import Head, check_experiment, heads_of
 
@@ -108,13 +117,13 @@ def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Colum
     values = []
     for cell in cells:
         try:
-            values.append(_value(cell, unit))
+            values.append(_cell_value(cell, unit))
         except ValueError as error:
             problems.append(cell.problem(str(error)))
     return Column(key, head, cells, values)
 
 
-def _value(cell: Cell, unit: str | None) -> object:
+def _cell_value(cell: Cell, unit: str | None) -> object:
     """Return a cell as a scenario takes it; raises ValueError with a message for the user."""
     if not cell.text:
         raise ValueError("this cell is empty")
@@ -397,6 +406,15 @@ def table_digests(document: Document, vary: Mapping[str, Variation]) -> dict[str
     return digests
 
 
+ENDS = ("from", "to", "count")
+LEAST_ENDS = 2
+LOG = "log"
+PLUS_MINUS = ("+-", "±")
+FORMS = "KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd (from:to also with :log at the end)"
+RANGE = "KEY=from:to (also with :log at the end)"
+SPREAD = "KEY=from:to, KEY=mean+-sd or KEY=a,b,c (from:to also with :log at the end)"
+
+
 class Variations(dict[str, Values]):
     """What is said of each key, as a [sweep] table has it, and the text in which a person said it."""
 
@@ -411,6 +429,62 @@ class Variations(dict[str, Values]):
         if isinstance(tables, cls):
             return tables
         return cls(tables, {key: f"{key}={values}" for key, values in tables.items()})
+
+
+def variations_option(
+    text: str, metavar: str, python: str, flag: str = "--vary", forms: str = FORMS, *, is_repeatable: bool = True
+) -> Option:
+    """Return an option that gives values to keys, KEY=VALUES, of which there may be several."""
+
+    def read(texts: str | Sequence[str]) -> Variations:
+        return read_variations([texts] if isinstance(texts, str) else texts, flag, forms)
+
+    return Option(text, (flag,), metavar, python, read, is_repeatable=is_repeatable, complete="scenario_keys")
+
+
+def read_variations(texts: Sequence[str], option: str = "--vary", forms: str = FORMS) -> Variations:
+    """Return the values of each key in texts such as `key=a,b,c`, `key=from:to:count` or `key=mean+-sd`.
+
+    Raises ScenarioError where a text is none of these `forms`, which are those that the option takes; wrong keys and
+    values show when the document is built.
+    """
+    unread, repeated, parts = [], [], {}
+    for text in texts:
+        key, equals, values = (part.strip() for part in text.partition("="))
+        if not (equals and key and values):
+            unread.append(Problem(f"{option} {text}", f"write {forms}"))
+        elif key in parts:
+            repeated.append(Problem(f"{option} {key}", "given twice; list all its values once"))
+        else:
+            parts[key] = (text, values)
+    if problems := [*unread, *repeated]:
+        raise ScenarioError(list(dict.fromkeys(problems)))
+    return Variations(
+        tables={key: _values(values) for key, (_, values) in parts.items()},
+        texts={key: text for key, (text, _) in parts.items()},
+    )
+
+
+def _values(text: str) -> Values:
+    sign = next((sign for sign in PLUS_MINUS if sign in text), None)
+    if sign is not None:
+        mean, _, sd = text.partition(sign)
+        return {"mean": _value(mean), "sd": _value(sd)}
+    parts = [_value(part) for part in text.split(":")]
+    if len(parts) > LEAST_ENDS and parts[-1] == LOG:
+        return {**dict(zip(ENDS, parts[:-1], strict=False)), "scale": LOG} if len(parts) <= len(ENDS) + 1 else parts
+    if LEAST_ENDS <= len(parts) <= len(ENDS):
+        return dict(zip(ENDS, parts, strict=False))
+    return [_value(part) for part in text.split(",")]
+
+
+def _value(text: str) -> object:
+    """Return a TOML value, or the bare text, which is checked where it is used."""
+    text = text.strip()
+    try:
+        return parse_value(text) if text else text
+    except UnfitOverrideError:
+        return text
 
 
 def build_distributions(document: Document, given: Variations, option: str, mode: str) -> Sweep:

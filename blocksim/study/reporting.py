@@ -13,9 +13,9 @@ from blocksim.scenario import input_files, load_stored
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
 from blocksim.study import compare, manifest, stored_run, sweep_folder
+from blocksim.study.answer import study_in, study_page
 from blocksim.study.pictures import read_sweep_data
 from blocksim.study.rows import FINISHED, TABLE
-from blocksim.study.study import study_in, study_page
 from blocksim.view.report.page import write_report
 from blocksim.view.report.player import MOST_BYTES
 from blocksim.view.report.subjects import (

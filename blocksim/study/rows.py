@@ -105,11 +105,6 @@ def heads_of(sweep: Sweep) -> tuple[Head, ...]:
     return tuple(Head(key, _unit(values)) for key, values in sweep.vary.items())
 
 
-def varied_cells(heads: Iterable[Head], settings: Mapping[str, object]) -> dict[str, object]:
-    """Return the varied values of a case by the names of their columns."""
-    return {str(head): head.cell(settings[head.key]) for head in heads}
-
-
 def _unit(values: object) -> str:
     """Return the unit of a column: the first that was typed, where all values are numbers."""
     if not isinstance(values, tuple):

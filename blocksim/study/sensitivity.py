@@ -17,10 +17,9 @@ from blocksim.scenario import Source, Sweep, document_of
 from blocksim.scenario.models.study import Normal, Variation
 from blocksim.silence import silent
 from blocksim.simulation import compilation, frames
+from blocksim.study import plan as plans
 from blocksim.study.executors.ensemble import run_members
-from blocksim.study.plan import Values, Variations, build_distributions, draw_values, open_interval
 from blocksim.study.rows import quarter_turns, ranges_of, values_at
-from blocksim.study.vary import SPREAD, variations_option
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -188,11 +187,6 @@ class Indices:
     sd: float
     numbers: Mapping[str, tuple[float, ...]]
 
-    @property
-    def varies(self) -> bool:
-        """Return True if there is a variation to be explained."""
-        return bool(self.numbers)
-
 
 @dataclass(frozen=True)
 class Sensitivity:
@@ -218,7 +212,7 @@ class Sensitivity:
             {"output": output.name, "unit": output.unit, "key": key}
             | {column: values[index] for column, values in output.numbers.items()}
             for output in self.outputs
-            if output.varies
+            if output.numbers
             for index, key in enumerate(self.keys)
         ]
 
@@ -239,7 +233,7 @@ class Sensitivity:
             self.method.sample_word.replace(" ", "_"): self.blocks,
             "left_out": self.left_out,
             "outputs": [
-                {"output": one.name, "unit": one.unit, "mean": one.mean, "sd": one.sd, "varies": one.varies}
+                {"output": one.name, "unit": one.unit, "mean": one.mean, "sd": one.sd, "varies": bool(one.numbers)}
                 for one in self.outputs
             ],
             "indices": self.records(),
@@ -251,14 +245,14 @@ class SensitivityOptions:
     """Which inputs vary, and the design of the runs."""
 
     vary: Annotated[
-        Mapping[str, Values] | None,
-        variations_option(
+        Mapping[str, plans.Values] | None,
+        plans.variations_option(
             "An input and its distribution: KEY=FROM:TO, KEY=MEAN+-SD or KEY=a,b,c. Repeatable. "
             "Default: the distributions of [sweep].",
             "KEY=FROM:TO",
             'The distribution of each dotted key, as {"gravity": {"from": 9.7, "to": 9.9}}, {mean, sd} or a '
             "list (default: those of [sweep]).",
-            forms=SPREAD,
+            forms=plans.SPREAD,
         ),
     ] = None
     _: KW_ONLY
@@ -296,14 +290,16 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
     if options.method not in METHODS:
         raise InvalidInputError(f"unknown method {options.method!r}; choose one of {', '.join(METHODS)}")
     document, method = document_of(scenario), METHODS[options.method]
-    vary, is_typed = options.vary, isinstance(options.vary, Variations)
+    vary, is_typed = options.vary, isinstance(options.vary, plans.Variations)
     if vary:
-        plan: Sweep | None = build_distributions(document, Variations.of(vary), VARY if is_typed else "vary", MODE)
+        plan: Sweep | None = plans.build_distributions(
+            document, plans.Variations.of(vary), VARY if is_typed else "vary", MODE
+        )
     else:
         plan = document.build().sweep
     if plan is None or not plan.is_sampled:
-        given = f"{VARY} KEY=FROM:TO" if is_typed else "vary={key: {'from': a, 'to': b}}"
-        raise InvalidInputError(f"nothing to vary: give {given}, or a [sweep] table with distributions")
+        form = f"{VARY} KEY=FROM:TO" if is_typed else "vary={key: {'from': a, 'to': b}}"
+        raise InvalidInputError(f"nothing to vary: give {form}, or a [sweep] table with distributions")
     document = document.without_sweep()
     base = document.build()
     options.on_start(compilation.kernels_of(base))
@@ -344,8 +340,8 @@ def settings_at(points: Floats, vary: Mapping[str, Variation]) -> Iterator[dict[
     columns = []
     for values, places in zip(vary.values(), points.T, strict=True):
         # not at the infinite ends of a normal distribution
-        inner = TAIL + (1.0 - 2.0 * TAIL) * places if isinstance(values, Normal) else open_interval(places)
-        columns.append(draw_values(values, inner))
+        inner = TAIL + (1.0 - 2.0 * TAIL) * places if isinstance(values, Normal) else plans.open_interval(places)
+        columns.append(plans.draw_values(values, inner))
     return (dict(zip(vary, row, strict=True)) for row in zip(*columns, strict=True))
 
 

@@ -24,8 +24,17 @@ from blocksim.simulation import folder as files
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.study import manifest, rows, sweep_folder
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
-from blocksim.study.plan import Cases, Settings, Values, cases_of, levels_of, plan_of, table_digests, with_sweep
-from blocksim.study.vary import variations_option
+from blocksim.study.plan import (
+    Cases,
+    Settings,
+    Values,
+    cases_of,
+    levels_of,
+    plan_of,
+    table_digests,
+    variations_option,
+    with_sweep,
+)
 
 TIMINGS = "timings.csv"
 MOST_INVALID = 500  # kept in memory before they are written

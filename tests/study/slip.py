@@ -8,11 +8,10 @@ from pydantic import BaseModel
 
 from blocksim.scenario import Document
 from blocksim.silence import silent
-from blocksim.study.answer import Answer, Overview
+from blocksim.study.answer import Answer, Overview, Study
 from blocksim.study.executors import Execution
 from blocksim.study.rows import Row
 from blocksim.study.runs import Replay, runs_of
-from blocksim.study.study import Study
 from blocksim.study.sweep_folder import FolderKind
 from blocksim.view.style import Paper
 from tests.study.test_limit import SQUAT, block_on_a_slope

@@ -13,7 +13,7 @@ from blocksim.study.pictures import read_sweep_data
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.rows import Head, Ranges, heads_of
 from blocksim.study.sweep import sweep
-from blocksim.study.verify_study import verify_sweep
+from blocksim.study.verify import verify_sweep
 from tests.study.conftest import SCENARIOS
 from tests.study.plans import OVERLAP, TILT, cases, plan_of
 

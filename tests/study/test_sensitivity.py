@@ -58,7 +58,7 @@ def test_measured_quantities_and_outcome_are_looked_at() -> None:
     names = [output.name for output in result.outputs]
     assert names[:3] == ["x of block 1", "x of block 2", "x of block 3"]
     assert names[-2:] == ["measured outcome 0/-90/-90", "inside all measured ranges"]
-    assert not result.outputs[0].varies
+    assert not result.outputs[0].numbers
     block_2 = result.outputs[names.index("x of block 2")]
     kinetic, _ = block_2.numbers["mu"]
     assert kinetic < -5.0  # more friction stops it sooner, by millimetres
@@ -73,7 +73,7 @@ def test_blocks_of_the_design_with_a_failed_run_are_left_out_and_counted() -> No
     assert 0 < result.failed < result.runs
     assert 0 < result.left_out < result.blocks == 16
     assert "ground" in result.first_problem
-    assert result.outputs[0].varies
+    assert result.outputs[0].numbers
 
 
 def test_too_many_failures_are_refused() -> None:

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyError
-from blocksim.study import study as studies
+from blocksim.study import answer as studies
+from blocksim.study.answer import study_in
 from blocksim.study.executors import Execution
 from blocksim.study.pictures import plot
 from blocksim.study.reporting import report
-from blocksim.study.study import study_in
-from blocksim.study.verify_study import verify_study
+from blocksim.study.verify import verify_study
 from tests.study.slip import SlipAnswer, slip
 
 CLUSTER = """

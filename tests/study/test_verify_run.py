@@ -5,7 +5,7 @@ from pathlib import Path
 import h5py
 
 from blocksim.simulation import simulate_into
-from blocksim.study.verify_run import verify_run
+from blocksim.study.verify import verify_run
 from tests.simulation.test_probes import PROBES, PULSE, scene
 
 
