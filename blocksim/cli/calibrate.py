@@ -108,9 +108,10 @@ def _probability(found: Fit) -> list[str]:
 
 
 def _notes(found: Fit) -> Iterator[str]:
-    for prior in found.at_bounds:
+    for prior in found.plan.priors:
         value = found.best.values[prior.key]
-        yield f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better"
+        if prior.lies_at_bound(value):
+            yield f"warning: {prior.key} = {value} lies at a bound of its prior; a wider one might fit better"
     failed = found.score.failed
     if failed:
         yield f"{failed} of {found.score.members} fresh samples failed or cannot be simulated; they count as outside"

@@ -145,11 +145,6 @@ class Fit:
         numbers = [prior.number(trial.values[prior.key]) for trial in self.ties or (self.best,)]
         return min(numbers), max(numbers)
 
-    @property
-    def at_bounds(self) -> tuple[calibrate_plan.Prior, ...]:
-        """Priors at an end of which the fitted value lies: a wider one might give a better fit."""
-        return tuple(prior for prior in self.plan.priors if prior.lies_at_bound(self.best.values[prior.key]))
-
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON."""
         low, high = self.score.interval
@@ -162,7 +157,7 @@ class Fit:
                     "prior": [prior.low, prior.high],
                     "unit": prior.unit,
                     "value": self.best.values[prior.key],
-                    "at_bound": prior in self.at_bounds,
+                    "at_bound": prior.lies_at_bound(self.best.values[prior.key]),
                     "equally_good": list(self.equally_good(prior)),
                 }
                 for prior in self.plan.priors

@@ -55,11 +55,6 @@ def _run(tasks: tuple[Task, ...], setting: Setting, ended: SimpleQueue[Batch]) -
     ended.put(Batch(tasks, tuple(rows), time.perf_counter() - began, platform.node()))
 
 
-def is_still_running() -> bool:
-    """Return True if steps are under way that nobody waits for; only the end of the process stops them."""
-    return any(thread.name == THREAD for thread in threading.enumerate())
-
-
 def rows_of(scenarios: Sequence[Scenario], threads: int, *, peaks: bool = False) -> list[Row]:
     """Return the row of every scenario; one that ends in an error of ours fails alone, found by halving."""
     if not scenarios:
