@@ -77,10 +77,6 @@ class Members:
         names = (str(name) for name in self.table.columns)
         return tuple(dict.fromkeys(name.rpartition(".")[0] for name in names if name.endswith(ends)))
 
-    def has(self, block: str, quantity: str) -> bool:
-        """Return True if the table has this quantity of this block."""
-        return _column(block, quantity) in self.table
-
     def values(self, block: str, quantity: str) -> "NDArray[np.float64]":
         """Return one quantity of one block (mm or deg), shape (count,); NaN where a member has none.
 
@@ -88,7 +84,7 @@ class Members:
         """
         import pandas as pd
 
-        name = _column(block, quantity)
+        name = f"{block}.{experiment.QUANTITIES[quantity].final_column}"
         if name not in self.table:
             message = (
                 f"{self.source}: no column {name}, which the measured {quantity} of block '{block}' is compared with"
@@ -103,10 +99,6 @@ class Members:
             raise InvalidInputError(message)
         values = np.where(self.finished, numbers.to_numpy(dtype=float, na_value=np.nan), np.nan)
         return np.where(np.isfinite(values), values, np.nan)
-
-
-def _column(block: str, quantity: str) -> str:
-    return f"{block}.{experiment.QUANTITIES[quantity].final_column}"
 
 
 Floats = NDArray[np.float64]

@@ -14,21 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.analysis import compare
-from blocksim.analysis.evidence import (
-    BLOCK,
-    Column,
-    Evidence,
-    Failure,
-    Findings,
-    Floats,
-    Form,
-    Interval,
-    Members,
-    Metric,
-    Row,
-    complete_repeats,
-    evidence_of,
-)
+from blocksim.analysis import evidence as facts
 from blocksim.analysis.experiment import ExperimentTable
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
@@ -51,8 +37,8 @@ FEWEST = 4  # values of a sample that is worth resampling
 SMALLEST_EIGENVALUE = 1e-9  # of the correlation matrix: below it, one position follows from the others
 Places = NDArray[np.int64]
 SHARE = (
-    Column("share", "share", Form.SHARE, "inside / of", 1),
-    Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+    facts.Column("share", "share", facts.Form.SHARE, "inside / of", 1),
+    facts.Column("interval", "95 %", facts.Form.SHARE, "Clopper-Pearson limits of the probability", 1),
 )
 
 
@@ -62,22 +48,27 @@ def outcome(rotations: Sequence[float]) -> str:
     return ", ".join(turns)
 
 
-def _find_outcome(evidence: Evidence) -> Findings:
+def _find_outcome(evidence: facts.Evidence) -> facts.Findings:
     measured = [pair for pair in evidence.pairs if pair.measured.quantity == ROTATION]
     members = evidence.members
     blocks = [pair.measured.block for pair in measured] or [
-        block for block in members.blocks if members.has(block, ROTATION)
+        block for block in members.blocks if f"{block}.rotation_deg" in members.table
     ]
     if not blocks:
-        return Findings((), ("not computed: the sweep has no rotations",))
+        return facts.Findings((), ("not computed: the sweep has no rotations",))
     rotations = np.column_stack([members.values(block, ROTATION) for block in blocks])
-    repeats, incomplete = complete_repeats(measured)
+    repeats, incomplete = facts.complete_repeats(measured)
     ends = zip(rotations.tolist(), members.finished, strict=True)
     found = Counter(outcome(row) if has_ended else FAILED for row, has_ended in ends)
     seen = Counter(map(outcome, repeats.tolist()))
-    rows: list[Row] = []
+    rows: list[facts.Row] = []
     for name in sorted({*found, *seen}, key=lambda name: (-found[name], -seen[name], name)):
-        row: Row = {"outcome": name, "members": found[name], "of": found.total(), **_share(found[name], found.total())}
+        row: facts.Row = {
+            "outcome": name,
+            "members": found[name],
+            "of": found.total(),
+            **_share(found[name], found.total()),
+        }
         row |= dict.fromkeys(("measured", "repeats", "lower_bound"), None)
         if seen[name]:
             bound = compare.lower_bound(seen[name], seen.total())
@@ -88,25 +79,25 @@ def _find_outcome(evidence: Evidence) -> Findings:
         messages.append(f"left out, as not all rotations were measured: replicate {incomplete}")
     if seen:
         messages.append("at least: one-sided 95 % limit of the measured share")
-    return Findings(tuple(rows), tuple(messages))
+    return facts.Findings(tuple(rows), tuple(messages))
 
 
-def _share(count: int, total: int) -> Row:
+def _share(count: int, total: int) -> facts.Row:
     return {"share": count / total, "interval": compare.interval(count, total)}
 
 
-OUTCOME = Metric(
+OUTCOME = facts.Metric(
     "outcome",
     "final rotations, rounded to quarter turns (deg)",
     (
-        Column("outcome", "outcome", Form.TEXT, "rotation of each block, rounded to 90 degrees"),
-        Column("members", "samples", Form.COUNT, "samples with this outcome"),
-        Column("of", "of", Form.COUNT, "all samples, failed ones included"),
-        Column("share", "share", Form.SHARE, "samples / of", 1),
-        Column("interval", "95 %", Form.SHARE, "Clopper-Pearson limits of the probability", 1),
-        Column("measured", "measured", Form.COUNT, "repeats with this outcome"),
-        Column("repeats", "of", Form.COUNT, "all repeats"),
-        Column("lower_bound", "at least", Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) if all n agree", 1),
+        facts.Column("outcome", "outcome", facts.Form.TEXT, "rotation of each block, rounded to 90 degrees"),
+        facts.Column("members", "samples", facts.Form.COUNT, "samples with this outcome"),
+        facts.Column("of", "of", facts.Form.COUNT, "all samples, failed ones included"),
+        facts.Column("share", "share", facts.Form.SHARE, "samples / of", 1),
+        facts.Column("interval", "95 %", facts.Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+        facts.Column("measured", "measured", facts.Form.COUNT, "repeats with this outcome"),
+        facts.Column("repeats", "of", facts.Form.COUNT, "all repeats"),
+        facts.Column("lower_bound", "at least", facts.Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) if all n agree", 1),
     ),
     _find_outcome,
 )
@@ -117,7 +108,7 @@ def repeat_passes(n: int) -> float:
     return (n - 1) / (n + 1)
 
 
-def repeat_passes_all(counts: list[int]) -> Interval | float | None:
+def repeat_passes_all(counts: list[int]) -> facts.Interval | float | None:
     """Return the bounds of the probability that the next repeat passes all tests, with n repeats in each."""
     if not counts:
         return None
@@ -126,65 +117,67 @@ def repeat_passes_all(counts: list[int]) -> Interval | float | None:
     return chances[0] if len(chances) == 1 else (least, min(chances))
 
 
-def _find_inside(evidence: Evidence) -> Findings:
+def _find_inside(evidence: facts.Evidence) -> facts.Findings:
     total = evidence.members.count
-    rows: list[Row] = []
+    rows: list[facts.Row] = []
     ranged = []  # repeats of those whose limits are those of the repeats, and no tolerance about them
     for pair in evidence.pairs:
         n, count = pair.measured.n, int(pair.between(pair.limits).sum())
         has_range = pair.limits == (pair.measured.minimum, pair.measured.maximum)
         ranged += [n] if has_range else []
-        row: Row = {**pair.head, "limits": pair.limits, "inside": count, "of": total, **_share(count, total)}
+        row: facts.Row = {**pair.head, "limits": pair.limits, "inside": count, "of": total, **_share(count, total)}
         rows.append({**row, "repeat_passes": repeat_passes(n) if has_range else None})
     count, failed = int(evidence.inside.sum()), total - int(evidence.members.finished.sum())
-    last: Row = {"block": ALL, "quantity": "", "unit": "", "limits": None, "inside": count, "of": total}
+    last: facts.Row = {"block": ALL, "quantity": "", "unit": "", "limits": None, "inside": count, "of": total}
     rows.append({**last, **_share(count, total), "repeat_passes": repeat_passes_all(ranged)})
     text = f"shares are of all {total} samples" + (f"; {failed} did not finish and count as outside" if failed else "")
-    return Findings(tuple(rows), (text,))
+    return facts.Findings(tuple(rows), (text,))
 
 
-def _find_predicted(evidence: Evidence) -> Findings:
+def _find_predicted(evidence: facts.Evidence) -> facts.Findings:
     total = evidence.members.count
-    rows: list[Row] = []
+    rows: list[facts.Row] = []
     for pair in (pair for pair in evidence.lengths if pair.scatters):
         half = compare.prediction_half_width(pair.measured.s, pair.measured.n)
         ends = (pair.measured.mean - half, pair.measured.mean + half)
         count = int(pair.between(ends).sum())
         rows.append({**pair.head, "prediction": ends, "inside": count, "of": total, **_share(count, total)})
     without = (pair.name for pair in evidence.lengths if not pair.scatters)
-    return Findings(tuple(rows), tuple(f"{name}: repeats without scatter predict nothing" for name in without))
+    return facts.Findings(tuple(rows), tuple(f"{name}: repeats without scatter predict nothing" for name in without))
 
 
-INSIDE = Metric(
+INSIDE = facts.Metric(
     "inside",
     "samples inside the measured limits, by the rules for single runs",
     (
-        *BLOCK,
-        Column("limits", "limits", Form.NUMBER, "limits of inside, as for a single run"),
-        Column("inside", "inside", Form.COUNT, "samples inside; failed ones count as outside"),
-        Column("of", "", Form.COUNT, "all samples, failed ones included"),
+        *facts.BLOCK,
+        facts.Column("limits", "limits", facts.Form.NUMBER, "limits of inside, as for a single run"),
+        facts.Column("inside", "inside", facts.Form.COUNT, "samples inside; failed ones count as outside"),
+        facts.Column("of", "", facts.Form.COUNT, "all samples, failed ones included"),
         *SHARE,
-        Column("repeat_passes", "repeat", Form.SHARE, "probability that the next repeat is inside: (n-1)/(n+1)", 0),
+        facts.Column(
+            "repeat_passes", "repeat", facts.Form.SHARE, "probability that the next repeat is inside: (n-1)/(n+1)", 0
+        ),
     ),
     _find_inside,
 )
-PREDICTION = Metric(
+PREDICTION = facts.Metric(
     "prediction",
     "samples inside the 95 % prediction interval for the next test (mm)",
     (
-        *BLOCK,
-        Column("prediction", "next test", Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
-        Column("inside", "inside", Form.COUNT, "samples in it; failed ones count as outside"),
-        Column("of", "of", Form.COUNT, "all samples, failed ones included"),
+        *facts.BLOCK,
+        facts.Column("prediction", "next test", facts.Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
+        facts.Column("inside", "inside", facts.Form.COUNT, "samples in it; failed ones count as outside"),
+        facts.Column("of", "of", facts.Form.COUNT, "all samples, failed ones included"),
         *SHARE,
     ),
     _find_predicted,
 )
 
 
-def _find_validation(evidence: Evidence) -> Findings:
+def _find_validation(evidence: facts.Evidence) -> facts.Findings:
     lengths, u_num = evidence.lengths, evidence.u_num
-    rows: list[Row] = []
+    rows: list[facts.Row] = []
     for pair in lengths:
         values, measured = pair.known, pair.measured
         simulated = float(np.mean(values)) if values.size else nan
@@ -192,7 +185,7 @@ def _find_validation(evidence: Evidence) -> Findings:
         u_input = float(np.std(values, ddof=1)) if values.size >= ENOUGH else nan
         u_data = compare.data_uncertainty(measured.s, measured.n)
         u_val = hypot(u_num, u_input, u_data)
-        row: Row = {**pair.head, "members": int(values.size), "S": simulated, "D": measured.mean, "E": error}
+        row: facts.Row = {**pair.head, "members": int(values.size), "S": simulated, "D": measured.mean, "E": error}
         row |= {"u_num": u_num, "u_input": u_input, "u_D": u_data, "u_val": u_val}
         is_known = isfinite(u_val) and isfinite(error)
         rows.append({**row, "within": abs(error) <= COVERAGE * u_val if is_known else None})
@@ -201,46 +194,48 @@ def _find_validation(evidence: Evidence) -> Findings:
         messages.append("u_input needs two samples with a value")
     if any(pair.measured.n < ENOUGH for pair in lengths):
         messages.append("u_D needs two repeats")
-    return Findings(tuple(rows), tuple(messages))
+    return facts.Findings(tuple(rows), tuple(messages))
 
 
-VALIDATION = Metric(
+VALIDATION = facts.Metric(
     "validation",
     "error and uncertainty after ASME V&V 20 (mm)",
     (
-        *BLOCK,
-        Column("members", "", Form.COUNT, "samples with a value, used for S and u_input"),
-        Column("S", "S", Form.NUMBER, "mean of the samples"),
-        Column("D", "D", Form.NUMBER, "mean of the repeats"),
-        Column("E", "E", Form.NUMBER, "S - D"),
-        Column("u_num", "", Form.NUMBER, "standard uncertainty of the numerical solution (--u-num)"),
-        Column("u_input", "u_input", Form.NUMBER, "standard deviation of the samples"),
-        Column("u_D", "u_D", Form.NUMBER, "of D: sqrt(s^2/n + 0.5^2), reading included"),
-        Column("u_val", "u_val", Form.NUMBER, "sqrt(u_num^2 + u_input^2 + u_D^2)"),
-        Column("within", "|E|<=2u", Form.TEXT, "|E| <= 2 u_val: no error of the model is detected"),
+        *facts.BLOCK,
+        facts.Column("members", "", facts.Form.COUNT, "samples with a value, used for S and u_input"),
+        facts.Column("S", "S", facts.Form.NUMBER, "mean of the samples"),
+        facts.Column("D", "D", facts.Form.NUMBER, "mean of the repeats"),
+        facts.Column("E", "E", facts.Form.NUMBER, "S - D"),
+        facts.Column("u_num", "", facts.Form.NUMBER, "standard uncertainty of the numerical solution (--u-num)"),
+        facts.Column("u_input", "u_input", facts.Form.NUMBER, "standard deviation of the samples"),
+        facts.Column("u_D", "u_D", facts.Form.NUMBER, "of D: sqrt(s^2/n + 0.5^2), reading included"),
+        facts.Column("u_val", "u_val", facts.Form.NUMBER, "sqrt(u_num^2 + u_input^2 + u_D^2)"),
+        facts.Column("within", "|E|<=2u", facts.Form.TEXT, "|E| <= 2 u_val: no error of the model is detected"),
     ),
     _find_validation,
 )
 
 
-def _on_grid(one: Floats, other: Floats) -> tuple[Floats, Places, Places]:
+def _on_grid(one: facts.Floats, other: facts.Floats) -> tuple[facts.Floats, Places, Places]:
     """Return the distances of the values of two samples in order, and which values each sample has."""
     grid, places = np.unique(np.concatenate([one, other]), return_inverse=True)
     return np.diff(grid), places[: one.size], places[one.size :]
 
 
-def _area(widths: Floats, one: Places, other: Places) -> float:
+def _area(widths: facts.Floats, one: Places, other: Places) -> float:
     """Return the area between the distributions of two samples on a common grid."""
     shares = (np.cumsum(np.bincount(sample, minlength=widths.size + 1))[:-1] / sample.size for sample in (one, other))
     return float(np.sum(np.abs(np.subtract(*shares)) * widths))  # not by BLAS, whose threads hinder one another here
 
 
-def area_between(one: Floats, other: Floats) -> float:
+def area_between(one: facts.Floats, other: facts.Floats) -> float:
     """Return the area between the distributions of two samples, at least one value each, in their unit."""
     return _area(*_on_grid(one, other))
 
 
-def area_interval(members: Floats, repeats: Floats, resamples: int = RESAMPLES, seed: int = SEED) -> Interval:
+def area_interval(
+    members: facts.Floats, repeats: facts.Floats, resamples: int = RESAMPLES, seed: int = SEED
+) -> facts.Interval:
     """Return the 95 % interval of the area by bootstrap; NaN where a sample is too small for one.
 
     Percentiles are widened for the smaller sample as Student's t widens those of the normal distribution.
@@ -260,8 +255,8 @@ def area_interval(members: Floats, repeats: Floats, resamples: int = RESAMPLES, 
     return max(area - half, 0.0), area + half
 
 
-def _find_area(evidence: Evidence) -> Findings:
-    rows: list[Row] = []
+def _find_area(evidence: facts.Evidence) -> facts.Findings:
+    rows: list[facts.Row] = []
     messages = []
     for pair in evidence.lengths:
         members, repeats = pair.known, np.array(list(pair.repeats.values()))
@@ -270,24 +265,26 @@ def _find_area(evidence: Evidence) -> Findings:
             why = f"which needs {FEWEST} samples and {FEWEST} repeats"
         if why:
             messages.append(f"{pair.name}: no interval, {why}")
-        row: Row = {**pair.head, "members": int(members.size), "repeats": int(repeats.size)}
+        row: facts.Row = {**pair.head, "members": int(members.size), "repeats": int(repeats.size)}
         area = area_between(members, repeats) if members.size else None
         row |= {"area": area, "interval": None if why or area is None else area_interval(members, repeats)}
         rows.append(row)
     if len(messages) < len(rows):
         messages.append(f"bootstrap of {RESAMPLES} resamples, seed {SEED}")
-    return Findings(tuple(rows), tuple(messages))
+    return facts.Findings(tuple(rows), tuple(messages))
 
 
-AREA = Metric(
+AREA = facts.Metric(
     "area",
     "area between the distributions of samples and repeats (mm)",
     (
-        *BLOCK,
-        Column("members", "samples", Form.COUNT, "samples with a value"),
-        Column("repeats", "repeats", Form.COUNT, "repeats with a value"),
-        Column("area", "area", Form.NUMBER, "integral of |F_samples - F_repeats| dx: 0 where they are equal"),
-        Column("interval", "95 %", Form.NUMBER, "bootstrap interval of the area, both samples resampled"),
+        *facts.BLOCK,
+        facts.Column("members", "samples", facts.Form.COUNT, "samples with a value"),
+        facts.Column("repeats", "repeats", facts.Form.COUNT, "repeats with a value"),
+        facts.Column(
+            "area", "area", facts.Form.NUMBER, "integral of |F_samples - F_repeats| dx: 0 where they are equal"
+        ),
+        facts.Column("interval", "95 %", facts.Form.NUMBER, "bootstrap interval of the area, both samples resampled"),
     ),
     _find_area,
 )
@@ -304,7 +301,7 @@ class Hotelling(NamedTuple):
     p_value: float
 
 
-def hotelling(repeats: Floats, members: Floats) -> Hotelling | None:
+def hotelling(repeats: facts.Floats, members: facts.Floats) -> Hotelling | None:
     """Compare the means of repeats (n, p) and members (N, p), n > p; None where degrees of freedom do not suffice."""
     n, p = repeats.shape
     difference = repeats.mean(axis=0) - members.mean(axis=0)
@@ -324,26 +321,26 @@ def hotelling(repeats: Floats, members: Floats) -> Hotelling | None:
     return Hotelling(squared, squared / scale, float(p), rest, critical, float(special.fdtrc(p, rest, squared / scale)))
 
 
-def _covariance_of_mean(sample: Floats) -> Floats:
+def _covariance_of_mean(sample: facts.Floats) -> facts.Floats:
     """Return the sample covariance of p columns by the number of rows; zero for a single row."""
     n, p = sample.shape
-    covariance: Floats = np.zeros((p, p)) if n == 1 else np.cov(sample, rowvar=False).reshape(p, p) / n
+    covariance: facts.Floats = np.zeros((p, p)) if n == 1 else np.cov(sample, rowvar=False).reshape(p, p) / n
     return covariance
 
 
-def _spread(both: Floats, part: Floats) -> float:
+def _spread(both: facts.Floats, part: facts.Floats) -> float:
     """Return tr(M^2) + tr(M)^2 for M = part both^-1, which has the traces of both^-1 part."""
     share = np.linalg.solve(both, part)
     return float(np.trace(share @ share) + np.trace(share) ** 2)
 
 
-def _find_joint(evidence: Evidence) -> Findings:
+def _find_joint(evidence: facts.Evidence) -> facts.Findings:
     lengths = evidence.lengths
     chosen = [pair for pair in lengths if pair.scatters]
     messages = [f"{pair.name}: repeats without scatter are left out" for pair in lengths if not pair.scatters]
     if not chosen:
-        return Findings((), (*messages, "not computed: no measured position scatters"))
-    repeats, incomplete = complete_repeats(chosen)
+        return facts.Findings((), (*messages, "not computed: no measured position scatters"))
+    repeats, incomplete = facts.complete_repeats(chosen)
     members = np.column_stack([pair.simulated for pair in chosen])
     members = members[np.isfinite(members).all(axis=1)]
     if incomplete:
@@ -351,13 +348,13 @@ def _find_joint(evidence: Evidence) -> Findings:
     complaint = _complaint_joint(repeats, members)
     found = None if complaint else hotelling(repeats, members)
     if found is None:
-        return Findings((), (*messages, f"not computed: {complaint or 'too few samples for their scatter'}"))
+        return facts.Findings((), (*messages, f"not computed: {complaint or 'too few samples for their scatter'}"))
     positions = ", ".join(f"{pair.measured.block} {pair.measured.quantity}" for pair in chosen)
-    row: Row = {"positions": positions, "repeats": len(repeats), "members": len(members)}
-    return Findings(({**row, **found._asdict(), "within": found.critical >= found.T2},), tuple(messages))
+    row: facts.Row = {"positions": positions, "repeats": len(repeats), "members": len(members)}
+    return facts.Findings(({**row, **found._asdict(), "within": found.critical >= found.T2},), tuple(messages))
 
 
-def _complaint_joint(repeats: Floats, members: Floats) -> str:
+def _complaint_joint(repeats: facts.Floats, members: facts.Floats) -> str:
     """Return why no test is possible, or nothing."""
     n, p = repeats.shape
     if n <= p:
@@ -372,26 +369,28 @@ def _complaint_joint(repeats: Floats, members: Floats) -> str:
     return ""
 
 
-JOINT = Metric(
+JOINT = facts.Metric(
     "joint",
     "do the means of all positions agree? Hotelling's T2, two samples",
     (
-        Column("positions", "positions", Form.TEXT, "blocks and quantities taken together"),
-        Column("repeats", "n", Form.COUNT, "repeats in which all of them were measured"),
-        Column("members", "N", Form.COUNT, "samples that have all of them"),
-        Column("T2", "T2", Form.NUMBER, "squared distance of the means in units of their scatter"),
-        Column("critical", "5 %", Form.NUMBER, "T2 that is exceeded by chance in 5 % of experiments"),
-        Column("F", "", Form.NUMBER, "T2 scaled to follow the F distribution"),
-        Column("dof_1", "", Form.NUMBER, "its degrees of freedom: number of positions"),
-        Column("dof_2", "dof", Form.NUMBER, "its degrees of freedom: n - p for large ensembles", 1),
-        Column("p_value", "p", Form.NUMBER, "probability of such a T2 if the true means agree", 3),
-        Column("within", "agree", Form.TEXT, "T2 <= critical T2"),
+        facts.Column("positions", "positions", facts.Form.TEXT, "blocks and quantities taken together"),
+        facts.Column("repeats", "n", facts.Form.COUNT, "repeats in which all of them were measured"),
+        facts.Column("members", "N", facts.Form.COUNT, "samples that have all of them"),
+        facts.Column("T2", "T2", facts.Form.NUMBER, "squared distance of the means in units of their scatter"),
+        facts.Column("critical", "5 %", facts.Form.NUMBER, "T2 that is exceeded by chance in 5 % of experiments"),
+        facts.Column("F", "", facts.Form.NUMBER, "T2 scaled to follow the F distribution"),
+        facts.Column("dof_1", "", facts.Form.NUMBER, "its degrees of freedom: number of positions"),
+        facts.Column("dof_2", "dof", facts.Form.NUMBER, "its degrees of freedom: n - p for large ensembles", 1),
+        facts.Column("p_value", "p", facts.Form.NUMBER, "probability of such a T2 if the true means agree", 3),
+        facts.Column("within", "agree", facts.Form.TEXT, "T2 <= critical T2"),
     ),
     _find_joint,
 )
 
 
-METRICS: dict[str, Metric] = {metric.name: metric for metric in (INSIDE, OUTCOME, VALIDATION, PREDICTION, AREA, JOINT)}
+METRICS: dict[str, facts.Metric] = {
+    metric.name: metric for metric in (INSIDE, OUTCOME, VALIDATION, PREDICTION, AREA, JOINT)
+}
 
 
 @dataclass(frozen=True)
@@ -419,9 +418,9 @@ class Judgement:
     source: str
     members: int
     inside_all: int
-    failures: tuple[Failure, ...]
+    failures: tuple[facts.Failure, ...]
     settings: Settings
-    findings: Mapping[str, Findings]
+    findings: Mapping[str, facts.Findings]
     messages: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -477,7 +476,7 @@ class Judgement:
 
 
 def judge(
-    members: Members, table: ExperimentTable, settings: Settings | None = None, messages: tuple[str, ...] = ()
+    members: facts.Members, table: ExperimentTable, settings: Settings | None = None, messages: tuple[str, ...] = ()
 ) -> Judgement:
     """Judge the members of a sweep by all metrics.
 
@@ -485,7 +484,7 @@ def judge(
     """
     settings = settings or Settings()
     table.refuse_unknown(members.blocks, "the sweep")
-    evidence, finished = evidence_of(members, table, settings.u_num), int(members.finished.sum())
+    evidence, finished = facts.evidence_of(members, table, settings.u_num), int(members.finished.sum())
     incomplete = (  # measured quantities of which finished samples have no value
         f"{finished - pair.known.size} finished samples have no {pair.name}: they count as outside"
         for pair in evidence.pairs

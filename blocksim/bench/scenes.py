@@ -58,7 +58,8 @@ def three_blocks(contact: Table | None = None, time: Table | None = None, fricti
     """Return the three blocks of scenarios/three_blocks_nominal.toml; more keys of [contact] and [time]."""
     stairs = {"kind": "staircase", "block": "brick", "count": 3, "overlap": OVERLAP}
     more = {"contact": {"restitution": RESTITUTION, **(contact or {})}, "time": {"end": 2.0, **(time or {})}}
-    return one_structure("three_blocks", _brick("length"), stairs, {**more, "friction": friction})
+    blocks = {"brick": {**SIDES, "upright": "length", "material": "aluminium"}}
+    return one_structure("three_blocks", blocks, stairs, {**more, "friction": friction})
 
 
 def pushed_wall(
@@ -72,7 +73,8 @@ def pushed_wall(
     wall = {"kind": "wall", "block": "brick", "columns": columns, "rows": rows, "shear_velocity": PUSH}
     more = {"contact": {"restitution": WALL_RESTITUTION, **(contact or {})}}
     more["time"] = {"end": 1.0, "stop_at_rest": False, **(time or {})}
-    return one_structure("pushed_wall", _brick(upright), wall, {**more, "friction": FRICTION})
+    blocks = {"brick": {**SIDES, "upright": upright, "material": "aluminium"}}
+    return one_structure("pushed_wall", blocks, wall, {**more, "friction": FRICTION})
 
 
 def one_structure(name: str, blocks: Table, structure: Table, more: Table) -> Scenario:
@@ -87,10 +89,6 @@ def one_structure(name: str, blocks: Table, structure: Table, more: Table) -> Sc
         **more,
     }
     return scenario_from_mapping(data)
-
-
-def _brick(upright: str) -> Table:
-    return {"brick": {**SIDES, "upright": upright, "material": "aluminium"}}
 
 
 class RunFailedError(BlocksimError):

@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
-from blocksim.bench.scenes import LOW_COURSES, Rerun, Stepping, pushed_wall
+from blocksim.bench import measurement, scenes
 from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import SCHEMES
@@ -36,20 +35,20 @@ RIGID_SIZES = (Size(40, 25), Size(90, 56), Size(180, 112))
 QUICK_RIGID_SIZES = (Size(8, 5), Size(16, 10))
 END = 1.0  # s, of the first wall; where it ends is known
 COMMON, QUICK_END = 0.5, 0.1  # s, of all walls
-USUAL = Stepping(1e-3)
+USUAL = scenes.Stepping(1e-3)
 
 
-def explicit_wall(size: Size, stiffness_scale: float = STIFFNESS_SCALE) -> Rerun:
+def explicit_wall(size: Size, stiffness_scale: float = STIFFNESS_SCALE) -> scenes.Rerun:
     """Return the wall on springs, at its start."""
-    return Rerun(pushed_wall(*size, contact={"stiffness_scale": stiffness_scale}))
+    return scenes.Rerun(scenes.pushed_wall(*size, contact={"stiffness_scale": stiffness_scale}))
 
 
-def nonsmooth_wall(size: Size) -> Rerun:
+def nonsmooth_wall(size: Size) -> scenes.Rerun:
     """Return the wall of the non-smooth scheme, at its start."""
-    return Rerun(pushed_wall(*size, time=USUAL.time(), upright=LOW_COURSES))
+    return scenes.Rerun(scenes.pushed_wall(*size, time=USUAL.time(), upright=scenes.LOW_COURSES))
 
 
-def growth(sizes: Sequence[Size], block_times: Sequence[Number]) -> float:
+def growth(sizes: Sequence[Size], block_times: Sequence[measurement.Number]) -> float:
     """Return the exponent that fits time per step over number of blocks best, both in logarithms.
 
     `block_times` are those of a step and block, in any unit.
@@ -59,7 +58,7 @@ def growth(sizes: Sequence[Size], block_times: Sequence[Number]) -> float:
     return float(np.polyfit(np.log(blocks), np.log(times), 1)[0])
 
 
-def measure_explicit(setting: Setting) -> Findings:
+def measure_explicit(setting: measurement.Setting) -> measurement.Findings:
     """Measure all sizes from the same start, over the same time."""
     sizes, steps = (QUICK_SIZES, QUICK_STEPS) if setting.quick else (SIZES, STEPS)
     times, memory, details = [], [], []
@@ -68,8 +67,8 @@ def measure_explicit(setting: Setting) -> Findings:
         repeats = [[scene.run(steps) for _ in range(rounds)] for _ in range(setting.repeats)]
         share = 1e9 / (rounds * steps * size.blocks)
         samples = tuple(share * sum(run.seconds for run in runs) for runs in repeats)
-        times.append(Number(f"{size.blocks} blocks", "ns/block/step", samples))
-        memory.append(single(f"{size.blocks} blocks, memory", "bytes/block", scene.bytes / size.blocks))
+        times.append(measurement.Number(f"{size.blocks} blocks", "ns/block/step", samples))
+        memory.append(measurement.single(f"{size.blocks} blocks, memory", "bytes/block", scene.bytes / size.blocks))
         details.append(
             {
                 "blocks": size.blocks,
@@ -80,21 +79,21 @@ def measure_explicit(setting: Setting) -> Findings:
                 "simulated_s": steps * scene.step,
             }
         )
-    exponent = single("growth exponent of a step's time", "", growth(sizes, times))
+    exponent = measurement.single("growth exponent of a step's time", "", growth(sizes, times))
     first, last = details[0], details[-1]
     note = (
         f"running bond, pushed with 1 m/s y/H, restitution 0.1, stiffness_scale {STIFFNESS_SCALE:g}, the first "
         f"{1e3 * first['simulated_s']:.1f} ms, {first['rebuilds']} to {last['rebuilds']} pair list updates"
     )
-    return Findings((*times, *memory, exponent), notes=(note,), details=tuple(details))
+    return measurement.Findings((*times, *memory, exponent), notes=(note,), details=tuple(details))
 
 
-def measure_nonsmooth(setting: Setting) -> Findings:
+def measure_nonsmooth(setting: measurement.Setting) -> measurement.Findings:
     """Measure all sizes from the same start, over the same time, and the smallest over its whole collapse."""
     end, common = (QUICK_END, QUICK_END) if setting.quick else (END, COMMON)
     sizes = QUICK_RIGID_SIZES if setting.quick else RIGID_SIZES
 
-    def watch(size: Size, end: float) -> tuple[tuple[float, ...], Number, dict[str, Any]]:
+    def watch(size: Size, end: float) -> tuple[tuple[float, ...], measurement.Number, dict[str, Any]]:
         """Return the CPU seconds of all repeats, those of a substep and block, and more for programs."""
         scene = nonsmooth_wall(size)
         steps = last_step_of(end, scene.step)
@@ -102,7 +101,7 @@ def measure_nonsmooth(setting: Setting) -> Findings:
         final, seconds = runs[-1], tuple(run.seconds for run in runs)  # every run ends with the same bits
         substeps = steps * USUAL.substeps
         samples = tuple(1e9 / (substeps * size.blocks) * one for one in seconds)
-        number = Number(f"{size.blocks} blocks, a substep", "ns/block", samples)
+        number = measurement.Number(f"{size.blocks} blocks, a substep", "ns/block", samples)
         detail = {
             "blocks": size.blocks,
             **size._asdict(),
@@ -120,12 +119,12 @@ def measure_nonsmooth(setting: Setting) -> Findings:
     times, details = [number for _, number, _ in walls], [detail for *_, detail in walls]
     name = f"{whole['blocks']} blocks"
     numbers = (
-        Number(f"{name}, {end:g} s", "CPU s", seconds),
-        Number(f"{name}, {end:g} s, a substep", "ns/block", substep.samples),
+        measurement.Number(f"{name}, {end:g} s", "CPU s", seconds),
+        measurement.Number(f"{name}, {end:g} s, a substep", "ns/block", substep.samples),
         *times,
-        single("growth exponent of a substep's time", "", growth(sizes, times)),
-        single(f"{name}, mean x at {end:g} s", "mm", 1e3 * whole["mean_x_m"]),
-        single(f"{name}, mean y at {end:g} s", "mm", 1e3 * whole["mean_y_m"]),
+        measurement.single("growth exponent of a substep's time", "", growth(sizes, times)),
+        measurement.single(f"{name}, mean x at {end:g} s", "mm", 1e3 * whole["mean_x_m"]),
+        measurement.single(f"{name}, mean y at {end:g} s", "mm", 1e3 * whole["mean_y_m"]),
     )
     first, last = details[0], details[-1]
     note = (
@@ -134,7 +133,7 @@ def measure_nonsmooth(setting: Setting) -> Findings:
         f"{last['rebuilds']} pair list updates, {first['sweeps_per_substep']:.2f} to "
         f"{last['sweeps_per_substep']:.2f} velocity sweeps a substep"
     )
-    return Findings(numbers, notes=(note,), details=(whole, *details))
+    return measurement.Findings(numbers, notes=(note,), details=(whole, *details))
 
 
 THREADS = 2
@@ -142,20 +141,20 @@ SOFT_SCALE = 1e-3  # a wall of a hundred blocks has fallen by then; softer ones 
 
 
 def measure_threads(
-    setting: Setting,
+    setting: measurement.Setting,
     *,
     scheme: str,
-    wall: Callable[[Size], Rerun],
+    wall: Callable[[Size], scenes.Rerun],
     sizes: tuple[tuple[Size, ...], tuple[Size, ...]],
     block_steps: tuple[int, int],
     most_steps: tuple[int, int],
-) -> Findings:
+) -> measurement.Findings:
     """Advance walls with one thread and with two, in turns, from the start: the smaller they are, the longer.
 
     Sizes, blocks times steps of one sample, and the most steps of one are given in full and quick.
     """
     most, limit = block_steps[setting.quick], most_steps[setting.quick]
-    numbers: list[Number] = []
+    numbers: list[measurement.Number] = []
     alone = []  # walls that use one thread
     for size in sizes[setting.quick]:
         threads = useful_threads(THREADS, size.blocks, SCHEMES[scheme].least_bodies)
@@ -166,12 +165,12 @@ def measure_threads(
     notes = [f"speed-up: wall time of one thread over that of {THREADS}; {THREADS} cores must be idle"]
     if alone:
         notes.append(f"walls of {', '.join(alone)} blocks always use one thread")
-    return Findings(tuple(numbers), notes=tuple(notes))
+    return measurement.Findings(tuple(numbers), notes=tuple(notes))
 
 
 def thread_numbers(
-    scene: Rerun, count: int, steps: int, threads: int, repeats: int, element: str = "block"
-) -> Iterator[Number]:
+    scene: scenes.Rerun, count: int, steps: int, threads: int, repeats: int, element: str = "block"
+) -> Iterator[measurement.Number]:
     """Yield the time of a scene of so many elements with two threads, and by how much that is faster than one.
 
     `threads` are as many as are of use.
@@ -185,20 +184,20 @@ def thread_numbers(
             gains.append(alone / times[-1])
     share = 1e9 / (steps * count)
     samples = tuple(share * one for one in times)
-    yield Number(f"{count} {element}s, {THREADS} threads", f"ns/{element}/step", samples)
-    yield Number(f"{count} {element}s, speed-up", "", tuple(gains))
+    yield measurement.Number(f"{count} {element}s, {THREADS} threads", f"ns/{element}/step", samples)
+    yield measurement.Number(f"{count} {element}s, speed-up", "", tuple(gains))
 
 
-EXPLICIT = Measurement(
+EXPLICIT = measurement.Measurement(
     "walls", "pushed walls", measure_explicit, quick="walls of 100 and 400 blocks, 150 steps instead of 300"
 )
-NONSMOOTH = Measurement(
+NONSMOOTH = measurement.Measurement(
     "nonsmooth-walls",
     "pushed walls, non-smooth",
     measure_nonsmooth,
     quick="walls of 40 and 160 blocks for 0.1 s",
 )
-EXPLICIT_THREADS = Measurement(
+EXPLICIT_THREADS = measurement.Measurement(
     "threads",
     "two threads on one wall",
     functools.partial(
@@ -211,7 +210,7 @@ EXPLICIT_THREADS = Measurement(
     ),
     quick="walls of 100 and 400 blocks, a tenth of the steps",
 )
-NONSMOOTH_THREADS = Measurement(
+NONSMOOTH_THREADS = measurement.Measurement(
     "nonsmooth-threads",
     "two threads on one wall, non-smooth",
     functools.partial(

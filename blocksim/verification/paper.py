@@ -153,7 +153,7 @@ def edges_table(edges: ExperimentTable, runs: Sequence[Result]) -> str:
             places = [run.columns[f"{quantity}_mm"][list(run.columns["block"]).index(block)] for run in runs]
             row = (f"{quantity}, block {block}", *_repeats(edges, block, quantity), *map(_hundredths, places))
             rows.append(row)
-    return _table(("mm", *map(str, edges.replicates), "mean", *_names(runs)), rows)
+    return _table(("mm", *map(str, edges.replicates), "mean", *(f"`{run.name}`" for run in runs)), rows)
 
 
 def centres_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
@@ -180,19 +180,16 @@ def centres_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
         for row in centres.summaries()
         if row.quantity == "rotation"
     ]
-    heads = ("mm", *map(str, centres.replicates), "mean", "the paper's simulation", *_names(runs))
+    names = [f"`{run.name}`" for run in runs]
+    heads = ("mm", *map(str, centres.replicates), "mean", "the paper's simulation", *names)
     said = "✓ inside the range of the six repeats, ✗ outside."
-    turned = _table(("block", "measured, all repeats", *_names(runs)), rotations)
+    turned = _table(("block", "measured, all repeats", *names), rotations)
     return f"{_table(heads, places)}\n\n{said}\n\n{turned}"
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table; the minus sign of numbers is a proper one."""
     return markdown(heads, [[f"−{cell[1:]}" if cell.startswith("-") else cell for cell in row] for row in rows])
-
-
-def _names(runs: Sequence[Result]) -> list[str]:
-    return [f"`{run.name}`" for run in runs]
 
 
 def _repeats(table: ExperimentTable, block: str, quantity: str) -> list[str]:

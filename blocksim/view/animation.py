@@ -111,7 +111,14 @@ def write_mp4(path: Path, pictures: Iterator[Pixels], seconds: run_data.Floats) 
 
     Raises UnavailableError with neither the package nor ffmpeg, OutputError.
     """
-    program = _ffmpeg()
+    try:
+        program = str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
+    except (ImportError, RuntimeError) as error:
+        program = shutil.which(PROGRAM) or ""
+        if not program:
+            needed = "MP4 needs ffmpeg, or the package imageio-ffmpeg"
+            message = f"{needed} ({error}); install the extra: pip install 'blocksim[video]'"
+            raise UnavailableError(message) from None
     rate = 1.0 / float(seconds[0])
     first = next(pictures)
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{first.shape[1]}x{first.shape[0]}", "-r", repr(rate)]
@@ -131,21 +138,6 @@ def write_mp4(path: Path, pictures: Iterator[Pixels], seconds: run_data.Floats) 
             is_whole = False
         if not is_whole:
             raise OutputError(f"{path}: cannot be written: ffmpeg stopped before the end")
-
-
-def _ffmpeg() -> str:
-    """Return the ffmpeg of the package or of the system; raises UnavailableError."""
-    try:
-        return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
-    except (ImportError, RuntimeError) as error:
-        program = shutil.which(PROGRAM)
-        if program is None:
-            message = (
-                f"MP4 needs ffmpeg, or the package imageio-ffmpeg ({error}); install the extra: "
-                "pip install 'blocksim[video]'"
-            )
-            raise UnavailableError(message) from None
-        return program
 
 
 def _codec(program: str) -> list[str]:

@@ -210,7 +210,7 @@ class Actions:
 def actions_on(frames: Frames, chosen: Indices, support: Support) -> Actions:
     """Return what acts from outside in the chosen frames."""
     poses = _Poses(frames, chosen)
-    raw = [*_forces(poses, support), *_speeds(poses, support)]
+    raw = [*_loads_and_speeds(poses, support)]
     largest: dict[str, float] = {}
     for one in raw:
         size = float(np.hypot(one.way[..., 0], one.way[..., 1]).max(initial=0.0))
@@ -280,8 +280,11 @@ class _Poses:
         return Arrows(kind, MILLIMETRES * (self.places[:, body, None] + arms), ways, pushes.astype(float))
 
 
-def _forces(poses: _Poses, support: Support) -> Iterator[Arrows]:
-    """Yield forces (N) and pressures (Pa); water is deep below its level, against gravity."""
+def _loads_and_speeds(poses: _Poses, support: Support) -> Iterator[Arrows]:
+    """Yield forces (N) and pressures (Pa), then the velocities (m/s) of driven bodies, from where these leave blocks.
+
+    Water is deep below its level, against gravity.
+    """
     for one in support.loads:
         load, factor = one.load, one.values(poses.time)[:, None]
         if isinstance(load, Force):
@@ -301,10 +304,6 @@ def _forces(poses: _Poses, support: Support) -> Iterator[Arrows]:
                 size = load.unit_weight * np.maximum(load.water_level * factor - heights, 0.0)
             inwards = poses.turned(one.body, -normal[None])
             yield poses.arrows(PRESSURE, one.body, arms, size[..., None] * inwards)
-
-
-def _speeds(poses: _Poses, support: Support) -> Iterator[Arrows]:
-    """Yield the velocities (m/s) of driven bodies, each from where it leaves its block."""
     driven = np.flatnonzero(support.driven)
     if not len(driven):
         return

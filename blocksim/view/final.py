@@ -42,11 +42,6 @@ def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float)
     return ranges
 
 
-def rows_of(ranges: Sequence[scene.MeasuredRange]) -> int:
-    """Return the number of rows that measured ranges take."""
-    return 1 + max((item.row for item in ranges), default=-1)
-
-
 def widen(extent: run_data.Extent, ranges: Sequence[scene.MeasuredRange]) -> run_data.Extent:
     """Return an extent that also holds the measured ranges, and is wide enough for the time above a tower."""
     margin = RANGE_GAP * extent.width
@@ -153,7 +148,7 @@ def draw_final(
     ranges = []
     if measured is not None and frame == drawable[-1]:  # measurements are of the final state
         ranges = measured_ranges(measured, frames.names, extent.width)
-    extent, rows = widen(extent, ranges), rows_of(ranges)
+    extent, rows = widen(extent, ranges), 1 + max((one.row for one in ranges), default=-1)
     width, tallest = paper.width(WIDTH, LEAST_WIDTH), TALLEST
     margins = SIDE, HEAD + MARKS * any(acts.marks), AXIS
     explanations = [] if scale is None else [scale.explanation]

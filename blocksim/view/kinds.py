@@ -8,9 +8,7 @@ from pathlib import Path
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
 from blocksim.view import final, history, strip, style
-from blocksim.view.style import Paper
-from blocksim.view.sweeps import lines, outcome_map, scatter
-from blocksim.view.sweeps.data import SweepData
+from blocksim.view.sweeps import data, lines, outcome_map, scatter
 
 STRIP, FINAL, HISTORY, PROFILE = "strip", "final", "history", "profile"
 MOTION = "motion"  # of the supports; needs no run
@@ -29,11 +27,11 @@ MOST_SLIPS = 2
 class Kind:
     """A kind of picture of a sweep: which sweeps it cannot show or suits best, and its drawing."""
 
-    refusal: Callable[[SweepData], str]  # why it cannot show a sweep; empty where it can
-    suits: Callable[[SweepData], bool]
-    drawn: Callable[[SweepData, Paper], AbstractContextManager["style.Figure"]]
+    refusal: Callable[[data.SweepData], str]  # why it cannot show a sweep; empty where it can
+    suits: Callable[[data.SweepData], bool]
+    drawn: Callable[[data.SweepData, style.Paper], AbstractContextManager["style.Figure"]]
 
-    def draw(self, sweep: SweepData, path: Path, paper: Paper = style.OWN) -> None:
+    def draw(self, sweep: data.SweepData, path: Path, paper: style.Paper = style.OWN) -> None:
         """Draw a sweep and write PNG, SVG or PDF; the same input gives the same bytes.
 
         Raises InvalidInputError for an unknown picture format or too small a page, OutputError.
@@ -60,6 +58,6 @@ def run_kind(name: str) -> Callable[..., None]:
     return RUN_KINDS[name]
 
 
-def kind_for(sweep: SweepData) -> Kind:
+def kind_for(sweep: data.SweepData) -> Kind:
     """Return the first kind that suits a sweep."""
     return next(kind for kind in SWEEP_KINDS.values() if not kind.refusal(sweep) and kind.suits(sweep))

@@ -142,7 +142,7 @@ def draw_strip(
     else:
         chosen = run_data.moments_at(frames, drawable, times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
-    rows = final.rows_of(ranges)
+    rows = 1 + max((one.row for one in ranges), default=-1)
     acts = arrows.actions_on(frames, chosen, support)
     texts = [*([scene.TOP] if frames.names else []), _notes(support, is_measured=bool(ranges))]
     texts += ["" if scale is None else scale.explanation, acts.explanation]

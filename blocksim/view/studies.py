@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blocksim.view import run_data, style
-from blocksim.view.style import OWN, Paper
 from blocksim.view.sweeps.data import short_names
 from blocksim.view.time_panels import limits_of
 
@@ -23,7 +22,7 @@ SIDES = 0.65, 0.15, 0.11, 0.42  # inches
 
 @contextmanager
 def open_study_figure(
-    path: Path | str, title: str | None, notes: Sequence[str], paper: Paper
+    path: Path | str, title: str | None, notes: Sequence[str], paper: style.Paper
 ) -> "Iterator[style.Axes]":
     """Give the panel; then write the picture as PNG, SVG or PDF.
 
@@ -65,7 +64,7 @@ class Law:
         return float(np.nanmax(np.abs(self.simulated - self.expected)))
 
 
-def draw_law(law: Law, path: Path | str, title: str, paper: Paper = OWN) -> None:
+def draw_law(law: Law, path: Path | str, title: str, paper: style.Paper = style.OWN) -> None:
     """Draw the quantity, and its difference to the formula, and write PNG, SVG or PDF; the same input, the same bytes.
 
     Raises InvalidInputError for an unknown picture format or a page that is too small, and OutputError when the file
@@ -145,7 +144,9 @@ def join_brackets(curve: LimitCurve) -> list[tuple[tuple[float, float], tuple[fl
     return lines
 
 
-def draw_limit_curve(curve: LimitCurve, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
+def draw_limit_curve(
+    curve: LimitCurve, path: Path | str, title: str | None = None, paper: style.Paper = style.OWN
+) -> None:
     """Draw the picture and write it; raises as `open_study_figure`.
 
     Brackets of a kind have one colour. Of what others found, long series are lines and short ones marks, which no line
@@ -220,7 +221,9 @@ def places(x: run_data.Floats) -> run_data.Floats:
     return np.asarray(np.geomspace(low, high, POINTS) if is_log else np.linspace(low, high, POINTS))
 
 
-def draw_fragility(found: Fragility, path: Path | str, title: str | None = None, paper: Paper = OWN) -> None:
+def draw_fragility(
+    found: Fragility, path: Path | str, title: str | None = None, paper: style.Paper = style.OWN
+) -> None:
     """Draw the picture and write it; raises as `open_study_figure`."""
     with open_study_figure(path, title, found.notes, paper) as axes:
         band = found.band
@@ -264,7 +267,7 @@ class Bars:
 
 
 def draw_tornado(
-    panels: Sequence[Bars], labels: tuple[str, str], path: Path | str, title: str, paper: Paper = OWN
+    panels: Sequence[Bars], labels: tuple[str, str], path: Path | str, title: str, paper: style.Paper = style.OWN
 ) -> None:
     """Draw bars of the indices and write PNG, SVG or PDF; `labels` name the whole bars and their dark parts.
 
@@ -275,7 +278,10 @@ def draw_tornado(
 
     path = style.picture_path(path)
     varying = [panel for panel in panels if np.any(panel.values)] or list(panels)
-    panels = [replace(panel, keys=tuple(map(_in_lines, short_names(panel.keys)))) for panel in varying[:MOST_PANELS]]
+    panels = []
+    for panel in varying[:MOST_PANELS]:  # keys in as many lines as they need at the left of the bars
+        names = ("\n".join(style.break_lines(name, MOST_ROOM)) for name in short_names(panel.keys))
+        panels.append(replace(panel, keys=tuple(names)))
     keys = [key for panel in panels for key in panel.keys]
     widest = max(style.width_of(line, style.FONT_SIZE) for key in keys for line in key.split("\n"))
     left, right = max(widest / style.POINTS_PER_INCH, LEAST_ROOM) + 0.2, 2.0 * style.EDGE
@@ -302,11 +308,6 @@ def draw_tornado(
 def order_of(values: run_data.Floats) -> list[int]:
     """Return the numbers of the keys to draw, the largest index first."""
     return [int(key) for key in np.argsort(-np.abs(values), kind="stable")[:MOST_KEYS]]
-
-
-def _in_lines(name: str) -> str:
-    """Return a key in as many lines as it needs at the left of the bars."""
-    return "\n".join(style.break_lines(name, MOST_ROOM))
 
 
 def _draw_bars(axes: "style.Axes", panel: Bars, font: float) -> None:
@@ -371,7 +372,7 @@ def draw_levels(
     path: Path | str,
     title: str | None = None,
     measured: Mapping[str, float] | None = None,
-    paper: Paper = OWN,
+    paper: style.Paper = style.OWN,
 ) -> None:
     """Draw the panels side by side and write them as PNG, SVG or PDF; the same input gives the same bytes.
 
@@ -396,7 +397,7 @@ def draw_levels(
         style.save_figure(figure, path)
 
 
-def refuse_small_page(panels: int, paper: Paper) -> None:
+def refuse_small_page(panels: int, paper: style.Paper) -> None:
     """Raise InvalidInputError where so many panels have no room, whatever their blocks."""
     with _open_levels(panels, [""] * MOST_BLOCKS, range(MOST_BLOCKS), None, paper):
         pass
@@ -404,7 +405,7 @@ def refuse_small_page(panels: int, paper: Paper) -> None:
 
 @contextmanager
 def _open_levels(
-    panels: int, blocks: Sequence[str], shown: Sequence[int], title: str | None, paper: Paper
+    panels: int, blocks: Sequence[str], shown: Sequence[int], title: str | None, paper: style.Paper
 ) -> Iterator[tuple["style.Figure", list["style.Axes"]]]:
     """Give panels side by side, and a legend that names the lines of some blocks."""
     from matplotlib.lines import Line2D

@@ -13,7 +13,6 @@ from blocksim.scenario import motion, spelling, units
 from blocksim.simulation import probes
 from blocksim.view import style
 from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support
-from blocksim.view.style import OWN, Paper
 
 WIDTH = 7.2  # inches
 SIDES = 0.78, 1.70, 0.12, 0.36  # inches, around the panels; texts stand on the right
@@ -61,7 +60,7 @@ def open_time_panels(
     panels: Sequence[TimePanel],
     title: str | None,
     notes: str = "",
-    paper: Paper = OWN,
+    paper: style.Paper = style.OWN,
     own: float | None = None,
     span: tuple[float, float] | None = None,
 ) -> Iterator[tuple["style.Figure", list["style.Axes"]]]:
@@ -167,7 +166,7 @@ def draw_probes(
     path: Path,
     title: str | None = None,
     names: Sequence[str] = (),
-    paper: Paper = OWN,
+    paper: style.Paper = style.OWN,
 ) -> None:
     """Draw probes, all or those of these names.
 
@@ -254,7 +253,9 @@ BETWEEN = 4
 ROUND_OFF = 1e-9
 
 
-def draw_support_motion(support: Support, end: float, path: Path, title: str | None = None, paper: Paper = OWN) -> None:
+def draw_support_motion(
+    support: Support, end: float, path: Path, title: str | None = None, paper: style.Paper = style.OWN
+) -> None:
     """Draw the motion of the supports along its direction from 0 to `end` (s).
 
     Raises InvalidInputError for supports that rest, an unknown picture format or too small a page, and OutputError when

@@ -141,18 +141,18 @@ COORDINATES = re.compile(r'(?<= (?:d|x|y)=")[^"]*')
 DIGITS = re.compile(r"(\.\d\d)\d+")
 
 
+@dataclass(frozen=True)
 class Repeats:
-    """The measured ranges of a comparison, as pictures want them."""
+    """The measured ranges of a comparison, as pictures want them: rows of `Comparison.to_dict`."""
 
-    def __init__(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Take the rows of `Comparison.to_dict`."""
-        self.rows = [row for row in rows if row["mean"] is not None]
+    rows: Sequence[Mapping[str, Any]]
 
     def statistics(self) -> "pd.DataFrame":
         """Return one row a block and quantity."""
         import pandas as pd
 
-        return pd.DataFrame(self.rows, columns=["block", "quantity", "mean", "minimum", "maximum"])
+        known = [row for row in self.rows if row["mean"] is not None]
+        return pd.DataFrame(known, columns=["block", "quantity", "mean", "minimum", "maximum"])
 
 
 def embedded(figure: "style.Figure") -> str:
@@ -180,7 +180,7 @@ def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
     pairs = (
         []
         if kinds.SWEEP_KINDS["map"].refusal(sweep)
-        else combinations([one for one in sweep.inputs if one.is_number], 2)
+        else combinations([one for one in sweep.inputs if not one.levels], 2)
     )
     names = dict(zip((one.key for one in sweep.inputs), short_names([one.key for one in sweep.inputs]), strict=True))
     maps = []

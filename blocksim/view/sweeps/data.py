@@ -34,14 +34,9 @@ class Input:
     key: str
     unit: str  # of SI; empty for plain numbers
     values: Floats  # (n,)
-    levels: tuple[str, ...] = ()
+    levels: tuple[str, ...] = ()  # such values cannot be an axis
     is_even: bool = False  # drawn from a range without regard to decades
     typed: InputUnit | None = None  # the unit that the user has typed, if any
-
-    @property
-    def is_number(self) -> bool:
-        """Whether the values can be an axis."""
-        return not self.levels
 
     @property
     def count(self) -> int:
@@ -71,7 +66,7 @@ class SweepData:
     """n cases of a sweep with k inputs and b blocks; numbers of cases that did not finish are NaN."""
 
     title: str
-    mode: str
+    mode: str  # of a "grid" every value of a key goes with all values of the others
     inputs: tuple[Input, ...]  # (k,) keys that take more than one value, or the first one
     blocks: tuple[str, ...]  # (b,)
     x_mm: Floats  # (n, b) final centres
@@ -85,11 +80,6 @@ class SweepData:
     def is_sampled(self) -> bool:
         """Whether values were drawn, so that shares of cases are probabilities."""
         return self.mode in {"lhs", "sobol", "normal"}
-
-    @property
-    def is_grid(self) -> bool:
-        """Whether every value of a key goes with all values of the others."""
-        return self.mode == "grid"
 
     @property
     def moving(self) -> list[int]:

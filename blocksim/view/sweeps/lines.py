@@ -35,7 +35,7 @@ def refusal(sweep: data.SweepData) -> str:
     """Return why a sweep cannot be shown."""
     if len(sweep.inputs) > MOST_INPUTS:
         return f"{len(sweep.inputs)} keys are varied; lines can show one or two"
-    if not any(one.is_number for one in sweep.inputs):
+    if all(one.levels for one in sweep.inputs):
         words = next(iter(sweep.inputs))
         return f"the values of {words.key} are not numbers (such as {words.levels[0]!r}); they cannot be an axis"
     return ""
@@ -73,9 +73,9 @@ def series_of(sweep: data.SweepData) -> Iterator[Series]:
 
 def _axis_and_other(sweep: data.SweepData) -> tuple[data.Input, data.Input | None]:
     """Return the number with the most values, and the other input where both go through all combinations."""
-    axis = max((one for one in sweep.inputs if one.is_number), key=lambda one: one.count)
+    axis = max((one for one in sweep.inputs if not one.levels), key=lambda one: one.count)
     others = [one for one in sweep.inputs if one is not axis]
-    return axis, others[0] if others and sweep.is_grid else None
+    return axis, others[0] if others and sweep.mode == "grid" else None
 
 
 @contextmanager

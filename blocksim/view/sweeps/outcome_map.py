@@ -170,7 +170,7 @@ class OutcomeMap:
     def plane(self, cases: run_data.Flags) -> Plane:
         """Return the inputs of some cases."""
         x, y = (axis.shown(one.values[cases]) for axis, one in zip(self.axes, (self.x, self.y), strict=True))
-        return Plane(x, y, self.axes, self.sweep.is_grid)
+        return Plane(x, y, self.axes, self.sweep.mode == "grid")
 
 
 def suits(sweep: data.SweepData) -> bool:
@@ -190,7 +190,7 @@ def refusal(sweep: data.SweepData) -> str:
 
 def _axes_of(sweep: data.SweepData) -> tuple[data.Input, ...]:
     """Return the two inputs with the most values; of equal ones the first."""
-    return tuple(sorted((one for one in sweep.inputs if one.is_number), key=lambda one: -one.count)[:AXES])
+    return tuple(sorted((one for one in sweep.inputs if not one.levels), key=lambda one: -one.count)[:AXES])
 
 
 def map_of(sweep: data.SweepData, axes: tuple[data.Input, ...] | None = None) -> OutcomeMap:
@@ -299,7 +299,7 @@ def _notes(found: OutcomeMap) -> str:
     texts = []
     if found.sweep.measured.x_mm:
         texts.append("Outlined: inside the measured range; at the bottom: inside all of them.")
-    if not found.sweep.is_grid:
+    if found.sweep.mode != "grid":
         texts.append("One dot: one run.")
     drawn = {found.x.key, found.y.key}
     hidden = [one for one in found.sweep.inputs if one.key not in drawn and len(found.columns) == 1]
