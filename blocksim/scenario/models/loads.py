@@ -14,7 +14,7 @@ and that of the last line after it. The resolved scenario holds the samples, so 
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
@@ -57,20 +57,59 @@ class Ramp(base.Table):
             raise q.invalid(message, "end")
 
 
-class Steps(base.Table):
+class _Sampled(base.Table):
+    """Numbers under a key at `times` that increase: in the scenario, or those of a CSV table that it names."""
+
+    column: ClassVar[str] = ""  # of the table; without one no table can be named
+    key: ClassVar[str] = "factors"
+    least: ClassVar[int] = 2
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, value: object, info: ValidationInfo) -> object:
+        if not cls.column or not isinstance(value, Mapping) or value.get("table") is None:
+            return value
+        for other in ("times", cls.key):
+            if other in value:
+                raise q.invalid(f"table and {other} are both given; keep one of them", other)
+        path = base.table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv")
+        try:
+            _, times, values = motion.read_series(
+                motion.content_of(path, MAX_BYTES), (cls.column,), f"{motion.TIME},{cls.column}", MAX_ROWS
+            )
+        except motion.MotionTableError as error:
+            raise q.invalid(f"{path.name}: {error}", "table") from None
+        kept = {name: entry for name, entry in value.items() if name != "table"}
+        samples = tuple(f"{one!r} deg" for one in values) if cls.column.endswith("_deg") else values
+        return {**kept, "times": times, cls.key: samples}
+
+    def _check(self) -> None:
+        times, values = (getattr(self, name) for name in ("times", self.key))
+        if len(times) < self.least:
+            message = (
+                f"{len(times)} times are too few; at least {self.least} {'is' if self.least == 1 else 'are'} needed"
+            )
+            raise q.invalid(message, "times")
+        if len(times) != len(values):
+            raise q.invalid(f"{len(values)} {self.key} for {len(times)} times; every time needs one", self.key)
+        for number, (one, other) in enumerate(pairwise(times), start=1):
+            if other <= one:
+                raise q.invalid(f"{other:g} s comes after {one:g} s; times must increase", "times", number)
+
+
+class Steps(_Sampled):
     """Factors that hold from their time on; none before the first."""
 
+    least = 1
     kind: Literal["steps"] = Field(description="kind of history")
     times: Times = Field(description="times at which the factor changes")
     factors: tuple[q.Number, ...] = Field(description="factor from each of these times on; 0 before")
 
-    def _check(self) -> None:
-        check_samples(self.times, self.factors, "factors", least=1)
 
-
-class Samples(base.Table):
+class Samples(_Sampled):
     """Factors at some times, joined by straight lines: of a CSV table, or `times` and `factors`."""
 
+    column = "factor"
     kind: Literal["table"] = Field(description="kind of history")
     table: str | None = Field(
         default=None, description="CSV table with the columns time_s and factor, relative to the scenario file"
@@ -78,49 +117,11 @@ class Samples(base.Table):
     times: Times = Field(default=(), description="times of the factors, instead of a table")
     factors: tuple[q.Number, ...] = Field(default=(), description="factors at these times, instead of a table")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read(cls, value: object, info: ValidationInfo) -> object:
-        return read_samples(value, info, "factor", "factors")
-
-    def _check(self) -> None:
-        check_samples(self.times, self.factors, "factors", least=2)
-
 
 AnyHistory = Annotated[Constant | Ramp | Steps | Samples, Field(discriminator="kind")]
 """Any history, distinguished by its `kind`."""
 HISTORIES: dict[str, type[base.Table]] = base.by_kind(AnyHistory)
 """Class by kind, as written in a scenario."""
-
-
-def check_samples(times: Sequence[float], values: Sequence[float], name: str, *, least: int) -> None:
-    """Raise pydantic's error where times do not increase, or do not go with the values of the key `name`."""
-    if len(times) < least:
-        message = f"{len(times)} times are too few; at least {least} {'is' if least == 1 else 'are'} needed"
-        raise q.invalid(message, "times")
-    if len(times) != len(values):
-        raise q.invalid(f"{len(values)} {name} for {len(times)} times; every time needs one", name)
-    for number, (one, other) in enumerate(pairwise(times), start=1):
-        if other <= one:
-            raise q.invalid(f"{other:g} s comes after {one:g} s; times must increase", "times", number)
-
-
-def read_samples(value: object, info: ValidationInfo, column: str, key: str) -> object:
-    """Return data with the samples of the CSV table that it names under `times` and `key`, where it names one."""
-    if not isinstance(value, Mapping) or value.get("table") is None:
-        return value
-    for other in ("times", key):
-        if other in value:
-            raise q.invalid(f"table and {other} are both given; keep one of them", other)
-    path = base.table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv")
-    try:
-        _, times, values = motion.read_series(
-            motion.content_of(path, MAX_BYTES), (column,), f"{motion.TIME},{column}", MAX_ROWS
-        )
-    except motion.MotionTableError as error:
-        raise q.invalid(f"{path.name}: {error}", "table") from None
-    kept = {name: entry for name, entry in value.items() if name != "table"}
-    return {**kept, "times": times, key: values}
 
 
 Axes = Literal["world", "body"]
@@ -197,13 +198,14 @@ class Horizontal(VaryingLoad):
     magnitude: q.Number = Field(description="acceleration over that of gravity, towards +x where positive")
 
 
-class Gravity(Load):
+class Gravity(Load, _Sampled):
     """Gravity that turns, as on a tilting table: from one tilt of the ground to another at a rate, or as samples say.
 
     Tilts are those of `ground.tilt`, which it takes the place of.
     """
 
     needs: ClassVar = ("to", "rate")
+    column, key = "tilt_deg", "tilts"
     kind: Literal["gravity"] = Field(description="kind of load")
     first: q.TiltAngle | None = Field(
         default=None, alias="from", description="tilt until it begins to turn (default: ground.tilt)"
@@ -218,21 +220,13 @@ class Gravity(Load):
     times: Times = Field(default=(), description="times of the tilts, instead of a table")
     tilts: tuple[q.TiltAngle, ...] = Field(default=(), description="tilts at these times, instead of a table")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _read(cls, value: object, info: ValidationInfo) -> object:
-        read = read_samples(value, info, "tilt_deg", "tilts")
-        if read is value or not isinstance(read, dict):
-            return value
-        return {**read, "tilts": tuple(f"{degrees!r} deg" for degrees in read["tilts"])}
-
     def _check(self) -> None:
         turns = {"to": self.last, "rate": self.rate}
         given = [key for key, value in {**turns, "from": self.first}.items() if value is not None]
         if self.times or self.tilts:
             if given:
                 raise q.invalid(f"{given[0]} and samples of the tilt are both given; keep one of them", given[0])
-            check_samples(self.times, self.tilts, "tilts", least=2)
+            super()._check()
             return
         for key, value in turns.items():
             if value is None:
