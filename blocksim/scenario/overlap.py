@@ -100,7 +100,8 @@ class Outlines(NamedTuple):
         """Heights of the lowest corners."""
         lowest = self.y - self.half_extent(0.0, 1.0)
         polygon = np.flatnonzero(self.kinds != RECTANGLE)
-        for some in _portions(polygon):
+        for begin in range(0, polygon.size, POLYGONS_AT_ONCE):
+            some = polygon[begin : begin + POLYGONS_AT_ONCE]
             lowest[some] = self.some(some).corners()[..., 1].min(axis=1)
         return lowest
 
@@ -116,18 +117,15 @@ def _table(polygons: Sequence[Corners]) -> Floats:
     return table
 
 
-def _portions(indices: Integers) -> Iterator[Integers]:
-    return (indices[begin : begin + POLYGONS_AT_ONCE] for begin in range(0, indices.size, POLYGONS_AT_ONCE))
-
-
 def penetration(ones: Outlines, others: Outlines) -> Floats:
     """Return the penetration depths (m) of pairs of outlines; zero or negative where they are apart."""
     x, y = others.x - ones.x, others.y - ones.y
     axes = [axis for r in (ones, others) for axis in ((r.cosine, r.sine), (-r.sine, r.cosine))]
     reaches = (ones.half_extent(*axis) + others.half_extent(*axis) - np.abs(x * axis[0] + y * axis[1]) for axis in axes)
     depth: Floats = np.min([*reaches], axis=0)
-    polygon = (ones.kinds != RECTANGLE) | (others.kinds != RECTANGLE)
-    for some in _portions(np.flatnonzero(polygon & (depth > 0.0))):
+    polygon = np.flatnonzero(((ones.kinds != RECTANGLE) | (others.kinds != RECTANGLE)) & (depth > 0.0))
+    for begin in range(0, polygon.size, POLYGONS_AT_ONCE):
+        some = polygon[begin : begin + POLYGONS_AT_ONCE]
         corners, behind = ones.some(some).corners(), others.some(some).corners()
         depth[some] = np.minimum(_least_reach(corners, behind), _least_reach(behind, corners))
     return depth
@@ -145,29 +143,25 @@ def _least_reach(ones: Floats, others: Floats) -> Floats:
     return least
 
 
-def overlapping_pairs(bodies: Sequence[PlacedBody]) -> Iterator[tuple[int, int, float]]:
-    """Yield the indices (smaller first) of every overlapping pair and its penetration in m."""
-    yield from _penetrating(Outlines.of(bodies), len(bodies), within=True)
+def overlapping_pairs(
+    bodies: Sequence[PlacedBody], segments: Sequence[PlacedSegment] | None = None
+) -> Iterator[tuple[int, int, float]]:
+    """Yield the indices (smaller first) and the penetration (m) of every two bodies that overlap.
 
-
-def crossings(bodies: Sequence[PlacedBody], segments: Sequence[PlacedSegment]) -> Iterator[tuple[int, int, float]]:
-    """Yield the body, the segment and the depth (m) where a body lies across a segment."""
-    if not segments:
-        return
-    both = Outlines.of(bodies).and_pieces(Outlines.along(segments))
-    for body, piece, depth in _penetrating(both, len(bodies), within=False):
-        yield body, piece - len(bodies), depth
-
-
-def _penetrating(outlines: Outlines, bodies: int, *, within: bool) -> Iterator[tuple[int, int, float]]:
-    """Yield the pairs among the first `bodies` outlines, or of one of them and one of the others, that penetrate."""
-    for one, other in near_pairs(outlines):
+    With segments those of bodies and of the segments that they lie across, and nothing else.
+    """
+    outlines = Outlines.of(bodies)
+    if segments is not None:
+        outlines = outlines.and_pieces(Outlines.along(segments))
+    for one, other in near_pairs(outlines) if segments is None or segments else ():
         first, second = np.minimum(one, other), np.maximum(one, other)
-        wanted = second < bodies if within else (first < bodies) & (second >= bodies)
-        first, second = first[wanted], second[wanted]
+        if segments is not None:
+            wanted = (first < len(bodies)) & (second >= len(bodies))
+            first, second = first[wanted], second[wanted]
         depth = penetration(outlines.some(first), outlines.some(second))
         deep = depth > TOLERANCE
-        yield from zip(first[deep].tolist(), second[deep].tolist(), depth[deep].tolist(), strict=True)
+        begin = 0 if segments is None else len(bodies)
+        yield from zip(first[deep].tolist(), (second[deep] - begin).tolist(), depth[deep].tolist(), strict=True)
 
 
 def near_pairs(outlines: Outlines) -> Iterator[Pairs]:

@@ -58,7 +58,7 @@ def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str,
     elif isinstance(load, Force):
         half = (0.5 * body.size_x, 0.5 * body.size_y)
         if body.outline:
-            is_inside = geometry.holds(body.outline, load.point, _margin(body))
+            is_inside = geometry.holds(body.outline, load.point, 0.5 * STRIP * body.least_width)
         else:
             is_inside = all(abs(at) <= side * (1.0 + STRIP) for at, side in zip(load.point, half, strict=True))
         if not is_inside:
@@ -85,25 +85,20 @@ def face_of(body: PlacedBody, face: Face) -> tuple[geometry.Corner, geometry.Cor
 
 
 def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequence[PlacedBody]) -> Iterator[str]:
-    """Yield what lies against a part of a face that is more than a line."""
-    strip = strip_before(body, load.face)
-    if scenario.ground.profile is None and float(overlap.Outlines.of([strip]).bottom[0]) < -_margin(body):
+    """Yield what lies against a part of a face that is more than a line: what reaches into half of the strip."""
+    strip, margin = strip_before(body, load.face), 0.5 * STRIP * body.least_width
+    if scenario.ground.profile is None and float(overlap.Outlines.of([strip]).bottom[0]) < -margin:
         yield "the ground"
     segments = placement.place_segments(scenario)
-    for _, segment, depth in overlap.crossings([strip], segments):
-        if depth > _margin(body):
+    for _, segment, depth in overlap.overlapping_pairs([strip], segments):
+        if depth > margin:
             yield "a wall" if segment >= len(segments) - len(scenario.walls) else "the ground"
     for pairs in overlap.near_pairs(overlap.Outlines.of([strip, *bodies])):
         for second in np.maximum(*pairs)[np.minimum(*pairs) == 0]:
             other = bodies[int(second) - 1]
             depths = overlap.penetration(overlap.Outlines.of([strip]), overlap.Outlines.of([other]))
-            if other is not body and depths[0] > _margin(body):
+            if other is not body and depths[0] > margin:
                 yield f"body {toml(other.name)}"
-
-
-def _margin(body: PlacedBody) -> float:
-    """Return how far (m) anything may reach into the strip: half of it."""
-    return 0.5 * STRIP * body.least_width
 
 
 def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
@@ -203,12 +198,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
     if unplaceable:
         yield from unplaceable
         return
-    yield from _endless_motion(scenario)
-    if scenario.contact.law != "linear":
-        for one, partners in scenario.pairs.items():
-            for other in (name for name, pair in partners.items() if pair.normal_stiffness is not None):
-                yield Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
-    yield from _impossible_masses(scenario)
+    yield from _unfit_tables(scenario)
     try:
         bodies, origins = placement.place_bodies(scenario), placement.placement_of(scenario).origins
     except UnfitError:
@@ -264,8 +254,8 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
             yield Mistake(path, f"block {toml(block)} has no shape; {SHAPES}")
 
 
-def _endless_motion(scenario: Scenario) -> Iterator[Mistake]:
-    """Find vibrations of too many cycles, and too many tables."""
+def _unfit_tables(scenario: Scenario) -> Iterator[Mistake]:
+    """Find vibrations of too many cycles, too many tables, stiffnesses without a law, and masses beyond all numbers."""
     motions: list[tuple[KeyPath, object]] = [((), scenario.motion)]
     motions += [(("bodies", number), body.motion) for number, body in enumerate(scenario.bodies)]
     for path, motion in motions:
@@ -276,10 +266,10 @@ def _endless_motion(scenario: Scenario) -> Iterator[Mistake]:
     if len(tables := {one.digest for one in resolved.tables_of_bodies(scenario).values()}) > MOST_BODY_TABLES:
         message = f"{len(tables)} different tables of motion of bodies are too many; at most {MOST_BODY_TABLES}"
         yield Mistake(("bodies",), f"{message} are allowed")
-
-
-def _impossible_masses(scenario: Scenario) -> Iterator[Mistake]:
-    """Find blocks with valid sizes but an invalid mass or inertia."""
+    if scenario.contact.law != "linear":
+        for one, partners in scenario.pairs.items():
+            for other in (name for name, pair in partners.items() if pair.normal_stiffness is not None):
+                yield Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
     for name, block in scenario.blocks.items():
         if not block.is_shaped:
             continue
@@ -367,7 +357,7 @@ def _overlaps(scenario: Scenario, origins: Sequence[KeyPath], bodies: Sequence[P
             yield Mistake(origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)")
     else:
         depths: dict[int, float] = {}
-        for index, _, sunk in overlap.crossings(bodies, placement.profile_segments(scenario)):
+        for index, _, sunk in overlap.overlapping_pairs(bodies, placement.profile_segments(scenario)):
             depths[index] = max(depths.get(index, 0.0), sunk)
         surface = placement.surface_heights(scenario, np.array([body.x for body in bodies]))
         for index, (origin, body) in enumerate(zip(origins, bodies, strict=True)):
@@ -375,7 +365,7 @@ def _overlaps(scenario: Scenario, origins: Sequence[KeyPath], bodies: Sequence[P
                 yield Mistake(origin, f"body {body.name} reaches {_mm(depths[index])} into the ground's profile")
             elif body.y < surface[index]:
                 yield Mistake(origin, f"body {body.name} lies below the ground's profile")
-    for index, wall, sunk in islice(overlap.crossings(bodies, placement.wall_segments(scenario)), MAX_OVERLAPS):
+    for index, wall, sunk in islice(overlap.overlapping_pairs(bodies, placement.wall_segments(scenario)), MAX_OVERLAPS):
         message = f"body {bodies[index].name} and walls.{wall} overlap by {_mm(sunk)}; they may only touch"
         yield Mistake(origins[index], message)
     for first, second, sunk in islice(overlap.overlapping_pairs(bodies), MAX_OVERLAPS):

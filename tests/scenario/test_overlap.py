@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.scenario.geometry import Corner, centre_outline
-from blocksim.scenario.overlap import Outlines, crossings, near_pairs, overlapping_pairs, penetration
+from blocksim.scenario.overlap import Outlines, near_pairs, overlapping_pairs, penetration
 from blocksim.scenario.placement import PlacedBody, PlacedSegment
 
 
@@ -132,8 +132,8 @@ def test_the_cells_find_the_crossings_that_comparing_all_finds(
     bodies: list[PlacedBody], ends: list[tuple[float, float, float, float]]
 ) -> None:
     pieces = [segment(*piece) for piece in ends if math.dist(piece[:2], piece[2:]) > 1e-4]
-    single = {(i, j) for i, b in enumerate(bodies) for j, p in enumerate(pieces) for _ in crossings([b], [p])}
-    found = [(i, j) for i, j, _ in crossings(bodies, pieces)]
+    single = {(i, j) for i, b in enumerate(bodies) for j, p in enumerate(pieces) for _ in overlapping_pairs([b], [p])}
+    found = [(i, j) for i, j, _ in overlapping_pairs(bodies, pieces)]
     assert set(found) == single
     assert len(found) == len(single)
 
@@ -145,7 +145,7 @@ def test_a_pair_is_found_wherever_it_is(x: float) -> None:
 
 def test_level_pieces_alone_have_no_height_and_still_meet_what_stands_on_end() -> None:
     short = [segment(0.001 * i, 0.0, 0.001 * (i + 1), 0.0) for i in range(-5, 5)]
-    assert {piece for _, piece, _ in crossings([body(0.0, 0.0)], short)} == set(range(10))
+    assert {piece for _, piece, _ in overlapping_pairs([body(0.0, 0.0)], short)} == set(range(10))
 
 
 def test_overlaps_are_found_in_portions(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,19 +179,19 @@ def test_a_piece_crosses_a_body_where_a_part_of_it_is_inside(
     piece_ends: tuple[float, float, float, float], angle: float
 ) -> None:
     piece, block = segment(*piece_ends), body(0.0, 0.0, angle)
-    found = list(crossings([block], [piece]))
+    found = list(overlapping_pairs([block], [piece]))
     assert bool(found) == (length_inside(piece, block) > 0) or all(depth < 1e-6 for *_, depth in found)
 
 
 def test_crossings_name_body_piece_and_depth() -> None:
     bodies = [body(0.0, 0.0), body(1.0, 0.0), body(1.03, 0.0)]
     pieces = [segment(-1.0, -0.01, 3.0, -0.01), segment(-1.0, 0.009, 0.5, 0.009), segment(1.0, -1.0, 1.0, 1.0)]
-    found = {(b, p): depth for b, p, depth in crossings(bodies, pieces)}
+    found = {(b, p): depth for b, p, depth in overlapping_pairs(bodies, pieces)}
     assert found == {(0, 1): pytest.approx(0.001), (1, 2): pytest.approx(0.02)}
 
 
 def test_bodies_without_pieces_cross_none() -> None:
-    assert list(crossings([body(0.0, 0.0)], [])) == []
+    assert list(overlapping_pairs([body(0.0, 0.0)], [])) == []
 
 
 def test_the_lowest_corner_of_a_turned_rectangle() -> None:
@@ -231,7 +231,7 @@ def test_the_cells_find_polygons_too(bodies: list[PlacedBody]) -> None:
 def test_a_piece_crosses_a_polygon_where_a_part_of_it_is_inside(
     block: PlacedBody, ends: tuple[float, float, float, float]
 ) -> None:
-    found = list(crossings([block], [segment(*ends)]))
+    found = list(overlapping_pairs([block], [segment(*ends)]))
     assert bool(found) == (length_inside(segment(*ends), block) > 0) or all(depth < 1e-6 for *_, depth in found)
 
 
