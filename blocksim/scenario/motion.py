@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.models.motion import Baseline, FromTable, Harmonic, Pulse, Ramp, Rotation
+from blocksim.scenario.models.motion import UNITS, Baseline, FromTable, Harmonic, Pulse, Ramp, Rotation
 from blocksim.scenario.models.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -111,7 +111,8 @@ def motion_pieces(scenario: Scenario) -> MotionPieces:
         case Pulse():
             pieces = hermite_pieces(*pulse_samples(motion))
         case _:
-            acceleration = motion.factor * np.array(motion.table.values)
+            unit = motion.unit if motion.table.unit is None else None  # samples are in m/s² where the file says theirs
+            acceleration = (1.0 if unit is None else UNITS[unit]) * np.array(motion.table.values)
             acceleration = correct_baseline(np.array(motion.table.times), acceleration, motion.baseline)
             peak = float(np.abs(acceleration).max())
             scale = motion.scale if motion.pga is None else motion.pga / peak if peak > 0.0 else 0.0

@@ -135,11 +135,6 @@ def scenario_hash(scenario: Scenario) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def motion_table_content(scenario: Scenario) -> bytes | None:
-    """Return the table of motion as it was read, for a copy, or None without one."""
-    return scenario.motion.table.content if isinstance(scenario.motion, motion.TABLED) else None
-
-
 def _plain(table: BaseModel) -> dict[str, Any]:
     """Turn a table into its TOML form; keys without a value are left out."""
     if isinstance(table, study.Sweep):

@@ -15,8 +15,8 @@ from pydantic import BaseModel
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, events, input_files, scenario_to_toml
-from blocksim.scenario.models.motion import MOST_BODY_TABLES
-from blocksim.scenario.resolved import MARK, motion_table_content, tables_of_bodies
+from blocksim.scenario.models.motion import MOST_BODY_TABLES, TABLED
+from blocksim.scenario.resolved import MARK, tables_of_bodies
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.provenance import run_hash
 
@@ -187,8 +187,9 @@ def read_tables(scenario: Scenario) -> dict[str, bytes]:
         tables[EXPERIMENT] = input_files.read_limited(scenario.experiment.table, TABLE_BYTES, links=True)
     contents = {table.digest: table.content for table in tables_of_bodies(scenario).values()}
     tables |= dict(zip(BODY_MOTIONS, contents.values(), strict=False))
-    motion = motion_table_content(scenario)
-    return tables if motion is None else {**tables, MOTION: motion}
+    if isinstance(scenario.motion, TABLED):
+        tables[MOTION] = scenario.motion.table.content
+    return tables
 
 
 def keep_scenario(

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
+from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.motion import (
     Floats,
     MotionPieces,
@@ -19,7 +20,6 @@ from blocksim.scenario.motion import (
     motion_pieces,
     spline_slopes,
 )
-from blocksim.scenario.resolved import motion_table_content
 from tests.scenario.conftest import data_of
 
 END = 3.0
@@ -162,7 +162,8 @@ def shaken(tmp_path: Path) -> Scenario:
 def test_a_copied_table_means_the_same(tmp_path: Path, shaken: Scenario) -> None:
     copy = tmp_path / "copy"
     copy.mkdir()
-    content = motion_table_content(shaken)
+    assert isinstance(shaken.motion, FromTable)
+    content = shaken.motion.table.content
     assert content == TABLE.encode()
     (copy / "motion.csv").write_bytes(content)
     (copy / "scenario.toml").write_text(scenario_to_toml(shaken, motion_table="motion.csv"))
@@ -183,10 +184,6 @@ def test_the_hash_ignores_notes_and_the_place_of_the_table(tmp_path: Path, shake
     (tmp_path / "other.csv").write_text("# noted\n" + TABLE.replace("0,0", "0.0, 0e0"))
     other = scenario({"kind": "table", "table": "other.csv", "direction": "10 deg"}, tmp_path)
     assert scenario_hash(other) == scenario_hash(shaken)
-
-
-def test_without_a_table_there_is_nothing_to_copy() -> None:
-    assert motion_table_content(scenario(HARMONIC)) is motion_table_content(scenario(None)) is None
 
 
 def test_a_sweep_may_vary_the_table(tmp_path: Path) -> None:

@@ -5,7 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    WithJsonSchema,
+    create_model,
+    model_validator,
+)
 from pydantic.json_schema import JsonSchemaValue
 
 from blocksim.scenario import input_files, spelling, units
@@ -107,6 +116,10 @@ def require_one(missing: str, **values: object) -> None:
         raise units.invalid(missing)
     if len(given) > 1:
         raise units.invalid(f"{' and '.join(given)} are both given; keep one of them", given[-1])
+
+
+PATH_SCHEMA = WithJsonSchema({"type": "string", "minLength": 1})
+"""Of the path of a file, for editors."""
 
 
 def table_path(value: object, folder: Path | str | None, example: str) -> Path:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import ConfigDict, Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -28,13 +28,25 @@ GROUND = "ground"
 """Stands for the ground where pairs name materials; no material can have this name."""
 
 
-class PairFriction(Table):
+class _Short(Table):
+    """A table in whose place a bare value may stand in the file."""
+
+    bare: ClassVar[JsonSchemaValue]
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Accept both."""
+        return {"anyOf": [cls.bare, handler(schema)]}
+
+
+class PairFriction(_Short):
     """Coulomb friction of one material pair, falling from static to kinetic with the sliding speed.
 
     mu(v) = kinetic + (static - kinetic) exp(-|v| / transition_speed). A bare number or friction angle in the
     file means static = kinetic. With kinetic_ratio, kinetic follows static where that is varied.
     """
 
+    bare = q.FrictionCoefficient().json_schema({"type": "number"})
     static: q.Friction = Field(description="friction coefficient at rest")
     kinetic_ratio: q.Ratio | None = Field(
         default=None, exclude=True, description="kinetic over static friction, in place of kinetic"
@@ -61,11 +73,6 @@ class PairFriction(Table):
         if self.kinetic > self.static:
             raise q.invalid(f"kinetic friction {self.kinetic:g} is above static friction {self.static:g}", "kinetic")
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Accept a bare number or angle."""
-        return {"anyOf": [q.FrictionCoefficient().json_schema({"type": "number"}), handler(schema)]}
-
 
 class Friction(Table):
     """Friction between blocks, and between blocks and the ground; the defaults are the paper's."""
@@ -76,9 +83,10 @@ class Friction(Table):
     )
 
 
-class Restitution(Table):
+class Restitution(_Short):
     """Coefficients of restitution; a bare number in the file sets both."""
 
+    bare: ClassVar = {"type": "number", "minimum": 0, "maximum": 1}
     block_block: q.Share = Field(default=0.2, description="restitution between two blocks (assumed)")
     block_ground: q.Share = Field(default=0.2, description="restitution between a block and the ground (assumed)")
 
@@ -90,11 +98,6 @@ class Restitution(Table):
         if isinstance(value, Mapping | Restitution):
             return value
         raise q.invalid(f"{q.toml(value)} is not a restitution; write a number or {{ block_block, block_ground }}")
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Accept a bare number."""
-        return {"anyOf": [{"type": "number", "minimum": 0, "maximum": 1}, handler(schema)]}
 
 
 class Pair(Table):

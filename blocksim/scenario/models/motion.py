@@ -34,14 +34,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic.json_schema import JsonSchemaValue
+from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import input_files
 from blocksim.scenario import units as q
-from blocksim.scenario.models.base import OneOf, Table, by_kind, require_one, table_path
+from blocksim.scenario.models.base import PATH_SCHEMA, OneOf, Table, by_kind, require_one, table_path
 
 PIECES_PER_CYCLE = 200
 """The cubic pieces are then off by less than (2 pi/200)^4/384 = 3e-9 of the amplitude."""
@@ -209,10 +208,6 @@ class TableFile:
         write = core_schema.plain_serializer_function_ser_schema(lambda table: table.path.as_posix())
         return core_schema.with_info_plain_validator_function(load, serialization=write)
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Describe the path to editors."""
-        return {"type": "string", "minLength": 1}
-
 
 class FromTable(Table):
     """Samples of a CSV table; see `blocksim.scenario.models.motion`.
@@ -222,7 +217,7 @@ class FromTable(Table):
     """
 
     kind: Literal["table"] = Field(description="kind of motion")
-    table: Annotated[MotionTable, TableFile(read_motion_table, "shaking.csv")] = Field(
+    table: Annotated[MotionTable, TableFile(read_motion_table, "shaking.csv"), PATH_SCHEMA] = Field(
         description="CSV table, relative to the scenario file: time_s and displacement_m, _mm or acceleration_g, _m_s2"
     )
     scale: q.Number = Field(default=1.0, description="factor on the table's values")
@@ -492,7 +487,7 @@ class Record(Table):
     """
 
     kind: Literal["record"] = Field(description="kind of motion")
-    table: Annotated[RecordTable, TableFile(read_record, "record.AT2")] = Field(
+    table: Annotated[RecordTable, TableFile(read_record, "record.AT2"), PATH_SCHEMA] = Field(
         description="accelerogram, relative to the scenario file: PEER AT2, or text or CSV of time and value"
     )
     unit: Annotated[Unit, OneOf(get_args(Unit))] | None = Field(
@@ -509,11 +504,6 @@ class Record(Table):
     start: q.NonNegativeTime = Field(
         default=0.0, description="time at which the record's time is zero; the supports rest before"
     )
-
-    @property
-    def factor(self) -> float:
-        """Factor from the table's values to m/s²."""
-        return UNITS[self.unit] if self.table.unit is None and self.unit is not None else 1.0
 
     def _check(self) -> None:
         name, said = self.table.path.name, self.table.unit

@@ -21,7 +21,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 
 from blocksim.scenario import spelling
 from blocksim.scenario import units as q
-from blocksim.scenario.models.base import OneOf, Table, Whole, table_path
+from blocksim.scenario.models.base import PATH_SCHEMA, OneOf, Table, Whole, table_path
 
 MAX_VALUES = 100_000
 SIGNIFICANT = 12
@@ -136,6 +136,7 @@ def _read_distribution(value: object) -> Variation:
         return _levels(value, "{ from, to } or { mean, sd }")
     if "count" in value:
         raise q.invalid('count belongs to the modes "grid" and "list"; here `samples` sets the number', "count")
+    found: Distribution
     if "mean" in value or "sd" in value:
         _refuse_slips(value, ("mean", "sd", "from", "to"), needed=("mean", "sd"))
         bounds = [name for name in ("from", "to") if name in value]
@@ -144,16 +145,19 @@ def _read_distribution(value: object) -> Variation:
             raise q.invalid(f"the standard deviation {q.toml(value['sd'])} is not above 0", "sd")
         ends = dict(zip(bounds, given, strict=True))
         low, high = ends.get("from", -math.inf), ends.get("to", math.inf)
-        _refuse_empty(value, low, high)
-        if low > mean + FARTHEST * sd or high < mean - FARTHEST * sd:
+        found = Normal(mean, sd, low, high, angle, _unit(value, "mean", "sd"))
+    else:
+        _refuse_slips(value, ("from", "to", "scale", "mean", "sd"), needed=("from", "to"))
+        (low, high), angle = _numbers(value, "from", "to")
+        found = Uniform(low, high, _scale(value, low, high), angle, _unit(value, "from", "to"))
+    if low >= high:
+        raise q.invalid(f"from = {q.toml(value['from'])} is not below to = {q.toml(value['to'])}", "from")
+    if isinstance(found, Normal):
+        reach = FARTHEST * found.sd
+        if low > found.mean + reach or high < found.mean - reach:
             message = f"the bounds exclude everything within {FARTHEST:g} standard deviations of the mean"
-            raise q.invalid(message, "from" if low > mean else "to")
-        return Normal(mean, sd, low, high, angle, _unit(value, "mean", "sd"))
-    _refuse_slips(value, ("from", "to", "scale", "mean", "sd"), needed=("from", "to"))
-    (low, high), angle = _numbers(value, "from", "to")
-    scale = _scale(value, low, high)
-    _refuse_empty(value, low, high)
-    return Uniform(low, high, scale, angle, _unit(value, "from", "to"))
+            raise q.invalid(message, "from" if low > found.mean else "to")
+    return found
 
 
 def _levels(value: object, tables: str) -> tuple[Any, ...]:
@@ -188,11 +192,6 @@ def is_descending(value: Mapping[str, Any]) -> bool:
     except PydanticCustomError:
         return False
     return first > last
-
-
-def _refuse_empty(value: Mapping[str, Any], low: float, high: float) -> None:
-    if low >= high:
-        raise q.invalid(f"from = {q.toml(value['from'])} is not below to = {q.toml(value['to'])}", "from")
 
 
 def _scale(value: Mapping[str, Any], low: float, high: float) -> Scale:
@@ -256,7 +255,7 @@ def _existing_table(value: object, info: ValidationInfo) -> object:
     return table_path(value, folder, "experiments/three_blocks.csv")
 
 
-TablePath = Annotated[Path, BeforeValidator(_existing_table), WithJsonSchema({"type": "string", "minLength": 1})]
+TablePath = Annotated[Path, BeforeValidator(_existing_table), PATH_SCHEMA]
 
 
 class Experiment(Table):
