@@ -165,8 +165,7 @@ def draw_mechanisms(
 
     Raises InvalidInputError for an unknown picture format, too small a page and runs without contacts, OutputError.
     """
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+    from matplotlib import lines, patches
 
     path = style.picture_path(path)
     width = paper.width(WIDTH, LEAST_WIDTH)
@@ -185,9 +184,9 @@ def draw_mechanisms(
     height = paper.height(HEAD + sum(page.height for page in pages) + foot)
     look = {"edgecolor": FIRST["color"], "linewidth": FIRST["linewidth"]}
     handles = [
-        Patch(facecolor="none", label="first block to move", **look),
-        Line2D([], [], label="sliding joint", **SLIDING),
-        Line2D([], [], linestyle="none", label="hinge", **HINGE),
+        patches.Patch(facecolor="none", label="first block to move", **look),
+        lines.Line2D([], [], label="sliding joint", **SLIDING),
+        lines.Line2D([], [], linestyle="none", label="hinge", **HINGE),
     ]
     with style.styled_figure(width, height, paper.dots) as figure:
         top = height - HEAD

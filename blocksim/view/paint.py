@@ -162,35 +162,32 @@ def _scaled(values: run_data.Floats, scale: Scale) -> Paint:
     """Return fills from a map of colours; `values` are (n, b)."""
 
     def fills(frame: int) -> list[str]:
-        from matplotlib import colormaps
-        from matplotlib.colors import to_hex
+        from matplotlib import colormaps, colors
 
         shares = (np.nan_to_num(values[frame]) - scale.low) / (scale.high - scale.low)
-        return [to_hex(colour) for colour in colormaps[scale.colours](shares.clip(0.0, 1.0))]
+        return [colors.to_hex(colour) for colour in colormaps[scale.colours](shares.clip(0.0, 1.0))]
 
     return Paint(fills, scale=scale)
 
 
 def draw_key(figure: "style.Figure", paint: Paint, left: float, bottom: float) -> None:
     """Draw what explains the colours, its lower left corner at a place given in inches."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from matplotlib.patches import Patch
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
+    from matplotlib import cm, colors, patches, ticker
 
     across = float(figure.get_figwidth())
     if paint.scale is not None:
         scale, width, left = paint.scale, min(0.4 * across, 3.0), left + 0.06 * across
-        colours = ScalarMappable(Normalize(scale.low, scale.high), scale.colours)
+        colours = cm.ScalarMappable(colors.Normalize(scale.low, scale.high), scale.colours)
         place = style.add_axes(figure, left, bottom + 0.34, width, BAR)
         bar = figure.colorbar(colours, cax=place, orientation="horizontal", extend=scale.extend)
         bar.outline.set_linewidth(style.LINE_WIDTH)
-        bar.locator = MaxNLocator(nbins=5, steps=[1, 2, 3, 4.5, 5, 9, 10])
-        bar.formatter = FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−"))
+        bar.locator = ticker.MaxNLocator(nbins=5, steps=[1, 2, 3, 4.5, 5, 9, 10])
+        bar.formatter = ticker.FuncFormatter(lambda value, _: f"{value:g}".replace("-", "−"))
         bar.update_ticks()
         style.write_text(figure, left + width + 0.15, bottom + 0.39, scale.label, va="center")
     elif paint.entries:
         handles = [
-            Patch(facecolor=fill, edgecolor=style.INK, linewidth=0.5, label=name) for name, fill in paint.entries
+            patches.Patch(facecolor=fill, edgecolor=style.INK, linewidth=0.5, label=name)
+            for name, fill in paint.entries
         ]
         style.write_legend(figure, handles, left, bottom, ncols=max(1, min(len(handles), int(across / 1.6))))

@@ -166,22 +166,21 @@ MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a
 
 def draw_support(canvas: Canvas, support: run_data.Support, offset: run_data.Floats) -> None:
     """Draw the part of ground and walls that can be seen, displaced by `offset` (mm) along x and y."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-    from matplotlib.transforms import Bbox
+    from matplotlib import collections, patches, path, transforms
 
     low, high = canvas.box()
     ground, *faces = _faces(support, canvas)
     deep = ground[[-1, 0]] * [1.0, 0.0] + [0.0, low[1] - canvas.extent.height]
     walls = [(WALLS, one + offset) for one in wall_outlines(support.walls, WALL_THICKNESS / canvas.points_per_mm)]
     for zorder, outline in (*walls, (GROUND, np.concatenate([ground + offset, deep]))):
-        seen = Path(np.concatenate([outline, outline[:1]]), closed=True).clip_to_bbox(Bbox([low, high]))
-        patch = PathPatch(seen, facecolor=style.GROUND_COLOUR, linewidth=0.0, zorder=zorder, transform=canvas.scene)
+        seen = path.Path(np.concatenate([outline, outline[:1]]), closed=True).clip_to_bbox(transforms.Bbox([low, high]))
+        patch = patches.PathPatch(
+            seen, facecolor=style.GROUND_COLOUR, linewidth=0.0, zorder=zorder, transform=canvas.scene
+        )
         canvas.axes.add_artist(patch)
     lines = np.concatenate([run_data.parts_within(line + offset, low, high) for line in (ground, *faces)])
     look: dict[str, Any] = {"colors": style.INK, "linewidths": style.LINE_WIDTH}
-    canvas.axes.add_collection(LineCollection(list(lines), **look, transform=canvas.scene))
+    canvas.axes.add_collection(collections.LineCollection(list(lines), **look, transform=canvas.scene))
 
 
 def draw_start(canvas: Canvas, support: run_data.Support, offset: run_data.Floats, outlines: run_data.Floats) -> None:

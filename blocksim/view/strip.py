@@ -220,8 +220,7 @@ def draw_profile(
     Raises InvalidInputError for an unknown picture format, a run without soil, a time that was not stored or a page
     that is too small, and OutputError when the file cannot be written.
     """
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
+    from matplotlib import colormaps, colors
 
     path = style.picture_path(path)
     support, drawable = support or run_data.Support(), run_data.drawable_frames(frames)
@@ -233,7 +232,8 @@ def draw_profile(
     lines = [[line for track, profile in surfaces for line in profile(track, frame)] for frame in chosen.tolist()]
     if not any(lines):
         raise InvalidInputError("no soil in this run: --kind profile draws its surface")
-    shades = [to_hex(colour) for colour in colormaps[COLOURS](np.linspace(0.0, 0.85, len(chosen)))]  # dark to light
+    steps = np.linspace(0.0, 0.85, len(chosen))  # dark to light
+    shades = [colors.to_hex(colour) for colour in colormaps[COLOURS](steps)]
     named = tuple((f"{float(frames.time[frame]):.3f} s", shade) for frame, shade in zip(chosen, shades, strict=True))
     key = Paint(lambda _: [PALE] * len(frames.names), named)
     side, head, foot = PROFILE_MARGINS

@@ -153,12 +153,11 @@ def shorten(text: str, letters: int) -> str:
 
 def width_of(text: str, size: float, *, bold: bool = False) -> float:
     """Return the width (points) of one line of text at a font size (points), as it is on paper."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
+    from matplotlib import font_manager, textpath
 
-    font = FontProperties(family=FONT, size=size, weight="bold" if bold else "normal")
+    font = font_manager.FontProperties(family=FONT, size=size, weight="bold" if bold else "normal")
     with silence_missing_glyphs():
-        return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0])
+        return float(textpath.text_to_path.get_text_width_height_descent(text, font, ismath=False)[0])
 
 
 def cut_to(text: str, room: float, size: float, *, bold: bool = False) -> str:

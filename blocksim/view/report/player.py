@@ -86,10 +86,9 @@ def pack_systems(frames: Frames, kept: Indices) -> list[dict[str, Any]]:
     those of all corners (f, b, k). `shades` are what elements can be coloured by: labels, values (f, b), and the value
     of the last of the `palette`.
     """
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
+    from matplotlib import colormaps, colors
 
-    palette = [to_hex(colour) for colour in colormaps[paint.ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
+    palette = [colors.to_hex(colour) for colour in colormaps[paint.ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
     systems = []
     for number, track in enumerate(frames.others, start=1):
         shades = []

@@ -77,11 +77,6 @@ class SweepData:
     manners: tuple[str, ...] = ()  # (n,) how each case ended, such as `fell`; none where nobody judged it
 
     @property
-    def is_sampled(self) -> bool:
-        """Whether values were drawn, so that shares of cases are probabilities."""
-        return self.mode in {"lhs", "sobol", "normal"}
-
-    @property
     def moving(self) -> list[int]:
         """The numbers of the blocks that are worth drawing."""
         low, high = np.percentile(self.x_mm[self.finished], [RARE, 100.0 - RARE], axis=0)

@@ -43,7 +43,7 @@ def refusal(sweep: data.SweepData) -> str:
 
 def suits(sweep: data.SweepData) -> bool:
     """Return True if all combinations exist, and the columns for the values of the second input are not too many."""
-    if refusal(sweep) or (sweep.is_sampled and len(sweep.inputs) > 1):
+    if refusal(sweep) or (sweep.mode in {"lhs", "sobol", "normal"} and len(sweep.inputs) > 1):
         return False
     _, other = _axis_and_other(sweep)
     return other is None or other.count <= data.MOST_COLUMNS

@@ -42,15 +42,13 @@ class Classes:
 
 def run_out_scale(x_mm: run_data.Floats) -> "tuple[Colormap, BoundaryNorm]":
     """Return a map of colours in round steps over all but the rarest run-outs (mm)."""
-    from matplotlib import colormaps
-    from matplotlib.colors import BoundaryNorm
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib import colormaps, colors, ticker
 
     low, high = np.nanpercentile(x_mm, [RARE, 100.0 - RARE])
     spare = 0.5 * max(LEAST_SPAN_MM - (high - low), 0.0)
-    edges = MaxNLocator(nbins=STEPS, steps=[1, 2, 2.5, 5, 10]).tick_values(low - spare, high + spare)
+    edges = ticker.MaxNLocator(nbins=STEPS, steps=[1, 2, 2.5, 5, 10]).tick_values(low - spare, high + spare)
     colours = colormaps[RUN_OUT_COLOURS]
-    return colours, BoundaryNorm(edges, colours.N, extend="both")
+    return colours, colors.BoundaryNorm(edges, colours.N, extend="both")
 
 
 def classes_of(sweep: data.SweepData) -> Classes:
@@ -215,9 +213,7 @@ def draw_map(
     `found` are its contents, by default over the two inputs with the most values; it gets the panels. `by_manner` shows
     in the last row how cases ended in place of their final rotations. Raises InvalidInputError for too small a page.
     """
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+    from matplotlib import colors, lines, patches
 
     found = found or map_of(sweep)
     count = len(found.columns)
@@ -227,9 +223,9 @@ def draw_map(
         if not (classes.numbers == number).any():
             continue
         if label.startswith("failed"):
-            handles.append(Line2D([], [], linestyle="", marker="x", markersize=4.0, color=style.INK, label=label))
+            handles.append(lines.Line2D([], [], linestyle="", marker="x", markersize=4.0, color=style.INK, label=label))
         else:
-            handles.append(Patch(facecolor=colour, label=label))
+            handles.append(patches.Patch(facecolor=colour, label=label))
     beside = LEFT + RIGHT + (count - 1) * COLUMN_GAP
     own = style.COLUMN_WIDTH - beside if count == 1 else min(WIDEST, (style.PAGE_WIDTH - beside) / count)
     width = paper.width(beside + count * own, beside + count * LEAST)
@@ -244,8 +240,8 @@ def draw_map(
         found.panels.extend(panels)
         for block, row in zip(found.blocks, panels[:-1], strict=True):
             _draw_block(figure, row, found, block)
-        norm = BoundaryNorm(np.arange(len(classes.colours) + 1) - 0.5, len(classes.colours))
-        look = {"cmap": ListedColormap(list(classes.colours)), "norm": norm}
+        norm = colors.BoundaryNorm(np.arange(len(classes.colours) + 1) - 0.5, len(classes.colours))
+        look = {"cmap": colors.ListedColormap(list(classes.colours)), "norm": norm}
         _draw_row(panels[-1], found, classes.title, classes.numbers, look, sweep.inside)
         style.name_axes(figure, panels, found.axes[0].label, found.axes[1].label, X_LABEL)
         for one, heading in zip(panels[0], headings, strict=True):
@@ -275,8 +271,7 @@ def _draw_row(
 
 def _draw_block(figure: "style.Figure", row: Sequence["style.Axes"], found: OutcomeMap, block: int) -> None:
     """Draw the run-out of a block, with the measured range outlined and marked at the colour bar."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colorbar import Colorbar
+    from matplotlib import cm, colorbar
 
     x = found.sweep.x_mm[:, block]
     colours, norm = run_out_scale(x)
@@ -287,7 +282,7 @@ def _draw_block(figure: "style.Figure", row: Sequence["style.Axes"], found: Outc
     _draw_row(row, found, f"final x of block {name} (mm)", x, {"cmap": colours, "norm": norm}, agrees)
     place, share = row[-1].get_position(), 0.1 / float(figure.get_figwidth())
     axes = figure.add_axes((place.x1 + share, place.y0, share, place.height))
-    bar = Colorbar(axes, ScalarMappable(norm, colours), spacing="proportional", extendfrac=0.06)
+    bar = colorbar.Colorbar(axes, cm.ScalarMappable(norm, colours), spacing="proportional", extendfrac=0.06)
     bar.ax.minorticks_off()
     style.number_axis(bar.ax.yaxis)
     low, high = np.clip(band or (0.0, 0.0), norm.vmin, norm.vmax)

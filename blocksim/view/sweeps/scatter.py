@@ -283,16 +283,15 @@ def _draw_block(axes: "style.Axes", sweep: SweepData, block: int, room: float) -
 
 def _entries_histogram(sweep: SweepData) -> list[Any]:
     """Return the entries of the legend."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+    from matplotlib import lines, patches
 
-    entries: list[Any] = [Patch(color=ALL_COLOUR, label=f"all {len(sweep.finished)} cases")]
+    entries: list[Any] = [patches.Patch(color=ALL_COLOUR, label=f"all {len(sweep.finished)} cases")]
     if sweep.inside is not None:
         share = percent(float(sweep.inside.mean()))
-        entries.append(Patch(color=INSIDE_COLOUR, label=f"all inside ({share})"))
+        entries.append(patches.Patch(color=INSIDE_COLOUR, label=f"all inside ({share})"))
     if sweep.measured.x_mm:
         count = max(len(repeats) for repeats in sweep.measured.x_mm.values())
-        entries.append(Line2D([], [], **_REPEATS, label=f"{count} repeats and their range"))
+        entries.append(lines.Line2D([], [], **_REPEATS, label=f"{count} repeats and their range"))
     if sweep.measured.prediction_mm:
-        entries.append(Line2D([], [], **_INTERVAL, label="next test (95 %)"))
+        entries.append(lines.Line2D([], [], **_INTERVAL, label="next test (95 %)"))
     return entries
