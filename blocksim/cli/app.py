@@ -1,12 +1,13 @@
 """What the command `blocksim` calls first: light, so that Ctrl-C is handled before anything heavy is imported."""
 
+import gc
 import io
 import sys
 import time
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from blocksim.cli.process import leave_all, take_interrupts
+from blocksim.cli.process import take_interrupts
 
 if TYPE_CHECKING:
     from blocksim.cli.commands import app as app  # noqa: PLC0414 - found when first asked for, as in blocksim
@@ -14,8 +15,7 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> Any:
     if name != "app":
-        message = f"module '{__name__}' has no attribute '{name}'"
-        raise AttributeError(message)
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     return import_module("blocksim.cli.commands").app
 
 
@@ -37,4 +37,4 @@ def main() -> None:
         report_internal_error(error)
         sys.exit(ExitCode.INTERNAL)
     finally:
-        leave_all()
+        gc.freeze()  # nothing for the collector: the process ends, and its memory goes as a whole

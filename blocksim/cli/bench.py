@@ -45,8 +45,7 @@ def bench_command(
     wanted = measurements.choose(names or [])
     if out is not None:  # checked before minutes of measuring
         if out.is_dir() or not out.absolute().parent.is_dir():
-            message = f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}"
-            raise OutputError(message)
+            raise OutputError(f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}")
         folder.refuse_foreign(out, overwrite=overwrite)
     machine = measurement.this_machine()
     prepare.announce_compilation("surface", quiet=screen.silent)

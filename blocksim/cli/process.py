@@ -98,8 +98,3 @@ def pause_collector() -> Iterator[None]:
         gc.freeze()
         if was_enabled:
             gc.enable()
-
-
-def leave_all() -> None:
-    """Keep the collector from everything that there is: the process ends, and its memory goes as a whole."""
-    gc.freeze()

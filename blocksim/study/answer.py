@@ -160,8 +160,7 @@ def draw_study(folder: Path, study: Study, options: "PlotOptions") -> Path:
     """
     kind, published = study.answer, options.table
     if options.kind not in {None, kind.picture}:
-        message = f"{folder}: {kind.files.what} is drawn as {kind.picture!r}, not as {options.kind!r}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{folder}: {kind.files.what} is drawn as {kind.picture!r}, not as {options.kind!r}")
     if published is not None and not kind.takes_table:
         takers = [one.files.what for one in (study_named(name).answer for name in STUDIES) if one.takes_table]
         message = f"{published}: a table is drawn beside {takers[0]} only, and {folder} is {kind.files.what}"

@@ -267,10 +267,9 @@ def _searched(
                 if trial.number > done:
                     options.on_trial(trial, max(tried, key=lambda one: one.score.value), trials)
         except KeyboardInterrupt:
-            message = (
+            raise StoppedEarlyError(
                 f"stopped after {len(calibrate_plan.finished_trials(study))} of {trials} trials; --resume runs the rest"
-            )
-            raise StoppedEarlyError(message) from None
+            ) from None
     if not tried:
         raise InvalidInputError("at least one trial is needed")
     best = max(tried, key=lambda one: one.score.value)

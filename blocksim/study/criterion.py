@@ -82,8 +82,7 @@ def read_criterion(text: str, option: str = STANDS) -> Criterion:
         try:
             condition, way = _condition(part)
         except ValueError as error:
-            message = f"{option} {part.strip() or '(empty)'}: {error}"
-            raise InvalidInputError(message) from None
+            raise InvalidInputError(f"{option} {part.strip() or '(empty)'}: {error}") from None
         conditions.append(condition)
         ways += way
     return Criterion(text, tuple(conditions), min(ways, default=None))

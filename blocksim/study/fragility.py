@@ -175,8 +175,7 @@ class FragilityAnswer(Answer, frozen=True):
         """Return counts and curve as they are drawn. Raises InvalidInputError where there are none."""
         points = [one for one in self.points if one.members and one.failures <= one.members]
         if not points:
-            message = f"{self.folder}: no sample of this study has a result; nothing to draw"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{self.folder}: no sample of this study has a result; nothing to draw")
         x, share, low, high = np.array([(one.intensity, one.share, one.low, one.high) for one in points], dtype=float).T
         at, curve = view.places(x), self.curve
         note, band = f"Failure: {self.fails}", None

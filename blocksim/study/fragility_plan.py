@@ -208,24 +208,20 @@ def read_fragility(document: Document, options: FragilityOptions) -> FragilityPl
     records = len(next(iter(shared.values()), ()))
     members = (records or MEMBERS) if options.members is None else options.members
     if members < 1 or members * len(levels) > plan.MOST_CASES or not 0 <= seed <= MOST_SEED:
-        message = (
+        raise InvalidInputError(
             f"{members} samples at {len(levels)} intensities with seed {seed}: 1 to {plan.MOST_CASES} runs are possible"
         )
-        raise InvalidInputError(message)
     if records and members % records:
-        message = (
+        raise InvalidInputError(
             f"{members} samples of {records} records: each must be there equally often; give a multiple of {records}"
         )
-        raise InvalidInputError(message)
     spread = _scatter(document, plan.Variations.of(options.scatter or {}), needed=not shared)
     keys = [overrides.parse_key(key) for key in (head.key, *shared, *(spread.vary if spread is not None else ()))]
     twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
     if twice == keys[0]:
-        message = f"{head.key} is the intensity; it cannot scatter too"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{head.key} is the intensity; it cannot scatter too")
     if twice is not None:
-        message = f"{overrides.format_key(twice)} is given as stripes; it cannot be drawn too"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{overrides.format_key(twice)} is given as stripes; it cannot be drawn too")
     return FragilityPlan(bare, head, levels, spread, members, seed, criteria, shared)
 
 
@@ -240,8 +236,7 @@ def _stripes(document: Document, given: plan.Variations) -> dict[str, tuple[obje
     for key, values in shared.items():
         if len(set(map(str, values))) < len(values) or len(values) == 1:
             why = "one record does not scatter; set it with --set" if len(values) == 1 else "a record is given twice"
-            message = f"{STRIPES} {given.texts[key]}: {why}"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{STRIPES} {given.texts[key]}: {why}")
     return shared
 
 
@@ -252,8 +247,7 @@ def _scatter(document: Document, given: plan.Variations, *, needed: bool) -> Swe
             (key for key, values in spread.vary.items() if len(set(map(str, plan.levels_of(values)))) == 1), None
         )
         if constant is not None:
-            message = f"{SCATTER} {given.texts[constant]}: one value does not scatter; set it with --set"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{SCATTER} {given.texts[constant]}: one value does not scatter; set it with --set")
         return spread
     own = document.build().sweep
     if own is None or not own.is_sampled:

@@ -309,8 +309,7 @@ def repeat_limit(answer: limit_answer.LimitAnswer, execution: Replay, out: Path)
             if again.comparable() == answer.comparable():
                 return again
     if not tried:
-        message = f"{answer.folder}: the manifest lacks runs of this search"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{answer.folder}: the manifest lacks runs of this search")
     return tried[0]
 
 

@@ -332,8 +332,7 @@ class LimitAnswer(Answer, frozen=True):
         if not brackets:
             empty = "it holds no runs of both sides of a bracket"
             why = empty if self.brackets else "nothing changes within its range"
-            message = f"{self.folder}: {why}; nothing to draw"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{self.folder}: {why}; nothing to draw")
         mechanism.draw_mechanisms(brackets, path, title, paper)
 
     def _picture_of(self, side: Side) -> mechanism.Side:
@@ -445,8 +444,7 @@ class CurveAnswer(Answer, frozen=True):
         ]  # fmt: skip
         none = [f"{value:.6g}" for value, brackets in points if not brackets]
         if len(none) == len(points):
-            message = f"{self.folder}: nothing changes within its range; nothing to draw"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{self.folder}: nothing changes within its range; nothing to draw")
         notes = [f"Stands means: {self.stands}.", *([f"Nothing changes at {', '.join(none)}."] if none else [])]
         axes = [
             f"{key} ({unit})" if unit else key for key, unit in ((self.over, self.over_unit), (self.key, self.unit))

@@ -293,8 +293,7 @@ def typed_levels(document: Document, given: Variations, option: str) -> tuple[He
     """
     text, table = next((given.texts[key], table) for key, table in given.items())
     if isinstance(table, Mapping) and "count" not in table:
-        message = f"{option} {text}: single values are needed, as in KEY=a,b,c or KEY=FROM:TO:COUNT"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{option} {text}: single values are needed, as in KEY=a,b,c or KEY=FROM:TO:COUNT")
     sweep = build_distributions(document, given, option, "grid")
     (head,), (values,) = heads_of(sweep), sweep.vary.values()
     levels: dict[float, object] = {}
@@ -304,8 +303,7 @@ def typed_levels(document: Document, given: Variations, option: str) -> tuple[He
         number = float(f"{cell:.12g}") if is_number else math.nan
         if not math.isfinite(number) or number in levels:
             why = "is given twice" if number in levels else "is not a number"
-            message = f"{option} {text}: {value} {why}"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{option} {text}: {value} {why}")
         levels[number] = value
     return head, dict(sorted(levels.items()))
 
@@ -359,13 +357,11 @@ def read_curve(document: Document, options: CurveOptions) -> CurvePlan:
     """Return the plan of a curve of limits. Raises as `read_limit`, for every value of the other key."""
     given = Variations.of(options.over or {})
     if len(given) != 1:
-        message = f"limits are searched over one key, not {len(given)}: give {OVER} KEY=a,b,c once"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"limits are searched over one key, not {len(given)}: give {OVER} KEY=a,b,c once")
     bare = document.without_sweep()
     head, levels = typed_levels(bare, given, OVER)
     if len(levels) > MOST_VALUES:
-        message = f"{len(levels)} values are too many; at most {MOST_VALUES} are searched"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{len(levels)} values are too many; at most {MOST_VALUES} are searched")
     one = LimitOptions(**options.shared)
     return CurvePlan(head, {at: read_limit(bare.with_values({head.key: value}), one) for at, value in levels.items()})
 
@@ -384,8 +380,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
         raise InvalidInputError(message)
     given = Variations.of(options.vary)
     if len(given) != 1:
-        message = f"a limit is searched along one key, not {len(given)}: give {OPTION} KEY=FROM:TO once"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"a limit is searched along one key, not {len(given)}: give {OPTION} KEY=FROM:TO once")
     key, table = next(iter(given.items()))
     bare = document.without_sweep()
     if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
@@ -393,8 +388,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
         raise InvalidInputError(message)
     count = table.get("count", options.scan)
     if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_SCANNED:
-        message = f"{count} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{count} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed")
     ends: dict[str, Any] = {name: table[name] for name in table if name != "count"}
     if study.is_descending(ends):
         ends |= {"from": ends["to"], "to": ends["from"]}

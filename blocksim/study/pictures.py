@@ -23,7 +23,7 @@ from blocksim.simulation.folder import refuse_foreign
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import compare, manifest, stored_run, sweep_folder
 from blocksim.study.answer import draw_study, study_in
-from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
+from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, is_angle, quarter_turns
 from blocksim.view import animation, history, run_data, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
 from blocksim.view.paint import COLOURS, paint_named
@@ -50,8 +50,7 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
     blocks = blocks_in(map(str, table.columns))
     finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
     if not blocks or not finished.any():
-        message = f"{folder}: no case of this sweep has finished; nothing to draw"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{folder}: no case of this sweep has finished; nothing to draw")
     members = Members(table, str(folder / TABLE))
     x_mm, rotation_deg = (
         np.stack([members.values(block, quantity) for block in blocks], axis=1) for quantity in ("x", "rotation")
@@ -120,7 +119,13 @@ def _input(scenario: Scenario, head: Head, column: "pd.Series", vary: Variation)
     if len(values) == len(column):
         typed = InputUnit(head.unit, head.si(1.0)) if head.unit else None
         is_even = isinstance(vary, Normal) or (isinstance(vary, Uniform) and vary.scale == "linear")
-        return Input(head.key, unit_of(scenario, head.key) or head.si_unit, values, is_even=is_even, typed=typed)
+        return Input(
+            head.key,
+            unit_of(scenario, head.key) or ("rad" if is_angle(head.unit) else ""),
+            values,
+            is_even=is_even,
+            typed=typed,
+        )
     words = [q.toml(value).strip('"') for value in column]
     levels = tuple(dict.fromkeys(words))
     return Input(head.key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)
@@ -160,8 +165,7 @@ METHODS = (
 def _draw_indices(table: Path, options: "PlotOptions") -> Path:
     """Draw the table of a sensitivity study. Raises what reading and drawing it raise, and for another kind."""
     if options.kind not in {None, TORNADO}:
-        message = f"{table}: a table of indices is drawn as {TORNADO!r}, not as {options.kind!r}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{table}: a table of indices is drawn as {TORNADO!r}, not as {options.kind!r}")
     panels, labels = read_indices(table)
     path = options.picture(f"{table.stem}.png")
     studies.draw_tornado(panels, labels, path, title="Which inputs matter", paper=options.paper)
@@ -183,8 +187,7 @@ def read_indices(path: Path) -> tuple[list[studies.Bars], tuple[str, str]]:
     if table.problems:
         input_files.raise_problems(table.problems)
     if not rows:
-        message = f"{path}: no result varies; nothing to draw"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}: no result varies; nothing to draw")
     panels = []
     for output in dict.fromkeys(str(row["output"]) for row in rows):
         own = [row for row in rows if row["output"] == output]
@@ -515,8 +518,7 @@ def plot(place: stored_run.Place, options: PlotOptions) -> Path:
 def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
     """Draw what lies at a place, see `plot`; return the picture's path and a remark on an unfinished run."""
     if not place.exists():
-        message = f"{place}: no such run folder, sweep folder, table or scenario file"
-        raise InputMissingError(message)
+        raise InputMissingError(f"{place}: no such run folder, sweep folder, table or scenario file")
     study = study_in(place)
     if study is not None:
         options.refuse(None, f"{place} is {study.answer.files.what}")

@@ -84,11 +84,6 @@ class Head:
         """Return the name of the column."""
         return f"{self.key} [{self.unit}]" if self.unit else self.key
 
-    @property
-    def si_unit(self) -> str:
-        """Return "rad" for a column of angles, as of friction angles; empty for all others."""
-        return "rad" if _is_angle(self.unit) else ""
-
     def cell(self, value: object) -> object:
         """Return a value as it stands in the column."""
         if not self.unit:
@@ -110,7 +105,7 @@ def _unit(values: object) -> str:
     if not isinstance(values, tuple):
         return str(getattr(values, "unit", ""))
     typed = next((unit for value in values if isinstance(value, str) and (unit := units.unit_in(value))), "")
-    if _is_angle(typed) and not all(isinstance(value, str) or value == 0 for value in values):
+    if is_angle(typed) and not all(isinstance(value, str) or value == 0 for value in values):
         return ""  # friction angles among friction coefficients: no unit holds for both
     numbers = all(
         not isinstance(value, bool) and (isinstance(value, int | float) or bool(units.unit_in(str(value))))
@@ -119,7 +114,8 @@ def _unit(values: object) -> str:
     return typed if numbers else ""
 
 
-def _is_angle(unit: str) -> bool:
+def is_angle(unit: str) -> bool:
+    """Return True for a unit of angles, as friction angles have it."""
     return bool(unit) and units.parse_unit(unit).dimension == units.ANGLE.dimension
 
 

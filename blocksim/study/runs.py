@@ -66,8 +66,7 @@ class Runs:
         except KeyboardInterrupt:
             is_complete = False
         if not is_complete:
-            message = f"stopped after {len(self.known)} runs; rerun the command to finish"
-            raise StoppedEarlyError(message)
+            raise StoppedEarlyError(f"stopped after {len(self.known)} runs; rerun the command to finish")
         return {key: self.known[name] for key, name in names.items()}
 
 
@@ -149,7 +148,6 @@ class Replay(Execution):
             entry = self.entry(task)
             if entry is None:
                 values = ", ".join(f"{key} = {value}" for key, value in task.settings.items())
-                message = f"the manifest has no run with {values}"
-                raise InvalidInputError(message)
+                raise InvalidInputError(f"the manifest has no run with {values}")
             self.tasks.append(task)
             yield Batch((task,), (entry.row,), 0.0, "")

@@ -365,8 +365,7 @@ def _read_table(path: Path) -> tuple[list[str], list[list[str]]]:
         raise InvalidInputError(message)
     short = next((number for number, line in enumerate(lines, start=2) if len(line) != len(head)), None)
     if short is not None:
-        message = f"{path}:{short}: {len(lines[short - 2])} cells, not {len(head)}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"{path}:{short}: {len(lines[short - 2])} cells, not {len(head)}")
     return head, lines
 
 
