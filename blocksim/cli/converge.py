@@ -15,17 +15,7 @@ from blocksim.errors import ExitCode
 from blocksim.options import Option, Replace
 from blocksim.scenario.spelling import list_names
 from blocksim.simulation import compilation, folder
-from blocksim.study import pictures, rows
-from blocksim.study.converge import (
-    TOLERANCE_MM,
-    Convergence,
-    ConvergenceVerdict,
-    ConvergeOptions,
-    Level,
-    RefinementStudy,
-    converge,
-    refinements_of,
-)
+from blocksim.study import converge, pictures, rows
 from blocksim.view import style
 from blocksim.view.studies import refuse_small_page
 
@@ -37,7 +27,7 @@ PERCENT = 100.0
 def converge_command(
     *,
     source: ScenarioInput,
-    options: ConvergeOptions,
+    options: converge.ConvergeOptions,
     jobs: Annotated[int | None, Option("Processes (default: one a core).", metavar="N", least=1)] = None,
     out: Annotated[
         Path | None, Option("Picture: .png, .svg or .pdf (default: results/NAME/converge.png).", metavar="FILE")
@@ -66,11 +56,11 @@ def converge_command(
         path = out or folder.RESULTS / ready.name / "converge.png"
         style.picture_path(path)
         if picture:
-            refuse_small_page(len(refinements_of(ready, options.studies)), paper)
+            refuse_small_page(len(converge.refinements_of(ready, options.studies)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture
                 folder.refuse_foreign(path, overwrite=overwrite)
         announce_compilation(compilation.kernels_of(ready), quiet=screen.silent)
-        result = converge(ready, replace(options, jobs=jobs, on_run=tell))
+        result = converge.converge(ready, replace(options, jobs=jobs, on_run=tell))
         drawn = path if picture and pictures.draw_convergence(result, ready, path, paper) else None
     lines = []
     for study in result.studies:
@@ -90,14 +80,14 @@ def converge_command(
     )
 
 
-def _table(result: Convergence, study: RefinementStudy) -> list[str]:
+def _table(result: converge.Convergence, study: converge.RefinementStudy) -> list[str]:
     """Return the levels of a study with the blocks whose final x its refinement moves most, in their order."""
     finished = np.array([level.x_mm for level in study.levels if level.is_finished])
     chosen: list[int] = []
     if finished.size:
         chosen = sorted(np.argsort(-np.ptp(finished, axis=0), kind="stable")[:MOST_BLOCKS].tolist())
 
-    def cells(level: Level) -> tuple[str, ...]:
+    def cells(level: converge.Level) -> tuple[str, ...]:
         value = f"{level.value:g} (own)" if level.is_own else f"{level.value:g}"
         places = [number(level.x_mm[block], 3) if level.is_finished else level.status for block in chosen]
         return (value, *places, number(level.change_mm, 4), number(level.order, 1), number(level.seconds))
@@ -115,7 +105,7 @@ def _short(name: str) -> str:
     return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "…"
 
 
-def _verdict(study: RefinementStudy) -> list[str]:
+def _verdict(study: converge.RefinementStudy) -> list[str]:
     """Return the verdict in words, with the levels between which blocks end in another place or on another side."""
     flips = []
     for before, level in pairwise(study.levels):
@@ -124,37 +114,38 @@ def _verdict(study: RefinementStudy) -> list[str]:
             blocks = "block" if len(level.flipped) == 1 else "blocks"
             flips.append(f"outcome differs between {before.value:g} and {level.value:g}: {blocks} {named}")
     match study.verdict:
-        case ConvergenceVerdict.CONVERGED:
+        case converge.ConvergenceVerdict.CONVERGED:
             found = f"converged: the last two refinements move no block by more than {_small(study.last_change_mm)};"
             best, coarsest = study.recommended, "the scenario's own value is the coarsest that is fine enough"
             if best is not None and not best.is_own:
                 coarsest = f"{best.value:g} is fine enough (within {_small(best.to_finest_mm)} of the finest level)"
             return [found, coarsest, *flips]
-        case ConvergenceVerdict.NOT_YET:
+        case converge.ConvergenceVerdict.NOT_YET:
             more = sum(not level.is_own for level in study.levels[study.levels.index(study.own) :]) + 2
             return [f"not yet converged: the changes shrink; try --levels {more}", *flips]
-        case ConvergenceVerdict.SCATTERED:
+        case converge.ConvergenceVerdict.SCATTERED:
             return [
                 "not converged: the changes do not shrink. Impacts amplify small differences, so",
                 "a single run means little: vary the start by a micrometre (blocksim sweep)",
             ]
-        case ConvergenceVerdict.FLIPS:
+        case converge.ConvergenceVerdict.FLIPS:
             return [
                 "not converged: the outcome flips between levels. A single run says little:",
                 "vary the start by a micrometre (blocksim sweep) and report how often each occurs",
                 *flips,
             ]
-        case ConvergenceVerdict.FAILED:
+        case converge.ConvergenceVerdict.FAILED:
             failed = [level for level in study.levels if not level.is_finished]
             count = f"{len(failed)} of {len(study.levels)} levels did not finish"
             return [f"not judged: {count}; the first, {failed[0].value:g}: {failed[0].reason}"]
 
 
 def _small(length: float) -> str:
-    return f"{length:.2g} mm" if length >= TOLERANCE_MM / PERCENT else f"{TOLERANCE_MM / PERCENT:g} mm"
+    least = converge.TOLERANCE_MM / PERCENT
+    return f"{length:.2g} mm" if length >= least else f"{least:g} mm"
 
 
-def _recommendation(result: Convergence, source: ScenarioInput) -> list[str]:
+def _recommendation(result: converge.Convergence, source: ScenarioInput) -> list[str]:
     """Return which settings are recommended, if any, and the command that runs the scenario with them."""
     joint = result.recommended
     if result.failed:

@@ -72,7 +72,7 @@ def _table(found: Sensitivity, output: Indices) -> list[str]:
 
 
 def _notes(found: Sensitivity, out: Path | None) -> Iterator[str]:
-    yield from (f"{column}: {meaning}" for column, meaning in found.meanings.items())
+    yield from (f"{column}: {meaning}" for column, (_, meaning) in found.method.columns.items())
     still = [output.name for output in found.outputs if not output.numbers]
     if still:
         yield f"does not vary: {', '.join(still)}"

@@ -15,7 +15,6 @@ from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.options import Option, Replace, takes
 from blocksim.scenario import Scenario, input_files, load_scenario, load_stored, overrides, spelling, units
-from blocksim.scenario import units as q
 from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.silence import silent
 from blocksim.simulation import folder as files
@@ -109,7 +108,7 @@ def _input(scenario: Scenario, head: Head, column: "pd.Series", vary: Variation)
     """Return the values of a key in SI, or the numbers of its words; in the table they stand as they were given."""
     numbers = []
     for value in column:
-        for read in (float, lambda text: q.parse_quantity(text, q.NUMBER)[0]):
+        for read in (float, lambda text: units.parse_quantity(text, units.NUMBER)[0]):
             with suppress(ValueError):
                 numbers.append(read(str(value)))
                 break
@@ -119,14 +118,9 @@ def _input(scenario: Scenario, head: Head, column: "pd.Series", vary: Variation)
     if len(values) == len(column):
         typed = InputUnit(head.unit, head.si(1.0)) if head.unit else None
         is_even = isinstance(vary, Normal) or (isinstance(vary, Uniform) and vary.scale == "linear")
-        return Input(
-            head.key,
-            unit_of(scenario, head.key) or ("rad" if is_angle(head.unit) else ""),
-            values,
-            is_even=is_even,
-            typed=typed,
-        )
-    words = [q.toml(value).strip('"') for value in column]
+        unit = unit_of(scenario, head.key) or ("rad" if is_angle(head.unit) else "")
+        return Input(head.key, unit, values, is_even=is_even, typed=typed)
+    words = [units.toml(value).strip('"') for value in column]
     levels = tuple(dict.fromkeys(words))
     return Input(head.key, "", np.array([levels.index(word) for word in words], dtype=np.float64), levels)
 

@@ -18,21 +18,12 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError, InvalidInputError, Problem, ScenarioError
 from blocksim.extras import load_module
 from blocksim.options import Option
-from blocksim.scenario import Document, Scenario, Sweep, scenario_hash, units
+from blocksim.scenario import Document, Scenario, Sweep, overrides, scenario_hash, units
 from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fault
 from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.motion import TABLED
 from blocksim.scenario.models.study import Normal, Uniform, Variation, round_digits, toml_number
-from blocksim.scenario.overrides import (
-    Override,
-    UnfitOverrideError,
-    format_key,
-    freeze,
-    parse_key,
-    parse_value,
-    with_value,
-)
 from blocksim.simulation.provenance import run_hash
 from blocksim.study.rows import Head, check_experiment, heads_of
 
@@ -137,7 +128,7 @@ def _cell_value(cell: Cell, unit: str | None) -> object:
 
 @functools.lru_cache(maxsize=1024)
 def _word(text: str) -> object:
-    value = parse_value(text)
+    value = overrides.parse_value(text)
     kinds: dict[type, str] = {list: "list", dict: "table"}
     if type(value) in kinds:
         raise ValueError(f"a cell holds one value, not a {kinds[type(value)]}")
@@ -222,7 +213,7 @@ def places_of(sweep: Sweep) -> Places:
         chunks = [sequence.random(size)[:, : len(sweep.vary)].copy() for _ in range(0, sweep.samples, size)]
         return np.asarray(np.concatenate(chunks)[: sweep.samples].T + 0.5 ** (BITS + 1))
     # a stream for every key, however its quotes are set
-    streams = [generator(sweep.seed, format_key(parse_key(key))) for key in sweep.vary]
+    streams = [generator(sweep.seed, overrides.format_key(overrides.parse_key(key))) for key in sweep.vary]
     if sweep.mode == "normal":
         return np.stack([stream.random(sweep.samples) for stream in streams])
     hypercube = load_module("scipy.stats.qmc", "sampled sweeps").LatinHypercube
@@ -323,22 +314,22 @@ def with_sweep(
     """
     present = document.data.get("sweep")
     table = dict(present) if isinstance(present, Mapping) and not vary else {}
-    overrides = list(document.overrides)
+    typed = list(document.overrides)
     for key, values in (vary or {}).items():
         if isinstance(values, Mapping):
-            table[key] = freeze(values)
+            table[key] = overrides.freeze(values)
         else:  # numbers of numpy as Python has them
             table[key] = tuple(one.item() if hasattr(one, "item") else one for one in values)
         text = vary.texts[key] if isinstance(vary, Variations) else f"{key}={units.toml(table[key])}"
         label = f"{option} {text}" if isinstance(vary, Variations) else "vary"
-        overrides.append(Override(label, text, ("sweep", key)))
+        typed.append(overrides.Override(label, text, ("sweep", key)))
     for name, value in {"mode": mode, "samples": samples, "seed": seed}.items():
         if value is not None and table:
             table[name] = value
             label = f"--{name}" if isinstance(vary, Variations) else name
-            overrides.append(Override(label, f"{name}={value}", ("sweep", name)))
+            typed.append(overrides.Override(label, f"{name}={value}", ("sweep", name)))
     data = {**document.data, "sweep": table} if table else document.data
-    document = replace(document, data=data, overrides=tuple(overrides))
+    document = replace(document, data=data, overrides=tuple(typed))
     if not table or table.get("mode") != "table":
         return document
     sweep = document.build().sweep
@@ -365,7 +356,7 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
     if scenario.experiment is not None:
         data = {**data, "experiment": {"table": scenario.experiment.table}}
     if isinstance(scenario.motion, TABLED):
-        data, _ = with_value(data, ("motion", "table"), scenario.motion.table)
+        data, _ = overrides.with_value(data, ("motion", "table"), scenario.motion.table)
     cases = Cases(replace(document, data=data), design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
     if all(case.scenario is None for case in islice(cases, looked_at)):
@@ -398,7 +389,7 @@ def table_digests(document: Document, vary: Mapping[str, Variation]) -> dict[str
     bare = document.without_sweep()
     digests: dict[str, list[str]] = {}
     for key, values in vary.items():
-        for value in values if parse_key(key)[-1] == TABLE and isinstance(values, tuple) else ():
+        for value in values if overrides.parse_key(key)[-1] == TABLE and isinstance(values, tuple) else ():
             digest = ""
             with suppress(BlocksimError):  # the case says so
                 digest = scenario_hash(bare.with_values({key: value}).build())
@@ -482,8 +473,8 @@ def _value(text: str) -> object:
     """Return a TOML value, or the bare text, which is checked where it is used."""
     text = text.strip()
     try:
-        return parse_value(text) if text else text
-    except UnfitOverrideError:
+        return overrides.parse_value(text) if text else text
+    except overrides.UnfitOverrideError:
         return text
 
 

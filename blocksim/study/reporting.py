@@ -16,20 +16,9 @@ from blocksim.study import compare, manifest, stored_run, sweep_folder
 from blocksim.study.answer import study_in, study_page
 from blocksim.study.pictures import read_sweep_data
 from blocksim.study.rows import FINISHED, TABLE
+from blocksim.view.report import subjects as parts
 from blocksim.view.report.page import write_report
 from blocksim.view.report.player import MOST_BYTES
-from blocksim.view.report.subjects import (
-    CaseTable,
-    PartialRun,
-    Subject,
-    pictures_of,
-    read_stored,
-    run_subject,
-    shared_path,
-    shared_text,
-    study_subject,
-    sweep_subject,
-)
 
 MEMBERS = 50  # of a sweep in one page
 MOST_TABLE_BYTES = 200 * input_files.MEGABYTE  # of sweep.csv
@@ -66,21 +55,21 @@ def report_on(
     `members` is the maximum number of runs of a sweep in the page; `on_remark` hears which of several runs is taken.
     Raises what finding and reading them raises, and OutputError.
     """
-    shown: list[Subject] = []
+    shown: list[parts.Subject] = []
     problems: list[str] = []
     for place in places:
         key = f"part-{len(shown) + 1}"
         study = study_in(place)
         if study is not None:
-            shown.append(study_subject(key, study_page(place, study), str(place)))
+            shown.append(parts.study_subject(key, study_page(place, study), str(place)))
             continue
         if manifest.is_sweep(place):
             subjects, damage = _sweep(key, place, experiment, members)
         else:
             is_run = place.is_dir() and any((place / name).is_file() for name in files.OURS)  # even if files lack
             folder = place if is_run else stored_run.find_run(place)
-            run = read_stored(folder)
-            subjects, damage = [run_subject(key, run, *_compared(run, experiment))], run.damage
+            run = parts.read_stored(folder)
+            subjects, damage = [parts.run_subject(key, run, *_compared(run, experiment))], run.damage
             remark = stored_run.choice(place, folder)
             if remark:
                 on_remark(remark)
@@ -90,7 +79,7 @@ def report_on(
     return write_report(shown, out, title=f"{', '.join(names)} – blocksim report", version=__version__), problems
 
 
-def _compared(run: PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
+def _compared(run: parts.PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
     """Return the comparison of a finished run, or why there is none though there is a measurement."""
     try:
         named = None if run.scenario is None or run.scenario.experiment is None else run.scenario.experiment.table
@@ -108,11 +97,11 @@ def _compared(run: PartialRun, experiment: Path | None) -> tuple[dict[str, objec
 
 def _shown(found: Comparison | Judgement) -> dict[str, Any]:
     """Return a comparison as a report has it, without paths of the machine."""
-    messages = [shared_text(text) for text in found.messages]
-    return {**found.to_dict(), "experiment": shared_path(found.source), "messages": messages}
+    messages = [parts.shared_text(text) for text in found.messages]
+    return {**found.to_dict(), "experiment": parts.shared_path(found.source), "messages": messages}
 
 
-def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[list[Subject], tuple[str, ...]]:
+def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[list[parts.Subject], tuple[str, ...]]:
     """Return a sweep and those of its members that have frames as subjects, and what is damaged in them.
 
     Rows that are cut off are left out. Raises InvalidInputError for what is no table of a sweep.
@@ -121,7 +110,7 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
     columns, *rows = list(filter(None, manifest.lines_in(path, MOST_TABLE_BYTES))) or [[]]
     if not set(columns) >= manifest.NEEDED:
         raise InvalidInputError(f"{path}: {manifest.NO_TABLE}: {manifest.NO_COLUMNS}")
-    table = CaseTable(place, tuple(columns), tuple(tuple(row) for row in rows if len(row) == len(columns)))
+    table = parts.CaseTable(place, tuple(columns), tuple(tuple(row) for row in rows if len(row) == len(columns)))
     problems: list[str] = []
     scenario, judged, pictures = None, None, []
     try:
@@ -143,15 +132,17 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
         problems.append(f"no picture of the sweep: {error}")
     else:
         is_whole = len(sweep.finished) == len(table.rows)
-        pictures = pictures_of(sweep) if is_whole else []
+        pictures = parts.pictures_of(sweep) if is_whole else []
         problems += [] if is_whole else ["no picture of the sweep: its table is damaged"]
     folders = {case: sweep_folder.case_folder(table.folder, case) for case in table.column("case")}
     cases = {case: one for case, one in folders.items() if one is not None and (one / files.FRAMES).is_file()}
-    found = [(case, read_stored(folder)) for case, folder in list(cases.items())[:most]]
+    found = [(case, parts.read_stored(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
-    subject = sweep_subject(key, table, scenario, keys, problems, list(cases)[most:], judged=judged, pictures=pictures)
+    subject = parts.sweep_subject(
+        key, table, scenario, keys, problems, list(cases)[most:], judged=judged, pictures=pictures
+    )
     shown = [
-        run_subject(keys[case], run, *_compared(run, experiment), most_bytes=MOST_BYTES // len(found), parent=key)
+        parts.run_subject(keys[case], run, *_compared(run, experiment), most_bytes=MOST_BYTES // len(found), parent=key)
         for case, run in found
     ]
     return [subject, *shown], tuple(text for _, run in found for text in run.damage)

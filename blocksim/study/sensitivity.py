@@ -201,11 +201,6 @@ class Sensitivity:
     blocks: int
     left_out: int
 
-    @property
-    def meanings(self) -> dict[str, str]:
-        """What the columns of the method mean."""
-        return {column: meaning for column, (_, meaning) in self.method.columns.items()}
-
     def records(self) -> list[dict[str, object]]:
         """Return one row per output that varies and key: output, unit, key, and the columns of the method."""
         return [
@@ -226,7 +221,7 @@ class Sensitivity:
         """Return plain values for JSON."""
         return {
             "method": self.method.name,
-            "meaning": self.meanings,
+            "meaning": {column: meaning for column, (_, meaning) in self.method.columns.items()},
             "keys": list(self.keys),
             "runs": self.runs,
             "failed": self.failed,

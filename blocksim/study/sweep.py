@@ -23,18 +23,8 @@ from blocksim.simulation import compilation, provenance, stopping
 from blocksim.simulation import folder as files
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.study import manifest, rows, sweep_folder
+from blocksim.study import plan as plans
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
-from blocksim.study.plan import (
-    Cases,
-    Settings,
-    Values,
-    cases_of,
-    levels_of,
-    plan_of,
-    table_digests,
-    variations_option,
-    with_sweep,
-)
 
 TIMINGS = "timings.csv"
 MOST_INVALID = 500  # kept in memory before they are written
@@ -54,8 +44,8 @@ class SweepOptions(Execution):
     """What is varied in a sweep, and how its cases are run and kept."""
 
     vary: Annotated[
-        Mapping[str, Values] | None,
-        variations_option(
+        Mapping[str, plans.Values] | None,
+        plans.variations_option(
             "KEY=a,b,c or KEY=from:to:count; for random draws KEY=from:to or KEY=mean+-sd. With :log at the end, "
             "from:to is spaced logarithmically. Repeatable.",
             "KEY=VALUES",
@@ -87,7 +77,7 @@ class SweepOptions(Execution):
 
     def document(self, scenario: Source) -> Document:
         """Return a scenario with the [sweep] table that these options make. Raises as `with_sweep`."""
-        return with_sweep(document_of(scenario), self.vary, self.mode, samples=self.samples, seed=self.seed)
+        return plans.with_sweep(document_of(scenario), self.vary, self.mode, samples=self.samples, seed=self.seed)
 
 
 @takes(SweepOptions)
@@ -112,9 +102,9 @@ def run_sweep(document: Document, options: SweepOptions) -> manifest.SweepResult
     shard = options.shard
     refuse_loss(shard, overwrite=options.overwrite)
     base = document.build()
-    plan = plan_of(base)
-    cases = cases_of(document, plan)
-    name = sweep_hash(base, plan, table_digests(document, plan.vary))
+    plan = plans.plan_of(base)
+    cases = plans.cases_of(document, plan)
+    name = sweep_hash(base, plan, plans.table_digests(document, plan.vary))
     folder = Path(options.out) if options.out is not None else files.RESULTS / base.name / f"sweep-{name}"
     run, setting = options.ready(folder / sweep_folder.CASES if options.keep_cases else None)
     sweep_folder.prepare(folder, base, name, overwrite=options.overwrite)
@@ -153,8 +143,8 @@ def kernels_for(document: Document) -> tuple[str, ...]:
     """Return the sets of kernels that the cases of a sweep need."""
     base = document.build()
     vary = base.sweep.vary if base.sweep else {}
-    schemes = (base.time.scheme, *map(str, levels_of(vary.get("time.scheme", ()))))
-    models = (base.contact.model, *map(str, levels_of(vary.get("contact.model", ()))))
+    schemes = (base.time.scheme, *map(str, plans.levels_of(vary.get("time.scheme", ()))))
+    models = (base.contact.model, *map(str, plans.levels_of(vary.get("contact.model", ()))))
     sets = (SCHEMES[scheme].kernels(model) for scheme in schemes for model in models)
     return tuple(dict.fromkeys((compilation.kernels_of(base), *sets)))
 
@@ -164,7 +154,7 @@ class SweepRun:
 
     def __init__(
         self,
-        cases: Cases,
+        cases: plans.Cases,
         shard: manifest.Shard,
         kept: manifest.Manifest,
         on_row: OnRow,
@@ -179,7 +169,7 @@ class SweepRun:
         self.done = manifest.CaseIndex(self.folder, len(cases))
         self.count = len(self.done.state[shard.slice])  # cases of this share
         self.new = 0  # rows of this call
-        self.invalid: list[tuple[manifest.Entry, Settings]] = []  # cases that cannot be run, until they are written
+        self.invalid: list[tuple[manifest.Entry, plans.Settings]] = []  # cases that cannot be run, not written yet
         self.next_at = time.monotonic() + SOONEST
 
     def forget_failed(self) -> None:
@@ -252,7 +242,7 @@ class SweepRun:
         manifest.note_timings(self.folder / self.shard.file(TIMINGS), executor, names, batch.seconds, batch.host)
         return has_failed
 
-    def _keep(self, ended: Sequence[tuple[manifest.Entry, Settings]] = ()) -> None:
+    def _keep(self, ended: Sequence[tuple[manifest.Entry, plans.Settings]] = ()) -> None:
         """Bring rows to the disk, with those of cases that cannot be run, and then report them."""
         ended, self.invalid = [*ended, *self.invalid], []
         if not ended:
@@ -275,7 +265,7 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> manifest.SweepR
     folder = Path(folder)
     document = sweep_folder.read_plan(folder)
     base = document.build()
-    cases = cases_of(document, plan_of(base))
+    cases = plans.cases_of(document, plans.plan_of(base))
     done = manifest.CaseIndex(folder, len(cases))
     if not done.paths:
         raise InputMissingError(f"{folder}: no case of this sweep has run yet")
