@@ -9,25 +9,21 @@ from typing import get_args
 
 from pydantic import ValidationError
 
-from blocksim.scenario import geometry, overrides
-from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, mistakes_of, unknown
+from blocksim.scenario import geometry, mistakes, overrides, start, units
 from blocksim.scenario.models import base, contact, stepping, study
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.overrides import SYNONYMS, Data, KeyPath, UnfitOverrideError, with_value
-from blocksim.scenario.start import impossible_starts, soil_tables, unfit_soils
 from blocksim.scenario.structures import PolygonStructure, polygons
-from blocksim.scenario.units import toml
 
 BLOCKS_BY_NAME = ("structures", "bodies")
 SPRING_CHOICES = ("model", "law")
 """Keys of [contact] that rigid contacts do not have."""
 
 
-def wrong_names(data: Data) -> Iterator[Mistake]:
+def wrong_names(data: overrides.Data) -> Iterator[mistakes.Mistake]:
     """Find names of blocks and materials that do not exist, and scenarios without a body."""
     if all(data.get(group, ()) == () for group in (*BLOCKS_BY_NAME, *base.SYSTEMS)):
         *tables, last = (f"[[{name}]]" for name in (*BLOCKS_BY_NAME, *base.SYSTEMS))
-        yield Mistake((), f"nothing to simulate: add a {', '.join(tables)} or {last} table")
+        yield mistakes.Mistake((), f"nothing to simulate: add a {', '.join(tables)} or {last} table")
     blocks = data.get("blocks")
     for name in blocks if isinstance(blocks, Mapping) else ():
         yield from _unknown(data, ("blocks", name, "material"), "materials")
@@ -40,75 +36,77 @@ def wrong_names(data: Data) -> Iterator[Mistake]:
     yield from _wrong_pairs(data)
 
 
-def _unknown(data: Data, path: KeyPath, group: str) -> Iterator[Mistake]:
+def _unknown(data: overrides.Data, path: overrides.KeyPath, group: str) -> Iterator[mistakes.Mistake]:
     known = data.get(group, {} if group == "blocks" else None)  # materials that are missing are told of by themselves
     if isinstance(known, Mapping):
-        yield from unknown(path, group.removesuffix("s"), known, overrides.follow(data, path))
+        yield from mistakes.unknown(path, group.removesuffix("s"), known, overrides.follow(data, path))
 
 
-def _wrong_pairs(data: Data) -> Iterator[Mistake]:
+def _wrong_pairs(data: overrides.Data) -> Iterator[mistakes.Mistake]:
     materials, pairs = data.get("materials"), data.get("pairs")
     known = [*materials, contact.GROUND] if isinstance(materials, Mapping) else []
     if contact.GROUND in known[:-1]:
-        message = f"{toml(contact.GROUND)} means the ground in [pairs]; give this material another name"
-        yield Mistake(("materials", contact.GROUND), message, at="key")
+        message = f"{units.toml(contact.GROUND)} means the ground in [pairs]; give this material another name"
+        yield mistakes.Mistake(("materials", contact.GROUND), message, at="key")
     found: set[frozenset[str]] = set()
     for one, partners in pairs.items() if isinstance(pairs, Mapping) else ():
-        yield from unknown(("pairs", one), "material", known, one if known else None, "key")
+        yield from mistakes.unknown(("pairs", one), "material", known, one if known else None, "key")
         missing = f"name the other material too, as in [{overrides.format_key(('pairs', one, contact.GROUND))}]"
         if partners == {}:
-            yield Mistake(("pairs", one), missing, at="key")
+            yield mistakes.Mistake(("pairs", one), missing, at="key")
         for other in partners if isinstance(partners, Mapping) else ():
             path = ("pairs", one, other)
             if other in contact.Pair.model_fields and other not in known:
-                yield Mistake(path, missing, at="key")
+                yield mistakes.Mistake(path, missing, at="key")
             else:
-                yield from unknown(path, "material", known, other if known else None, "key")
+                yield from mistakes.unknown(path, "material", known, other if known else None, "key")
             if one == other == contact.GROUND:
-                yield Mistake(path, "the ground is not in contact with itself", at="key")
+                yield mistakes.Mistake(path, "the ground is not in contact with itself", at="key")
             elif frozenset((one, other)) in found:
                 twin = overrides.format_key(("pairs", other, one))
-                yield Mistake(path, f"the same pair is given as {twin}; keep one of the two", at="key")
+                yield mistakes.Mistake(path, f"the same pair is given as {twin}; keep one of the two", at="key")
             found.add(frozenset((one, other)))
 
 
-def unfit_choices(scenario: Scenario) -> Iterator[Mistake]:
+def unfit_choices(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     """Find contact model and force law that the non-smooth scheme does not have.
 
     Numbers of springs and dashpots are not refused, so that a scenario can be run by both schemes; they have no effect.
     """
     for name in () if scenario.time.has_systems else scenario.systems:
-        message = f"{name} need another scheme: {toml(scenario.time.scheme)} advances blocks and supports only"
-        yield Mistake((name,), message, at="key", relation=True)
-    yield from unfit_soils(scenario)
+        message = f"{name} need another scheme: {units.toml(scenario.time.scheme)} advances blocks and supports only"
+        yield mistakes.Mistake((name,), message, at="key", relation=True)
+    yield from start.unfit_soils(scenario)
     if scenario.start.settle and scenario.systems:
         message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
-        yield Mistake(("start", "settle"), message, relation=True)
+        yield mistakes.Mistake(("start", "settle"), message, relation=True)
     scheme, model, why = scenario.time.scheme, scenario.contact.model, ""  # why no block can have an outline
     if model not in scenario.time.models_of_outlines:
         reason = ": its boundary particles lie on rectangles only" if scenario.time.has_springs else ""
         known = ((name, one) for name, time in sorted(stepping.SCHEMES.items()) for one in time.models_of_outlines)
-        modelled = " or ".join(f"{toml(name)} and {toml(one)}" for name, one in known)
-        where = f"with time.scheme = {toml(scheme)} and contact.model = {toml(model)}"
+        modelled = " or ".join(f"{units.toml(name)} and {units.toml(one)}" for name, one in known)
+        where = f"with time.scheme = {units.toml(scheme)} and contact.model = {units.toml(model)}"
         why = f"outlines are not modelled {where}{reason}; use {modelled}"
     elif scenario.systems:
         why = f"outlines are not modelled beside {', '.join(scenario.systems)}, whose particles meet rectangles only"
     for name, block in scenario.blocks.items():
         if why and block.polygon:
             key = "outline" if block.outline is not None else "sides"
-            yield Mistake(("blocks", name, key), why, at="key", relation=True)
+            yield mistakes.Mistake(("blocks", name, key), why, at="key", relation=True)
     for number, structure in enumerate(scenario.structures):
         if why and isinstance(structure, PolygonStructure):
-            yield Mistake(("structures", number, "kind"), why, relation=True)
+            yield mistakes.Mistake(("structures", number, "kind"), why, relation=True)
     springs = next(name for name, one in stepping.SCHEMES.items() if one.has_springs)
     for key in () if scenario.time.has_springs else SPRING_CHOICES:
         chosen = getattr(scenario.contact, key)
         if chosen != contact.Contact.model_fields[key].default:
-            message = f"{toml(chosen)} needs springs, time.scheme = {toml(springs)}; here contacts are rigid"
-            yield Mistake(("contact", key), message, relation=True)
+            message = (
+                f"{units.toml(chosen)} needs springs, time.scheme = {units.toml(springs)}; here contacts are rigid"
+            )
+            yield mistakes.Mistake(("contact", key), message, relation=True)
 
 
-def _unknown_provenance(data: Data) -> Iterator[Mistake]:
+def _unknown_provenance(data: overrides.Data) -> Iterator[mistakes.Mistake]:
     """Find provenance of keys that no scenario has."""
     table = data.get("provenance")
     for key, text in table.items() if isinstance(table, Mapping) else ():
@@ -117,7 +115,7 @@ def _unknown_provenance(data: Data) -> Iterator[Mistake]:
         except ValueError:
             path = ()
         if isinstance(text, str) and not (path and overrides.is_known(path, data)):
-            yield Mistake(("provenance", key), f"{toml(key)} is not a key of this scenario", at="key")
+            yield mistakes.Mistake(("provenance", key), f"{units.toml(key)} is not a key of this scenario", at="key")
 
 
 STEEPEST = 5.0
@@ -154,7 +152,7 @@ def implausible_values(scenario: Scenario) -> list[str]:
                 key = overrides.format_key(("structures", number))
                 warnings.append(f'{key}: blocks of {size:.3g} m; for a drawing in mm add unit = "1 mm"')
     warnings += _friction_angles(scenario)
-    for soil in soil_tables(scenario):
+    for soil in start.soil_tables(scenario):
         extents = soil.corners.max(axis=0) - soil.corners.min(axis=0)
         counts = geometry.count_across(soil.corners, soil.spacing)
         for way, extent, count in zip(("width", "height"), extents, counts, strict=True):
@@ -199,12 +197,12 @@ MAX_VARIED = 100
 MODES = get_args(study.Mode)
 ENDS = ("from", "mean", "to")
 """Keys of a variation that is not a list, in the order in which they are reported."""
-Trial = Callable[[KeyPath, object, KeyPath], Iterator[Mistake]]
+Trial = Callable[[overrides.KeyPath, object, overrides.KeyPath], Iterator[mistakes.Mistake]]
 """Finds the mistakes of a value at the path of a key, and puts them at a place of the sweep."""
 UNVARIED = ("schema", "name", "description", "experiment", "sweep", "provenance")
 
 
-def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
+def examine(data: overrides.Data, folder: Path) -> tuple[Scenario | None, list[mistakes.Mistake]]:
     """Validate data (tuples for lists): the scenario, or None and all mistakes.
 
     Mistakes of placement, such as overlapping bodies, can only be found once everything else is right.
@@ -212,26 +210,28 @@ def examine(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
     scenario, findings = _validated(data, folder)
     findings += [*_sweep(data, folder), *_unknown_provenance(data)]
     if scenario is not None and not findings:
-        findings += [*unfit_choices(scenario), *impossible_starts(scenario)]
+        findings += [*unfit_choices(scenario), *start.impossible_starts(scenario)]
     return (None if findings else scenario), findings
 
 
-def _validated(data: Data, folder: Path) -> tuple[Scenario | None, list[Mistake]]:
+def _validated(data: overrides.Data, folder: Path) -> tuple[Scenario | None, list[mistakes.Mistake]]:
     """Return the scenario, None where pydantic has errors, and the mistakes of values and of names."""
     try:
         scenario, findings = Scenario.model_validate(data, context={"folder": folder}), []
     except ValidationError as error:
-        scenario, findings = None, mistakes_of(error, data)
-    return scenario, [*findings, *islice(wrong_names(data), MAX_MISTAKES)]
+        scenario, findings = None, mistakes.mistakes_of(error, data)
+    return scenario, [*findings, *islice(wrong_names(data), mistakes.MAX_MISTAKES)]
 
 
-def _sweep(data: Data, folder: Path) -> Iterator[Mistake]:
+def _sweep(data: overrides.Data, folder: Path) -> Iterator[mistakes.Mistake]:
     """Try the values of a sweep one by one; whether values are compatible shows in each case of the sweep."""
     sweep = data.get("sweep")
     if not isinstance(sweep, Mapping):
         return
     if len(sweep) > MAX_VARIED:
-        yield Mistake(("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key")
+        yield mistakes.Mistake(
+            ("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key"
+        )
         return
     trial = _trial(data, folder)
     mode = {"mode": sweep["mode"]} if sweep.get("mode") in MODES else {}
@@ -244,17 +244,17 @@ def _sweep(data: Data, folder: Path) -> Iterator[Mistake]:
             yield from islice(_varied(trial, str(key), values), 1)
     for key in map(str, sweep):
         table, dot, word = key.rpartition(".")
-        synonym = f"{table}{dot}{SYNONYMS.get(word, word)}"
+        synonym = f"{table}{dot}{overrides.SYNONYMS.get(word, word)}"
         if word == "kinetic_ratio" and synonym in sweep:
             message = f"{synonym}, which means the same, is varied too; keep one of the two"
-            yield Mistake(("sweep", key), message, at="key")
+            yield mistakes.Mistake(("sweep", key), message, at="key")
 
 
-def _varied(tried: Trial, key: str, values: object) -> Iterator[Mistake]:
+def _varied(tried: Trial, key: str, values: object) -> Iterator[mistakes.Mistake]:
     """Yield the mistakes in a swept key, then in its values as written, so that their dimension is checked too."""
     complaint = variation_fault(key)
     if complaint:
-        yield Mistake(("sweep", key), complaint, at="key")
+        yield mistakes.Mistake(("sweep", key), complaint, at="key")
         return
     parts = {end: values[end] for end in ENDS if end in values} if isinstance(values, Mapping) else {}
     for part, value in parts.items() or enumerate(values[:MAX_TRIED] if isinstance(values, tuple) else ()):
@@ -266,28 +266,28 @@ def variation_fault(key: str) -> str:
     try:
         first = overrides.parse_key(key)[0]
     except ValueError:
-        return f"{toml(key)} is not a dotted key"
+        return f"{units.toml(key)} is not a dotted key"
     return f"{first} cannot be varied" if first in UNVARIED else ""
 
 
-def mistakes_of_value(data: Data, folder: Path, key: str, value: object) -> list[Mistake]:
+def mistakes_of_value(data: overrides.Data, folder: Path, key: str, value: object) -> list[mistakes.Mistake]:
     """List the mistakes in one value of one key by itself, in data that may have a sweep."""
     return [*_trial(data, folder)(overrides.parse_key(key), value, ("sweep", key))]
 
 
-def _trial(data: Data, folder: Path) -> Trial:
+def _trial(data: overrides.Data, folder: Path) -> Trial:
     """Return what finds the mistakes that setting one value adds to data, without its sweep and experiment."""
     bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
     _, before = _validated(bare, folder)
 
-    def tried(path: KeyPath, value: object, place: KeyPath) -> Iterator[Mistake]:
+    def tried(path: overrides.KeyPath, value: object, place: overrides.KeyPath) -> Iterator[mistakes.Mistake]:
         try:
-            changed, _ = with_value(bare, path, value)
-        except UnfitOverrideError as error:
-            yield Mistake(place[:2], str(error), at="key")
+            changed, _ = overrides.with_value(bare, path, value)
+        except overrides.UnfitOverrideError as error:
+            yield mistakes.Mistake(place[:2], str(error), at="key")
             return
         for finding in _validated(changed, folder)[1]:
             if not finding.relation and finding not in before:
-                yield Mistake(place[:2] if finding.at == "key" else place, finding.message, at=finding.at)
+                yield mistakes.Mistake(place[:2] if finding.at == "key" else place, finding.message, at=finding.at)
 
     return tried

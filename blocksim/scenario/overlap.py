@@ -8,8 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario.geometry import Corners, middle_of
-from blocksim.scenario.placement import TOLERANCE, PlacedBody, PlacedSegment
+from blocksim.scenario import geometry, placement
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -39,23 +38,23 @@ class Outlines(NamedTuple):
     polygons: Floats  # (s, k, 2) corners (m) along these axes from the middle of the box, the last one repeated
 
     @classmethod
-    def of(cls, bodies: Sequence[PlacedBody]) -> Self:
+    def of(cls, bodies: Sequence[placement.PlacedBody]) -> Self:
         """Take those of placed bodies."""
         names = ("x", "y", "size_x", "size_y")
         x, y, size_x, size_y = (np.fromiter(map(attrgetter(one), bodies), np.float64, len(bodies)) for one in names)
         # math, as numpy's functions may differ in the last digit
         cosine, sine = (np.fromiter((of(body.angle) for body in bodies), np.float64) for of in (math.cos, math.sin))
-        numbers: dict[Corners, int] = {(): RECTANGLE}
+        numbers: dict[geometry.Corners, int] = {(): RECTANGLE}
         kind_of = (numbers.setdefault(body.outline, len(numbers) - 1) for body in bodies)
         kinds = np.fromiter(kind_of, np.int64, len(bodies))
         for index in np.flatnonzero(kinds != RECTANGLE).tolist():
-            middle_x, middle_y = middle_of(bodies[index].outline)
+            middle_x, middle_y = geometry.middle_of(bodies[index].outline)
             x[index] += cosine[index] * middle_x - sine[index] * middle_y
             y[index] += sine[index] * middle_x + cosine[index] * middle_y
         return cls(x, y, 0.5 * size_x, 0.5 * size_y, cosine, sine, kinds, _table([*numbers][1:]))
 
     @classmethod
-    def along(cls, segments: Sequence[PlacedSegment]) -> Self:
+    def along(cls, segments: Sequence[placement.PlacedSegment]) -> Self:
         """Take straight pieces as rectangles without height."""
         ends = np.array([(s.x0, s.y0, s.x1, s.y1, s.length) for s in segments], dtype=np.float64).reshape(-1, 5)
         x0, y0, x1, y1, length = ends.T
@@ -106,13 +105,13 @@ class Outlines(NamedTuple):
         return lowest
 
 
-def _table(polygons: Sequence[Corners]) -> Floats:
+def _table(polygons: Sequence[geometry.Corners]) -> Floats:
     """Return corners (m) from the middles of their boxes, (s, k, 2), the last ones repeated up to a common number."""
     if not polygons:
         return np.zeros((0, 4, 2))
     most = max(4, *map(len, polygons))
     full = [(*corners, *corners[-1:] * (most - len(corners))) for corners in polygons]
-    middles = [middle_of(corners) for corners in polygons]
+    middles = [geometry.middle_of(corners) for corners in polygons]
     table: Floats = np.array(full) - np.array(middles)[:, None]
     return table
 
@@ -144,7 +143,7 @@ def _least_reach(ones: Floats, others: Floats) -> Floats:
 
 
 def overlapping_pairs(
-    bodies: Sequence[PlacedBody], segments: Sequence[PlacedSegment] | None = None
+    bodies: Sequence[placement.PlacedBody], segments: Sequence[placement.PlacedSegment] | None = None
 ) -> Iterator[tuple[int, int, float]]:
     """Yield the indices (smaller first) and the penetration (m) of every two bodies that overlap.
 
@@ -159,7 +158,7 @@ def overlapping_pairs(
             wanted = (first < len(bodies)) & (second >= len(bodies))
             first, second = first[wanted], second[wanted]
         depth = penetration(outlines.some(first), outlines.some(second))
-        deep = depth > TOLERANCE
+        deep = depth > placement.TOLERANCE
         begin = 0 if segments is None else len(bodies)
         yield from zip(first[deep].tolist(), (second[deep] - begin).tolist(), depth[deep].tolist(), strict=True)
 
