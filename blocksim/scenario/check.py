@@ -12,7 +12,8 @@ from pydantic import ValidationError
 from blocksim.scenario import geometry, mistakes, overrides, start, units
 from blocksim.scenario.models import base, contact, stepping, study
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.structures import PolygonStructure, polygons
+from blocksim.scenario.structures import polygons
+from blocksim.scenario.structures.base import PolygonStructure
 
 BLOCKS_BY_NAME = ("structures", "bodies")
 SPRING_CHOICES = ("model", "law")

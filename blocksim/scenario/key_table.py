@@ -13,7 +13,8 @@ from pydantic_core import PydanticUndefined
 from blocksim.scenario.models import contact, geometry, loads, motion, scenario, stepping, study
 from blocksim.scenario.models.base import HELD, SYSTEMS
 from blocksim.scenario.overrides import options, si_unit
-from blocksim.scenario.structures import KINDS, Structure
+from blocksim.scenario.structures import KINDS
+from blocksim.scenario.structures.base import Structure
 
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"

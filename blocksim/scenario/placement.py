@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import geometry, overrides
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.structures import PolygonStructure, Pose, Structure
+from blocksim.scenario.structures.base import PolygonStructure, Pose, Structure
 
 LENGTH_WITHOUT_BLOCKS = 0.1  # m: can be seen beside soil
 

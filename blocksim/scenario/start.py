@@ -16,7 +16,8 @@ from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.overrides import KeyPath
 from blocksim.scenario.placement import PlacedBody
-from blocksim.scenario.structures import MAX_BLOCKS, Polygons, PolygonStructure, UnfitError
+from blocksim.scenario.structures.base import MAX_BLOCKS, PolygonStructure, UnfitError
+from blocksim.scenario.structures.polygons import Polygons
 from blocksim.scenario.units import toml
 
 MAX_LOADS = 1000

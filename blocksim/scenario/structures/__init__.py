@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from blocksim.scenario.models.base import by_kind
-from blocksim.scenario.structures.base import MAX_BLOCKS, PolygonStructure, Pose, Structure, UnfitError
+from blocksim.scenario.structures.base import Structure
 from blocksim.scenario.structures.cells import Arch, Column, Rubble, Voronoi
 from blocksim.scenario.structures.masonry import BlockWall, Dominoes, Grid, Pyramid, Stack, Staircase
 from blocksim.scenario.structures.polygons import Polygons
@@ -18,24 +18,3 @@ AnyStructure = Annotated[
 
 KINDS: dict[str, type[Structure]] = by_kind(AnyStructure)
 """Class by kind, as written in a scenario."""
-
-__all__ = [
-    "KINDS",
-    "MAX_BLOCKS",
-    "AnyStructure",
-    "Arch",
-    "BlockWall",
-    "Column",
-    "Dominoes",
-    "Grid",
-    "PolygonStructure",
-    "Polygons",
-    "Pose",
-    "Pyramid",
-    "Rubble",
-    "Stack",
-    "Staircase",
-    "Structure",
-    "UnfitError",
-    "Voronoi",
-]

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from blocksim.scenario import PlacedBody
 from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.overlap import overlapping_pairs
-from blocksim.scenario.structures import Grid, Pose, UnfitError
+from blocksim.scenario.structures.base import Pose, UnfitError
+from blocksim.scenario.structures.masonry import Grid
 
 BRICK = Block(width=0.05, height=0.025, length=0.032, material="aluminium")
 

@@ -5,22 +5,11 @@ from collections.abc import Mapping
 import pytest
 
 from blocksim.scenario.models.geometry import Block
-from blocksim.scenario.structures import (
-    KINDS,
-    Arch,
-    BlockWall,
-    Column,
-    Dominoes,
-    Grid,
-    Polygons,
-    Pose,
-    Pyramid,
-    Rubble,
-    Stack,
-    Staircase,
-    UnfitError,
-    Voronoi,
-)
+from blocksim.scenario.structures import KINDS
+from blocksim.scenario.structures.base import Pose, UnfitError
+from blocksim.scenario.structures.cells import Arch, Column, Rubble, Voronoi
+from blocksim.scenario.structures.masonry import BlockWall, Dominoes, Grid, Pyramid, Stack, Staircase
+from blocksim.scenario.structures.polygons import Polygons
 
 BRICK = Block(width=0.032, height=0.025, length=0.05, material="aluminium")
 

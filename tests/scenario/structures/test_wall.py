@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blocksim.scenario.models.geometry import Block
-from blocksim.scenario.structures import BlockWall, Pose
+from blocksim.scenario.structures.base import Pose
+from blocksim.scenario.structures.masonry import BlockWall
 
 BRICK = Block(width=0.05, height=0.025, length=0.032, material="aluminium")
 
