@@ -272,18 +272,6 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
     return table
 
 
-def bare_rows(content: bytes) -> list[tuple[int, list[str]]]:
-    """Return number (from 1) and cells of every line of a table that is neither empty nor a comment.
-
-    Raises UnicodeDecodeError where the content is not UTF-8 text.
-    """
-    return [
-        (number, [QUOTED.sub(r"\1", cell.strip()) for cell in line.split(",")])
-        for number, line in numbered_lines(content.decode("utf-8-sig"))
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-
-
 def raise_problems(problems: Sequence[Problem]) -> NoReturn:
     """Raise one InvalidInputError that shows the problems by line; many are cut and counted."""
     by_line = sorted(problems, key=lambda problem: (problem.line_number or 0, problem.caret_start))

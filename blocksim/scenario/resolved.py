@@ -135,15 +135,24 @@ def scenario_hash(scenario: Scenario) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _plain(table: BaseModel) -> dict[str, Any]:
-    """Turn a table into its TOML form; keys without a value are left out."""
-    if isinstance(table, study.Sweep):
-        return {key: _value(entry) for key, entry in table.as_table().items()}
+def _plain(table: object) -> Any:
+    """Turn a table, or a value in it, into its TOML form; keys without a value are left out."""
+    match table:
+        case study.Sweep():
+            return _plain(table.as_table())
+        case Mapping():
+            return {key: _plain(entry) for key, entry in table.items()}
+        case tuple() | list():
+            return [_plain(entry) for entry in table]
+        case Path() | motion.MotionTable():
+            return (table if isinstance(table, Path) else table.path).as_posix()
+    if not isinstance(table, BaseModel):
+        return table
     entries: dict[str, Any] = {}
     for name, info in type(table).model_fields.items():
         value = getattr(table, name)
         if si_unit(info) != ANGLE.unit or value is None:
-            value = _value(value)
+            value = _plain(value)
         elif isinstance(value, tuple):
             value = [f"{one!r} rad" for one in value]  # an angle must carry a unit: a bare one would be refused
         else:
@@ -155,19 +164,3 @@ def _plain(table: BaseModel) -> dict[str, Any]:
     if isinstance(table, geometry.Block):
         entries = {key: entry for key, entry in entries.items() if table.has_key(key)}
     return {key: entry for key, entry in entries.items() if entry is not None}
-
-
-def _value(value: object) -> object:
-    match value:
-        case BaseModel():
-            return _plain(value)
-        case Mapping():
-            return {key: _value(entry) for key, entry in value.items()}
-        case tuple() | list():
-            return [_value(entry) for entry in value]
-        case Path():
-            return value.as_posix()
-        case motion.MotionTable():
-            return value.path.as_posix()
-        case _:
-            return value

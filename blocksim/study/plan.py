@@ -23,7 +23,7 @@ from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fau
 from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.motion import TABLED
-from blocksim.scenario.models.study import Normal, Uniform, Variation, round_digits, toml_number
+from blocksim.scenario.models.study import SIGNIFICANT, Normal, Uniform, Variation, toml_number
 from blocksim.simulation.provenance import run_hash
 from blocksim.study.rows import Head, check_experiment, heads_of
 
@@ -170,7 +170,8 @@ def draw_values(values: Variation, places: Places) -> Sequence[object]:
     if isinstance(values, tuple):  # equally likely levels
         return [values[index] for index in np.minimum(places * len(values), len(values) - 1).astype(int).tolist()]
     low, high = values.low, values.high
-    numbers = (min(max(round_digits(number), low), high) for number in quantile(values, places).tolist())
+    digits = (float(f"{number:.{SIGNIFICANT - 1}e}") for number in quantile(values, places).tolist())
+    numbers = (min(max(number, low), high) for number in digits)
     return [toml_number(number, angle=values.angle) for number in numbers]
 
 

@@ -139,9 +139,11 @@ def read_series(
     Raises MotionTableError with the line of the first mistake; `needed` names the columns.
     """
     try:
-        lines = input_files.bare_rows(content)
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise MotionTableError("not a text file in UTF-8") from None
+    kept = (one for one in input_files.numbered_lines(text) if one[1].strip() and not one[1].lstrip().startswith("#"))
+    lines = [(number, [input_files.QUOTED.sub(r"\1", cell.strip()) for cell in row.split(",")]) for number, row in kept]
     line, names = lines[0] if lines else (1, [])
     others = [name for name in names if name != TIME]
     if len(names) != 2 or len(others) != 1 or others[0] not in columns:

@@ -94,11 +94,6 @@ def _unit(value: Mapping[str, Any], *names: str) -> str:
     return next((unit for text in texts if (unit := q.unit_in(text))), "")
 
 
-def round_digits(number: float) -> float:
-    """Return a number to the digits that are equal on every machine."""
-    return float(f"{number:.{SIGNIFICANT - 1}e}")
-
-
 def _read_spread(value: object) -> tuple[Any, ...]:
     """Return the values of a list or of { from, to, count }; raises a pydantic error for anything else.
 
@@ -118,7 +113,8 @@ def _read_spread(value: object) -> tuple[Any, ...]:
     (first, last), angle = _numbers(value, "from", "to")
     scale = _scale(value, first, last)
     if scale == "log":
-        inner = [round_digits(first * (last / first) ** (i / (count - 1))) for i in range(1, count - 1)]
+        powers = (first * (last / first) ** (i / (count - 1)) for i in range(1, count - 1))
+        inner = [float(f"{number:.{SIGNIFICANT - 1}e}") for number in powers]
     else:
         inner = [first + (last - first) * i / (count - 1) for i in range(1, count - 1)]
     if type(value["from"]) is type(value["to"]) is int:
