@@ -293,20 +293,18 @@ def load_properties(path: Path | str) -> PropertyTable:
             table.problems.append(unit.problem(f"{found} is not a unit of {name}, write for example {interval.unit}"))
             continue
         try:
-            values[name] = _within(row["value"].number() * factor, interval)
+            value = row["value"].number() * factor
         except ValueError as error:
             table.problems.append(row["value"].problem(str(error)))
+            continue
+        if interval.above < value < interval.below:
+            values[name] = value
+            continue
+        si = "" if interval.unit == "1" else f" {interval.unit}"
+        limit = "" if interval.below == inf else f" and below {interval.below:g}{si}"
+        complaint = f"{value:g}{si} is impossible, it must be above {interval.above:g}{si}{limit}"
+        table.problems.append(row["value"].problem(complaint))
     _refuse_empty(table)
     if table.problems:
         input_files.raise_problems(table.problems)
     return PropertyTable(values=MappingProxyType(values), source=str(path), notes=table.notes)
-
-
-def _within(value: float, interval: Interval) -> float:
-    """Return the value; raises ValueError when it lies outside its interval."""
-    if interval.above < value < interval.below:
-        return value
-    unit = "" if interval.unit == "1" else f" {interval.unit}"
-    limit = "" if interval.below == inf else f" and below {interval.below:g}{unit}"
-    message = f"{value:g}{unit} is impossible, it must be above {interval.above:g}{unit}{limit}"
-    raise ValueError(message)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode
-from blocksim.kernels.common.arrays import World
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.models.stepping import IMPULSES, Nonsmooth
 from blocksim.simulation.loop import BY_CODE, Outcome
@@ -106,19 +105,14 @@ class TimedRun(NamedTuple):
     outcome: Outcome
 
     @property
-    def world(self) -> World:
-        """The arrays that all schemes have."""
-        return self.scene.world
-
-    @property
     def steps(self) -> int:
         """Steps done."""
-        return int(self.world.clock[0].steps)
+        return int(self.scene.world.clock[0].steps)
 
     @property
     def bodies(self) -> Any:
         """All bodies without the ground."""
-        return self.world.bodies[:-1]
+        return self.scene.world.bodies[:-1]
 
 
 class Rerun:

@@ -103,11 +103,6 @@ class Level:
         """For people."""
         return ", ".join(f"{name} {value:g}" for name, value in self.setting.items())
 
-    @property
-    def median(self) -> float:
-        """CPU seconds."""
-        return statistics.median(self.seconds)
-
     def off(self, other: "Level") -> float:
         """Return the largest distance (m) between final positions of a block by this and another way."""
         return float(np.hypot(*(self.centres - other.centres)).max())
@@ -122,7 +117,7 @@ class Level:
             **self.setting,
             "steps": self.steps,
             "off_mm": 1e3 * self.off(finest),
-            "cpu_ms": 1e3 * self.median,
+            "cpu_ms": 1e3 * statistics.median(self.seconds),
             "x_mm": [1e3 * x for x in self.centres[0].tolist()],
         }
 
@@ -152,7 +147,7 @@ def measure_explicit(setting: Setting) -> Findings:
     levels = [level for row in rows for level in row]
     finest = levels[-1]
     close = [level for row in rows for level in converged_levels(row, finest)]
-    cheapest = min(close, key=lambda level: level.median)
+    cheapest = min(close, key=lambda level: statistics.median(level.seconds))
     scene = Rerun(three_blocks(time={"stop_at_rest": False}))  # the blocks are at rest for the last quarter
     last = last_step_of(QUICK_DURATION if setting.quick else DURATION, scene.step)
     numbers = (
@@ -180,7 +175,7 @@ def measure_nonsmooth(setting: Setting) -> Findings:
     finest = solve(Stepping(finest_step, substeps=1))
     rows = [[solve(Stepping(step, parts)) for step in steps] for parts in SUBSTEPS]
     close = [level for row in rows for level in converged_levels(row, finest)] or [finest]
-    cheapest = min(close, key=lambda level: level.median)
+    cheapest = min(close, key=lambda level: statistics.median(level.seconds))
     members = QUICK_MEMBERS if setting.quick else MEMBERS
     numbers, ends = [], []
     for restitution, level in ((0.0, without), (RESTITUTION, cheapest)):

@@ -75,7 +75,7 @@ def measure_explicit(setting: measurement.Setting) -> measurement.Findings:
                 **size._asdict(),
                 "ns_per_block_and_step": times[-1].median,
                 "bytes_per_block": scene.bytes / size.blocks,
-                "rebuilds": int(repeats[-1][-1].world.clock[0].rebuilds) - 1,
+                "rebuilds": int(repeats[-1][-1].scene.world.clock[0].rebuilds) - 1,
                 "simulated_s": steps * scene.step,
             }
         )
@@ -107,7 +107,7 @@ def measure_nonsmooth(setting: measurement.Setting) -> measurement.Findings:
             **size._asdict(),
             "cpu_s": statistics.median(seconds),
             "ns_per_block_and_substep": number.median,
-            "rebuilds": int(final.world.clock[0].rebuilds),
+            "rebuilds": int(final.scene.world.clock[0].rebuilds),
             "sweeps_per_substep": int(final.scene.contacts.stepping[0].sweeps) / substeps,  # of the velocity pass
             "mean_x_m": float(final.bodies.x.mean()),
             "mean_y_m": float(final.bodies.y.mean()),
