@@ -12,21 +12,8 @@ from typing import NamedTuple, Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
 from blocksim.scenario import check, input_files, mistakes, resolved, units
+from blocksim.scenario import overrides as keys
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.overrides import (
-    MAX_PARTS,
-    Data,
-    KeyPath,
-    Override,
-    TooDeepError,
-    UnfitOverrideError,
-    format_key,
-    freeze,
-    parse_override,
-    read_key,
-    skip,
-    with_value,
-)
 
 MAX_SHOWN = 110
 """Characters of a line that a message shows; a longer line is cut on both sides of the caret."""
@@ -82,11 +69,11 @@ class ScenarioText:
         return self.text.split("\n")
 
     @functools.cached_property
-    def places(self) -> dict[KeyPath, Place]:
+    def places(self) -> dict[keys.KeyPath, Place]:
         """Every key and value of the text; only located once a mistake must be shown."""
         return locate(self.text)
 
-    def problem(self, path: KeyPath, message: str, at: str) -> Problem:
+    def problem(self, path: keys.KeyPath, message: str, at: str) -> Problem:
         """Show a mistake at its key or value, or at the nearest table around it."""
         around = (self.places.get(path[:size]) for size in range(len(path), 0, -1))
         place, span = next((one for one in around if one), None), None
@@ -94,7 +81,7 @@ class ScenarioText:
             span = place.key if at == "key" else place.value
         elif self.text:
             span = Span(1, 0, len(self.lines[0]))
-        return self.problem_in(message, format_key(path), span)
+        return self.problem_in(message, keys.format_key(path), span)
 
     def problem_in(self, message: str, key: str, span: Span | None) -> Problem:
         """Make the problem with its line."""
@@ -119,22 +106,22 @@ class ScenarioText:
         return self.problem_in(message, "", Span(number, column, 1))
 
 
-def override_problem(override: Override, path: KeyPath, message: str, at: str) -> Problem:
+def override_problem(override: keys.Override, path: keys.KeyPath, message: str, at: str) -> Problem:
     """Show a mistake in a value that was set from outside."""
     text = override.text
     try:
-        end = read_key(text)[1]
+        end = keys.read_key(text)[1]
     except ValueError:
         end = max(1, len(text.partition("=")[0]))
     equals = text.find("=", end)
     value = len(text) - len(text[equals + 1 :].lstrip())
     in_key = equals < 0 or (at == "key" and len(path) <= len(override.path))
     start, stop = (0, end) if in_key else (value, len(text))
-    depth, key = len(override.path), format_key(path)
+    depth, key = len(override.path), keys.format_key(path)
     if path == override.path:
         key = ""  # it stands in the text
     elif path[0] == "sweep" and path[:depth] == override.path:  # what lies below a key that a study varies
-        key = "" if isinstance(path[depth], int) else format_key(path[depth:])
+        key = "" if isinstance(path[depth], int) else keys.format_key(path[depth:])
     return Problem(override.label, message, key, None, *clip_line(text, start, stop - start))
 
 
@@ -148,17 +135,17 @@ def clip_line(line: str, start: int, length: int = 1) -> tuple[str, int, int]:
     return clean, start, max(1, min(length, len(clean) - start))
 
 
-def locate(text: str) -> dict[KeyPath, Place]:
+def locate(text: str) -> dict[keys.KeyPath, Place]:
     """Map every path of a valid TOML text (lines end with a line feed) to its place; the first one of a table."""
     scanner = _Scanner(text)
-    table: KeyPath = ()
-    at = skip(text, 0, _SPACE)
+    table: keys.KeyPath = ()
+    at = keys.skip(text, 0, _SPACE)
     while at < len(text):
         if text[at] == "[":
             table, at = scanner.header(at)
         else:
             at = scanner.pair(table, at)
-        at = skip(text, at, _SPACE)
+        at = keys.skip(text, at, _SPACE)
     return scanner.places
 
 
@@ -168,16 +155,16 @@ class _Scanner:
     def __init__(self, text: str) -> None:
         self.text = text
         self.line_starts = [0, *(match.end() for match in re.finditer("\n", text))]
-        self.places: dict[KeyPath, Place] = {}
-        self.list_sizes: dict[KeyPath, int] = {}
+        self.places: dict[keys.KeyPath, Place] = {}
+        self.list_sizes: dict[keys.KeyPath, int] = {}
 
-    def header(self, at: int) -> tuple[KeyPath, int]:
+    def header(self, at: int) -> tuple[keys.KeyPath, int]:
         """Read [a.b] or [[a.b]]: the path of the table that starts here, and the end of the header."""
         brackets = 2 if self.text.startswith("[[", at) else 1
-        start = skip(self.text, at + brackets)
-        parts, end = read_key(self.text, start)
+        start = keys.skip(self.text, at + brackets)
+        parts, end = keys.read_key(self.text, start)
         span = self.span(start, end)
-        path: KeyPath = ()
+        path: keys.KeyPath = ()
         for part in parts[:-1]:
             path = self.latest((*path, part))
             self.places.setdefault(path, Place(span, span))
@@ -187,17 +174,17 @@ class _Scanner:
             self.list_sizes[path] = self.list_sizes.get(path, 0) + 1
             path = self.latest(path)
             self.places[path] = Place(span, span)
-        return path, skip(self.text, end) + brackets
+        return path, keys.skip(self.text, end) + brackets
 
-    def latest(self, path: KeyPath) -> KeyPath:
+    def latest(self, path: keys.KeyPath) -> keys.KeyPath:
         """Step into the newest element where the path is an array of tables."""
         size = self.list_sizes.get(path, 0)
         return (*path, size - 1) if size else path
 
-    def pair(self, table: KeyPath, at: int) -> int:
+    def pair(self, table: keys.KeyPath, at: int) -> int:
         """Read key = value below a table."""
-        parts, end = read_key(self.text, at)
-        start = skip(self.text, skip(self.text, end) + 1)
+        parts, end = keys.read_key(self.text, at)
+        start = keys.skip(self.text, keys.skip(self.text, end) + 1)
         path = (*table, *parts)
         after = self.value(path, start)
         place = Place(self.span(at, end), self.span(start, after))
@@ -206,13 +193,13 @@ class _Scanner:
         self.places[path] = place
         return after
 
-    def value(self, path: KeyPath, at: int) -> int:
+    def value(self, path: keys.KeyPath, at: int) -> int:
         """Pass one value and record what is inside it; return its end."""
         opening, number = self.text[at : at + 1], 0
         if opening not in ("[", "{"):
-            return skip(self.text, at, _VALUE)
+            return keys.skip(self.text, at, _VALUE)
         closing = "]" if opening == "[" else "}"
-        at = skip(self.text, at + 1, _SPACE)
+        at = keys.skip(self.text, at + 1, _SPACE)
         while at < len(self.text) and self.text[at] != closing:
             if opening == "{":
                 at = self.pair(path, at)
@@ -221,9 +208,9 @@ class _Scanner:
                 span = self.span(start, at)
                 self.places[*path, number] = Place(span, span)
                 number += 1
-            at = skip(self.text, at, _SPACE)
+            at = keys.skip(self.text, at, _SPACE)
             if self.text.startswith(",", at):
-                at = skip(self.text, at + 1, _SPACE)
+                at = keys.skip(self.text, at + 1, _SPACE)
         return at + 1
 
     def span(self, start: int, end: int) -> Span:
@@ -239,7 +226,7 @@ MAX_PROBLEMS = 50
 Pair = tuple[str | Sequence[str], object]
 TOO_DEEP = "tables or lists are nested too deeply for a scenario"
 _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
-ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{MAX_PARTS}}}")
+ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{keys.MAX_PARTS}}}")
 """A dotted key (or a text like one) that would keep tomllib busy for minutes; it takes the square of the parts."""
 
 
@@ -251,10 +238,10 @@ class Document:
     folder of results (`is_stored`) no link is followed: it may come from somebody else and lead to a private file.
     """
 
-    data: Data
+    data: keys.Data
     source: ScenarioText
     folder: Path = Path()
-    overrides: tuple[Override, ...] = ()
+    overrides: tuple[keys.Override, ...] = ()
     allow_outside: bool = field(default_factory=lambda: input_files.access.get()[0])
     is_stored: bool = False
 
@@ -298,10 +285,10 @@ class Document:
             span = Span(before.count("\n") + 1, len(before) - (before.rfind("\n") + 1), 1)
             raise ScenarioError([source.problem_in(TOO_DEEP, "", span)])
         try:
-            data = cast("Data", freeze(tomllib.loads(source.text)))
+            data = cast("keys.Data", keys.freeze(tomllib.loads(source.text)))
         except tomllib.TOMLDecodeError as error:
             raise ScenarioError([source.syntax_problem(error)]) from None
-        except (RecursionError, TooDeepError):
+        except (RecursionError, keys.TooDeepError):
             raise ScenarioError([Problem(where, TOO_DEEP)]) from None
         except ValueError as error:  # whole numbers with thousands of digits
             raise ScenarioError([Problem(where, f"not valid TOML: {error}")]) from None
@@ -313,8 +300,8 @@ class Document:
     def from_mapping(cls, data: Mapping[str, object], folder: Path = Path()) -> Self:
         """Take data from Python in the form of a file; raises ScenarioError where it is nested too deeply."""
         try:
-            return cls(cast("Data", freeze(data)), ScenarioText("scenario"), folder)
-        except TooDeepError:
+            return cls(cast("keys.Data", keys.freeze(data)), ScenarioText("scenario"), folder)
+        except keys.TooDeepError:
             raise ScenarioError([Problem("scenario", TOO_DEEP)]) from None
 
     def with_values(self, values: Mapping[str, object]) -> Self:
@@ -339,11 +326,11 @@ class Document:
         data, overrides, problems = self.data, list(self.overrides), []
         for label, text, pair in settings:
             try:
-                key, value = parse_override(text) if pair is None else pair
-                data, path = with_value(data, key, input_files.user_value(key, value) if pair is None else value)
-                overrides.append(Override(label, text, path))
-            except (UnfitOverrideError, TooDeepError) as error:
-                problems.append(override_problem(Override(label, text, ()), (), str(error), "key"))
+                key, value = keys.parse_override(text) if pair is None else pair
+                data, path = keys.with_value(data, key, input_files.user_value(key, value) if pair is None else value)
+                overrides.append(keys.Override(label, text, path))
+            except (keys.UnfitOverrideError, keys.TooDeepError) as error:
+                problems.append(override_problem(keys.Override(label, text, ()), (), str(error), "key"))
         if problems:
             raise ScenarioError(problems)
         return replace(self, data=data, overrides=tuple(overrides))
@@ -373,7 +360,7 @@ class Document:
             return override_problem(override, finding.path, finding.message, finding.at)
         return self.source.problem(finding.path, finding.message, finding.at)
 
-    def _is_cause(self, override: Override, finding: mistakes.Mistake) -> bool:
+    def _is_cause(self, override: keys.Override, finding: mistakes.Mistake) -> bool:
         path, found = override.path, finding.path
         inside = found[: len(path)] == path
         on_the_way = path[: len(found)] == found and found not in self.source.places
