@@ -340,10 +340,10 @@ def take_over(stored: StoredCheckpoint, scenario: Scenario, recorder: Recorder) 
             f"{path}: changed after the interruption: the {count} frames before step {position.step} do not "
             f"match the SHA-256 in {stored.path.name}; {REMEDY}"
         )
-    if recorder.probes.all:
-        missing = recorder.probes.take_over(read_probes(path, scenario), position.step)
-        if missing:
-            raise InvalidInputError(f"{path}: samples of probe {missing[0]} are missing {before}")
+    kept = read_probes(path, scenario) if recorder.probes.all else {}
+    for probe in recorder.probes.all:
+        if probe.name not in kept or not probe.take_over(kept[probe.name], position.step):
+            raise InvalidInputError(f"{path}: samples of probe {probe.name} are missing {before}")
 
 
 def _refuse_other(path: Path, what: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:

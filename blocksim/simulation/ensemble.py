@@ -19,7 +19,7 @@ from blocksim.simulation import compilation, events, loop, probes, recorder, set
 from blocksim.simulation.frames import COLUMNS, Columns, Frames, as_frame, final_values
 from blocksim.simulation.ledger import EnergyLedger, adds_up, energy_ledger, ledger_of, next_energy_check, start_energy
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
-from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, mass_of_systems, measure_row, scheme_of
+from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measure_row, measured_systems, scheme_of
 from blocksim.world.build import Refusal, Stack, member, stack_of_one
 from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
 
@@ -71,7 +71,9 @@ EnsembleEnd = MemberEnd | MemberFailure
 
 def in_play_of(scenes: AnyScene | systems.Coupled, members: Sequence[int]) -> list[tuple[float, float]]:
     """Return mass (kg) and energy moved (J), which decide the energy in play, of some members of a stack."""
-    further = mass_of_systems(member(scenes, 0)) if isinstance(scenes, systems.Coupled) else 0.0  # in a stack of one
+    further = (
+        measured_systems(member(scenes, 0))[1] if isinstance(scenes, systems.Coupled) else 0.0
+    )  # in a stack of one
     mass = scenes.world.bodies.view(np.ndarray)["mass"]
     masses = [float(np.sum(mass[m])) + further for m in members]  # one by one: the order matters
     book = scenes.world.ledger[:, 0]
@@ -284,7 +286,7 @@ class Ensemble:
             self._advance_members(np.array([m]), stops, rows, self.codes)
             rows = np.zeros_like(rows)  # what is measured at the start of a later call
             is_under_way = self.codes[m] == arrays.REACHED and frame < stop
-            if self.codes[m] == arrays.REACHED and self._is_frame(m, frame):
+            if self.codes[m] == arrays.REACHED and frame_times.next_frame(frame - 1, self.periods[m]) == frame:
                 motion = motion_of(self.scenes.world.bodies[[m], : len(self.placed[0])])
                 self.watch.follow([m], motion, [frame * self.time_steps[m]])
 
@@ -292,9 +294,6 @@ class Ensemble:
         """Advance some members in compiled code, where the scheme can."""
         if self.scheme.advance_members is not None:
             self.scheme.advance_members(self.scenes, members, stops, rows, codes, self.watched)
-
-    def _is_frame(self, m: int, step: int) -> bool:
-        return step > 0 and frame_times.next_frame(step - 1, self.periods[m]) == step
 
     def _positions(self, scenes: AnyScene, which: list[int] | slice) -> NDArray[np.float64]:
         """Return x, y (m) and angle (rad) of the blocks of some scenes of a stack, (k, 3, b)."""
@@ -347,7 +346,7 @@ class Ensemble:
                 now = int(scene.world.clock[0].steps)
                 is_under_way = code == arrays.REACHED and now < last
                 continues = is_under_way and (now != look or adds_up(energy_ledger(scene, start)))
-                if not continues or self._is_frame(m, now):
+                if not continues or frame_times.next_frame(now - 1, self.periods[m]) == now:
                     motion = motion_of(stack_of_one(scene).world.bodies[[0], : len(self.placed[0])])
                     self.watch.follow([m], motion, [now * self.time_steps[m]])
         except BlocksimError as error:

@@ -14,9 +14,8 @@ from typing import Self
 from pydantic import BaseModel
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
-from blocksim.scenario import Scenario, events, input_files, scenario_to_toml
+from blocksim.scenario import Scenario, events, input_files, resolved, scenario_to_toml
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, TABLED
-from blocksim.scenario.resolved import MARK, tables_of_bodies
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.provenance import run_hash
 
@@ -30,14 +29,14 @@ FRAMES = "run.h5"
 PROBE = "probe-"  # and its name: CSV of a probe
 PROBE_TABLE = re.compile(r"probe-[A-Za-z0-9._-]+\.csv|\.probe-[A-Za-z0-9._-]+\.csv\.[a-z0-9_]{8}(?:\.csv)?")
 SUMMARY = "run.json"
-DONE = "done.json"  # written last: a folder without it is not finished
+DONE = "done.json"  # written last: the folder of a run without it is not finished
 CHECKPOINTS = ("checkpoint.0", "checkpoint.1")  # written by turns while a run continues, removed when it has finished
 OURS = (SCENARIO, EXPERIMENT, MOTION, *BODY_MOTIONS, FINAL, SOILS, FRAMES, SUMMARY, DONE, *CHECKPOINTS)
 HEAD_BYTES = 4096
 LONGEST_HEADER = 100_000  # bytes
 MOST_BYTES = 10 * input_files.MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = input_files.MEGABYTE  # of a table of an experiment, which is not read if larger
-RESOLVED = MARK.encode()
+RESOLVED = resolved.MARK.encode()
 CHANGED = "changed since blocksim wrote it; move it away, or write elsewhere with --out DIR"
 Kind = Callable[[bytes], bool]  # whether the first HEAD_BYTES of a file are of a kind
 
@@ -185,7 +184,7 @@ def read_tables(scenario: Scenario) -> dict[str, bytes]:
     tables = {}
     if scenario.experiment is not None:
         tables[EXPERIMENT] = input_files.read_limited(scenario.experiment.table, TABLE_BYTES, links=True)
-    contents = {table.digest: table.content for table in tables_of_bodies(scenario).values()}
+    contents = {table.digest: table.content for table in resolved.tables_of_bodies(scenario).values()}
     tables |= dict(zip(BODY_MOTIONS, contents.values(), strict=False))
     if isinstance(scenario.motion, TABLED):
         tables[MOTION] = scenario.motion.table.content
@@ -205,7 +204,7 @@ def keep_scenario(
     if os.path.lexists(folder / plan) and not is_resolved(folder / plan):
         raise OutputExistsError(f"{folder / plan}: {CHANGED}")
     names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
-    digests = dict.fromkeys(table.digest for table in tables_of_bodies(scenario).values())
+    digests = dict.fromkeys(table.digest for table in resolved.tables_of_bodies(scenario).values())
     of_bodies = dict(zip(digests, BODY_MOTIONS, strict=False))
     is_varied = plan != SCENARIO  # the base of others
     text = head + scenario_to_toml(scenario, names[EXPERIMENT], names[MOTION], of_bodies, is_varied=is_varied)
@@ -289,11 +288,6 @@ def default_folder(scenario: Scenario) -> Path:
     return RESULTS / scenario.name / run_hash(scenario)
 
 
-def is_finished(folder: Path) -> bool:
-    """Return True if the folder holds a finished run."""
-    return (folder / DONE).is_file()
-
-
 def holds_run(folder: Path, scenario: Scenario) -> bool:
     """Return True if the folder holds a finished run of exactly this scenario and code."""
     with contextlib.suppress(BlocksimError, ValueError, KeyError, TypeError, RecursionError):
@@ -338,7 +332,7 @@ def prepare_folder(folder: Path, *, overwrite: bool) -> None:
     with _locate_errors(folder, "created"):
         present = _run_files(folder)
         if present and not overwrite:
-            raise OutputExistsError(f"{folder}: {FINISHED if is_finished(folder) else UNFINISHED}")
+            raise OutputExistsError(f"{folder}: {FINISHED if (folder / DONE).is_file() else UNFINISHED}")
         # the mark of a finished run goes first, and last what shows that this is the folder of a run
         for name in sorted(present, key=lambda name: (name != DONE, name == SCENARIO)):
             (folder / name).unlink(missing_ok=True)
@@ -348,7 +342,7 @@ def check_folder(folder: Path) -> None:
     """Raise OutputExistsError unless a run in this folder may continue: nothing but an unfinished run is there."""
     with _locate_errors(folder, "read"):
         _run_files(folder)
-        if is_finished(folder):
+        if (folder / DONE).is_file():
             raise OutputExistsError(f"{folder}: {FINISHED}")
 
 
@@ -455,4 +449,4 @@ def newest_finished(folder: Path) -> Path | None:
 def unfinished_siblings(folder: Path) -> list[Path]:
     """Return the folders beside one in which checkpoints of runs that did not finish wait."""
     checkpoints = (path for name in CHECKPOINTS for path in folder.parent.glob(f"*/{name}"))
-    return sorted({path.parent for path in checkpoints if path.parent != folder and not is_finished(path.parent)})
+    return sorted({path.parent for path in checkpoints if path.parent != folder and not (path.parent / DONE).is_file()})

@@ -50,10 +50,6 @@ class Contacts:
         """Return the contacts of one frame, (k,) CONTACT_ROW."""
         return self.rows[self.ends[frame - 1] if frame > 0 else 0 : self.ends[frame]]
 
-    def tables(self) -> list[Rows]:
-        """Return the contacts of all frames, one table each."""
-        return [self.at(frame) for frame in range(len(self))]
-
     @property
     def frame(self) -> NDArray[np.intp]:
         """Number of the frame of every contact, (c,)."""

@@ -12,15 +12,8 @@ from blocksim.errors import ExitCode
 from blocksim.kernels.common import arrays
 from blocksim.scenario import PlacedBody
 from blocksim.simulation import checkpoint, result
+from blocksim.simulation import ledger as books
 from blocksim.simulation.events import Timeline
-from blocksim.simulation.ledger import (
-    RESIDUAL_LIMIT,
-    EnergyLedger,
-    adds_up,
-    energy_ledger,
-    next_energy_check,
-    start_energy,
-)
 from blocksim.simulation.recorder import MOTION, Recorder
 from blocksim.simulation.schemes import AnyScene, measure_row, scheme_of
 from blocksim.simulation.team import ALONE, Team
@@ -40,7 +33,7 @@ class Outcome:
 END_OF_TIME = Outcome("finished", "end of simulated time", ExitCode.SUCCESS)
 REST = Outcome("finished", "at rest", ExitCode.SUCCESS)
 RESIDUAL = Outcome(
-    "failed", f"energy residual above {RESIDUAL_LIMIT:.0%} of the energy in play", ExitCode.NUMERICAL_FAILURE
+    "failed", f"energy residual above {books.RESIDUAL_LIMIT:.0%} of the energy in play", ExitCode.NUMERICAL_FAILURE
 )
 
 BY_CODE = {
@@ -138,7 +131,7 @@ class LoopResult:
 
     scene: AnyScene
     outcome: Outcome
-    ledger: EnergyLedger
+    ledger: books.EnergyLedger
     solver_seconds: float
     threads: int
     overlap: float
@@ -151,10 +144,10 @@ def last_step_of(end: float, step: float) -> int:
     return max(1, round(end / step))
 
 
-def outcome_of(code: int, ledger: EnergyLedger) -> Outcome:
+def outcome_of(code: int, ledger: books.EnergyLedger) -> Outcome:
     """Return what a run came to that was not interrupted: its status code, and whether its energy adds up."""
     outcome = BY_CODE[code]
-    return RESIDUAL if outcome.status == "finished" and not adds_up(ledger) else outcome
+    return RESIDUAL if outcome.status == "finished" and not books.adds_up(ledger) else outcome
 
 
 def run_loop(
@@ -179,7 +172,7 @@ def run_loop(
     if why:
         run.write_checkpoint()
     recorder.sample(run.scene)  # wherever it ended
-    ledger = energy_ledger(run.scene, run.start)
+    ledger = books.energy_ledger(run.scene, run.start)
     outcome = Outcome("interrupted", why, ExitCode.STOPPED_EARLY) if why else outcome_of(run.status, ledger)
     outcome = diagnose(outcome, run.status, run.scene, recorder.placed)
     overlap, timeline = float(measure_row(run.scene)[-1]), control.timeline
@@ -224,7 +217,7 @@ class _Run:
                 self.timeline.records = since.events
             return
         self._advance(0)
-        self.start = start_energy(self.scene)
+        self.start = books.start_energy(self.scene)
         self.recorder.sample(self.scene)
         self.recorder.probes.sample(self.scene)
 
@@ -236,7 +229,7 @@ class _Run:
     def advance_towards(self, wanted: int) -> None:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
         done, before = self.done, time.perf_counter()
-        look = next_energy_check(done, self.bodies)
+        look = books.next_energy_check(done, self.bodies)
         event = wanted if self.timeline is None else self.timeline.next_step(done)
         checkpoints = self.control.checkpoints
         due = checkpoint.NEVER if checkpoints is None else checkpoints.next_step(done)
@@ -249,9 +242,9 @@ class _Run:
             self.recorder.sink.keep_up()  # with the samples
         if self.done == wanted:
             self.recorder.sample(self.scene)
-        ledger = energy_ledger(self.scene, self.start)
-        self.is_lost = self.done == look and not adds_up(ledger)
-        is_sound = self.status == arrays.REACHED and adds_up(ledger) and self.done < self.last
+        ledger = books.energy_ledger(self.scene, self.start)
+        self.is_lost = self.done == look and not books.adds_up(ledger)
+        is_sound = self.status == arrays.REACHED and books.adds_up(ledger) and self.done < self.last
         if is_sound and checkpoints is not None and checkpoints.is_due(self.done):
             self.write_checkpoint()
         self.control.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))

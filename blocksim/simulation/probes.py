@@ -345,14 +345,6 @@ class Probes:
             for probe in self.all:
                 probe.sample(moment)
 
-    def take_over(self, kept: Mapping[str, ProbeSeries], last_step: int) -> list[str]:
-        """Begin with samples of an earlier part up to a step; return the names of probes of which some are missing."""
-        return [
-            probe.name
-            for probe in self.all
-            if probe.name not in kept or not probe.take_over(kept[probe.name], last_step)
-        ]
-
     def series(self) -> dict[str, ProbeSeries]:
         """Return the samples that are held by the names of their probes."""
         return {one.name: series_of(one.name, one.kind, one.units, one.rows, self.time_step) for one in self.all}

@@ -93,7 +93,7 @@ class Recorder:
         Those after its checkpoint are among them, as the run would only repeat them; that of the moment at which it was
         stopped is not.
         """
-        tables = [None] * len(rows.steps) if rows.contacts is None else rows.contacts.tables()
+        tables = [None if rows.contacts is None else rows.contacts.at(k) for k in range(len(rows.steps))]
         states = zip(*rows.values, strict=True)
         frames = (Frame(*one) for one in zip(rows.steps.tolist(), states, rows.measured, tables, strict=True))
         self.held = [one for one in frames if one.step == 0 or self.next_step(one.step - 1) == one.step]

@@ -57,7 +57,7 @@ def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Pat
         message = f"{place}: this is a table, not a run; a run folder, results/NAME or a scenario file is needed"
         raise InvalidInputError(message)
     folder = files.default_folder(load_scenario(place))
-    if not files.is_finished(folder):
+    if not (folder / files.DONE).is_file():
         message = f"{place}: no finished run of this scenario without changes; first: blocksim run {place}"
         newest = files.newest_finished(folder.parent) if folder.parent.is_dir() else None
         if newest is not None:

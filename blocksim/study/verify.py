@@ -78,7 +78,7 @@ def differing_entries(
     is_allowed = bool(then.resumed_from) or all(text.endswith(checkpoint.STARTS_ANEW) for text in before)
     if whole and not (is_allowed and (*before, *now.warnings) == then.warnings):
         found.append(EntryDifference(files.SUMMARY, "warnings", list(then.warnings), list(now.warnings)))
-    if files.is_finished(folder):  # the mark of the end must not contradict run.json
+    if (folder / files.DONE).is_file():  # the mark of the end must not contradict run.json
         marked = _read_entries(folder / files.DONE)
         for name in ("run", "status"):
             found += apart(files.DONE, name, marked.get(name), getattr(then, name))

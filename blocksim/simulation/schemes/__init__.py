@@ -238,18 +238,14 @@ def measure_row(scene: AnyScene | Coupled) -> NDArray[np.float64]:
     scheme.measure(scene, row)
     if not isinstance(scene, Coupled):
         return row
-    further = np.concatenate([energies for energies, _ in _measured_systems(scene)])
-    return np.concatenate([row[: -len(COUNTED)], further, row[-len(COUNTED) :]])
+    return np.concatenate([row[: -len(COUNTED)], measured_systems(scene)[0], row[-len(COUNTED) :]])
 
 
-def mass_of_systems(scene: AnyScene | Coupled) -> float:
-    """Return the mass (kg) of all systems beside the blocks."""
-    return sum((mass for _, mass in _measured_systems(scene)), 0.0) if isinstance(scene, Coupled) else 0.0
-
-
-def _measured_systems(scene: Coupled) -> list[tuple[NDArray[np.float64], float]]:
-    """Return energies (J) and mass (kg) of each system."""
+def measured_systems(scene: AnyScene | Coupled) -> tuple[Floats, float]:
+    """Return energies (J) of the systems beside the blocks, one after the other, and the mass (kg) of them all."""
+    if not isinstance(scene, Coupled):
+        return np.zeros(0), 0.0
     counts = [len(names) + 1 for names in plan_of(scene.systems).energies]
-    row = np.zeros(sum(counts))
+    row, masses = np.zeros(sum(counts)), np.cumsum(counts) - 1  # a mass after the energies of each
     measure_systems(scene, row)
-    return [(part[:-1], float(part[-1])) for part in np.split(row, np.cumsum(counts)[:-1])]
+    return np.delete(row, masses), sum(row[masses].tolist(), 0.0)

@@ -58,7 +58,7 @@ def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
         columns = [probes.TABLE_UNITS[UNITS[name]][1] * rows[name] for name in CONTACT_NUMBERS]
         return zip(*(names[rows[name]] for name in BODIES), *(column.tolist() for column in columns), strict=True)
 
-    _write(path, CONTACT_COLUMNS, frames.time, map(table, contacts.tables()))
+    _write(path, CONTACT_COLUMNS, frames.time, (table(contacts.at(k)) for k in range(len(contacts))))
     return len(contacts.rows)
 
 

@@ -26,9 +26,8 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.scenario import Scenario, events, input_files, place_bodies
-from blocksim.simulation import atomic
+from blocksim.simulation import atomic, probes
 from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames
-from blocksim.simulation.probes import CHUNK_ROWS, ProbeSeries
 from blocksim.simulation.recorder import Frame, Recorder, Rows, frames_from_rows
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems import blocks, others_of
@@ -52,7 +51,7 @@ class DataSet:
     of: Callable[[Any], Values]  # its rows in frames, or in a ProbeSeries
     kind: Any = np.float64
     row: tuple[int, ...] = ()  # shape of a row
-    chunk: int = CHUNK_ROWS  # rows
+    chunk: int = probes.CHUNK_ROWS  # rows
     is_sum: bool = False  # what it counts goes on from its last row
 
 
@@ -263,7 +262,7 @@ def refuse_too_many(path: Path, sets: dict[str, Any], rows: int, what: str = "fr
         )
 
 
-def read_probes(path: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
+def read_probes(path: Path, scenario: Scenario) -> dict[str, probes.ProbeSeries]:
     """Return the samples of all probes of a scenario in a run file, by name.
 
     Raises InputMissingError, or InvalidInputError for a damaged file or one without these probes.
@@ -275,7 +274,7 @@ def read_probes(path: Path, scenario: Scenario) -> dict[str, ProbeSeries]:
         return {name: _samples(path, file, name) for name in names}
 
 
-def _samples(path: Path, file: Any, name: str) -> ProbeSeries:
+def _samples(path: Path, file: Any, name: str) -> probes.ProbeSeries:
     place = f"{PROBES}/{name}"
     count = int(data_set(file, f"{place}/{COMMITTED}", 0)[()])
     sets = {one: data_set(file, f"{place}/{one}", 1) for one in group(file, place) if one != COMMITTED}
@@ -288,7 +287,7 @@ def _samples(path: Path, file: Any, name: str) -> ProbeSeries:
     times = np.asarray(sets.pop(PROBE_TIME)[:count], dtype=np.float64)
     columns = {one: np.asarray(data[:count], dtype=np.float64) for one, data in sets.items()}
     units = {one: str(data.attrs["unit"]) for one, data in sets.items()}
-    return ProbeSeries(name, kind, steps, times, columns, units)
+    return probes.ProbeSeries(name, kind, steps, times, columns, units)
 
 
 def read_frames(path: Path, scenario: Scenario) -> Frames:

@@ -111,7 +111,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         with suppress(BlocksimError):
             summary = read_summary(folder / files.SUMMARY)
             # a case that failed has come to its end too
-            has_ended = files.is_finished(folder) if summary.status == FINISHED else summary.status != INTERRUPTED
+            has_ended = (folder / files.DONE).is_file() if summary.status == FINISHED else summary.status != INTERRUPTED
             if has_ended and summary.run == provenance.run_hash(scenario) and not changed_results(folder, summary):
                 return _row_of(summary, frames.read_table(folder / files.FINAL))
         try:
