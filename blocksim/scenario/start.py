@@ -251,7 +251,7 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
         for place, cell in enumerate(structure.divide() if isinstance(structure, Polygons) else ()):
             yield from unknown(("structures", number, "cells", place, "block"), "block", scenario.blocks, cell.block)
     for path, block in needing:
-        if not scenario.blocks[block].is_shaped:
+        if scenario.blocks[block].size_x == 0.0:
             yield Mistake(path, f"block {toml(block)} has no shape; {SHAPES}")
 
 
@@ -272,7 +272,7 @@ def _unfit_tables(scenario: Scenario) -> Iterator[Mistake]:
             for other in (name for name, pair in partners.items() if pair.normal_stiffness is not None):
                 yield Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
     for name, block in scenario.blocks.items():
-        if not block.is_shaped:
+        if block.size_x == 0.0:
             continue
         density = scenario.materials[block.material].density
         mass = density * block.size_x * block.size_y * block.depth

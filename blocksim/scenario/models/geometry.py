@@ -158,11 +158,6 @@ class Block(Table):
             return key not in RECTANGLE_KEYS and getattr(self, "given_depth" if key == "depth" else key) is not None
         return key in {*RECTANGLE_KEYS, "material"}
 
-    @property
-    def is_shaped(self) -> bool:
-        """Whether the block has a shape; without one it has only a depth and a material."""
-        return self.width is not None or bool(self.polygon)
-
     @cached_property
     def polygon(self) -> geometry.Corners:
         """Corners (m) counter-clockwise about the centroid; empty for a rectangular block."""
@@ -172,7 +167,7 @@ class Block(Table):
 
     @cached_property
     def size_x(self) -> float:
-        """Extent along x in m; of an outline that of its bounding box."""
+        """Extent along x in m; of an outline that of its bounding box, 0 where the structure gives the shape."""
         return self._extent(0, self.along)
 
     @cached_property

@@ -166,7 +166,7 @@ class PolygonStructure(Structure):
 
     def place(self, block: Block) -> Sequence[Pose]:
         """Return the centroids of all blocks, none of them turned."""
-        if block.is_shaped:
+        if block.size_x > 0.0:
             raise UnfitError("block", "this structure shapes its blocks; give the block a depth and a material only")
         return [Pose(*geometry.centroid(cell.corners)) for cell in self.cells]
 
