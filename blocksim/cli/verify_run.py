@@ -11,13 +11,8 @@ from blocksim.options import Option
 from blocksim.scenario import load_stored
 from blocksim.simulation.compilation import kernels_of
 from blocksim.simulation.folder import SCENARIO
-from blocksim.study import verify
-from blocksim.study.answer import study_in
-from blocksim.study.manifest import is_sweep
+from blocksim.study import answer, manifest, stored_run, sweep, sweep_folder, verify
 from blocksim.study.run import Threads
-from blocksim.study.stored_run import find_run
-from blocksim.study.sweep import kernels_for
-from blocksim.study.sweep_folder import read_plan
 
 INDENT = "  "
 MOST_LINES = 5
@@ -65,20 +60,20 @@ def verify_run_command(
 def _verified(place: Path, threads: int, sample: int, seed: int, screen: command_line.Screen) -> command_line.Report:
     """Verify one place; an error in it does not stop the others."""
     try:
-        study = study_in(place)
+        study = answer.study_in(place)
         if study is not None:
             kernels = [kernels_of(load_stored(place / study.answer.files.plan))]
         else:
             kernels = (
-                [*kernels_for(read_plan(place))]
-                if is_sweep(place)
-                else [kernels_of(load_stored(find_run(place) / SCENARIO))]
+                [*sweep.kernels_for(sweep_folder.read_plan(place))]
+                if manifest.is_sweep(place)
+                else [kernels_of(load_stored(stored_run.find_run(place) / SCENARIO))]
             )
         for one in kernels:
             prepare.announce_compilation(one, quiet=screen.silent)
         if study is not None:
             return _of_study(verify.verify_study(place, study, sample, seed))
-        if is_sweep(place):
+        if manifest.is_sweep(place):
             return _of_sweep(verify.verify_sweep(place, sample, seed))
         with progress.run_progress(quiet=screen.silent) as on_progress:
             verdict = verify.verify_run(place, threads=threads, on_progress=on_progress)

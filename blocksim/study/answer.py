@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 from pydantic import BaseModel, Field, ValidationError
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
-from blocksim.scenario import load_stored
-from blocksim.scenario.input_files import MEGABYTE, read_limited
+from blocksim.scenario import input_files, load_stored
 from blocksim.study.sweep_folder import FolderKind, write_answer
 from blocksim.view.report.subjects import StudyPage
 from blocksim.view.style import OWN, Paper
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from blocksim.study.pictures import PlotOptions
     from blocksim.study.runs import Replay
 
-MOST_BYTES = 50 * MEGABYTE
+MOST_BYTES = 50 * input_files.MEGABYTE
 STUDIES = {
     "fragility": "blocksim.study.fragility:FRAGILITY",
     "limit": "blocksim.study.limit:LIMIT",
@@ -90,7 +89,7 @@ class Answer(BaseModel, frozen=True):
         """Return the answer that a folder holds. Raises InputMissingError or InvalidInputError."""
         path = folder / cls.files.origin
         try:
-            found = cls.model_validate_json(read_limited(path, MOST_BYTES))
+            found = cls.model_validate_json(input_files.read_limited(path, MOST_BYTES))
         except ValidationError as error:
             message = f"{path}: not the answer of {cls.files.what}: {str(error).splitlines()[0]}"
             raise InvalidInputError(message) from None

@@ -31,9 +31,8 @@ from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, start
 from blocksim.silence import silent
-from blocksim.simulation import compilation, provenance, result, stopping
+from blocksim.simulation import compilation, provenance, result, schemes, stopping
 from blocksim.simulation import folder as files
-from blocksim.simulation.schemes import build_scene
 from blocksim.study.executors import Setting, Task, processes
 from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance
@@ -326,7 +325,7 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
         raise InvalidInputError(f"the tolerance must be above 0 mm and levels {FEWEST_LEVELS} or more")
     scenario = scenario.model_copy(update={"sweep": None})
     check_experiment(scenario)
-    build_scene(scenario)
+    schemes.build_scene(scenario)
     refinements = refinements_of(scenario, studies)
     compilation.compile_kernels(compilation.kernels_of(scenario))
     folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / FOLDER
@@ -441,7 +440,7 @@ def _possible(scenario: Scenario) -> list[Refinement]:
     """Return what can be refined, and how: by halves, or by half decades, also from coarser values that are cheap."""
     time, contact = scenario.time, scenario.contact
     if time.has_rigid_contacts:
-        step = float(build_scene(scenario).world.controls[0].step)  # as given or as it was chosen
+        step = float(schemes.build_scene(scenario).world.controls[0].step)  # as given or as it was chosen
         tolerance = velocity_tolerance(scenario, len(place_bodies(scenario)))
         key = "time.velocity_tolerance"
         return [
@@ -483,6 +482,6 @@ def _halved(scenario: Scenario, key: str, own: float) -> Refinement:
         changed = with_setting(scenario, key, halved.value(-coarser))
         with suppress(ValueError, InvalidInputError):
             type(changed.time).model_validate(changed.time.model_dump())
-            build_scene(changed)
+            schemes.build_scene(changed)
             return replace(halved, coarser=coarser)
     return halved

@@ -22,8 +22,7 @@ from blocksim.scenario import Document, Sweep, overrides, scenario_hash
 from blocksim.scenario.models.study import Uniform, Variation
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
-from blocksim.study import answer, criterion, limit_plan, manifest, plan, rows, runs
-from blocksim.study.executors import Execution
+from blocksim.study import answer, criterion, executors, limit_plan, manifest, plan, rows, runs
 
 INTENSITY, SCATTER, STRIPES, FAILS = "--intensity", "--scatter", "--stripes", "--fails"
 COLLAPSE = "outcome = fell"
@@ -37,7 +36,7 @@ OnRow = Callable[[int, int, rows.Row], None]
 
 
 @dataclass(frozen=True)
-class FragilityOptions(Execution):
+class FragilityOptions(executors.Execution):
     """Intensities, what scatters at each of them, what counts as failure, and how members are run and kept."""
 
     intensity: Annotated[

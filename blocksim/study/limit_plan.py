@@ -24,15 +24,13 @@ import numpy as np
 
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, Overwrite, takes
-from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, place_segments, scenario_hash
+from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, place_segments, scenario_hash, units
 from blocksim.scenario.models import loads, stepping, study
 from blocksim.scenario.placement import smallest_width
-from blocksim.scenario.units import parse_unit
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
-from blocksim.study import answer, criterion, runs
+from blocksim.study import answer, criterion, executors, runs
 from blocksim.study.criterion import Criterion, Verdict
-from blocksim.study.executors import Execution
 from blocksim.study.plan import RANGE, Values, Variations, build_distributions, levels_of, variations_option
 from blocksim.study.rows import Head, Row, heads_of
 
@@ -75,7 +73,7 @@ OtherKey = Annotated[
 
 
 @dataclass(frozen=True)
-class SearchOptions(Execution):
+class SearchOptions(executors.Execution):
     """Which limits are searched, how narrowly, and where the runs are kept."""
 
     vary: Annotated[
@@ -395,7 +393,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     values = build_distributions(bare, Variations({key: ends}, given.texts), OPTION, "sobol").vary[key]
     assert isinstance(values, study.Uniform)  # noqa: S101 - it has two ends
     unit = values.unit or ("rad" if values.angle else "")
-    factor = float(parse_unit(unit).factor) if unit else 1.0
+    factor = float(units.parse_unit(unit).factor) if unit else 1.0
     low, high = (float(f"{end / factor:.{DIGITS}g}") for end in (values.low, values.high))
     is_whole = takes_whole(bare, key) and all(type(ends[end]) is int for end in ("from", "to"))
     count = min(count, int(high - low) + 1) if is_whole else count  # every whole number that fits

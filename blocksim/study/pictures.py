@@ -20,8 +20,7 @@ from blocksim.silence import silent
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
 from blocksim.simulation.stores.hdf5 import read_probes
-from blocksim.study import compare, manifest, stored_run, sweep_folder
-from blocksim.study.answer import draw_study, study_in
+from blocksim.study import answer, compare, manifest, stored_run, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, is_angle, quarter_turns
 from blocksim.view import animation, history, run_data, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
@@ -513,10 +512,10 @@ def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
     """Draw what lies at a place, see `plot`; return the picture's path and a remark on an unfinished run."""
     if not place.exists():
         raise InputMissingError(f"{place}: no such run folder, sweep folder, table or scenario file")
-    study = study_in(place)
+    study = answer.study_in(place)
     if study is not None:
         options.refuse(None, f"{place} is {study.answer.files.what}")
-        return draw_study(place, study, options), ""
+        return answer.draw_study(place, study, options), ""
     if manifest.is_sweep(place):
         options.refuse(None, f"{place} is a sweep")
         return _draw_sweep(place, options), ""

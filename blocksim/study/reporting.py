@@ -12,8 +12,7 @@ from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError,
 from blocksim.scenario import input_files, load_stored
 from blocksim.simulation import folder as files
 from blocksim.simulation.folder import refuse_foreign
-from blocksim.study import compare, manifest, stored_run, sweep_folder
-from blocksim.study.answer import study_in, study_page
+from blocksim.study import answer, compare, manifest, stored_run, sweep_folder
 from blocksim.study.pictures import read_sweep_data
 from blocksim.study.rows import FINISHED, TABLE
 from blocksim.view.report import subjects as parts
@@ -59,9 +58,9 @@ def report_on(
     problems: list[str] = []
     for place in places:
         key = f"part-{len(shown) + 1}"
-        study = study_in(place)
+        study = answer.study_in(place)
         if study is not None:
-            shown.append(parts.study_subject(key, study_page(place, study), str(place)))
+            shown.append(parts.study_subject(key, answer.study_page(place, study), str(place)))
             continue
         if manifest.is_sweep(place):
             subjects, damage = _sweep(key, place, experiment, members)

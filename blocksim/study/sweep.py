@@ -22,9 +22,8 @@ from blocksim.silence import silent
 from blocksim.simulation import compilation, provenance, stopping
 from blocksim.simulation import folder as files
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.study import manifest, rows, sweep_folder
+from blocksim.study import executors, manifest, rows, sweep_folder
 from blocksim.study import plan as plans
-from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 
 TIMINGS = "timings.csv"
 MOST_INVALID = 500  # kept in memory before they are written
@@ -40,7 +39,7 @@ SharedCases = Annotated[
 
 
 @dataclass(frozen=True)
-class SweepOptions(Execution):
+class SweepOptions(executors.Execution):
     """What is varied in a sweep, and how its cases are run and kept."""
 
     vary: Annotated[
@@ -177,7 +176,7 @@ class SweepRun:
         state = self.done.state[self.shard.slice]
         state[state == manifest.ENDED_BADLY] = manifest.MISSING
 
-    def run(self, executor: Run, setting: Setting, *, fail_fast: bool = False) -> None:
+    def run(self, executor: executors.Run, setting: executors.Setting, *, fail_fast: bool = False) -> None:
         """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
         try:
             with stopping.stop_requests() as is_stopped:
@@ -214,14 +213,14 @@ class SweepRun:
         ended = time.monotonic()
         self.next_at = ended + max(SOONEST, (ended - began) / SHARE)
 
-    def _tasks(self) -> Iterator[Task]:
+    def _tasks(self) -> Iterator[executors.Task]:
         """Make one task after the other; cases that cannot be run get their rows on the way."""
         for number in self.shard.numbers(len(self.cases)):
             if self.done.holds(number, self.cases.design[number]):
                 continue
             case = self.cases[number]
             if case.scenario is not None:
-                yield Task(number, case.name, case.settings, case.scenario)
+                yield executors.Task(number, case.name, case.settings, case.scenario)
                 continue
             entry = manifest.Entry(
                 number, case.name, manifest.values_hash(case.settings), rows.invalid_row(case.problem)
@@ -230,7 +229,7 @@ class SweepRun:
             if len(self.invalid) >= MOST_INVALID:
                 self._keep()
 
-    def _keep_batch(self, batch: Batch, executor: str) -> bool:
+    def _keep_batch(self, batch: executors.Batch, executor: str) -> bool:
         """Keep rows, and return whether one of them is of a case that failed."""
         ended = [
             (manifest.Entry(task.number, task.name, manifest.values_hash(task.settings), row), task.settings)

@@ -25,16 +25,13 @@ from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import input_files, scenario_hash
 from blocksim.silence import silent
-from blocksim.simulation import Watcher, checkpoint, probes, provenance, read_result, result, simulate
+from blocksim.simulation import Watcher, checkpoint, observables, probes, provenance, read_result, result, simulate
 from blocksim.simulation import folder as files
 from blocksim.simulation.frames import csv_text
-from blocksim.simulation.observables import PEAK
-from blocksim.study import manifest, plan, sweep, sweep_folder
-from blocksim.study.answer import Study, study_in
+from blocksim.study import answer, manifest, plan, stored_run, sweep, sweep_folder
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row
 from blocksim.study.runs import Replay
-from blocksim.study.stored_run import find_run
 
 INTERRUPTED = "interrupted"
 SCENARIO = "scenario"  # its hash, beside the entries of `environment`
@@ -168,7 +165,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     A run that was interrupted is repeated as far as it got. Raises InputMissingError where no run is there,
     InvalidInputError (ScenarioError) for files that cannot be read, StoppedEarlyError where the repetition is stopped.
     """
-    folder = find_run(place)
+    folder = stored_run.find_run(place)
     summary = result.read_summary(folder / files.SUMMARY)
     changed = result.changed_files(folder, summary)
     try:
@@ -302,13 +299,13 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
     return SweepVerdict(folder, len(lines), checked, tuple(found), origins, kept)
 
 
-def verify_study(folder: Path, study: Study, sample: int = SAMPLE, seed: int = 0) -> tuple[SweepVerdict, ...]:
+def verify_study(folder: Path, study: answer.Study, sample: int = SAMPLE, seed: int = 0) -> tuple[SweepVerdict, ...]:
     """Verify a study; of one that consists of others all of them, and then itself.
 
     Raises InputMissingError or InvalidInputError for files that cannot be read or do not go together.
     """
     stored, replay = study.answer.read(folder), Replay.of(folder, by_number=study.is_design)
-    parts = [(place, part) for place in study.parts(stored) if (part := study_in(place)) is not None]
+    parts = [(place, part) for place in study.parts(stored) if (part := answer.study_in(place)) is not None]
     verdicts = [verdict for place, part in parts for verdict in verify_study(place, part, sample, seed)]
     kind = stored.files
     with TemporaryDirectory() as place:
@@ -320,7 +317,7 @@ def verify_study(folder: Path, study: Study, sample: int = SAMPLE, seed: int = 0
     tasks = replay.tasks
     chosen = _chosen(len(tasks), sample, seed)
     known = [entry for number in chosen if (entry := replay.entry(tasks[number])) is not None]  # all were there
-    peaks = any(PEAK in entry.row for entry in known)
+    peaks = any(observables.PEAK in entry.row for entry in known)
     rows = rows_of([tasks[number].scenario for number in chosen], os.cpu_count() or 1, peaks=peaks)
     for number, entry, row in zip(chosen, known, rows, strict=True):
         then: Row = {CASE: entry.case, **entry.row}
