@@ -17,8 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from blocksim.scenario import load_scenario as load
-    from blocksim.scenario import replace_values as replace
+    from blocksim.scenario import load_scenario as load, replace_values as replace
     from blocksim.study.calibrate import calibrate
     from blocksim.study.compare import compare
     from blocksim.study.converge import converge

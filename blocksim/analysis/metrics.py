@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.analysis import compare
-from blocksim.analysis import evidence as facts
+from blocksim.analysis import compare, evidence as facts
 from blocksim.analysis.experiment import ExperimentTable
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module

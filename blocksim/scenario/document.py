@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import NamedTuple, Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
-from blocksim.scenario import check, input_files, mistakes, resolved, units
-from blocksim.scenario import overrides as keys
+from blocksim.scenario import check, input_files, mistakes, overrides as keys, resolved, units
 from blocksim.scenario.models.scenario import Scenario
 
 MAX_SHOWN = 110

@@ -21,8 +21,7 @@ from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
 from blocksim.scenario import Scenario, load_stored, resolved, units
 from blocksim.scenario.units import TIME
-from blocksim.simulation import atomic, provenance, result
-from blocksim.simulation import folder as files
+from blocksim.simulation import atomic, folder as files, provenance, result
 from blocksim.simulation.folder import CHECKPOINTS
 from blocksim.simulation.recorder import Recorder
 from blocksim.simulation.schemes import AnyScene

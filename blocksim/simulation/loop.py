@@ -11,8 +11,7 @@ import numpy as np
 from blocksim.errors import ExitCode
 from blocksim.kernels.common import arrays
 from blocksim.scenario import PlacedBody
-from blocksim.simulation import checkpoint, result
-from blocksim.simulation import ledger as books
+from blocksim.simulation import checkpoint, ledger as books, result
 from blocksim.simulation.events import Timeline
 from blocksim.simulation.recorder import MOTION, Recorder
 from blocksim.simulation.schemes import AnyScene, measure_row, scheme_of

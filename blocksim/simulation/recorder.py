@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody
-from blocksim.simulation.frames import Contacts, Frames, join_contacts
-from blocksim.simulation.frames import Rows as ContactRows
+from blocksim.simulation.frames import Contacts, Frames, Rows as ContactRows, join_contacts
 from blocksim.simulation.ledger import compiled
 from blocksim.simulation.observables import Watch
 from blocksim.simulation.probes import AT_REST, NO_PROBES, MovingSupport, Probes

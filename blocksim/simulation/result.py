@@ -13,8 +13,7 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, input_files, load_stored, place_bodies
 from blocksim.scenario.models.stepping import Event
-from blocksim.simulation import atomic, ledger, observables
-from blocksim.simulation import folder as files
+from blocksim.simulation import atomic, folder as files, ledger, observables
 from blocksim.simulation.folder import PROBE, keep_scenario, probe_tables, read_tables
 from blocksim.simulation.frames import Columns, Frames, as_frame, csv_text, data_set, read_table, tidy_table
 from blocksim.simulation.probes import ProbeSeries

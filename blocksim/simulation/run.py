@@ -17,8 +17,17 @@ from blocksim.kernels.common.compiler import compiling
 from blocksim.scenario import PlacedBody, Scenario, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
 from blocksim.silence import silent
-from blocksim.simulation import checkpoint, compilation, events, ledger, loop, observables, provenance, settling
-from blocksim.simulation import folder as files
+from blocksim.simulation import (
+    checkpoint,
+    compilation,
+    events,
+    folder as files,
+    ledger,
+    loop,
+    observables,
+    provenance,
+    settling,
+)
 from blocksim.simulation.folder import CHECKPOINTS, folder_lock, keep_scenario, probe_tables, read_tables
 from blocksim.simulation.frames import final_columns
 from blocksim.simulation.probes import MovingSupport, bytes_of_series, probes_of

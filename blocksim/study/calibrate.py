@@ -17,8 +17,7 @@ from blocksim.scenario import Document, Source, document_of, scenario_hash, scen
 from blocksim.scenario.document import locate
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import KeyPath, follow, format_key, with_value
-from blocksim.simulation import atomic, compilation, stopping
-from blocksim.simulation import folder as files
+from blocksim.simulation import atomic, compilation, folder as files, stopping
 from blocksim.study import calibrate_plan
 from blocksim.study.executors.ensemble import run_members
 

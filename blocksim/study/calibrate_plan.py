@@ -23,8 +23,7 @@ from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides,
 from blocksim.scenario.models.study import Normal, Uniform, toml_number
 from blocksim.silence import silent
 from blocksim.simulation import atomic, folder, provenance
-from blocksim.study import compare
-from blocksim.study import plan as plans
+from blocksim.study import compare, plan as plans
 from blocksim.study.executors.ensemble import Member
 from blocksim.study.rows import Range, check_experiment, ranges_of, si_number, values_at
 

@@ -10,8 +10,7 @@ from blocksim.analysis.metrics import Judgement, Settings, judge
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
 from blocksim.scenario import load_scenario, load_stored
-from blocksim.simulation import Result
-from blocksim.simulation import folder as files
+from blocksim.simulation import Result, folder as files
 from blocksim.simulation.result import read_final, read_summary
 from blocksim.study import manifest, rows, stored_run, sweep_folder
 from blocksim.study.manifest import SweepResult

@@ -31,8 +31,7 @@ from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, start
 from blocksim.silence import silent
-from blocksim.simulation import compilation, provenance, result, schemes, stopping
-from blocksim.simulation import folder as files
+from blocksim.simulation import compilation, folder as files, provenance, result, schemes, stopping
 from blocksim.study.executors import Setting, Task, processes
 from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance

@@ -9,8 +9,16 @@ from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.silence import silent
-from blocksim.simulation import Result, Watcher, checkpoint, read_result, renew_copies, simulate, simulate_into
-from blocksim.simulation import folder as files
+from blocksim.simulation import (
+    Result,
+    Watcher,
+    checkpoint,
+    folder as files,
+    read_result,
+    renew_copies,
+    simulate,
+    simulate_into,
+)
 from blocksim.simulation.result import changed_results, read_summary
 from blocksim.simulation.run import NO_CALLBACKS, RunCallbacks
 from blocksim.study import rows, stored_run

@@ -11,8 +11,7 @@ from typing import Self, TypeVar
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
 from blocksim.silence import silent
-from blocksim.simulation import compilation, provenance, stopping
-from blocksim.simulation import folder as files
+from blocksim.simulation import compilation, folder as files, provenance, stopping
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.manifest import MANIFEST, PATTERN, Entry, Manifest, read_entries, values_hash
 from blocksim.study.rows import Row, check_experiment, invalid_row

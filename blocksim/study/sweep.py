@@ -19,11 +19,9 @@ from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.silence import silent
-from blocksim.simulation import compilation, provenance, stopping
-from blocksim.simulation import folder as files
+from blocksim.simulation import compilation, folder as files, provenance, stopping
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.study import executors, manifest, rows, sweep_folder
-from blocksim.study import plan as plans
+from blocksim.study import executors, manifest, plan as plans, rows, sweep_folder
 
 TIMINGS = "timings.csv"
 MOST_INVALID = 500  # kept in memory before they are written

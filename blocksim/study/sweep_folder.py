@@ -16,8 +16,7 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario, input_files, overrides, spelling
 from blocksim.scenario.models.motion import TABLED, FromTable, content_of
-from blocksim.simulation import atomic, provenance
-from blocksim.simulation import folder as files
+from blocksim.simulation import atomic, folder as files, provenance
 from blocksim.simulation.folder import is_resolved
 
 MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each

@@ -25,8 +25,17 @@ from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import input_files, scenario_hash
 from blocksim.silence import silent
-from blocksim.simulation import Watcher, checkpoint, observables, probes, provenance, read_result, result, simulate
-from blocksim.simulation import folder as files
+from blocksim.simulation import (
+    Watcher,
+    checkpoint,
+    folder as files,
+    observables,
+    probes,
+    provenance,
+    read_result,
+    result,
+    simulate,
+)
 from blocksim.simulation.frames import csv_text
 from blocksim.study import answer, manifest, plan, stored_run, sweep, sweep_folder
 from blocksim.study.executors.ensemble import rows_of

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.fuzz.conftest import LONG, QUICK, assert_harmless
 from tests.fuzz.mutations import BINARY, JSON, SCENARIO, TABLE, damaged

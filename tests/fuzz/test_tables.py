@@ -6,8 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.fuzz.conftest import LONG, QUICK, ROOT, assert_harmless
 from tests.fuzz.mutations import TABLE, damaged

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from blocksim.errors import Problem, ScenarioError
 from blocksim.scenario import Document, scenario_to_toml

@@ -1,8 +1,7 @@
 """Dotted keys: written, read, and followed through data and models."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.scenario.models.motion import FromTable

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.interpolate import CubicSpline
 
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml

@@ -4,8 +4,7 @@ import math
 from itertools import combinations
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.scenario.geometry import Corner, centre_outline
 from blocksim.scenario.overlap import Outlines, near_pairs, overlapping_pairs, penetration

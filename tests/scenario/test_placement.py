@@ -6,8 +6,7 @@ import weakref
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
 from blocksim.scenario.overrides import freeze

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.scenario import PlacedSegment, Scenario, place_segments, scenario_from_mapping
 from blocksim.scenario.placement import ENDLESS, surface_heights

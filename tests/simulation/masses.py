@@ -12,8 +12,7 @@ import numpy as np
 from blocksim.kernels.common.arrays import Floats, Records, World, record_type, zeros
 from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.common.systems import Stages, part_of_thread
-from blocksim.scenario import Scenario
-from blocksim.scenario import units as q
+from blocksim.scenario import Scenario, units as q
 from blocksim.scenario.models.base import SystemTable, Whole
 from blocksim.world.systems import Function
 from blocksim.world.systems.system import Elements, Indices, Output, Quantity, System, Track, discs

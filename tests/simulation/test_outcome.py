@@ -11,8 +11,7 @@ import pytest
 from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.scenario import place_bodies
-from blocksim.simulation import run as running
-from blocksim.simulation import run_ensemble, simulate, simulate_into
+from blocksim.simulation import run as running, run_ensemble, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
 from blocksim.simulation.loop import BY_CODE, RESIDUAL, Outcome, diagnose
 from blocksim.simulation.schemes import build, build_scene

@@ -22,8 +22,7 @@ from blocksim.study.converge import (
     refinements_of,
     with_setting,
 )
-from blocksim.study.executors import Batch, Setting, Task, processes
-from blocksim.study.executors import ensemble as folders
+from blocksim.study.executors import Batch, Setting, Task, ensemble as folders, processes
 from blocksim.study.executors.processes import DEAD
 from tests.soils import column, scene
 from tests.study.conftest import SCENARIOS

@@ -10,8 +10,7 @@ from blocksim.analysis.experiment import load_table
 from blocksim.errors import BlocksimError
 from blocksim.scenario import load_scenario
 from blocksim.simulation.run import simulate
-from blocksim.verification import paper as laws
-from blocksim.verification import paper as tables
+from blocksim.verification import paper as laws, paper as tables
 from blocksim.verification.paper import COLLAPSES, write_paper
 
 SCENARIOS = Path(laws.__file__).parents[2] / "scenarios"

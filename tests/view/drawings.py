@@ -21,8 +21,7 @@ from blocksim.view.run_data import ActingLoad, Support
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, LevelPanel, draw_levels, draw_tornado
 from blocksim.view.sweeps.lines import Series, draw_series
-from tests.bench.peers.work_precision import Curve, draw_work_precision
-from tests.bench.peers.work_precision import Panel as Work
+from tests.bench.peers.work_precision import Curve, Panel as Work, draw_work_precision
 from tests.view.made_up import HOSTILE, pressed, stacked, toppling
 from tests.view.sweeps.made_up import grid, made_up, samples
 

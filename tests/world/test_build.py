@@ -11,6 +11,7 @@ import pytest
 from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import (
     ARRIVED,
+    BODY as BODY_RECORD,
     CACHE_LINE,
     CONTACT,
     GROUP,
@@ -21,7 +22,6 @@ from blocksim.kernels.common.arrays import (
     TEAM_WORDS,
     zeros,
 )
-from blocksim.kernels.common.arrays import BODY as BODY_RECORD
 from blocksim.kernels.explicit.energy import tallied
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world import memory

@@ -4,8 +4,7 @@ from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.integrate import solve_ivp
 
 from blocksim.world.interactions import SMALLEST_RESTITUTION, damping_ratio, restitution_of

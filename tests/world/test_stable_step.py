@@ -4,8 +4,7 @@ from math import cos, inf, pi, sin, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.world.step import ContactStiffness, Kind, frequency_squared, stable_step
 

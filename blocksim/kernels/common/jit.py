@@ -34,8 +34,7 @@ from typing import Any, TypeVar
 import llvmlite
 import numba
 import numpy as np
-from numba import config as numba_config
-from numba import types as numba_types
+from numba import config as numba_config, types as numba_types
 from numba.core import serialize
 from numba.core.caching import FunctionCache
 from numba.core.registry import CPUDispatcher

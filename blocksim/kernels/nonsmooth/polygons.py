@@ -36,8 +36,8 @@ from blocksim.kernels.nonsmooth.faces import (
     has_point,
     in_frame,
     opposite_edge,
+    points_of as points_on,
 )
-from blocksim.kernels.nonsmooth.faces import points_of as points_on
 
 
 class Hulls(NamedTuple):

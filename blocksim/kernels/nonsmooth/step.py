@@ -22,8 +22,7 @@ from blocksim.kernels.common.energy import weights_power
 from blocksim.kernels.common.integrate import fastest_point, kinetic_energy, renew_angles
 from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
 from blocksim.kernels.common.loads import are_loads_steady
-from blocksim.kernels.common.members import Watched, frame_to_watch, of_member, watch
-from blocksim.kernels.common.members import member as world_of
+from blocksim.kernels.common.members import Watched, frame_to_watch, member as world_of, of_member, watch
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.common.supports import has_motion, is_support_at_rest
 from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth

@@ -16,8 +16,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticKnownError
 
-from blocksim.scenario import geometry
-from blocksim.scenario import units as q
+from blocksim.scenario import geometry, units as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole, require_one
 from blocksim.scenario.models.motion import AnyDrive
 

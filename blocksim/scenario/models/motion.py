@@ -38,8 +38,7 @@ from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from blocksim.errors import BlocksimError
-from blocksim.scenario import input_files
-from blocksim.scenario import units as q
+from blocksim.scenario import input_files, units as q
 from blocksim.scenario.models.base import PATH_SCHEMA, OneOf, Table, by_kind, require_one, table_path
 
 PIECES_PER_CYCLE = 200

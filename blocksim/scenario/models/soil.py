@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 import numpy as np
 from pydantic import Field
 
-from blocksim.scenario import geometry, spelling
-from blocksim.scenario import units as q
+from blocksim.scenario import geometry, spelling, units as q
 from blocksim.scenario.models.base import SYSTEMS, Identifier, OneOf, SystemTable
 from blocksim.scenario.models.geometry import Point
 

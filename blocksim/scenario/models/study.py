@@ -19,8 +19,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from blocksim.scenario import spelling
-from blocksim.scenario import units as q
+from blocksim.scenario import spelling, units as q
 from blocksim.scenario.models.base import PATH_SCHEMA, OneOf, Table, Whole, table_path
 
 MAX_VALUES = 100_000

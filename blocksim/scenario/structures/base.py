@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from blocksim.scenario import geometry
-from blocksim.scenario import units as q
+from blocksim.scenario import geometry, units as q
 from blocksim.scenario.models.base import Table, Whole
 from blocksim.scenario.models.geometry import Block
 

@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from blocksim.scenario import geometry
-from blocksim.scenario import units as q
+from blocksim.scenario import geometry, units as q
 from blocksim.scenario.models.base import Whole, require_one
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure, Seed, UnfitError, draws

@@ -13,8 +13,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from blocksim.errors import BlocksimError
 from blocksim.extras import load_module
-from blocksim.scenario import geometry, input_files
-from blocksim.scenario import units as q
+from blocksim.scenario import geometry, input_files, units as q
 from blocksim.scenario.models.base import Identifier, Table, table_path
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure

@@ -11,8 +11,7 @@ from blocksim.kernels.common import arrays, systems
 from blocksim.kernels.explicit import depth, step
 from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
-from blocksim.kernels.explicit.models import KERNEL
-from blocksim.kernels.explicit.models import SURFACE as SURFACE_MODEL
+from blocksim.kernels.explicit.models import KERNEL, SURFACE as SURFACE_MODEL
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.scenario.overlap import penetration
 from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, UNITS, Rows

@@ -16,8 +16,7 @@ from queue import SimpleQueue
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.simulation import MemberFailure, Summary, frames, provenance, run_in_batches
-from blocksim.simulation import folder as files
+from blocksim.simulation import MemberFailure, Summary, folder as files, frames, provenance, run_in_batches
 from blocksim.simulation.result import changed_results, read_summary
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error

@@ -17,8 +17,7 @@ import numpy as np
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, document, input_files, load_stored
-from blocksim.simulation import folder as files
-from blocksim.simulation import observables, result
+from blocksim.simulation import folder as files, observables, result
 from blocksim.simulation.frames import Columns, Frames, read_table, rows_of
 from blocksim.simulation.probes import ProbeSeries
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes

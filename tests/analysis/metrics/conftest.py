@@ -5,8 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from blocksim.analysis.evidence import Evidence, Findings, Members
-from blocksim.analysis.evidence import evidence_of as joined
+from blocksim.analysis.evidence import Evidence, Findings, Members, evidence_of as joined
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Measurement
 from blocksim.analysis.metrics import METRICS
 

@@ -13,15 +13,12 @@ from blocksim.bench.measurement import Measurement, Setting, single
 from blocksim.bench.scenes import Stepping, three_blocks
 from blocksim.scenario import Scenario
 from blocksim.scenario.geometry import edges_of
-from tests.bench.peers import __main__ as script
-from tests.bench.peers import three_blocks as three_blocks_peers
-from tests.bench.peers import wall
+from tests.bench.peers import __main__ as script, three_blocks as three_blocks_peers, wall
 from tests.bench.peers.__main__ import main
 from tests.bench.peers.blocksim_engine import Explicit, Nonsmooth
 from tests.bench.peers.box2d_engine import Box2D
 from tests.bench.peers.engine import Final, Findings, Scene, Series, Solver, Stepper
-from tests.bench.peers.heap import HEAP, Heap
-from tests.bench.peers.heap import SMALL as SMALL_HEAP
+from tests.bench.peers.heap import HEAP, SMALL as SMALL_HEAP, Heap
 from tests.bench.peers.pymunk_engine import Pymunk
 from tests.bench.peers.series import three_blocks_series, wall_racers, wall_series
 from tests.bench.peers.three_blocks import starts

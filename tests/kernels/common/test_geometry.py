@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import BODY, zeros
 from blocksim.kernels.common.shapes import (
@@ -23,8 +22,7 @@ from blocksim.kernels.common.shapes import (
     to_world,
     turn,
 )
-from tests.kernels.rectangles import corners, distances, turned
-from tests.kernels.rectangles import gap as largest_gap
+from tests.kernels.rectangles import corners, distances, gap as largest_gap, turned
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record

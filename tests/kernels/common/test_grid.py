@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import HALF, NORMAL, SHEAR, Records, World
 from blocksim.kernels.common.grid import FARTHEST_CELL, bucket, cell_of, fill_grid

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import AT_REST, MOTION_PIECE, REACHED, Records, World, zeros
 from blocksim.kernels.common.supports import acceleration, displacement, has_motion, piece_at, tally_support

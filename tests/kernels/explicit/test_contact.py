@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR
 from blocksim.kernels.explicit.contact import (

@@ -4,8 +4,7 @@ from math import exp, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.friction import friction_coefficient

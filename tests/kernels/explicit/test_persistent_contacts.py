@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 
 from blocksim.kernels.common.arrays import NORMAL, OPERATOR, SHEAR, zeros
 from blocksim.kernels.explicit.contact import fill_operator

@@ -13,8 +13,7 @@ world/bodies.py. Where an ended contact was is derived again for corners and kep
 
 from blocksim.kernels.common.arrays import Integers, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.models import outlines, smoothed, surface
-from blocksim.kernels.explicit.models import particles as discs
+from blocksim.kernels.explicit.models import outlines, particles as discs, smoothed, surface
 
 SURFACE, PARTICLES, KERNEL = range(3)
 MODEL_CODES = {"surface": SURFACE, "particles": PARTICLES, "kernel": KERNEL}

@@ -3,8 +3,7 @@
 from typing import Any, get_args
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from blocksim.kernels.explicit.laws import LAW_CODES, elastic_force, stored_energy, tangent_stiffness
 from blocksim.scenario.models.contact import Contact

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 
 from blocksim.kernels.common.arrays import CONTACT, CONTACTS, HALF, PAIR, POINT, SLOTS, zeros
 from blocksim.kernels.common.shapes import ground_gap, separation
