@@ -244,7 +244,11 @@ _ALL = (
 )
 OBSERVABLES: dict[str, Observable] = {one.name: one for one in _ALL}
 """All observables by name, in the order in which they are written."""
-TABLE_COLUMNS = [one.name for one in _ALL if one.in_rows and one.in_tables]  # of sweep.csv
+
+
+def table_columns() -> list[str]:
+    """Return the names of those that are columns of sweep.csv, those added since this module was read too."""
+    return [one.name for one in OBSERVABLES.values() if one.in_rows and one.in_tables]
 
 
 def observe(ends: Ends, names: Sequence[str]) -> list[dict[str, Value]]:

@@ -20,7 +20,7 @@ from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of, motion
 from blocksim.silence import silent
-from blocksim.simulation.observables import PEAK, TABLE_COLUMNS, Response
+from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import build
 from blocksim.study import limit_answer, limit_margin, limit_plan, sweep_folder
@@ -274,7 +274,7 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
             raise OutputError(message)
         if row["status"] == FINISHED:
             is_seen = falls and row["outcome"] != Response.STANDS.value  # of one that was released to be seen to fall
-            update = {name: row.get(name) for name in (*TABLE_COLUMNS, PEAK)} if is_seen else {}
+            update = {name: row.get(name) for name in (*table_columns(), PEAK)} if is_seen else {}
             sides[side.value] = side.model_copy(update={**update, "case": name})
     brackets = [
         one.model_copy(update={name: sides.get(side.value, side) for name, side in one.sides.items()})

@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_valid
 
 from blocksim.errors import ExitCode, InvalidInputError, Problem
 from blocksim.scenario.input_files import raise_problems, read_table
-from blocksim.simulation.observables import PEAK, TABLE_COLUMNS, Response
+from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.study.answer import Answer, Overview, with_unit
 from blocksim.study.criterion import Verdict
 from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
@@ -51,7 +51,7 @@ class Side(BaseModel, frozen=True, extra="allow"):
     @classmethod
     def of(cls, value: Number, verdict: Verdict, row: Row) -> Self:
         """Take what a row says."""
-        names = (*TABLE_COLUMNS, PEAK, "status", "reason")
+        names = (*table_columns(), PEAK, "status", "reason")
         cells: dict[str, Any] = {name: row.get(name) for name in names}
         return cls(value=value, verdict=verdict, **cells, case=None)
 
@@ -209,7 +209,7 @@ class LimitAnswer(Answer, frozen=True):
         """Make the answer of a search; `stiffer` has rows by stiffness scale, `finer` by time step (s)."""
         scenario = plan.scenario
         scale = scenario.contact.stiffness_scale if scenario.time.has_springs else None
-        columns = [*TABLE_COLUMNS, PEAK, "status", "reason", "seconds"]
+        columns = [*table_columns(), PEAK, "status", "reason", "seconds"]
         searches = [
             (scale, None, rows),
             *((stiff, None, more) for stiff, more in stiffer.items()),

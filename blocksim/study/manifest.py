@@ -260,7 +260,7 @@ def table_rows(
     """Yield the heads and all rows so far, one after the other: none is kept."""
     verdict = [] if ranges is None else ["inside"]
     blocks = dict.fromkeys(block for names in sorted(done.blocks, key=done.blocks.__getitem__) for block in names)
-    ends = observables.TABLE_COLUMNS + [f"{block}.{name}" for block in blocks for name in rows.KEPT]
+    ends = observables.table_columns() + [f"{block}.{name}" for block in blocks for name in rows.KEPT]
     yield ["case", *map(str, cases.heads), *OUTCOME, *verdict, *ends]
     for _, settings, entry in done.entries(cases, shard):
         row = entry.row

@@ -12,7 +12,7 @@ import h5py
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.simulation.observables import TABLE_COLUMNS
+from blocksim.simulation.observables import table_columns
 from blocksim.study.sweep import sweep
 from tests.cli.conftest import SOFT, Command
 from tests.view.report.folders import SCENARIOS, write_experiment, write_run, write_sweep
@@ -113,7 +113,7 @@ def test_varied_inputs_of_a_real_sweep_are_its_keys_and_no_result(blocksim: Comm
     assert len(data_of(REPORT)["pictures"][0]["x"]) == 4
     assert "map of block_block.kinetic over ground.tilt" in REPORT.read_text(encoding="utf-8")
     assert by_role["varied"] == list(table.keys) == ["ground.tilt [deg]", KINETIC]
-    assert by_role["outcome"] == ["status", "reason", "seconds", "inside", *TABLE_COLUMNS]
+    assert by_role["outcome"] == ["status", "reason", "seconds", "inside", *table_columns()]
     assert "<dt>varied</dt><dd><bdi>ground.tilt [deg], friction.block_block.kinetic</bdi></dd>" in REPORT.read_text()
 
 

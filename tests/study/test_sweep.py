@@ -19,7 +19,7 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
 from blocksim.simulation.folder import is_resolved
-from blocksim.simulation.observables import TABLE_COLUMNS
+from blocksim.simulation.observables import table_columns
 from blocksim.study.executors.ensemble import run_case
 from blocksim.study.fragility import fragility
 from blocksim.study.fragility_plan import read_fragility
@@ -78,7 +78,7 @@ def test_rows_distinguish_what_rocked_back_from_what_stands(tmp_path: Path) -> N
     assert table["first_mover"][1] == "1"
     assert table["first_moved_s"][1] == pytest.approx(0.01, abs=1e-5)  # the first frame
     kept = run_case(Document.from_mapping(ROCKING).with_values({"bodies.0.spin": 6.0}).build(), tmp_path / "case")
-    assert [kept[name] for name in TABLE_COLUMNS] == [table[name][1] for name in TABLE_COLUMNS]
+    assert [kept[name] for name in table_columns()] == [table[name][1] for name in table_columns()]
 
 
 def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_folder_holds_plan_table_and_manifest_and_the_plan_repeats_the_sweep(qui
         "reason",
         "seconds",
         "inside",
-        *TABLE_COLUMNS,
+        *table_columns(),
         *ends,
     ]
     pd.testing.assert_frame_equal(read_sweep(tmp_path).table, result.table, check_exact=True)
