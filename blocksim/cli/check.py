@@ -10,13 +10,12 @@ from typing import Annotated
 from blocksim.cli import command_line, output, prepare
 from blocksim.options import Option
 from blocksim.scenario import PlacedBody, Scenario, check, place_bodies, scenario_to_toml, units
-from blocksim.scenario.events import in_order, probe_names
+from blocksim.scenario.events import describe_event, in_order, probe_names
 from blocksim.scenario.models.loads import AnyLoad, Constant, Force, Gravity, Horizontal, Moment, Pressure, Ramp
 from blocksim.scenario.models.stepping import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
 from blocksim.scenario.motion import drives_of, greatest_rate, settles
 from blocksim.scenario.resolved import DEFAULT, MATERIALS
 from blocksim.simulation.probes import bytes_of_series
-from blocksim.simulation.result import describe_event
 from blocksim.study.rows import check_experiment
 from blocksim.world import free_memory, memory
 from blocksim.world.describe import Description, PairDescription, StepLimits, describe

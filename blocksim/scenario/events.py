@@ -20,6 +20,9 @@ MAX_EVENTS = 1000
 GROUPS = ("remove", "fix", "free")
 FREE, FIXED, DRIVEN, GONE = "free", "fixed", "driven", "removed"
 RESULTS = {"remove": GONE, "fix": FIXED, "free": FREE}
+LISTED = 6
+"""Names of bodies that a line about an event has; of more it has the number."""
+RATES = {"vx": "m/s", "vy": "m/s", "spin": "rad/s"}
 MANY = 50
 """Names of bodies beyond which a message does not list them all."""
 
@@ -32,6 +35,22 @@ def wall_names(scenario: Scenario) -> list[str]:
 def in_order(events: Sequence[Event]) -> list[int]:
     """Return the numbers of events: those with a time by it, then those that wait for rest; else as in the file."""
     return sorted(range(len(events)), key=lambda number: (events[number].at is None, events[number].at or 0.0))
+
+
+def describe_event(event: Event) -> str:
+    """Return what an event does."""
+    parts = [
+        f"{', '.join(names) if len(names) <= LISTED else f'{len(names)} bodies'} {done}"
+        for names, done in ((event.remove, "removed"), (event.fix, "fixed"), (event.free, "freed"))
+        if names
+    ]
+    if event.unload:
+        parts.append(f"{'load' if len(event.unload) == 1 else 'loads'} {', '.join(event.unload)} ended")
+    if event.velocity is not None:
+        rates = ((name, getattr(event.velocity, name), unit) for name, unit in RATES.items())
+        values = ", ".join(f"{name} {value:g} {unit}" for name, value, unit in rates if value is not None)
+        parts.append(f"{event.velocity.body} gets {values}")
+    return "; ".join(parts)
 
 
 def impossible_events(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:

@@ -81,7 +81,7 @@ class Timeline:
         clock.checks_at_rest = 0
         scene.world.ledger[0].events += energy
         steps = int(clock.steps)
-        what, seconds = result.describe_event(event), steps * self.step
+        what, seconds = events.describe_event(event), steps * self.step
         record = result.EventRecord(event=number, step=steps, time_s=seconds, what=what, energy_J=energy)
         self.records = (*self.records, record)
         return scene, status

@@ -12,7 +12,6 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, input_files, load_stored, place_bodies
-from blocksim.scenario.models.stepping import Event
 from blocksim.simulation import atomic, folder as files, ledger, observables
 from blocksim.simulation.folder import PROBE, keep_scenario, probe_tables, read_tables
 from blocksim.simulation.frames import Columns, Frames, as_frame, csv_text, data_set, read_table, tidy_table
@@ -38,11 +37,6 @@ class RestState(BaseModel, frozen=True):
     at_rest: bool = True  # False where it was released all the same (`start.release`)
 
 
-LISTED = 6
-"""Names of bodies that a line has; of more it has the number."""
-RATES = {"vx": "m/s", "vy": "m/s", "spin": "rad/s"}
-
-
 class EventRecord(BaseModel, frozen=True):
     """One event that has happened."""
 
@@ -51,22 +45,6 @@ class EventRecord(BaseModel, frozen=True):
     time_s: float  # of that step
     what: str  # in words
     energy_J: float  # noqa: N815 - taken from what the scene holds; negative where the event has brought some in
-
-
-def describe_event(event: Event) -> str:
-    """Return what an event does."""
-    parts = [
-        f"{', '.join(names) if len(names) <= LISTED else f'{len(names)} bodies'} {done}"
-        for names, done in ((event.remove, "removed"), (event.fix, "fixed"), (event.free, "freed"))
-        if names
-    ]
-    if event.unload:
-        parts.append(f"{'load' if len(event.unload) == 1 else 'loads'} {', '.join(event.unload)} ended")
-    if event.velocity is not None:
-        rates = ((name, getattr(event.velocity, name), unit) for name, unit in RATES.items())
-        values = ", ".join(f"{name} {value:g} {unit}" for name, value, unit in rates if value is not None)
-        parts.append(f"{event.velocity.body} gets {values}")
-    return "; ".join(parts)
 
 
 MOST_BYTES = input_files.MEGABYTE

@@ -15,6 +15,7 @@ from blocksim.errors import OutputError
 from blocksim.kernels.common.arrays import World
 from blocksim.kernels.common.compiler import compiling
 from blocksim.scenario import PlacedBody, Scenario, motion, placement, scenario_hash
+from blocksim.scenario.events import describe_event
 from blocksim.scenario.models.motion import Pulse
 from blocksim.silence import silent
 from blocksim.simulation import (
@@ -32,7 +33,7 @@ from blocksim.simulation.folder import CHECKPOINTS, folder_lock, keep_scenario, 
 from blocksim.simulation.frames import final_columns
 from blocksim.simulation.probes import MovingSupport, bytes_of_series, probes_of
 from blocksim.simulation.recorder import Recorder
-from blocksim.simulation.result import RestState, Result, Summary, describe_event, keep_result
+from blocksim.simulation.result import RestState, Result, Summary, keep_result
 from blocksim.simulation.schemes import AnyScene, build, ledger_names, measure_row, scheme_of
 from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.stores.hdf5 import FrameFile
