@@ -75,7 +75,7 @@ class ExperimentTable:
     source: str
     notes: tuple[str, ...] = ()
     missing: tuple[Measurement, ...] = ()
-    places: Mapping[str, input_files.Cell] = field(default_factory=dict, repr=False)
+    places: Mapping[str, input_files.TableCell] = field(default_factory=dict, repr=False)
 
     @property
     def data(self) -> "pd.DataFrame":
@@ -194,13 +194,13 @@ def load_table(path: Path | str) -> ExperimentTable:
     return ExperimentTable(measured, str(path), table.notes, missing, places)
 
 
-def _refuse_empty(table: input_files.Table) -> None:
+def _refuse_empty(table: input_files.CsvTable) -> None:
     """Record a problem if there is no row, and no other problem that says why."""
     if not table.rows and not table.problems:
         table.problems.append(table.header.problem("the table has a header and no rows"))
 
 
-def _measurement(row: dict[str, input_files.Cell], problems: list[Problem]) -> Measurement | None:
+def _measurement(row: dict[str, input_files.TableCell], problems: list[Problem]) -> Measurement | None:
     """Check one row; None after recording its problems. The value is NaN for an empty cell."""
     before = len(problems)
     block, number, unit, cell = (row[name] for name in ("block", "replicate", "unit", "value"))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.scenario.models.stepping import IMPULSES, Nonsmooth
+from blocksim.scenario.models.timeline import IMPULSES, Nonsmooth
 from blocksim.simulation.loop import BY_CODE, Outcome
 from blocksim.simulation.schemes import AnyScene, build_scene
 from blocksim.simulation.team import ALONE, Team

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeat
 from blocksim.bench.scenes import FRICTION, RESTITUTION, Rerun, Stepping, Table, three_blocks
 from blocksim.scenario import Scenario
-from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
+from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
 from blocksim.scenario.structures.base import draws
 from blocksim.simulation.ensemble import Ensemble, run_ensemble
 from blocksim.simulation.loop import last_step_of

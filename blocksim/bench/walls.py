@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blocksim.bench import measurement, scenes
-from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
+from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.simulation.team import Team, useful_threads

@@ -11,10 +11,10 @@ from blocksim.cli import command_line, output, prepare
 from blocksim.options import Option
 from blocksim.scenario import PlacedBody, Scenario, check, place_bodies, scenario_to_toml, units
 from blocksim.scenario.events import describe_event, in_order, probe_names
-from blocksim.scenario.models.loads import AnyLoad, Constant, Force, Gravity, Horizontal, Moment, Pressure, Ramp
-from blocksim.scenario.models.stepping import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
+from blocksim.scenario.models.loads import AnyLoad, Constant, Force, Gravity, Horizontal, Moment, Pressure, RampHistory
+from blocksim.scenario.models.timeline import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
 from blocksim.scenario.motion import drives_of, greatest_rate, settles
-from blocksim.scenario.resolved import DEFAULT, MATERIALS
+from blocksim.scenario.resolution import DEFAULT, MATERIALS
 from blocksim.simulation.probes import bytes_of_series
 from blocksim.study.rows import check_experiment
 from blocksim.world import free_memory, memory
@@ -187,7 +187,7 @@ def _load(load: AnyLoad) -> str:
     match load.history:
         case Constant():
             return text
-        case Ramp() as ramp:
+        case RampHistory() as ramp:
             return f"{text}; factor {ramp.first:g} to {ramp.last:g} from {ramp.start:g} to {ramp.end:g} s"
         case other:
             return f"{text}; {other.kind} of {len(other.times)} factors until {other.times[-1]:g} s"

@@ -11,7 +11,7 @@ import typer
 from blocksim.cli import command_line, prepare, progress
 from blocksim.options import Option
 from blocksim.scenario.check import implausible_values
-from blocksim.scenario.models.stepping import SPRINGS
+from blocksim.scenario.models.timeline import SPRINGS
 from blocksim.simulation.compilation import kernels_of
 from blocksim.study import answer, criterion, limit, limit_answer, limit_margin, limit_plan, rows
 

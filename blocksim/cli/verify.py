@@ -7,7 +7,7 @@ from typing import Annotated
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode
 from blocksim.options import Option
-from blocksim.scenario.models.stepping import IMPULSES, SPRINGS
+from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.verification.case import Outcome, Setting, run_case
 from blocksim.verification.cases import choose_cases, excluded_cases

@@ -13,7 +13,7 @@ from blocksim.scenario.models.contact import GROUND
 from blocksim.scenario.models.scenario import Scenario, json_schema
 from blocksim.scenario.models.study import Sweep
 from blocksim.scenario.placement import PlacedBody, PlacedSegment, place_bodies, place_segments
-from blocksim.scenario.resolved import resolve_pair, scenario_hash, scenario_to_toml
+from blocksim.scenario.resolution import resolve_pair, scenario_hash, scenario_to_toml
 
 __all__ = [
     "GROUND",

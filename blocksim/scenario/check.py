@@ -10,7 +10,7 @@ from typing import get_args
 from pydantic import ValidationError
 
 from blocksim.scenario import geometry, mistakes, overrides, start, units
-from blocksim.scenario.models import base, contact, stepping, study
+from blocksim.scenario.models import base, contact, study, timeline
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.structures import polygons
 from blocksim.scenario.structures.base import PolygonStructure
@@ -84,7 +84,7 @@ def unfit_choices(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     scheme, model, why = scenario.time.scheme, scenario.contact.model, ""  # why no block can have an outline
     if model not in scenario.time.models_of_outlines:
         reason = ": its boundary particles lie on rectangles only" if scenario.time.has_springs else ""
-        known = ((name, one) for name, time in sorted(stepping.SCHEMES.items()) for one in time.models_of_outlines)
+        known = ((name, one) for name, time in sorted(timeline.SCHEMES.items()) for one in time.models_of_outlines)
         modelled = " or ".join(f"{units.toml(name)} and {units.toml(one)}" for name, one in known)
         where = f"with time.scheme = {units.toml(scheme)} and contact.model = {units.toml(model)}"
         why = f"outlines are not modelled {where}{reason}; use {modelled}"
@@ -97,7 +97,7 @@ def unfit_choices(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     for number, structure in enumerate(scenario.structures):
         if why and isinstance(structure, PolygonStructure):
             yield mistakes.Mistake(("structures", number, "kind"), why, relation=True)
-    springs = next(name for name, one in stepping.SCHEMES.items() if one.has_springs)
+    springs = next(name for name, one in timeline.SCHEMES.items() if one.has_springs)
     for key in () if scenario.time.has_springs else SPRING_CHOICES:
         chosen = getattr(scenario.contact, key)
         if chosen != contact.Contact.model_fields[key].default:

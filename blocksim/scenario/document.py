@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple, Self, cast
 
 from blocksim.errors import InputMissingError, Problem, ScenarioError
-from blocksim.scenario import check, input_files, mistakes, overrides as keys, resolved, units
+from blocksim.scenario import check, input_files, mistakes, overrides as keys, resolution, units
 from blocksim.scenario.models.scenario import Scenario
 
 MAX_SHOWN = 110
@@ -423,7 +423,7 @@ def document_of(source: Source) -> Document:
     if isinstance(source, Document):
         return source
     if isinstance(source, Scenario):
-        return replace(Document.parse(resolved.scenario_to_toml(source), source.name), allow_outside=True)
+        return replace(Document.parse(resolution.scenario_to_toml(source), source.name), allow_outside=True)
     return Document.from_mapping(source) if isinstance(source, Mapping) else Document.read(source)
 
 

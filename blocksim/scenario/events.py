@@ -10,7 +10,7 @@ from blocksim.scenario.geometry import Corner, dot, edges_of
 from blocksim.scenario.mistakes import Mistake, repetitions, unknown
 from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.stepping import Event, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.models.timeline import Event, ForceProbe, JointProbe, PointProbe
 from blocksim.scenario.overrides import KeyPath
 from blocksim.scenario.placement import TOLERANCE, PlacedBody
 from blocksim.scenario.spelling import did_you_mean_or_list

@@ -189,7 +189,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Cell:
+class TableCell:
     """One cell: its text without quotes and surrounding blanks, and its place."""
 
     column: str
@@ -213,18 +213,18 @@ class Cell:
 
 
 @dataclass
-class Table:
+class CsvTable:
     """The rows of one file, its comment lines, and the mistakes found so far."""
 
     where: str
     notes: tuple[str, ...]
     header: Line
-    heads: tuple[Cell, ...]  # of the header, whose own column is empty
-    rows: list[dict[str, Cell]] = field(default_factory=list)
+    heads: tuple[TableCell, ...]  # of the header, whose own column is empty
+    rows: list[dict[str, TableCell]] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
 
 
-def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FILE) -> Table:
+def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FILE) -> CsvTable:
     """Read a table that has exactly these columns, in any order; or any, if none are given, each with a name.
 
     `limit` is the largest size in bytes. Rows of the wrong shape are left out and recorded in `problems`, and so are
@@ -241,7 +241,7 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
         raise_problems([line.problem(f"columns are separated by semicolons; {DIALECT}")])
     if places is None:
         raise_problems([line.problem(_shape_complaint(line, places, 0))])
-    heads = tuple(Cell("", *place) for place in places)
+    heads = tuple(TableCell("", *place) for place in places)
     names = [head.text for head in heads]
     problems = []
     for index, head in enumerate(heads):
@@ -261,14 +261,14 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
     if problems and sorted(meant) != sorted(columns):
         raise_problems(problems)
     notes = tuple(line.text.strip()[1:].strip() for line in lines if line.text.lstrip().startswith("#"))
-    table = Table(str(path), notes, line, heads, problems=problems)
+    table = CsvTable(str(path), notes, line, heads, problems=problems)
     for row in content[1:]:
         cells = _cells(row)
         complaint = _shape_complaint(row, cells, len(names))
         if complaint or cells is None:
             table.problems.append(row.problem(complaint))
         else:
-            table.rows.append({name: Cell(name, *place) for name, place in zip(meant, cells, strict=True)})
+            table.rows.append({name: TableCell(name, *place) for name, place in zip(meant, cells, strict=True)})
     return table
 
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from blocksim.scenario.models import contact, geometry, loads, motion, scenario, stepping, study
+from blocksim.scenario.models import contact, geometry, loads, motion, scenario, study, timeline
 from blocksim.scenario.models.base import HELD, SYSTEMS
 from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS
@@ -19,7 +19,7 @@ from blocksim.scenario.structures.base import Structure
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
 HEAD = "| key | unit | default | meaning |\n| --- | --- | --- | --- |"
-SHARED = (Structure, loads.Load, stepping.Time, stepping.Probe)
+SHARED = (Structure, loads.Load, timeline.Time, timeline.Probe)
 """What kinds of a table have in common, listed once."""
 
 
@@ -36,22 +36,22 @@ def key_table() -> str:
         ("ground", geometry.Ground),
         ("walls", geometry.Wall),
         *((f'motion, kind = "{kind}"', model) for kind, model in motion.MOTIONS.items()),
-        ("events", stepping.Event),
-        ("events.velocity", stepping.NewVelocity),
+        ("events", timeline.Event),
+        ("events.velocity", timeline.NewVelocity),
         ("loads, every kind", loads.Load),
         *((f'loads, kind = "{kind}"', model) for kind, model in loads.LOADS.items()),
         *((f'loads.history, kind = "{kind}"', model) for kind, model in loads.HISTORIES.items()),
-        ("start", stepping.Start),
+        ("start", timeline.Start),
         ("friction", contact.Friction),
         ("friction.PAIR", contact.PairFriction),
         ("pairs.A.B", contact.Pair),
         ("contact", contact.Contact),
         ("contact.restitution", contact.Restitution),
-        ("time", stepping.Time),
-        *((f'time, scheme = "{scheme}"', model) for scheme, model in stepping.SCHEMES.items()),
-        ("output", stepping.Output),
-        ("probes, every kind", stepping.Probe),
-        *((f'probes, kind = "{kind}"', model) for kind, model in stepping.PROBES.items()),
+        ("time", timeline.Time),
+        *((f'time, scheme = "{scheme}"', model) for scheme, model in timeline.SCHEMES.items()),
+        ("output", timeline.Output),
+        ("probes, every kind", timeline.Probe),
+        *((f'probes, kind = "{kind}"', model) for kind, model in timeline.PROBES.items()),
         ("experiment", study.Experiment),
         ("sweep", study.Sweep),
         *SYSTEMS.items(),

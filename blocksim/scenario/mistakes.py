@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from blocksim.scenario.models import base, loads, motion, scenario, stepping
+from blocksim.scenario.models import base, loads, motion, scenario, timeline
 from blocksim.scenario.overrides import MISSING, NAMED, KeyPath, field_at, fields_of, follow, marks_of, table_at
 from blocksim.scenario.spelling import did_you_mean, did_you_mean_or_list, meant_word, nearest
 from blocksim.scenario.structures import KINDS
@@ -19,7 +19,7 @@ MAX_MISTAKES = 200
 KINDS_IN: dict[str | int, Iterable[str]] = {
     "structures": KINDS,
     "motion": motion.MOTIONS,
-    "probes": stepping.PROBES,
+    "probes": timeline.PROBES,
     "bodies": motion.DRIVES,
     "loads": loads.LOADS,
     "history": loads.HISTORIES,
@@ -105,7 +105,7 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
             path = (*path[:2], "history", *path[5:])
         case ("loads", *_):
             path = (*path[:2], *path[3:])
-        case ("time", scheme, *_) if scheme not in stepping.SCHEMES:
+        case ("time", scheme, *_) if scheme not in timeline.SCHEMES:
             pass  # a scheme that is none of the union
         case ("motion" | "time", *_) | ("sweep", "vary", *_):
             path = (path[0], *path[2:])
@@ -130,14 +130,14 @@ def _missing(path: KeyPath, data: object) -> Mistake:
 
 
 def _unknown_key(path: KeyPath, data: object) -> Mistake:
-    schemes = [word for word, table in stepping.SCHEMES.items() if path[0] == "time" and path[-1] in fields_of(table)]
+    schemes = [word for word, table in timeline.SCHEMES.items() if path[0] == "time" and path[-1] in fields_of(table)]
     if schemes:
-        present = stepping.scheme_of(follow(data, path[:-1]))
+        present = timeline.scheme_of(follow(data, path[:-1]))
         return Mistake(
             path, f"this key belongs to scheme {toml(schemes[0])}; the scheme here is {toml(present)}", at="key"
         )
     table = (
-        stepping.SCHEMES[stepping.scheme_of(follow(data, path[:-1]))]
+        timeline.SCHEMES[timeline.scheme_of(follow(data, path[:-1]))]
         if path[0] == "time"
         else table_at(path[:-1], data)
     )

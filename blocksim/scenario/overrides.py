@@ -10,7 +10,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from blocksim.scenario.models import base, contact, stepping
+from blocksim.scenario.models import base, contact, timeline
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.units import Kind, Quantity, toml
@@ -161,7 +161,7 @@ def fields_of(table: type[base.Table]) -> dict[str, FieldInfo]:
 def _table(annotation: object, node: object) -> type[base.Table] | None:
     tables = [option for option in options(annotation) if isinstance(option, type) and issubclass(option, base.Table)]
     if len(tables) > 1:
-        tables = [*stepping.SCHEMES.values()] if issubclass(tables[0], stepping.Time) else tables
+        tables = [*timeline.SCHEMES.values()] if issubclass(tables[0], timeline.Time) else tables
         for table in tables:
             tag = next(tag for tag in TAGS if tag in table.model_fields)  # the key that tells, here or by default
             word = node.get(tag, MISSING) if isinstance(node, Mapping) else MISSING

@@ -7,7 +7,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from blocksim.scenario import events, geometry, overlap, placement, resolved
+from blocksim.scenario import events, geometry, overlap, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
@@ -264,7 +264,7 @@ def _unfit_tables(scenario: Scenario) -> Iterator[Mistake]:
         if pieces > MAX_PIECES:
             message = f"{pieces / PIECES_PER_CYCLE:.6g} cycles are too many; at most {MAX_PIECES // PIECES_PER_CYCLE}"
             yield Mistake((*path, "motion", "frequency"), f"{message} are allowed")
-    if len(tables := {one.digest for one in resolved.tables_of_bodies(scenario).values()}) > MOST_BODY_TABLES:
+    if len(tables := {one.digest for one in resolution.tables_of_bodies(scenario).values()}) > MOST_BODY_TABLES:
         message = f"{len(tables)} different tables of motion of bodies are too many; at most {MOST_BODY_TABLES}"
         yield Mistake(("bodies",), f"{message} are allowed")
     if scenario.contact.law != "linear":

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
-from blocksim.scenario import Scenario, load_stored, resolved, units
+from blocksim.scenario import Scenario, load_stored, resolution, units
 from blocksim.scenario.units import TIME
 from blocksim.simulation import atomic, folder as files, provenance, result
 from blocksim.simulation.folder import CHECKPOINTS
@@ -53,7 +53,7 @@ class Position(BaseModel, frozen=True):
 class Origin(BaseModel, frozen=True):
     """All that decides the bits of a run, taken apart so that differences can be named."""
 
-    scenario: dict[str, Any]  # as blocksim.scenario.resolved.deciding_values
+    scenario: dict[str, Any]  # as blocksim.scenario.resolution.deciding_values
     versions: dict[str, str]  # of blocksim and of what compiles it
     rooms: dict[str, str]  # hash of every folder of code that decides bits
     machine: str  # processor and system: the last digit of a sine may depend on them
@@ -86,7 +86,7 @@ class StoredCheckpoint(NamedTuple):
 def origin_of(scenario: Scenario) -> Origin:
     """Return what a run of a scenario comes from, here and now."""
     return Origin(
-        scenario=resolved.deciding_values(scenario),
+        scenario=resolution.deciding_values(scenario),
         versions={"blocksim": provenance.code_version(), **{name: metadata.version(name) for name in COMPILERS}},
         rooms=provenance.code_hashes(),
         machine=provenance.machine(),
@@ -293,7 +293,7 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
             begun = load_stored(path)
         except BlocksimError:  # killed before it was written, or damaged: there is nothing here to lose
             begun = scenario
-        _refuse_other(path, "scenario", resolved.deciding_values(begun), resolved.deciding_values(scenario))
+        _refuse_other(path, "scenario", resolution.deciding_values(begun), resolution.deciding_values(scenario))
         return Resumption(remarks=(f"{folder}: no checkpoint saved; {STARTS_ANEW}",))
     remarks: list[str] = []
     whole: list[StoredCheckpoint] = []

@@ -20,7 +20,7 @@ from blocksim.simulation.frames import COLUMNS, Columns, Frames, as_frame, final
 from blocksim.simulation.ledger import EnergyLedger, adds_up, energy_ledger, ledger_of, next_energy_check, start_energy
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measure_row, measured_systems, scheme_of
-from blocksim.world.build import Refusal, Stack, member, stack_of_one
+from blocksim.world.build import Refusal, SceneStack, member, stack_of_one
 from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario
 class Ensemble:
     """Scenes of one scheme and shape, stacked, to be advanced together once."""
 
-    def __init__(self, scenarios: Sequence[Scenario], stack: Stack, *, peaks: bool = False) -> None:
+    def __init__(self, scenarios: Sequence[Scenario], stack: SceneStack, *, peaks: bool = False) -> None:
         """Take a stack of scenes that have not moved yet, and the scenarios that its numbers count.
 
         `peaks` says whether the largest rotations on the way are followed.

@@ -12,7 +12,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import AT_REST, DRIVEN, REACHED, REMOVED, SUPPORT, Record, World, zeros
 from blocksim.scenario import PlacedBody, Scenario, events
-from blocksim.scenario.models.stepping import Event
+from blocksim.scenario.models.timeline import Event
 from blocksim.simulation import ledger, result
 from blocksim.simulation.schemes import AnyScene, scheme_of
 from blocksim.simulation.team import Team

@@ -14,7 +14,7 @@ from typing import Self
 from pydantic import BaseModel
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
-from blocksim.scenario import Scenario, events, input_files, resolved, scenario_to_toml
+from blocksim.scenario import Scenario, events, input_files, resolution, scenario_to_toml
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, TABLED
 from blocksim.simulation.atomic import sha256_of, write_bytes, write_text
 from blocksim.simulation.provenance import run_hash
@@ -36,7 +36,7 @@ HEAD_BYTES = 4096
 LONGEST_HEADER = 100_000  # bytes
 MOST_BYTES = 10 * input_files.MEGABYTE  # of a scenario or a summary
 TABLE_BYTES = input_files.MEGABYTE  # of a table of an experiment, which is not read if larger
-RESOLVED = resolved.MARK.encode()
+RESOLVED = resolution.MARK.encode()
 CHANGED = "changed since blocksim wrote it; move it away, or write elsewhere with --out DIR"
 Kind = Callable[[bytes], bool]  # whether the first HEAD_BYTES of a file are of a kind
 
@@ -184,7 +184,7 @@ def read_tables(scenario: Scenario) -> dict[str, bytes]:
     tables = {}
     if scenario.experiment is not None:
         tables[EXPERIMENT] = input_files.read_limited(scenario.experiment.table, TABLE_BYTES, links=True)
-    contents = {table.digest: table.content for table in resolved.tables_of_bodies(scenario).values()}
+    contents = {table.digest: table.content for table in resolution.tables_of_bodies(scenario).values()}
     tables |= dict(zip(BODY_MOTIONS, contents.values(), strict=False))
     if isinstance(scenario.motion, TABLED):
         tables[MOTION] = scenario.motion.table.content
@@ -204,7 +204,7 @@ def keep_scenario(
     if os.path.lexists(folder / plan) and not is_resolved(folder / plan):
         raise OutputExistsError(f"{folder / plan}: {CHANGED}")
     names = {name: name if name in tables else None for name in (EXPERIMENT, MOTION)}
-    digests = dict.fromkeys(table.digest for table in resolved.tables_of_bodies(scenario).values())
+    digests = dict.fromkeys(table.digest for table in resolution.tables_of_bodies(scenario).values())
     of_bodies = dict(zip(digests, BODY_MOTIONS, strict=False))
     is_varied = plan != SCENARIO  # the base of others
     text = head + scenario_to_toml(scenario, names[EXPERIMENT], names[MOTION], of_bodies, is_varied=is_varied)

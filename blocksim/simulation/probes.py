@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody, Scenario, events, motion, place_segments
-from blocksim.scenario.models.stepping import STEP, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.models.timeline import STEP, ForceProbe, JointProbe, PointProbe
 from blocksim.simulation.frames import CONTACT_ROW, forces_on_a
 from blocksim.simulation.ledger import compiled
 from blocksim.world.systems import systems_of

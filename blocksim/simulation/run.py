@@ -38,7 +38,7 @@ from blocksim.simulation.schemes import AnyScene, build, ledger_names, measure_r
 from blocksim.simulation.stopping import WallTime, stop_requests
 from blocksim.simulation.stores.hdf5 import FrameFile
 from blocksim.simulation.team import ALONE, Team, team_for
-from blocksim.world.build import Built, arrays_of
+from blocksim.world.build import InitialScene, arrays_of
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import is_shorter_than_step, output_count, recorded_contacts, run_bytes
 from blocksim.world.systems import others_of, warnings_of
@@ -239,7 +239,7 @@ def _attended(
         yield team, loop.RunControl(on_progress, lambda: requests.reason() or limit.reason(), timeline=timeline)
 
 
-def _recorder(scenario: Scenario, built: Built) -> Recorder:
+def _recorder(scenario: Scenario, built: InitialScene) -> Recorder:
     step, output = float(built.scene.world.controls[0].step), scenario.output
     probes, others = probes_of(scenario, built.placed, step, ledger_names(built.scene)), others_of(scenario)
     support = MovingSupport(scenario)

@@ -34,7 +34,7 @@ from pydantic import BaseModel
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies, placement
-from blocksim.scenario.models import motion, stepping
+from blocksim.scenario.models import motion, timeline
 from blocksim.scenario.motion import settles
 from blocksim.simulation.observables import FURTHER, MOVED_SHARE, Response
 from blocksim.study.criterion import Verdict
@@ -54,7 +54,7 @@ COEFFICIENTS = ("friction.", ".friction")
 HORIZONTAL = "loads."
 STIFFNESS = "contact.stiffness_scale"
 OF_STIFFNESS = ("stiffness", "young_modulus", "poisson_ratio", "contact_radius", "time.")
-NO_SPRINGS = f"rigid contacts have no stiffness: --stiffer is for springs (time.scheme {stepping.SPRINGS})"
+NO_SPRINGS = f"rigid contacts have no stiffness: --stiffer is for springs (time.scheme {timeline.SPRINGS})"
 
 
 class Level(BaseModel, frozen=True):
@@ -150,7 +150,7 @@ def refuse_without_springs(*plans: LimitPlan) -> None:
         return
     if not any(plan.scenario.time.has_springs for plan in plans):
         raise InvalidInputError(NO_SPRINGS)
-    message = f"--stiffer: {NAMES[stepping.SPRINGS]} are not made stiffer for a limit of {plans[0].key}, or beside soil"
+    message = f"--stiffer: {NAMES[timeline.SPRINGS]} are not made stiffer for a limit of {plans[0].key}, or beside soil"
     raise InvalidInputError(message)
 
 

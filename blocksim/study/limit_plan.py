@@ -25,7 +25,7 @@ import numpy as np
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, place_segments, scenario_hash, units
-from blocksim.scenario.models import loads, stepping, study
+from blocksim.scenario.models import loads, study, timeline
 from blocksim.scenario.placement import smallest_width
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
@@ -46,7 +46,7 @@ MOST_SCANNED = MOST_VALUES = 1000
 TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
 OPTION, OVER = "--vary", "--over"
-NAMES = {name: time.contacts for name, time in stepping.SCHEMES.items()}
+NAMES = {name: time.contacts for name, time in timeline.SCHEMES.items()}
 Number = float  # in the unit of the range
 OnRun = Callable[[Number, Verdict, Row], None]
 
@@ -422,7 +422,7 @@ def takes_whole(document: Document, key: str) -> bool:
 def variants(document: Document, *, both_laws: bool = False) -> dict[str, Document]:
     """Return the scenarios whose limits are compared, by what distinguishes them: both laws, or the present one."""
     if both_laws:
-        return {time.contacts: with_scheme(document, name) for name, time in stepping.SCHEMES.items()}
+        return {time.contacts: with_scheme(document, name) for name, time in timeline.SCHEMES.items()}
     return {document.build().time.contacts: document}
 
 
@@ -433,7 +433,7 @@ def with_scheme(document: Document, scheme: str) -> Document:
     """
     table = document.data.get("time")
     present = dict(table) if isinstance(table, Mapping) else {}
-    others = set() if present.get("scheme", stepping.SPRINGS) == scheme else {"step", "force_step"}
-    known = set(stepping.SCHEMES[scheme].model_fields) - others
+    others = set() if present.get("scheme", timeline.SPRINGS) == scheme else {"step", "force_step"}
+    known = set(timeline.SCHEMES[scheme].model_fields) - others
     kept = {key: value for key, value in present.items() if key in known}
     return replace(document, data={**document.data, "time": {**kept, "scheme": scheme}})

@@ -193,7 +193,7 @@ def read_indices(path: Path) -> tuple[list[studies.Bars], tuple[str, str]]:
     return panels, shown.labels
 
 
-def _read(cell: input_files.Cell, problems: list[Problem]) -> str | float:
+def _read(cell: input_files.TableCell, problems: list[Problem]) -> str | float:
     """Return the text of a name or the number of an index; 0 after noting a problem."""
     if cell.column in HEAD:
         return cell.text

@@ -20,7 +20,7 @@ from blocksim.extras import load_module
 from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, Sweep, overrides, scenario_hash, units
 from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fault
-from blocksim.scenario.input_files import NUMBER, Cell, raise_problems, read_table
+from blocksim.scenario.input_files import NUMBER, TableCell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.motion import TABLED
 from blocksim.scenario.models.study import SIGNIFICANT, Normal, Uniform, Variation, toml_number
@@ -71,8 +71,8 @@ class Column:
     """One column: the key that it varies, its head, and cell and value of every row."""
 
     key: str
-    head: Cell
-    cells: Sequence[Cell]
+    head: TableCell
+    cells: Sequence[TableCell]
     values: Sequence[object]
 
 
@@ -93,7 +93,7 @@ def read_columns(path: Path) -> list[Column]:
     return columns
 
 
-def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Column:
+def _column(head: TableCell, cells: Sequence[TableCell], problems: list[Problem]) -> Column:
     found = HEAD.fullmatch(head.text)
     key, unit = (head.text, None) if found is None else (found["key"], found["unit"])
     complaint = variation_fault(key)
@@ -114,7 +114,7 @@ def _column(head: Cell, cells: Sequence[Cell], problems: list[Problem]) -> Colum
     return Column(key, head, cells, values)
 
 
-def _cell_value(cell: Cell, unit: str | None) -> object:
+def _cell_value(cell: TableCell, unit: str | None) -> object:
     """Return a cell as a scenario takes it; raises ValueError with a message for the user."""
     if not cell.text:
         raise ValueError("this cell is empty")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario.models.stepping import SCHEMES, SPRINGS
+from blocksim.scenario.models.timeline import SCHEMES, SPRINGS
 from blocksim.verification.scene import Scene, Simulation
 
 NUMBERS = ("quantity", "unit", "expected", "measured", "error", "tolerance")  # of a row, for programs

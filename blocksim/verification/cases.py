@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
-from blocksim.scenario.models.stepping import IMPULSES
+from blocksim.scenario.models.timeline import IMPULSES
 from blocksim.verification import collapse, energy, impacts, resting, toppling
 from blocksim.verification.case import Case, Setting
 from blocksim.verification.soil import SOIL_CASES

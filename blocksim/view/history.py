@@ -14,7 +14,7 @@ from blocksim.simulation.frames import Frames, force_on_supports
 from blocksim.view import arrows, final, run_data, style, time_panels
 from blocksim.view.paint import Paint, by_block
 from blocksim.world.systems.blocks import BLOCKS
-from blocksim.world.systems.system import Output
+from blocksim.world.systems.system import Channel
 
 MOST_BLOCKS = len(style.BLOCK_COLOURS)  # that get a line of their own, unless they are chosen
 MOST_POINTS = 2000  # of a line
@@ -114,7 +114,7 @@ MOTIONS: dict[str, Callable[[FramesInView], Motion]] = {
 }
 
 
-def _shown(output: Output) -> Callable[[FramesInView], Motion]:
+def _shown(output: Channel) -> Callable[[FramesInView], Motion]:
     """Return the panel of what blocks show beside their motion."""
 
     def motion(seen: FramesInView) -> Motion:

@@ -24,7 +24,7 @@ from blocksim.kernels.explicit.models.particles import PER_PARTICLE
 from blocksim.kernels.explicit.outlines import WIDEST_CONE
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
 from blocksim.scenario.placement import length_beside, smallest_width
-from blocksim.world.forcing import Drives, LoadArrays, drive_records, load_arrays
+from blocksim.world.excitation import Drives, LoadArrays, drive_records, load_arrays
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
 
 NO_FACE = (0.0, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # nothing is beyond it, or looks against it

@@ -75,14 +75,14 @@ class Construction:
     assemble: Callable[[Parts, Sequence[Stride]], Any]
 
 
-class Built(NamedTuple):
+class InitialScene(NamedTuple):
     """One scene at time zero, and its blocks as they were placed."""
 
     placed: tuple[PlacedBody, ...]
     scene: Any  # of the scheme's type
 
 
-class Stack(NamedTuple):
+class SceneStack(NamedTuple):
     """Scenes that were built together."""
 
     numbers: list[int]  # which of the scenarios they are of
@@ -97,19 +97,19 @@ class Refusal(NamedTuple):
     error: BlocksimError
 
 
-def build_one(scenario: Scenario, construction: Construction) -> Built:
+def build_one(scenario: Scenario, construction: Construction) -> InitialScene:
     """Build the scene of one scenario.
 
     Raises SceneTooLargeError when there is not enough memory for it, StepError when the scenario asks for an
     inadmissible step without forcing it, and SkinTooSmallError when the skin that it asks for could miss contacts.
     """
     stack = only_stack(build_stacks([scenario], construction))
-    return Built(stack.placed[0], member(stack.scenes, 0))
+    return InitialScene(stack.placed[0], member(stack.scenes, 0))
 
 
 def build_stacks(
     scenarios: Sequence[Scenario], construction: Construction, numbers: Sequence[int] | None = None
-) -> Iterator[Stack | Refusal]:
+) -> Iterator[SceneStack | Refusal]:
     """Build scenarios of one scheme; those of one shape come in as few stacks as memory allows.
 
     A scenario whose step, skin or size is refused does not stop the others. Stacks name them by `numbers`, by their
@@ -137,7 +137,7 @@ def build_stacks(
 
 def _stacks(
     numbers: list[int], parts: Parts, strides: list[Stride], construction: Construction
-) -> Iterator[Stack | Refusal]:
+) -> Iterator[SceneStack | Refusal]:
     """Build scenes of one shape, as many at a time as have room."""
     size = construction.size(parts)
     count = max(1, MOST_BYTES // size.bytes)
@@ -151,7 +151,7 @@ def _stacks(
         else:
             chosen = parts.chosen(places)
             placed = [layout.placed for layout in chosen.layouts]
-            yield Stack(names, placed, construction.assemble(chosen, [strides[k] for k in places]))
+            yield SceneStack(names, placed, construction.assemble(chosen, [strides[k] for k in places]))
 
 
 def _divided(layouts: Sequence[Layout], bodies: arrays.Records) -> Iterator[tuple[list[int], Parts]]:
@@ -222,7 +222,7 @@ def take_members(records: arrays.Records, numbers: Sequence[int]) -> arrays.Reco
     return chosen
 
 
-def only_stack(stacks: Iterable[Stack | Refusal]) -> Stack:
+def only_stack(stacks: Iterable[SceneStack | Refusal]) -> SceneStack:
     """Return the one stack that was built. Raises what refused it."""
     (one,) = stacks
     if isinstance(one, Refusal):

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.kernels.common.arrays import INTERACTION, Records, zeros
-from blocksim.scenario import GROUND, PlacedBody, Scenario, resolve_pair, resolved
+from blocksim.scenario import GROUND, PlacedBody, Scenario, resolution, resolve_pair
 
 # e = 0 would need infinite damping; this rebound counts as none (the promise is at most 1 % of the impact speed)
 SMALLEST_RESTITUTION = 0.009
@@ -106,7 +106,7 @@ def contact_classes(scenario: Scenario, placed: tuple[PlacedBody, ...]) -> tuple
     )
 
 
-def pair_of(scenario: Scenario, a: ContactClass, b: ContactClass) -> resolved.ResolvedPair:
+def pair_of(scenario: Scenario, a: ContactClass, b: ContactClass) -> resolution.ResolvedPair:
     """Return the scenario's contact parameters of two classes, at least one of them blocks."""
     block, other = (b, a) if a.is_ground else (a, b)
     partner = other.material if other.is_wall or not other.is_ground else GROUND

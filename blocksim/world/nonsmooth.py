@@ -11,7 +11,7 @@ from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth import arrays
 from blocksim.kernels.nonsmooth.groups import LONELY
 from blocksim.scenario import PlacedBody, Scenario, place_bodies, placement
-from blocksim.scenario.models.stepping import Nonsmooth as Stepping
+from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.world import build, memory, rigid_step, sag, step
 from blocksim.world.bodies import Layout
 

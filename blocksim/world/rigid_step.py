@@ -68,7 +68,7 @@ Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
 
-class Joint(NamedTuple):
+class ContactJoint(NamedTuple):
     """Where two bodies touch; pieces of ground and walls are numbered after the blocks, the half-plane comes last."""
 
     one: int
@@ -101,7 +101,7 @@ class _Hit(NamedTuple):
 
 def joints_of(
     placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment], free: Collection[int], near: float, *, level: bool
-) -> list[Joint]:
+) -> list[ContactJoint]:
     """Return the joints of free blocks with each other and with supports; faces up to `near` (m) apart touch.
 
     `level` says whether the half-plane y < 0 is one of the supports.
@@ -153,7 +153,7 @@ def _hits(sides: Sequence[_Side], free: Collection[int], near: float) -> Iterato
             yield (min(i, j), max(i, j)), _Hit((x0, y0), j, (dy, -dx), bool(is_inside))
 
 
-def _joint(pair: tuple[int, int], hits: Sequence[_Hit], near: float) -> Joint | None:
+def _joint(pair: tuple[int, int], hits: Sequence[_Hit], near: float) -> ContactJoint | None:
     """Return the joint of two bodies; None where only corners touch."""
     first = hits[0].point
     one = max((hit.point for hit in hits), key=lambda point: math.dist(point, first))
@@ -164,18 +164,18 @@ def _joint(pair: tuple[int, int], hits: Sequence[_Hit], near: float) -> Joint | 
         along = [hit.normal[0] * across[0] + hit.normal[1] * across[1] for hit in hits]
         best = max(range(len(hits)), key=lambda k: abs(along[k]))
         way = math.copysign(1.0, along[best]) * (1.0 if hits[best].owner == pair[0] else -1.0)
-        return Joint(*pair, (way * across[0], way * across[1]), (one, other))
+        return ContactJoint(*pair, (way * across[0], way * across[1]), (one, other))
     inside = next((hit for hit in hits if hit.is_inside), None)
     if inside is None:
         return None
     way = 1.0 if inside.owner == pair[0] else -1.0
-    return Joint(*pair, (way * inside.normal[0], way * inside.normal[1]), (inside.point,))
+    return ContactJoint(*pair, (way * inside.normal[0], way * inside.normal[1]), (inside.point,))
 
 
 class _Frame(NamedTuple):
     """Contact points of all joints as springs between blocks, for w = 1/s."""
 
-    joints: Sequence[Joint]
+    joints: Sequence[ContactJoint]
     blocks: Sequence[int]  # n
     joint: NDArray[np.int64]  # (p,) that a point is of
     arms: Floats  # (p, 2, 2) m: from the centroids of both bodies to the point
@@ -211,7 +211,7 @@ def thrust_shift(layout: Layout) -> float:
     return 0.0 if rest is None else _greatest_shift(frame, *rest) * (COURSED if frame.is_coursed else 1.0)
 
 
-def _carried(joints: Sequence[Joint], free: set[int]) -> tuple[list[Joint], list[int]]:
+def _carried(joints: Sequence[ContactJoint], free: set[int]) -> tuple[list[ContactJoint], list[int]]:
     """Return the joints of blocks that stand on supports, by way of others or not, and these blocks."""
     held: set[int] = set()
     sides = [side for joint in joints for side in ((joint.one, joint.other), (joint.other, joint.one))]
@@ -220,7 +220,7 @@ def _carried(joints: Sequence[Joint], free: set[int]) -> tuple[list[Joint], list
     return [joint for joint in joints if joint.one in held or joint.other in held], sorted(held)
 
 
-def _frame(placed: Sequence[PlacedBody], joints: Sequence[Joint], blocks: Sequence[int]) -> _Frame:
+def _frame(placed: Sequence[PlacedBody], joints: Sequence[ContactJoint], blocks: Sequence[int]) -> _Frame:
     place, count = {body: k for k, body in enumerate(blocks)}, len(blocks)
     points = np.array([point for joint in joints for point in joint.points])
     joint = np.repeat(np.arange(len(joints)), [len(one.points) for one in joints])

@@ -46,9 +46,9 @@ from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import OUTLINE
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
 from blocksim.scenario import Scenario, motion, placement
-from blocksim.scenario.models.stepping import Explicit
+from blocksim.scenario.models.timeline import Explicit
 from blocksim.world.bodies import Layout, Shapes
-from blocksim.world.forcing import drive_bounds, steepest_tilt
+from blocksim.world.excitation import drive_bounds, steepest_tilt
 from blocksim.world.interactions import Interactions
 from blocksim.world.systems import largest_step
 
@@ -90,7 +90,7 @@ class Stride(NamedTuple):
     approach: float = 0.0  # m, up to which bodies are always listed
 
 
-class Kind(NamedTuple):
+class BlockKind(NamedTuple):
     """Blocks that are alike."""
 
     half_x: float  # m
@@ -108,9 +108,9 @@ class Bounds(NamedTuple):
     speed: float  # m/s, no point is faster
     mass: float  # kg, of all free ones
     free: int  # blocks that are not fixed
-    kinds: frozenset[Kind]
+    kinds: frozenset[BlockKind]
     grounds: frozenset[int]  # contact classes of the half-plane and its pieces
-    standing: frozenset[Kind]  # blocks on each of their faces, as `standing_kinds` has them
+    standing: frozenset[BlockKind]  # blocks on each of their faces, as `standing_kinds` has them
 
 
 def bounds_of(layouts: Sequence[Layout], bodies: NDArray[np.record]) -> list[Bounds]:
@@ -128,8 +128,8 @@ def bounds_of(layouts: Sequence[Layout], bodies: NDArray[np.record]) -> list[Bou
     sides = 2.0 * np.minimum(columns["half_x"], columns["half_y"])
     sides = np.where(blocks["faces"] == OUTLINE, blocks["least_width"], sides)
     speeds = np.hypot(blocks["vx"], blocks["vy"]) + columns["radius"] * np.abs(blocks["spin"])
-    columns_of_kinds = zip(*(blocks[name].tolist() for name in Kind._fields), strict=True)
-    kinds = [frozenset(map(Kind, *one)) for one in columns_of_kinds]
+    columns_of_kinds = zip(*(blocks[name].tolist() for name in BlockKind._fields), strict=True)
+    kinds = [frozenset(map(BlockKind, *one)) for one in columns_of_kinds]
     of_scenes = zip(
         sides.min(axis=1, initial=math.inf).tolist(),
         np.max(blocks["y"] + columns["radius"], axis=1, initial=-math.inf).tolist(),
@@ -148,15 +148,15 @@ def bounds_of(layouts: Sequence[Layout], bodies: NDArray[np.record]) -> list[Bou
     return [Bounds(*one) for one in of_scenes]
 
 
-def standing_kinds(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[Kind]:
+def standing_kinds(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[BlockKind]:
     """Return the blocks of a scene as they stand, a polygon on each of its faces.
 
     In place of `half_x` is how far along the face a corner is from the foot of the centroid, at most, and in place of
     `half_y` the distance of the face: what half sides are to a rectangle.
     """
-    kinds: set[Kind] = set()
+    kinds: set[BlockKind] = set()
     for block, first, size in zip(blocks, shapes.firsts, shapes.sizes, strict=False):
-        kind = Kind(*(block[name].item() for name in Kind._fields))
+        kind = BlockKind(*(block[name].item() for name in BlockKind._fields))
         if block["faces"] != OUTLINE:
             kinds.add(kind)
             continue
@@ -228,7 +228,7 @@ def max_tangent_stiffness(law: str, stiffness: float, inverse_mass: float, load:
     return 1.5 * stiffness * math.sqrt(max(impact, static))
 
 
-def frequency_squared(body: Kind, normal: float, shear: float) -> float:
+def frequency_squared(body: BlockKind, normal: float, shear: float) -> float:
     """Return w2 (1/s2), the stiffest mode of a body that stands with one of its faces on a rigid plane."""
     greatest = 2.0 * normal * body.inverse_mass
     for half, distance in ((body.half_x, body.half_y), (body.half_y, body.half_x)):
@@ -240,7 +240,7 @@ def frequency_squared(body: Kind, normal: float, shear: float) -> float:
     return greatest
 
 
-def stable_step(pairs: Iterable[tuple[Kind, Kind | None, ContactStiffness]], safety: float) -> float:
+def stable_step(pairs: Iterable[tuple[BlockKind, BlockKind | None, ContactStiffness]], safety: float) -> float:
     """Return the admissible step (s) of a scene; `pairs` lists every kind of contact (None: the ground).
 
     `safety` (-) is the share of the undamped stability limit. Returns infinity when nothing can touch anything.
@@ -265,7 +265,7 @@ def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str
         normal = max_tangent_stiffness(law, row.normal_stiffness, inverse_mass, load)
         return ContactStiffness(normal, normal * row.shear_ratio, max(row.normal_damping, row.shear_damping))
 
-    def stiffest(number: int, springs: ContactStiffness) -> Kind:
+    def stiffest(number: int, springs: ContactStiffness) -> BlockKind:
         """Return the body of a class with the stiffest mode on given springs."""
         bodies = (kind for kind in kinds if kind.contact_class == number)
         return max(bodies, key=lambda kind: frequency_squared(kind, springs.normal, springs.shear))

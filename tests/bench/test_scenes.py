@@ -7,7 +7,7 @@ import pytest
 
 from blocksim.bench.scenes import LOW_COURSES, UNTIL_SOLVED, Stepping, pushed_wall, three_blocks
 from blocksim.scenario import load_scenario, place_bodies
-from blocksim.scenario.models.stepping import Nonsmooth
+from blocksim.scenario.models.timeline import Nonsmooth
 
 NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
 

@@ -13,7 +13,7 @@ import pytest
 from blocksim.errors import InvalidInputError, ScenarioError, UnavailableError
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_hash, scenario_to_toml
 from blocksim.scenario.document import Document
-from blocksim.scenario.models.stepping import Explicit
+from blocksim.scenario.models.timeline import Explicit
 from blocksim.scenario.structures.polygons import DrawingError, read_drawing, simplify
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from blocksim.kernels.common.arrays import REACHED, Floats, World
-from blocksim.scenario.models.stepping import Time
+from blocksim.scenario.models.timeline import Time
 from blocksim.simulation.schemes import Scheme
 from blocksim.world.bodies import Layout
 from blocksim.world.build import Construction, Parts, assemble_world, run_controls

@@ -15,7 +15,7 @@ from blocksim.kernels.common.systems import Stages, part_of_thread
 from blocksim.scenario import Scenario, units as q
 from blocksim.scenario.models.base import SystemTable, Whole
 from blocksim.world.systems import Function
-from blocksim.world.systems.system import Elements, Indices, Output, Quantity, System, Track, discs
+from blocksim.world.systems.system import Channel, Dataset, Elements, Indices, System, Track, discs
 
 POINT = record_type("x y vx vy fx fy mass stiffness tie reach")  # m, m/s, N, kg, N/m, N/m, m
 RADIUS = 0.004  # m, in pictures
@@ -164,13 +164,13 @@ def _largest_step(scenario: Scenario) -> float:
 MASSES = System(
     name="masses",
     element="mass",
-    quantities=(Quantity("x", "m"), Quantity("y", "m"), Quantity("vx", "m/s"), Quantity("vy", "m/s")),
-    constants=(Quantity("mass", "kg"),),
+    quantities=(Dataset("x", "m"), Dataset("y", "m"), Dataset("vx", "m/s"), Dataset("vy", "m/s")),
+    constants=(Dataset("mass", "kg"),),
     outputs=(
-        Output("x", "m", "place along the ground", "x_mm", 1e3),
-        Output("y", "m", "place above the ground", "y_mm", 1e3),
-        Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", 1e3),
-        Output("height", "m", "height above the start", "height_mm", 1e3, lambda one: one["y"] - one.at_start("y")),
+        Channel("x", "m", "place along the ground", "x_mm", 1e3),
+        Channel("y", "m", "place above the ground", "y_mm", 1e3),
+        Channel("vy", "m/s", "velocity normal to the ground", "vy_mm_s", 1e3),
+        Channel("height", "m", "height above the start", "height_mm", 1e3, lambda one: one["y"] - one.at_start("y")),
     ),
     elements=_elements,
     state=_state,

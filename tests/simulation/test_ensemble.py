@@ -13,7 +13,7 @@ from blocksim.simulation import ensemble, simulate
 from blocksim.simulation.ensemble import Ensemble, EnsembleEnd, MemberEnd, MemberFailure, run_ensemble, run_in_batches
 from blocksim.simulation.schemes import build_stacks
 from blocksim.world import build, memory
-from blocksim.world.build import Stack
+from blocksim.world.build import SceneStack
 from blocksim.world.memory import SceneTooLargeError, scene_size
 from blocksim.world.step import SkinTooSmallError, StepError
 
@@ -192,9 +192,9 @@ def test_a_stack_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatc
     scenarios = collapses(*({"friction.block_block": 0.3, "time.end": 1e-3 * k} for k in range(1, 6)))
     whole = [end.columns for end in run_ensemble(scenarios)]
     one = next(iter(build_stacks(scenarios[:1])))
-    assert isinstance(one, Stack)
+    assert isinstance(one, SceneStack)
     monkeypatch.setattr(build, "MOST_BYTES", 2 * scene_size(4, 16, 8).bytes)
-    assert [len(stack.placed) for stack in build_stacks(scenarios) if isinstance(stack, Stack)] == [2, 2, 1]
+    assert [len(stack.placed) for stack in build_stacks(scenarios) if isinstance(stack, SceneStack)] == [2, 2, 1]
     assert [end.columns for end in run_ensemble(scenarios)] == whole
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.scenario import Scenario
-    from blocksim.world.build import Built
+    from blocksim.world.build import InitialScene
     from tests.simulation.conftest import Shipped
 
 TIMES_THE_LIMIT = 50.0
@@ -31,7 +31,7 @@ TIMES_THE_LIMIT = 50.0
 def forced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every scene step fifty times as far as it safely can."""
 
-    def forced_build(scenario: Scenario) -> Built:
+    def forced_build(scenario: Scenario) -> InitialScene:
         built = build(scenario)
         built.scene.world.controls[0].step *= TIMES_THE_LIMIT
         return built

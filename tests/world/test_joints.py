@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from blocksim.scenario import place_bodies, place_segments, scenario_from_mapping
-from blocksim.world.rigid_step import Joint, joints_of
+from blocksim.world.rigid_step import ContactJoint, joints_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 NEAR = 1e-5  # m
 
 
-def joints(*bodies: Mapping[str, Any], **tables: Any) -> list[Joint]:
+def joints(*bodies: Mapping[str, Any], **tables: Any) -> list[ContactJoint]:
     """Return the joints of bricks of 0.2 x 0.1 m and triangles, the fixed ones supports."""
     triangle = {"outline": [[-0.1, -0.05], [0.1, -0.05], [0.0, 0.1]], "depth": 1.0, "material": "stone"}
     scenario = scenario_from_mapping(
@@ -40,7 +40,7 @@ def joints(*bodies: Mapping[str, Any], **tables: Any) -> list[Joint]:
     return joints_of(placed, place_segments(scenario), free, NEAR, level=level)
 
 
-def ends(joint: Joint) -> list[tuple[float, float]]:
+def ends(joint: ContactJoint) -> list[tuple[float, float]]:
     return sorted((round(x, 9), round(y, 9)) for x, y in joint.points)
 
 

@@ -11,7 +11,7 @@ import pytest
 from blocksim.kernels.common.supports import acceleration, displacement, piece_at
 from blocksim.verification.scene import scenario_of
 from blocksim.world.build import build_world
-from blocksim.world.forcing import support_pieces
+from blocksim.world.excitation import support_pieces
 
 if TYPE_CHECKING:
     from blocksim.scenario import Scenario

@@ -13,7 +13,7 @@ from blocksim.kernels.explicit.outlines import MOST_CORNERS, UPPER, WIDEST_CONE
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.geometry import MOST, centre_outline, least_width, regular
 from blocksim.world.bodies import body_records, cone_of, corner_rows, layout_of
-from blocksim.world.build import Stack, build_stacks, member
+from blocksim.world.build import SceneStack, build_stacks, member
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
 from blocksim.world.step import bounds_of
 
@@ -118,7 +118,7 @@ def test_members_of_a_stack_have_corners_of_their_own() -> None:
     wedges = [scenario(wedge={"outline": [[0.0, 0.0], [0.4, 0.0], [0.1, h]], "depth": 0.1}) for h in (0.2, 0.3)]
     hexagon = scenario(hexagon={"sides": 6, "radius": 0.2, "depth": 0.1})
     brick = scenario(brick={"width": 0.2, "height": 0.1, "length": 0.1})
-    stacks = [one for one in build_stacks([*wedges, hexagon, brick], NONSMOOTH) if isinstance(one, Stack)]
+    stacks = [one for one in build_stacks([*wedges, hexagon, brick], NONSMOOTH) if isinstance(one, SceneStack)]
     assert [stack.numbers for stack in stacks] == [[0, 1], [2], [3]]
     assert stacks[-1].scenes.world.corners is None
     for m, wedge in enumerate(wedges):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.world.step import ContactStiffness, Kind, frequency_squared, stable_step
+from blocksim.world.step import BlockKind, ContactStiffness, frequency_squared, stable_step
 
 sizes = st.floats(1e-3, 1.0)
 densities = st.floats(100.0, 2e4)
@@ -17,9 +17,9 @@ growing = st.floats(1.0, 20.0)
 K = 9.5e8
 
 
-def body_of(size_x: float, size_y: float, density: float = 2700.0, depth: float = 0.05) -> Kind:
+def body_of(size_x: float, size_y: float, density: float = 2700.0, depth: float = 0.05) -> BlockKind:
     mass = density * size_x * size_y * depth
-    return Kind(0.5 * size_x, 0.5 * size_y, 1.0 / mass, 12.0 / (mass * (size_x**2 + size_y**2)), 1)
+    return BlockKind(0.5 * size_x, 0.5 * size_y, 1.0 / mass, 12.0 / (mass * (size_x**2 + size_y**2)), 1)
 
 
 def stiffness_at(points: list[tuple[float, float, float]], normal: float, shear: float) -> np.ndarray:
@@ -33,7 +33,7 @@ def stiffness_at(points: list[tuple[float, float, float]], normal: float, shear:
     return total
 
 
-def largest(body: Kind, stiffness: np.ndarray) -> float:
+def largest(body: BlockKind, stiffness: np.ndarray) -> float:
     root = np.sqrt([body.inverse_mass, body.inverse_mass, body.inverse_inertia])
     return float(np.linalg.eigvalsh(root[:, None] * stiffness * root).max())
 
@@ -131,7 +131,7 @@ def test_two_bodies_get_a_smaller_step_than_one_on_the_ground() -> None:
 
 
 def test_scene_in_which_nothing_can_move_has_no_limit() -> None:
-    wall = Kind(0.5, 0.5, 0.0, 0.0, 1)
+    wall = BlockKind(0.5, 0.5, 0.0, 0.0, 1)
     assert (
         stable_step([(wall, None, ContactStiffness(K, K, 0.5)), (wall, wall, ContactStiffness(K, K, 0.5))], 1.0) == inf
     )

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
 from blocksim.scenario import units as q
 from blocksim.scenario.models import base, geometry, motion
@@ -42,8 +42,10 @@ class Constant(base.Table):
     kind: Literal["constant"] = Field(description="kind of history")
 
 
-class Ramp(base.Table):
+class RampHistory(base.Table):
     """A factor that changes evenly from one time to another, and stays."""
+
+    model_config = ConfigDict(title="Ramp")
 
     kind: Literal["ramp"] = Field(description="kind of history")
     start: q.NonNegativeTime = Field(default=0.0, description="begin of the ramp")
@@ -118,7 +120,7 @@ class Samples(_Sampled):
     factors: tuple[q.Number, ...] = Field(default=(), description="factors at these times, instead of a table")
 
 
-AnyHistory = Annotated[Constant | Ramp | Steps | Samples, Field(discriminator="kind")]
+AnyHistory = Annotated[Constant | RampHistory | Steps | Samples, Field(discriminator="kind")]
 """Any history, distinguished by its `kind`."""
 HISTORIES: dict[str, type[base.Table]] = base.by_kind(AnyHistory)
 """Class by kind, as written in a scenario."""
@@ -249,7 +251,7 @@ def stretches_of(load: AnyLoad, tilt: float) -> tuple[Stretch, ...]:
     match history:
         case Constant():
             return (Stretch(0.0, 1.0, 0.0),)
-        case Ramp():
+        case RampHistory():
             times, values = (history.start, history.end), (history.first, history.last)
         case Gravity(times=()):
             first, last = tilt if history.first is None else history.first, history.last or 0.0

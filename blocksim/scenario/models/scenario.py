@@ -20,8 +20,8 @@ from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.loads import AnyLoad
 from blocksim.scenario.models.motion import AnyMotion
-from blocksim.scenario.models.stepping import AnyProbe, AnyTime, Event, Explicit, Output, Start
 from blocksim.scenario.models.study import Experiment, Sweep
+from blocksim.scenario.models.timeline import AnyProbe, AnyTime, Event, Explicit, Output, Start
 from blocksim.scenario.structures import AnyStructure
 
 SCHEMA_VERSION = 1
@@ -92,7 +92,7 @@ class Scenario(Table):
 
     def _repr_html_(self) -> str:
         """Return the same line, blocks and materials, and all values as they stand in a file, for notebooks."""
-        from blocksim.scenario.resolved import scenario_to_toml  # noqa: PLC0415 - needs this model
+        from blocksim.scenario.resolution import scenario_to_toml  # noqa: PLC0415 - needs this model
 
         rows = ""
         for name, block in self.blocks.items():

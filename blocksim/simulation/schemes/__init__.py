@@ -1,6 +1,6 @@
 """The stepping schemes: what each is to the rest of the simulation, and how to find that of a scene.
 
-A new one is one file of this folder and one line in `blocksim.scenario.models.stepping.SCHEMES`. Nothing outside this
+A new one is one file of this folder and one line in `blocksim.scenario.models.timeline.SCHEMES`. Nothing outside this
 folder and the kernels asks which scheme a scene is of: it asks the scheme.
 """
 
@@ -18,12 +18,21 @@ from blocksim.kernels.common.arrays import ALL, OUTLINE, Records, World
 from blocksim.kernels.common.systems import Coupled, measure_systems, plan_of
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import PlacedBody, Scenario, overlap
-from blocksim.scenario.models.stepping import SCHEMES as TABLES
+from blocksim.scenario.models.timeline import SCHEMES as TABLES
 from blocksim.scenario.motion import settles
 from blocksim.silence import silent
 from blocksim.simulation.frames import CONTACT_ROW, Rows
 from blocksim.world import build as scenes
-from blocksim.world.build import Built, Construction, Refusal, Stack, build_one, couple, group_equal, stack_of_one
+from blocksim.world.build import (
+    Construction,
+    InitialScene,
+    Refusal,
+    SceneStack,
+    build_one,
+    couple,
+    group_equal,
+    stack_of_one,
+)
 from blocksim.world.systems import others_of
 
 AnyScene = World | Nonsmooth
@@ -190,14 +199,14 @@ def build_scene(scenario: Scenario) -> AnyScene:
     return scene
 
 
-def build(scenario: Scenario) -> Built:
+def build(scenario: Scenario) -> InitialScene:
     """Return the same scene with the blocks as they were placed."""
     built = build_one(scenario, SCHEMES[scenario.time.scheme].construction)
     others = others_of(scenario)
     return built._replace(scene=couple(scenario, built.scene, others)) if others else built
 
 
-def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
+def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[SceneStack | Refusal]:
     """Build the scenes of scenarios at time zero, those of one scheme and shape together.
 
     A scene with systems beside blocks and supports, one of a scheme without a way to advance members together, and one
@@ -220,7 +229,7 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[Stack | Refusal]:
             except BlocksimError as error:
                 yield Refusal(i, error)
             else:
-                yield Stack([i], [built.placed], stack_of_one(built.scene))
+                yield SceneStack([i], [built.placed], stack_of_one(built.scene))
 
 
 def ledger_names(scene: AnyScene | Coupled) -> tuple[str, ...]:

@@ -17,19 +17,19 @@ from blocksim.world.systems import system
 
 MILLI, DEGREES = 1e3, float(np.degrees(1.0))
 QUANTITIES = (
-    system.Quantity("x", "m"),  # centre
-    system.Quantity("y", "m"),
-    system.Quantity("angle", "rad"),  # of the body axes, counter-clockwise, never wrapped
-    system.Quantity("vx", "m/s"),
-    system.Quantity("vy", "m/s"),
-    system.Quantity("spin", "rad/s"),
+    system.Dataset("x", "m"),  # centre
+    system.Dataset("y", "m"),
+    system.Dataset("angle", "rad"),  # of the body axes, counter-clockwise, never wrapped
+    system.Dataset("vx", "m/s"),
+    system.Dataset("vy", "m/s"),
+    system.Dataset("spin", "rad/s"),
 )
 CONSTANTS = (
-    system.Quantity("size_x", "m"),  # along the body's own axes
-    system.Quantity("size_y", "m"),
-    system.Quantity("depth", "m"),
-    system.Quantity("mass", "kg"),
-    system.Quantity("inertia", "kg m2"),
+    system.Dataset("size_x", "m"),  # along the body's own axes
+    system.Dataset("size_y", "m"),
+    system.Dataset("depth", "m"),
+    system.Dataset("mass", "kg"),
+    system.Dataset("inertia", "kg m2"),
 )
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
@@ -135,9 +135,9 @@ BLOCKS = system.System(
     quantities=QUANTITIES,
     constants=CONSTANTS,
     outputs=(
-        system.Output("x", "m", "centre along the ground", "x_mm", MILLI),
-        system.Output("y", "m", "centre above the ground", "y_mm", MILLI),
-        system.Output(
+        system.Channel("x", "m", "centre along the ground", "x_mm", MILLI),
+        system.Channel("y", "m", "centre above the ground", "y_mm", MILLI),
+        system.Channel(
             "rotation",
             "rad",
             "angle turned since the start, counter-clockwise positive, not wrapped",
@@ -145,10 +145,10 @@ BLOCKS = system.System(
             DEGREES,
             lambda track: track["angle"] - track.at_start("angle"),
         ),
-        system.Output("vx", "m/s", "velocity along the ground", "vx_mm_s", MILLI),
-        system.Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", MILLI),
-        system.Output("spin", "rad/s", "angular velocity", "spin_deg_s", DEGREES),
-        system.Output("kinetic_energy", "J", "kinetic energy", "kinetic_energy_J", formula=kinetic_energy),
+        system.Channel("vx", "m/s", "velocity along the ground", "vx_mm_s", MILLI),
+        system.Channel("vy", "m/s", "velocity normal to the ground", "vy_mm_s", MILLI),
+        system.Channel("spin", "rad/s", "angular velocity", "spin_deg_s", DEGREES),
+        system.Channel("kinetic_energy", "J", "kinetic energy", "kinetic_energy_J", formula=kinetic_energy),
     ),
     elements=lambda scenario: blocks_placed(place_bodies(scenario)).elements,
     state=lambda world, count: motion_of(world.bodies[:count]),
@@ -167,12 +167,12 @@ def blocks_placed(placed: Sequence[PlacedBody]) -> system.SystemInScene:
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks
 THICKNESS = 0.25  # of the smallest side of all blocks
-CORNERS = tuple(system.Quantity(f"{axis}{corner}", "m") for corner in range(4) for axis in "xy")  # at rest
+CORNERS = tuple(system.Dataset(f"{axis}{corner}", "m") for corner in range(4) for axis in "xy")  # at rest
 SUPPORT_QUANTITIES = (
-    system.Quantity("dx", "m"),
-    system.Quantity("dy", "m"),
-    system.Quantity("vx", "m/s"),
-    system.Quantity("vy", "m/s"),
+    system.Dataset("dx", "m"),
+    system.Dataset("dy", "m"),
+    system.Dataset("vx", "m/s"),
+    system.Dataset("vy", "m/s"),
 )
 
 

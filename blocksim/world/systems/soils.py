@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, resolve_pair
-from blocksim.scenario.models import contact, stepping
+from blocksim.scenario.models import contact, timeline
 from blocksim.scenario.models.geometry import Material
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.start import soil_tables
@@ -59,17 +59,17 @@ ENERGIES = (
 COST = system.Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
 GRADIENT_COST = {"raw": 1.0, "corrected": 1.5}  # time of a step over that, measured
 QUANTITIES = (
-    system.Quantity("x", "m"),
-    system.Quantity("y", "m"),
-    system.Quantity("vx", "m/s"),
-    system.Quantity("vy", "m/s"),
-    system.Quantity("sxx", "Pa"),  # tension positive
-    system.Quantity("syy", "Pa"),
-    system.Quantity("szz", "Pa"),
-    system.Quantity("sxy", "Pa"),
-    system.Quantity("plastic", "1"),  # accumulated plastic shear strain
+    system.Dataset("x", "m"),
+    system.Dataset("y", "m"),
+    system.Dataset("vx", "m/s"),
+    system.Dataset("vy", "m/s"),
+    system.Dataset("sxx", "Pa"),  # tension positive
+    system.Dataset("syy", "Pa"),
+    system.Dataset("szz", "Pa"),
+    system.Dataset("sxy", "Pa"),
+    system.Dataset("plastic", "1"),  # accumulated plastic shear strain
 )
-CONSTANTS = (system.Quantity("mass", "kg"), system.Quantity("spacing", "m"))
+CONSTANTS = (system.Dataset("mass", "kg"), system.Dataset("spacing", "m"))
 
 
 def lame_constants(material: Material) -> tuple[float, float]:
@@ -358,7 +358,7 @@ def _state(soils: Any, count: int) -> system.Floats:
 
 def _largest_step(scenario: Scenario) -> float:
     tables = soil_tables(scenario)
-    usual = float(stepping.Explicit.model_fields["safety"].default)
+    usual = float(timeline.Explicit.model_fields["safety"].default)
     finer = min(1.0, float(getattr(scenario.time, "safety", usual)) / usual)  # a finer step is finer for all
     courant = COURANT * finer
     return min(courant * SMOOTHING * table.spacing / wave_speed(scenario.materials[table.material]) for table in tables)
@@ -384,17 +384,17 @@ SOILS = system.System(
     quantities=QUANTITIES,
     constants=CONSTANTS,
     outputs=(
-        system.Output("x", "m", "place along the ground", "x_mm", MILLI),
-        system.Output("y", "m", "place above the ground", "y_mm", MILLI),
-        system.Output("vx", "m/s", "velocity along the ground", "vx_mm_s", MILLI),
-        system.Output("vy", "m/s", "velocity normal to the ground", "vy_mm_s", MILLI),
-        system.Output("displacement", "m", "distance from where it began", "displacement_mm", MILLI, displacement),
-        system.Output("sxx", "Pa", "stress along the ground, tension positive", "sxx_Pa"),
-        system.Output("syy", "Pa", "stress normal to the ground, tension positive", "syy_Pa"),
-        system.Output("szz", "Pa", "stress out of the plane, tension positive", "szz_Pa"),
-        system.Output("sxy", "Pa", "shear stress", "sxy_Pa"),
-        system.Output("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", formula=pressure),
-        system.Output("plastic", "1", "accumulated plastic shear strain", "plastic_strain"),
+        system.Channel("x", "m", "place along the ground", "x_mm", MILLI),
+        system.Channel("y", "m", "place above the ground", "y_mm", MILLI),
+        system.Channel("vx", "m/s", "velocity along the ground", "vx_mm_s", MILLI),
+        system.Channel("vy", "m/s", "velocity normal to the ground", "vy_mm_s", MILLI),
+        system.Channel("displacement", "m", "distance from where it began", "displacement_mm", MILLI, displacement),
+        system.Channel("sxx", "Pa", "stress along the ground, tension positive", "sxx_Pa"),
+        system.Channel("syy", "Pa", "stress normal to the ground, tension positive", "syy_Pa"),
+        system.Channel("szz", "Pa", "stress out of the plane, tension positive", "szz_Pa"),
+        system.Channel("sxy", "Pa", "shear stress", "sxy_Pa"),
+        system.Channel("pressure", "Pa", "mean pressure, averaged over neighbours", "pressure_Pa", formula=pressure),
+        system.Channel("plastic", "1", "accumulated plastic shear strain", "plastic_strain"),
     ),
     elements=elements_of,
     state=_state,

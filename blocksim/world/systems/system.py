@@ -22,7 +22,7 @@ Table = dict[str, list[Any]]
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Dataset:
     """A number of every element that frames or files keep."""
 
     name: str
@@ -35,7 +35,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Output:
+class Channel:
     """A number of every element that exports, tables and pictures of histories show."""
 
     name: str
@@ -98,9 +98,9 @@ class System:
 
     name: str  # in files, the ledger and the table of interactions
     element: str  # what one of them is called
-    quantities: tuple[Quantity, ...]  # kept of every element in every frame
-    constants: tuple[Quantity, ...]  # kept of every element once
-    outputs: tuple[Output, ...]
+    quantities: tuple[Dataset, ...]  # kept of every element in every frame
+    constants: tuple[Dataset, ...]  # kept of every element once
+    outputs: tuple[Channel, ...]
     elements: Callable[[Scenario], Elements]
     state: Callable[[Any, int], Floats]  # of the arrays of a scene with so many elements, (q, b)
     outlines: Callable[["Track", Indices], Floats]  # corners (m, counter-clockwise) in some frames, (f, b, k, 2)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.scenario.models.stepping import Nonsmooth
+from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import Scene, Simulation
 from tests.kernels.nonsmooth.scenes import ENDLESS, RIGID, rigid

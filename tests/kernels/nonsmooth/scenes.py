@@ -16,7 +16,7 @@ from blocksim.kernels.nonsmooth.begin import load_states
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
 from blocksim.kernels.nonsmooth.step import find_manifolds, substep
-from blocksim.scenario.models.stepping import Nonsmooth as Stepping
+from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, Scene
 from blocksim.world.nonsmooth import with_more_constraints

@@ -9,13 +9,13 @@ import pytest
 
 from blocksim.bench.scenes import pushed_wall, three_blocks
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.scenario.models import stepping
+from blocksim.scenario.models import timeline
 from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
 from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import SCHEMES, build_scene, build_stacks, measure_row, scheme_of
 from blocksim.simulation.team import ALONE, Team
 from blocksim.world import build
-from blocksim.world.build import Stack, arrays_of, member, only_stack
+from blocksim.world.build import SceneStack, arrays_of, member, only_stack
 from blocksim.world.nonsmooth import build_nonsmooth
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def same_bits(one: Nonsmooth, other: Nonsmooth) -> bool:
 
 
 def test_every_scheme_of_the_file_can_be_run() -> None:
-    assert set(SCHEMES) == set(stepping.SCHEMES)
+    assert set(SCHEMES) == set(timeline.SCHEMES)
     for name, scheme in SCHEMES.items():
         scene = build_scene(three_blocks(time={"scheme": name}))
         assert scheme_of(scene) is scheme
@@ -145,6 +145,6 @@ def test_members_of_a_stack_are_the_scenes_that_would_be_built_alone() -> None:
 
 def test_scenes_of_other_schemes_and_shapes_come_in_stacks_of_their_own() -> None:
     scenarios = [collapse(), wall(), three_blocks(), collapse(step=5e-4)]
-    stacks = [one for one in build_stacks(scenarios) if isinstance(one, Stack)]
+    stacks = [one for one in build_stacks(scenarios) if isinstance(one, SceneStack)]
     assert [stack.numbers for stack in stacks] == [[0, 3], [1], [2]]
     assert [len(stack.placed) for stack in stacks] == [2, 1, 1]

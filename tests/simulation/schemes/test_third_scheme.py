@@ -10,7 +10,7 @@ import blocksim
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.scenario.document import Document
-from blocksim.scenario.models.stepping import SCHEMES
+from blocksim.scenario.models.timeline import SCHEMES
 from blocksim.simulation import run_ensemble
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.compilation import SMALLEST_SCENE

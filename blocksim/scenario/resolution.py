@@ -11,7 +11,7 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
-from blocksim.scenario.models import base, geometry, motion, stepping, study
+from blocksim.scenario.models import base, geometry, motion, study, timeline
 from blocksim.scenario.models.contact import GROUND, Friction, PairFriction
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.overrides import format_key, si_unit
@@ -101,7 +101,7 @@ def scenario_to_toml(
             if friction is not None and "kinetic" not in friction.model_fields_set:
                 functools.reduce(dict.__getitem__, path, data).pop("kinetic", None)
     if scenario.sweep is not None and SCHEME in scenario.sweep.vary:
-        data["time"] = {key: value for key, value in data["time"].items() if key in stepping.Time.model_fields}
+        data["time"] = {key: value for key, value in data["time"].items() if key in timeline.Time.model_fields}
     if experiment_table is not None and "experiment" in data:
         data["experiment"] = {"table": experiment_table}
     if motion_table is not None and isinstance(scenario.motion, motion.TABLED):

@@ -19,7 +19,7 @@ from blocksim.scenario import (
     scenario_to_toml,
 )
 from blocksim.scenario.overrides import freeze
-from blocksim.scenario.resolved import deciding_values
+from blocksim.scenario.resolution import deciding_values
 
 REPOSITORY = Path(__file__).parents[2]
 
