@@ -16,8 +16,7 @@ from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.overrides import KeyPath
 from blocksim.scenario.placement import PlacedBody
-from blocksim.scenario.structures.base import MAX_BLOCKS, PolygonStructure, UnfitError
-from blocksim.scenario.structures.polygons import Polygons
+from blocksim.scenario.structures import base, polygons
 from blocksim.scenario.units import toml
 
 MAX_LOADS = 1000
@@ -202,11 +201,11 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
     yield from _unfit_tables(scenario)
     try:
         bodies, origins = placement.place_bodies(scenario), placement.placement_of(scenario).origins
-    except UnfitError:
+    except base.UnfitError:
         for number, structure in enumerate(scenario.structures):
             try:
                 structure.start(scenario.blocks[structure.block])
-            except UnfitError as error:
+            except base.UnfitError as error:
                 yield Mistake(("structures", number, error.key), str(error))
         return
     endless = [*_endless(origins, bodies)]
@@ -230,7 +229,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
 def _too_many(scenario: Scenario) -> Iterator[Mistake]:
     bodies = sum(structure.size for structure in scenario.structures) + len(scenario.bodies)
     counts: tuple[tuple[KeyPath, int, str, int], ...] = (
-        (("structures",), bodies, "bodies", MAX_BLOCKS),
+        (("structures",), bodies, "bodies", base.MAX_BLOCKS),
         (("walls",), len(scenario.walls), "walls", MAX_SEGMENTS),
         (("ground", "profile"), len(scenario.ground.profile or ()), "points", MAX_SEGMENTS),
         (("probes",), len(scenario.probes), "probes", MAX_PROBES),
@@ -246,9 +245,9 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
     needing: list[tuple[KeyPath, str]]
     needing = [(("bodies", number, "block"), spec.block) for number, spec in enumerate(scenario.bodies)]
     for number, structure in enumerate(scenario.structures):
-        if not isinstance(structure, PolygonStructure):
+        if not isinstance(structure, base.PolygonStructure):
             needing.append((("structures", number, "block"), structure.block))
-        for place, cell in enumerate(structure.divide() if isinstance(structure, Polygons) else ()):
+        for place, cell in enumerate(structure.divide() if isinstance(structure, polygons.Polygons) else ()):
             yield from unknown(("structures", number, "cells", place, "block"), "block", scenario.blocks, cell.block)
     for path, block in needing:
         if scenario.blocks[block].size_x == 0.0:

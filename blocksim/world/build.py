@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common import arrays
 from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
-from blocksim.kernels.explicit.broad_phase import TRAVELLED
-from blocksim.kernels.explicit.laws import LAW_CODES
+from blocksim.kernels.explicit import broad_phase, laws
 from blocksim.kernels.explicit.models import MODEL_CODES
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import PlacedBody, Scenario, motion
@@ -276,7 +275,7 @@ def _assemble(parts: Parts, strides: Sequence[Stride]) -> arrays.World:
     else:
         contacts = arrays.zeros((members, parts.slots), arrays.PARTICLE_CONTACT)
     controls = run_controls(parts, strides)
-    reach = np.maximum(controls["skin"], TRAVELLED * controls["skin"] + controls["approach"])
+    reach = np.maximum(controls["skin"], broad_phase.TRAVELLED * controls["skin"] + controls["approach"])
     controls["cell_width"] = 2.0 * controls["cell_radius"] + reach
     return assemble_world(parts, controls, first_capacity(bodies), parts.slots, contacts)
 
@@ -404,7 +403,7 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
             "max_overlap": 0.0 if contact.max_overlap is None else contact.max_overlap,
             "rest_speed": time.rest_speed,
             "model": MODEL_CODES[contact.model],
-            "law": LAW_CODES[contact.law],
+            "law": laws.LAW_CODES[contact.law],
             "sph_kernel": kernel,
             "particle_size": contact.particle_spacing,
             "smoothing_length": smoothing_length,

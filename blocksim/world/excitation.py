@@ -11,17 +11,7 @@ import numpy as np
 
 from blocksim.kernels.common import arrays
 from blocksim.scenario import PlacedBody, Scenario, motion, place_bodies, start
-from blocksim.scenario.models.loads import (
-    AnyLoad,
-    Force,
-    Gravity,
-    Horizontal,
-    Moment,
-    OnBody,
-    Pressure,
-    Stretch,
-    stretches_of,
-)
+from blocksim.scenario.models import loads
 
 NO_FACE = ((0.0, 0.0), (0.0, 0.0))
 """Of a body that has none: no load acts on it, as such a scenario is refused."""
@@ -41,48 +31,48 @@ class LoadArrays(NamedTuple):
 def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
     """Return the loads of a scenario, in its order."""
     numbers = {body.name: number for number, body in enumerate(placed)} if scenario.loads else {}
-    loads = arrays.zeros(len(scenario.loads), arrays.LOAD)
+    records = arrays.zeros(len(scenario.loads), arrays.LOAD)
     rows: list[tuple[float, float, float]] = []
     push = end = 0.0
-    for record, load in zip(loads, scenario.loads, strict=True):
-        stretches = stretches_of(load, scenario.ground.tilt)
+    for record, load in zip(records, scenario.loads, strict=True):
+        stretches = loads.stretches_of(load, scenario.ground.tilt)
         largest = max(abs(one.value) for one in stretches)
         fields, own = _fields(scenario, load, placed, numbers, largest)
         for name, value in fields.items():
             record[name] = value
-        record["body"] = numbers[load.body] if isinstance(load, OnBody) else 0
+        record["body"] = numbers[load.body] if isinstance(load, loads.OnBody) else 0
         record["first_piece"], record["last_piece"] = len(rows), len(rows) + len(stretches)
         level = 1.0  # m: of water the history is that of the level
-        if isinstance(load, Pressure) and load.water_level is not None:
+        if isinstance(load, loads.Pressure) and load.water_level is not None:
             level = load.water_level
         rows += [(one.start, level * one.value, level * one.rate) for one in stretches]
         push, end = push + own, max(end, stretches[-1].start)
     pieces = arrays.zeros(len(rows), arrays.LOAD_PIECE)
-    for name, column in zip(Stretch._fields, zip(*rows, strict=True), strict=False):
+    for name, column in zip(loads.Stretch._fields, zip(*rows, strict=True), strict=False):
         pieces[name] = column
-    return LoadArrays(loads, pieces, push, end)
+    return LoadArrays(records, pieces, push, end)
 
 
 def _fields(
-    scenario: Scenario, load: AnyLoad, placed: Sequence[PlacedBody], numbers: Mapping[str, int], largest: float
+    scenario: Scenario, load: loads.AnyLoad, placed: Sequence[PlacedBody], numbers: Mapping[str, int], largest: float
 ) -> tuple[dict[str, float], float]:
     """Return the fields of the record of a load, but for its body and pieces, and a bound of its push.
 
     That is what it gives a point of a body (m/s2) beyond gravity of its usual size, with a factor of `largest`.
     """
     tilt = scenario.ground.tilt
-    if isinstance(load, Gravity):  # it turns, and gets no larger
+    if isinstance(load, loads.Gravity):  # it turns, and gets no larger
         return {"kind": arrays.LOAD_TILT, "fx": scenario.gravity}, 0.0
-    if isinstance(load, Horizontal):
+    if isinstance(load, loads.Horizontal):
         size = load.magnitude * scenario.gravity
         fields = {"kind": arrays.LOAD_FIELD, "fx": size * math.cos(tilt), "fy": -size * math.sin(tilt)}
         return fields, largest * abs(load.magnitude) * scenario.gravity
     body = placed[numbers[load.body]]
     radius = body.radius
-    if isinstance(load, Moment):
+    if isinstance(load, loads.Moment):
         fields = {"kind": arrays.LOAD_FORCE, "torque": load.magnitude}
         return fields, largest * (abs(load.magnitude) * radius / body.inertia)
-    if isinstance(load, Force):
+    if isinstance(load, loads.Force):
         x, y = load.point
         fx, fy = load.magnitude * math.cos(load.direction), load.magnitude * math.sin(load.direction)
         fields = {"kind": arrays.LOAD_FORCE, "x": x, "y": y, "fx": fx, "fy": fy, "turns": load.axes == "body"}
@@ -110,8 +100,8 @@ def _fields(
 def steepest_tilt(scenario: Scenario) -> float:
     """Return the greatest slope (rad) that gravity has in a run, without its sign."""
     tilt = scenario.ground.tilt
-    tilts = [one.value for load in scenario.loads if isinstance(load, Gravity) for one in stretches_of(load, tilt)]
-    return max(map(abs, (tilt, *tilts)))
+    turns = (loads.stretches_of(load, tilt) for load in scenario.loads if isinstance(load, loads.Gravity))
+    return max(map(abs, (tilt, *(one.value for stretches in turns for one in stretches))))
 
 
 class Drives(NamedTuple):

@@ -5,16 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    WithJsonSchema,
-    create_model,
-    model_validator,
-)
+import pydantic
+from pydantic import Field
 from pydantic.json_schema import JsonSchemaValue
 
 from blocksim.scenario import input_files, spelling, units
@@ -23,12 +15,12 @@ if TYPE_CHECKING:
     from blocksim.scenario.models.scenario import Scenario
 
 
-class Table(BaseModel):
+class Table(pydantic.BaseModel):
     """One TOML table: frozen, no unknown keys, no silent conversions."""
 
-    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+    model_config = pydantic.ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def _checked(self) -> Self:
         self._check()
         return self
@@ -118,7 +110,7 @@ def require_one(missing: str, **values: object) -> None:
         raise units.invalid(f"{' and '.join(given)} are both given; keep one of them", given[-1])
 
 
-PATH_SCHEMA = WithJsonSchema({"type": "string", "minLength": 1})
+PATH_SCHEMA = pydantic.WithJsonSchema({"type": "string", "minLength": 1})
 """Of the path of a file, for editors."""
 
 
@@ -154,7 +146,7 @@ DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "
 _DEVICE = "([Cc][Oo][Nn]|[Pp][Rr][Nn]|[Aa][Uu][Xx]|[Nn][Uu][Ll]|[Cc][Oo][Mm][1-9]|[Ll][Pp][Tt][1-9])"
 Identifier = Annotated[
     str,
-    BeforeValidator(_identifier),
+    pydantic.BeforeValidator(_identifier),
     Field(json_schema_extra={"pattern": rf"^(?!{_DEVICE}(\.|$))[A-Za-z0-9_]([A-Za-z0-9._-]{{0,98}}[A-Za-z0-9_-])?$"}),
 ]
 """A name that can be a folder or a table cell on every system."""
@@ -178,9 +170,9 @@ SYSTEMS: dict[str, type[SystemTable]] = {}
 """Table of a scenario and its model."""
 
 
-def read_tables(held: Any, info: ValidationInfo) -> dict[str, tuple[SystemTable, ...]]:
+def read_tables(held: Any, info: pydantic.ValidationInfo) -> dict[str, tuple[SystemTable, ...]]:
     """Return the validated tables of all systems; raises pydantic's error, with their places."""
     several: Any = tuple  # of which type follows at run time
     fields: dict[str, Any] = {name: (several[SYSTEMS[name], ...], ...) for name in held}
-    read = create_model("Systems", __base__=Table, **fields).model_validate(held, context=info.context)
+    read = pydantic.create_model("Systems", __base__=Table, **fields).model_validate(held, context=info.context)
     return {name: getattr(read, name) for name in held}

@@ -6,14 +6,8 @@ from functools import cached_property
 from itertools import chain, pairwise
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import (
-    ConfigDict,
-    Field,
-    SerializerFunctionWrapHandler,
-    field_validator,
-    model_serializer,
-    model_validator,
-)
+import pydantic
+from pydantic import ConfigDict, Field
 from pydantic_core import PydanticKnownError
 
 from blocksim.scenario import geometry, units as q
@@ -109,7 +103,7 @@ class Block(Table):
     )
     material: str = Field(description="the name of the block's material")
 
-    @model_validator(mode="before")
+    @pydantic.model_validator(mode="before")
     @classmethod
     def _needs_its_shape(cls, data: object) -> object:
         """Mark what is missing for the shape that is begun, so that each key is reported by itself."""
@@ -119,7 +113,7 @@ class Block(Table):
         needed = OUTLINE_KEYS.get(shape, () if "depth" in data and data.keys().isdisjoint(SIDES) else SIDES)
         return {**dict.fromkeys(needed, ABSENT), **data}
 
-    @field_validator(*SIDES, "outline", "sides", "radius", "given_depth", mode="before")
+    @pydantic.field_validator(*SIDES, "outline", "sides", "radius", "given_depth", mode="before")
     @classmethod
     def _is_there(cls, value: object) -> object:
         if value is ABSENT:
@@ -145,8 +139,8 @@ class Block(Table):
         for _, message in geometry.faults(self.polygon) if self.sides is not None and self.radius is not None else ():
             raise q.invalid(message, "radius")
 
-    @model_serializer(mode="wrap")
-    def _own_keys(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    @pydantic.model_serializer(mode="wrap")
+    def _own_keys(self, write: pydantic.SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out the keys of other shapes: they decide nothing."""
         data: dict[str, Any] = write(self)
         return {key: value for key, value in data.items() if self.has_key(key)}

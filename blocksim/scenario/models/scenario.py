@@ -4,14 +4,8 @@ from collections.abc import Mapping
 from html import escape
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    SerializeAsAny,
-    SerializerFunctionWrapHandler,
-    model_serializer,
-    model_validator,
-)
+import pydantic
+from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from blocksim.scenario import units as q
@@ -66,10 +60,10 @@ class Scenario(Table):
     )
 
     systems: SkipJsonSchema[
-        Annotated[dict[str, tuple[SerializeAsAny[SystemTable], ...]], BeforeValidator(read_tables)]
+        Annotated[dict[str, tuple[pydantic.SerializeAsAny[SystemTable], ...]], pydantic.BeforeValidator(read_tables)]
     ] = Field(default={}, alias="(systems)", description="tables of systems beside blocks and supports, by their name")
 
-    @model_validator(mode="before")
+    @pydantic.model_validator(mode="before")
     @classmethod
     def _with_systems(cls, data: object) -> object:
         if not isinstance(data, Mapping) or not any(name in SYSTEMS for name in data):
@@ -77,8 +71,8 @@ class Scenario(Table):
         held = {name: entry for name, entry in data.items() if name in SYSTEMS}
         return {**{key: entry for key, entry in data.items() if key not in held}, HELD: held}
 
-    @model_serializer(mode="wrap")
-    def _without_systems(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    @pydantic.model_serializer(mode="wrap")
+    def _without_systems(self, write: pydantic.SerializerFunctionWrapHandler) -> dict[str, Any]:
         data: dict[str, Any] = write(self)
         systems: dict[str, Any] = data.pop(HELD, data.pop("systems", {}))
         return data | systems

@@ -6,16 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    GetJsonSchemaHandler,
-    PlainValidator,
-    ValidationInfo,
-    WithJsonSchema,
-    field_validator,
-    model_validator,
-)
+import pydantic
+from pydantic import Field, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
@@ -242,7 +234,7 @@ KEYS_OF = {"samples": SAMPLED, "seed": SAMPLED, "table": ("table",)}
 """Keys of [sweep] that only some modes have."""
 
 
-def _existing_table(value: object, info: ValidationInfo) -> object:
+def _existing_table(value: object, info: pydantic.ValidationInfo) -> object:
     """Resolve the path against the scenario's folder, which is the validation context, and look for it."""
     if isinstance(value, Path):
         return value
@@ -250,7 +242,7 @@ def _existing_table(value: object, info: ValidationInfo) -> object:
     return table_path(value, folder, "experiments/three_blocks.csv")
 
 
-TablePath = Annotated[Path, BeforeValidator(_existing_table), PATH_SCHEMA]
+TablePath = Annotated[Path, pydantic.BeforeValidator(_existing_table), PATH_SCHEMA]
 
 
 class Experiment(Table):
@@ -266,7 +258,7 @@ class _Slip:
     meant: str
 
 
-def _variation(value: object, info: ValidationInfo) -> Variation:
+def _variation(value: object, info: pydantic.ValidationInfo) -> Variation:
     """Read what the mode allows; where the mode itself is wrong, anything that some mode allows."""
     if isinstance(value, _Slip):
         raise q.invalid(f"unknown key, did you mean {value.meant!r}?", at="key")
@@ -279,7 +271,7 @@ def _variation(value: object, info: ValidationInfo) -> Variation:
     return _read_distribution(value) if is_sampled else _read_spread(value)
 
 
-def _of_the_mode(value: object, info: ValidationInfo) -> object:
+def _of_the_mode(value: object, info: pydantic.ValidationInfo) -> object:
     """Refuse a key that belongs to other modes."""
     modes = KEYS_OF[str(info.field_name)]
     mode = info.data.get("mode")
@@ -289,7 +281,7 @@ def _of_the_mode(value: object, info: ValidationInfo) -> object:
     return value
 
 
-Values = Annotated[Variation, PlainValidator(_variation), WithJsonSchema(VALUES_SCHEMA)]
+Values = Annotated[Variation, pydantic.PlainValidator(_variation), pydantic.WithJsonSchema(VALUES_SCHEMA)]
 
 
 class Sweep(Table):
@@ -300,13 +292,13 @@ class Sweep(Table):
         description="grid: every combination; list: all first values, all second values …; table: rows of a file; "
         "lhs: Latin hypercube; sobol: scrambled Sobol points; normal: independent random draws",
     )
-    samples: Annotated[int, Whole(1, MAX_SAMPLES), BeforeValidator(_of_the_mode)] = Field(
+    samples: Annotated[int, Whole(1, MAX_SAMPLES), pydantic.BeforeValidator(_of_the_mode)] = Field(
         default=128, description="number of cases to draw (lhs, sobol, normal; sobol is balanced at powers of two)"
     )
-    seed: Annotated[int, Whole(0, MAX_SEED), BeforeValidator(_of_the_mode)] = Field(
+    seed: Annotated[int, Whole(0, MAX_SEED), pydantic.BeforeValidator(_of_the_mode)] = Field(
         default=0, description="random seed (lhs, sobol, normal)"
     )
-    table: Annotated[TablePath | None, BeforeValidator(_of_the_mode)] = Field(
+    table: Annotated[TablePath | None, pydantic.BeforeValidator(_of_the_mode)] = Field(
         default=None,
         description="CSV table of cases, relative to the scenario file: one column per key, units as in `overlap [mm]`",
     )
@@ -315,7 +307,7 @@ class Sweep(Table):
         '{ mean, sd, from, to }; scale = "log" with from and to'
     )
 
-    @model_validator(mode="before")
+    @pydantic.model_validator(mode="before")
     @classmethod
     def _collect(cls, value: object) -> object:
         if not isinstance(value, Mapping) or "vary" in value:
@@ -327,7 +319,7 @@ class Sweep(Table):
             raise q.invalid('nothing to vary; add a line such as "contact.stiffness_scale" = [0.1, 1.0]')
         return {**own, "vary": keys}
 
-    @field_validator("vary")
+    @pydantic.field_validator("vary")
     @classmethod
     def _lists_first(cls, vary: dict[str, Variation]) -> dict[str, Variation]:
         """Put lists before distributions, as in a resolved file: Sobol's dimensions follow the order of keys."""

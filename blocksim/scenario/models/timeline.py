@@ -3,20 +3,11 @@
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, get_args
 
-from pydantic import (
-    BeforeValidator,
-    Discriminator,
-    Field,
-    SerializeAsAny,
-    Tag,
-    ValidationInfo,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
-)
+import pydantic
+from pydantic import Field
 
-from blocksim.scenario import units as q
+from blocksim.scenario import spelling, units as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table, TimeOr, Whole, by_kind, require_one
-from blocksim.scenario.spelling import nearest
 
 Scheme = Literal["explicit", "nonsmooth"]
 SPRINGS, IMPULSES = map(str, get_args(Scheme))
@@ -100,20 +91,20 @@ def scheme_of(value: object) -> str:
     scheme = value.get("scheme") if isinstance(value, Mapping) else getattr(value, "scheme", None)
     if not isinstance(scheme, str):
         return SPRINGS
-    return scheme if scheme in SCHEMES else nearest(scheme, SCHEMES, most=MOST_SLIPS) or SPRINGS
+    return scheme if scheme in SCHEMES else spelling.nearest(scheme, SCHEMES, most=MOST_SLIPS) or SPRINGS
 
 
-def _registered(value: object, usual: ValidatorFunctionWrapHandler, info: ValidationInfo) -> object:
+def _registered(value: object, usual: pydantic.ValidatorFunctionWrapHandler, info: pydantic.ValidationInfo) -> object:
     """Read the table of a scheme that is none of those in the union."""
     scheme = SCHEMES[scheme_of(value)]
     return usual(value) if scheme in (Explicit, Nonsmooth) else scheme.model_validate(value, context=info.context)
 
 
-AnyTime = SerializeAsAny[
+AnyTime = pydantic.SerializeAsAny[
     Annotated[
-        Annotated[Explicit, Tag(SPRINGS)] | Annotated[Nonsmooth, Tag(IMPULSES)],
-        Discriminator(scheme_of),
-        WrapValidator(_registered),
+        Annotated[Explicit, pydantic.Tag(SPRINGS)] | Annotated[Nonsmooth, pydantic.Tag(IMPULSES)],
+        pydantic.Discriminator(scheme_of),
+        pydantic.WrapValidator(_registered),
     ]
 ]
 """Any stepping, distinguished by its `scheme`."""
@@ -240,7 +231,7 @@ class JointProbe(Probe):
     """Opening and slip of the joint between two faces that lie opposite each other at the start."""
 
     kind: Literal["joint"] = Field(description="kind of probe")
-    bodies: Annotated[tuple[str, str], BeforeValidator(_two)] = Field(
+    bodies: Annotated[tuple[str, str], pydantic.BeforeValidator(_two)] = Field(
         description="two bodies by name; the joint turns with the first"
     )
 
