@@ -12,8 +12,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from blocksim.kernels.common.arrays import ARRIVED, MEETINGS, TEAM_SIZE, Integers
-from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common import arrays, jit
 
 WORD_BYTES = 8
 SPINS = 100  # examines the number of meetings, some 2 us, before the core is offered to others
@@ -73,16 +72,16 @@ write: Any = intrinsic(_write)
 relax: Any = intrinsic(_relax)
 
 
-@rare_kernel
-def wait_for_all(team: Integers) -> None:
+@jit.rare_kernel
+def wait_for_all(team: arrays.Integers) -> None:
     """Wait until as many threads as the team has are here."""
-    meeting = read(team, MEETINGS)
-    if add_one(team, ARRIVED) == team[TEAM_SIZE] - 1:
-        write(team, ARRIVED, 0)
-        write(team, MEETINGS, meeting + 1)
+    meeting = read(team, arrays.MEETINGS)
+    if add_one(team, arrays.ARRIVED) == team[arrays.TEAM_SIZE] - 1:
+        write(team, arrays.ARRIVED, 0)
+        write(team, arrays.MEETINGS, meeting + 1)
         return
     spins = 0
-    while read(team, MEETINGS) == meeting:
+    while read(team, arrays.MEETINGS) == meeting:
         spins += 1
         if spins < SPINS:
             relax()
@@ -90,8 +89,8 @@ def wait_for_all(team: Integers) -> None:
             give_way()
 
 
-@kernel
-def barrier(team: Integers) -> None:
+@jit.kernel
+def barrier(team: arrays.Integers) -> None:
     """Wait for the others of the team, if there are any."""
-    if team[TEAM_SIZE] > 1:
+    if team[arrays.TEAM_SIZE] > 1:
         wait_for_all(team)

@@ -2,12 +2,11 @@
 
 import math
 
-from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, World
-from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common import arrays, jit
 
 
-@rare_kernel
-def potential_energy(world: World) -> float:
+@jit.rare_kernel
+def potential_energy(world: arrays.World) -> float:
     """Return the energy (J) of all masses in the field of gravity, zero at the origin."""
     total = 0.0
     controls = world.controls[0]
@@ -17,8 +16,8 @@ def potential_energy(world: World) -> float:
     return total
 
 
-@rare_kernel
-def weights_power(world: World) -> float:
+@jit.rare_kernel
+def weights_power(world: arrays.World) -> float:
     """Return the power (W) of all weights, each counted positive: summed over time, the travel of the weights."""
     total = 0.0
     controls = world.controls[0]
@@ -28,10 +27,10 @@ def weights_power(world: World) -> float:
     return total
 
 
-@rare_kernel
-def smallest_side(body: Record) -> float:
+@jit.rare_kernel
+def smallest_side(body: arrays.Record) -> float:
     """Return the smaller side (m) of a body, of a polygon its least width; infinite for the ground and its pieces."""
-    if body.faces == OUTLINE:
+    if body.faces == arrays.OUTLINE:
         return float(body.least_width)
     half = min(body.half_x, body.half_y)
-    return 2.0 * half if half > 0.0 and body.faces == ALL else math.inf
+    return 2.0 * half if half > 0.0 and body.faces == arrays.ALL else math.inf

@@ -2,8 +2,7 @@
 
 import math
 
-from blocksim.kernels.common.arrays import World
-from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common import arrays, jit
 
 FARTHEST_CELL = 1e9  # bodies beyond it share cells
 
@@ -11,20 +10,20 @@ FARTHEST_CELL = 1e9  # bodies beyond it share cells
 PRIME_COLUMN, PRIME_ROW = 73856093, 19349663  # M. Teschner et al., Proc. VMV (2003) 47-54
 
 
-@rare_kernel
+@jit.rare_kernel
 def cell_of(place: float, width: float) -> int:
     """Return the number of the cell along one axis."""
     return math.floor(min(max(place / width, -FARTHEST_CELL), FARTHEST_CELL))
 
 
-@rare_kernel
+@jit.rare_kernel
 def bucket(column: int, row: int, size: int) -> int:
     """Return the bucket of a cell in a table whose size is a power of two."""
     return (column * PRIME_COLUMN ^ row * PRIME_ROW) & (size - 1)
 
 
-@rare_kernel
-def fill_grid(world: World) -> None:
+@jit.rare_kernel
+def fill_grid(world: arrays.World) -> None:
     """Link the bodies of every bucket, in the order of their numbers; the largest ones and the ground stay out."""
     controls = world.controls[0]
     world.heads[:] = 0

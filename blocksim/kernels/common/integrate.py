@@ -2,13 +2,11 @@
 
 import math
 
-from blocksim.kernels.common.arrays import Record, Records, World
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import place_corners, turn
+from blocksim.kernels.common import arrays, jit, shapes
 
 
-@kernel
-def start_step(body: Record, step: float) -> None:
+@jit.kernel
+def start_step(body: arrays.Record, step: float) -> None:
     """Advance the velocities of a body by half a step, then its position and rotation by a full one.
 
     Uses the accelerations of the last force evaluation.
@@ -21,26 +19,26 @@ def start_step(body: Record, step: float) -> None:
     body.x += step * body.vx
     body.y += step * body.vy
     body.angle += turned
-    body.cos, body.sin = turn(body.cos, body.sin, turned)
-    place_corners(body)
+    body.cos, body.sin = shapes.turn(body.cos, body.sin, turned)
+    shapes.place_corners(body)
 
 
-@kernel
-def start_all(bodies: Records, first: int, last: int, step: float) -> None:
+@jit.kernel
+def start_all(bodies: arrays.Records, first: int, last: int, step: float) -> None:
     """Start a step of the bodies from `first` to before `last`; the ground, the last of all, never moves by itself."""
     for i in range(first, min(last, bodies.size - 1)):
         start_step(bodies[i], step)
 
 
-@rare_kernel
-def place_all_corners(bodies: Records) -> None:
+@jit.rare_kernel
+def place_all_corners(bodies: arrays.Records) -> None:
     """Update the vectors to the corners of all bodies after their rotations changed; the ground has none."""
     for i in range(bodies.size - 1):
-        place_corners(bodies[i])
+        shapes.place_corners(bodies[i])
 
 
-@rare_kernel
-def renew_angles(bodies: Records) -> None:
+@jit.rare_kernel
+def renew_angles(bodies: arrays.Records) -> None:
     """Recompute cosines and sines from the angles, so that round-off does not add up."""
     for i in range(bodies.size):
         body = bodies[i]
@@ -48,15 +46,15 @@ def renew_angles(bodies: Records) -> None:
         body.sin = math.sin(body.angle)
 
 
-@rare_kernel
-def renew_rotations(bodies: Records) -> None:
+@jit.rare_kernel
+def renew_rotations(bodies: arrays.Records) -> None:
     """Do the same, and update the vectors to the corners."""
     renew_angles(bodies)
     place_all_corners(bodies)
 
 
-@kernel
-def finish_step(body: Record, controls: Record, step: float) -> None:
+@jit.kernel
+def finish_step(body: arrays.Record, controls: arrays.Record, step: float) -> None:
     """Turn gravity and contact totals of a body into accelerations, advance its velocities by half a step with them.
 
     Clears the totals. Fixed bodies and the ground have no acceleration; their totals are the support's affair.
@@ -78,8 +76,8 @@ def finish_step(body: Record, controls: Record, step: float) -> None:
         body.torque = 0.0
 
 
-@rare_kernel
-def kinetic_energy(world: World) -> float:
+@jit.rare_kernel
+def kinetic_energy(world: arrays.World) -> float:
     """Return the kinetic energy (J) of all bodies."""
     total = 0.0
     for i in range(world.bodies.size - 1):
@@ -88,8 +86,8 @@ def kinetic_energy(world: World) -> float:
     return 0.5 * total
 
 
-@rare_kernel
-def fastest_point(bodies: Records) -> float:
+@jit.rare_kernel
+def fastest_point(bodies: arrays.Records) -> float:
     """Return an upper bound (m/s) of the speed of any point of any body; infinite when a state is not finite."""
     fastest = 0.0
     for i in range(bodies.size - 1):

@@ -10,9 +10,7 @@ Potential energy is that in the gravity of the controls. What turned gravity doe
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import GROUP, LOAD_FORCE, LOAD_TILT, LOAD_WATER, Record, Records, World
-from blocksim.kernels.common.jit import rare_kernel
-from blocksim.kernels.common.shapes import turn
+from blocksim.kernels.common import arrays, jit, shapes
 
 
 class Pose(NamedTuple):
@@ -24,8 +22,8 @@ class Pose(NamedTuple):
     sin: float
 
 
-@rare_kernel
-def value_at(world: World, load: Record, time: float) -> float:
+@jit.rare_kernel
+def value_at(world: arrays.World, load: arrays.Record, time: float) -> float:
     """Return the value of a load at a time (s): a factor, a level (m) or a tilt (rad)."""
     low = load.first_piece
     high = load.last_piece
@@ -39,18 +37,18 @@ def value_at(world: World, load: Record, time: float) -> float:
     return piece.value + (time - piece.start) * piece.rate
 
 
-@rare_kernel
-def acceleration_at(world: World, load: Record, time: float) -> tuple[float, float]:
+@jit.rare_kernel
+def acceleration_at(world: arrays.World, load: arrays.Record, time: float) -> tuple[float, float]:
     """Return the acceleration (m/s2) that a load gives all free bodies beyond gravity."""
     value = value_at(world, load, time)
-    if load.kind == LOAD_TILT:
+    if load.kind == arrays.LOAD_TILT:
         controls = world.controls[0]
         return -load.fx * math.sin(value) - controls.gravity_x, -load.fx * math.cos(value) - controls.gravity_y
     return value * load.fx, value * load.fy
 
 
-@rare_kernel
-def water_on(load: Record, level: float, pose: Pose) -> tuple[float, float]:
+@jit.rare_kernel
+def water_on(load: arrays.Record, level: float, pose: Pose) -> tuple[float, float]:
     """Return force (N) of water on a face along its inward normal, and where it acts: a fraction of the length.
 
     Depth goes linearly along the face, whose dry part is cut off: the exact integral over the wet one.
@@ -72,13 +70,13 @@ def water_on(load: Record, level: float, pose: Pose) -> tuple[float, float]:
     return load.unit_weight * mean * (end - begin), centre
 
 
-@rare_kernel
-def force_at(world: World, load: Record, time: float, pose: Pose) -> tuple[float, float, float]:
+@jit.rare_kernel
+def force_at(world: arrays.World, load: arrays.Record, time: float, pose: Pose) -> tuple[float, float, float]:
     """Return force (N) and torque about the centre (N m) of a load on its body."""
     value = value_at(world, load, time)
     along = 0.0
     size = value
-    if load.kind == LOAD_WATER:
+    if load.kind == arrays.LOAD_WATER:
         size, along = water_on(load, value, pose)
     x = load.x + along * (load.end_x - load.x)
     y = load.y + along * (load.end_y - load.y)
@@ -91,8 +89,8 @@ def force_at(world: World, load: Record, time: float, pose: Pose) -> tuple[float
     return fx, fy, size * load.torque + arm_x * fy - arm_y * fx
 
 
-@rare_kernel
-def accelerate(world: World, load: Record, first: int, last: int, time: float, step: float) -> None:
+@jit.rare_kernel
+def accelerate(world: arrays.World, load: arrays.Record, first: int, last: int, time: float, step: float) -> None:
     """Add an acceleration of all to the free bodies from `first` to before `last`, and tally its work.
 
     `time` (s) is the end of that drift, `step` (s) its length.
@@ -106,16 +104,16 @@ def accelerate(world: World, load: Record, first: int, last: int, time: float, s
             body.fx += body.mass * ax
             body.fy += body.mass * ay
             work = half * body.mass * ((ax + bx) * body.vx + (ay + by) * body.vy)
-            world.ledger[i // GROUP].to_loads -= work
+            world.ledger[i // arrays.GROUP].to_loads -= work
 
 
-@rare_kernel
-def push(world: World, load: Record, time: float, step: float) -> None:
+@jit.rare_kernel
+def push(world: arrays.World, load: arrays.Record, time: float, step: float) -> None:
     """Add a load on one body to its totals, and tally its work of the last drift as `accelerate` does."""
     body = world.bodies[load.body]
     fx, fy, torque = force_at(world, load, time, Pose(body.x, body.y, body.cos, body.sin))
     work = (load.last_fx + fx) * body.vx + (load.last_fy + fy) * body.vy + (load.last_torque + torque) * body.spin
-    world.ledger[load.body // GROUP].to_loads -= 0.5 * step * work
+    world.ledger[load.body // arrays.GROUP].to_loads -= 0.5 * step * work
     load.last_fx = fx
     load.last_fy = fy
     load.last_torque = torque
@@ -124,25 +122,27 @@ def push(world: World, load: Record, time: float, step: float) -> None:
     body.torque += torque
 
 
-@rare_kernel
-def push_bodies(world: World, first: int, last: int, time: float, step: float) -> None:
+@jit.rare_kernel
+def push_bodies(world: arrays.World, first: int, last: int, time: float, step: float) -> None:
     """Add all loads to the totals of the bodies from `first` to before `last`, at the end of a drift of `step` (s)."""
     for load in world.loads:
-        if load.kind >= LOAD_FORCE:
+        if load.kind >= arrays.LOAD_FORCE:
             if first <= load.body < last:
                 push(world, load, time, step)
         else:
             accelerate(world, load, first, min(last, world.bodies.size - 1), time, step)
 
 
-@rare_kernel
-def are_loads_steady(world: World) -> bool:
+@jit.rare_kernel
+def are_loads_steady(world: arrays.World) -> bool:
     """Return True if no load changes any more with time, or there is none."""
     return world.clock[0].steps * world.controls[0].step >= world.controls[0].loads_end
 
 
-@rare_kernel
-def accelerations(world: World, lines: Records, pushes: Records, first: int, last: int, time: float) -> None:
+@jit.rare_kernel
+def accelerations(
+    world: arrays.World, lines: arrays.Records, pushes: arrays.Records, first: int, last: int, time: float
+) -> None:
     """Write what loads give the bodies from `first` to before `last` at a time (s), their displacements in `lines`.
 
     `lines` and `pushes` are those of the non-smooth scheme; what was there before is kept as the last.
@@ -154,7 +154,7 @@ def accelerations(world: World, lines: Records, pushes: Records, first: int, las
         one.last_rate = one.rate
         one.ax = one.ay = one.rate = 0.0
     for load in world.loads:
-        if load.kind < LOAD_FORCE:
+        if load.kind < arrays.LOAD_FORCE:
             ax, ay = acceleration_at(world, load, time)
             for i in range(first, last):
                 if lines[i].inverse_mass > 0.0:
@@ -164,11 +164,11 @@ def accelerations(world: World, lines: Records, pushes: Records, first: int, las
             add_force(world, load, lines[load.body], pushes[load.body], time)
 
 
-@rare_kernel
-def add_force(world: World, load: Record, line: Record, one: Record, time: float) -> None:
+@jit.rare_kernel
+def add_force(world: arrays.World, load: arrays.Record, line: arrays.Record, one: arrays.Record, time: float) -> None:
     """Add what a load on one body gives it, at its place in the step so far."""
     body = world.bodies[load.body]
-    cos, sin = turn(body.cos, body.sin, line.turned)
+    cos, sin = shapes.turn(body.cos, body.sin, line.turned)
     fx, fy, torque = force_at(world, load, time, Pose(body.x + line.dx, body.y + line.dy, cos, sin))
     one.ax += line.inverse_mass * fx
     one.ay += line.inverse_mass * fy

@@ -7,23 +7,21 @@ block was first is decided by blocksim.simulation.movement, as for a run with fr
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import Floats, Integers, Records, World
-from blocksim.kernels.common.frame_times import next_frame
-from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common import arrays, frame_times, jit
 
 
-@kernel
-def of_member(records: Records | None, m: int) -> Records | None:
+@jit.kernel
+def of_member(records: arrays.Records | None, m: int) -> arrays.Records | None:
     """Return the particles or corners of one member; None where there are none."""
     if records is None:
         return None
     return records[m]
 
 
-@rare_kernel
-def member(worlds: World, m: int) -> World:
+@jit.rare_kernel
+def member(worlds: arrays.World, m: int) -> arrays.World:
     """Return the world of one member; every array of `worlds` has the members along its first axis."""
-    return World(
+    return arrays.World(
         worlds.bodies[m],
         worlds.pairs[m],
         worlds.contacts[m],
@@ -58,20 +56,20 @@ def member(worlds: World, m: int) -> World:
 class Watched(NamedTuple):
     """What is watched of m members with b blocks each."""
 
-    frames: Floats  # (m,) steps between two frames, zero where peaks are not followed
-    periods: Floats  # (m,) the same, zero where it is not watched what moves first
-    steps: Integers  # (m,) output: the first frame in which a block had moved, zero before
-    places: Floats  # (m, 3, b) output: x, y (m), angle (rad) then
-    start: Floats  # (m, 3, b) x, y (m), angle (rad)
-    reach: Floats  # (m, b) m, half a diagonal
-    thresholds: Floats  # (m, b) m, infinite for fixed blocks
-    peaks: Floats  # (m,) output: rad, the largest rotation of a block that can move
+    frames: arrays.Floats  # (m,) steps between two frames, zero where peaks are not followed
+    periods: arrays.Floats  # (m,) the same, zero where it is not watched what moves first
+    steps: arrays.Integers  # (m,) output: the first frame in which a block had moved, zero before
+    places: arrays.Floats  # (m, 3, b) output: x, y (m), angle (rad) then
+    start: arrays.Floats  # (m, 3, b) x, y (m), angle (rad)
+    reach: arrays.Floats  # (m, b) m, half a diagonal
+    thresholds: arrays.Floats  # (m, b) m, infinite for fixed blocks
+    peaks: arrays.Floats  # (m,) output: rad, the largest rotation of a block that can move
 
 
-step_of_next = rare_kernel(next_frame)
+step_of_next = jit.rare_kernel(frame_times.next_frame)
 
 
-@rare_kernel
+@jit.rare_kernel
 def frame_to_watch(watched: Watched, m: int, done: int) -> int:
     """Return the next step with a frame of a member that is of interest, zero where there is none.
 
@@ -83,8 +81,8 @@ def frame_to_watch(watched: Watched, m: int, done: int) -> int:
     return step_of_next(done, watched.periods[m]) if is_watched else 0
 
 
-@rare_kernel
-def has_moved(bodies: Records, watched: Watched, m: int) -> bool:
+@jit.rare_kernel
+def has_moved(bodies: arrays.Records, watched: Watched, m: int) -> bool:
     """Return True if some block of a member is farther than its threshold from where it began, or not finite."""
     for i in range(watched.thresholds.shape[1]):
         body = bodies[i]
@@ -96,8 +94,8 @@ def has_moved(bodies: Records, watched: Watched, m: int) -> bool:
     return False
 
 
-@rare_kernel
-def watch(bodies: Records, watched: Watched, m: int, step: int) -> None:
+@jit.rare_kernel
+def watch(bodies: arrays.Records, watched: Watched, m: int, step: int) -> None:
     """Examine a frame of a member: how far blocks are turned, and what has moved if nothing had before."""
     for i in range(watched.thresholds.shape[1]):
         turn = abs(bodies[i].angle - watched.start[m, 2, i])

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.common.arrays import Record, Records
-from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common import arrays, jit
 
 SMALL_TURN = 1e-2
 
@@ -20,7 +19,7 @@ SMALL_TURN = 1e-2
 END_RATIO = 3.0
 
 
-@kernel
+@jit.kernel
 def turn(cos: float, sin: float, angle: float) -> tuple[float, float]:
     """Return (cos, sin) rotated by `angle` (rad).
 
@@ -38,8 +37,8 @@ def turn(cos: float, sin: float, angle: float) -> tuple[float, float]:
     return cos * cos_turn - sin * sin_turn, sin * cos_turn + cos * sin_turn
 
 
-@kernel
-def relative_pose(body: Record, other: Record) -> tuple[float, float, float, float]:
+@jit.kernel
+def relative_pose(body: arrays.Record, other: arrays.Record) -> tuple[float, float, float, float]:
     """Return the centre of `body` and the cosine and sine of its rotation, all in the frame of `other`."""
     dx = body.x - other.x
     dy = body.y - other.y
@@ -51,8 +50,8 @@ def relative_pose(body: Record, other: Record) -> tuple[float, float, float, flo
     )
 
 
-@kernel
-def separation(body: Record, other: Record) -> float:
+@jit.kernel
+def separation(body: arrays.Record, other: arrays.Record) -> float:
     """Return the largest gap (m) between two rectangles along their four face normals; negative when they overlap.
 
     Separating axis theorem: never more than the distance between the rectangles.
@@ -67,27 +66,27 @@ def separation(body: Record, other: Record) -> float:
     return max(gap_x, gap_y, gap_u, gap_v)
 
 
-@kernel
-def ground_gap(body: Record) -> float:
+@jit.kernel
+def ground_gap(body: arrays.Record) -> float:
     """Return the height (m) of the lowest corner of a body over the ground."""
     return body.y - abs(body.sin) * body.half_x - abs(body.cos) * body.half_y
 
 
-@kernel
-def to_world(body: Record, px: float, py: float) -> tuple[float, float]:
+@jit.kernel
+def to_world(body: arrays.Record, px: float, py: float) -> tuple[float, float]:
     """Return the world position of a point given in the frame of a body."""
     return body.x + body.cos * px - body.sin * py, body.y + body.sin * px + body.cos * py
 
 
-@kernel
-def slab_depth(px: float, py: float, slab: Record) -> float:
+@jit.kernel
+def slab_depth(px: float, py: float, slab: arrays.Record) -> float:
     """Return how deep (m) a point, given in the frame of a slab of ground, lies below its upper face; zero outside."""
     depth = slab.half_y - py
     return depth if 0.0 < depth <= END_RATIO * (slab.half_x - abs(px)) else 0.0
 
 
-@kernel
-def corner_offset(body: Record, corner: int) -> tuple[float, float]:
+@jit.kernel
+def corner_offset(body: arrays.Record, corner: int) -> tuple[float, float]:
     """Return the vector (m) from the centre of a body to one of its corners, in world axes."""
     is_upper = corner == 0 or corner == 2  # or its opposite
     x = body.upper_x if is_upper else body.lower_x
@@ -95,8 +94,8 @@ def corner_offset(body: Record, corner: int) -> tuple[float, float]:
     return (x, y) if corner == 1 or corner == 2 else (-x, -y)
 
 
-@kernel
-def place_corners(body: Record) -> None:
+@jit.kernel
+def place_corners(body: arrays.Record) -> None:
     """Update the vectors to the corners of a body after its rotation changed."""
     ux = body.cos * body.half_x
     uy = body.sin * body.half_x
@@ -111,7 +110,7 @@ def place_corners(body: Record) -> None:
 class Hull(NamedTuple):
     """The corners of a body: those from `first` on of a table (CORNER). Face k leads from corner k to the next one."""
 
-    table: Records
+    table: arrays.Records
     first: int
     size: int  # number of corners
     inner: float  # m, from the centroid to the nearest face
@@ -120,27 +119,27 @@ class Hull(NamedTuple):
 AnyHull = Any  # None, a type of its own, for rectangles among themselves, whose corners are in no table
 
 
-@kernel
-def hull_of(body: Record, table: Records) -> Hull:
+@jit.kernel
+def hull_of(body: arrays.Record, table: arrays.Records) -> Hull:
     """Return the corners of a body, of a polygon or a rectangle."""
     first: Any = np.int64(body.first_corner)  # compiled code makes floats of signed and unsigned ones together
     size: Any = np.int64(body.corner_count)
     return Hull(table, first, size, body.inner_radius)
 
 
-@kernel
-def corner_at(hull: Hull, number: int) -> Record:
+@jit.kernel
+def corner_at(hull: Hull, number: int) -> arrays.Record:
     """Return a corner, with the face that begins there."""
     return hull.table[hull.first + number]
 
 
-@kernel
+@jit.kernel
 def next_corner(hull: Hull, number: int) -> int:
     """Return the number of the corner after one, counter-clockwise."""
     return number + 1 if number + 1 < hull.size else 0
 
 
-@kernel
+@jit.kernel
 def least_along(hull: Hull, nx: float, ny: float) -> float:
     """Return how far (m) a body reaches from its centre along a unit vector given in its own frame, at least."""
     least = math.inf
@@ -150,7 +149,7 @@ def least_along(hull: Hull, nx: float, ny: float) -> float:
     return least
 
 
-@kernel
+@jit.kernel
 def face_towards(hull: Hull, nx: float, ny: float) -> int:
     """Return the face whose outward normal is nearest to a unit vector given in the frame of the body.
 

@@ -9,53 +9,51 @@ is at p + R(q) (c - p) + s d, and the body is turned by q. Both functions are pi
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import Record, Records, World
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import place_corners
+from blocksim.kernels.common import arrays, jit, shapes
 
 
-@kernel
-def has_motion(controls: Record) -> bool:
+@jit.kernel
+def has_motion(controls: arrays.Record) -> bool:
     """Return True if the support moves at all, or any body is driven."""
     return controls.motion_x != 0.0 or controls.motion_y != 0.0 or controls.driven != 0
 
 
-@kernel
-def is_driven(one: Record) -> bool:
+@jit.kernel
+def is_driven(one: arrays.Record) -> bool:
     """Return True for the record of a body with a motion of its own, among those that move."""
     return one.shift_end > 0
 
 
-@rare_kernel
-def piece_at(motion: Records, piece: int, time: float) -> int:
+@jit.rare_kernel
+def piece_at(motion: arrays.Records, piece: int, time: float) -> int:
     """Return the piece that holds at a time (s), sought from `piece` on."""
     while piece + 1 < motion.size and motion[piece + 1].start <= time:
         piece += 1
     return piece
 
 
-@rare_kernel
-def displacement(piece: Record, time: float) -> float:
+@jit.rare_kernel
+def displacement(piece: arrays.Record, time: float) -> float:
     """Return the displacement (m) at a time (s)."""
     t = time - piece.start
     return piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3))
 
 
-@rare_kernel
-def rate(piece: Record, time: float) -> float:
+@jit.rare_kernel
+def rate(piece: arrays.Record, time: float) -> float:
     """Return the velocity (m/s) at a time (s)."""
     t = time - piece.start
     return piece.c1 + t * (2.0 * piece.c2 + 3.0 * t * piece.c3)
 
 
-@rare_kernel
-def acceleration(piece: Record, time: float) -> float:
+@jit.rare_kernel
+def acceleration(piece: arrays.Record, time: float) -> float:
     """Return the acceleration (m/s2) at a time (s)."""
     return 2.0 * piece.c2 + 6.0 * piece.c3 * (time - piece.start)
 
 
-@rare_kernel
-def move_support(world: World, step: float) -> None:
+@jit.rare_kernel
+def move_support(world: arrays.World, step: float) -> None:
     """Bring everything that moves with the support to the end of the current drift.
 
     Positions are exact at every step, never summed up. The velocity is that of the drift, displacement over time, as
@@ -83,8 +81,8 @@ def move_support(world: World, step: float) -> None:
         body.ay = controls.motion_y * change
 
 
-@rare_kernel
-def tally_support(world: World, step: float) -> None:
+@jit.rare_kernel
+def tally_support(world: arrays.World, step: float) -> None:
     """Tally the work that contacts have done on the support over the last drift, by the trapezoid rule as all work.
 
     Clears the totals.
@@ -104,8 +102,8 @@ def tally_support(world: World, step: float) -> None:
     world.ledger[0].to_support += 0.5 * step * total
 
 
-@rare_kernel
-def is_support_at_rest(world: World) -> bool:
+@jit.rare_kernel
+def is_support_at_rest(world: arrays.World) -> bool:
     """Return True if the motion of the support and of all driven bodies is over, or there is none."""
     time = world.clock[0].steps * world.controls[0].step
     for one in world.moved:
@@ -124,28 +122,28 @@ class Pose(NamedTuple):
     angle: float
 
 
-@rare_kernel
-def path_piece(motion: Records, piece: int, end: int, time: float) -> int:
+@jit.rare_kernel
+def path_piece(motion: arrays.Records, piece: int, end: int, time: float) -> int:
     """Return the piece of one path that holds at a time (s), sought from `piece` to before `end`."""
     while piece + 1 < end and motion[piece + 1].start <= time:
         piece += 1
     return piece
 
 
-@rare_kernel
-def shift_at(world: World, one: Record, time: float) -> Record:
+@jit.rare_kernel
+def shift_at(world: arrays.World, one: arrays.Record, time: float) -> arrays.Record:
     """Return the piece of the shift of a driven body that holds at a time (s) that is not before the current step."""
     return world.motion[path_piece(world.motion, one.shift, one.shift_end, time)]
 
 
-@rare_kernel
-def turn_at(world: World, one: Record, time: float) -> Record:
+@jit.rare_kernel
+def turn_at(world: arrays.World, one: arrays.Record, time: float) -> arrays.Record:
     """Return the piece of the turn of a driven body that holds at a time (s) that is not before the current step."""
     return world.motion[path_piece(world.motion, one.turn, one.turn_end, time)]
 
 
-@rare_kernel
-def pose_at(world: World, one: Record, time: float) -> Pose:
+@jit.rare_kernel
+def pose_at(world: arrays.World, one: arrays.Record, time: float) -> Pose:
     """Return where a driven body is at a time (s) that is not before the current step."""
     shift = displacement(shift_at(world, one, time), time)
     turn = displacement(turn_at(world, one, time), time)
@@ -158,34 +156,34 @@ def pose_at(world: World, one: Record, time: float) -> Pose:
     return Pose(x, y, one.angle + turn)
 
 
-@rare_kernel
-def way_over(world: World, one: Record, begin: float, step: float) -> Pose:
+@jit.rare_kernel
+def way_over(world: arrays.World, one: arrays.Record, begin: float, step: float) -> Pose:
     """Return how far a driven body comes from `begin` (s) on within `step` (s)."""
     then = pose_at(world, one, begin)
     now = pose_at(world, one, begin + step)
     return Pose(now.x - then.x, now.y - then.y, now.angle - then.angle)
 
 
-@rare_kernel
-def put(body: Record, pose: Pose) -> None:
+@jit.rare_kernel
+def put(body: arrays.Record, pose: Pose) -> None:
     """Bring a body to a pose."""
     body.x = pose.x
     body.y = pose.y
     body.angle = pose.angle
     body.cos = math.cos(pose.angle)
     body.sin = math.sin(pose.angle)
-    place_corners(body)
+    shapes.place_corners(body)
 
 
-@rare_kernel
-def follow_pieces(world: World, one: Record, time: float) -> None:
+@jit.rare_kernel
+def follow_pieces(world: arrays.World, one: arrays.Record, time: float) -> None:
     """Have pieces of a driven body sought from those on that hold at a time (s)."""
     one.shift = path_piece(world.motion, one.shift, one.shift_end, time)
     one.turn = path_piece(world.motion, one.turn, one.turn_end, time)
 
 
-@rare_kernel
-def move_driven(world: World, step: float) -> None:
+@jit.rare_kernel
+def move_driven(world: arrays.World, step: float) -> None:
     """Bring all driven bodies to the end of the current drift: poses exact, velocities those of the drift."""
     before = world.clock[0].steps * world.controls[0].step
     for one in world.moved:
@@ -204,8 +202,8 @@ def move_driven(world: World, step: float) -> None:
         note_accelerations(world, one, body, before + step)
 
 
-@rare_kernel
-def note_rates(world: World, one: Record, body: Record, time: float) -> None:
+@jit.rare_kernel
+def note_rates(world: arrays.World, one: arrays.Record, body: arrays.Record, time: float) -> None:
     """Give a driven body the velocity that it has at a time (s)."""
     pose = pose_at(world, one, time)
     shift = shift_at(world, one, time)
@@ -217,8 +215,8 @@ def note_rates(world: World, one: Record, body: Record, time: float) -> None:
     body.vy = one.along_y * speed + spin * (pose.x - one.about_x - one.along_x * moved)
 
 
-@rare_kernel
-def note_accelerations(world: World, one: Record, body: Record, time: float) -> None:
+@jit.rare_kernel
+def note_accelerations(world: arrays.World, one: arrays.Record, body: arrays.Record, time: float) -> None:
     """Give a driven body the accelerations that it has at a time (s), as contacts predict velocities with them."""
     pose = pose_at(world, one, time)
     shift = shift_at(world, one, time)
@@ -233,8 +231,8 @@ def note_accelerations(world: World, one: Record, body: Record, time: float) -> 
     body.ay = one.along_y * change + body.spin_rate * rx - spin * spin * ry
 
 
-@rare_kernel
-def tally_driven(world: World, step: float) -> None:
+@jit.rare_kernel
+def tally_driven(world: arrays.World, step: float) -> None:
     """Tally the work that contacts have done on driven bodies over the last drift, as tally_support does.
 
     Clears the totals.

@@ -25,9 +25,8 @@ from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import ALL, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.damping import OPERATOR_LIFE, renew_dashpots
+from blocksim.kernels.explicit import damping, outlines
 from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, PARALLEL
-from blocksim.kernels.explicit.outlines import cone_of, corner_of, into_world, side_along
 
 FLAT = 0.01  # sine of the angle between two faces up to which they are parallel
 FLAT_SHARE = FLAT / CONE_TOLERANCE  # the same of the cone, where that of polygons is narrower
@@ -186,16 +185,16 @@ class Facing(NamedTuple):
 @kernel
 def seen_along(body: Record, side: Record, nx: float, ny: float) -> tuple[float, float, float, float]:
     """Return the normal of a face in world axes, its middle (m) along the tangent and its cosine to (nx, ny)."""
-    mx, my = into_world(body, side.nx, side.ny)
-    x, y = into_world(body, side.x - side.half * side.ny, side.y + side.half * side.nx)
+    mx, my = outlines.into_world(body, side.nx, side.ny)
+    x, y = outlines.into_world(body, side.x - side.half * side.ny, side.y + side.half * side.nx)
     return mx, my, nx * y - ny * x, abs(mx * nx + my * ny)
 
 
 @rare_kernel
 def facing_of(a: Record, b: Record, nx: float, ny: float, table: Records) -> Facing:
     """Return how the faces of a and b look at each other along the normal (nx, ny), b to a."""
-    one = corner_of(a, table, side_along(a, table, -nx, -ny))
-    two = corner_of(b, table, side_along(b, table, nx, ny))
+    one = outlines.corner_of(a, table, outlines.side_along(a, table, -nx, -ny))
+    two = outlines.corner_of(b, table, outlines.side_along(b, table, nx, ny))
     ax, ay, middle_a, cos_a = seen_along(a, one, nx, ny)
     bx, by, middle_b, cos_b = seen_along(b, two, nx, ny)
     middle_a += nx * (a.y - b.y) - ny * (a.x - b.x)
@@ -204,7 +203,7 @@ def facing_of(a: Record, b: Record, nx: float, ny: float, table: Records) -> Fac
     sine = ax * by - ay * bx  # of the angle from the face of b to that of a
     cosine = -ax * bx - ay * by
     rate = cosine if sine > 0.0 else -cosine
-    return Facing(interval, abs(sine) if cosine > 0.0 else 1.0, rate, cone_of(a, b, table))
+    return Facing(interval, abs(sine) if cosine > 0.0 else 1.0, rate, outlines.cone_of(a, b, table))
 
 
 @rare_kernel
@@ -244,8 +243,8 @@ def measure_soon(pair: Record, slip: float, turned: float, corners: Records | No
     """
     if corners is not None:
         change = abs(pair.slide * slip + pair.turn * turned)
-        if OPERATOR_LIFE * change > MOST_CHANGE * pair.stiffness:
-            renew_dashpots(pair)
+        if damping.OPERATOR_LIFE * change > MOST_CHANGE * pair.stiffness:
+            damping.renew_dashpots(pair)
 
 
 @rare_kernel

@@ -9,12 +9,7 @@ When the pair list has to be rebuilt: how far bodies have come since it was made
 
 import math
 
-from blocksim.kernels.common.arrays import NORMAL, SHEAR, Integers, Record, World
-from blocksim.kernels.common.energy import smallest_side
-from blocksim.kernels.common.grid import bucket, cell_of, fill_grid
-from blocksim.kernels.common.jit import rare_kernel
-from blocksim.kernels.common.shapes import ground_gap, separation
-from blocksim.kernels.common.supports import has_motion
+from blocksim.kernels.common import arrays, energy, grid, jit, shapes, supports
 from blocksim.kernels.explicit.depth import overlap_limit
 from blocksim.kernels.explicit.models import near_slots
 
@@ -22,25 +17,25 @@ MOST_SLOTS = 32  # of corners of a pair
 TRAVELLED = 0.8  # of the skin, by which two bodies may have come nearer since the list was made
 
 
-@rare_kernel
-def are_near(body: Record, other: Record, reach: float) -> bool:
+@jit.rare_kernel
+def are_near(body: arrays.Record, other: arrays.Record, reach: float) -> bool:
     """Return True if two bodies, at least one of them free, may be closer than `reach` (m)."""
     if body.inverse_mass == 0.0 and other.inverse_mass == 0.0:
         return False
     dx = body.x - other.x
     dy = body.y - other.y
     limit = body.radius + other.radius + reach
-    return dx * dx + dy * dy <= limit * limit and separation(body, other) <= reach
+    return dx * dx + dy * dy <= limit * limit and shapes.separation(body, other) <= reach
 
 
-@rare_kernel
-def list_reach(controls: Record) -> float:
+@jit.rare_kernel
+def list_reach(controls: arrays.Record) -> float:
     """Return up to which gap (m) two bodies are listed: they may move by 0.8 of the skin, and be on approach then."""
     return max(controls.skin, TRAVELLED * controls.skin + controls.approach)
 
 
-@rare_kernel
-def add_pair(world: World, count: int, a: int, b: int) -> int:
+@jit.rare_kernel
+def add_pair(world: arrays.World, count: int, a: int, b: int) -> int:
     """Append a pair with its candidate slots, if it has any and there is room; return the count needed."""
     fits = count < world.spare_pairs.size
     row = count if fits else world.spare_pairs.size - 1
@@ -66,8 +61,8 @@ def add_pair(world: World, count: int, a: int, b: int) -> int:
     return count + 1 if near > 0 else count
 
 
-@rare_kernel
-def insert_sorted(row: Integers, count: int, j: int) -> int:
+@jit.rare_kernel
+def insert_sorted(row: arrays.Integers, count: int, j: int) -> int:
     """Insert a number into the first `count` of a sorted row, unless it is there; return the new count."""
     k = count
     while k > 0 and row[k - 1] > j:
@@ -80,11 +75,11 @@ def insert_sorted(row: Integers, count: int, j: int) -> int:
     return count + 1
 
 
-@rare_kernel
-def neighbours_in_cell(world: World, i: int, column: int, row: int, count: int) -> int:
+@jit.rare_kernel
+def neighbours_in_cell(world: arrays.World, i: int, column: int, row: int, count: int) -> int:
     """Add the bodies after i in one cell that are within the skin of it to the work space; return their number."""
     reach = list_reach(world.controls[0])
-    j = world.heads[bucket(column, row, world.heads.size)]
+    j = world.heads[grid.bucket(column, row, world.heads.size)]
     while j > 0:
         if j - 1 > i and are_near(world.bodies[i], world.bodies[j - 1], reach):
             count = insert_sorted(world.neighbours, count, j - 1)
@@ -92,8 +87,8 @@ def neighbours_in_cell(world: World, i: int, column: int, row: int, count: int) 
     return count
 
 
-@rare_kernel
-def neighbours_of_large(world: World, i: int) -> int:
+@jit.rare_kernel
+def neighbours_of_large(world: arrays.World, i: int) -> int:
     """Write the bodies after i that are within the skin of it into the work space, sorted; return their number."""
     count = 0
     for j in range(i + 1, world.bodies.size - 1):
@@ -103,16 +98,16 @@ def neighbours_of_large(world: World, i: int) -> int:
     return count
 
 
-@rare_kernel
-def neighbours_of(world: World, i: int) -> int:
+@jit.rare_kernel
+def neighbours_of(world: arrays.World, i: int) -> int:
     """Write the bodies after i that are within the skin of it into the work space, sorted; return their number."""
     controls = world.controls[0]
     body = world.bodies[i]
     if body.radius > controls.cell_radius:
         return neighbours_of_large(world, i)
     count = 0
-    column = cell_of(body.x, controls.cell_width)
-    row = cell_of(body.y, controls.cell_width)
+    column = grid.cell_of(body.x, controls.cell_width)
+    row = grid.cell_of(body.y, controls.cell_width)
     for x in range(column - 1, column + 2):
         for y in range(row - 1, row + 2):
             count = neighbours_in_cell(world, i, x, y, count)
@@ -122,39 +117,39 @@ def neighbours_of(world: World, i: int) -> int:
     return count
 
 
-@rare_kernel
-def collect_pairs(world: World) -> int:
+@jit.rare_kernel
+def collect_pairs(world: arrays.World) -> int:
     """Write all pairs within reach into the spare list, sorted; return how many there are, fitting or not."""
     bodies = world.bodies
     ground = bodies.size - 1
     reach = list_reach(world.controls[0])
     count = 0
-    fill_grid(world)
+    grid.fill_grid(world)
     for i in range(ground):
         for k in range(neighbours_of(world, i)):
             count = add_pair(world, count, i, world.neighbours[k])
-        if bodies[i].inverse_mass > 0.0 and ground_gap(bodies[i]) <= bodies[ground].y + reach:
+        if bodies[i].inverse_mass > 0.0 and shapes.ground_gap(bodies[i]) <= bodies[ground].y + reach:
             count = add_pair(world, count, i, ground)
     return count
 
 
-@rare_kernel
-def comes_before(one: Record, two: Record) -> bool:
+@jit.rare_kernel
+def comes_before(one: arrays.Record, two: arrays.Record) -> bool:
     """Return True if a pair comes before another in the order of the list."""
     return one.a < two.a or (one.a == two.a and one.b < two.b)
 
 
-@rare_kernel
-def move_contacts(world: World, source: int, target: int, count: int) -> None:
+@jit.rare_kernel
+def move_contacts(world: arrays.World, source: int, target: int, count: int) -> None:
     """Copy the first `count` contacts and the dashpots of one pair's place in the list to another's."""
     for k in range(count):
         world.contacts[target, k] = world.contacts[source, k]
-    world.operators[target, NORMAL] = world.operators[source, NORMAL]
-    world.operators[target, SHEAR] = world.operators[source, SHEAR]
+    world.operators[target, arrays.NORMAL] = world.operators[source, arrays.NORMAL]
+    world.operators[target, arrays.SHEAR] = world.operators[source, arrays.SHEAR]
 
 
-@rare_kernel
-def carry_history(world: World, count: int) -> None:
+@jit.rare_kernel
+def carry_history(world: arrays.World, count: int) -> None:
     """Bring the contacts of pairs that are in both lists to their new places.
 
     Nothing of them changes, so that the motion does not depend on when lists are made. In place, as there is no memory
@@ -190,8 +185,8 @@ def carry_history(world: World, count: int) -> None:
             move_contacts(world, kept, p, world.spare_pairs[p].active)
 
 
-@rare_kernel
-def idle_candidates(pair: Record) -> int:
+@jit.rare_kernel
+def idle_candidates(pair: arrays.Record) -> int:
     """Return how many candidates of a pair are neither in contact nor the duplicate of one that is.
 
     Discs can have two contacts each, so that there may be more of those than candidates.
@@ -202,8 +197,8 @@ def idle_candidates(pair: Record) -> int:
     return max(0, int(pair.near) - int(pair.active) - duplicates)
 
 
-@rare_kernel
-def rebuild_pairs(world: World) -> bool:
+@jit.rare_kernel
+def rebuild_pairs(world: arrays.World) -> bool:
     """Rebuild the pair list; return False, with the old list untouched, where it does not fit."""
     count = collect_pairs(world)
     if count > world.spare_pairs.size:
@@ -220,7 +215,7 @@ def rebuild_pairs(world: World) -> bool:
         body.list_x = body.x
         body.list_y = body.y
         body.list_angle = body.angle
-        body.counts = body.inverse_mass > 0.0 or (body.is_moved != 0 and has_motion(world.controls[0]))
+        body.counts = body.inverse_mass > 0.0 or (body.is_moved != 0 and supports.has_motion(world.controls[0]))
     world.clock[0].pair_count = count
     world.clock[0].rebuilds += 1
     return True
@@ -233,8 +228,8 @@ WAY_SHARE = 0.25  # of the smallest side, by which two bodies may come nearer in
 MOST_UNSEEN_DRIVEN = 8  # steps, where a support moves: how fast it will, nothing here knows
 
 
-@rare_kernel
-def outruns_lists(world: World) -> bool:
+@jit.rare_kernel
+def outruns_lists(world: arrays.World) -> bool:
     """Return True if two bodies could meet in one step that are not listed, or a corner pass through another body.
 
     Steps by the rules are far shorter (world/step.py), so this happens only with forced ones, and where blocks become
@@ -245,21 +240,21 @@ def outruns_lists(world: World) -> bool:
     fastest = 0.0
     for i in range(world.bodies.size):
         body = world.bodies[i]
-        way = min(way, WAY_SHARE * smallest_side(body))
+        way = min(way, WAY_SHARE * energy.smallest_side(body))
         fastest = max(fastest, math.sqrt(body.vx**2 + body.vy**2) + body.radius * abs(body.spin))
     return math.isfinite(fastest) and 2.0 * controls.step * fastest > way
 
 
-@rare_kernel
-def travel(body: Record) -> float:
+@jit.rare_kernel
+def travel(body: arrays.Record) -> float:
     """Return how far (m) a corner of a body may have come since the pair list was made."""
     dx = body.x - body.list_x
     dy = body.y - body.list_y
     return math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
 
 
-@rare_kernel
-def unseen_steps(world: World, farthest: float, fastest: float) -> int:
+@jit.rare_kernel
+def unseen_steps(world: arrays.World, farthest: float, fastest: float) -> int:
     """Return for how many steps no body can come beyond its share of the skin.
 
     `farthest` (m) is how far one has come already and `fastest` (m/s) the speed of the fastest point of any. Falls over
@@ -270,13 +265,13 @@ def unseen_steps(world: World, farthest: float, fastest: float) -> int:
     if left <= 0.0:
         return 0
     gravity = math.sqrt(controls.gravity_x**2 + controls.gravity_y**2) + controls.push
-    most = MOST_UNSEEN_DRIVEN if has_motion(controls) else MOST_UNSEEN
+    most = MOST_UNSEEN_DRIVEN if supports.has_motion(controls) else MOST_UNSEEN
     drift = controls.step * (GROWTH * fastest + math.sqrt(2.0 * gravity * left))
     return most if left > drift * most else int(left / drift)
 
 
-@rare_kernel
-def update_pairs(world: World) -> bool:
+@jit.rare_kernel
+def update_pairs(world: arrays.World) -> bool:
     """Rebuild the pair list if a body has come too far since, and set the step of the next check.
 
     Returns False where the list does not fit into its arrays; nothing has changed then.

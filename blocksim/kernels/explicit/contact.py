@@ -22,44 +22,22 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.bearing import ENDS, measure, measure_soon
-from blocksim.kernels.explicit.damping import (
-    BOTH,
-    MOBILITY,
-    OPERATOR_LIFE,
-    add_coupled_dashpots,
-    are_dashpots_due,
-    damp_one,
-    damp_two,
-    fill_alike,
-    fill_different,
-    fill_mobility,
-    fill_single,
-    keep_dashpots,
-    keep_masses,
-    note_slip,
-    renew_dashpots,
-    sliding_mass,
+from blocksim.kernels.explicit import (
+    bearing,
+    damping,
+    depth,
+    friction,
+    history,
+    inertia,
+    kinematics,
+    laws,
+    outlines,
+    persistent_outlines,
+    sliver_axes,
+    slivers,
 )
-from blocksim.kernels.explicit.depth import is_too_deep
-from blocksim.kernels.explicit.friction import clip_to_cone, draw_spring
-from blocksim.kernels.explicit.history import (
-    change_contacts,
-    keep_places,
-    normal_loss,
-    shear_loss,
-    shear_stiffness_before,
-    stiffness_before,
-)
-from blocksim.kernels.explicit.inertia import Piece, piece_of
-from blocksim.kernels.explicit.kinematics import IMPACT_STEPS, coupling, mutual_mass, resolve_point, weigh_onset
-from blocksim.kernels.explicit.laws import elastic_force, has_constant_stiffness, stored_energy, tangent_stiffness
 from blocksim.kernels.explicit.models import SURFACE, contact_points
 from blocksim.kernels.explicit.models.outlines import add_slot, has_passed
-from blocksim.kernels.explicit.outlines import MOST_CORNERS, cone_of, side_along, side_normal
-from blocksim.kernels.explicit.persistent_outlines import begins_on_outlines, has_crossed, lie_on_sliver
-from blocksim.kernels.explicit.sliver_axes import Axis, flat_within
-from blocksim.kernels.explicit.slivers import has_both_ends, points_of_sliver
 
 SEARCH = -1
 
@@ -76,26 +54,26 @@ def lasting_points(world: World, p: int, corners: Records | None) -> int:
 def ends_that_last(world: World, p: int, table: Records) -> int:
     """As lasting_points, for two ends of an interval in a scene with polygons."""
     pair = world.pairs[p]
-    is_settled = pair.active == 2 and pair.bearing == ENDS and pair.is_sliver == 0
-    if has_constant_stiffness(world.controls[0].law) or not is_settled:
+    is_settled = pair.active == 2 and pair.bearing == bearing.ENDS and pair.is_sliver == 0
+    if laws.has_constant_stiffness(world.controls[0].law) or not is_settled:
         return SEARCH
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
-    if pair.duplicates != 0 and has_crossed(world, p, a, b, table):
+    if pair.duplicates != 0 and persistent_outlines.has_crossed(world, p, a, b, table):
         return SEARCH
     if not are_found(world, p, a, b, table):
         return SEARCH
-    if pair.idle > 0 and begins_on_outlines(world, p, a, b, table):
+    if pair.idle > 0 and persistent_outlines.begins_on_outlines(world, p, a, b, table):
         return SEARCH
-    if lie_on_sliver(a, b, world.points[0], world.points[1], table) or not are_both_ends(world, p, a, b, table):
+    if persistent_outlines.lie_on_sliver(a, b, world.points[0], world.points[1], table):
         return SEARCH
-    return 2
+    return 2 if are_both_ends(world, p, a, b, table) else SEARCH
 
 
 @kernel
 def are_found(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
     """Fill `points` with two contacts of a pair; return True if they are still on their faces, and the inner ones."""
-    cone = cone_of(a, b, table)
+    cone = outlines.cone_of(a, b, table)
     duplicates: Any = np.int64(world.pairs[p].duplicates)
     for i in range(2):
         contact = world.contacts[p, i]
@@ -112,15 +90,17 @@ def are_both_ends(world: World, p: int, a: Record, b: Record, table: Records) ->
     """Return True if two points are both ends of the interval of two parallel faces."""
     point = world.points[1 if world.points[1].depth > world.points[0].depth else 0]
     face: Any = np.int64(point.face)
-    of_b = bool(point.slot < MOST_CORNERS)
-    corner: Any = np.int64(point.slot - (0 if of_b else MOST_CORNERS))
+    of_b = bool(point.slot < outlines.MOST_CORNERS)
+    corner: Any = np.int64(point.slot - (0 if of_b else outlines.MOST_CORNERS))
     body, other = (b, a) if of_b else (a, b)
-    nx, ny = side_normal(body, table, face)
-    across = side_along(other, table, -nx, -ny)
-    mx, my = side_normal(other, table, across)
-    if abs(nx * my - ny * mx) > flat_within(cone_of(a, b, table)):
+    nx, ny = outlines.side_normal(body, table, face)
+    across = outlines.side_along(other, table, -nx, -ny)
+    mx, my = outlines.side_normal(other, table, across)
+    if abs(nx * my - ny * mx) > sliver_axes.flat_within(outlines.cone_of(a, b, table)):
         return False
-    return has_both_ends(world, 2, Axis(of_b, face, corner, point.depth), across, world.pairs[p].limit, a, b, table)
+    return slivers.has_both_ends(
+        world, 2, sliver_axes.Axis(of_b, face, corner, point.depth), across, world.pairs[p].limit, a, b, table
+    )
 
 
 @kernel
@@ -128,8 +108,8 @@ def push_spring(point: Record, contact: Record, law: int, stiffness: float) -> N
     """Set the normal spring force of a point and what its dashpot needs."""
     point.before = contact.normal_force
     point.rate = point.closing_rate
-    point.stiffness = tangent_stiffness(law, stiffness * point.share, point.depth)
-    point.force = elastic_force(law, stiffness * point.share, point.depth)
+    point.stiffness = laws.tangent_stiffness(law, stiffness * point.share, point.depth)
+    point.force = laws.elastic_force(law, stiffness * point.share, point.depth)
     point.spring_force = point.force
 
 
@@ -153,9 +133,9 @@ def spare_lost_faces(world: World, p: int, count: int) -> None:
     """
     for i in range(count):
         point = world.points[i]
-        if point.beside < IMPACT_STEPS * abs(point.closing):
+        if point.beside < kinematics.IMPACT_STEPS * abs(point.closing):
             point.weight = 0.0
-            renew_dashpots(world.pairs[p])
+            damping.renew_dashpots(world.pairs[p])
 
 
 @kernel
@@ -193,18 +173,20 @@ def damp(world: World, p: int, count: int, direction: int, pattern: int, ratio: 
         damp_many(world, p, count, direction, ratio, step)
         return
     operator = world.operators[p, direction]
-    if are_dashpots_due(world.pairs[p], direction):
+    if damping.are_dashpots_due(world.pairs[p], direction):
         fill_operator(world, p, count, direction, pattern, ratio, step)
     one = world.points[0]
     if count == 1:
-        one.force = damp_one(operator, one.force, one.before, one.rate)
+        one.force = damping.damp_one(operator, one.force, one.before, one.rate)
     else:
         two = world.points[1]
-        one.force, two.force = damp_two(operator, one.force, two.force, one.before, two.before, one.rate, two.rate)
+        one.force, two.force = damping.damp_two(
+            operator, one.force, two.force, one.before, two.before, one.rate, two.rate
+        )
 
 
 @rare_kernel
-def pieces_of(world: World, p: int, count: int, direction: int) -> tuple[Piece, Piece]:
+def pieces_of(world: World, p: int, count: int, direction: int) -> tuple[inertia.Piece, inertia.Piece]:
     """Return what of both bodies the dashpots of a pair with one or two points stand for."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
@@ -214,8 +196,8 @@ def pieces_of(world: World, p: int, count: int, direction: int) -> tuple[Piece, 
     stiffness = count * pair.stiffness
     mean_a = 0.5 * (one.normal_arm_a + two.normal_arm_a)
     mean_b = 0.5 * (one.normal_arm_b + two.normal_arm_b)
-    of_a = piece_of(a, stiffness, one.nx, one.ny, mean_a, direction)
-    return of_a, piece_of(b, stiffness, one.nx, one.ny, mean_b, direction)
+    of_a = inertia.piece_of(a, stiffness, one.nx, one.ny, mean_a, direction)
+    return of_a, inertia.piece_of(b, stiffness, one.nx, one.ny, mean_b, direction)
 
 
 @rare_kernel
@@ -229,32 +211,34 @@ def fill_operator(world: World, p: int, count: int, direction: int, pattern: int
     two = world.points[count - 1]
     half = 0.5 * step
     of_a, of_b = pieces_of(world, p, count, direction)
-    m_one = mutual_mass(one, one, of_a, of_b, direction)
-    m_mixed = mutual_mass(one, two, of_a, of_b, direction)
-    m_two = mutual_mass(two, two, of_a, of_b, direction)
+    m_one = kinematics.mutual_mass(one, one, of_a, of_b, direction)
+    m_mixed = kinematics.mutual_mass(one, two, of_a, of_b, direction)
+    m_two = kinematics.mutual_mass(two, two, of_a, of_b, direction)
     if direction == NORMAL and pair.slides != 0:
         values = world.interactions[a.contact_class, b.contact_class]
-        m_one = m_mixed = m_two = sliding_mass(m_one, coupling(one, of_a, of_b), values.kinetic_friction, pair.slides)
-    keep_masses(operator, half, m_one, m_mixed, m_two)
+        m_one = m_mixed = m_two = damping.sliding_mass(
+            m_one, kinematics.coupling(one, of_a, of_b), values.kinetic_friction, pair.slides
+        )
+    damping.keep_masses(operator, half, m_one, m_mixed, m_two)
     if pattern == 1:
-        fill_single(operator, 0, ratio, half, m_one, one.stiffness, one.weight)
-    elif pattern != BOTH:
-        fill_single(operator, 1, ratio, half, m_two, two.stiffness, two.weight)
+        damping.fill_single(operator, 0, ratio, half, m_one, one.stiffness, one.weight)
+    elif pattern != damping.BOTH:
+        damping.fill_single(operator, 1, ratio, half, m_two, two.stiffness, two.weight)
     elif one.weight == two.weight and one.stiffness == two.stiffness:
         g = one.weight * 2.0 * ratio * one.stiffness**0.5
-        fill_alike(operator, g, half, m_one, m_mixed, m_two)
+        damping.fill_alike(operator, g, half, m_one, m_mixed, m_two)
     else:
-        fill_different(operator, ratio, half, m_one, m_mixed, m_two, one, two)
+        damping.fill_different(operator, ratio, half, m_one, m_mixed, m_two, one, two)
     lasts = half > 0.0 and one.weight == 1.0 and two.weight == 1.0
-    keep_dashpots(pair, direction, pattern, OPERATOR_LIFE if lasts else 0)
+    damping.keep_dashpots(pair, direction, pattern, damping.OPERATOR_LIFE if lasts else 0)
 
 
 @rare_kernel
 def damp_many(world: World, p: int, count: int, direction: int, ratio: float, step: float) -> None:
     """Add the dashpots of more than two points."""
     pair = world.pairs[p]
-    fill_mobility(world.bodies[pair.a], world.bodies[pair.b], world.matrices[MOBILITY])
-    add_coupled_dashpots(world.points, count, direction, ratio, step, world.matrices)
+    damping.fill_mobility(world.bodies[pair.a], world.bodies[pair.b], world.matrices[damping.MOBILITY])
+    damping.add_coupled_dashpots(world.points, count, direction, ratio, step, world.matrices)
 
 
 @rare_kernel
@@ -268,15 +252,15 @@ def resolve_points(world: World, p: int, count: int, step: float, tally: Record)
     loses_face = False
     for i in range(count):
         point = world.points[i]
-        resolve_point(point, a, b, step)
-        if not has_constant_stiffness(law):
-            weigh_onset(point, law)
+        kinematics.resolve_point(point, a, b, step)
+        if not laws.has_constant_stiffness(law):
+            kinematics.weigh_onset(point, law)
         if i < pair.active:
             contact = world.contacts[p, i]
             continuing += 1 if contact.slot == point.slot and contact.face == point.face else 0
-        loses_face = loses_face or point.beside < IMPACT_STEPS * abs(point.closing)
+        loses_face = loses_face or point.beside < kinematics.IMPACT_STEPS * abs(point.closing)
     if continuing != count or count != pair.active:
-        change_contacts(world, p, count, step, tally)
+        history.change_contacts(world, p, count, step, tally)
     if loses_face:
         spare_lost_faces(world, p, count)
 
@@ -285,7 +269,7 @@ def resolve_points(world: World, p: int, count: int, step: float, tally: Record)
 def foresee_slip(pair: Record, point: Record, values: Record) -> None:
     """Note whether the only contact of a pair, which has just begun, will slide: whether shear outgrows friction."""
     drawn = values.shear_ratio * abs(point.slipping)
-    note_slip(pair, drawn > values.kinetic_friction * point.closing, point.slipping)
+    damping.note_slip(pair, drawn > values.kinetic_friction * point.closing, point.slipping)
 
 
 @rare_kernel
@@ -315,16 +299,16 @@ def draw_springs(world: World, p: int, count: int, values: Record, before: float
     for i in range(count):
         point = world.points[i]
         contact = world.contacts[p, i]
-        of_spring = stiffness_before(contact, before, values, world.particles)
-        old_stiffness = shear_stiffness_before(contact, of_spring, values, law)
-        tally.dashpot += clip_tension(point, normal_loss(contact, of_spring, law))
+        of_spring = history.stiffness_before(contact, before, values, world.particles)
+        old_stiffness = history.shear_stiffness_before(contact, of_spring, values, law)
+        tally.dashpot += clip_tension(point, history.normal_loss(contact, of_spring, law))
         stiffness = values.shear_ratio * point.stiffness
         slip = point.slipping
-        spring, point.limit, slides, friction_work = draw_spring(
+        spring, point.limit, slides, friction_work = friction.draw_spring(
             values, stiffness, old_stiffness, contact.spring, slip, point.drawn, point.normal_force, point.slip_rate
         )
         tally.friction += friction_work
-        point.lost = shear_loss(contact, old_stiffness)
+        point.lost = history.shear_loss(contact, old_stiffness)
         sticking |= 0 if slides else 1 << min(i, 30)
         point.stiffness = 0.0 if slides else stiffness
         point.before = contact.shear_force
@@ -348,9 +332,9 @@ def shear_pass(world: World, p: int, count: int, values: Record, before: float, 
     for i in range(count):
         point = world.points[i]
         contact = world.contacts[p, i]
-        force = clip_to_cone(values, point.force, point.limit, point.normal_force, point.slip_rate)
+        force = friction.clip_to_cone(values, point.force, point.limit, point.normal_force, point.slip_rate)
         if count == 1 and point.normal_force > 0.0:
-            note_slip(pair, sticking == 0 or force != point.force, force)
+            damping.note_slip(pair, sticking == 0 or force != point.force, force)
         tally.dashpot += 0.5 * (point.lost + (force - point.spring_force)) * point.slipping
         contact.shear_force = point.force = force
 
@@ -366,8 +350,8 @@ def force_pass(world: World, p: int, count: int, action: Record) -> None:
     law = world.controls[0].law
     for i in range(count):
         point = world.points[i]
-        along = point.force + stored_energy(law, pair.slide, point.depth)
-        couple = stored_energy(law, pair.turn, point.depth)
+        along = point.force + laws.stored_energy(law, pair.slide, point.depth)
+        couple = laws.stored_energy(law, pair.turn, point.depth)
         action.fx += point.nx * point.normal_force + point.ny * along
         action.fy += point.ny * point.normal_force - point.nx * along
         action.torque_a += point.normal_arm_a * point.normal_force - point.shear_arm_a * along - couple
@@ -402,26 +386,26 @@ def pair_forces(world: World, p: int, step: float) -> None:
     clear_action(action)
     count = lasting_points(world, p, world.corners)
     if count == SEARCH:
-        count = points_of_sliver(world, p, contact_points(world, p), world.corners)
-    action.is_too_deep = is_too_deep(world, p, count)
+        count = slivers.points_of_sliver(world, p, contact_points(world, p), world.corners)
+    action.is_too_deep = depth.is_too_deep(world, p, count)
     model = world.controls[0].model
     action.asks = count != pair.active and model == SURFACE
     before = pair.stiffness
     if count == 0:
         if pair.active > 0:
-            change_contacts(world, p, 0, step, action)
+            history.change_contacts(world, p, 0, step, action)
         return
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
-    if has_new_neighbours(a, b, model) or not has_constant_stiffness(world.controls[0].law):
-        renew_dashpots(pair)
+    if has_new_neighbours(a, b, model) or not laws.has_constant_stiffness(world.controls[0].law):
+        damping.renew_dashpots(pair)
     resolve_points(world, p, count, step, action)
     if model == SURFACE:
-        measure(world, p, count, values.normal_stiffness)
+        bearing.measure(world, p, count, values.normal_stiffness)
     shared = step if model == SURFACE else shared_step(a, b, step)
     normal_pass(world, p, count, values, shared)
     shear_pass(world, p, count, values, before, shared, action)
     force_pass(world, p, count, action)
-    measure_soon(pair, world.points[0].slipping, step * (a.spin - b.spin), world.corners)
-    keep_places(world, p, count)
+    bearing.measure_soon(pair, world.points[0].slipping, step * (a.spin - b.spin), world.corners)
+    history.keep_places(world, p, count)

@@ -8,10 +8,7 @@ shapes. No step takes a block far into another (world/step.py, broad_phase.py), 
 found.
 """
 
-from blocksim.kernels.common.arrays import ALL, Record, Records, World
-from blocksim.kernels.common.energy import smallest_side
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import ground_gap, separation
+from blocksim.kernels.common import arrays, energy, jit, shapes
 from blocksim.kernels.explicit.models import KERNEL, SURFACE
 from blocksim.kernels.explicit.outlines import deepest_overlap
 
@@ -20,44 +17,46 @@ MIDDLE = 0.5  # of it, beyond which no limit can be
 ROWS_APART = 0.75  # of a particle; at 0.35 two rows may rest in the gaps of one another, at 1 their centres meet
 
 
-@rare_kernel
-def overlap_limit(a: Record, b: Record, given: float) -> float:
+@jit.rare_kernel
+def overlap_limit(a: arrays.Record, b: arrays.Record, given: float) -> float:
     """Return how far (m) two bodies may overlap; `given` (m) is zero where nothing was asked for."""
-    side = min(smallest_side(a), smallest_side(b))
+    side = min(energy.smallest_side(a), energy.smallest_side(b))
     return min(given, MIDDLE * side) if given > 0.0 else OVERLAP_SHARE * side
 
 
-@rare_kernel
-def penetration(world: World, pair: Record) -> float:
+@jit.rare_kernel
+def penetration(world: arrays.World, pair: arrays.Record) -> float:
     """Return how deep (m) the bodies of a pair overlap; what lies behind a piece of ground does not overlap it."""
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     is_ground = pair.b == world.bodies.size - 1
-    if not is_ground and b.faces < ALL and b.cos * (a.y - b.y) - b.sin * (a.x - b.x) < b.half_y:
+    if not is_ground and b.faces < arrays.ALL and b.cos * (a.y - b.y) - b.sin * (a.x - b.x) < b.half_y:
         return 0.0
     return overlap_of(a, b, is_ground, world.corners)
 
 
-@kernel
-def overlap_of(a: Record, b: Record, is_ground: bool, corners: Records | None) -> float:
+@jit.kernel
+def overlap_of(a: arrays.Record, b: arrays.Record, is_ground: bool, corners: arrays.Records | None) -> float:
     """Return how deep (m) two bodies overlap; less than zero where they do not."""
     if corners is not None:
         return deepest_overlap(a, b, is_ground, corners)
-    return b.y - ground_gap(a) if is_ground else -separation(a, b)
+    return b.y - shapes.ground_gap(a) if is_ground else -shapes.separation(a, b)
 
 
-@rare_kernel
-def reach_of_contacts(world: World, pair: Record) -> float:
+@jit.rare_kernel
+def reach_of_contacts(world: arrays.World, pair: arrays.Record) -> float:
     """Return at which overlap (m) of the rectangles contacts may be lost, or act the wrong way."""
     controls = world.controls[0]
     if controls.model == SURFACE:
         return pair.limit
     reach = controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size
-    return min(reach, MIDDLE * min(smallest_side(world.bodies[pair.a]), smallest_side(world.bodies[pair.b])))
+    return min(
+        reach, MIDDLE * min(energy.smallest_side(world.bodies[pair.a]), energy.smallest_side(world.bodies[pair.b]))
+    )
 
 
-@rare_kernel
-def is_too_deep(world: World, p: int, count: int) -> bool:
+@jit.rare_kernel
+def is_too_deep(world: arrays.World, p: int, count: int) -> bool:
     """Return True if pair p, whose `count` points have been found, overlaps too far."""
     pair = world.pairs[p]
     for i in range(count):

@@ -1,11 +1,7 @@
 """Energy ledger: what the scene holds now. Losses are tallied where the forces are applied (contact.py)."""
 
-from blocksim.kernels.common.arrays import Floats, Records, World
-from blocksim.kernels.common.energy import potential_energy
-from blocksim.kernels.common.integrate import kinetic_energy
-from blocksim.kernels.common.jit import entry_kernel, rare_kernel
-from blocksim.kernels.explicit.history import shear_stiffness_before, stiffness_before
-from blocksim.kernels.explicit.laws import stored_energy
+from blocksim.kernels.common import arrays, energy, integrate, jit
+from blocksim.kernels.explicit import history, laws
 
 LEDGER_ROW = (
     "kinetic",
@@ -21,8 +17,8 @@ LEDGER_ROW = (
 )
 
 
-@rare_kernel
-def contact_summary(world: World) -> tuple[float, float, int, float]:
+@jit.rare_kernel
+def contact_summary(world: arrays.World) -> tuple[float, float, int, float]:
     """Return energy stored in normal and in shear springs (J), number of contacts, largest overlap (m)."""
     normal = 0.0
     shear = 0.0
@@ -35,17 +31,17 @@ def contact_summary(world: World) -> tuple[float, float, int, float]:
             values = world.interactions[world.bodies[pair.a].contact_class, world.bodies[pair.b].contact_class]
             for k in range(pair.active):
                 contact = world.contacts[p, k]
-                of_spring = stiffness_before(contact, pair.stiffness, values, world.particles)
-                stiffness = shear_stiffness_before(contact, of_spring, values, law)
-                normal += stored_energy(law, of_spring, contact.depth)
+                of_spring = history.stiffness_before(contact, pair.stiffness, values, world.particles)
+                stiffness = history.shear_stiffness_before(contact, of_spring, values, law)
+                normal += laws.stored_energy(law, of_spring, contact.depth)
                 shear += 0.5 * stiffness * contact.spring * contact.spring
                 count += 1
                 largest = max(largest, contact.depth)
     return normal, shear, count, largest
 
 
-@rare_kernel
-def tallied(ledger: Records) -> tuple[float, float, float]:
+@jit.rare_kernel
+def tallied(ledger: arrays.Records) -> tuple[float, float, float]:
     """Return the losses (J) to dashpots, friction and broken contacts, summed over all groups of pairs in order."""
     dashpot = 0.0
     friction = 0.0
@@ -57,8 +53,8 @@ def tallied(ledger: Records) -> tuple[float, float, float]:
     return dashpot, friction, broken
 
 
-@rare_kernel
-def given_to_loads(ledger: Records) -> float:
+@jit.rare_kernel
+def given_to_loads(ledger: arrays.Records) -> float:
     """Return the work (J) done on loads, against that which they do, summed over all groups of bodies in order."""
     total = 0.0
     for tally in ledger:
@@ -66,13 +62,13 @@ def given_to_loads(ledger: Records) -> float:
     return total
 
 
-@entry_kernel
-def measure(world: World, row: Floats) -> None:
+@jit.entry_kernel
+def measure(world: arrays.World, row: arrays.Floats) -> None:
     """Write one row of the ledger: energies (J) as in `LEDGER_ROW`, number of contacts, largest overlap (m)."""
     ledger = world.ledger[0]
     normal, shear, count, largest = contact_summary(world)
-    row[0] = kinetic_energy(world)
-    row[1] = potential_energy(world)
+    row[0] = integrate.kinetic_energy(world)
+    row[1] = energy.potential_energy(world)
     row[2] = normal
     row[3] = shear
     row[4], row[5], row[6] = tallied(world.ledger)

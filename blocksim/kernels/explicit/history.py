@@ -9,12 +9,8 @@ exactly aligned), the contact itself continues under another corner, and its his
 
 from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.broad_phase import idle_candidates
-from blocksim.kernels.explicit.damping import renew_dashpots
-from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point, weigh_first_step
-from blocksim.kernels.explicit.laws import elastic_force, tangent_stiffness
-from blocksim.kernels.explicit.models import SURFACE, place_ended, slot_normal
-from blocksim.kernels.explicit.models.surface import PARALLEL
+from blocksim.kernels.explicit import broad_phase, damping, kinematics, laws
+from blocksim.kernels.explicit.models import SURFACE, place_ended, slot_normal, surface
 
 
 @kernel
@@ -28,13 +24,13 @@ def stiffness_before(contact: Record, of_corners: float, values: Record, particl
 @kernel
 def shear_stiffness_before(contact: Record, stiffness: float, values: Record, law: int) -> float:
     """Return the stiffness (N/m) that the shear spring of a contact had; `stiffness` as above."""
-    return values.shear_ratio * tangent_stiffness(law, stiffness, contact.depth)
+    return values.shear_ratio * laws.tangent_stiffness(law, stiffness, contact.depth)
 
 
 @kernel
 def normal_loss(contact: Record, stiffness: float, law: int) -> float:
     """Return the part (N) of the normal force that was dashpot, less what clipping took; `stiffness` as above."""
-    return contact.normal_force - elastic_force(law, stiffness, contact.depth)
+    return contact.normal_force - laws.elastic_force(law, stiffness, contact.depth)
 
 
 @kernel
@@ -88,13 +84,13 @@ def take_over(world: World, p: int, i: int, count: int) -> None:
     """
     pair = world.pairs[p]
     point = world.points[i]
-    if has_just_begun(point) or was_in_contact(point.slot, world.before, count):
+    if kinematics.has_just_begun(point) or was_in_contact(point.slot, world.before, count):
         return
     for j in range(count):
         old = world.before[j]
         if old.slot != TAKEN:
             nx, ny = slot_normal(world, pair, old.slot, old.face)
-            if nx * point.nx + ny * point.ny > PARALLEL:
+            if nx * point.nx + ny * point.ny > surface.PARALLEL:
                 contact = world.contacts[p, i]
                 contact.spring = old.spring
                 contact.depth = old.depth
@@ -118,7 +114,7 @@ def release(world: World, p: int, old: Record, step: float, tally: Record) -> No
     law = world.controls[0].law
     point = world.points[world.points.size - 1]
     place_ended(world, p, old, point)
-    resolve_point(point, a, b, step)
+    kinematics.resolve_point(point, a, b, step)
     of_spring = stiffness_before(old, pair.stiffness, values, world.particles)
     stiffness = shear_stiffness_before(old, of_spring, values, law)
     lost = normal_loss(old, of_spring, law) * point.closing
@@ -140,13 +136,13 @@ def change_contacts(world: World, p: int, count: int, step: float, tally: Record
         if contact.depth == 0.0 and world.controls[0].model == SURFACE:
             take_over(world, p, i, before)
         if contact.depth == 0.0:  # it is new
-            weigh_first_step(world.points[i], world.controls[0].law)
+            kinematics.weigh_first_step(world.points[i], world.controls[0].law)
     for j in range(before):
         if world.before[j].slot != TAKEN:
             release(world, p, world.before[j], step, tally)
-    renew_dashpots(pair)
+    damping.renew_dashpots(pair)
     pair.active = count
-    pair.idle = idle_candidates(pair)
+    pair.idle = broad_phase.idle_candidates(pair)
 
 
 @rare_kernel

@@ -30,10 +30,9 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import ALL, HALF, SHEAR, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import corner_offset, ground_gap
+from blocksim.kernels.explicit import outlines, separation
 from blocksim.kernels.explicit.bearing import are_blocks, bearing_along
 from blocksim.kernels.explicit.models import SURFACE, slot_normal, slot_place
-from blocksim.kernels.explicit.outlines import corner_vector, gap_on, lowest_corner, number_of_corners, way_over
-from blocksim.kernels.explicit.separation import gap_along
 
 LEAST_GYRATION = 0.1
 SHARE_PERIOD, MOST_PERIOD, SUM_PERIOD = 32, 128, 256  # steps
@@ -102,15 +101,15 @@ def way_of(pair: Record, a: Record, b: Record, is_ground: bool, corners: Records
     """Return the same for bodies of any shape, `corners` being those of the scene."""
     if corners is None:
         return way_apart(pair, a, b, a.x - b.x, a.y - b.y)
-    return way_over(pair, a, b, is_ground, corners)
+    return outlines.way_over(pair, a, b, is_ground, corners)
 
 
 @kernel
 def gap_of(pair: Record, a: Record, b: Record, is_ground: bool, corners: Records | None) -> float:
     """Return the gap (m) of two bodies along the axis along which they were found apart."""
     if corners is None:
-        return gap_along(pair.axis, a, b, a.x - b.x, a.y - b.y)
-    return gap_on(pair.axis, a, b, is_ground, corners)
+        return separation.gap_along(pair.axis, a, b, a.x - b.x, a.y - b.y)
+    return outlines.gap_on(pair.axis, a, b, is_ground, corners)
 
 
 @rare_kernel
@@ -144,7 +143,7 @@ def height_of(body: Record, corners: Records | None) -> float:
     """Return the height (m) of the lowest corner of a body over y = 0."""
     if corners is None:
         return ground_gap(body)
-    return lowest_corner(body, corners)
+    return outlines.lowest_corner(body, corners)
 
 
 @rare_kernel
@@ -210,7 +209,7 @@ def corners_of(block: Record, corners: Records | None) -> int:
     """Return how many corners a block has."""
     if corners is None:
         return HALF
-    return number_of_corners(block)
+    return outlines.number_of_corners(block)
 
 
 @kernel
@@ -218,7 +217,7 @@ def corner_from(block: Record, number: int, corners: Records | None) -> tuple[fl
     """Return the vector (m) from the centre of a block to one of its corners, in world axes."""
     if corners is None:
         return corner_offset(block, number)
-    return corner_vector(block, corners, number)
+    return outlines.corner_vector(block, corners, number)
 
 
 @rare_kernel

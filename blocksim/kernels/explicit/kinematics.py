@@ -1,7 +1,6 @@
 """Rates, displacements and inverse masses at the contact points of one pair, along the normals or the tangents."""
 
-from blocksim.kernels.common.arrays import NORMAL, Record
-from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.explicit.inertia import Piece, inverse_mass_of
 from blocksim.kernels.explicit.laws import dashpot_weight
 
@@ -10,8 +9,8 @@ IMPACT_STEPS = 10.0  # an impact lasts some thirty steps; a face lost in a third
 ONSET_STEPS = 16.0  # after which the mean over a step and the value in its middle differ by less than 1/30000
 
 
-@kernel
-def resolve_point(point: Record, a: Record, b: Record, step: float) -> None:
+@jit.kernel
+def resolve_point(point: arrays.Record, a: arrays.Record, b: arrays.Record, step: float) -> None:
     """Fill lever arms, displacements of the last drift and rates at its end of one point; full weights.
 
     Velocities are those of the last drift; the rates at its end are predicted with the last accelerations. Closing
@@ -40,14 +39,14 @@ def resolve_point(point: Record, a: Record, b: Record, step: float) -> None:
     point.drawn = 1.0
 
 
-@rare_kernel
-def has_just_begun(point: Record) -> bool:
+@jit.rare_kernel
+def has_just_begun(point: arrays.Record) -> bool:
     """Return True if a point came into contact within the last drift: it is no deeper than it closed, to round-off."""
     return point.closing > 0.0 and point.depth <= point.closing * (1.0 + ROUND_OFF)
 
 
-@rare_kernel
-def weigh_first_step(point: Record, law: int) -> None:
+@jit.rare_kernel
+def weigh_first_step(point: arrays.Record, law: int) -> None:
     """Set the dashpot weight and the drawn share of the shear spring of a point that was not in contact before.
 
     The kick at time t covers [t - dt/2, t + dt/2]. A contact with overlap d = s v dt began at t - s dt, so a dashpot of
@@ -61,8 +60,8 @@ def weigh_first_step(point: Record, law: int) -> None:
         point.drawn = share
 
 
-@rare_kernel
-def weigh_onset(point: Record, law: int) -> None:
+@jit.rare_kernel
+def weigh_onset(point: arrays.Record, law: int) -> None:
     """Set the dashpot weight of a point whose contact began some steps ago, where the coefficient still rises fast.
 
     Hertz: it goes with the fourth root of time, and one value for each step would leave an error of order dt^(5/4).
@@ -72,21 +71,21 @@ def weigh_onset(point: Record, law: int) -> None:
         point.weight = dashpot_weight(law, max(at - 0.5, 0.0), at + 0.5, at)
 
 
-@rare_kernel
-def coupling(point: Record, of_a: Piece, of_b: Piece) -> float:
+@jit.rare_kernel
+def coupling(point: arrays.Record, of_a: Piece, of_b: Piece) -> float:
     """Return the inverse mass (1/kg) that couples normal and tangent of a point, by its arms about both centres."""
     turning_a = (point.normal_arm_a - of_a.arm) * point.shear_arm_a * of_a.inverse_inertia
     return turning_a + (point.normal_arm_b - of_b.arm) * point.shear_arm_b * of_b.inverse_inertia
 
 
-@rare_kernel
-def mutual_mass(one: Record, two: Record, of_a: Piece, of_b: Piece, direction: int) -> float:
+@jit.rare_kernel
+def mutual_mass(one: arrays.Record, two: arrays.Record, of_a: Piece, of_b: Piece, direction: int) -> float:
     """Return the inverse mass (1/kg) J M^-1 J^T that two points see of one another, along normals or tangents.
 
     Tangents enclose the angle of the normals, so that one formula for the translation serves both directions.
     """
     cosine = one.nx * two.nx + one.ny * two.ny
-    if direction == NORMAL:
+    if direction == arrays.NORMAL:
         arms_a, arms_b = (one.normal_arm_a, two.normal_arm_a), (one.normal_arm_b, two.normal_arm_b)
     else:
         arms_a, arms_b = (one.shear_arm_a, two.shear_arm_a), (one.shear_arm_b, two.shear_arm_b)

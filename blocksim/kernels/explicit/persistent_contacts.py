@@ -10,17 +10,7 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import HALF, NORMAL, SHEAR, Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import corner_offset
-from blocksim.kernels.explicit.damping import (
-    BOTH,
-    OPERATOR_LIFE,
-    fill_alike,
-    fill_single,
-    keep_dashpots,
-    keep_masses,
-    sliding_mass,
-)
-from blocksim.kernels.explicit.inertia import Piece, inverse_mass_of, piece_of
-from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
+from blocksim.kernels.explicit import damping, inertia, kinematics
 from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, corner_signs
 
 
@@ -103,7 +93,7 @@ def follow(
     beside = half_length - abs(along)
     goes_on = depth > 0.0 and beside >= 0.0 and (not turns or admits(owner, corner, nx, ny))
     found = contact_at(x if is_own else ox, y if is_own else oy, side * nx, side * ny, depth, motion, step)
-    if beside < max(depth, IMPACT_STEPS * abs(found.closing)):
+    if beside < max(depth, kinematics.IMPACT_STEPS * abs(found.closing)):
         other = 1.0 if along > 0.0 else -1.0
         goes_on = goes_on and not admits(owner, corner, -other * ny, other * nx)
     return goes_on, found
@@ -136,10 +126,10 @@ def arms(found: PersistentContact, dx: float, dy: float, direction: int) -> tupl
 @kernel
 def pieces_of(
     a: Record, b: Record, found: PersistentContact, arm_a: float, arm_b: float, stiffness: float, direction: int
-) -> tuple[Piece, Piece]:
+) -> tuple[inertia.Piece, inertia.Piece]:
     """Return what of both bodies the dashpots of a pair stand for; mean arms (m) of its normals, stiffness (N/m)."""
-    of_a = piece_of(a, stiffness, found.nx, found.ny, arm_a, direction)
-    return of_a, piece_of(b, stiffness, found.nx, found.ny, arm_b, direction)
+    of_a = inertia.piece_of(a, stiffness, found.nx, found.ny, arm_a, direction)
+    return of_a, inertia.piece_of(b, stiffness, found.nx, found.ny, arm_b, direction)
 
 
 @rare_kernel
@@ -160,11 +150,11 @@ def renew_single(
     normal_a, normal_b = arms(found, dx, dy, NORMAL)
     of_a, of_b = pieces_of(a, b, found, normal_a, normal_b, pair.stiffness, direction)
     arm_a, arm_b = arms(found, dx, dy, direction)
-    mass = inverse_mass_of(arm_a, arm_b, arm_a, arm_b, 1.0, of_a, of_b)
+    mass = inertia.inverse_mass_of(arm_a, arm_b, arm_a, arm_b, 1.0, of_a, of_b)
     half = 0.5 * step
-    keep_masses(operator, half, mass, mass, mass)
-    keep_dashpots(pair, direction, 1, OPERATOR_LIFE if half > 0.0 else 0)
-    fill_single(operator, 0, ratio, half, mass, stiffness, 1.0)
+    damping.keep_masses(operator, half, mass, mass, mass)
+    damping.keep_dashpots(pair, direction, 1, damping.OPERATOR_LIFE if half > 0.0 else 0)
+    damping.fill_single(operator, 0, ratio, half, mass, stiffness, 1.0)
 
 
 @rare_kernel
@@ -177,13 +167,13 @@ def renew_sliding(
     arm_a, arm_b = arms(found, dx, dy, NORMAL)
     shear_a, shear_b = arms(found, dx, dy, SHEAR)
     of_a, of_b = pieces_of(a, b, found, arm_a, arm_b, pair.stiffness, NORMAL)
-    mass = inverse_mass_of(arm_a, arm_b, arm_a, arm_b, 1.0, of_a, of_b)
+    mass = inertia.inverse_mass_of(arm_a, arm_b, arm_a, arm_b, 1.0, of_a, of_b)
     mixed = (arm_a - of_a.arm) * shear_a * of_a.inverse_inertia + (arm_b - of_b.arm) * shear_b * of_b.inverse_inertia
-    mass = sliding_mass(mass, mixed, values.kinetic_friction, pair.slides)
+    mass = damping.sliding_mass(mass, mixed, values.kinetic_friction, pair.slides)
     half = 0.5 * step
-    keep_masses(operator, half, mass, mass, mass)
-    keep_dashpots(pair, NORMAL, 1, OPERATOR_LIFE if half > 0.0 else 0)
-    fill_single(operator, 0, values.normal_damping, half, mass, pair.stiffness, 1.0)
+    damping.keep_masses(operator, half, mass, mass, mass)
+    damping.keep_dashpots(pair, NORMAL, 1, damping.OPERATOR_LIFE if half > 0.0 else 0)
+    damping.fill_single(operator, 0, values.normal_damping, half, mass, pair.stiffness, 1.0)
 
 
 @rare_kernel
@@ -214,13 +204,13 @@ def renew_double(
     one_a, one_b = arms(one, dx, dy, direction)
     two_a, two_b = arms(two, dx, dy, direction)
     cosine = one.nx * two.nx + one.ny * two.ny
-    m_one = inverse_mass_of(one_a, one_b, one_a, one_b, 1.0, of_a, of_b)
-    m_two = inverse_mass_of(two_a, two_b, two_a, two_b, 1.0, of_a, of_b)
-    m_mixed = inverse_mass_of(one_a, one_b, two_a, two_b, cosine, of_a, of_b)
+    m_one = inertia.inverse_mass_of(one_a, one_b, one_a, one_b, 1.0, of_a, of_b)
+    m_two = inertia.inverse_mass_of(two_a, two_b, two_a, two_b, 1.0, of_a, of_b)
+    m_mixed = inertia.inverse_mass_of(one_a, one_b, two_a, two_b, cosine, of_a, of_b)
     half = 0.5 * step
-    keep_masses(operator, half, m_one, m_mixed, m_two)
-    keep_dashpots(pair, direction, pattern, OPERATOR_LIFE if half > 0.0 else 0)
-    if pattern == BOTH:
-        fill_alike(operator, 2.0 * ratio * math.sqrt(stiffness), half, m_one, m_mixed, m_two)
+    damping.keep_masses(operator, half, m_one, m_mixed, m_two)
+    damping.keep_dashpots(pair, direction, pattern, damping.OPERATOR_LIFE if half > 0.0 else 0)
+    if pattern == damping.BOTH:
+        damping.fill_alike(operator, 2.0 * ratio * math.sqrt(stiffness), half, m_one, m_mixed, m_two)
     else:
-        fill_single(operator, pattern - 1, ratio, half, m_one if pattern == 1 else m_two, stiffness, 1.0)
+        damping.fill_single(operator, pattern - 1, ratio, half, m_one if pattern == 1 else m_two, stiffness, 1.0)

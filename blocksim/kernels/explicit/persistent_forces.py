@@ -15,6 +15,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import ALL, NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.explicit import damping, laws, outlines, persistent_contacts, persistent_outlines, separation
 from blocksim.kernels.explicit.bearing import (
     APART,
     PLANE,
@@ -25,39 +26,8 @@ from blocksim.kernels.explicit.bearing import (
     stiffness_between,
 )
 from blocksim.kernels.explicit.contact import has_new_neighbours
-from blocksim.kernels.explicit.damping import (
-    BOTH,
-    are_dashpots_due,
-    count_down,
-    damp_one,
-    damp_two,
-    note_slip,
-    renew_dashpots,
-)
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_lasting_spring
-from blocksim.kernels.explicit.laws import has_constant_stiffness
-from blocksim.kernels.explicit.models import SURFACE
-from blocksim.kernels.explicit.models.surface import is_oblique
-from blocksim.kernels.explicit.outlines import gap_on, widest_gap
-from blocksim.kernels.explicit.persistent_contacts import (
-    Motion,
-    PersistentContact,
-    follow,
-    relative_motion,
-    renew_double,
-    renew_single,
-    renew_sliding,
-)
-from blocksim.kernels.explicit.persistent_outlines import (
-    are_parallel,
-    begins_on_outlines,
-    ends_in_sliver,
-    follow_on_outlines,
-    has_crossed,
-    lie_on_sliver,
-    measure_on_outlines,
-)
-from blocksim.kernels.explicit.separation import begins_contact, choose_axis, gap_along
+from blocksim.kernels.explicit.models import SURFACE, surface
 
 CHANGED, UNTOUCHED, TOUCHING = range(3)
 
@@ -83,21 +53,26 @@ def follow_corner(
     b: Record,
     dx: float,
     dy: float,
-    motion: Motion,
+    motion: persistent_contacts.Motion,
     step: float,
     turns: bool,
     duplicates: int,
     corners: Records | None,
-) -> tuple[bool, PersistentContact]:
+) -> tuple[bool, persistent_contacts.PersistentContact]:
     """Check that a contact continues, and where and how; see persistent_contacts.py."""
     if corners is None:
-        return follow(contact, a, b, dx, dy, motion, step, turns)
-    return follow_on_outlines(contact, a, b, dx, dy, motion, step, turns, duplicates, corners)
+        return persistent_contacts.follow(contact, a, b, dx, dy, motion, step, turns)
+    return persistent_outlines.follow_on_outlines(contact, a, b, dx, dy, motion, step, turns, duplicates, corners)
 
 
 @kernel
 def measure_corner(
-    pair: Record, a: Record, b: Record, found: PersistentContact, stiffness: float, corners: Records | None
+    pair: Record,
+    a: Record,
+    b: Record,
+    found: persistent_contacts.PersistentContact,
+    stiffness: float,
+    corners: Records | None,
 ) -> None:
     """Measure the stiffness of a single contact of two blocks; `stiffness` is that of a corner alone."""
     if corners is None:
@@ -106,15 +81,15 @@ def measure_corner(
         pair.slide = stiffness * bearing.slide
         pair.turn = stiffness * bearing.turn
     else:
-        measure_on_outlines(pair, a, b, found.nx, found.ny, stiffness, corners)
+        persistent_outlines.measure_on_outlines(pair, a, b, found.nx, found.ny, stiffness, corners)
 
 
 @kernel
-def are_flat(a: Record, b: Record, found: PersistentContact, corners: Records | None) -> bool:
+def are_flat(a: Record, b: Record, found: persistent_contacts.PersistentContact, corners: Records | None) -> bool:
     """Return True if the faces of two blocks that meet along the normal of a contact are parallel."""
     if corners is None:
         return is_flat(a, b)
-    return are_parallel(a, b, found.nx, found.ny, corners)
+    return persistent_outlines.are_parallel(a, b, found.nx, found.ny, corners)
 
 
 @kernel
@@ -122,8 +97,8 @@ def are_ends(
     pair: Record,
     a: Record,
     b: Record,
-    found: PersistentContact,
-    other: PersistentContact,
+    found: persistent_contacts.PersistentContact,
+    other: persistent_contacts.PersistentContact,
     is_due: bool,
     corners: Records | None,
 ) -> bool:
@@ -142,32 +117,40 @@ def use_operator_of_one(
     pair: Record,
     a: Record,
     b: Record,
-    found: PersistentContact,
+    found: persistent_contacts.PersistentContact,
     values: Record,
     step: float,
     is_due: bool,
 ) -> None:
     """Rebuild the operator along the normal of a single contact where it is due, else count down."""
     if not is_due:
-        count_down(pair)
+        damping.count_down(pair)
     elif pair.slides != 0:
-        renew_sliding(operator, pair, a, b, found, values, step)
+        persistent_contacts.renew_sliding(operator, pair, a, b, found, values, step)
     else:
-        renew_single(operator, pair, a, b, found, NORMAL, values.normal_damping, step, pair.stiffness)
+        persistent_contacts.renew_single(
+            operator, pair, a, b, found, NORMAL, values.normal_damping, step, pair.stiffness
+        )
 
 
 @kernel
-def one_is_sliver(contact: Record, a: Record, b: Record, found: PersistentContact, corners: Records | None) -> bool:
+def one_is_sliver(
+    contact: Record, a: Record, b: Record, found: persistent_contacts.PersistentContact, corners: Records | None
+) -> bool:
     """Return True if a single contact is that of two polygons which overlap by a sliver; see slivers.py."""
-    return False if corners is None else ends_in_sliver(contact, a, b, found, corners)
+    return False if corners is None else persistent_outlines.ends_in_sliver(contact, a, b, found, corners)
 
 
 @kernel
 def two_are_sliver(
-    a: Record, b: Record, one: PersistentContact, two: PersistentContact, corners: Records | None
+    a: Record,
+    b: Record,
+    one: persistent_contacts.PersistentContact,
+    two: persistent_contacts.PersistentContact,
+    corners: Records | None,
 ) -> bool:
     """Return True if two contacts are those of two polygons which overlap by a sliver; see slivers.py."""
-    return False if corners is None else lie_on_sliver(a, b, one, two, corners)
+    return False if corners is None else persistent_outlines.lie_on_sliver(a, b, one, two, corners)
 
 
 @kernel
@@ -181,7 +164,7 @@ def single(
     contact = world.contacts[p, 0]
     pair = world.pairs[p]
     values = world.interactions[a.contact_class, b.contact_class]
-    motion = relative_motion(a, b, dx, dy, 0.5 * step)
+    motion = persistent_contacts.relative_motion(a, b, dx, dy, 0.5 * step)
     goes_on, found = follow_corner(contact, a, b, dx, dy, motion, step, is_due, pair.duplicates, world.corners)
     if not goes_on or found.depth > pair.limit or one_is_sliver(contact, a, b, found, world.corners):
         return CHANGED, NOTHING
@@ -193,7 +176,7 @@ def single(
     if not is_due or values.normal_damping > 0.0:
         operator = world.operators[p, NORMAL]
         use_operator_of_one(operator, pair, a, b, found, values, step, is_due)
-        force = damp_one(operator, spring, contact.normal_force, found.closing_rate)
+        force = damping.damp_one(operator, spring, contact.normal_force, found.closing_rate)
     normal = max(force, 0.0)
     dashpot = 0.5 * (contact.normal_force - before * contact.depth + (normal - spring)) * found.closing
     drawn, shear, lost, friction = shear_of_one(world, p, a, b, values, found, normal, step, before, is_due)
@@ -214,7 +197,7 @@ def shear_of_one(
     a: Record,
     b: Record,
     values: Record,
-    found: PersistentContact,
+    found: persistent_contacts.PersistentContact,
     normal: float,
     step: float,
     before: float,
@@ -237,13 +220,13 @@ def shear_of_one(
     if slides:
         pair.shear_left = 0
     elif values.shear_damping > 0.0:
-        if are_dashpots_due(pair, SHEAR):
-            renew_single(operator, pair, a, b, found, SHEAR, values.shear_damping, step, k)
-        free = damp_one(operator, elastic, contact.shear_force, found.slip_rate)
+        if damping.are_dashpots_due(pair, SHEAR):
+            persistent_contacts.renew_single(operator, pair, a, b, found, SHEAR, values.shear_damping, step, k)
+        free = damping.damp_one(operator, elastic, contact.shear_force, found.slip_rate)
         shear = clip_to_cone(values, free, limit, normal, found.slip_rate)
         slides = shear != free
     if normal > 0.0:
-        note_slip(pair, slides, shear)
+        damping.note_slip(pair, slides, shear)
     dashpot = 0.5 * (contact.shear_force - old * contact.spring + (shear - elastic)) * found.slip
     return drawn, shear, dashpot, friction
 
@@ -263,17 +246,19 @@ def use_operator_of_two(
     pair: Record,
     a: Record,
     b: Record,
-    one: PersistentContact,
-    two: PersistentContact,
+    one: persistent_contacts.PersistentContact,
+    two: persistent_contacts.PersistentContact,
     values: Record,
     step: float,
     is_due: bool,
 ) -> None:
     """Rebuild the operator along the normals of two contacts where it is due, else count down."""
     if is_due:
-        renew_double(operator, pair, a, b, one, two, NORMAL, BOTH, values.normal_damping, step, pair.stiffness)
+        persistent_contacts.renew_double(
+            operator, pair, a, b, one, two, NORMAL, damping.BOTH, values.normal_damping, step, pair.stiffness
+        )
     else:
-        count_down(pair)
+        damping.count_down(pair)
 
 
 @kernel
@@ -286,7 +271,7 @@ def double(
     pair = world.pairs[p]
     operator = world.operators[p, NORMAL]
     values = world.interactions[a.contact_class, b.contact_class]
-    motion = relative_motion(a, b, dx, dy, 0.5 * step)
+    motion = persistent_contacts.relative_motion(a, b, dx, dy, 0.5 * step)
     goes_1, one = follow_corner(first, a, b, dx, dy, motion, step, is_due, pair.duplicates, world.corners)
     goes_2, two = follow_corner(second, a, b, dx, dy, motion, step, is_due, pair.duplicates, world.corners)
     goes_on = goes_1 and goes_2 and are_ends(pair, a, b, one, two, is_due, world.corners)
@@ -299,7 +284,7 @@ def double(
     spring_1, spring_2 = force_1, force_2 = k * one.depth, k * two.depth
     if not is_due or values.normal_damping > 0.0:
         use_operator_of_two(operator, pair, a, b, one, two, values, step, is_due)
-        force_1, force_2 = damp_two(
+        force_1, force_2 = damping.damp_two(
             operator, spring_1, spring_2, first.normal_force, second.normal_force, one.closing_rate, two.closing_rate
         )
     normal_1, normal_2 = max(force_1, 0.0), max(force_2, 0.0)
@@ -320,7 +305,12 @@ def double(
 
 @kernel
 def sum_of_two(
-    one: PersistentContact, two: PersistentContact, normal_1: float, normal_2: float, shear_1: float, shear_2: float
+    one: persistent_contacts.PersistentContact,
+    two: persistent_contacts.PersistentContact,
+    normal_1: float,
+    normal_2: float,
+    shear_1: float,
+    shear_2: float,
 ) -> tuple[float, float, float]:
     """Return the force (N) of two contacts on body a and its torque (N m) about the centre of b."""
     fx_1 = one.nx * normal_1 + one.ny * shear_1
@@ -338,8 +328,8 @@ def shear_of_two(
     a: Record,
     b: Record,
     values: Record,
-    one: PersistentContact,
-    two: PersistentContact,
+    one: persistent_contacts.PersistentContact,
+    two: persistent_contacts.PersistentContact,
     normal_1: float,
     normal_2: float,
     step: float,
@@ -370,9 +360,11 @@ def shear_of_two(
     if sticking == 0:
         pair.shear_left = 0
     elif values.shear_damping > 0.0:
-        if pair.sticking != sticking or are_dashpots_due(pair, SHEAR):
-            renew_double(operator, pair, a, b, one, two, SHEAR, sticking, values.shear_damping, step, k)
-        shear_1, shear_2 = damp_two(
+        if pair.sticking != sticking or damping.are_dashpots_due(pair, SHEAR):
+            persistent_contacts.renew_double(
+                operator, pair, a, b, one, two, SHEAR, sticking, values.shear_damping, step, k
+            )
+        shear_1, shear_2 = damping.damp_two(
             operator, elastic_1, elastic_2, first.shear_force, second.shear_force, one.slip_rate, two.slip_rate
         )
         # a point that slides has its spring at the limit and no dashpot
@@ -407,13 +399,13 @@ def forces_of_rectangles(world: World, p: int, step: float) -> tuple[int, Effect
     b = world.bodies[pair.b]
     dx = a.x - b.x
     dy = a.y - b.y
-    if pair.active == 0 and gap_along(pair.axis, a, b, dx, dy) >= 0.0:
+    if pair.active == 0 and separation.gap_along(pair.axis, a, b, dx, dy) >= 0.0:
         return UNTOUCHED, NOTHING
     if is_unsettled(world, p, a, b, dx, dy):
         return CHANGED, NOTHING
     if pair.active > 0:
         return forces_of_contacts(world, p, a, b, dx, dy, step)
-    gap = choose_axis(pair, a, b, dx, dy, pair.b == world.bodies.size - 1)
+    gap = separation.choose_axis(pair, a, b, dx, dy, pair.b == world.bodies.size - 1)
     return UNTOUCHED if gap >= -pair.limit else CHANGED, NOTHING
 
 
@@ -466,10 +458,12 @@ def apart_or_changed(world: World, p: int, a: Record, b: Record, table: Records)
     pair = world.pairs[p]
     is_ground = pair.b == world.bodies.size - 1
     axis: Any = np.int64(pair.axis)
-    if gap_on(axis, a, b, is_ground, table) >= 0.0:
+    if outlines.gap_on(axis, a, b, is_ground, table) >= 0.0:
         return UNTOUCHED
-    gap = widest_gap(pair, a, b, is_ground, table)
-    if gap < 0.0 and (are_blocks(a, b) or gap < -pair.limit or begins_on_outlines(world, p, a, b, table)):
+    gap = outlines.widest_gap(pair, a, b, is_ground, table)
+    if gap < 0.0 and (
+        are_blocks(a, b) or gap < -pair.limit or persistent_outlines.begins_on_outlines(world, p, a, b, table)
+    ):
         return CHANGED
     return UNTOUCHED
 
@@ -478,14 +472,14 @@ def apart_or_changed(world: World, p: int, a: Record, b: Record, table: Records)
 def has_changed(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
     """As is_unsettled, for two bodies that touch in a scene with polygons."""
     pair = world.pairs[p]
-    if pair.is_sliver != 0 or not has_constant_stiffness(world.controls[0].law):
+    if pair.is_sliver != 0 or not laws.has_constant_stiffness(world.controls[0].law):
         return True
-    if pair.duplicates != 0 and has_crossed(world, p, a, b, table):
+    if pair.duplicates != 0 and persistent_outlines.has_crossed(world, p, a, b, table):
         return True
-    if pair.idle > 0 and begins_on_outlines(world, p, a, b, table):
+    if pair.idle > 0 and persistent_outlines.begins_on_outlines(world, p, a, b, table):
         return True
     if has_new_neighbours(a, b, SURFACE):
-        renew_dashpots(pair)
+        damping.renew_dashpots(pair)
     return False
 
 
@@ -496,10 +490,10 @@ def is_unsettled(world: World, p: int, a: Record, b: Record, dx: float, dy: floa
     Has the dashpots rebuilt where the number of pairs on a body has changed.
     """
     pair = world.pairs[p]
-    if pair.duplicates != 0 and is_oblique(a, b):
+    if pair.duplicates != 0 and surface.is_oblique(a, b):
         return True
-    if pair.idle > 0 and begins_contact(world, p, a, b, dx, dy):
+    if pair.idle > 0 and separation.begins_contact(world, p, a, b, dx, dy):
         return True
     if pair.active > 0 and has_new_neighbours(a, b, SURFACE):
-        renew_dashpots(pair)
-    return pair.active > 0 and (b.faces != ALL or not has_constant_stiffness(world.controls[0].law))
+        damping.renew_dashpots(pair)
+    return pair.active > 0 and (b.faces != ALL or not laws.has_constant_stiffness(world.controls[0].law))

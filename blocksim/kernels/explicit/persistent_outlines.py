@@ -14,23 +14,9 @@ import numpy as np
 from blocksim.kernels.common.arrays import NO_FACE, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import END_RATIO
+from blocksim.kernels.explicit import kinematics, outlines, persistent_contacts
 from blocksim.kernels.explicit.bearing import bearing_of_facing, facing_of, flat_of
-from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
 from blocksim.kernels.explicit.models.outlines import DEEPEST, HAND_OVER, can_touch, corner_seen, face_met, has_inner
-from blocksim.kernels.explicit.outlines import (
-    MOST_CORNERS,
-    UPPER,
-    cone_of,
-    corner_of,
-    corner_vector,
-    into_frame,
-    into_world,
-    is_piece,
-    next_number,
-    number_before,
-    number_of_corners,
-)
-from blocksim.kernels.explicit.persistent_contacts import Motion, PersistentContact, contact_at
 from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver, least_ratio, meets_along
 
 FRONT_BITS = 4  # of PAIR.fronts for each of the first candidates, enough for the faces of a block
@@ -41,7 +27,7 @@ MOST_FRONTS = 8
 @rare_kernel
 def stays_on(face: int, owner: Record, number: int, touched: Record, way: float, table: Records) -> bool:
     """Return True if a corner of `owner` touches this face, and would still do `way` (m) nearer to the next one."""
-    cone = cone_of(owner, touched, table)
+    cone = outlines.cone_of(owner, touched, table)
     found, depth, beside = face_met(corner_seen(owner, number, touched, table), touched, table, cone)
     return found == face and depth > 0.0 and beside >= way
 
@@ -49,8 +35,10 @@ def stays_on(face: int, owner: Record, number: int, touched: Record, way: float,
 @rare_kernel
 def is_admitted(face: int, owner: Record, number: int, touched: Record, table: Records) -> bool:
     """Return True if a corner of `owner` can touch a face, wherever it is."""
-    side = corner_of(touched, table, face)
-    return can_touch(corner_seen(owner, number, touched, table), side.nx, side.ny, cone_of(owner, touched, table))
+    side = outlines.corner_of(touched, table, face)
+    return can_touch(
+        corner_seen(owner, number, touched, table), side.nx, side.ny, outlines.cone_of(owner, touched, table)
+    )
 
 
 @kernel
@@ -60,37 +48,39 @@ def follow_on_outlines(
     b: Record,
     dx: float,
     dy: float,
-    motion: Motion,
+    motion: persistent_contacts.Motion,
     step: float,
     turns: bool,
     duplicates: int,
     table: Records,
-) -> tuple[bool, PersistentContact]:
+) -> tuple[bool, persistent_contacts.PersistentContact]:
     """As follow in persistent_contacts.py, with corners and faces of the table."""
     slot: Any = np.int64(contact.slot)
     face: Any = np.int64(contact.face)
-    is_own = slot < MOST_CORNERS
+    is_own = slot < outlines.MOST_CORNERS
     owner = a if is_own else b
     touched = b if is_own else a
     sign = 1.0 if is_own else -1.0
-    number = slot if is_own else slot - MOST_CORNERS
-    corner = corner_of(owner, table, number)
-    side = corner_of(touched, table, face)
-    ox, oy = into_world(owner, corner.x, corner.y)
-    nx, ny = into_world(touched, side.nx, side.ny)
+    number = slot if is_own else slot - outlines.MOST_CORNERS
+    corner = outlines.corner_of(owner, table, number)
+    side = outlines.corner_of(touched, table, face)
+    ox, oy = outlines.into_world(owner, corner.x, corner.y)
+    nx, ny = outlines.into_world(touched, side.nx, side.ny)
     x = ox + sign * dx
     y = oy + sign * dy
     depth = side.distance - (x * nx + y * ny)
     along = y * nx - x * ny - side.middle
     end = side.half - abs(along)
-    found = contact_at(x if is_own else ox, y if is_own else oy, sign * nx, sign * ny, depth, motion, step)
+    found = persistent_contacts.contact_at(
+        x if is_own else ox, y if is_own else oy, sign * nx, sign * ny, depth, motion, step
+    )
     goes_on = depth > 0.0
-    if is_piece(touched):
+    if outlines.is_piece(touched):
         goes_on = goes_on and depth <= END_RATIO * end
     elif end < math.inf:  # else the half-plane
-        way = IMPACT_STEPS * abs(found.closing)
+        way = kinematics.IMPACT_STEPS * abs(found.closing)
         if side.clear * end - depth <= max(depth, way) or depth > side.distance:
-            beside = next_number(touched, face) if along > 0.0 else number_before(touched, face)
+            beside = outlines.next_number(touched, face) if along > 0.0 else outlines.number_before(touched, face)
             goes_on = goes_on and not has_inner(duplicates, is_own, touched, face, along, -end - HAND_OVER * depth)
             goes_on = goes_on and (
                 is_nearer_than_beside(owner, number, touched, face, beside, x, y, depth, way, end, table)
@@ -120,22 +110,22 @@ def is_nearer_than_beside(
     (x, y) (m) is its place about the centre of `touched`, `beside` the face there, `depth` (m) and `end` (m) how far
     it is from the face and its end. The other faces are too far away, the one beside farther, or not to be touched.
     """
-    side = corner_of(touched, table, face)
+    side = outlines.corner_of(touched, table, face)
     need = max(depth, way)
     if min(side.far, side.clear * side.half) <= need + depth + max(-end, 0.0) or depth > side.distance:
         return False
-    other = corner_of(touched, table, beside)
-    nx, ny = into_world(touched, other.nx, other.ny)
+    other = outlines.corner_of(touched, table, beside)
+    nx, ny = outlines.into_world(touched, other.nx, other.ny)
     over = other.distance - (nx * x + ny * y)
     if over < 0.0:
         return False
-    fx, fy = into_world(touched, side.nx, side.ny)
-    if goes_inwards(owner, number, fx, fy, beside == next_number(touched, face), side.cone, table):
+    fx, fy = outlines.into_world(touched, side.nx, side.ny)
+    if goes_inwards(owner, number, fx, fy, beside == outlines.next_number(touched, face), side.cone, table):
         return True
-    ahead = corner_of(owner, table, number)
-    back = corner_of(owner, table, number_before(owner, number))
-    ax, ay = into_world(owner, ahead.nx, ahead.ny)
-    bx, by = into_world(owner, back.nx, back.ny)
+    ahead = outlines.corner_of(owner, table, number)
+    back = outlines.corner_of(owner, table, outlines.number_before(owner, number))
+    ax, ay = outlines.into_world(owner, ahead.nx, ahead.ny)
+    bx, by = outlines.into_world(owner, back.nx, back.ny)
     cone = min(side.cone, ahead.cone)
     # no branches, as none is foreseen well
     admits = (fy * ax - fx * ay >= -cone) & (fx * by - fy * bx >= -cone)
@@ -151,13 +141,15 @@ def goes_inwards(owner: Record, number: int, nx: float, ny: float, is_last: bool
     (world/bodies.py), so that no face of the corner falls by more than the cone: it can touch this face. Towards the
     face beside, which turns away by as much, its own falls by more than the cone: that one it cannot touch.
     """
-    level = corner_of(owner, table, number if is_last else number_before(owner, number))
-    mx, my = into_world(owner, level.nx, level.ny)
+    level = outlines.corner_of(owner, table, number if is_last else outlines.number_before(owner, number))
+    mx, my = outlines.into_world(owner, level.nx, level.ny)
     return (nx * mx + ny * my < 0.0) & (abs(nx * my - ny * mx) <= 0.5 * min(cone, level.cone))
 
 
 @kernel
-def ends_in_sliver(contact: Record, a: Record, b: Record, found: PersistentContact, table: Records) -> bool:
+def ends_in_sliver(
+    contact: Record, a: Record, b: Record, found: persistent_contacts.PersistentContact, table: Records
+) -> bool:
     """Return True if two bodies with one contact overlap by a sliver.
 
     No other axis, of faces that are not parallel, is less deep than the way to the end of the face times the sine of
@@ -165,29 +157,35 @@ def ends_in_sliver(contact: Record, a: Record, b: Record, found: PersistentConta
     """
     slot: Any = np.int64(contact.slot)
     face: Any = np.int64(contact.face)
-    is_own = slot < MOST_CORNERS
+    is_own = slot < outlines.MOST_CORNERS
     owner, touched = (a, b) if is_own else (b, a)
-    if is_piece(touched):
+    if outlines.is_piece(touched):
         return False
-    side = corner_of(touched, table, face)
-    nx, ny = into_world(touched, side.nx, side.ny)
+    side = outlines.corner_of(touched, table, face)
+    nx, ny = outlines.into_world(touched, side.nx, side.ny)
     x = found.x - (touched.x - b.x)
     y = found.y - (touched.y - b.y)
     along = y * nx - x * ny - side.middle
     end = side.half - abs(along)
-    cone = cone_of(a, b, table)
+    cone = outlines.cone_of(a, b, table)
     least = least_ratio(cone) * end * min(side.clear, flat_within(cone))
     if found.depth * (1.0 + SLIVER) <= least:
         return False
-    number = slot if is_own else slot - MOST_CORNERS
+    number = slot if is_own else slot - outlines.MOST_CORNERS
     return not meets_along(owner, number, touched, side, nx, ny, along, found.depth, table) and is_sliver(a, b, table)
 
 
 @kernel
-def lie_on_sliver(a: Record, b: Record, one: PersistentContact, two: PersistentContact, table: Records) -> bool:
+def lie_on_sliver(
+    a: Record,
+    b: Record,
+    one: persistent_contacts.PersistentContact,
+    two: persistent_contacts.PersistentContact,
+    table: Records,
+) -> bool:
     """Return True if two bodies with two contacts overlap by a sliver; no axis is less deep than the way between."""
     way = max(abs(one.x - two.x), abs(one.y - two.y))
-    return max(one.depth, two.depth) > SLIVER * way * cone_of(a, b, table) and is_sliver(a, b, table)
+    return max(one.depth, two.depth) > SLIVER * way * outlines.cone_of(a, b, table) and is_sliver(a, b, table)
 
 
 @kernel
@@ -196,16 +194,16 @@ def face_below(owner: Record, number: int, touched: Record, last: int, table: Re
 
     `last` is the one of the last time, which it mostly still is: that is asked first.
     """
-    corner = corner_of(owner, table, number)
-    ox, oy = into_world(owner, corner.x, corner.y)
-    x, y = into_frame(touched, owner.x - touched.x + ox, owner.y - touched.y + oy)
-    if is_piece(touched):
-        return UPPER if y > touched.half_y else NO_FACE
+    corner = outlines.corner_of(owner, table, number)
+    ox, oy = outlines.into_world(owner, corner.x, corner.y)
+    x, y = outlines.into_frame(touched, owner.x - touched.x + ox, owner.y - touched.y + oy)
+    if outlines.is_piece(touched):
+        return outlines.UPPER if y > touched.half_y else NO_FACE
     room = DEEPEST * touched.radius
-    count = number_of_corners(touched)
+    count = outlines.number_of_corners(touched)
     k = last if last < count else 0
     for _ in range(count):
-        side = corner_of(touched, table, k)
+        side = outlines.corner_of(touched, table, k)
         if side.nx * x + side.ny * y - side.distance > side.sharp * room:
             return k
         k = k + 1 if k + 1 < count else 0
@@ -215,7 +213,7 @@ def face_below(owner: Record, number: int, touched: Record, last: int, table: Re
 @rare_kernel
 def has_face(owner: Record, number: int, touched: Record, table: Records) -> bool:
     """Return True if a corner of `owner` touches a face."""
-    cone = cone_of(owner, touched, table)
+    cone = outlines.cone_of(owner, touched, table)
     face, depth, _ = face_met(corner_seen(owner, number, touched, table), touched, table, cone)
     return face != NO_FACE and depth > 0.0
 
@@ -227,7 +225,7 @@ def touches(pair: Record, m: int, owner: Record, number: int, touched: Record, i
     Notes which face it is in front of, for the next time.
     """
     if is_ground:
-        return owner.y + corner_vector(owner, table, number)[1] < touched.y
+        return owner.y + outlines.corner_vector(owner, table, number)[1] < touched.y
     place = FRONT_BITS * m if m < MOST_FRONTS else 0
     fronts: Any = np.int64(pair.fronts)
     last = (fronts >> place) & FRONT
@@ -250,10 +248,10 @@ def begins_on_outlines(world: World, p: int, a: Record, b: Record, table: Record
         if known < pair.active and world.contacts[p, known].slot == slot:
             known += 1
         elif (pair.duplicates >> slot) & 1 == 0:
-            if slot < MOST_CORNERS:
+            if slot < outlines.MOST_CORNERS:
                 if touches(pair, m, a, slot, b, is_ground, table):
                     return True
-            elif touches(pair, m, b, slot - MOST_CORNERS, a, False, table):
+            elif touches(pair, m, b, slot - outlines.MOST_CORNERS, a, False, table):
                 return True
     return False
 
@@ -266,14 +264,14 @@ def has_crossed(world: World, p: int, a: Record, b: Record, table: Records) -> b
     """
     contact = world.contacts[p, 0]
     slot: Any = np.int64(contact.slot)
-    is_own = slot < MOST_CORNERS
+    is_own = slot < outlines.MOST_CORNERS
     owner, touched = (a, b) if is_own else (b, a)
-    corner = corner_seen(owner, slot if is_own else slot - MOST_CORNERS, touched, table)
+    corner = corner_seen(owner, slot if is_own else slot - outlines.MOST_CORNERS, touched, table)
     face: Any = np.int64(contact.face)
-    side = corner_of(touched, table, face)
+    side = outlines.corner_of(touched, table, face)
     ahead = abs(side.nx * corner.ahead_x + side.ny * corner.ahead_y)
     back = abs(side.nx * corner.back_x + side.ny * corner.back_y)
-    cone = cone_of(a, b, table)
+    cone = outlines.cone_of(a, b, table)
     return min(ahead, back) > (flat_within(cone) if world.pairs[p].normal_left == 0 else cone)
 
 

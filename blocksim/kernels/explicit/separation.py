@@ -7,21 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.kernels.common.arrays import HALF, Record, World
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import corner_offset
+from blocksim.kernels.common import arrays, jit, shapes
 
 
-@kernel
-def extent(body: Record, nx: float, ny: float) -> float:
+@jit.kernel
+def extent(body: arrays.Record, nx: float, ny: float) -> float:
     """Return how far (m) a body reaches from its centre along a unit vector."""
     upper = abs(nx * body.upper_x + ny * body.upper_y)
     lower = abs(nx * body.lower_x + ny * body.lower_y)
     return max(upper, lower)
 
 
-@kernel
-def gap_along(axis: int, a: Record, b: Record, dx: float, dy: float) -> float:
+@jit.kernel
+def gap_along(axis: int, a: arrays.Record, b: arrays.Record, dx: float, dy: float) -> float:
     """Return the gap (m) between two bodies along one of their four axes; from zero on they do not touch."""
     body = b if axis < 2 else a
     other = a if axis < 2 else b
@@ -32,8 +30,10 @@ def gap_along(axis: int, a: Record, b: Record, dx: float, dy: float) -> float:
     return abs(nx * dx + ny * dy) - half - extent(other, nx, ny)
 
 
-@rare_kernel
-def choose_axis(pair: Record, a: Record, b: Record, dx: float, dy: float, is_ground: bool) -> float:
+@jit.rare_kernel
+def choose_axis(
+    pair: arrays.Record, a: arrays.Record, b: arrays.Record, dx: float, dy: float, is_ground: bool
+) -> float:
     """Note along which axis two bodies that do not touch are farthest apart; the ground has but its vertical one.
 
     Returns the gap (m) along it.
@@ -46,8 +46,8 @@ def choose_axis(pair: Record, a: Record, b: Record, dx: float, dy: float, is_gro
     return gap_along(best, a, b, dx, dy)
 
 
-@kernel
-def begins_contact(world: World, p: int, a: Record, b: Record, dx: float, dy: float) -> bool:
+@jit.kernel
+def begins_contact(world: arrays.World, p: int, a: arrays.Record, b: arrays.Record, dx: float, dy: float) -> bool:
     """Return True if a candidate corner that was outside the other body is inside now."""
     pair = world.pairs[p]
     is_ground = pair.b == world.bodies.size - 1
@@ -57,9 +57,9 @@ def begins_contact(world: World, p: int, a: Record, b: Record, dx: float, dy: fl
     for m in range(pair.near):
         slot: Any = np.int64(world.candidates[p, m])
         if (known >> slot) & 1 == 0:
-            is_own = slot < HALF
+            is_own = slot < arrays.HALF
             owner, touched, side = (a, b, 1.0) if is_own else (b, a, -1.0)
-            ox, oy = corner_offset(owner, slot % HALF)
+            ox, oy = shapes.corner_offset(owner, slot % arrays.HALF)
             x = ox + side * dx
             y = oy + side * dy
             if y < 0.0 if is_ground else is_inside(touched, x, y):
@@ -67,8 +67,8 @@ def begins_contact(world: World, p: int, a: Record, b: Record, dx: float, dy: fl
     return False
 
 
-@kernel
-def is_inside(body: Record, x: float, y: float) -> bool:
+@jit.kernel
+def is_inside(body: arrays.Record, x: float, y: float) -> bool:
     """Return True if a place (m, from its centre, world axes) lies inside a body."""
     px = body.cos * x + body.sin * y
     py = body.cos * y - body.sin * x

@@ -15,17 +15,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.bearing import FLAT, FLAT_SHARE, are_blocks
-from blocksim.kernels.explicit.outlines import (
-    cone_of,
-    corner_of,
-    corner_vector,
-    into_world,
-    number_before,
-    number_of_corners,
-    side_along,
-    side_normal,
-)
+from blocksim.kernels.explicit import bearing, outlines
 
 
 class Jet(NamedTuple):
@@ -113,14 +103,14 @@ class Axis(NamedTuple):
 def axis_of(of_b: bool, face: int, a: Record, b: Record, table: Records, least: float = math.inf) -> Axis:
     """Return the axis of a face of b, or of a; of one that cannot be less deep than `least` (m) no corner is sought."""
     body, other = (b, a) if of_b else (a, b)
-    nx, ny = side_normal(body, table, face)
+    nx, ny = outlines.side_normal(body, table, face)
     best = -math.inf
     number = 0
-    reach = corner_of(body, table, face).distance + nx * (body.x - other.x) + ny * (body.y - other.y)
+    reach = outlines.corner_of(body, table, face).distance + nx * (body.x - other.x) + ny * (body.y - other.y)
     if reach + other.inner_radius > least:
         return Axis(of_b, face, number, math.inf)
-    for k in range(number_of_corners(other)):
-        x, y = corner_vector(other, table, k)
+    for k in range(outlines.number_of_corners(other)):
+        x, y = outlines.corner_vector(other, table, k)
         depth = reach - (nx * x + ny * y)
         if depth > best:
             best = depth
@@ -132,10 +122,10 @@ def axis_of(of_b: bool, face: int, a: Record, b: Record, table: Records, least: 
 def face_across(axis: Axis, a: Record, b: Record, table: Records) -> int:
     """Return the face of the other body that looks at that of an axis, or -1 where none is within the cone."""
     body, other = (b, a) if axis.of_b else (a, b)
-    nx, ny = side_normal(body, table, axis.face)
-    found: Any = np.int64(side_along(other, table, -nx, -ny))
-    mx, my = side_normal(other, table, found)
-    within = nx * mx + ny * my < 0.0 and abs(nx * my - ny * mx) < cone_of(a, b, table)
+    nx, ny = outlines.side_normal(body, table, axis.face)
+    found: Any = np.int64(outlines.side_along(other, table, -nx, -ny))
+    mx, my = outlines.side_normal(other, table, found)
+    within = nx * mx + ny * my < 0.0 and abs(nx * my - ny * mx) < outlines.cone_of(a, b, table)
     return found if within else -1
 
 
@@ -143,11 +133,11 @@ def face_across(axis: Axis, a: Record, b: Record, table: Records) -> int:
 def nearest_axis(a: Record, b: Record, table: Records) -> Axis:
     """Return the axis of least depth; those of b come first."""
     best = axis_of(True, 0, a, b, table)
-    for k in range(1, number_of_corners(b)):
+    for k in range(1, outlines.number_of_corners(b)):
         axis = axis_of(True, k, a, b, table, best.depth)
         if axis.depth < best.depth:
             best = axis
-    for k in range(number_of_corners(a)):
+    for k in range(outlines.number_of_corners(a)):
         axis = axis_of(False, k, a, b, table, best.depth)
         if axis.depth < best.depth:
             best = axis
@@ -159,9 +149,9 @@ def next_axis(nearest: Axis, across: int, a: Record, b: Record, table: Records) 
     """Return the axis of least depth but the nearest one, whose face looks at the face `across`."""
     best = nearest
     least = math.inf
-    for m in range(number_of_corners(b) + number_of_corners(a)):
-        of_b = m < number_of_corners(b)
-        face = m if of_b else m - number_of_corners(b)
+    for m in range(outlines.number_of_corners(b) + outlines.number_of_corners(a)):
+        of_b = m < outlines.number_of_corners(b)
+        face = m if of_b else m - outlines.number_of_corners(b)
         if face != (nearest.face if of_b == nearest.of_b else across):
             axis = axis_of(of_b, face, a, b, table, least)
             if axis.depth < least:
@@ -173,8 +163,8 @@ def next_axis(nearest: Axis, across: int, a: Record, b: Record, table: Records) 
 @rare_kernel
 def tilt_between(of_a: int, of_b: int, a: Record, b: Record, table: Records) -> Jet:
     """Return the sine of the angle between a face of a and one of b."""
-    ax, ay = side_normal(a, table, of_a)
-    bx, by = side_normal(b, table, of_b)
+    ax, ay = outlines.side_normal(a, table, of_a)
+    bx, by = outlines.side_normal(b, table, of_b)
     return absolute(Jet(ax * by - ay * bx, 0.0, 0.0, -ax * bx - ay * by))
 
 
@@ -189,7 +179,7 @@ def tilt_of(axis: Axis, across: int, a: Record, b: Record, table: Records) -> Je
 @rare_kernel
 def flat_within(cone: float) -> float:
     """Return the sine up to which faces are parallel."""
-    return min(FLAT, FLAT_SHARE * cone)
+    return min(bearing.FLAT, bearing.FLAT_SHARE * cone)
 
 
 @kernel
@@ -201,7 +191,7 @@ def least_ratio(cone: float) -> float:
 @rare_kernel
 def is_short(nearest: Axis, across: int, a: Record, b: Record, table: Records) -> bool:
     """Return True if another axis is about as deep as the nearest one; of parallel faces both are one."""
-    cone = cone_of(a, b, table)
+    cone = outlines.cone_of(a, b, table)
     if across >= 0 and tilt_of(nearest, across, a, b, table).value > flat_within(cone):
         return nearest.depth > least_ratio(cone) * next_axis(nearest, -1, a, b, table).depth
     return nearest.depth > SLIVER * next_axis(nearest, across, a, b, table).depth
@@ -210,7 +200,7 @@ def is_short(nearest: Axis, across: int, a: Record, b: Record, table: Records) -
 @rare_kernel
 def is_sliver(a: Record, b: Record, table: Records) -> bool:
     """Return True if two bodies overlap by a sliver."""
-    if not are_blocks(a, b):
+    if not bearing.are_blocks(a, b):
         return False
     nearest = nearest_axis(a, b, table)
     return nearest.depth > 0.0 and is_short(nearest, face_across(nearest, a, b, table), a, b, table)
@@ -238,15 +228,17 @@ def meets_along(
     least c L/2 - D from the other one: less deep no other axis can be. The nearest one, f or g, is at most D deep, so
     there is no sliver where D <= SLIVER (c L/2 - D). Another SLIVER D is more than 1 - cos, up to s^2 of G, can change.
     """
-    ahead = corner_of(owner, table, number)
-    back = corner_of(owner, table, number_before(owner, number))
-    ax, ay = into_world(owner, ahead.nx, ahead.ny)
-    bx, by = into_world(owner, back.nx, back.ny)
+    ahead = outlines.corner_of(owner, table, number)
+    back = outlines.corner_of(owner, table, outlines.number_before(owner, number))
+    ax, ay = outlines.into_world(owner, ahead.nx, ahead.ny)
+    bx, by = outlines.into_world(owner, back.nx, back.ny)
     cos_ahead = nx * ax + ny * ay
     cos_back = nx * bx + ny * by
     is_ahead = cos_ahead < cos_back  # that face goes to the end of f where `along` is least
     sine = abs(nx * ay - ny * ax) if is_ahead else abs(nx * by - ny * bx)
-    if min(cos_ahead, cos_back) > 0.0 or sine > 0.5 * min(FLAT, FLAT_SHARE * min(side.cone, ahead.cone)):
+    if min(cos_ahead, cos_back) > 0.0 or sine > 0.5 * min(
+        bearing.FLAT, bearing.FLAT_SHARE * min(side.cone, ahead.cone)
+    ):
         return False
     place = along if is_ahead else -along
     length = 2.0 * (ahead.half if is_ahead else back.half)

@@ -5,68 +5,32 @@ Forces of all pairs of one thread's share; its bodies continue as soon as the la
 
 import math
 
-from blocksim.kernels.common.arrays import (
-    AT_REST,
-    GROUP,
-    NOT_FINITE,
-    OVERLAP_LIMIT,
-    PAIRS_FULL,
-    REACHED,
-    STATUS,
-    TEAM_SIZE,
-    TOO_FAST,
-    Floats,
-    Integers,
-    Record,
-    Records,
-    World,
-)
+from blocksim.kernels.common import arrays, integrate, jit, loads, supports
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.energy import weights_power
-from blocksim.kernels.common.integrate import (
-    fastest_point,
-    finish_step,
-    kinetic_energy,
-    place_all_corners,
-    renew_rotations,
-    start_all,
-    start_step,
-)
-from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
-from blocksim.kernels.common.loads import are_loads_steady, push_bodies
 from blocksim.kernels.common.members import Watched, frame_to_watch, member, watch
-from blocksim.kernels.common.supports import (
-    has_motion,
-    is_support_at_rest,
-    move_driven,
-    move_support,
-    tally_driven,
-    tally_support,
-)
 from blocksim.kernels.common.systems import Coupled, Systems, step_systems, survey_systems
-from blocksim.kernels.explicit.broad_phase import outruns_lists, update_pairs
-from blocksim.kernels.explicit.contact import pair_forces
+from blocksim.kernels.explicit import broad_phase, contact, inertia
 from blocksim.kernels.explicit.energy import measure
-from blocksim.kernels.explicit.inertia import note_contacts, share_out
 from blocksim.kernels.explicit.partition import add_from_before, add_kept, add_to_first, add_to_second, keep, partition
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
 
 
-@rare_kernel
-def note(share: Record, action: Record) -> None:
+@jit.rare_kernel
+def note(share: arrays.Record, action: arrays.Record) -> None:
     """Note of a pair that was evaluated what all threads have to know after the step."""
     share.is_too_deep |= action.is_too_deep
     share.asks |= action.asks
 
 
-@rare_kernel
-def forces_between(world: World, share: Record, step: float) -> None:
+@jit.rare_kernel
+def forces_between(world: arrays.World, share: arrays.Record, step: float) -> None:
     """Evaluate a thread's part of the pairs between shares after a drift of `step` (s), and keep what they do."""
     for m in range(share.first_task, share.last_task):
         p = world.between[m].pair
         kind, effect = persistent_forces(world, p, step, world.particles, world.corners)
         if kind == CHANGED:
-            pair_forces(world, p, step)
+            contact.pair_forces(world, p, step)
             note(share, world.action[0])
             world.between[m] = world.action[0]
             world.between[m].pair = p
@@ -74,24 +38,24 @@ def forces_between(world: World, share: Record, step: float) -> None:
             keep(world.between[m], effect, kind == TOUCHING)
 
 
-@rare_kernel
-def changed_forces(world: World, p: int, step: float, tally: Record) -> None:
+@jit.rare_kernel
+def changed_forces(world: arrays.World, p: int, step: float, tally: arrays.Record) -> None:
     """Evaluate a pair whose contacts change, or which is not one that persistent_forces.py handles."""
-    pair_forces(world, p, step)
+    contact.pair_forces(world, p, step)
     add_kept(world, world.pairs[p], world.action[0], tally)
 
 
-@kernel
-def finish_group(world: World, first: int, end: int, step: float, goes_on: bool) -> None:
+@jit.kernel
+def finish_group(world: arrays.World, first: int, end: int, step: float, goes_on: bool) -> None:
     """Finish the step of the bodies from `first` to before `end`, and start their next one where the run continues."""
     for i in range(first, end):
-        finish_step(world.bodies[i], world.controls[0], step)
+        integrate.finish_step(world.bodies[i], world.controls[0], step)
         if goes_on:
-            start_step(world.bodies[i], step)
+            integrate.start_step(world.bodies[i], step)
 
 
-@kernel
-def forces_of_group(world: World, share: Record, end: int, step: float, tally: Record) -> None:
+@jit.kernel
+def forces_of_group(world: arrays.World, share: arrays.Record, end: int, step: float, tally: arrays.Record) -> None:
     """Evaluate the next pairs of a share, those whose first body is before `end`, and tally what they lose."""
     p = share.next_pair
     dashpot = 0.0
@@ -121,8 +85,8 @@ def forces_of_group(world: World, share: Record, end: int, step: float, tally: R
     tally.friction += friction
 
 
-@kernel
-def forces_within(world: World, share: Record, step: float, goes_on: bool) -> None:
+@jit.kernel
+def forces_within(world: arrays.World, share: arrays.Record, step: float, goes_on: bool) -> None:
     """Evaluate the pairs of a share after a drift of `step` (s), and finish the step of its bodies.
 
     A body is complete after the last pair of which it is the first body, since its pairs with bodies before come
@@ -134,8 +98,8 @@ def forces_within(world: World, share: Record, step: float, goes_on: bool) -> No
     last_body = min(share.last_body, world.bodies.size - 1)  # the ground does not move by itself
     first = share.first_body
     while first < last_body:
-        end = min(first + GROUP, last_body)
-        forces_of_group(world, share, end, step, world.ledger[first // GROUP])
+        end = min(first + arrays.GROUP, last_body)
+        forces_of_group(world, share, end, step, world.ledger[first // arrays.GROUP])
         finish_group(world, first, end, step, goes_on)
         first = end
 
@@ -143,8 +107,8 @@ def forces_within(world: World, share: Record, step: float, goes_on: bool) -> No
 NEIGHBOURS, CHECK, MOVE, TALLY, SHARE_OUT = range(5)  # what one thread does for all
 
 
-@rare_kernel
-def is_supported(bodies: Records, controls: Record) -> bool:
+@jit.rare_kernel
+def is_supported(bodies: arrays.Records, controls: arrays.Record) -> bool:
     """Return True if every free body touches something, where there is gravity: at the top of its flight none rests."""
     if controls.gravity_x == 0.0 and controls.gravity_y == 0.0 and controls.push == 0.0:
         return True
@@ -154,15 +118,15 @@ def is_supported(bodies: Records, controls: Record) -> bool:
     return True
 
 
-@rare_kernel
-def check(world: World, systems: Systems | None) -> int:
+@jit.rare_kernel
+def check(world: arrays.World, systems: Systems | None) -> int:
     """Check that the run may continue: finite, no pair overlaps too far, not at rest for the hold time."""
     controls = world.controls[0]
     clock = world.clock[0]
     ledger = world.ledger[0]
-    renew_rotations(world.bodies)
-    fastest = fastest_point(world.bodies)
-    kinetic = kinetic_energy(world)
+    integrate.renew_rotations(world.bodies)
+    fastest = integrate.fastest_point(world.bodies)
+    kinetic = integrate.kinetic_energy(world)
     power = weights_power(world)
     if systems is not None:
         speed, energy, work = survey_systems(systems, world)
@@ -172,62 +136,64 @@ def check(world: World, systems: Systems | None) -> int:
     ledger.travel_work += controls.check_every * controls.step * power
     ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic)
     if math.isinf(fastest):
-        return NOT_FINITE
+        return arrays.NOT_FINITE
     if clock.ends_at > 0:
         clock.ends_at = clock.steps
-        return OVERLAP_LIMIT
-    rests = fastest < controls.rest_speed and is_supported(world.bodies, controls) and is_support_at_rest(world)
-    rests = rests and are_loads_steady(world)
+        return arrays.OVERLAP_LIMIT
+    rests = (
+        fastest < controls.rest_speed and is_supported(world.bodies, controls) and supports.is_support_at_rest(world)
+    )
+    rests = rests and loads.are_loads_steady(world)
     clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
-    return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
+    return arrays.AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else arrays.REACHED
 
 
-@rare_kernel
-def update_neighbours(world: World) -> int:
+@jit.rare_kernel
+def update_neighbours(world: arrays.World) -> int:
     """Keep the pair list valid; return PAIRS_FULL where it does not fit, TOO_FAST where none would do, else REACHED."""
-    if outruns_lists(world):
-        return TOO_FAST
+    if broad_phase.outruns_lists(world):
+        return arrays.TOO_FAST
     rebuilds = world.clock[0].rebuilds
-    if not update_pairs(world):
-        return PAIRS_FULL
+    if not broad_phase.update_pairs(world):
+        return arrays.PAIRS_FULL
     if world.clock[0].rebuilds != rebuilds:
-        partition(world, world.team[TEAM_SIZE])
-    return REACHED
+        partition(world, world.team[arrays.TEAM_SIZE])
+    return arrays.REACHED
 
 
-@rare_kernel
-def supervise(world: World, k: int, task: int, step: float, systems: Systems | None) -> int:
+@jit.rare_kernel
+def supervise(world: arrays.World, k: int, task: int, step: float, systems: Systems | None) -> int:
     """Let the first thread do a task for all while the others wait; return the status code that all follow."""
     barrier(world.team)
     if k == 0:
         world.clock[0].steps = world.shares[0].steps
-        world.team[STATUS] = REACHED
+        world.team[arrays.STATUS] = arrays.REACHED
         if task == NEIGHBOURS:
-            world.team[STATUS] = update_neighbours(world)
+            world.team[arrays.STATUS] = update_neighbours(world)
         elif task == CHECK:
-            world.team[STATUS] = check(world, systems)
+            world.team[arrays.STATUS] = check(world, systems)
         elif task == MOVE:
-            move_support(world, step)
-            move_driven(world, step)
+            supports.move_support(world, step)
+            supports.move_driven(world, step)
         elif task == SHARE_OUT:
-            share_out(world)
+            inertia.share_out(world)
         else:
-            tally_support(world, step)
-            tally_driven(world, step)
+            supports.tally_support(world, step)
+            supports.tally_driven(world, step)
     barrier(world.team)
-    return world.team[STATUS]
+    return world.team[arrays.STATUS]
 
 
-@rare_kernel
-def exchange_forces(world: World, k: int, step: float) -> None:
+@jit.rare_kernel
+def exchange_forces(world: arrays.World, k: int, step: float) -> None:
     """Evaluate the pairs between shares, everyone some of them, and add what comes from shares before."""
     forces_between(world, world.shares[k], step)
     barrier(world.team)
     add_from_before(world, world.shares[k])
 
 
-@rare_kernel
-def note_depth(clock: Record, share: Record) -> None:
+@jit.rare_kernel
+def note_depth(clock: arrays.Record, share: arrays.Record) -> None:
     """End the run with the next step if a pair of a share overlapped too far; at once where checks are due.
 
     Bodies that were done early have started the next step by now. All threads that note it in the same step write the
@@ -237,28 +203,28 @@ def note_depth(clock: Record, share: Record) -> None:
         clock.ends_at = share.steps + 1
 
 
-@kernel
-def note_step(clock: Record, share: Record) -> None:
+@jit.kernel
+def note_step(clock: arrays.Record, share: arrays.Record) -> None:
     """Note what all threads have to know of the step of a share; most steps have nothing, and call nothing."""
     if share.is_too_deep or share.asks:
         note_depth(clock, share)
-        note_contacts(clock, share)
+        inertia.note_contacts(clock, share)
 
 
-@kernel
-def has_ended(clock: Record, steps: int) -> bool:
+@jit.kernel
+def has_ended(clock: arrays.Record, steps: int) -> bool:
     """Return True if the last step of a run that failed is among so many steps."""
     return 0 < clock.ends_at <= steps
 
 
-@rare_kernel
-def open_call(world: World, k: int, last_step: int) -> None:
+@jit.rare_kernel
+def open_call(world: arrays.World, k: int, last_step: int) -> None:
     """Get ready for the steps of one call."""
     clock = world.clock[0]
     if k == 0:
         if clock.is_started == 0:
-            place_all_corners(world.bodies)
-        partition(world, world.team[TEAM_SIZE])
+            integrate.place_all_corners(world.bodies)
+        partition(world, world.team[arrays.TEAM_SIZE])
     barrier(world.team)
     every = world.controls[0].check_every
     share = world.shares[k]
@@ -269,11 +235,11 @@ def open_call(world: World, k: int, last_step: int) -> None:
     share.until = 0
     share.is_too_deep = 0
     share.asks = 0
-    share.status = OVERLAP_LIMIT if has_ended(clock, clock.steps) else REACHED
+    share.status = arrays.OVERLAP_LIMIT if has_ended(clock, clock.steps) else arrays.REACHED
 
 
-@rare_kernel
-def close_call(world: World, k: int) -> int:
+@jit.rare_kernel
+def close_call(world: arrays.World, k: int) -> int:
     """Note how far the run is and return its status code, once all threads are done."""
     share = world.shares[k]
     barrier(world.team)
@@ -283,18 +249,18 @@ def close_call(world: World, k: int) -> int:
     return share.status
 
 
-@rare_kernel
-def begin_steps(world: World, k: int, step: float) -> bool:
+@jit.rare_kernel
+def begin_steps(world: arrays.World, k: int, step: float) -> bool:
     """Start a step of `step` (s), set up to which one nothing has to be checked, return whether the run continues."""
     share = world.shares[k]
     if share.steps >= world.clock[0].next_update:
         share.status = supervise(world, k, NEIGHBOURS, step, None)
-        if share.status != REACHED:
+        if share.status != arrays.REACHED:
             return False
-    start_all(world.bodies, share.first_body, share.last_body, step)
+    integrate.start_all(world.bodies, share.first_body, share.last_body, step)
     if world.loads.size > 0:
-        push_bodies(world, share.first_body, share.last_body, share.steps * world.controls[0].step + step, step)
-    if has_motion(world.controls[0]):
+        loads.push_bodies(world, share.first_body, share.last_body, share.steps * world.controls[0].step + step, step)
+    if supports.has_motion(world.controls[0]):
         supervise(world, k, MOVE, step, None)
         return True
     barrier(world.team)
@@ -303,32 +269,34 @@ def begin_steps(world: World, k: int, step: float) -> bool:
     return True
 
 
-@rare_kernel
-def end_steps(world: World, k: int, step: float, systems: Systems | None) -> bool:
+@jit.rare_kernel
+def end_steps(world: arrays.World, k: int, step: float, systems: Systems | None) -> bool:
     """Do the checks that are due after some steps; return whether the run continues."""
     share = world.shares[k]
-    if has_motion(world.controls[0]):
+    if supports.has_motion(world.controls[0]):
         supervise(world, k, TALLY, step, None)
     if share.steps >= world.clock[0].next_share:
         supervise(world, k, SHARE_OUT, step, None)
     if share.steps == share.next_check:
         share.next_check += world.controls[0].check_every
         share.status = supervise(world, k, CHECK, step, systems)
-    if has_ended(world.clock[0], share.steps) and share.status != NOT_FINITE:
-        share.status = OVERLAP_LIMIT
-    return share.status == REACHED
+    if has_ended(world.clock[0], share.steps) and share.status != arrays.NOT_FINITE:
+        share.status = arrays.OVERLAP_LIMIT
+    return share.status == arrays.REACHED
 
 
-@kernel
-def goes_further(clock: Record, share: Record) -> bool:
+@jit.kernel
+def goes_further(clock: arrays.Record, share: arrays.Record) -> bool:
     """Return True if a thread has another step to do; the last step of a run that failed may be one more than asked."""
-    if share.status != REACHED:
+    if share.status != arrays.REACHED:
         return False
     return share.steps < share.last_step or share.is_started == 0 or share.steps + 1 == clock.ends_at
 
 
-@rare_kernel
-def advance_thread(world: World, last_step: int, k: int, team: Integers | None, systems: Systems | None) -> int:
+@jit.rare_kernel
+def advance_thread(
+    world: arrays.World, last_step: int, k: int, team: arrays.Integers | None, systems: Systems | None
+) -> int:
     """Be thread k of those that step a world until `last_step`, or until something ends the run.
 
     Without a `team`, which is world.team, what threads exchange is not compiled: a first run is for one thread. With
@@ -360,21 +328,21 @@ def advance_thread(world: World, last_step: int, k: int, team: Integers | None, 
     return close_call(world, k)
 
 
-@kernel
-def advance_single(world: World, last_step: int) -> int:
+@jit.kernel
+def advance_single(world: arrays.World, last_step: int) -> int:
     """Step a world with one thread; see advance."""
-    world.team[TEAM_SIZE] = 1
+    world.team[arrays.TEAM_SIZE] = 1
     return advance_thread(world, last_step, 0, None, None)
 
 
-@entry_kernel
-def advance_alone(world: World, last_step: int) -> int:
+@jit.entry_kernel
+def advance_alone(world: arrays.World, last_step: int) -> int:
     """Step a world with one thread; see advance."""
     return advance_single(world, last_step)
 
 
-@entry_kernel
-def advance_in_team(world: World, last_step: int, k: int) -> int:
+@jit.entry_kernel
+def advance_in_team(world: arrays.World, last_step: int, k: int) -> int:
     """Be thread k of the world.team[TEAM_SIZE] that advance one world together; see advance. All get the same answer.
 
     Every thread comes with work space of its own (points, matrices, before, action) and shares all other arrays.
@@ -382,7 +350,7 @@ def advance_in_team(world: World, last_step: int, k: int) -> int:
     return advance_thread(world, last_step, k, world.team, None)
 
 
-def advance(world: World, last_step: int) -> int:
+def advance(world: arrays.World, last_step: int) -> int:
     """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
 
     The first call also evaluates the contacts at the start, as if after a step of no length; `advance(world, 0)` does
@@ -393,28 +361,33 @@ def advance(world: World, last_step: int) -> int:
     return int(advance_alone(world, last_step))
 
 
-@entry_kernel
+@jit.entry_kernel
 def advance_coupled_alone(scene: Coupled, last_step: int) -> int:
     """Step a world and further systems with one thread; see advance."""
-    scene.world.team[TEAM_SIZE] = 1
+    scene.world.team[arrays.TEAM_SIZE] = 1
     return advance_thread(scene.world, last_step, 0, None, scene.systems)
 
 
-@entry_kernel
+@jit.entry_kernel
 def advance_coupled_in_team(scene: Coupled, last_step: int, k: int) -> int:
     """Be thread k of those that advance a world and further systems together; see advance_in_team."""
     return advance_thread(scene.world, last_step, k, scene.world.team, scene.systems)
 
 
-@rare_kernel
-def advance_member(world: World, last_step: int) -> int:
+@jit.rare_kernel
+def advance_member(world: arrays.World, last_step: int) -> int:
     """Step one member; see advance."""
     return advance_single(world, last_step)
 
 
-@entry_kernel
+@jit.entry_kernel
 def advance_members(
-    worlds: World, members: Integers, last_steps: Integers, starts: Floats, codes: Integers, watched: Watched
+    worlds: arrays.World,
+    members: arrays.Integers,
+    last_steps: arrays.Integers,
+    starts: arrays.Floats,
+    codes: arrays.Integers,
+    watched: Watched,
 ) -> None:
     """Advance some members from their start to their last step, or to what ends them before.
 
@@ -426,10 +399,10 @@ def advance_members(
     for m in members:
         world = member(worlds, m)
         codes[m] = advance_member(world, 0)
-        if codes[m] != PAIRS_FULL:
+        if codes[m] != arrays.PAIRS_FULL:
             measure(world, starts[m])
         clock = world.clock[0]
-        while codes[m] == REACHED and clock.steps < last_steps[m]:
+        while codes[m] == arrays.REACHED and clock.steps < last_steps[m]:
             frame = frame_to_watch(watched, m, clock.steps)
             stop = min(frame, last_steps[m]) if frame > 0 else last_steps[m]
             codes[m] = advance_member(world, stop)

@@ -7,20 +7,18 @@ substep: those of blocks at rest by nothing, that of a block that was held and i
 substep is one like all others then.
 """
 
-from blocksim.kernels.common.arrays import Record
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.loads import accelerations
+from blocksim.kernels.common import arrays, jit, loads
 from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
 
 
-@kernel
+@jit.kernel
 def is_start(scene: Nonsmooth) -> bool:
     """Return True if velocities are those of time zero, not half a substep before."""
     stepping = scene.contacts.stepping[0]
     return scene.world.clock[0].steps == 0 and stepping.parts == 0 and stepping.is_settled == 0
 
 
-@rare_kernel
+@jit.rare_kernel
 def load_states(scene: Nonsmooth) -> None:
     """Bring velocities and inverse masses of all bodies into their states: at the start of a run."""
     controls = scene.world.controls[0]
@@ -42,7 +40,7 @@ def load_states(scene: Nonsmooth) -> None:
         scene.contacts.before[i].lifted = h * (controls.gravity_x * state.vx + controls.gravity_y * state.vy)
 
 
-@rare_kernel
+@jit.rare_kernel
 def go_back(scene: Nonsmooth) -> None:
     """Take half of what gravity, loads and the impulses of a whole substep do to velocities from them."""
     world = scene.world
@@ -51,7 +49,7 @@ def go_back(scene: Nonsmooth) -> None:
     half = 0.5 * contacts.stepping[0].substep
     count = world.bodies.size - 1
     if world.loads.size > 0:
-        accelerations(world, contacts.states, scene.pushes, 0, count, 0.0)
+        loads.accelerations(world, contacts.states, scene.pushes, 0, count, 0.0)
     for i in range(count):
         state = contacts.states[i]
         if state.inverse_mass > 0.0:
@@ -68,8 +66,8 @@ def go_back(scene: Nonsmooth) -> None:
             push_back(constraint, contacts.states[constraint.b], -1.0, constraint.arm_b, constraint.shear_arm_b)
 
 
-@rare_kernel
-def push_back(constraint: Record, state: Record, sign: float, arm: float, shear_arm: float) -> None:
+@jit.rare_kernel
+def push_back(constraint: arrays.Record, state: arrays.Record, sign: float, arm: float, shear_arm: float) -> None:
     """Take half of what the impulses of a constraint do to a body, with its arms (m), from its velocity."""
     share = -0.5 * sign
     normal = constraint.normal_one + constraint.normal_two

@@ -3,15 +3,14 @@
 Fixed bodies join no cluster, as no impulse moves them: two blocks on one table are independent.
 """
 
-from blocksim.kernels.common.arrays import Record, Records
-from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
 
 ROUND_OFF = 1e-9  # of the kinetic energy of a cluster; impacts are solved no better
 
 
-@rare_kernel
-def root_of(bodies: Records, i: int) -> int:
+@jit.rare_kernel
+def root_of(bodies: arrays.Records, i: int) -> int:
     """Return the body that stands for the cluster of body i, so far; shortens the way there."""
     while bodies[i].root != i:
         bodies[i].root = bodies[bodies[i].root].root
@@ -19,23 +18,23 @@ def root_of(bodies: Records, i: int) -> int:
     return i
 
 
-@rare_kernel
-def join(bodies: Records, i: int, j: int) -> None:
+@jit.rare_kernel
+def join(bodies: arrays.Records, i: int, j: int) -> None:
     """Make one cluster of two."""
     i = root_of(bodies, i)
     j = root_of(bodies, j)
     bodies[max(i, j)].root = min(i, j)
 
 
-@rare_kernel
-def of_constraint(contacts: Contacts, group: Record, lane: int) -> Record:
+@jit.rare_kernel
+def of_constraint(contacts: Contacts, group: arrays.Record, lane: int) -> arrays.Record:
     """Return the record of a free body of a constraint."""
     a = group.a[lane]
     return contacts.impacts[a if contacts.states[a].inverse_mass > 0.0 else group.b[lane]]
 
 
-@rare_kernel
-def join_touching(contacts: Contacts, group: Record) -> None:
+@jit.rare_kernel
+def join_touching(contacts: Contacts, group: arrays.Record) -> None:
     """Join the free bodies of the constraints of a group with a point that counts."""
     states = contacts.states
     for lane in range(group.count):
@@ -45,8 +44,8 @@ def join_touching(contacts: Contacts, group: Record) -> None:
             join(contacts.impacts, a, b)
 
 
-@rare_kernel
-def mark_rebounds(contacts: Contacts, group: Record) -> None:
+@jit.rare_kernel
+def mark_rebounds(contacts: Contacts, group: arrays.Record) -> None:
     """Mark the clusters of the constraints of a group with a point that rebounds."""
     bodies = contacts.impacts
     for lane in range(group.count):
@@ -54,7 +53,7 @@ def mark_rebounds(contacts: Contacts, group: Record) -> None:
             bodies[root_of(bodies, of_constraint(contacts, group, lane).root)].is_hit = 1
 
 
-@rare_kernel
+@jit.rare_kernel
 def find_clusters(contacts: Contacts) -> None:
     """Join the bodies of all constraints with a point that counts, and mark the clusters in which anything rebounds."""
     bodies = contacts.impacts
@@ -70,15 +69,15 @@ def find_clusters(contacts: Contacts) -> None:
         bodies[i].is_hit = bodies[bodies[i].root].is_hit
 
 
-@rare_kernel
-def energy(contacts: Contacts, state: Record, vx: float, vy: float, spin: float) -> float:
+@jit.rare_kernel
+def energy(contacts: Contacts, state: arrays.Record, vx: float, vy: float, spin: float) -> float:
     """Return the kinetic energy (J) of a body, seen from the supports: those that move may well bring energy in."""
     ux = vx - contacts.stepping[0].support_vx
     uy = vy - contacts.stepping[0].support_vy
     return 0.5 * ((ux * ux + uy * uy) / state.inverse_mass + spin * spin / state.inverse_inertia)
 
 
-@rare_kernel
+@jit.rare_kernel
 def count_work(contacts: Contacts) -> None:
     """Take the work of driven bodies, seen from the supports, out of the energies of clusters after a round.
 
@@ -92,8 +91,8 @@ def count_work(contacts: Contacts) -> None:
             root.now -= work_of(contacts, group, lane)
 
 
-@rare_kernel
-def work_of(contacts: Contacts, group: Record, lane: int) -> float:
+@jit.rare_kernel
+def work_of(contacts: Contacts, group: arrays.Record, lane: int) -> float:
     """Return the work (J) that the impulses of a constraint bring into its free body, seen from the supports."""
     states = contacts.states
     is_b = states[group.a[lane]].inverse_mass > 0.0
@@ -112,13 +111,13 @@ def work_of(contacts: Contacts, group: Record, lane: int) -> float:
     return work if is_b else -work
 
 
-@rare_kernel
-def has_gain(root: Record) -> bool:
+@jit.rare_kernel
+def has_gain(root: arrays.Record) -> bool:
     """Return True if impacts have created energy in a cluster."""
     return root.now > root.then * (1.0 + ROUND_OFF)
 
 
-@rare_kernel
+@jit.rare_kernel
 def weigh(contacts: Contacts) -> bool:
     """Sum up the energies of all clusters before and after a round; return whether any has gained."""
     states = contacts.states

@@ -10,10 +10,7 @@ Loads that kick by h a add their impulse m h a times the mean of the velocities 
 from (J + m h (g + a)) times that mean, the change of K(v). So their work needs no place, nor the position pass.
 """
 
-from blocksim.kernels.common.arrays import Floats, Records
-from blocksim.kernels.common.energy import potential_energy, smallest_side
-from blocksim.kernels.common.integrate import kinetic_energy
-from blocksim.kernels.common.jit import entry_kernel, rare_kernel
+from blocksim.kernels.common import arrays, energy, integrate, jit
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
 from blocksim.kernels.nonsmooth.begin import is_start
 
@@ -24,8 +21,8 @@ DEEPEST = (
 NONSMOOTH_LEDGER = ("kinetic", "potential", "impacts", "friction", "correction", "to_support", "to_loads", "events")
 
 
-@rare_kernel
-def tallied(tallies: Records) -> tuple[float, float, float]:
+@jit.rare_kernel
+def tallied(tallies: arrays.Records) -> tuple[float, float, float]:
     """Return what has gone (J) into impacts, friction and supports, summed over all tallies in order."""
     impacts = 0.0
     friction = 0.0
@@ -37,7 +34,7 @@ def tallied(tallies: Records) -> tuple[float, float, float]:
     return impacts, friction, to_support
 
 
-@rare_kernel
+@jit.rare_kernel
 def correction(scene: Nonsmooth) -> float:
     """Return the work (J) of the weights on the displacements of the position passes.
 
@@ -61,7 +58,7 @@ def correction(scene: Nonsmooth) -> float:
     return total
 
 
-@rare_kernel
+@jit.rare_kernel
 def is_shown_by_loads(scene: Nonsmooth, i: int) -> bool:
     """Return True if the velocity shown of a body has half a kick of loads beyond that after the last substep."""
     if scene.pushes.size == 1 or is_start(scene):
@@ -71,7 +68,7 @@ def is_shown_by_loads(scene: Nonsmooth, i: int) -> bool:
     return body.vx != state.vx or body.vy != state.vy or body.spin != state.spin
 
 
-@rare_kernel
+@jit.rare_kernel
 def given_to_loads(scene: Nonsmooth) -> float:
     """Return the work (J) done on loads, against that which they do.
 
@@ -92,7 +89,7 @@ def given_to_loads(scene: Nonsmooth) -> float:
     return total
 
 
-@rare_kernel
+@jit.rare_kernel
 def contact_points(scene: Nonsmooth) -> tuple[int, float]:
     """Return how many points press, and the largest overlap (m), of the last substep and of the start of the step."""
     count = 0
@@ -105,7 +102,7 @@ def contact_points(scene: Nonsmooth) -> tuple[int, float]:
     return count, largest
 
 
-@rare_kernel
+@jit.rare_kernel
 def has_excessive_overlap(scene: Nonsmooth) -> bool:
     """Return True if an overlap exceeds the limit given, or a share of the smallest side of its pair."""
     given = scene.world.controls[0].max_overlap
@@ -114,17 +111,17 @@ def has_excessive_overlap(scene: Nonsmooth) -> bool:
         constraint = scene.contacts.constraints[r]
         overlap = max(-constraint.gap_one, -constraint.gap_two)
         if constraint.reach == TOUCHING and overlap > 0.0:
-            side = min(smallest_side(bodies[constraint.a]), smallest_side(bodies[constraint.b]))
+            side = min(energy.smallest_side(bodies[constraint.a]), energy.smallest_side(bodies[constraint.b]))
             if overlap > (given if given > 0.0 else DEEPEST * side):
                 return True
     return False
 
 
-@entry_kernel
-def measure_nonsmooth(scene: Nonsmooth, row: Floats) -> None:
+@jit.entry_kernel
+def measure_nonsmooth(scene: Nonsmooth, row: arrays.Floats) -> None:
     """Write one row of the ledger: energies (J) as in `NONSMOOTH_LEDGER`, contacts, largest overlap (m)."""
-    row[0] = kinetic_energy(scene.world)
-    row[1] = potential_energy(scene.world)
+    row[0] = integrate.kinetic_energy(scene.world)
+    row[1] = energy.potential_energy(scene.world)
     row[2], row[3], row[5] = tallied(scene.contacts.tallies)
     row[4] = correction(scene)
     row[6] = given_to_loads(scene)

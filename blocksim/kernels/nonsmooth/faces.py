@@ -17,8 +17,7 @@ time t = m h are off by (2 m - n + 1)^2 h / 4 bends.
 
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import Record
-from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.common.simd import Lanes, Mask, lesser, select
 from blocksim.kernels.nonsmooth.arrays import FAR
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, slip_of
@@ -76,13 +75,13 @@ class Points(NamedTuple):
     is_of_b: Mask  # the reference face is one of body b
 
 
-@kernel
-def block_of(body: Record) -> Block:
+@jit.kernel
+def block_of(body: arrays.Record) -> Block:
     """Return what of a body decides where it touches."""
     return Block(body.x, body.y, body.cos, body.sin, body.half_x, body.half_y)
 
 
-@kernel
+@jit.kernel
 def face_of(body: Block, mx: Lanes, my: Lanes, along_x: Mask) -> Face:
     """Return the face of a body with the outward normal (mx, my), on its own x axis or y axis."""
     distance = select(along_x, body.half_x, body.half_y)
@@ -90,7 +89,7 @@ def face_of(body: Block, mx: Lanes, my: Lanes, along_x: Mask) -> Face:
     return Face(mx, my, body.x, body.y, distance, -half, half)
 
 
-@kernel
+@jit.kernel
 def face_towards(body: Block, x: Lanes, y: Lanes, along_x: Mask) -> Face:
     """Return the face on one of a body's axes that is on the side of a place (m), given in the body's own frame."""
     sign = select(select(along_x, x, y) >= 0.0, 1.0, -1.0)
@@ -99,7 +98,7 @@ def face_towards(body: Block, x: Lanes, y: Lanes, along_x: Mask) -> Face:
     return face_of(body, mx, my, along_x)
 
 
-@kernel
+@jit.kernel
 def in_frame(face: Face, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
     """Return a place (m) in the frame of a face: to the right along it, and above it."""
     dx = x - face.x
@@ -107,7 +106,7 @@ def in_frame(face: Face, x: Lanes, y: Lanes) -> tuple[Lanes, Lanes]:
     return dx * face.ny - dy * face.nx, dx * face.nx + dy * face.ny - face.distance
 
 
-@kernel
+@jit.kernel
 def opposite_edge(face: Face, body: Block) -> Edge:
     """Return the face of a body that looks most towards a reference face."""
     x, y = in_frame(face, body.x, body.y)
@@ -129,7 +128,7 @@ def opposite_edge(face: Face, body: Block) -> Edge:
     return Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
 
 
-@kernel
+@jit.kernel
 def clip(edge: Edge, face: Face) -> Edge:
     """Cut an edge at both ends of the reference face; empty (left > right) where it lies beyond."""
     left, left_gap, right, right_gap, is_left, is_right = edge
@@ -146,7 +145,7 @@ def clip(edge: Edge, face: Face) -> Edge:
     )
 
 
-@kernel
+@jit.kernel
 def clip_one(edge: Edge, face: Face) -> Edge:
     """Return the same for a single edge, bit by bit, without the division where nothing is cut."""
     if edge.left >= face.left and edge.right <= face.right:
@@ -154,7 +153,7 @@ def clip_one(edge: Edge, face: Face) -> Edge:
     return clip(edge, face)
 
 
-@kernel
+@jit.kernel
 def counted(left_gap: Lanes, right_gap: Lanes, width: Lanes, a: Block, b: Block, margin: float) -> tuple[Lanes, Lanes]:
     """Return the gaps (m) of two points with a width (m) between them, FAR where one does not count."""
     left_gap = select(left_gap <= margin, left_gap, FAR)
@@ -166,7 +165,7 @@ def counted(left_gap: Lanes, right_gap: Lanes, width: Lanes, a: Block, b: Block,
     return left_gap, right_gap
 
 
-@kernel
+@jit.kernel
 def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin: float) -> Points:
     """Return normal, arms and gaps of a manifold.
 
@@ -195,13 +194,13 @@ def points_of(face: Face, edge: Edge, a: Block, b: Block, is_of_b: Mask, margin:
     return Points(constraint, select(is_of_b, right_gap, left_gap), select(is_of_b, left_gap, right_gap), is_of_b)
 
 
-@kernel
+@jit.kernel
 def has_point(points: Points) -> Mask:
     """Return True if a manifold has a point."""
     return lesser(points.gap_one, points.gap_two) < FAR
 
 
-@kernel
+@jit.kernel
 def block_ahead(body: Block, vx: Lanes, vy: Lanes, spin: Lanes, ahead: Lanes) -> Block:
     """Return a body as it will be a short time `ahead` (s); its turn to second order."""
     turn = ahead * spin
@@ -211,7 +210,7 @@ def block_ahead(body: Block, vx: Lanes, vy: Lanes, spin: Lanes, ahead: Lanes) ->
     return Block(body.x + ahead * vx, body.y + ahead * vy, cos, sin, body.half_x, body.half_y)
 
 
-@kernel
+@jit.kernel
 def at_start(points: Points, motion: Motion) -> Points:
     """Return a manifold found ahead of time with the gaps it has now, along its own normal and arms."""
     slip = slip_of(points.constraint, motion.vx, motion.vy, motion.spin_a, motion.spin_b)
@@ -226,7 +225,7 @@ class Bend(NamedTuple):
     shear: Lanes
 
 
-@kernel
+@jit.kernel
 def bend_of(constraint: Constraints, motion: Motion, is_of_b: Mask, is_two: Mask) -> Bend:
     """Return what the velocities at a contact gain within half a substep, as bodies turn on with the speed they have.
 
@@ -252,15 +251,15 @@ def bend_of(constraint: Constraints, motion: Motion, is_of_b: Mask, is_two: Mask
     return Bend(motion.half * select(is_of_b, of_b, of_a), motion.half * sticking)
 
 
-@kernel
-def bend_time(stepping: Record, number: int) -> float:
+@jit.kernel
+def bend_time(stepping: arrays.Record, number: int) -> float:
     """Return by how much gaps at the start of substep `number` are off, over the bend of their constraint (s)."""
     off = 2 * number - stepping.substeps + 1
     return 0.25 * stepping.substep * off * off
 
 
-@kernel
-def follow_curvature(stepping: Record, number: int) -> None:
+@jit.kernel
+def follow_curvature(stepping: arrays.Record, number: int) -> None:
     """Set the bends in substep `number`."""
     stepping.bend_share = 2 * number - stepping.substeps + 2
     stepping.bend_time = bend_time(stepping, number)

@@ -7,8 +7,7 @@ left out.
 
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import Integers, Record
-from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.common.simd import (
     WIDTH,
     Lane,
@@ -40,8 +39,8 @@ class Bodies(NamedTuple):
     turned: Lanes
 
 
-@kernel
-def constraints_of(group: Record, lane: Lane) -> Constraints:
+@jit.kernel
+def constraints_of(group: arrays.Record, lane: Lane) -> Constraints:
     """Return the constraints of a group."""
     return Constraints(
         load(lane, group.nx),
@@ -54,15 +53,15 @@ def constraints_of(group: Record, lane: Lane) -> Constraints:
     )
 
 
-@kernel
-def bodies_at(contacts: Contacts, places: Integers, lane: Lane) -> Bodies:
+@jit.kernel
+def bodies_at(contacts: Contacts, places: arrays.Integers, lane: Lane) -> Bodies:
     """Return the bodies of a group."""
     vx, vy, spin, inverse_mass = fields_0(lane, contacts.states, places)
     inverse_inertia, dx, dy, turned = fields_4(lane, contacts.states, places)
     return Bodies(vx, vy, spin, inverse_mass, inverse_inertia, dx, dy, turned)
 
 
-@kernel
+@jit.kernel
 def normal_masses(constraint: Constraints, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
     """Return A (1/kg) of the two normals: of one, mixed, of two."""
     together = a.inverse_mass + b.inverse_mass
@@ -76,7 +75,7 @@ def normal_masses(constraint: Constraints, a: Bodies, b: Bodies) -> tuple[Lanes,
     return one, mixed, two
 
 
-@kernel
+@jit.kernel
 def tangent_mass(constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
     """Return A (1/kg) along the tangent."""
     coupled_a = a.inverse_inertia * constraint.shear_arm_a
@@ -84,14 +83,14 @@ def tangent_mass(constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
     return a.inverse_mass + b.inverse_mass + coupled_a * constraint.shear_arm_a + coupled_b * constraint.shear_arm_b
 
 
-@kernel
-def material_of(contacts: Contacts, group: Record, k: int) -> Record:
+@jit.kernel
+def material_of(contacts: Contacts, group: arrays.Record, k: int) -> arrays.Record:
     """Return how the bodies of one constraint of a group interact."""
     return contacts.materials[contacts.constraints[group.constraint[k]].material]
 
 
-@kernel
-def gather(contacts: Contacts, begins: Integers) -> None:
+@jit.kernel
+def gather(contacts: Contacts, begins: arrays.Integers) -> None:
     """Make groups of the constraints within the margin, colour after colour.
 
     Those that touch come first, so that groups of which none does can be passed by.
@@ -127,15 +126,15 @@ def gather(contacts: Contacts, begins: Integers) -> None:
     stepping.group_count = number
 
 
-@kernel
-def close(group: Record, count: int) -> None:
+@jit.kernel
+def close(group: arrays.Record, count: int) -> None:
     """Fill a group of `count` constraints up with the last one."""
     group.count = count
     for lane in range(count, WIDTH):
         group.constraint[lane] = group.constraint[count - 1]
 
 
-@kernel
+@jit.kernel
 def pack_groups(contacts: Contacts, begin: int, end: int) -> None:
     """Copy the constraints of some groups into them."""
     for m in range(begin, end):
@@ -159,8 +158,8 @@ def pack_groups(contacts: Contacts, begin: int, end: int) -> None:
             keep_masses(contacts, group)
 
 
-@kernel
-def keep_masses(contacts: Contacts, group: Record) -> None:
+@jit.kernel
+def keep_masses(contacts: Contacts, group: arrays.Record) -> None:
     """Keep A of a group of one, the same for all substeps of a step."""
     constraint = constraints_of(group, 0)
     a = bodies_at(contacts, group.a, 0)
@@ -169,8 +168,8 @@ def keep_masses(contacts: Contacts, group: Record) -> None:
     group.along = tangent_mass(constraint, a, b)
 
 
-@kernel
-def pack(contacts: Contacts, group: Record, lane: Lane) -> None:
+@jit.kernel
+def pack(contacts: Contacts, group: arrays.Record, lane: Lane) -> None:
     """Copy the numbers of the constraints of a group into it."""
     nx, ny, arm_a, arm_b = fields_0(lane, contacts.constraints, group.constraint)
     width, shear_arm_a, shear_arm_b, gap_one = fields_4(lane, contacts.constraints, group.constraint)
@@ -192,7 +191,7 @@ def pack(contacts: Contacts, group: Record, lane: Lane) -> None:
     store(lane, group.shear, shear)
 
 
-@kernel
+@jit.kernel
 def unpack_groups(contacts: Contacts, begin: int, end: int) -> None:
     """Bring the impulses of some groups back to their constraints."""
     for m in range(begin, end):
@@ -204,14 +203,14 @@ def unpack_groups(contacts: Contacts, begin: int, end: int) -> None:
             constraint.shear = group.shear[lane]
 
 
-@kernel
+@jit.kernel
 def total(x: Lanes, count: int) -> float:
     """Return the sum of the first `count` lanes, at least two."""
     one, two, three, four = split(x)
     return (one + two) + ((three if count > 2 else 0.0) + (four if count > 3 else 0.0))
 
 
-@kernel
+@jit.kernel
 def highest(x: Lanes) -> float:
     """Return the largest number."""
     one, two, three, four = split(x)

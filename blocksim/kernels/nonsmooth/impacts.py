@@ -44,30 +44,18 @@ from blocksim.kernels.common.arrays import TEAM_SIZE, Integers, Record, Records
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.common.simd import WIDTH, load, store
-from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-from blocksim.kernels.nonsmooth.clusters import (
-    ROUND_OFF,
-    count_work,
-    energy,
-    find_clusters,
-    has_gain,
-    of_constraint,
-    weigh,
-)
-from blocksim.kernels.nonsmooth.motion import kick_again
-from blocksim.kernels.nonsmooth.rounds import aim_rest, aim_round, bring_back, clear, set_aside, tally_round
-from blocksim.kernels.nonsmooth.sweeps import VELOCITY, agree, part_of, velocity_pass
+from blocksim.kernels.nonsmooth import arrays, clusters, motion, rounds, sweeps
 
 NEITHER, LOW, HIGH = range(3)  # what the last solution of a cluster is kept as: that with too little or too much energy
 
 
 @rare_kernel
-def begin_search(contacts: Contacts) -> None:
+def begin_search(contacts: arrays.Contacts) -> None:
     """Let all clusters that have gained energy begin without rebounds; the others keep all of theirs."""
     bodies = contacts.impacts
     for body in bodies:
         root = bodies[body.root]
-        body.is_open = 1 if has_gain(root) else 0
+        body.is_open = 1 if clusters.has_gain(root) else 0
         body.share = 0.0 if body.is_open else 1.0
         body.side = NEITHER
         body.low = 0.0
@@ -77,7 +65,7 @@ def begin_search(contacts: Contacts) -> None:
 
 
 @rare_kernel
-def keep_all(contacts: Contacts, begin: int, end: int) -> None:
+def keep_all(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Keep the targets of a round and the impulses with all rebounds."""
     for m in range(begin, end):
         aside = contacts.asides[m]
@@ -91,15 +79,15 @@ def keep_all(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @rare_kernel
-def aim_share(contacts: Contacts, begin: int, end: int) -> None:
+def aim_share(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Begin a round again with the share of its rebounds that is to be tried; leave out clusters that are done."""
     for m in range(begin, end):
         aside = contacts.asides[m]
         if aside.is_hit:
             group = contacts.groups[m]
-            clear(group)
+            rounds.clear(group)
             for lane in range(WIDTH):
-                body = of_constraint(contacts, group, min(lane, group.count - 1))
+                body = clusters.of_constraint(contacts, group, min(lane, group.count - 1))
                 group.target_one[lane] = part_of_target(aside.all_one[lane], body)
                 group.target_two[lane] = part_of_target(aside.all_two[lane], body)
 
@@ -108,12 +96,12 @@ def aim_share(contacts: Contacts, begin: int, end: int) -> None:
 def part_of_target(target: float, body: Record) -> float:
     """Return what a point has to reach (m/s) with the share of its rebound that is to be tried."""
     if not body.is_open:
-        return -FAR
+        return -arrays.FAR
     return body.share * target if target > 0.0 else target
 
 
 @rare_kernel
-def judge(contacts: Contacts, is_last: bool) -> bool:
+def judge(contacts: arrays.Contacts, is_last: bool) -> bool:
     """Decide as what the solutions just found are to be kept, and what is to be tried next; return whether anything is.
 
     Clusters that are done have in `share` where they are between their two solutions.
@@ -137,7 +125,7 @@ def judge(contacts: Contacts, is_last: bool) -> bool:
 
 
 @rare_kernel
-def weigh_again(contacts: Contacts) -> None:
+def weigh_again(contacts: arrays.Contacts) -> None:
     """Sum up the energies of all clusters that are not done."""
     states = contacts.states
     bodies = contacts.impacts
@@ -146,8 +134,10 @@ def weigh_again(contacts: Contacts) -> None:
             body.now = 0.0
     for i in range(bodies.size):
         if bodies[i].is_open and states[i].inverse_mass > 0.0:
-            bodies[bodies[i].root].now += energy(contacts, states[i], states[i].vx, states[i].vy, states[i].spin)
-    count_work(contacts)
+            bodies[bodies[i].root].now += clusters.energy(
+                contacts, states[i], states[i].vx, states[i].vy, states[i].spin
+            )
+    clusters.count_work(contacts)
 
 
 @rare_kernel
@@ -166,7 +156,7 @@ def close_in(root: Record) -> None:
 
 
 @rare_kernel
-def find_between(contacts: Contacts) -> None:
+def find_between(contacts: arrays.Contacts) -> None:
     """Sum up the energy of the difference between the two solutions of every cluster, and give its bodies the side."""
     states = contacts.states
     bodies = contacts.impacts
@@ -184,7 +174,7 @@ def find_between(contacts: Contacts) -> None:
             vx = state.vx - (body.after_vx if is_low else body.low_vx) + ux
             vy = state.vy - (body.after_vy if is_low else body.low_vy) + uy
             spin = state.spin - (body.after_spin if is_low else body.low_spin)
-            root.between += energy(contacts, state, vx, vy, spin)
+            root.between += clusters.energy(contacts, state, vx, vy, spin)
 
 
 @rare_kernel
@@ -192,7 +182,7 @@ def try_next(root: Record, is_last: bool) -> None:
     """Set the share that a cluster tries next, or where it ends up between its two solutions."""
     room = root.then - root.least
     excess = root.most - root.then
-    if is_last or room <= 0.0 or abs(root.now - root.then) <= ROUND_OFF * root.then:
+    if is_last or room <= 0.0 or abs(root.now - root.then) <= clusters.ROUND_OFF * root.then:
         root.is_open = 0
         root.share = share_of(room, room + excess, root.between)
         return
@@ -217,14 +207,14 @@ def share_of(room: float, gain: float, between: float) -> float:
 
 
 @rare_kernel
-def keep_constraints(contacts: Contacts, begin: int, end: int) -> None:
+def keep_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Keep the impulses just found, on the side that their cluster is on."""
     for m in range(begin, end):
         aside = contacts.asides[m]
         if aside.is_hit:
             group = contacts.groups[m]
             for lane in range(WIDTH):
-                side = of_constraint(contacts, group, min(lane, group.count - 1)).side
+                side = clusters.of_constraint(contacts, group, min(lane, group.count - 1)).side
                 if side == LOW:
                     aside.low_one[lane] = group.normal_one[lane]
                     aside.low_two[lane] = group.normal_two[lane]
@@ -236,7 +226,7 @@ def keep_constraints(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @rare_kernel
-def keep_bodies(contacts: Contacts, first: int, last: int) -> None:
+def keep_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
     """Keep the velocities just found, on the side that their cluster is on, and go back to the start of the round."""
     for i in range(first, last):
         body = contacts.impacts[i]
@@ -250,21 +240,21 @@ def keep_bodies(contacts: Contacts, first: int, last: int) -> None:
 
 
 @rare_kernel
-def settle_constraints(contacts: Contacts, begin: int, end: int) -> None:
+def settle_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Give constraints the impulses that their cluster ends up with."""
     for m in range(begin, end):
         aside = contacts.asides[m]
         if aside.is_hit:
             group = contacts.groups[m]
             for lane in range(WIDTH):
-                s = of_constraint(contacts, group, min(lane, group.count - 1)).share
+                s = clusters.of_constraint(contacts, group, min(lane, group.count - 1)).share
                 group.normal_one[lane] = between(aside.low_one[lane], aside.after_one[lane], s)
                 group.normal_two[lane] = between(aside.low_two[lane], aside.after_two[lane], s)
                 group.shear[lane] = between(aside.low_shear[lane], aside.after_shear[lane], s)
 
 
 @rare_kernel
-def settle_bodies(contacts: Contacts, first: int, last: int) -> None:
+def settle_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
     """Give bodies the velocities that their cluster ends up with."""
     for i in range(first, last):
         body = contacts.impacts[i]
@@ -294,7 +284,7 @@ def tolerance_of(stepping: Record) -> float:
 
 
 @rare_kernel
-def rewind(contacts: Contacts, first: int, last: int) -> None:
+def rewind(contacts: arrays.Contacts, first: int, last: int) -> None:
     """Bring the bodies of clusters that are hit back to their velocities before the substep."""
     for i in range(first, last):
         if contacts.impacts[i].is_hit:
@@ -306,7 +296,7 @@ def rewind(contacts: Contacts, first: int, last: int) -> None:
 
 
 @rare_kernel
-def note(contacts: Contacts, first: int, last: int) -> None:
+def note(contacts: arrays.Contacts, first: int, last: int) -> None:
     """Keep the velocities at the start of a round; those of supports too."""
     for i in range(first, last):
         body = contacts.impacts[i]
@@ -317,7 +307,7 @@ def note(contacts: Contacts, first: int, last: int) -> None:
 
 
 @rare_kernel
-def undo(contacts: Contacts, first: int, last: int) -> None:
+def undo(contacts: arrays.Contacts, first: int, last: int) -> None:
     """Keep the velocities after a round, and go back to its start."""
     for i in range(first, last):
         body = contacts.impacts[i]
@@ -329,7 +319,7 @@ def undo(contacts: Contacts, first: int, last: int) -> None:
 
 
 @rare_kernel
-def resume(contacts: Contacts, first: int, last: int, gx: float, gy: float) -> None:
+def resume(contacts: arrays.Contacts, first: int, last: int, gx: float, gy: float) -> None:
     """Let the substep of the bodies of clusters that were hit begin after the last impact, with gravity (m/s)."""
     for i in range(first, last):
         if contacts.impacts[i].is_hit:
@@ -343,7 +333,9 @@ def resume(contacts: Contacts, first: int, last: int, gx: float, gy: float) -> N
 
 
 @rare_kernel
-def restrain(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]) -> None:
+def restrain(
+    contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]
+) -> None:
     """Leave clusters that have gained energy in a round that share of their rebounds with which they do not."""
     stepping = contacts.stepping[0]
     keep_all(contacts, groups[0], groups[1])
@@ -355,7 +347,7 @@ def restrain(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int]
     for number in range(MOST_TRIES):
         aim_share(contacts, groups[0], groups[1])
         barrier(team)
-        velocity_pass(contacts, team, k, VELOCITY, tolerance_of(stepping))
+        sweeps.velocity_pass(contacts, team, k, sweeps.VELOCITY, tolerance_of(stepping))
         barrier(team)
         if k == 0:
             stepping.has_gain = judge(contacts, number == MOST_TRIES - 1)
@@ -370,12 +362,14 @@ def restrain(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int]
 
 
 @rare_kernel
-def go_round(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]) -> None:
+def go_round(
+    contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]
+) -> None:
     """Solve one round that has been aimed."""
-    velocity_pass(contacts, team, k, VELOCITY, tolerance_of(contacts.stepping[0]))
+    sweeps.velocity_pass(contacts, team, k, sweeps.VELOCITY, tolerance_of(contacts.stepping[0]))
     barrier(team)
     if k == 0:
-        contacts.stepping[0].has_gain = weigh(contacts)
+        contacts.stepping[0].has_gain = clusters.weigh(contacts)
     barrier(team)
     if contacts.stepping[0].has_gain:
         restrain(contacts, team, k, bodies, groups)
@@ -384,35 +378,35 @@ def go_round(contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int]
 
 @rare_kernel
 def follow_impacts(
-    contacts: Contacts, team: Integers, k: int, bodies: tuple[int, int], share: float, pushes: Records
+    contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], share: float, pushes: Records
 ) -> None:
     """Let clusters in which anything rebounds go through their impacts one after the other.
 
     `bodies` are those of thread k, `share` is that of a kick of gravity in this substep, `pushes` are of loads.
     """
     stepping = contacts.stepping[0]
-    groups = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
+    groups = sweeps.part_of(0, stepping.group_count, k, team[TEAM_SIZE])
     if k == 0:
-        find_clusters(contacts)
+        clusters.find_clusters(contacts)
     barrier(team)
     rewind(contacts, bodies[0], bodies[1])
-    set_aside(contacts, groups[0], groups[1])
+    rounds.set_aside(contacts, groups[0], groups[1])
     barrier(team)
     for number in range(MOST_ROUNDS):
         note(contacts, bodies[0], bodies[1] + (k == team[TEAM_SIZE] - 1))  # the ground, which may move, is the last
-        hits = aim_round(contacts, groups[0], groups[1], number == 0)
-        if agree(contacts, team, k, number, hits) == 0.0:
+        hits = rounds.aim_round(contacts, groups[0], groups[1], number == 0)
+        if sweeps.agree(contacts, team, k, number, hits) == 0.0:
             break
         go_round(contacts, team, k, bodies, groups)
         lacks = 2.0 * stepping.lag  # once before the round, once after it
-        tally_round(contacts, groups[0], groups[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
+        rounds.tally_round(contacts, groups[0], groups[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
         barrier(team)
     resume(contacts, bodies[0], bodies[1], share * stepping.fall_x, share * stepping.fall_y)
     if pushes.size > 1:
-        kick_again(contacts, pushes, bodies[0], bodies[1], share)
+        motion.kick_again(contacts, pushes, bodies[0], bodies[1], share)
     barrier(team)
-    aim_rest(contacts, groups[0], groups[1])
+    rounds.aim_rest(contacts, groups[0], groups[1])
     barrier(team)
-    velocity_pass(contacts, team, k, VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
-    bring_back(contacts, groups[0], groups[1], False)
+    sweeps.velocity_pass(contacts, team, k, sweeps.VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
+    rounds.bring_back(contacts, groups[0], groups[1], False)
     barrier(team)

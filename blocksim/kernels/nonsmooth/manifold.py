@@ -11,9 +11,8 @@ are: bodies that meet half a step too deep would be taken for neighbours side by
 
 from typing import NamedTuple
 
+from blocksim.kernels.common import jit, shapes
 from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, Records
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import hull_of
 from blocksim.kernels.common.simd import (
     WIDTH,
     Lanes,
@@ -31,28 +30,12 @@ from blocksim.kernels.common.simd import (
     write_fields_4,
     write_fields_8,
 )
-from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, OPEN, TOUCHING, Contacts
-from blocksim.kernels.nonsmooth.faces import (
-    Block,
-    Points,
-    at_start,
-    bend_of,
-    block_ahead,
-    block_of,
-    clip,
-    face_towards,
-    has_point,
-    opposite_edge,
-    points_of,
-)
-from blocksim.kernels.nonsmooth.pieces import points_on_ground, points_on_level, points_on_piece
-from blocksim.kernels.nonsmooth.polygons import corners_on_ground, follow_corners, hulls_of_one, points_of_two
-from blocksim.kernels.nonsmooth.slip import Constraints, Motion, presses
+from blocksim.kernels.nonsmooth import arrays, faces, pieces, polygons, slip
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
 EDGE = 0.01  # of the smaller half side: two faces that face each other over less are passed by
 LEVEL = 0.1  # sine of the angle between two blocks up to which that is so
-NOT_THERE = 0.5 * FAR  # m: what is FAR changes a little as bodies move
+NOT_THERE = 0.5 * arrays.FAR  # m: what is FAR changes a little as bodies move
 TURNED = 0.906307787036650  # cosine of 25 degrees
 
 
@@ -66,8 +49,8 @@ class Place(NamedTuple):
     stepping: Record
 
 
-@kernel
-def write_points(constraint: Record, points: Points, motion: Motion) -> None:
+@jit.kernel
+def write_points(constraint: Record, points: faces.Points, motion: slip.Motion) -> None:
     """Write a manifold into a constraint. Impulses along another normal are forgotten.
 
     One of a point that is not there any more goes to the other: where a block rolls over a corner, what was the right
@@ -90,13 +73,13 @@ def write_points(constraint: Record, points: Points, motion: Motion) -> None:
     constraint.shear_arm_b = found.shear_arm_b
     constraint.gap_one = points.gap_one
     constraint.gap_two = points.gap_two
-    bend = bend_of(found, motion, points.is_of_b, constraint.normal_two > constraint.normal_one)
+    bend = faces.bend_of(found, motion, points.is_of_b, constraint.normal_two > constraint.normal_one)
     constraint.bend = bend.normal
     constraint.shear_bend = bend.shear
 
 
-@kernel
-def passes_edge(best: Lanes, other: Lanes, a: Block, b: Block) -> Mask:
+@jit.kernel
+def passes_edge(best: Lanes, other: Lanes, a: faces.Block, b: faces.Block) -> Mask:
     """Return True if two faces at a distance `best` (m) overlap so little that the blocks meet at other faces.
 
     `other` is the distance (m) along the other axis, which is negative by what they overlap. A block that slides over
@@ -106,10 +89,10 @@ def passes_edge(best: Lanes, other: Lanes, a: Block, b: Block) -> Mask:
     return (-EDGE * least < other) & (other < best)
 
 
-@kernel
-def chosen(is_one: Mask, one: Block, two: Block) -> Block:
+@jit.kernel
+def chosen(is_one: Mask, one: faces.Block, two: faces.Block) -> faces.Block:
     """Return one block or the other."""
-    return Block(
+    return faces.Block(
         select(is_one, one.x, two.x),
         select(is_one, one.y, two.y),
         select(is_one, one.cos, two.cos),
@@ -119,14 +102,16 @@ def chosen(is_one: Mask, one: Block, two: Block) -> Block:
     )
 
 
-@kernel
-def nothing(zero: Lanes, is_of_b: Mask) -> Points:
+@jit.kernel
+def nothing(zero: Lanes, is_of_b: Mask) -> faces.Points:
     """Return a manifold without points."""
-    return Points(Constraints(zero, zero, zero, zero, zero, zero, zero), zero + FAR, zero + FAR, is_of_b)
+    return faces.Points(
+        slip.Constraints(zero, zero, zero, zero, zero, zero, zero), zero + arrays.FAR, zero + arrays.FAR, is_of_b
+    )
 
 
-@kernel
-def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
+@jit.kernel
+def points_of_blocks(a: faces.Block, b: faces.Block, margin: float) -> tuple[faces.Points, Mask]:
     """Return the contact manifold of two blocks within the margin (m), and whether there is one.
 
     No processor can predict which faces meet, so the code has no branches but one, for pairs that are not near.
@@ -153,25 +138,25 @@ def points_of_blocks(a: Block, b: Block, margin: float) -> tuple[Points, Mask]:
     of_y = select(is_of_b, gap_by, gap_ay)
     is_level = lesser(c_abs, s_abs) < LEVEL
     along_x = (of_x > of_y) ^ (is_level & passes_edge(greater(of_x, of_y), lesser(of_x, of_y), a, b))
-    face = face_towards(chosen(is_of_b, b, a), select(is_of_b, bx, -ax), select(is_of_b, by, -ay), along_x)
-    edge = clip(opposite_edge(face, chosen(is_of_b, a, b)), face)
-    points = points_of(face, edge, a, b, is_of_b, margin)
+    face = faces.face_towards(chosen(is_of_b, b, a), select(is_of_b, bx, -ax), select(is_of_b, by, -ay), along_x)
+    edge = faces.clip(faces.opposite_edge(face, chosen(is_of_b, a, b)), face)
+    points = faces.points_of(face, edge, a, b, is_of_b, margin)
     is_near = (farthest <= margin) & (edge.right > edge.left)
-    return points, is_near & has_point(points)
+    return points, is_near & faces.has_point(points)
 
 
-@kernel
+@jit.kernel
 def reach_of(constraint: Record, inverse_mass: float, stepping: Record) -> int:
     """Return TOUCHING if a constraint within the margin has a point that touches or pressed in the last substep.
 
     `inverse_mass` (1/kg) is that of both bodies together.
     """
     gap = min(constraint.gap_one, constraint.gap_two)
-    is_pressed = presses(constraint.normal_one + constraint.normal_two, inverse_mass, stepping)
-    return TOUCHING if gap <= stepping.touch_gap or is_pressed else OPEN
+    is_pressed = slip.presses(constraint.normal_one + constraint.normal_two, inverse_mass, stepping)
+    return arrays.TOUCHING if gap <= stepping.touch_gap or is_pressed else arrays.OPEN
 
 
-@kernel
+@jit.kernel
 def inverse_masses_at(states: Records, a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> Lanes:
     """Return the inverse masses (1/kg) of the bodies of four pairs, both together."""
     _, _, _, of_a = fields_0(None, states, a)
@@ -179,20 +164,20 @@ def inverse_masses_at(states: Records, a: tuple[int, int, int, int], b: tuple[in
     return of_a + of_b
 
 
-@kernel
+@jit.kernel
 def blocks_at(
     bodies: Records, states: Records, places: tuple[int, int, int, int], ahead: Lanes
-) -> tuple[Block, Lanes, Lanes, Lanes]:
+) -> tuple[faces.Block, Lanes, Lanes, Lanes]:
     """Return four blocks as they will be a time `ahead` (s), and their velocities (m/s, m/s, rad/s)."""
     x, y, _, cos = fields_0(None, bodies, places)
     sin, _, _, _ = fields_4(None, bodies, places)
     _, _, half_x, half_y = fields_16(None, bodies, places)
     vx, vy, spin, _ = fields_0(None, states, places)
-    return block_ahead(Block(x, y, cos, sin, half_x, half_y), vx, vy, spin, ahead), vx, vy, spin
+    return faces.block_ahead(faces.Block(x, y, cos, sin, half_x, half_y), vx, vy, spin, ahead), vx, vy, spin
 
 
-@kernel
-def collide_four(contacts: Contacts, bodies: Records, first: int, ahead: float) -> None:
+@jit.kernel
+def collide_four(contacts: arrays.Contacts, bodies: Records, first: int, ahead: float) -> None:
     """Find the manifolds of four pairs of blocks from constraint `first` on; those that press a time `ahead` (s)."""
     constraints = contacts.constraints
     stepping = contacts.stepping[0]
@@ -202,22 +187,22 @@ def collide_four(contacts: Contacts, bodies: Records, first: int, ahead: float) 
     places_b = (one.b, two.b, three.b, four.b)
     inverse_mass = inverse_masses_at(contacts.states, places_a, places_b)
     _, normal_one, normal_two, _ = fields_8(None, constraints, places)
-    are_pressed = presses(normal_one + normal_two, inverse_mass, stepping)
+    are_pressed = slip.presses(normal_one + normal_two, inverse_mass, stepping)
     times = select(are_pressed, ahead, 0.0)
     half = select(are_pressed, 0.5 * stepping.substep, 0.0)
     a, vx_a, vy_a, spin_a = blocks_at(bodies, contacts.states, places_a, times)
     b, vx_b, vy_b, spin_b = blocks_at(bodies, contacts.states, places_b, times)
     points, is_near = points_of_blocks(a, b, stepping.margin)
-    motion = Motion(vx_a - vx_b, vy_a - vy_b, spin_a, spin_b, times, half)
-    write_four(contacts, places, at_start(points, motion), motion, is_near, inverse_mass)
+    motion = slip.Motion(vx_a - vx_b, vy_a - vy_b, spin_a, spin_b, times, half)
+    write_four(contacts, places, faces.at_start(points, motion), motion, is_near, inverse_mass)
 
 
-@kernel
+@jit.kernel
 def write_four(
-    contacts: Contacts,
+    contacts: arrays.Contacts,
     places: tuple[int, int, int, int],
-    points: Points,
-    motion: Motion,
+    points: faces.Points,
+    motion: slip.Motion,
     is_near: Mask,
     inverse_mass: Lanes,
 ) -> None:
@@ -241,10 +226,10 @@ def write_four(
     columns = (found.width, found.shear_arm_a, found.shear_arm_b, points.gap_one)
     write_fields_4(None, constraints, places, are_all, columns)
     write_fields_8(None, constraints, places, are_all, (points.gap_two, normal_one, normal_two, shear))
-    bend = bend_of(found, motion, points.is_of_b, normal_two > normal_one)
-    is_pressed = presses(normal_one + normal_two, inverse_mass, stepping)
+    bend = faces.bend_of(found, motion, points.is_of_b, normal_two > normal_one)
+    is_pressed = slip.presses(normal_one + normal_two, inverse_mass, stepping)
     is_touching = (lesser(points.gap_one, points.gap_two) <= stepping.touch_gap) | is_pressed
-    reach = select(is_near, select(is_touching, 1.0 * TOUCHING, 1.0 * OPEN), 1.0 * AWAY)
+    reach = select(is_near, select(is_touching, 1.0 * arrays.TOUCHING, 1.0 * arrays.OPEN), 1.0 * arrays.AWAY)
     one, two, three, four = (
         constraints[places[0]],
         constraints[places[1]],
@@ -256,7 +241,7 @@ def write_four(
     one.reach, two.reach, three.reach, four.reach = split(reach)
 
 
-@kernel
+@jit.kernel
 def are_four_of_blocks(constraints: Records, first: int, bodies: Records) -> bool:
     """Return True if four pairs, from constraint `first` on, are of blocks only, none of ground."""
     for r in range(first, first + WIDTH):
@@ -266,7 +251,7 @@ def are_four_of_blocks(constraints: Records, first: int, bodies: Records) -> boo
     return True
 
 
-@rare_kernel
+@jit.rare_kernel
 def collide(
     constraint: Record, a: Record, b: Record, line_a: Record, line_b: Record, place: Place, corners: Records | None
 ) -> None:
@@ -275,25 +260,25 @@ def collide(
     `corners` are those of all polygons; where there are none, the compiler leaves them out altogether.
     """
     inverse_mass = line_a.inverse_mass + line_b.inverse_mass
-    is_pressed = presses(constraint.normal_one + constraint.normal_two, inverse_mass, place.stepping)
+    is_pressed = slip.presses(constraint.normal_one + constraint.normal_two, inverse_mass, place.stepping)
     ahead = place.ahead if is_pressed else 0.0
-    one = block_ahead(block_of(a), line_a.vx, line_a.vy, line_a.spin, ahead)
-    two = block_ahead(block_of(b), line_b.vx, line_b.vy, line_b.spin, ahead)
+    one = faces.block_ahead(faces.block_of(a), line_a.vx, line_a.vy, line_a.spin, ahead)
+    two = faces.block_ahead(faces.block_of(b), line_b.vx, line_b.vy, line_b.spin, ahead)
     points, is_near = points_of_pair(constraint, a, one, b, two, place, corners)
     if is_near:
         half = place.half if is_pressed else 0.0
-        motion = Motion(line_a.vx - line_b.vx, line_a.vy - line_b.vy, line_a.spin, line_b.spin, ahead, half)
-        write_points(constraint, at_start(points, motion), motion)
+        motion = slip.Motion(line_a.vx - line_b.vx, line_a.vy - line_b.vy, line_a.spin, line_b.spin, ahead, half)
+        write_points(constraint, faces.at_start(points, motion), motion)
         constraint.reach = reach_of(constraint, inverse_mass, place.stepping)
     else:
         constraint.normal_one = constraint.normal_two = constraint.shear = 0.0
-        constraint.reach = AWAY
+        constraint.reach = arrays.AWAY
 
 
-@kernel
+@jit.kernel
 def points_of_pair(
-    constraint: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records | None
-) -> tuple[Points, bool]:
+    constraint: Record, a: Record, one: faces.Block, b: Record, two: faces.Block, place: Place, corners: Records | None
+) -> tuple[faces.Points, bool]:
     """Return the contact manifold of two bodies, that are in `one` and `two`, and whether there is one."""
     if corners is None:
         return points_of_rectangles(a, one, b, two, place)
@@ -302,38 +287,44 @@ def points_of_pair(
     return points_of_rectangles(a, one, b, two, place)
 
 
-@kernel
-def points_of_rectangles(a: Record, one: Block, b: Record, two: Block, place: Place) -> tuple[Points, bool]:
+@jit.kernel
+def points_of_rectangles(
+    a: Record, one: faces.Block, b: Record, two: faces.Block, place: Place
+) -> tuple[faces.Points, bool]:
     """Return the contact manifold of a rectangle and another or the ground, and whether there is one."""
     if place.is_ground:
-        return points_on_level(one, two, place.margin)
+        return pieces.points_on_level(one, two, place.margin)
     if a.faces != ALL:
-        return points_on_piece(two, None, one, a.corners, False, place.margin)
+        return pieces.points_on_piece(two, None, one, a.corners, False, place.margin)
     if b.faces != ALL:
-        return points_on_piece(one, None, two, b.corners, True, place.margin)
+        return pieces.points_on_piece(one, None, two, b.corners, True, place.margin)
     return points_of_blocks(one, two, place.margin)
 
 
-@kernel
+@jit.kernel
 def points_with_polygon(
-    constraint: Record, a: Record, one: Block, b: Record, two: Block, place: Place, corners: Records
-) -> tuple[Points, bool]:
+    constraint: Record, a: Record, one: faces.Block, b: Record, two: faces.Block, place: Place, corners: Records
+) -> tuple[faces.Points, bool]:
     """Return the contact manifold of a polygon and another, a rectangle or the ground, and whether there is one."""
-    hull_a = hull_of(a, corners)
-    hull_b = hull_of(b, corners)
+    hull_a = shapes.hull_of(a, corners)
+    hull_b = shapes.hull_of(b, corners)
     is_first = a.faces >= ALL
     if is_first and b.faces >= ALL and not place.is_ground:
-        found = points_of_two(one, hulls_of_one(hull_a), two, hulls_of_one(hull_b), place.margin)
+        found = polygons.points_of_two(
+            one, polygons.hulls_of_one(hull_a), two, polygons.hulls_of_one(hull_b), place.margin
+        )
         if found.is_near:
-            follow_corners(constraint, int(found.one), int(found.two))
+            polygons.follow_corners(constraint, int(found.one), int(found.two))
         return found.points, found.is_near
     if place.is_ground:
-        points, is_near = points_on_ground(one, hull_a, two, place.margin)
+        points, is_near = pieces.points_on_ground(one, hull_a, two, place.margin)
     elif is_first:
-        points, is_near = points_on_piece(one, hull_a, two, b.corners, True, place.margin)
+        points, is_near = pieces.points_on_piece(one, hull_a, two, b.corners, True, place.margin)
     else:
-        points, is_near = points_on_piece(two, hull_b, one, a.corners, False, place.margin)
+        points, is_near = pieces.points_on_piece(two, hull_b, one, a.corners, False, place.margin)
     if is_near:
-        first, second = corners_on_ground(points, one if is_first else two, hull_a if is_first else hull_b, is_first)
-        follow_corners(constraint, first, second)
+        first, second = polygons.corners_on_ground(
+            points, one if is_first else two, hull_a if is_first else hull_b, is_first
+        )
+        polygons.follow_corners(constraint, first, second)
     return points, is_near

@@ -14,8 +14,7 @@ from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.loads import acceleration_at, accelerations
 from blocksim.kernels.common.shapes import turn
 from blocksim.kernels.common.supports import displacement, follow_pieces, is_driven, piece_at, pose_at, put, way_over
-from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
-from blocksim.kernels.nonsmooth.parts import begin_of_part, end_of_part
+from blocksim.kernels.nonsmooth import arrays, parts
 
 IN_FLIGHT = 1e-9  # of a kick: bodies whose velocity changes by no more beside it touch nothing
 
@@ -112,7 +111,7 @@ def place(body: Record, state: Record, before: Record, share: float, h: float, g
 
 @kernel
 def place_all(
-    bodies: Records, contacts: Contacts, first: int, last: int, share: float, gravity: tuple[float, float]
+    bodies: Records, contacts: arrays.Contacts, first: int, last: int, share: float, gravity: tuple[float, float]
 ) -> None:
     """End a step of the free bodies from `first` to before `last`."""
     h = contacts.stepping[0].substep
@@ -136,7 +135,7 @@ def pull_of_loads(world: World, time: float) -> tuple[float, float]:
 
 
 @rare_kernel
-def kick_by_loads(scene: Nonsmooth, number: int, first: int, last: int, share: float, last_share: float) -> None:
+def kick_by_loads(scene: arrays.Nonsmooth, number: int, first: int, last: int, share: float, last_share: float) -> None:
     """Add the kick of loads to bodies that gravity has kicked in substep `number` of a step.
 
     Bodies that were warm-started have that of the last substep once more, of which there was a share `last_share`.
@@ -156,7 +155,7 @@ def kick_by_loads(scene: Nonsmooth, number: int, first: int, last: int, share: f
 
 
 @rare_kernel
-def kick_again(contacts: Contacts, pushes: Records, first: int, last: int, share: float) -> None:
+def kick_again(contacts: arrays.Contacts, pushes: Records, first: int, last: int, share: float) -> None:
     """Add the kick of loads to bodies of clusters that were hit, whose substep begins after the last impact."""
     kick = share * contacts.stepping[0].substep
     for i in range(first, last):
@@ -168,7 +167,7 @@ def kick_again(contacts: Contacts, pushes: Records, first: int, last: int, share
 
 
 @rare_kernel
-def tally_loads(scene: Nonsmooth, first: int, last: int, share: float) -> None:
+def tally_loads(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> None:
     """Tally what loads have brought the bodies from `first` to before `last` in a substep with that share of a kick."""
     half = 0.5 * share * scene.contacts.stepping[0].substep
     for i in range(first, last):
@@ -183,7 +182,7 @@ def tally_loads(scene: Nonsmooth, first: int, last: int, share: float) -> None:
 
 
 @rare_kernel
-def show_velocities(scene: Nonsmooth, first: int, last: int, share: float) -> None:
+def show_velocities(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> None:
     """Bring the velocities of bodies in flight up to their places, at the end of a step; `share` is of the last kick.
 
     As motion.place does with gravity alone.
@@ -212,13 +211,13 @@ def displacement_at(world: World, time: float) -> float:
 
 
 @rare_kernel
-def drive(scene: Nonsmooth, number: int) -> None:
+def drive(scene: arrays.Nonsmooth, number: int) -> None:
     """Give supports and driven bodies their velocity in substep `number`: displacement over time."""
     world = scene.world
     controls = world.controls[0]
     stepping = scene.contacts.stepping[0]
     h = stepping.substep
-    begin = begin_of_part(scene) + number * h
+    begin = parts.begin_of_part(scene) + number * h
     rate = (displacement_at(world, begin + h) - displacement_at(world, begin)) / h
     stepping.support_vx = controls.motion_x * rate
     stepping.support_vy = controls.motion_y * rate
@@ -233,7 +232,7 @@ def drive(scene: Nonsmooth, number: int) -> None:
 
 
 @rare_kernel
-def drive_own(scene: Nonsmooth, one: Record, begin: float) -> None:
+def drive_own(scene: arrays.Nonsmooth, one: Record, begin: float) -> None:
     """Give a driven body its velocity in the substep that begins at a time (s)."""
     h = scene.contacts.stepping[0].substep
     state = scene.contacts.states[one.body]
@@ -245,12 +244,12 @@ def drive_own(scene: Nonsmooth, one: Record, begin: float) -> None:
 
 
 @rare_kernel
-def place_supports(scene: Nonsmooth) -> None:
+def place_supports(scene: arrays.Nonsmooth) -> None:
     """End a step of supports and driven bodies, which is not counted yet: where they have to be, never summed up."""
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
-    now = end_of_part(scene)
+    now = parts.end_of_part(scene)
     clock.motion_piece = piece_at(world.motion, clock.motion_piece, now)
     moved = displacement(world.motion[clock.motion_piece], now)
     stepping = scene.contacts.stepping[0]
@@ -271,7 +270,7 @@ def place_supports(scene: Nonsmooth) -> None:
 
 
 @rare_kernel
-def place_driven(scene: Nonsmooth, one: Record, time: float) -> None:
+def place_driven(scene: arrays.Nonsmooth, one: Record, time: float) -> None:
     """End a step of one driven body, at a time (s)."""
     world = scene.world
     body = world.bodies[one.body]

@@ -17,19 +17,15 @@ not depend on who takes which part. Greedy in the order of the list: the same li
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import Record
-from blocksim.kernels.common.grid import bucket, cell_of, fill_grid
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import ground_gap, separation
+from blocksim.kernels.common import arrays, grid, jit, shapes, supports
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.common.supports import has_motion, is_driven, way_over
 from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, Nonsmooth
 from blocksim.kernels.nonsmooth.groups import LONELY
 
 ONE = 1
 
 
-@rare_kernel
+@jit.rare_kernel
 def lowest_free(used: int) -> int:
     """Return the first colour whose bit is not set; the last one where there is none."""
     colour = 0
@@ -38,14 +34,14 @@ def lowest_free(used: int) -> int:
     return colour
 
 
-@rare_kernel
+@jit.rare_kernel
 def bit_of(colour: int) -> int:
     """Return the bit of a colour; none for the last one, which anybody can have (and which would be the sign)."""
     return ONE << colour if colour < COLOURS - 1 else 0
 
 
-@kernel
-def forget(one: Record) -> None:
+@jit.kernel
+def forget(one: arrays.Record) -> None:
     """Set what a constraint keeps from step to step to zero."""
     one.nx = 0.0
     one.ny = 0.0
@@ -57,8 +53,8 @@ def forget(one: Record) -> None:
     one.is_struck = 0
 
 
-@kernel
-def copy_impulses(source: Record, target: Record) -> None:
+@jit.kernel
+def copy_impulses(source: arrays.Record, target: arrays.Record) -> None:
     """Copy what a constraint keeps from step to step."""
     target.nx = source.nx
     target.ny = source.ny
@@ -70,7 +66,7 @@ def copy_impulses(source: Record, target: Record) -> None:
     target.is_struck = source.is_struck
 
 
-@rare_kernel
+@jit.rare_kernel
 def keep_impulses(scene: Nonsmooth, count: int) -> None:
     """Copy the impulses of pairs that are in the old list and in the new one of `count` pairs."""
     constraints = scene.contacts.constraints
@@ -92,7 +88,7 @@ def keep_impulses(scene: Nonsmooth, count: int) -> None:
             forget(one)
 
 
-@rare_kernel
+@jit.rare_kernel
 def colour_pairs(scene: Nonsmooth, count: int) -> None:
     """Give every pair a colour, and set where the constraints of every colour begin."""
     states = scene.contacts.states
@@ -119,7 +115,7 @@ def colour_pairs(scene: Nonsmooth, count: int) -> None:
     scene.contacts.stepping[0].colours = last
 
 
-@rare_kernel
+@jit.rare_kernel
 def most_groups(scene: Nonsmooth) -> int:
     """Return how many groups the constraints can make, whichever are active; the last colour's are solved singly."""
     count = 0
@@ -130,7 +126,7 @@ def most_groups(scene: Nonsmooth) -> int:
     return count
 
 
-@rare_kernel
+@jit.rare_kernel
 def place_constraints(scene: Nonsmooth, count: int) -> None:
     """Make the constraints of all pairs, sorted by colour, with the impulses that were kept."""
     bodies = scene.world.bodies
@@ -163,20 +159,20 @@ class Frame(NamedTuple):
     vy: float
 
 
-@kernel
+@jit.kernel
 def frame_of_supports(scene: Nonsmooth) -> Frame:
     """Return the motion of the supports."""
     one = scene.contacts.stepping[0]
     return Frame(one.support_x - one.listed_x, one.support_y - one.listed_y, one.support_vx, one.support_vy)
 
 
-@kernel
+@jit.kernel
 def common_frame(scene: Nonsmooth) -> Frame:
     """Return the mean motion of the bodies along x, or that of the supports where anything but the ground is fixed."""
     bodies = scene.world.bodies
     way = 0.0
     speed = 0.0
-    if has_motion(scene.world.controls[0]):
+    if supports.has_motion(scene.world.controls[0]):
         return frame_of_supports(scene)
     for i in range(bodies.size - 1):
         body = bodies[i]
@@ -188,13 +184,13 @@ def common_frame(scene: Nonsmooth) -> Frame:
     return Frame(way / count, 0.0, speed / count, 0.0)
 
 
-@kernel
-def corner_speed(body: Record, frame: Frame) -> float:
+@jit.kernel
+def corner_speed(body: arrays.Record, frame: Frame) -> float:
     """Return an upper bound (m/s) of the speed of a body's points in a frame."""
     return math.sqrt((body.vx - frame.vx) ** 2 + (body.vy - frame.vy) ** 2) + body.radius * abs(body.spin)
 
 
-@kernel
+@jit.kernel
 def travel(scene: Nonsmooth, i: int, frame: Frame) -> float:
     """Return how far (m) a corner of a body may have come in a frame since the pair list was made."""
     body = scene.world.bodies[i]
@@ -203,14 +199,14 @@ def travel(scene: Nonsmooth, i: int, frame: Frame) -> float:
     return math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
 
 
-@rare_kernel
+@jit.rare_kernel
 def update_driven(scene: Nonsmooth, frame: Frame) -> tuple[float, bool]:
     """Return the speed (m/s) of the fastest driven body in the next step, and whether none uses up its reach."""
     step = scene.world.controls[0].step
     fastest = 0.0
     is_good = True
     for one in scene.world.moved:
-        if is_driven(one):
+        if supports.is_driven(one):
             rate = coming_speed(scene, one, frame)
             reach = scene.listed[one.body].reach
             fastest = max(fastest, rate)
@@ -218,20 +214,20 @@ def update_driven(scene: Nonsmooth, frame: Frame) -> tuple[float, bool]:
     return fastest, is_good
 
 
-@rare_kernel
-def coming_speed(scene: Nonsmooth, one: Record, frame: Frame) -> float:
+@jit.rare_kernel
+def coming_speed(scene: Nonsmooth, one: arrays.Record, frame: Frame) -> float:
     """Return an upper bound (m/s) of the mean speed of the points of a driven body in the next step, in a frame.
 
     A path may begin, end or turn back at once: the velocity until now does not show it.
     """
     world = scene.world
     step = world.controls[0].step
-    way = way_over(world, one, world.clock[0].steps * step, step)
+    way = supports.way_over(world, one, world.clock[0].steps * step, step)
     rate = math.sqrt((way.x / step - frame.vx) ** 2 + (way.y / step - frame.vy) ** 2)
     return rate + world.bodies[one.body].radius * abs(way.angle) / step
 
 
-@kernel
+@jit.kernel
 def update_pairs(scene: Nonsmooth) -> bool:
     """Set the margin of the next step, and rebuild the pair list if bodies have come too far.
 
@@ -261,7 +257,7 @@ def update_pairs(scene: Nonsmooth) -> bool:
     return is_good or not is_finite or rebuild(scene, frame)  # what is not finite is found after the step
 
 
-@rare_kernel
+@jit.rare_kernel
 def note_places(scene: Nonsmooth, frame: Frame) -> None:
     """Write where all bodies are and how far they reach."""
     world = scene.world
@@ -279,7 +275,7 @@ def note_places(scene: Nonsmooth, frame: Frame) -> None:
         body.list_angle = body.angle
 
 
-@kernel
+@jit.kernel
 def add(scene: Nonsmooth, count: int, i: int, j: int) -> int:
     """List a pair, if there is room; return the count needed."""
     if count < scene.kept.size:
@@ -288,7 +284,7 @@ def add(scene: Nonsmooth, count: int, i: int, j: int) -> int:
     return count + 1
 
 
-@kernel
+@jit.kernel
 def are_near(scene: Nonsmooth, i: int, j: int) -> bool:
     """Return True if the reaches of two bodies meet, at least one of them free."""
     one = scene.listed[i]
@@ -301,25 +297,25 @@ def are_near(scene: Nonsmooth, i: int, j: int) -> bool:
     states = scene.contacts.states
     if states[i].inverse_mass + states[j].inverse_mass == 0.0:
         return False
-    return separation(scene.world.bodies[i], scene.world.bodies[j]) <= one.reach + two.reach
+    return shapes.separation(scene.world.bodies[i], scene.world.bodies[j]) <= one.reach + two.reach
 
 
-@rare_kernel
+@jit.rare_kernel
 def add_from_cell(scene: Nonsmooth, i: int, column: int, row: int, least: int, count: int) -> int:
     """List the neighbours of body i in one cell, from body number `least` on; return the count needed."""
     world = scene.world
     width = world.controls[0].cell_width
-    j = world.heads[bucket(column, row, world.heads.size)]
+    j = world.heads[grid.bucket(column, row, world.heads.size)]
     while j > 0:
         if j > least and are_near(scene, i, j - 1):
             other = scene.listed[j - 1]  # cells share buckets
-            if cell_of(other.x, width) == column and cell_of(other.y, width) == row:
+            if grid.cell_of(other.x, width) == column and grid.cell_of(other.y, width) == row:
                 count = add(scene, count, i, j - 1)
         j = world.links[j - 1]
     return count
 
 
-@rare_kernel
+@jit.rare_kernel
 def add_large(scene: Nonsmooth, i: int, count: int) -> int:
     """List the neighbours of body i among those too large for the grid."""
     for j in scene.world.large:
@@ -329,7 +325,7 @@ def add_large(scene: Nonsmooth, i: int, count: int) -> int:
     return count
 
 
-@rare_kernel
+@jit.rare_kernel
 def list_pairs(scene: Nonsmooth) -> int:
     """List all pairs whose reaches meet; return how many there are, fitting or not.
 
@@ -339,24 +335,24 @@ def list_pairs(scene: Nonsmooth) -> int:
     width = world.controls[0].cell_width
     ground = world.bodies.size - 1
     level = world.bodies[ground].y
-    fill_grid(world)
+    grid.fill_grid(world)
     count = 0
     for i in range(ground):
         body = world.bodies[i]
         if body.radius <= world.controls[0].cell_radius:
-            column = cell_of(body.x, width)
-            row = cell_of(body.y, width)
+            column = grid.cell_of(body.x, width)
+            row = grid.cell_of(body.y, width)
             count = add_from_cell(scene, i, column, row, i + 1, count)
             count = add_from_cell(scene, i, column + 1, row, 0, count)
             for x in range(column - 1, column + 2):
                 count = add_from_cell(scene, i, x, row + 1, 0, count)
         count = add_large(scene, i, count)
-        if body.inverse_mass > 0.0 and ground_gap(body) <= level + scene.listed[i].reach:
+        if body.inverse_mass > 0.0 and shapes.ground_gap(body) <= level + scene.listed[i].reach:
             count = add(scene, count, i, ground)
     return count
 
 
-@rare_kernel
+@jit.rare_kernel
 def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
     """Rebuild the pair list; return False, with the constraints untouched, where it does not fit."""
     note_places(scene, frame)

@@ -18,9 +18,7 @@ import math
 
 from blocksim.kernels.common.arrays import Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.nonsmooth.arrays import AWAY, FAR, Nonsmooth
-from blocksim.kernels.nonsmooth.begin import is_start
-from blocksim.kernels.nonsmooth.slip import presses
+from blocksim.kernels.nonsmooth import arrays, begin, slip
 
 FINE = 1.0 / 64.0  # of a step: the part in which an impact falls
 MOST_PARTS = 32  # of a step; what is left then is one more
@@ -28,20 +26,20 @@ MOST_CHANGE = 1.5  # of the square of gravity: that of an acceleration with whic
 
 
 @kernel
-def begin_of_part(scene: Nonsmooth) -> float:
+def begin_of_part(scene: arrays.Nonsmooth) -> float:
     """Return the time (s) at which the current part begins."""
     return scene.world.clock[0].steps * scene.world.controls[0].step + scene.contacts.stepping[0].gone
 
 
 @kernel
-def is_cut(scene: Nonsmooth) -> bool:
+def is_cut(scene: arrays.Nonsmooth) -> bool:
     """Return True if the step goes on after the current part."""
     stepping = scene.contacts.stepping[0]
     return stepping.length < scene.world.controls[0].step - stepping.gone
 
 
 @kernel
-def end_of_part(scene: Nonsmooth) -> float:
+def end_of_part(scene: arrays.Nonsmooth) -> float:
     """Return the time (s) at which the current part ends; a step ends at a multiple of its length."""
     if is_cut(scene):
         return begin_of_part(scene) + scene.contacts.stepping[0].length
@@ -49,7 +47,7 @@ def end_of_part(scene: Nonsmooth) -> float:
 
 
 @kernel
-def begin_step(scene: Nonsmooth, asides: Records | None) -> None:
+def begin_step(scene: arrays.Nonsmooth, asides: Records | None) -> None:
     """Begin a step with a part as long as it is.
 
     Where there are no `asides` no impact follows from another, and the compiler leaves parts out altogether.
@@ -65,7 +63,7 @@ def begin_step(scene: Nonsmooth, asides: Records | None) -> None:
 
 
 @kernel
-def is_continued(scene: Nonsmooth, asides: Records | None) -> bool:
+def is_continued(scene: arrays.Nonsmooth, asides: Records | None) -> bool:
     """Begin the next part of a step that was cut; return False where there is none. `asides` as in begin_step."""
     if asides is None:
         return False
@@ -76,7 +74,7 @@ def is_continued(scene: Nonsmooth, asides: Records | None) -> bool:
 
 
 @kernel
-def is_shortened(scene: Nonsmooth, asides: Records | None) -> bool:
+def is_shortened(scene: arrays.Nonsmooth, asides: Records | None) -> bool:
     """Cut the current part where an impact comes; return False if none does. `asides` as in begin_step."""
     if asides is None:
         return False
@@ -86,7 +84,7 @@ def is_shortened(scene: Nonsmooth, asides: Records | None) -> bool:
 
 
 @rare_kernel
-def begin_next_part(scene: Nonsmooth) -> None:
+def begin_next_part(scene: arrays.Nonsmooth) -> None:
     """Continue a step that was cut, with a part as long as what is left of it."""
     stepping = scene.contacts.stepping[0]
     stepping.parts += 1
@@ -96,7 +94,7 @@ def begin_next_part(scene: Nonsmooth) -> None:
 
 
 @rare_kernel
-def set_length(scene: Nonsmooth, length: float) -> None:
+def set_length(scene: arrays.Nonsmooth, length: float) -> None:
     """Give the next part a length (s)."""
     stepping = scene.contacts.stepping[0]
     h = length / stepping.substeps
@@ -119,7 +117,7 @@ def set_length(scene: Nonsmooth, length: float) -> None:
 
 
 @rare_kernel
-def mark_pressed(scene: Nonsmooth) -> None:
+def mark_pressed(scene: arrays.Nonsmooth) -> None:
     """Mark the bodies with a contact that presses, not only in an impact."""
     scene.used[:] = 0
     states = scene.contacts.states
@@ -128,13 +126,13 @@ def mark_pressed(scene: Nonsmooth) -> None:
         constraint = scene.contacts.constraints[r]
         inverse_mass = states[constraint.a].inverse_mass + states[constraint.b].inverse_mass
         impulse = constraint.normal_one + constraint.normal_two
-        if presses(impulse, inverse_mass, stepping) and not constraint.is_struck:
+        if slip.presses(impulse, inverse_mass, stepping) and not constraint.is_struck:
             scene.used[constraint.a] = 1
             scene.used[constraint.b] = 1
 
 
 @rare_kernel
-def shift_velocities(scene: Nonsmooth, h: float) -> None:
+def shift_velocities(scene: arrays.Nonsmooth, h: float) -> None:
     """Bring velocities from half of the last substep behind to half of the next, h (s), by what the last one changed.
 
     In flight that is gravity, of what something holds it is what the last substep has left of it (`held_change`).
@@ -144,7 +142,7 @@ def shift_velocities(scene: Nonsmooth, h: float) -> None:
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
     old = stepping.substep
-    behind = 0.0 if is_start(scene) else 0.5
+    behind = 0.0 if begin.is_start(scene) else 0.5
     mark_pressed(scene)
     for i in range(scene.world.bodies.size - 1):
         state = scene.contacts.states[i]
@@ -199,7 +197,7 @@ def kinetic_ahead(vx: float, vy: float, time: float, controls: Record) -> float:
 
 
 @rare_kernel
-def cut(scene: Nonsmooth) -> bool:
+def cut(scene: arrays.Nonsmooth) -> bool:
     """Cut the current part, which ends with the step, before or after the next impact; return True if it was cut."""
     stepping = scene.contacts.stepping[0]
     if is_cut(scene) or stepping.parts >= MOST_PARTS:
@@ -214,7 +212,7 @@ def cut(scene: Nonsmooth) -> bool:
 
 
 @rare_kernel
-def time_to_impact(scene: Nonsmooth) -> float:
+def time_to_impact(scene: arrays.Nonsmooth) -> float:
     """Return the time (s) until a point meets something fast enough to rebound; infinite if none does."""
     contacts = scene.contacts
     bodies = scene.world.bodies
@@ -222,7 +220,7 @@ def time_to_impact(scene: Nonsmooth) -> float:
     least = math.inf
     for r in range(contacts.stepping[0].constraint_count):
         constraint = contacts.constraints[r]
-        if constraint.reach != AWAY:
+        if constraint.reach != arrays.AWAY:
             a, b = bodies[constraint.a], bodies[constraint.b]
             free = (1.0 if a.inverse_mass > 0.0 else 0.0) - (1.0 if b.inverse_mass > 0.0 else 0.0)
             pull = free * (constraint.nx * controls.gravity_x + constraint.ny * controls.gravity_y)
@@ -241,7 +239,7 @@ def time_to_impact(scene: Nonsmooth) -> float:
 @rare_kernel
 def meeting_time(gap: float, rate: float, pull: float, stepping: Record) -> float:
     """Return when (s) a gap (m) closes that changes at a rate (m/s), with a pull (m/s2); infinite if too slowly."""
-    if gap >= FAR or rate >= -stepping.threshold:
+    if gap >= arrays.FAR or rate >= -stepping.threshold:
         return math.inf
     square = rate * rate - 2.0 * pull * max(gap, 0.0)
     if square <= stepping.threshold * stepping.threshold:

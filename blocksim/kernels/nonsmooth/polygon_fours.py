@@ -1,17 +1,12 @@
 """Manifolds of four pairs of polygons at a time, as of rectangles (manifold.py), but for what is looked at alone."""
 
+from blocksim.kernels.common import jit, shapes
 from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, Records
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import Hull, hull_of
 from blocksim.kernels.common.simd import WIDTH, fields_8, four, is_all, select, split
-from blocksim.kernels.nonsmooth.arrays import Contacts
-from blocksim.kernels.nonsmooth.faces import at_start
-from blocksim.kernels.nonsmooth.manifold import Place, blocks_at, collide, inverse_masses_at, write_four
-from blocksim.kernels.nonsmooth.polygons import Found, Hulls, follow_corners, points_of_polygons
-from blocksim.kernels.nonsmooth.slip import Motion, presses
+from blocksim.kernels.nonsmooth import arrays, faces, manifold, polygons, slip
 
 
-@kernel
+@jit.kernel
 def is_of_polygons(constraint: Record, bodies: Records) -> bool:
     """Return True if a pair is of blocks, at least one of them a polygon."""
     if constraint.b == bodies.size - 1:
@@ -20,7 +15,7 @@ def is_of_polygons(constraint: Record, bodies: Records) -> bool:
     return min(one, two) >= ALL and max(one, two) == OUTLINE
 
 
-@kernel
+@jit.kernel
 def is_left_to_fours(constraint: Record, bodies: Records, corners: Records | None) -> bool:
     """Return True if a pair is found with others of polygons; where there are no corners none is."""
     if corners is None:
@@ -28,9 +23,9 @@ def is_left_to_fours(constraint: Record, bodies: Records, corners: Records | Non
     return is_of_polygons(constraint, bodies)
 
 
-@kernel
+@jit.kernel
 def find_manifolds_of_polygons(
-    contacts: Contacts, bodies: Records, begin: int, end: int, ahead: float, corners: Records | None
+    contacts: arrays.Contacts, bodies: Records, begin: int, end: int, ahead: float, corners: Records | None
 ) -> None:
     """Find the manifolds of those of some constraints that are of polygons; where there are no corners none is."""
     if corners is None:
@@ -52,10 +47,10 @@ def find_manifolds_of_polygons(
         collide_one(contacts, bodies, three, ahead, corners)
 
 
-@kernel
-def hulls_of(one: Hull, two: Hull, three: Hull, last: Hull) -> Hulls:
+@jit.kernel
+def hulls_of(one: shapes.Hull, two: shapes.Hull, three: shapes.Hull, last: shapes.Hull) -> polygons.Hulls:
     """Return the corners of four bodies."""
-    return Hulls(
+    return polygons.Hulls(
         one.table,
         (one.first, two.first, three.first, last.first),
         max(one.size, two.size, three.size, last.size),
@@ -65,21 +60,21 @@ def hulls_of(one: Hull, two: Hull, three: Hull, last: Hull) -> Hulls:
     )
 
 
-@kernel
-def hulls_at(bodies: Records, places: tuple[int, int, int, int], corners: Records) -> Hulls:
+@jit.kernel
+def hulls_at(bodies: Records, places: tuple[int, int, int, int], corners: Records) -> polygons.Hulls:
     """Return the corners of the bodies at four places."""
     one, two, three, last = places
     return hulls_of(
-        hull_of(bodies[one], corners),
-        hull_of(bodies[two], corners),
-        hull_of(bodies[three], corners),
-        hull_of(bodies[last], corners),
+        shapes.hull_of(bodies[one], corners),
+        shapes.hull_of(bodies[two], corners),
+        shapes.hull_of(bodies[three], corners),
+        shapes.hull_of(bodies[last], corners),
     )
 
 
-@kernel
+@jit.kernel
 def collide_four_polygons(
-    contacts: Contacts, bodies: Records, places: tuple[int, int, int, int], ahead: float, corners: Records
+    contacts: arrays.Contacts, bodies: Records, places: tuple[int, int, int, int], ahead: float, corners: Records
 ) -> None:
     """Find the manifolds of four pairs of polygons, constraints at any places; those that press a time `ahead` (s)."""
     constraints = contacts.constraints
@@ -92,42 +87,42 @@ def collide_four_polygons(
     )
     places_a = (one.a, two.a, three.a, last.a)
     places_b = (one.b, two.b, three.b, last.b)
-    inverse_mass = inverse_masses_at(contacts.states, places_a, places_b)
+    inverse_mass = manifold.inverse_masses_at(contacts.states, places_a, places_b)
     _, normal_one, normal_two, _ = fields_8(None, constraints, places)
-    are_pressed = presses(normal_one + normal_two, inverse_mass, stepping)
+    are_pressed = slip.presses(normal_one + normal_two, inverse_mass, stepping)
     times = select(are_pressed, ahead, 0.0)
     half = select(are_pressed, 0.5 * stepping.substep, 0.0)
-    a, vx_a, vy_a, spin_a = blocks_at(bodies, contacts.states, places_a, times)
-    b, vx_b, vy_b, spin_b = blocks_at(bodies, contacts.states, places_b, times)
+    a, vx_a, vy_a, spin_a = manifold.blocks_at(bodies, contacts.states, places_a, times)
+    b, vx_b, vy_b, spin_b = manifold.blocks_at(bodies, contacts.states, places_b, times)
     hulls_a = hulls_at(bodies, places_a, corners)
     hulls_b = hulls_at(bodies, places_b, corners)
-    found, _, _ = points_of_polygons(a, hulls_a, b, hulls_b, stepping.margin, None)
+    found, _, _ = polygons.points_of_polygons(a, hulls_a, b, hulls_b, stepping.margin, None)
     if is_all(select(found.is_odd, 1.0, 0.0) + 0.0 * half <= 0.0):
         follow_four(constraints, places, found)
-        motion = Motion(vx_a - vx_b, vy_a - vy_b, spin_a, spin_b, times, half)
-        write_four(contacts, places, at_start(found.points, motion), motion, found.is_near, inverse_mass)
+        motion = slip.Motion(vx_a - vx_b, vy_a - vy_b, spin_a, spin_b, times, half)
+        manifold.write_four(contacts, places, faces.at_start(found.points, motion), motion, found.is_near, inverse_mass)
     else:
         for r in places:
             collide_one(contacts, bodies, r, ahead, corners)
 
 
-@kernel
-def follow_four(constraints: Records, places: tuple[int, int, int, int], found: Found) -> None:
+@jit.kernel
+def follow_four(constraints: Records, places: tuple[int, int, int, int], found: polygons.Found) -> None:
     """Have impulses of four pairs go with their corners where there is a manifold."""
     are_near = split(select(found.is_near, 1.0, 0.0))
     ones = split(found.one)
     twos = split(found.two)
     for lane in range(WIDTH):
         if are_near[lane] > 0.0:
-            follow_corners(constraints[places[lane]], int(ones[lane]), int(twos[lane]))
+            polygons.follow_corners(constraints[places[lane]], int(ones[lane]), int(twos[lane]))
 
 
-@rare_kernel
-def collide_one(contacts: Contacts, bodies: Records, r: int, ahead: float, corners: Records) -> None:
+@jit.rare_kernel
+def collide_one(contacts: arrays.Contacts, bodies: Records, r: int, ahead: float, corners: Records) -> None:
     """Find the manifold of one pair of polygons."""
     stepping = contacts.stepping[0]
     states = contacts.states
     constraint = contacts.constraints[r]
     a, b = constraint.a, constraint.b
-    place = Place(stepping.margin, ahead, 0.5 * stepping.substep, False, stepping)
-    collide(constraint, bodies[a], bodies[b], states[a], states[b], place, corners)
+    place = manifold.Place(stepping.margin, ahead, 0.5 * stepping.substep, False, stepping)
+    manifold.collide(constraint, bodies[a], bodies[b], states[a], states[b], place, corners)

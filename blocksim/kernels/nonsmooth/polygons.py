@@ -21,23 +21,10 @@ a little. And a face of b on which no point lies gives way to that of a.
 
 from typing import NamedTuple
 
+from blocksim.kernels.common import jit, shapes
 from blocksim.kernels.common.arrays import Record, Records
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import AnyHull, Hull, face_towards, next_corner
 from blocksim.kernels.common.simd import Lane, Lanes, Mask, fields_0, fields_4, greater, is_all, lesser, select, split
-from blocksim.kernels.nonsmooth.arrays import FAR
-from blocksim.kernels.nonsmooth.faces import (
-    Block,
-    Edge,
-    Face,
-    Points,
-    clip,
-    face_of,
-    has_point,
-    in_frame,
-    opposite_edge,
-    points_of as points_on,
-)
+from blocksim.kernels.nonsmooth import arrays, faces
 
 
 class Hulls(NamedTuple):
@@ -61,22 +48,22 @@ class Side(NamedTuple):
     half: Lanes
 
 
-@kernel
-def hulls_of_one(hull: Hull) -> Hulls:
+@jit.kernel
+def hulls_of_one(hull: shapes.Hull) -> Hulls:
     """Return the corners of a single body."""
     first, size = hull.first, hull.size
     places = (first, first, first, first)
     return Hulls(hull.table, places, size, 1.0 * first, 1.0 * size, 1.0 * hull.inner)
 
 
-@kernel
+@jit.kernel
 def normal_at(hulls: Hulls, k: int, lane: Lane) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     """Return normal, distance and middle (m) of face k of bodies."""
     one, two, three, four = hulls.places
     return fields_0(lane, hulls.table, (one + k, two + k, three + k, four + k))
 
 
-@kernel
+@jit.kernel
 def side_at(table: Records, place: Lanes, lane: Lane) -> Side:
     """Return the faces at places of the table."""
     one, two, three, four = split(place)
@@ -86,7 +73,7 @@ def side_at(table: Records, place: Lanes, lane: Lane) -> Side:
     return Side(nx, ny, distance, middle, half)
 
 
-@kernel
+@jit.kernel
 def number_against(hulls: Hulls, mx: Lanes, my: Lanes, lane: Lane) -> Lanes:
     """Return the numbers of the faces that look most against unit vectors given in the frames of the bodies."""
     nx, ny, _, _ = normal_at(hulls, 0, lane)
@@ -101,7 +88,7 @@ def number_against(hulls: Hulls, mx: Lanes, my: Lanes, lane: Lane) -> Lanes:
     return number
 
 
-@kernel
+@jit.kernel
 def least_along(side: Side, mx: Lanes, my: Lanes) -> Lanes:
     """Return how far (m) a body reaches along a unit vector in its frame at least, given the face most against it.
 
@@ -112,10 +99,10 @@ def least_along(side: Side, mx: Lanes, my: Lanes) -> Lanes:
     return side.distance * along + side.middle * across - side.half * abs(across)
 
 
-@kernel
-def side_face(body: Block, side: Side) -> Face:
+@jit.kernel
+def side_face(body: faces.Block, side: Side) -> faces.Face:
     """Return a face as reference: of a rectangle what face_of returns, bit by bit."""
-    return Face(
+    return faces.Face(
         body.cos * side.nx - body.sin * side.ny,
         body.sin * side.nx + body.cos * side.ny,
         body.x,
@@ -126,14 +113,14 @@ def side_face(body: Block, side: Side) -> Face:
     )
 
 
-@kernel
-def side_edge(face: Face, body: Block, side: Side) -> Edge:
+@jit.kernel
+def side_edge(face: faces.Face, body: faces.Block, side: Side) -> faces.Edge:
     """Return a face that looks towards a reference face: it begins at the left.
 
     Of a rectangle that is what opposite_edge returns, bit by bit: from the centre to the middle of the face, and from
     there to both ends.
     """
-    x, y = in_frame(face, body.x, body.y)
+    x, y = faces.in_frame(face, body.x, body.y)
     # the body's own x axis in the frame of the reference face
     c = body.cos * face.ny - body.sin * face.nx
     s = body.cos * face.nx + body.sin * face.ny
@@ -147,7 +134,7 @@ def side_edge(face: Face, body: Block, side: Side) -> Edge:
     ex = side.half * tx
     ey = side.half * ty
     are_all = abs(ex) >= 0.0
-    return Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
+    return faces.Edge(x - ex, y - ey, x + ex, y + ey, are_all, are_all)
 
 
 TIE = 1e-7  # m: by so much a face of body a has to be better than one of body b
@@ -196,55 +183,55 @@ class Found(NamedTuple):
     `is_near` tells whether there is one, `is_odd` that faces hardly face one another or have no point.
     """
 
-    points: Points
+    points: faces.Points
     is_near: Mask
     is_odd: Mask
     one: Lanes
     two: Lanes
 
 
-@kernel
-def face_count(hull: AnyHull) -> int:
+@jit.kernel
+def face_count(hull: shapes.AnyHull) -> int:
     """Return the number of faces of a body; a rectangle has no hull."""
     if hull is None:
         return RECTANGLE
     return hull.size
 
 
-@kernel
-def side_numbered(hull: Hull, number: int) -> Side:
+@jit.kernel
+def side_numbered(hull: shapes.Hull, number: int) -> Side:
     """Return a face of a polygon."""
     return side_at(hull.table, 1.0 * (hull.first + number), 0)
 
 
-@kernel
-def face_numbered(body: Block, hull: AnyHull, number: int) -> Face:
+@jit.kernel
+def face_numbered(body: faces.Block, hull: shapes.AnyHull, number: int) -> faces.Face:
     """Return one of the faces of a body."""
     if hull is None:
         sign = 1.0 if number < 2 else -1.0
         along_x = number % 2 == 0
         mx = sign * (body.cos if along_x else -body.sin)
         my = sign * (body.sin if along_x else body.cos)
-        return face_of(body, mx, my, along_x)
+        return faces.face_of(body, mx, my, along_x)
     return side_face(body, side_numbered(hull, number))
 
 
-@kernel
-def edge_opposite(face: Face, body: Block, hull: AnyHull) -> Edge:
+@jit.kernel
+def edge_opposite(face: faces.Face, body: faces.Block, hull: shapes.AnyHull) -> faces.Edge:
     """Return the face of a body that looks most towards a reference face."""
     if hull is None:
-        return opposite_edge(face, body)
+        return faces.opposite_edge(face, body)
     return side_edge(face, body, side_numbered(hull, number_opposite(face.nx, face.ny, body, hull)))
 
 
-@kernel
-def number_opposite(nx: float, ny: float, body: Block, hull: Hull) -> int:
+@jit.kernel
+def number_opposite(nx: float, ny: float, body: faces.Block, hull: shapes.Hull) -> int:
     """Return the number of the face of a body that looks most against a direction."""
-    return face_towards(hull, -(body.cos * nx + body.sin * ny), body.sin * nx - body.cos * ny)
+    return shapes.face_towards(hull, -(body.cos * nx + body.sin * ny), body.sin * nx - body.cos * ny)
 
 
-@kernel
-def pose_of(other: Block, body: Block) -> Pose:
+@jit.kernel
+def pose_of(other: faces.Block, body: faces.Block) -> Pose:
     """Return another body in the frame of a body; (c, s) turns directions of this frame into the frame of the other."""
     dx = other.x - body.x
     dy = other.y - body.y
@@ -256,7 +243,7 @@ def pose_of(other: Block, body: Block) -> Pose:
     )
 
 
-@kernel
+@jit.kernel
 def gap_beyond(away: Lanes, nx: Lanes, ny: Lanes, pose: Pose, other: Hulls, lane: Lane) -> tuple[Lanes, Lanes]:
     """Return the gap (m) beyond a face with a normal, and the number of the face of the other body that it meets.
 
@@ -268,13 +255,13 @@ def gap_beyond(away: Lanes, nx: Lanes, ny: Lanes, pose: Pose, other: Hulls, lane
     return away + least_along(side_at(other.table, other.first + against, lane), mx, my), against
 
 
-@kernel
+@jit.kernel
 def farthest_face(hulls: Hulls, pose: Pose, lane: Lane) -> Farthest:
     """Return the face of a body from which the centroid of another one is farthest; of equal ones the first."""
     fx, fy, distance, _ = normal_at(hulls, 0, lane)
     most = fx * pose.x + fy * pose.y - distance
     number = 0.0 * most
-    second = number - FAR
+    second = number - arrays.FAR
     for k in range(1, hulls.size):
         nx, ny, distance, _ = normal_at(hulls, k, lane)
         away = nx * pose.x + ny * pose.y - distance
@@ -287,7 +274,7 @@ def farthest_face(hulls: Hulls, pose: Pose, lane: Lane) -> Farthest:
     return Farthest(most, number, fx, fy, second)
 
 
-@kernel
+@jit.kernel
 def best_from(found: Farthest, hulls: Hulls, pose: Pose, other: Hulls, lane: Lane) -> Best:
     """Return the face of a body beyond which another one reaches least.
 
@@ -301,7 +288,7 @@ def best_from(found: Farthest, hulls: Hulls, pose: Pose, other: Hulls, lane: Lan
     return best_of_others(best, hulls, pose, other, lane)
 
 
-@kernel
+@jit.kernel
 def best_of_others(best: Best, hulls: Hulls, pose: Pose, other: Hulls, lane: Lane) -> Best:
     """Return the best face of a body, or one that is better; of equal ones the first."""
     gap, number, against = best
@@ -318,13 +305,13 @@ def best_of_others(best: Best, hulls: Hulls, pose: Pose, other: Hulls, lane: Lan
     return Best(gap, number, against)
 
 
-@kernel
+@jit.kernel
 def best_face(hulls: Hulls, pose: Pose, other: Hulls, lane: Lane) -> Best:
     """Return the face of a body beyond which another one reaches least."""
     return best_from(farthest_face(hulls, pose, lane), hulls, pose, other, lane)
 
 
-@kernel
+@jit.kernel
 def best_if_above(least: Lanes, hulls: Hulls, pose: Pose, other: Hulls, lane: Lane) -> Best:
     """Return the face of a body beyond which another one reaches least, if the gap there is above `least` (m).
 
@@ -342,10 +329,10 @@ def best_if_above(least: Lanes, hulls: Hulls, pose: Pose, other: Hulls, lane: La
     return Best(select(is_above, best.gap, least), select(is_above, best.number, none), best.against)
 
 
-@kernel
-def one_of(is_one: Mask, one: Block, two: Block) -> Block:
+@jit.kernel
+def one_of(is_one: Mask, one: faces.Block, two: faces.Block) -> faces.Block:
     """Return the place of one body or the other."""
-    return Block(
+    return faces.Block(
         select(is_one, one.x, two.x),
         select(is_one, one.y, two.y),
         select(is_one, one.cos, two.cos),
@@ -355,21 +342,21 @@ def one_of(is_one: Mask, one: Block, two: Block) -> Block:
     )
 
 
-@kernel
+@jit.kernel
 def after(number: Lanes, count: Lanes) -> Lanes:
     """Return the number of the next corner."""
     return select(number + 1.0 < count, number + 1.0, 0.0 * number)
 
 
-@kernel
+@jit.kernel
 def of_other(corner: Lanes) -> Lanes:
     """Return a corner as one of the other body of a pair."""
     return select(corner > 1.0 * OF_B, corner - 1.0 * OF_B, corner + 1.0 * OF_B)
 
 
-@kernel
+@jit.kernel
 def found_on(
-    is_of_b: Mask, best: Best, a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float, lane: Lane
+    is_of_b: Mask, best: Best, a: faces.Block, hulls_a: Hulls, b: faces.Block, hulls_b: Hulls, margin: float, lane: Lane
 ) -> Found:
     """Return manifolds on faces of bodies b or a. Point one is the right one of a face of b, the left one of one of a.
 
@@ -380,8 +367,8 @@ def found_on(
     face = side_face(one_of(is_of_b, b, a), side_at(hulls_a.table, place, lane))
     place = select(is_of_b, hulls_a.first, hulls_b.first) + best.against
     whole = side_edge(face, other, side_at(hulls_a.table, place, lane))
-    edge = clip(whole, face)
-    points = points_on(face, edge, a, b, is_of_b, margin)
+    edge = faces.clip(whole, face)
+    points = faces.points_of(face, edge, a, b, is_of_b, margin)
     next_number = after(best.number, select(is_of_b, hulls_b.count, hulls_a.count))
     next_against = after(best.against, select(is_of_b, hulls_a.count, hulls_b.count))
     left = select(whole.left >= face.left, 1.0 + best.against, (OF_B + 1.0) + next_number)
@@ -389,16 +376,16 @@ def found_on(
     is_sliver = edge.right - edge.left < EDGE * lesser(hulls_a.inner, hulls_b.inner)
     return Found(
         points,
-        (edge.right > edge.left) & has_point(points),
-        is_sliver | (is_of_b & (lesser(points.gap_one, points.gap_two) >= FAR)),
+        (edge.right > edge.left) & faces.has_point(points),
+        is_sliver | (is_of_b & (lesser(points.gap_one, points.gap_two) >= arrays.FAR)),
         select(is_of_b, right, of_other(left)),
         select(is_of_b, left, of_other(right)),
     )
 
 
-@kernel
+@jit.kernel
 def points_of_polygons(
-    a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float, lane: Lane
+    a: faces.Block, hulls_a: Hulls, b: faces.Block, hulls_b: Hulls, margin: float, lane: Lane
 ) -> tuple[Found, Best, Best]:
     """Return the contact manifolds of convex polygons within the margin (m), and the best faces of b and a.
 
@@ -422,17 +409,17 @@ def points_of_polygons(
     )
 
 
-@kernel
-def corners_on_ground(points: Points, block: Block, hull: Hull, is_first: bool) -> tuple[int, int]:
+@jit.kernel
+def corners_on_ground(points: faces.Points, block: faces.Block, hull: shapes.Hull, is_first: bool) -> tuple[int, int]:
     """Return the corners of a polygon at the points of a manifold with the ground, which `is_first` has as body a."""
     if is_first:
         number = number_opposite(points.constraint.nx, points.constraint.ny, block, hull)
-        return 1 + next_corner(hull, number), 1 + number
+        return 1 + shapes.next_corner(hull, number), 1 + number
     number = number_opposite(-points.constraint.nx, -points.constraint.ny, block, hull)
-    return OF_B + 1 + number, OF_B + 1 + next_corner(hull, number)
+    return OF_B + 1 + number, OF_B + 1 + shapes.next_corner(hull, number)
 
 
-@kernel
+@jit.kernel
 def follow_corners(constraint: Record, one: int, two: int) -> None:
     """Have impulses of the last step go with their corners; where a corner has not changed places they stay."""
     normal_one = constraint.normal_one
@@ -449,8 +436,8 @@ def follow_corners(constraint: Record, one: int, two: int) -> None:
 LEVEL = -0.99498743710662  # cosine: two faces within 0.1 rad of each other can meet as faces
 
 
-@kernel
-def points_of_two(a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float) -> Found:
+@jit.kernel
+def points_of_two(a: faces.Block, hulls_a: Hulls, b: faces.Block, hulls_b: Hulls, margin: float) -> Found:
     """Return the contact manifold of two convex polygons within the margin (m)."""
     found, best_b, best_a = points_of_polygons(a, hulls_a, b, hulls_b, margin, 0)
     if found.is_odd:
@@ -458,9 +445,9 @@ def points_of_two(a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: fl
     return found
 
 
-@rare_kernel
+@jit.rare_kernel
 def points_where_odd(
-    best_b: Best, best_a: Best, a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float
+    best_b: Best, best_a: Best, a: faces.Block, hulls_a: Hulls, b: faces.Block, hulls_b: Hulls, margin: float
 ) -> Found:
     """Return the same for polygons whose best faces face one another over a sliver, or have no point."""
     if best_a.number < 0.0:
@@ -473,8 +460,10 @@ def points_where_odd(
     return found_beside(False, best_a, a, hulls_a, b, hulls_b, margin)
 
 
-@rare_kernel
-def found_beside(is_of_b: bool, best: Best, a: Block, hulls_a: Hulls, b: Block, hulls_b: Hulls, margin: float) -> Found:
+@jit.rare_kernel
+def found_beside(
+    is_of_b: bool, best: Best, a: faces.Block, hulls_a: Hulls, b: faces.Block, hulls_b: Hulls, margin: float
+) -> Found:
     """Return the manifold on the best face of a body, or on the next best where it faces the other over a sliver."""
     found = found_on(is_of_b, best, a, hulls_a, b, hulls_b, margin, 0)
     least = EDGE * min(hulls_a.inner, hulls_b.inner)
@@ -486,8 +475,8 @@ def found_beside(is_of_b: bool, best: Best, a: Block, hulls_a: Hulls, b: Block, 
     return found
 
 
-@kernel
-def next_above(least: float, but: float, hulls: Hulls, body: Block, others: Hulls, other: Block) -> Best:
+@jit.kernel
+def next_above(least: float, but: float, hulls: Hulls, body: faces.Block, others: Hulls, other: faces.Block) -> Best:
     """Return the best face of a body but one of those with a gap above `least` (m)."""
     pose = pose_of(other, body)
     best = Best(least, -1.0, -1.0)
@@ -499,8 +488,8 @@ def next_above(least: float, but: float, hulls: Hulls, body: Block, others: Hull
     return best
 
 
-@kernel
-def can_meet(best: Best, body: Block, hulls: Hulls, other: Block, others: Hulls) -> bool:
+@jit.kernel
+def can_meet(best: Best, body: faces.Block, hulls: Hulls, other: faces.Block, others: Hulls) -> bool:
     """Return True if two faces are nearly parallel."""
     pose = pose_of(other, body)
     one = side_at(hulls.table, hulls.first + best.number, 0)

@@ -5,20 +5,7 @@ import math
 from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import WIDTH, Lane, Lanes, Mask, fields_0, greater, lesser, load, select, store
-from blocksim.kernels.nonsmooth.arrays import (
-    AWAY,
-    FAR,
-    FORGOTTEN,
-    NOT_STRUCK,
-    PART,
-    STRUCK,
-    STRUCK_AT_REST,
-    Contacts,
-)
-from blocksim.kernels.nonsmooth.clusters import of_constraint
-from blocksim.kernels.nonsmooth.groups import bodies_at, constraints_of, highest, total
-from blocksim.kernels.nonsmooth.passes import gaps, pulls, taken_by
-from blocksim.kernels.nonsmooth.slip import presses, slip_of
+from blocksim.kernels.nonsmooth import arrays, clusters, groups, passes, slip
 
 UPRIGHT = 0.1  # cosine of the angle between a normal and gravity, from which on it presses at the start of a run
 
@@ -33,7 +20,7 @@ def clear(group: Record) -> None:
 
 
 @kernel
-def keep_held(contacts: Contacts, begin: int, end: int) -> None:
+def keep_held(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Keep the normal impulses with which a substep begins for some groups: they tell what presses."""
     for m in range(begin, end):
         group = contacts.groups[m]
@@ -41,7 +28,7 @@ def keep_held(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @rare_kernel
-def hold(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+def hold(contacts: arrays.Contacts, begin: int, end: int, gx: float, gy: float) -> None:
     """Let constraints of some groups press that did so before an impact, in the first substep after it.
 
     At the start of a run, with a gravity (gx, gy), all those press that are not upright: nothing is known of them yet.
@@ -52,19 +39,19 @@ def hold(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None
         for lane in range(WIDTH):
             constraint = contacts.constraints[group.constraint[lane]]
             across = abs(constraint.nx * gx + constraint.ny * gy)
-            if constraint.is_struck == FORGOTTEN or across > least:
-                contacts.asides[m].held[lane] = FAR
+            if constraint.is_struck == arrays.FORGOTTEN or across > least:
+                contacts.asides[m].held[lane] = arrays.FAR
         for lane in range(group.count):
-            contacts.constraints[group.constraint[lane]].is_struck = NOT_STRUCK
+            contacts.constraints[group.constraint[lane]].is_struck = arrays.NOT_STRUCK
 
 
 @rare_kernel
-def set_aside(contacts: Contacts, begin: int, end: int) -> None:
+def set_aside(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Keep what the velocity pass has found for some groups, and leave all constraints out of those to come."""
     for m in range(begin, end):
         group = contacts.groups[m]
         aside = contacts.asides[m]
-        none = 0.0 * load(None, group.normal_one) - FAR
+        none = 0.0 * load(None, group.normal_one) - arrays.FAR
         store(None, aside.normal_one, load(None, group.normal_one))
         store(None, aside.normal_two, load(None, group.normal_two))
         store(None, aside.shear, load(None, group.shear))
@@ -74,7 +61,7 @@ def set_aside(contacts: Contacts, begin: int, end: int) -> None:
         store(None, aside.rise_two, none)
         aside.is_hit = 0
         for lane in range(group.count):
-            if of_constraint(contacts, group, lane).is_hit:
+            if clusters.of_constraint(contacts, group, lane).is_hit:
                 aside.is_hit = 1
         forget_hits(contacts, group, aside)
         store(None, group.target_one, none)
@@ -83,13 +70,13 @@ def set_aside(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @rare_kernel
-def forget_hits(contacts: Contacts, group: Record, aside: Record) -> None:
+def forget_hits(contacts: arrays.Contacts, group: Record, aside: Record) -> None:
     """Begin to sum up the impulses of constraints of clusters that are hit; leave out others of their group."""
     for lane in range(WIDTH if aside.is_hit else 0):
-        if of_constraint(contacts, group, min(lane, group.count - 1)).is_hit:
+        if clusters.of_constraint(contacts, group, min(lane, group.count - 1)).is_hit:
             aside.normal_one[lane] = aside.normal_two[lane] = aside.shear[lane] = 0.0
         else:
-            aside.target_one[lane] = aside.target_two[lane] = -FAR
+            aside.target_one[lane] = aside.target_two[lane] = -arrays.FAR
 
 
 @rare_kernel
@@ -100,10 +87,10 @@ def aim_point(
 
     A point that is not `held` does not press: it waits until what it touches comes nearer.
     """
-    counts = active > -FAR
+    counts = active > -arrays.FAR
     is_hit = counts & (u < -stepping.threshold)
     rests = counts & held & (abs(u) <= stepping.threshold) & (start <= stepping.rest_gap)
-    return select(is_hit, bend + after, select(rests, bend - greater(u, 0.0), -FAR)), is_hit
+    return select(is_hit, bend + after, select(rests, bend - greater(u, 0.0), -arrays.FAR)), is_hit
 
 
 @rare_kernel
@@ -116,25 +103,25 @@ def least_after(u: Lanes, last: Lanes, pull: Lanes, e: Lanes) -> Lanes:
 
 
 @rare_kernel
-def aim_group(contacts: Contacts, m: int, lane: Lane, is_first: bool) -> Lanes:
+def aim_group(contacts: arrays.Contacts, m: int, lane: Lane, is_first: bool) -> Lanes:
     """Set what a round has to reach at the points of a group; return 1 for constraints that are hit, 0 for others."""
     stepping = contacts.stepping[0]
     group = contacts.groups[m]
     aside = contacts.asides[m]
-    constraint = constraints_of(group, lane)
-    a = bodies_at(contacts, group.a, lane)
-    b = bodies_at(contacts, group.b, lane)
-    u = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
+    constraint = groups.constraints_of(group, lane)
+    a = groups.bodies_at(contacts, group.a, lane)
+    b = groups.bodies_at(contacts, group.b, lane)
+    u = slip.slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
     e = load(lane, group.restitution)
     bend = stepping.bend_share * load(lane, group.bend)
-    pull = pulls(constraint, a, b, stepping)
+    pull = passes.pulls(constraint, a, b, stepping)
     old_one = load(lane, aside.target_one)
     old_two = load(lane, aside.target_two)
     last_one = old_one if is_first else -e * u.one - 0.5 * pull
     last_two = old_two if is_first else -e * u.two - 0.5 * pull
     after_one = least_after(u.one, last_one, pull, e)
     after_two = least_after(u.two, last_two, pull, e)
-    held = presses(load(lane, aside.held), a.inverse_mass + b.inverse_mass, stepping)
+    held = slip.presses(load(lane, aside.held), a.inverse_mass + b.inverse_mass, stepping)
     t_one, hit_one = aim_point(u.one, load(lane, group.start_one), old_one, after_one, bend, held, stepping)
     t_two, hit_two = aim_point(u.two, load(lane, group.start_two), old_two, after_two, bend, held, stepping)
     store(lane, group.target_one, t_one)
@@ -143,13 +130,13 @@ def aim_group(contacts: Contacts, m: int, lane: Lane, is_first: bool) -> Lanes:
     rise_two = load(lane, aside.rise_two)
     more_one = select(pull < 0.0, last_one + e * u.one, 0.0)
     more_two = select(pull < 0.0, last_two + e * u.two, 0.0)
-    store(lane, aside.rise_one, select(hit_one & (rise_one <= -FAR), more_one, rise_one))
-    store(lane, aside.rise_two, select(hit_two & (rise_two <= -FAR), more_two, rise_two))
+    store(lane, aside.rise_one, select(hit_one & (rise_one <= -arrays.FAR), more_one, rise_one))
+    store(lane, aside.rise_two, select(hit_two & (rise_two <= -arrays.FAR), more_two, rise_two))
     return select(hit_one | hit_two, 1.0 + 0.0 * t_one, 0.0 * t_one)
 
 
 @rare_kernel
-def aim_round(contacts: Contacts, begin: int, end: int, is_first: bool) -> float:
+def aim_round(contacts: arrays.Contacts, begin: int, end: int, is_first: bool) -> float:
     """Begin a round for some groups; return 1 where any point is hit, else 0."""
     hits = 0.0
     for m in range(begin, end):
@@ -159,35 +146,35 @@ def aim_round(contacts: Contacts, begin: int, end: int, is_first: bool) -> float
             if group.count == 1:
                 hits = max(hits, aim_group(contacts, m, 0, is_first))
             else:
-                hits = max(hits, highest(aim_group(contacts, m, None, is_first)))
+                hits = max(hits, groups.highest(aim_group(contacts, m, None, is_first)))
     return hits
 
 
 @rare_kernel
-def tally_round(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+def tally_round(contacts: arrays.Contacts, begin: int, end: int, gx: float, gy: float) -> None:
     """Tally a round for some groups, and sum up its impulses; (gx, gy) as in taken_by."""
     for m in range(begin, end):
         aside = contacts.asides[m]
         if aside.is_hit:
             group = contacts.groups[m]
-            tally = contacts.tallies[m // PART]
+            tally = contacts.tallies[m // arrays.PART]
             if group.count == 1:
-                normal, shear, given = taken_by(contacts, contacts.impacts, group, 0, gx, gy)
+                normal, shear, given = passes.taken_by(contacts, contacts.impacts, group, 0, gx, gy)
                 tally.impacts -= 0.5 * normal
                 tally.friction -= 0.5 * shear
                 tally.to_support += given
             else:
-                normals, shears, gifts = taken_by(contacts, contacts.impacts, group, None, gx, gy)
-                tally.impacts -= 0.5 * total(normals, group.count)
-                tally.friction -= 0.5 * total(shears, group.count)
-                tally.to_support += total(gifts, group.count)
+                normals, shears, gifts = passes.taken_by(contacts, contacts.impacts, group, None, gx, gy)
+                tally.impacts -= 0.5 * groups.total(normals, group.count)
+                tally.friction -= 0.5 * groups.total(shears, group.count)
+                tally.to_support += groups.total(gifts, group.count)
             store(None, aside.normal_one, load(None, aside.normal_one) + load(None, group.normal_one))
             store(None, aside.normal_two, load(None, aside.normal_two) + load(None, group.normal_two))
             store(None, aside.shear, load(None, aside.shear) + load(None, group.shear))
 
 
 @rare_kernel
-def aim_rest_of(contacts: Contacts, m: int, lane: Lane) -> None:
+def aim_rest_of(contacts: arrays.Contacts, m: int, lane: Lane) -> None:
     """Set what the points of a group keep after all impacts: their rebound against gravity, else no approach.
 
     Two free bodies that only touched have nothing to rebound against: what moves slower than the threshold pushes one
@@ -196,34 +183,34 @@ def aim_rest_of(contacts: Contacts, m: int, lane: Lane) -> None:
     stepping = contacts.stepping[0]
     group = contacts.groups[m]
     aside = contacts.asides[m]
-    constraint = constraints_of(group, lane)
-    a = bodies_at(contacts, group.a, lane)
-    b = bodies_at(contacts, group.b, lane)
-    gap_one, gap_two = gaps(group, lane, constraint, a, b, stepping.next_bend_time)
+    constraint = groups.constraints_of(group, lane)
+    a = groups.bodies_at(contacts, group.a, lane)
+    b = groups.bodies_at(contacts, group.b, lane)
+    gap_one, gap_two = passes.gaps(group, lane, constraint, a, b, stepping.next_bend_time)
     vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
-    u = slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
+    u = slip.slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
     bend = stepping.bend_share * load(lane, group.bend)
     are_free = lesser(a.inverse_mass, b.inverse_mass) > 0.0
-    held = presses(load(lane, aside.held), a.inverse_mass + b.inverse_mass, stepping)
-    none = 0.0 * bend - FAR
+    held = slip.presses(load(lane, aside.held), a.inverse_mass + b.inverse_mass, stepping)
+    none = 0.0 * bend - arrays.FAR
     rise_one = select(are_free, select(held, load(lane, aside.rise_one), none), load(lane, aside.rise_one))
     rise_two = select(are_free, select(held, load(lane, aside.rise_two), none), load(lane, aside.rise_two))
     one = kept(u.one, rise_one, bend, gap_one, stepping)
     two = kept(u.two, rise_two, bend, gap_two, stepping)
-    store(lane, group.target_one, select(load(lane, aside.target_one) > -FAR, one, -FAR))
-    store(lane, group.target_two, select(load(lane, aside.target_two) > -FAR, two, -FAR))
+    store(lane, group.target_one, select(load(lane, aside.target_one) > -arrays.FAR, one, -arrays.FAR))
+    store(lane, group.target_two, select(load(lane, aside.target_two) > -arrays.FAR, two, -arrays.FAR))
 
 
 @rare_kernel
 def kept(u: Lanes, rise: Lanes, bend: Lanes, gap: Lanes, stepping: Record) -> Lanes:
     """Return what a point has to reach at least (m/s) in the velocity pass after all impacts, u after the last one."""
     least = -greater(gap, 0.0) * stepping.open_bias
-    return select((rise > -FAR) & (u > 0.0), greater(u + rise, 0.0) + bend, least)
+    return select((rise > -arrays.FAR) & (u > 0.0), greater(u + rise, 0.0) + bend, least)
 
 
 @rare_kernel
-def aim_rest(contacts: Contacts, begin: int, end: int) -> None:
+def aim_rest(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Begin the velocity pass after all impacts for some groups."""
     for m in range(begin, end):
         if contacts.asides[m].is_hit:
@@ -236,7 +223,7 @@ def aim_rest(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @rare_kernel
-def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
+def bring_back(contacts: arrays.Contacts, begin: int, end: int, are_hit: bool) -> None:
     """Restore the impulses of clusters that were not hit; give those that were hit the impulses of all rounds.
 
     Impacts are over, so that no substep begins with their impulses; at the end of a step they are reported.
@@ -245,32 +232,34 @@ def bring_back(contacts: Contacts, begin: int, end: int, are_hit: bool) -> None:
         group = contacts.groups[m]
         aside = contacts.asides[m]
         for lane in range(WIDTH):  # copies find the same
-            is_hit = of_constraint(contacts, group, min(lane, group.count - 1)).is_hit == 1
+            is_hit = clusters.of_constraint(contacts, group, min(lane, group.count - 1)).is_hit == 1
             if is_hit == are_hit:
                 if aside.normal_one[lane] + aside.normal_two[lane] > 0.0 and is_hit:
                     states = contacts.states
                     inverse_mass = states[group.a[lane]].inverse_mass + states[group.b[lane]].inverse_mass
-                    is_held = presses(aside.held[lane], inverse_mass, contacts.stepping[0])
-                    contacts.constraints[group.constraint[lane]].is_struck = STRUCK_AT_REST if is_held else STRUCK
+                    is_held = slip.presses(aside.held[lane], inverse_mass, contacts.stepping[0])
+                    contacts.constraints[group.constraint[lane]].is_struck = (
+                        arrays.STRUCK_AT_REST if is_held else arrays.STRUCK
+                    )
                 group.normal_one[lane] += aside.normal_one[lane]
                 group.normal_two[lane] += aside.normal_two[lane]
                 group.shear[lane] += aside.shear[lane]
 
 
 @rare_kernel
-def forget_struck(contacts: Contacts, begin: int, end: int) -> None:
+def forget_struck(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Let some constraints begin a step without the impulses of impacts: nothing presses on them any more.
 
     Those that pressed before are still known, for the first substep; see hold.
     """
     for r in range(begin, end):
         constraint = contacts.constraints[r]
-        if constraint.is_struck == STRUCK or constraint.is_struck == STRUCK_AT_REST:
+        if constraint.is_struck == arrays.STRUCK or constraint.is_struck == arrays.STRUCK_AT_REST:
             constraint.normal_one = constraint.normal_two = constraint.shear = 0.0
-            if constraint.is_struck == STRUCK_AT_REST:
-                constraint.is_struck = FORGOTTEN
+            if constraint.is_struck == arrays.STRUCK_AT_REST:
+                constraint.is_struck = arrays.FORGOTTEN
                 contacts.stepping[0].has_forgotten = 1  # the same by every thread
             else:
-                constraint.is_struck = NOT_STRUCK
-        elif constraint.reach == AWAY:
-            constraint.is_struck = NOT_STRUCK
+                constraint.is_struck = arrays.NOT_STRUCK
+        elif constraint.reach == arrays.AWAY:
+            constraint.is_struck = arrays.NOT_STRUCK

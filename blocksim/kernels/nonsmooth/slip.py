@@ -2,8 +2,7 @@
 
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import Record
-from blocksim.kernels.common.jit import kernel
+from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.common.simd import Lanes, Mask
 
 
@@ -42,8 +41,8 @@ class Motion(NamedTuple):
     half: Lanes
 
 
-@kernel
-def presses(impulse: Lanes, inverse_mass: Lanes, stepping: Record) -> Mask:
+@jit.kernel
+def presses(impulse: Lanes, inverse_mass: Lanes, stepping: arrays.Record) -> Mask:
     """Return True if an impulse (N s) is more than round-off: if it moves bodies by more than `touch_gap` in a substep.
 
     `inverse_mass` (1/kg) is that of both bodies together.
@@ -51,7 +50,7 @@ def presses(impulse: Lanes, inverse_mass: Lanes, stepping: Record) -> Mask:
     return inverse_mass * impulse > stepping.touch_gap * stepping.open_bias
 
 
-@kernel
+@jit.kernel
 def slip_of(constraint: Constraints, vx: Lanes, vy: Lanes, spin_a: Lanes, spin_b: Lanes) -> Slip:
     """Return the velocities at the points, given that of centre a against centre b and both spins."""
     along = constraint.nx * vx + constraint.ny * vy

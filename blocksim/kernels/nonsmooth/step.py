@@ -5,6 +5,7 @@ One substep of all bodies and constraints, shared by threads.
 
 import math
 
+from blocksim.kernels.common import integrate, jit, loads, supports
 from blocksim.kernels.common.arrays import (
     AT_REST,
     NOT_FINITE,
@@ -19,54 +20,33 @@ from blocksim.kernels.common.arrays import (
 )
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.energy import weights_power
-from blocksim.kernels.common.integrate import fastest_point, kinetic_energy, renew_angles
-from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
-from blocksim.kernels.common.loads import are_loads_steady
 from blocksim.kernels.common.members import Watched, frame_to_watch, member as world_of, of_member, watch
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.common.supports import has_motion, is_support_at_rest
-from blocksim.kernels.nonsmooth.arrays import Contacts, Nonsmooth
+from blocksim.kernels.nonsmooth import (
+    arrays,
+    energy,
+    faces,
+    groups,
+    impacts,
+    manifold,
+    motion,
+    neighbours,
+    parts,
+    polygon_fours,
+    rounds,
+    sweeps,
+)
 from blocksim.kernels.nonsmooth.begin import is_start, load_states
-from blocksim.kernels.nonsmooth.energy import has_excessive_overlap, measure_nonsmooth
-from blocksim.kernels.nonsmooth.faces import follow_curvature
-from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
-from blocksim.kernels.nonsmooth.impacts import follow_impacts
-from blocksim.kernels.nonsmooth.manifold import Place, are_four_of_blocks, collide, collide_four
-from blocksim.kernels.nonsmooth.motion import (
-    drift_all,
-    drive,
-    kick_all,
-    kick_all_warm,
-    kick_by_loads,
-    place_all,
-    place_supports,
-    pull_of_loads,
-    show_velocities,
-    tally_loads,
-)
-from blocksim.kernels.nonsmooth.neighbours import update_pairs
-from blocksim.kernels.nonsmooth.parts import begin_step, is_continued, is_shortened
-from blocksim.kernels.nonsmooth.polygon_fours import find_manifolds_of_polygons, is_left_to_fours
-from blocksim.kernels.nonsmooth.rounds import bring_back, forget_struck, hold, keep_held
-from blocksim.kernels.nonsmooth.sweeps import (
-    FIRST_VELOCITY,
-    POSITION,
-    WARM,
-    part_of,
-    sweep,
-    tally_constraints,
-    velocity_pass,
-)
 
 
-@kernel
+@jit.kernel
 def kick_share(number: int, is_first_step: bool) -> float:
     """Return the share of a whole kick of gravity in substep `number` of a step; the first of a run has half of one."""
     return 0.5 if is_first_step and number == 0 else 1.0
 
 
-@kernel
-def bodies_of(contacts: Contacts, k: int, size: int) -> tuple[int, int]:
+@jit.kernel
+def bodies_of(contacts: arrays.Contacts, k: int, size: int) -> tuple[int, int]:
     """Return the bodies of thread k, from the first to before the last; the ground belongs to no thread."""
     count = contacts.states.size - 1
     if size == 1:
@@ -74,30 +54,30 @@ def bodies_of(contacts: Contacts, k: int, size: int) -> tuple[int, int]:
     return count * k // size, count * (k + 1) // size
 
 
-@kernel
-def prepare(scene: Nonsmooth, number: int, share: float) -> None:
+@jit.kernel
+def prepare(scene: arrays.Nonsmooth, number: int, share: float) -> None:
     """Set what is the same for all bodies and constraints in substep `number`, with that share of a kick of gravity."""
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
-    stepping.is_shaken = has_motion(controls)
+    stepping.is_shaken = supports.has_motion(controls)
     if stepping.is_shaken:
-        drive(scene, number)
-    follow_curvature(stepping, number)
+        motion.drive(scene, number)
+    faces.follow_curvature(stepping, number)
     stepping.fall_x = stepping.substep * controls.gravity_x
     stepping.fall_y = stepping.substep * controls.gravity_y
     stepping.pull_x = stepping.fall_x
     stepping.pull_y = stepping.fall_y
     if scene.world.loads.size > 0:
         time = scene.world.clock[0].steps * controls.step + number * stepping.substep
-        ax, ay = pull_of_loads(scene.world, time)
+        ax, ay = motion.pull_of_loads(scene.world, time)
         stepping.pull_x += stepping.substep * ax
         stepping.pull_y += stepping.substep * ay
     stepping.lag = share - 0.5
     stepping.has_rebounds = 0
 
 
-@kernel
-def start(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
+@jit.kernel
+def start(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     """Kick the bodies of thread k with gravity and loads, and begin with the impulses of the last substep."""
     contacts = scene.contacts
     team = scene.world.team
@@ -107,51 +87,55 @@ def start(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     share = kick_share(number, is_first_step)
     first, last = bodies_of(contacts, k, team[TEAM_SIZE])
     if number == 0:
-        kick_all(contacts.states, contacts.before, first, last, share, hx, hy)
+        motion.kick_all(contacts.states, contacts.before, first, last, share, hx, hy)
         if scene.world.loads.size > 0:
-            kick_by_loads(scene, number, first, last, share, 0.0)
+            motion.kick_by_loads(scene, number, first, last, share, 0.0)
         barrier(team)
-        sweep(contacts, WARM, team, k)
+        sweeps.sweep(contacts, sweeps.WARM, team, k)
     else:
         last_share = kick_share(number - 1, is_first_step)
-        kick_all_warm(contacts.states, contacts.before, first, last, last_share, hx, hy)
+        motion.kick_all_warm(contacts.states, contacts.before, first, last, last_share, hx, hy)
         if scene.world.loads.size > 0:
-            kick_by_loads(scene, number, first, last, share, last_share)
+            motion.kick_by_loads(scene, number, first, last, share, last_share)
         barrier(team)
 
 
-@kernel
-def tally(scene: Nonsmooth, k: int, share: float) -> tuple[int, int]:
+@jit.kernel
+def tally(scene: arrays.Nonsmooth, k: int, share: float) -> tuple[int, int]:
     """Tally bodies and constraints of thread k, whose groups are returned, in a substep with that share of a kick."""
     contacts = scene.contacts
     stepping = contacts.stepping[0]
     team = scene.world.team
     if scene.world.loads.size > 0:
         first, last = bodies_of(contacts, k, team[TEAM_SIZE])
-        tally_loads(scene, first, last, share)
-    first, last = part_of(0, stepping.group_count, k, team[TEAM_SIZE])
+        motion.tally_loads(scene, first, last, share)
+    first, last = sweeps.part_of(0, stepping.group_count, k, team[TEAM_SIZE])
     hx = stepping.substep * scene.world.controls[0].gravity_x
     hy = stepping.substep * scene.world.controls[0].gravity_y
-    tally_constraints(contacts, first, last, (share - 1.0) * hx, (share - 1.0) * hy)
+    sweeps.tally_constraints(contacts, first, last, (share - 1.0) * hx, (share - 1.0) * hy)
     return first, last
 
 
-@kernel
-def note_what_presses(scene: Nonsmooth, k: int, number: int, is_first_step: bool, asides: Records | None) -> None:
+@jit.kernel
+def note_what_presses(
+    scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool, asides: Records | None
+) -> None:
     """Note what presses before substep `number` as thread k; `asides` as in go_through_impacts."""
     if asides is None:
         return
     contacts = scene.contacts
-    first, last = part_of(0, contacts.stepping[0].group_count, k, scene.world.team[TEAM_SIZE])
-    keep_held(contacts, first, last)
+    first, last = sweeps.part_of(0, contacts.stepping[0].group_count, k, scene.world.team[TEAM_SIZE])
+    rounds.keep_held(contacts, first, last)
     if number == 0 and (is_first_step or contacts.stepping[0].has_forgotten):
         controls = scene.world.controls[0]
         share = 1.0 if is_first_step else 0.0
-        hold(contacts, first, last, share * controls.gravity_x, share * controls.gravity_y)
+        rounds.hold(contacts, first, last, share * controls.gravity_x, share * controls.gravity_y)
 
 
-@kernel
-def go_through_impacts(scene: Nonsmooth, k: int, bodies: tuple[int, int], share: float, asides: Records | None) -> None:
+@jit.kernel
+def go_through_impacts(
+    scene: arrays.Nonsmooth, k: int, bodies: tuple[int, int], share: float, asides: Records | None
+) -> None:
     """Let impacts of a substep follow from one another as thread k; see follow_impacts.
 
     Where there are no `asides` nothing rebounds that much, and the compiler leaves this out altogether.
@@ -160,20 +144,20 @@ def go_through_impacts(scene: Nonsmooth, k: int, bodies: tuple[int, int], share:
         return
     if scene.contacts.stepping[0].has_rebounds:
         barrier(scene.world.team)
-        follow_impacts(scene.contacts, scene.world.team, k, bodies, share, scene.pushes)
+        impacts.follow_impacts(scene.contacts, scene.world.team, k, bodies, share, scene.pushes)
 
 
-@kernel
-def report_impacts(contacts: Contacts, first: int, last: int, asides: Records | None) -> None:
+@jit.kernel
+def report_impacts(contacts: arrays.Contacts, first: int, last: int, asides: Records | None) -> None:
     """Give some groups the impulses of impacts at the end of a step; `asides` as in go_through_impacts."""
     if asides is None:
         return
     if contacts.stepping[0].has_rebounds:
-        bring_back(contacts, first, last, True)
+        rounds.bring_back(contacts, first, last, True)
 
 
-@kernel
-def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
+@jit.kernel
+def substep(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
     """Go through substep `number` of a step as thread k; the first one of a run has half a kick of gravity."""
     contacts = scene.contacts
     team = scene.world.team
@@ -184,11 +168,11 @@ def substep(scene: Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
         prepare(scene, number, share)
     note_what_presses(scene, k, number, is_first_step, contacts.asides)
     start(scene, k, number, is_first_step)
-    sweep(contacts, POSITION, team, k)
+    sweeps.sweep(contacts, sweeps.POSITION, team, k)
     ground = last + (k == team[TEAM_SIZE] - 1)  # which may move, is the last
-    drift_all(contacts.states, first, ground, stepping.substep)
+    motion.drift_all(contacts.states, first, ground, stepping.substep)
     barrier(team)
-    velocity_pass(contacts, team, k, FIRST_VELOCITY, stepping.tolerance)
+    sweeps.velocity_pass(contacts, team, k, sweeps.FIRST_VELOCITY, stepping.tolerance)
     go_through_impacts(scene, k, (first, last), share, contacts.asides)
     first, last = tally(scene, k, share)
     if number == stepping.substeps - 1:
@@ -200,8 +184,8 @@ NEIGHBOURS, GATHER, CHECK = range(3)  # what one thread does for all
 UNDER_WAY = -1  # beside the status codes: the step goes on
 
 
-@kernel
-def is_supported(scene: Nonsmooth) -> bool:
+@jit.kernel
+def is_supported(scene: arrays.Nonsmooth) -> bool:
     """Return True if every free body has a contact that presses, where there is gravity."""
     world = scene.world
     controls = world.controls[0]
@@ -220,65 +204,65 @@ def is_supported(scene: Nonsmooth) -> bool:
     return True
 
 
-@kernel
-def check(scene: Nonsmooth) -> int:
+@jit.kernel
+def check(scene: arrays.Nonsmooth) -> int:
     """Check that the run may continue: finite, not at rest for the hold time."""
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
-    renew_angles(world.bodies)
+    integrate.renew_angles(world.bodies)
     ledger = world.ledger[0]
     ledger.travel_work += controls.check_every * controls.step * weights_power(world)
-    ledger.largest_kinetic = max(ledger.largest_kinetic, kinetic_energy(world))
-    fastest = fastest_point(world.bodies)
+    ledger.largest_kinetic = max(ledger.largest_kinetic, integrate.kinetic_energy(world))
+    fastest = integrate.fastest_point(world.bodies)
     if math.isinf(fastest):
         return NOT_FINITE
-    if has_excessive_overlap(scene):
+    if energy.has_excessive_overlap(scene):
         return OVERLAP_LIMIT
-    rests = fastest < controls.rest_speed and is_supported(scene) and is_support_at_rest(world)
-    rests = rests and are_loads_steady(world)
+    rests = fastest < controls.rest_speed and is_supported(scene) and supports.is_support_at_rest(world)
+    rests = rests and loads.are_loads_steady(world)
     clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
     return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
 
 
-@kernel
-def end_part(scene: Nonsmooth) -> int:
+@jit.kernel
+def end_part(scene: arrays.Nonsmooth) -> int:
     """End a part of a step for all; return UNDER_WAY, or the status of a step that has come to its end."""
     clock = scene.world.clock[0]
     scene.contacts.stepping[0].has_forgotten = 0
-    if has_motion(scene.world.controls[0]):
-        place_supports(scene)
-    if is_continued(scene, scene.contacts.asides):
+    if supports.has_motion(scene.world.controls[0]):
+        motion.place_supports(scene)
+    if parts.is_continued(scene, scene.contacts.asides):
         return UNDER_WAY
     clock.steps += 1
     return check(scene) if clock.steps % scene.world.controls[0].check_every == 0 else REACHED
 
 
-@kernel
-def supervise(scene: Nonsmooth, k: int, task: int) -> int:
+@jit.kernel
+def supervise(scene: arrays.Nonsmooth, k: int, task: int) -> int:
     """Let the first thread do a task for all while the others wait; return the status code that all follow."""
     team = scene.world.team
     barrier(team)
     if k == 0:
         team[STATUS] = REACHED
         if task == NEIGHBOURS:
-            if update_pairs(scene):
-                begin_step(scene, scene.contacts.asides)
+            if neighbours.update_pairs(scene):
+                parts.begin_step(scene, scene.contacts.asides)
             else:
                 team[STATUS] = PAIRS_FULL
         elif task == GATHER:
-            if is_shortened(scene, scene.contacts.asides):
+            if parts.is_shortened(scene, scene.contacts.asides):
                 team[STATUS] = UNDER_WAY
             else:
-                gather(scene.contacts, scene.begins)
+                groups.gather(scene.contacts, scene.begins)
         else:
             team[STATUS] = end_part(scene)
     barrier(team)
     return team[STATUS]
 
 
-@kernel
-def find_manifolds(scene: Nonsmooth, begin: int, end: int) -> None:
+@jit.kernel
+def find_manifolds(scene: arrays.Nonsmooth, begin: int, end: int) -> None:
     """Find the manifolds of some constraints."""
     contacts = scene.contacts
     bodies = scene.world.bodies
@@ -287,19 +271,19 @@ def find_manifolds(scene: Nonsmooth, begin: int, end: int) -> None:
     stepping = contacts.stepping[0]
     h = stepping.substep
     ahead = 0.5 * (stepping.length - h)
-    find_manifolds_of_polygons(contacts, bodies, begin, end, ahead, scene.world.corners)
+    polygon_fours.find_manifolds_of_polygons(contacts, bodies, begin, end, ahead, scene.world.corners)
     r = begin
     while r < end:
-        if r + WIDTH <= end and are_four_of_blocks(constraints, r, bodies):
-            collide_four(contacts, bodies, r, ahead)
+        if r + WIDTH <= end and manifold.are_four_of_blocks(constraints, r, bodies):
+            manifold.collide_four(contacts, bodies, r, ahead)
             r += WIDTH
-        elif is_left_to_fours(constraints[r], bodies, scene.world.corners):
+        elif polygon_fours.is_left_to_fours(constraints[r], bodies, scene.world.corners):
             r += 1
         else:
             constraint = constraints[r]
             states = contacts.states
-            place = Place(stepping.margin, ahead, 0.5 * h, constraint.b == ground, stepping)
-            collide(
+            place = manifold.Place(stepping.margin, ahead, 0.5 * h, constraint.b == ground, stepping)
+            manifold.collide(
                 constraint,
                 bodies[constraint.a],
                 bodies[constraint.b],
@@ -311,13 +295,13 @@ def find_manifolds(scene: Nonsmooth, begin: int, end: int) -> None:
             r += 1
 
 
-@kernel
-def do_step(scene: Nonsmooth, k: int) -> int:
+@jit.kernel
+def do_step(scene: arrays.Nonsmooth, k: int) -> int:
     """Take one step as thread k, in as many parts as it takes; return the status code."""
     contacts = scene.contacts
     if contacts.stepping[0].is_guarded:
-        first, last = part_of(0, contacts.stepping[0].constraint_count, k, scene.world.team[TEAM_SIZE])
-        forget_struck(contacts, first, last)
+        first, last = sweeps.part_of(0, contacts.stepping[0].constraint_count, k, scene.world.team[TEAM_SIZE])
+        rounds.forget_struck(contacts, first, last)
     status = supervise(scene, k, NEIGHBOURS)
     if status != REACHED:
         return status
@@ -327,40 +311,40 @@ def do_step(scene: Nonsmooth, k: int) -> int:
     return status
 
 
-@kernel
-def do_part(scene: Nonsmooth, k: int) -> int:
+@jit.kernel
+def do_part(scene: arrays.Nonsmooth, k: int) -> int:
     """Take one part of a step as thread k, or find that it has to be shorter; return UNDER_WAY or the status code."""
     world = scene.world
     contacts = scene.contacts
     size = world.team[TEAM_SIZE]
-    first, last = part_of(0, contacts.stepping[0].constraint_count, k, size)
+    first, last = sweeps.part_of(0, contacts.stepping[0].constraint_count, k, size)
     if contacts.stepping[0].parts > 0:
-        forget_struck(contacts, first, last)
+        rounds.forget_struck(contacts, first, last)
     find_manifolds(scene, first, last)
     if supervise(scene, k, GATHER) == UNDER_WAY:
         return UNDER_WAY
-    begin, end = part_of(0, contacts.stepping[0].group_count, k, size)
-    pack_groups(contacts, begin, end)
+    begin, end = sweeps.part_of(0, contacts.stepping[0].group_count, k, size)
+    groups.pack_groups(contacts, begin, end)
     count = contacts.stepping[0].substeps
     is_first = is_start(scene)
     for number in range(count):
         substep(scene, k, number, is_first)
-    unpack_groups(contacts, begin, end)
+    groups.unpack_groups(contacts, begin, end)
     first, last = bodies_of(contacts, k, size)
     gravity = (world.controls[0].gravity_x, world.controls[0].gravity_y)
     share = kick_share(count - 1, is_first)
-    place_all(world.bodies, contacts, first, last, share, gravity)
+    motion.place_all(world.bodies, contacts, first, last, share, gravity)
     if world.loads.size > 0:
-        show_velocities(scene, first, last, share)
+        motion.show_velocities(scene, first, last, share)
     return supervise(scene, k, CHECK)
 
 
-@kernel
-def advance_thread(scene: Nonsmooth, last_step: int, k: int) -> int:
+@jit.kernel
+def advance_thread(scene: arrays.Nonsmooth, last_step: int, k: int) -> int:
     """Be thread k of those that step a world until `last_step`, or until something ends the run."""
     if k == 0 and scene.world.clock[0].is_started == 0:
         load_states(scene)
-        renew_angles(scene.world.bodies)
+        integrate.renew_angles(scene.world.bodies)
         scene.world.clock[0].is_started = 1
     barrier(scene.world.team)
     status = REACHED
@@ -370,20 +354,20 @@ def advance_thread(scene: Nonsmooth, last_step: int, k: int) -> int:
     return status
 
 
-@kernel
-def advance_single(scene: Nonsmooth, last_step: int) -> int:
+@jit.kernel
+def advance_single(scene: arrays.Nonsmooth, last_step: int) -> int:
     """Step a world with one thread; see advance."""
     scene.world.team[TEAM_SIZE] = 1
     return advance_thread(scene, last_step, 0)
 
 
-@entry_kernel
-def advance_nonsmooth_in_team(scene: Nonsmooth, last_step: int, k: int) -> int:
+@jit.entry_kernel
+def advance_nonsmooth_in_team(scene: arrays.Nonsmooth, last_step: int, k: int) -> int:
     """Be thread k of the team[TEAM_SIZE] that advance one world together. All get the same answer."""
     return advance_thread(scene, last_step, k)
 
 
-def advance_nonsmooth(scene: Nonsmooth, last_step: int) -> int:
+def advance_nonsmooth(scene: arrays.Nonsmooth, last_step: int) -> int:
     """Step until `last_step` or until something ends the run; return one of the status codes of arrays.py.
 
     PAIRS_FULL returns before anything of the step has moved: give the lists more room and call again.
@@ -392,13 +376,13 @@ def advance_nonsmooth(scene: Nonsmooth, last_step: int) -> int:
     return int(advance_nonsmooth_in_team(scene, last_step, 0))
 
 
-@rare_kernel
-def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
+@jit.rare_kernel
+def member(scenes: arrays.Nonsmooth, m: int) -> arrays.Nonsmooth:
     """Return the scene of one member; every array of `scenes` has the members along its first axis."""
     contacts = scenes.contacts
-    return Nonsmooth(
+    return arrays.Nonsmooth(
         world_of(scenes.world, m),
-        Contacts(
+        arrays.Contacts(
             contacts.states[m],
             contacts.before[m],
             contacts.constraints[m],
@@ -420,15 +404,15 @@ def member(scenes: Nonsmooth, m: int) -> Nonsmooth:
     )
 
 
-@rare_kernel
-def advance_member(scene: Nonsmooth, last_step: int) -> int:
+@jit.rare_kernel
+def advance_member(scene: arrays.Nonsmooth, last_step: int) -> int:
     """Step one member; see advance."""
     return advance_single(scene, last_step)
 
 
-@entry_kernel
+@jit.entry_kernel
 def advance_nonsmooth_members(
-    scenes: Nonsmooth, members: Integers, last_steps: Integers, starts: Floats, codes: Integers, watched: Watched
+    scenes: arrays.Nonsmooth, members: Integers, last_steps: Integers, starts: Floats, codes: Integers, watched: Watched
 ) -> None:
     """Advance some members from their start to their last step, or to what ends them before.
 
@@ -437,7 +421,7 @@ def advance_nonsmooth_members(
     for m in members:
         scene = member(scenes, m)
         codes[m] = advance_member(scene, 0)
-        measure_nonsmooth(scene, starts[m])
+        energy.measure_nonsmooth(scene, starts[m])
         clock = scene.world.clock[0]
         while codes[m] == REACHED and clock.steps < last_steps[m]:
             frame = frame_to_watch(watched, m, clock.steps)

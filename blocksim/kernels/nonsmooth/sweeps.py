@@ -9,10 +9,7 @@ from blocksim.kernels.common.arrays import TEAM_SIZE, Integers
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import greater, spread
-from blocksim.kernels.nonsmooth.arrays import COLOURS, PART, Contacts
-from blocksim.kernels.nonsmooth.cone import LATE, find_couplings, forget_couplings
-from blocksim.kernels.nonsmooth.groups import highest, total
-from blocksim.kernels.nonsmooth.passes import first_velocity_group, position_group, taken_by, velocity_group, warm_group
+from blocksim.kernels.nonsmooth import arrays, cone, groups, passes
 
 
 @kernel
@@ -20,86 +17,86 @@ def part_of(begin: int, end: int, k: int, size: int) -> tuple[int, int]:
     """Return where the part of thread k begins and ends: whole tallies, so that no two threads write to one."""
     if size == 1:
         return begin, end
-    blocks = (end - begin + PART - 1) // PART
-    return min(end, begin + blocks * k // size * PART), min(end, begin + blocks * (k + 1) // size * PART)
+    blocks = (end - begin + arrays.PART - 1) // arrays.PART
+    return min(end, begin + blocks * k // size * arrays.PART), min(end, begin + blocks * (k + 1) // size * arrays.PART)
 
 
 @kernel
-def warm_constraints(contacts: Contacts, begin: int, end: int) -> None:
+def warm_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Warm-start the constraints of some groups."""
     for m in range(begin, end):
         group = contacts.groups[m]
         if group.count == 1:
-            warm_group(contacts, group, 0)
+            passes.warm_group(contacts, group, 0)
         else:
-            warm_group(contacts, group, None)
+            passes.warm_group(contacts, group, None)
 
 
 @kernel
-def position_constraints(contacts: Contacts, begin: int, end: int) -> None:
+def position_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Go through the position pass of some groups."""
     for m in range(begin, end):
         group = contacts.groups[m]
         if group.count == 1:
-            position_group(contacts, group, 0)
+            passes.position_group(contacts, group, 0)
         else:
-            position_group(contacts, group, None)
+            passes.position_group(contacts, group, None)
 
 
 @kernel
-def first_velocity_constraints(contacts: Contacts, begin: int, end: int) -> float:
+def first_velocity_constraints(contacts: arrays.Contacts, begin: int, end: int) -> float:
     """Begin the velocity pass of some groups; return the largest change of velocity (m/s)."""
     largest = spread(0.0)
     single = 0.0
     for m in range(begin, end):
         group = contacts.groups[m]
         if group.count == 1:
-            single = greater(first_velocity_group(contacts, group, 0), single)
+            single = greater(passes.first_velocity_group(contacts, group, 0), single)
         else:
-            largest = greater(first_velocity_group(contacts, group, None), largest)
-    return max(single, highest(largest))
+            largest = greater(passes.first_velocity_group(contacts, group, None), largest)
+    return max(single, groups.highest(largest))
 
 
 @kernel
-def velocity_constraints(contacts: Contacts, begin: int, end: int) -> float:
+def velocity_constraints(contacts: arrays.Contacts, begin: int, end: int) -> float:
     """Go once more through the velocity pass of some groups; return the largest change of velocity (m/s)."""
     largest = spread(0.0)
     single = 0.0
     for m in range(begin, end):
         group = contacts.groups[m]
         if group.count == 1:
-            single = greater(velocity_group(contacts, group, 0), single)
+            single = greater(passes.velocity_group(contacts, group, 0), single)
         else:
-            largest = greater(velocity_group(contacts, group, None), largest)
-    return max(single, highest(largest))
+            largest = greater(passes.velocity_group(contacts, group, None), largest)
+    return max(single, groups.highest(largest))
 
 
 @kernel
-def tally_constraints(contacts: Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+def tally_constraints(contacts: arrays.Contacts, begin: int, end: int, gx: float, gy: float) -> None:
     """Tally the constraints of some groups; (gx, gy), m/s, is what velocities lack of gravity."""
     is_shaken = contacts.stepping[0].is_shaken
     for m in range(begin, end):
         group = contacts.groups[m]
-        tally = contacts.tallies[m // PART]
+        tally = contacts.tallies[m // arrays.PART]
         if group.count == 1:
-            normal, shear, given = taken_by(contacts, contacts.before, group, 0, gx, gy)
+            normal, shear, given = passes.taken_by(contacts, contacts.before, group, 0, gx, gy)
             tally.impacts -= 0.5 * normal
             tally.friction -= 0.5 * shear
             if is_shaken:
                 tally.to_support += given
         else:
-            normals, shears, gifts = taken_by(contacts, contacts.before, group, None, gx, gy)
-            tally.impacts -= 0.5 * total(normals, group.count)
-            tally.friction -= 0.5 * total(shears, group.count)
+            normals, shears, gifts = passes.taken_by(contacts, contacts.before, group, None, gx, gy)
+            tally.impacts -= 0.5 * groups.total(normals, group.count)
+            tally.friction -= 0.5 * groups.total(shears, group.count)
             if is_shaken:
-                tally.to_support += total(gifts, group.count)
+                tally.to_support += groups.total(gifts, group.count)
 
 
 WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
 
 
 @kernel
-def go_through(contacts: Contacts, task: int, begin: int, end: int) -> float:
+def go_through(contacts: arrays.Contacts, task: int, begin: int, end: int) -> float:
     """Do one task for some groups; return the largest change of velocity (m/s) where it is of interest."""
     if task == WARM:
         warm_constraints(contacts, begin, end)
@@ -113,7 +110,7 @@ def go_through(contacts: Contacts, task: int, begin: int, end: int) -> float:
 
 
 @kernel
-def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
+def sweep(contacts: arrays.Contacts, task: int, team: Integers, k: int) -> float:
     """Do one task for all groups, colour after colour; return the largest change of velocity (m/s) of thread k.
 
     For one thread colours are one sequence of groups, the same.
@@ -124,15 +121,15 @@ def sweep(contacts: Contacts, task: int, team: Integers, k: int) -> float:
         begin = 0 if size == 1 else contacts.ends[colour]
         end = contacts.stepping[0].group_count if size == 1 else contacts.ends[colour + 1]
         if begin < end:
-            first, last = part_of(begin, end, k, 1 if colour == COLOURS - 1 else size)
-            if colour < COLOURS - 1 or k == 0:
+            first, last = part_of(begin, end, k, 1 if colour == arrays.COLOURS - 1 else size)
+            if colour < arrays.COLOURS - 1 or k == 0:
                 largest = max(largest, go_through(contacts, task, first, last))
             barrier(team)
     return largest
 
 
 @kernel
-def agree(contacts: Contacts, team: Integers, k: int, number: int, largest: float) -> float:
+def agree(contacts: arrays.Contacts, team: Integers, k: int, number: int, largest: float) -> float:
     """Return the largest of what all threads have found; `number` distinguishes one question from the next."""
     size = team[TEAM_SIZE]
     if size == 1:
@@ -146,29 +143,29 @@ def agree(contacts: Contacts, team: Integers, k: int, number: int, largest: floa
 
 
 @rare_kernel
-def hold_back(contacts: Contacts, team: Integers, k: int, is_late: bool) -> None:
+def hold_back(contacts: arrays.Contacts, team: Integers, k: int, is_late: bool) -> None:
     """Let friction that couples strongly go a share of the way from now on, or all of it again; see cone.py."""
     first, last = part_of(0, contacts.stepping[0].group_count, k, team[TEAM_SIZE])
     if is_late:
-        find_couplings(contacts, first, last)
+        cone.find_couplings(contacts, first, last)
     else:
-        forget_couplings(contacts, first, last)
+        cone.forget_couplings(contacts, first, last)
     barrier(team)
 
 
 @kernel
-def velocity_pass(contacts: Contacts, team: Integers, k: int, task: int, tolerance: float) -> None:
+def velocity_pass(contacts: arrays.Contacts, team: Integers, k: int, task: int, tolerance: float) -> None:
     """Sweep until no impulse changes a velocity by more than the tolerance (m/s), or as often as allowed."""
     stepping = contacts.stepping[0]
     largest = math.inf
     sweeps = 0
     while largest > tolerance and sweeps < stepping.velocity_sweeps:
-        if sweeps == LATE:
+        if sweeps == cone.LATE:
             hold_back(contacts, team, k, True)
         sweeps += 1
         largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
         task = VELOCITY
-    if sweeps > LATE:
+    if sweeps > cone.LATE:
         hold_back(contacts, team, k, False)
     if k == 0:
         stepping.sweeps += sweeps

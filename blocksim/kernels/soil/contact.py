@@ -17,11 +17,8 @@ beyond an end is its neighbour's affair. The half-plane, the last of all bodies,
 
 import math
 
-from blocksim.kernels.common.arrays import ALL, Record, World
+from blocksim.kernels.common import arrays, jit, supports, systems
 from blocksim.kernels.common.barrier import barrier
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.supports import has_motion
-from blocksim.kernels.common.systems import part_of_thread
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.soil.arrays import GROUP, Soils
 from blocksim.kernels.soil.neighbours import grid_of
@@ -30,7 +27,7 @@ from blocksim.kernels.sph.cells import clipped_cell
 UPPER_RIGHT, UPPER_LEFT = 4, 8  # bits of corners that can be touched
 
 
-@kernel
+@jit.kernel
 def from_rectangle(u: float, v: float, half_x: float, half_y: float) -> tuple[float, float, float]:
     """Return the distance (m, negative inside) from a rectangle and its outward normal, all in the body's frame."""
     along, across = abs(u) - half_x, abs(v) - half_y
@@ -42,8 +39,8 @@ def from_rectangle(u: float, v: float, half_x: float, half_y: float) -> tuple[fl
     return across, 0.0, math.copysign(1.0, v)
 
 
-@kernel
-def from_piece(body: Record, u: float, v: float, radius: float) -> tuple[float, float, float]:
+@jit.kernel
+def from_piece(body: arrays.Record, u: float, v: float, radius: float) -> tuple[float, float, float]:
     """Return the same of the upper face of a piece of ground or wall; infinite where it is not concerned.
 
     A centre that is more than half a radius below the face has come around its end, or through it.
@@ -60,22 +57,22 @@ def from_piece(body: Record, u: float, v: float, radius: float) -> tuple[float, 
     return distance, math.copysign(along / distance, u), across / distance
 
 
-@kernel
-def from_body(body: Record, is_ground: bool, x: float, y: float, radius: float) -> tuple[float, float, float]:
+@jit.kernel
+def from_body(body: arrays.Record, is_ground: bool, x: float, y: float, radius: float) -> tuple[float, float, float]:
     """Return the distance (m) of a place from a body and the outward normal there; a disc of that radius is meant."""
     if is_ground:
         return y - body.y, 0.0, 1.0
     dx, dy = x - body.x, y - body.y
     u, v = body.cos * dx + body.sin * dy, body.cos * dy - body.sin * dx
-    if body.faces == ALL:
+    if body.faces == arrays.ALL:
         distance, nu, nv = from_rectangle(u, v, body.half_x, body.half_y)
     else:
         distance, nu, nv = from_piece(body, u, v, radius)
     return distance, body.cos * nu - body.sin * nv, body.sin * nu + body.cos * nv
 
 
-@kernel
-def is_near(body: Record, is_ground: bool, x: float, y: float, reach: float) -> bool:
+@jit.kernel
+def is_near(body: arrays.Record, is_ground: bool, x: float, y: float, reach: float) -> bool:
     """Return True if a place (m) is within reach (m) of a body, or inside."""
     if is_ground:
         return y - body.y < reach
@@ -85,14 +82,14 @@ def is_near(body: Record, is_ground: bool, x: float, y: float, reach: float) -> 
     return along * along + across * across < reach * reach
 
 
-@kernel
-def dashpot_of(ratio: float, stiffness: float, mass: float, body: Record) -> float:
+@jit.kernel
+def dashpot_of(ratio: float, stiffness: float, mass: float, body: arrays.Record) -> float:
     """Return the coefficient (N s/m) of a dashpot of this ratio between a particle of that mass (kg) and a body."""
     return 2.0 * ratio * math.sqrt(stiffness * mass / (1.0 + mass * body.inverse_mass))
 
 
-@kernel
-def rates(point: Record, body: Record, is_ground: bool, nx: float, ny: float) -> tuple[float, float]:
+@jit.kernel
+def rates(point: arrays.Record, body: arrays.Record, is_ground: bool, nx: float, ny: float) -> tuple[float, float]:
     """Return how fast (m/s) a particle comes nearer to a body along the normal, and slips along the tangent."""
     ux, uy = point.vx - body.vx, point.vy - body.vy
     if not is_ground:
@@ -101,8 +98,8 @@ def rates(point: Record, body: Record, is_ground: bool, nx: float, ny: float) ->
     return -(ux * nx + uy * ny), uy * nx - ux * ny
 
 
-@rare_kernel
-def press(soils: Soils, touch: Record, body: Record, is_ground: bool, step: float) -> None:
+@jit.rare_kernel
+def press(soils: Soils, touch: arrays.Record, body: arrays.Record, is_ground: bool, step: float) -> None:
     """Evaluate one touch: forces on its particle, losses of the last drift."""
     point, state = soils.points[touch.particle], soils.states[touch.particle]
     radius = soils.controls[0].radius
@@ -131,11 +128,11 @@ def press(soils: Soils, touch: Record, body: Record, is_ground: bool, step: floa
     state.fy += touch.fy
 
 
-@rare_kernel
+@jit.rare_kernel
 def book_touch(
     soils: Soils,
-    touch: Record,
-    values: Record,
+    touch: arrays.Record,
+    values: arrays.Record,
     closing: float,
     slip: float,
     normal: float,
@@ -156,16 +153,16 @@ def book_touch(
     touch.spring = spring
 
 
-@rare_kernel
-def end_touch(soils: Soils, touch: Record, values: Record, closing: float, slip: float) -> None:
+@jit.rare_kernel
+def end_touch(soils: Soils, touch: arrays.Record, values: arrays.Record, closing: float, slip: float) -> None:
     """End a contact; what its springs hold and did not give back is lost."""
     book_touch(soils, touch, values, closing, slip, 0.0, 0.0, 0.0, 0.0)
     touch.fx = 0.0
     touch.fy = 0.0
 
 
-@rare_kernel
-def press_all(soils: Soils, world: World, k: int, step: float, of_blocks: bool) -> None:
+@jit.rare_kernel
+def press_all(soils: Soils, world: arrays.World, k: int, step: float, of_blocks: bool) -> None:
     """Evaluate the touches of the particles of thread k with blocks, or with supports."""
     first, last = particles_of_thread(soils, world, k)
     if first >= last:
@@ -179,15 +176,15 @@ def press_all(soils: Soils, world: World, k: int, step: float, of_blocks: bool) 
             press(soils, touch, world.bodies[touch.body], touch.body == ground, step)
 
 
-@kernel
-def particles_of_thread(soils: Soils, world: World, k: int) -> tuple[int, int]:
+@jit.kernel
+def particles_of_thread(soils: Soils, world: arrays.World, k: int) -> tuple[int, int]:
     """Return where the particles of thread k begin and end: whole groups."""
-    first, last = part_of_thread(soils.tallies.size, world, k)
+    first, last = systems.part_of_thread(soils.tallies.size, world, k)
     return min(GROUP * first, soils.points.size), min(GROUP * last, soils.points.size)
 
 
-@rare_kernel
-def load_bodies(soils: Soils, world: World, first: int, last: int) -> None:
+@jit.rare_kernel
+def load_bodies(soils: Soils, world: arrays.World, first: int, last: int) -> None:
     """Add to bodies what their particles do, in the order of the list."""
     for b in range(first, last):
         body = world.bodies[b]
@@ -207,20 +204,20 @@ def load_bodies(soils: Soils, world: World, first: int, last: int) -> None:
             body.pairs_now += touches
 
 
-@rare_kernel
-def touch_blocks(soils: Soils, _: World, world: World, k: int, step: float) -> None:
+@jit.rare_kernel
+def touch_blocks(soils: Soils, _: arrays.World, world: arrays.World, k: int, step: float) -> None:
     """Let soils and blocks act on one another."""
     press_all(soils, world, k, step, True)
     barrier(world.team)
-    first, last = part_of_thread(soils.controls[0].blocks, world, k)
+    first, last = systems.part_of_thread(soils.controls[0].blocks, world, k)
     load_bodies(soils, world, first, last)
 
 
-@rare_kernel
-def touch_supports(soils: Soils, _: World, world: World, k: int, step: float) -> None:
+@jit.rare_kernel
+def touch_supports(soils: Soils, _: arrays.World, world: arrays.World, k: int, step: float) -> None:
     """Let soils and supports act on one another; what supports get matters where they move."""
     press_all(soils, world, k, step, False)
-    if has_motion(world.controls[0]):
+    if supports.has_motion(world.controls[0]):
         barrier(world.team)
         if k == 0:
             load_bodies(soils, world, soils.controls[0].blocks, world.bodies.size)
@@ -229,8 +226,8 @@ def touch_supports(soils: Soils, _: World, world: World, k: int, step: float) ->
 AT_TOUCH = 1e-3  # of the radius; what is nearer to touching a body than this at the start is in contact
 
 
-@rare_kernel
-def extent_of(body: Record, is_ground: bool, reach: float) -> tuple[float, float, float, float]:
+@jit.rare_kernel
+def extent_of(body: arrays.Record, is_ground: bool, reach: float) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top (m) of what is within reach of a body."""
     if is_ground:
         return -math.inf, math.inf, -math.inf, body.y + reach
@@ -239,8 +236,8 @@ def extent_of(body: Record, is_ground: bool, reach: float) -> tuple[float, float
     return body.x - wide, body.x + wide, body.y - high, body.y + high
 
 
-@rare_kernel
-def find_near(soils: Soils, world: World, b: int, count: int) -> int:
+@jit.rare_kernel
+def find_near(soils: Soils, world: arrays.World, b: int, count: int) -> int:
     """Append the particles near body b to `by_body`, as far as there is room; return the count needed.
 
     Those beyond the grid are in its outermost cells, where bodies beyond it look for them.
@@ -268,8 +265,8 @@ def find_near(soils: Soils, world: World, b: int, count: int) -> int:
     return count
 
 
-@rare_kernel
-def find_all(soils: Soils, world: World) -> int:
+@jit.rare_kernel
+def find_all(soils: Soils, world: arrays.World) -> int:
     """Find the particles near all bodies, body after body; return how many touches there are."""
     count = 0
     for b in range(world.bodies.size):
@@ -282,7 +279,7 @@ def find_all(soils: Soils, world: World) -> int:
     return count
 
 
-@rare_kernel
+@jit.rare_kernel
 def count_touches(soils: Soils, count: int) -> None:
     """Say where the touches of each particle are to begin; `lengths` and `order` are work space.
 
@@ -298,8 +295,8 @@ def count_touches(soils: Soils, count: int) -> None:
         total += soils.lengths[i]
 
 
-@kernel
-def keep(new: Record, old: Record) -> None:
+@jit.kernel
+def keep(new: arrays.Record, old: arrays.Record) -> None:
     """Give a touch or history what another one has of a contact with the same body."""
     new.body = old.body
     new.spring = old.spring
@@ -308,8 +305,8 @@ def keep(new: Record, old: Record) -> None:
     new.shear_force = old.shear_force
 
 
-@rare_kernel
-def carry_over(soils: Soils, state: Record, touch: Record) -> None:
+@jit.rare_kernel
+def carry_over(soils: Soils, state: arrays.Record, touch: arrays.Record) -> None:
     """Give a touch the history that its particle had with this body, if any."""
     touch.spring = touch.depth = touch.normal_force = touch.shear_force = touch.fx = touch.fy = 0.0
     for e in range(state.first, state.first + state.count):
@@ -317,8 +314,8 @@ def carry_over(soils: Soils, state: Record, touch: Record) -> None:
             keep(touch, soils.kept[e])
 
 
-@rare_kernel
-def make_touches(soils: Soils, world: World) -> None:
+@jit.rare_kernel
+def make_touches(soils: Soils, world: arrays.World) -> None:
     """List all touches anew, particles being in their new order; those of a particle are in the order of bodies."""
     controls = soils.controls[0]
     for e in range(controls.touch_count):
@@ -342,8 +339,8 @@ def make_touches(soils: Soils, world: World) -> None:
     controls.touch_count = count
 
 
-@rare_kernel
-def preload(soils: Soils, world: World) -> None:
+@jit.rare_kernel
+def preload(soils: Soils, world: arrays.World) -> None:
     """Press particles that touch a body at the start against it, as their stress wants it.
 
     Otherwise every contact would begin without a force: the shock of the soil that drops on its supports, a few

@@ -2,14 +2,13 @@
 
 import math
 
-from blocksim.kernels.common.arrays import Floats, World
-from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.stress import invariants, strain_energy
 
 
-@rare_kernel
-def survey(soils: Soils, world: World) -> tuple[float, float, float]:
+@jit.rare_kernel
+def survey(soils: Soils, world: arrays.World) -> tuple[float, float, float]:
     """Return highest speed (m/s), kinetic energy (J) and power of the weights (W), each counted positive.
 
     The speed is infinite where a number is not finite, or a list had no room.
@@ -28,8 +27,8 @@ def survey(soils: Soils, world: World) -> tuple[float, float, float]:
     return math.sqrt(fastest), kinetic, power
 
 
-@rare_kernel
-def measure_touches(soils: Soils, world: World) -> float:
+@jit.rare_kernel
+def measure_touches(soils: Soils, world: arrays.World) -> float:
     """Return the energy (J) in the springs between particles and bodies."""
     total = 0.0
     for e in range(soils.controls[0].touch_count):
@@ -41,8 +40,8 @@ def measure_touches(soils: Soils, world: World) -> float:
     return total
 
 
-@rare_kernel
-def measure(soils: Soils, world: World, row: Floats) -> None:
+@jit.rare_kernel
+def measure(soils: Soils, world: arrays.World, row: arrays.Floats) -> None:
     """Write the energies (J) as in ENERGIES, then the mass (kg)."""
     row[:] = 0.0
     controls = world.controls[0]

@@ -11,8 +11,7 @@ but the order of sums, and follows from the state alone, so that it is the same 
 
 import math
 
-from blocksim.kernels.common.arrays import Integers, Records, World
-from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.common.simd import Lanes, fields_0, is_all, spread
 from blocksim.kernels.soil.arrays import CLUSTER, GROUP, Soils
 from blocksim.kernels.sph.cells import CellGrid, cell_number, clipped_cell
@@ -22,8 +21,8 @@ FAR = 4.0  # mean distances from the middle, beyond which particles count to the
 PASSES = 16  # at most, to find these
 
 
-@rare_kernel
-def fastest_body(world: World) -> float:
+@jit.rare_kernel
+def fastest_body(world: arrays.World) -> float:
     """Return an upper bound (m/s) of the speed of any point of any body, those of the supports included."""
     fastest = 0.0
     for i in range(world.bodies.size):
@@ -35,8 +34,8 @@ def fastest_body(world: World) -> float:
     return fastest
 
 
-@rare_kernel
-def travelled(soils: Soils, world: World, step: float) -> float:
+@jit.rare_kernel
+def travelled(soils: Soils, world: arrays.World, step: float) -> float:
     """Return how far (m) anything may have moved since the lists were made, the current drift included."""
     fastest = fastest_body(world)
     for tally in soils.tallies:
@@ -44,28 +43,28 @@ def travelled(soils: Soils, world: World, step: float) -> float:
     return soils.controls[0].travel + step * fastest
 
 
-@kernel
+@jit.kernel
 def are_lists_due(soils: Soils, travel: float) -> bool:
     """Return True if lists no longer hold all neighbours; of two that approach each may have moved by the travel."""
     controls = soils.controls[0]
     return controls.is_listed == 0 or not 2.0 * travel <= controls.skin
 
 
-@kernel
+@jit.kernel
 def grid_of(soils: Soils) -> CellGrid:
     """Return the cells."""
     controls = soils.controls[0]
     return CellGrid(controls.left, controls.bottom, controls.cell, controls.columns, controls.rows)
 
 
-@kernel
+@jit.kernel
 def cell_of(grid: CellGrid, x: float, y: float) -> int:
     """Return the cell of a place (m); one that is no number is in the first cell."""
     return cell_number(grid, x, y) if math.isfinite(x + y) else 0
 
 
-@rare_kernel
-def bulk_along(points: Records, is_x: bool, least: float, most: float) -> tuple[float, float]:
+@jit.rare_kernel
+def bulk_along(points: arrays.Records, is_x: bool, least: float, most: float) -> tuple[float, float]:
     """Return from where to where (m) the particles from `least` to `most` lie, but for those far from the others."""
     low, high, total, away, count = math.inf, -math.inf, 0.0, 0.0, 0
     for i in range(points.size):
@@ -85,8 +84,8 @@ def bulk_along(points: Records, is_x: bool, least: float, most: float) -> tuple[
     return max(low, middle - away), max(low, min(high, middle + away))
 
 
-@rare_kernel
-def extent_along(points: Records, is_x: bool) -> tuple[float, float]:
+@jit.rare_kernel
+def extent_along(points: arrays.Records, is_x: bool) -> tuple[float, float]:
     """Return from where to where (m) cells are of use along an axis.
 
     Over the whole way to a few particles that have flown off, they would be so large that nothing is sorted.
@@ -100,8 +99,8 @@ def extent_along(points: Records, is_x: bool) -> tuple[float, float]:
     return low, high
 
 
-@rare_kernel
-def ends_along(points: Records, is_x: bool) -> tuple[float, float]:
+@jit.rare_kernel
+def ends_along(points: arrays.Records, is_x: bool) -> tuple[float, float]:
     """Return from where to where (m) all particles lie along an axis, those that have flown off included."""
     low, high = math.inf, -math.inf
     for i in range(points.size):
@@ -111,7 +110,7 @@ def ends_along(points: Records, is_x: bool) -> tuple[float, float]:
     return low, high
 
 
-@rare_kernel
+@jit.rare_kernel
 def lay_cells(soils: Soils) -> None:
     """Lay cells over the particles: as large as clusters ought to be, or larger where there would be too many.
 
@@ -132,7 +131,7 @@ def lay_cells(soils: Soils) -> None:
     controls.least_y, controls.most_y = ends_along(soils.points, False)
 
 
-@rare_kernel
+@jit.rare_kernel
 def sort_particles(soils: Soils) -> None:
     """Find the order of the particles by their cells; within a cell it stays as it is.
 
@@ -153,7 +152,7 @@ def sort_particles(soils: Soils) -> None:
         starts[c + 1] += 1
 
 
-@rare_kernel
+@jit.rare_kernel
 def move_particles(soils: Soils) -> None:
     """Bring all particles into the order found, cycle by cycle in place."""
     points, states, order = soils.points, soils.states, soils.order
@@ -173,13 +172,13 @@ def move_particles(soils: Soils) -> None:
             order[i] = i
 
 
-@kernel
+@jit.kernel
 def clusters_of_group(soils: Soils, g: int) -> range:
     """Return the clusters of a group."""
     return range(GROUP // CLUSTER * g, (min(GROUP * (g + 1), soils.points.size) + CLUSTER - 1) // CLUSTER)
 
 
-@kernel
+@jit.kernel
 def places_of(soils: Soils, c: int) -> tuple[int, int, int, int]:
     """Return which particles are in the lanes of a cluster; the last particle of all fills up the last cluster."""
     last = soils.points.size - 1
@@ -187,7 +186,7 @@ def places_of(soils: Soils, c: int) -> tuple[int, int, int, int]:
     return i, min(i + 1, last), min(i + 2, last), min(i + 3, last)
 
 
-@kernel
+@jit.kernel
 def is_near_any(x: Lanes, y: Lanes, other_x: float, other_y: float, radius: float) -> bool:
     """Return True if a place (m) is nearer than the radius to any of four; one that is no number is near to none."""
     dx, dy = other_x - x, other_y - y
@@ -195,8 +194,8 @@ def is_near_any(x: Lanes, y: Lanes, other_x: float, other_y: float, radius: floa
     return not is_all((dx * dx + dy * dy < radius * radius) ^ everywhere)
 
 
-@rare_kernel
-def list_of(soils: Soils, grid: CellGrid, c: int, near: Integers, begin: int) -> int:
+@jit.rare_kernel
+def list_of(soils: Soils, grid: CellGrid, c: int, near: arrays.Integers, begin: int) -> int:
     """Write the list of cluster c from `begin` on, as far as there is room; return where it ends."""
     controls, points = soils.controls[0], soils.points
     radius = controls.reach + controls.skin
@@ -225,7 +224,7 @@ def list_of(soils: Soils, grid: CellGrid, c: int, near: Integers, begin: int) ->
     return end
 
 
-@rare_kernel
+@jit.rare_kernel
 def list_neighbours(soils: Soils, first: int, last: int) -> None:
     """Write the lists of the groups from `first` to before `last`.
 

@@ -34,9 +34,9 @@ that approach one another. Both are odd in the particles bit by bit: momentum ch
 
 import math
 
+from blocksim.kernels.common import jit, systems
 from blocksim.kernels.common.arrays import Integers, Record, Records, World
 from blocksim.kernels.common.barrier import barrier
-from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import (
     Lanes,
     fields_0,
@@ -49,20 +49,7 @@ from blocksim.kernels.common.simd import (
     spread,
     write_fields_4,
 )
-from blocksim.kernels.common.systems import part_of_thread
-from blocksim.kernels.soil.arrays import CLUSTER, GROUP, Soils
-from blocksim.kernels.soil.contact import make_touches, particles_of_thread, preload
-from blocksim.kernels.soil.neighbours import (
-    are_lists_due,
-    clusters_of_group,
-    lay_cells,
-    list_neighbours,
-    move_particles,
-    places_of,
-    sort_particles,
-    travelled,
-)
-from blocksim.kernels.soil.stress import balance_rows, strain
+from blocksim.kernels.soil import arrays, contact, neighbours, stress
 from blocksim.kernels.sph.functions import wendland_fading, wendland_steepness
 
 # Smallest eigenvalue of M with which a particle is corrected: 1 inside, 0.5 on a flat surface, above 0.1 in a corner.
@@ -70,7 +57,7 @@ from blocksim.kernels.sph.functions import wendland_fading, wendland_steepness
 LEAST_SPREAD = 0.05
 
 
-@kernel
+@jit.kernel
 def raw_gradient(
     controls: Record, points: Records, near: Integers, x: Lanes, y: Lanes, vx: Lanes, vy: Lanes, lag: float
 ) -> tuple[Lanes, Lanes, Lanes, Lanes]:
@@ -91,7 +78,7 @@ def raw_gradient(
     return scale * ux, scale * uy, scale * wx, scale * wy
 
 
-@kernel
+@jit.kernel
 def correction(
     controls: Record, points: Records, near: Integers, x: Lanes, y: Lanes, vx: Lanes, vy: Lanes, lag: float
 ) -> tuple[Lanes, Lanes, Lanes]:
@@ -118,15 +105,17 @@ def correction(
 SOFTENING = 0.01  # h^2; keeps the viscosity finite where two particles meet
 
 
-@kernel
-def impedance_of(soils: Soils, i: int) -> float:
+@jit.kernel
+def impedance_of(soils: arrays.Soils, i: int) -> float:
     """Return density times wave speed (kg/(m2 s)) of a particle."""
     impedance: float = soils.kinds[soils.states[i].kind].impedance
     return impedance
 
 
-@kernel
-def forces_on(soils: Soils, near: Integers, places: tuple[int, int, int, int]) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+@jit.kernel
+def forces_on(
+    soils: arrays.Soils, near: Integers, places: tuple[int, int, int, int]
+) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     """Return force of the stresses (x and y) and of the viscosity (x and y) on four particles, in N/m3.
 
     That is, by volume; `near` are the neighbours of the four.
@@ -159,14 +148,14 @@ def forces_on(soils: Soils, near: Integers, places: tuple[int, int, int, int]) -
     return both * fx, both * fy, stiff * drag_x, stiff * drag_y
 
 
-@kernel
-def share_of_gravity(soils: Soils, time: float) -> float:
+@jit.kernel
+def share_of_gravity(soils: arrays.Soils, time: float) -> float:
     """Return which share of gravity acts on soil at a time (s)."""
     ramp = soils.controls[0].ramp
     return 1.0 if time >= ramp else time / ramp
 
 
-@kernel
+@jit.kernel
 def kick(point: Record, state: Record, kind: Record, gx: float, gy: float, half: float, damped: float) -> float:
     """Advance the velocity of a particle by half a step (s); return the energy (J) lost to damping, a factor."""
     vx = point.vx + half * (gx + state.fx / kind.mass)
@@ -175,14 +164,14 @@ def kick(point: Record, state: Record, kind: Record, gx: float, gy: float, half:
     return 0.5 * kind.mass * (1.0 - damped * damped) * (vx * vx + vy * vy)
 
 
-@kernel
+@jit.kernel
 def damping_of(kind: Record, half: float, time: float) -> float:
     """Return by which factor damping slows particles down in half a step (s) at a time (s)."""
     return 1.0 / (1.0 + half * kind.settling) if time < kind.settled else 1.0
 
 
-@rare_kernel
-def start_group(soils: Soils, world: World, g: int, time: float, step: float) -> None:
+@jit.rare_kernel
+def start_group(soils: arrays.Soils, world: World, g: int, time: float, step: float) -> None:
     """Half a kick and the drift of the particles of a group; `time` (s) is that before the step."""
     controls = world.controls[0]
     tally = soils.tallies[g]
@@ -190,7 +179,7 @@ def start_group(soils: Soils, world: World, g: int, time: float, step: float) ->
     share = share_of_gravity(soils, time)
     missing = 1.0 - 0.5 * (share + share_of_gravity(soils, time + step))
     fastest = 0.0
-    for i in range(GROUP * g, min(GROUP * (g + 1), soils.points.size)):
+    for i in range(arrays.GROUP * g, min(arrays.GROUP * (g + 1), soils.points.size)):
         point, state = soils.points[i], soils.states[i]
         kind = soils.kinds[state.kind]
         damped = damping_of(kind, half, time)
@@ -208,16 +197,16 @@ def start_group(soils: Soils, world: World, g: int, time: float, step: float) ->
     tally.fastest = math.sqrt(fastest)
 
 
-@rare_kernel
-def start(soils: Soils, world: World, k: int, step: float) -> None:
+@jit.rare_kernel
+def start(soils: arrays.Soils, world: World, k: int, step: float) -> None:
     """Half a kick, the drift, and new lists where they are due."""
-    first, last = particles_of_thread(soils, world, k)
+    first, last = contact.particles_of_thread(soils, world, k)
     time = world.shares[k].steps * world.controls[0].step - step
-    for g in range(first // GROUP, (last + GROUP - 1) // GROUP):
+    for g in range(first // arrays.GROUP, (last + arrays.GROUP - 1) // arrays.GROUP):
         start_group(soils, world, g, time, step)
     barrier(world.team)
-    travel = travelled(soils, world, step)
-    is_due = are_lists_due(soils, travel)
+    travel = neighbours.travelled(soils, world, step)
+    is_due = neighbours.are_lists_due(soils, travel)
     barrier(world.team)
     if k == 0:
         soils.controls[0].travel = 0.0 if is_due else travel
@@ -225,37 +214,37 @@ def start(soils: Soils, world: World, k: int, step: float) -> None:
         renew_lists(soils, world, k)
 
 
-@rare_kernel
-def renew_lists(soils: Soils, world: World, k: int) -> None:
+@jit.rare_kernel
+def renew_lists(soils: arrays.Soils, world: World, k: int) -> None:
     """Sort the particles, and make all lists anew."""
     if k == 0:
-        lay_cells(soils)
-        sort_particles(soils)
-        move_particles(soils)
-        make_touches(soils, world)
+        neighbours.lay_cells(soils)
+        neighbours.sort_particles(soils)
+        neighbours.move_particles(soils)
+        contact.make_touches(soils, world)
         if soils.controls[0].is_listed == 0:
-            preload(soils, world)
-            balance_rows(soils, world)
+            contact.preload(soils, world)
+            stress.balance_rows(soils, world)
         soils.controls[0].is_listed = 1
     barrier(world.team)
-    first, last = part_of_thread(soils.tallies.size, world, k)
-    list_neighbours(soils, first, last)
+    first, last = systems.part_of_thread(soils.tallies.size, world, k)
+    neighbours.list_neighbours(soils, first, last)
 
 
-@rare_kernel
+@jit.rare_kernel
 def stress_particle(point: Record, state: Record, kind: Record, step: float) -> float:
     """Advance the stress of a particle by its gradient, which lies where its stress is to; return the energy (J) lost.
 
     That is what flow takes.
     """
-    lost = strain(state, kind, point.pxx, point.pxy, point.pyx, point.pyy, step)
+    lost = stress.strain(state, kind, point.pxx, point.pxy, point.pyx, point.pyy, step)
     point.pxx = state.sxx
     point.pxy = point.pyx = state.sxy
     point.pyy = state.syy
     return lost
 
 
-@rare_kernel
+@jit.rare_kernel
 def stress_corrected(
     point: Record,
     state: Record,
@@ -268,7 +257,7 @@ def stress_corrected(
     bxx, bxy, byy = halfway
     ux, uy = point.pxx * bxx + point.pxy * bxy, point.pxx * bxy + point.pxy * byy
     wx, wy = point.pyx * bxx + point.pyy * bxy, point.pyx * bxy + point.pyy * byy
-    lost = strain(state, kind, ux, uy, wx, wy, step)
+    lost = stress.strain(state, kind, ux, uy, wx, wy, step)
     bxx, bxy, byy = now
     point.pxx = state.sxx * bxx + state.sxy * bxy
     point.pxy = state.sxx * bxy + state.sxy * byy
@@ -277,27 +266,27 @@ def stress_corrected(
     return lost
 
 
-@kernel
-def is_any_corrected(soils: Soils, c: int) -> bool:
+@jit.kernel
+def is_any_corrected(soils: arrays.Soils, c: int) -> bool:
     """Return True if the gradient of any particle of a cluster is corrected."""
     is_corrected = False
-    for i in range(CLUSTER * c, min(CLUSTER * (c + 1), soils.points.size)):
+    for i in range(arrays.CLUSTER * c, min(arrays.CLUSTER * (c + 1), soils.points.size)):
         is_corrected = is_corrected or soils.kinds[soils.states[i].kind].is_corrected != 0
     return is_corrected
 
 
-@rare_kernel
-def correct_cluster(soils: Soils, c: int, near: Integers, step: float) -> float:
+@jit.rare_kernel
+def correct_cluster(soils: arrays.Soils, c: int, near: Integers, step: float) -> float:
     """Advance the stresses of a cluster of which some are corrected by their gradients; return the energy (J) lost."""
     controls, points, lag = soils.controls[0], soils.points, 0.5 * step
-    x, y, vx, vy = fields_0(None, points, places_of(soils, c))
+    x, y, vx, vy = fields_0(None, points, neighbours.places_of(soils, c))
     halfway = correction(controls, points, near, x, y, vx, vy, lag)
     now = correction(controls, points, near, x, y, vx, vy, 0.0)
     hxx, hxy, hyy = split(halfway[0]), split(halfway[1]), split(halfway[2])
     bxx, bxy, byy = split(now[0]), split(now[1]), split(now[2])
     lost = 0.0
-    for m in range(min(CLUSTER, points.size - CLUSTER * c)):
-        point, state = points[CLUSTER * c + m], soils.states[CLUSTER * c + m]
+    for m in range(min(arrays.CLUSTER, points.size - arrays.CLUSTER * c)):
+        point, state = points[arrays.CLUSTER * c + m], soils.states[arrays.CLUSTER * c + m]
         kind = soils.kinds[state.kind]
         if kind.is_corrected:
             tensors = (hxx[m], hxy[m], hyy[m]), (bxx[m], bxy[m], byy[m])
@@ -307,43 +296,43 @@ def correct_cluster(soils: Soils, c: int, near: Integers, step: float) -> float:
     return lost
 
 
-@kernel
-def stress_cluster(soils: Soils, c: int, near: Integers, step: float) -> float:
+@jit.kernel
+def stress_cluster(soils: arrays.Soils, c: int, near: Integers, step: float) -> float:
     """Advance the stresses of the particles of a cluster; return the energy (J) lost to flow.
 
     Until then their gradients lie where what neighbours feel of their stress is to: nobody reads that in this stage.
     """
-    points, places = soils.points, places_of(soils, c)
+    points, places = soils.points, neighbours.places_of(soils, c)
     x, y, vx, vy = fields_0(None, points, places)
     gradients = raw_gradient(soils.controls[0], points, near, x, y, vx, vy, 0.5 * step)
     write_fields_4(None, points, places, spread(0.0) <= 0.0, gradients)
     if is_any_corrected(soils, c):
         return correct_cluster(soils, c, near, step)
     lost = 0.0
-    for i in range(CLUSTER * c, min(CLUSTER * (c + 1), points.size)):
+    for i in range(arrays.CLUSTER * c, min(arrays.CLUSTER * (c + 1), points.size)):
         state = soils.states[i]
         lost += stress_particle(points[i], state, soils.kinds[state.kind], step)
     return lost
 
 
-@rare_kernel
-def stress_group(soils: Soils, g: int, step: float) -> None:
+@jit.rare_kernel
+def stress_group(soils: arrays.Soils, g: int, step: float) -> None:
     """Advance the stresses of the particles of a group; nothing that others read of them changes before."""
     begin = 0
-    for c in clusters_of_group(soils, g):
+    for c in neighbours.clusters_of_group(soils, g):
         end = begin + soils.lengths[c]
         soils.tallies[g].plastic += stress_cluster(soils, c, soils.lists[g, begin:end], step)
         begin = end
 
 
-@kernel
-def force_cluster(soils: Soils, c: int, near: Integers) -> float:
+@jit.kernel
+def force_cluster(soils: arrays.Soils, c: int, near: Integers) -> float:
     """Add the forces between particles to those of a cluster; return the power (W) of the viscosity."""
-    lanes = forces_on(soils, near, places_of(soils, c))
+    lanes = forces_on(soils, near, neighbours.places_of(soils, c))
     fx, fy, drag_x, drag_y = split(lanes[0]), split(lanes[1]), split(lanes[2]), split(lanes[3])
     power = 0.0
-    for m in range(min(CLUSTER, soils.points.size - CLUSTER * c)):
-        point, state = soils.points[CLUSTER * c + m], soils.states[CLUSTER * c + m]
+    for m in range(min(arrays.CLUSTER, soils.points.size - arrays.CLUSTER * c)):
+        point, state = soils.points[arrays.CLUSTER * c + m], soils.states[arrays.CLUSTER * c + m]
         volume = soils.kinds[state.kind].volume
         state.drag_x = volume * drag_x[m]
         state.drag_y = volume * drag_y[m]
@@ -353,21 +342,21 @@ def force_cluster(soils: Soils, c: int, near: Integers) -> float:
     return power
 
 
-@rare_kernel
-def force_group(soils: Soils, g: int, step: float) -> None:
+@jit.rare_kernel
+def force_group(soils: arrays.Soils, g: int, step: float) -> None:
     """Add the forces between particles to those of a group."""
     begin = 0
-    for c in clusters_of_group(soils, g):
+    for c in neighbours.clusters_of_group(soils, g):
         end = begin + soils.lengths[c]
         soils.tallies[g].viscosity -= 0.5 * step * force_cluster(soils, c, soils.lists[g, begin:end])
         begin = end
 
 
-@rare_kernel
-def flow(soils: Soils, _: Soils, world: World, k: int, step: float) -> None:
+@jit.rare_kernel
+def flow(soils: arrays.Soils, _: arrays.Soils, world: World, k: int, step: float) -> None:
     """Let the particles of all soils act on one another."""
-    first, last = particles_of_thread(soils, world, k)
-    groups = range(first // GROUP, (last + GROUP - 1) // GROUP)
+    first, last = contact.particles_of_thread(soils, world, k)
+    groups = range(first // arrays.GROUP, (last + arrays.GROUP - 1) // arrays.GROUP)
     for g in groups:
         stress_group(soils, g, step)
     barrier(world.team)
@@ -375,10 +364,10 @@ def flow(soils: Soils, _: Soils, world: World, k: int, step: float) -> None:
         force_group(soils, g, step)
 
 
-@rare_kernel
-def finish(soils: Soils, world: World, k: int, step: float) -> None:
+@jit.rare_kernel
+def finish(soils: arrays.Soils, world: World, k: int, step: float) -> None:
     """Advance velocities by the other half of the kick."""
-    first, last = particles_of_thread(soils, world, k)
+    first, last = contact.particles_of_thread(soils, world, k)
     controls = world.controls[0]
     time = world.shares[k].steps * controls.step
     share = share_of_gravity(soils, time)
@@ -388,4 +377,4 @@ def finish(soils: Soils, world: World, k: int, step: float) -> None:
         kind = soils.kinds[state.kind]
         damped = damping_of(kind, half, time)
         lost = kick(point, state, kind, share * controls.gravity_x, share * controls.gravity_y, half, damped)
-        soils.tallies[i // GROUP].settling += lost
+        soils.tallies[i // arrays.GROUP].settling += lost

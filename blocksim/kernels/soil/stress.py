@@ -42,8 +42,7 @@ That is for rows that stand against an upright or level face as the lattice of a
 
 import math
 
-from blocksim.kernels.common.arrays import Record, World
-from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.contact import from_body, is_near
 
@@ -51,7 +50,7 @@ from blocksim.kernels.soil.contact import from_body, is_near
 RESILIENCE = math.exp(-math.pi)
 
 
-@kernel
+@jit.kernel
 def invariants(sxx: float, syy: float, szz: float, sxy: float) -> tuple[float, float]:
     """Return I1 (Pa) and the root of J2 (Pa)."""
     total = sxx + syy + szz
@@ -60,13 +59,13 @@ def invariants(sxx: float, syy: float, szz: float, sxy: float) -> tuple[float, f
     return total, math.sqrt(0.5 * (dx * dx + dy * dy + dz * dz) + sxy * sxy)
 
 
-@kernel
-def strain_energy(kind: Record, total: float, deviator: float) -> float:
+@jit.kernel
+def strain_energy(kind: arrays.Record, total: float, deviator: float) -> float:
     """Return the elastic energy (J) of a particle with these invariants (Pa)."""
     return kind.volume * (total * total / (18.0 * kind.bulk) + deviator * deviator / (2.0 * kind.shear))
 
 
-@kernel
+@jit.kernel
 def turned(sxx: float, syy: float, sxy: float, angle: float) -> tuple[float, float, float]:
     """Return a stress (Pa) turned with its body by a small angle (rad), counter-clockwise positive."""
     q = 0.5 * angle
@@ -79,20 +78,20 @@ def turned(sxx: float, syy: float, sxy: float, angle: float) -> tuple[float, flo
     return mean + half, mean - half, across
 
 
-@kernel
-def strength(kind: Record, total: float) -> float:
+@jit.kernel
+def strength(kind: arrays.Record, total: float) -> float:
     """Return the largest root of J2 (Pa) at I1 (Pa); negative beyond the apex."""
     return kind.cohesion - kind.slope * total
 
 
-@kernel
-def work_of(state: Record, sxx: float, syy: float, sxy: float, dxx: float, dyy: float, dxy: float) -> float:
+@jit.kernel
+def work_of(state: arrays.Record, sxx: float, syy: float, sxy: float, dxx: float, dyy: float, dxy: float) -> float:
     """Return the work per volume (J/m3) of the mean of the stress before, given, and now over a strain (-)."""
     return 0.5 * ((sxx + state.sxx) * dxx + (syy + state.syy) * dyy + 2.0 * (sxy + state.sxy) * dxy)
 
 
-@kernel
-def return_to_surface(state: Record, kind: Record) -> float:
+@jit.kernel
+def return_to_surface(state: arrays.Record, kind: arrays.Record) -> float:
     """Bring the stress of a particle back to the yield surface; return the root of J2 (Pa) that was too much, or 0."""
     total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
     most = strength(kind, total)
@@ -111,8 +110,8 @@ def return_to_surface(state: Record, kind: Record) -> float:
     return deviator * (1.0 - factor)
 
 
-@kernel
-def close_gaps(state: Record, kind: Record, volume: float) -> float:
+@jit.kernel
+def close_gaps(state: arrays.Record, kind: arrays.Record, volume: float) -> float:
     """Close gaps of a particle whose stress has followed a volume strain (-) of the step; return by how much (-)."""
     if state.opening == 0.0 or volume >= 0.0:
         return 0.0
@@ -125,8 +124,8 @@ def close_gaps(state: Record, kind: Record, volume: float) -> float:
     return closed
 
 
-@kernel
-def stretch(state: Record, kind: Record, dxx: float, dyy: float, dxy: float) -> float:
+@jit.kernel
+def stretch(state: arrays.Record, kind: arrays.Record, dxx: float, dyy: float, dxy: float) -> float:
     """Advance the stress of a particle by a strain (-); return the energy (J) lost to flow and gaps.
 
     The loss is the work of the mean stress less what elasticity has gained.
@@ -151,8 +150,8 @@ def stretch(state: Record, kind: Record, dxx: float, dyy: float, dxy: float) -> 
     return work - (strain_energy(kind, total, deviator) - held)
 
 
-@kernel
-def strain(state: Record, kind: Record, ux: float, uy: float, wx: float, wy: float, step: float) -> float:
+@jit.kernel
+def strain(state: arrays.Record, kind: arrays.Record, ux: float, uy: float, wx: float, wy: float, step: float) -> float:
     """Advance the stress of a particle by a step (s) of a velocity gradient (1/s); return the energy (J) lost to flow.
 
     dvx/dx, dvx/dy, dvy/dx, dvy/dy. Half of the rotation comes before the strain and half after it: the stress of the
@@ -170,7 +169,7 @@ ROWS = 5  # the next one wants 1.0003
 OUT_OF_LINE = 1e-3  # spacings; rows nearer than this to where they ought to be stand against a face
 
 
-@kernel
+@jit.kernel
 def share_of_row(row: float) -> float:
     """Return the stress of a row beside a face, counted from 1, over that inside; 1 beyond those that differ."""
     if row > ROWS:
@@ -178,7 +177,7 @@ def share_of_row(row: float) -> float:
     return 1.0 - 2.0 * (-DECAY) ** int(row) / (1.0 + DECAY * DECAY)
 
 
-@kernel
+@jit.kernel
 def part_of_kernel(row: float) -> float:
     """Return which part of sum V f d (x) d across a face a row beside it has, counted from 1."""
     if row > 2.0:
@@ -187,14 +186,14 @@ def part_of_kernel(row: float) -> float:
     return 0.5 if row < 2.0 else 0.5 + 0.5 * (1.0 + DECAY * DECAY) / squared  # 1/2 + a_1, of a_1 + a_2 = 1/2
 
 
-@kernel
+@jit.kernel
 def share_across(row: float, is_corrected: bool) -> float:
     """Return the stress across a face in a row beside it, counted from 1, over that inside."""
     return share_of_row(row) * (part_of_kernel(row) if is_corrected else 1.0)
 
 
-@rare_kernel
-def row_beside(body: Record, is_ground: bool, x: float, y: float, spacing: float) -> tuple[float, float, float]:
+@jit.rare_kernel
+def row_beside(body: arrays.Record, is_ground: bool, x: float, y: float, spacing: float) -> tuple[float, float, float]:
     """Return the row along a face of a body in which a place (m) is, and the normal; 0 if it is in none."""
     if not is_near(body, is_ground, x, y, ROWS * spacing):
         return 0.0, 0.0, 1.0
@@ -206,8 +205,8 @@ def row_beside(body: Record, is_ground: bool, x: float, y: float, spacing: float
     return (nearest if nearest >= 1.0 and abs(row - nearest) < OUT_OF_LINE else 0.0), nx, ny
 
 
-@rare_kernel
-def shares_of_place(world: World, x: float, y: float, spacing: float, is_corrected: bool) -> tuple[float, float]:
+@jit.rare_kernel
+def shares_of_place(world: arrays.World, x: float, y: float, spacing: float, is_corrected: bool) -> tuple[float, float]:
     """Return the stresses across upright and level faces at a place (m) over those far from all faces.
 
     Of faces to the same side, such as those of blocks on one another, the nearest counts.
@@ -224,8 +223,8 @@ def shares_of_place(world: World, x: float, y: float, spacing: float, is_correct
     return along_x, share_across(below, is_corrected) * share_across(above, is_corrected)
 
 
-@rare_kernel
-def keep_within_surface(state: Record, kind: Record) -> None:
+@jit.rare_kernel
+def keep_within_surface(state: arrays.Record, kind: arrays.Record) -> None:
     """Bring a compressed particle without shear stress within the yield surface, by the larger of its stresses.
 
     With the stress out of the plane midway, as where it fails, the larger pressure T and the smaller N have
@@ -241,8 +240,8 @@ def keep_within_surface(state: Record, kind: Record) -> None:
     state.szz = 0.5 * (state.sxx + state.syy)
 
 
-@rare_kernel
-def balance(state: Record, kind: Record, along_x: float, along_y: float) -> None:
+@jit.rare_kernel
+def balance(state: arrays.Record, kind: arrays.Record, along_x: float, along_y: float) -> None:
     """Bring the stress of a particle to these shares across upright and level faces."""
     if kind.is_corrected:
         state.sxx *= along_x
@@ -256,8 +255,8 @@ def balance(state: Record, kind: Record, along_x: float, along_y: float) -> None
         state.sxy *= share
 
 
-@rare_kernel
-def balance_rows(soils: Soils, world: World) -> None:
+@jit.rare_kernel
+def balance_rows(soils: Soils, world: arrays.World) -> None:
     """Bring the stresses of all rows along faces into equilibrium; a particle in a corner is in a row of both."""
     spacing = 2.0 * soils.controls[0].radius
     for i in range(soils.points.size):

@@ -47,8 +47,7 @@ from numpy.typing import ArrayLike
 
 from blocksim.kernels.common.arrays import Floats, Integers
 from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
-from blocksim.kernels.sph.cells import Neighbours, find_neighbours
-from blocksim.kernels.sph.functions import KERNEL_CODES, kernel_slope, kernel_value, support_radius
+from blocksim.kernels.sph import cells, functions
 
 PLAIN = 0
 SHEPARD, LINEAR = 1, 2
@@ -90,14 +89,14 @@ def pseudo_inverse(a: float, b: float, d: float, least: float) -> tuple[float, f
 def weight(sources: Sources, b: int, dx: float, dy: float) -> float:
     """Return V_b W for a point that particle b is (dx, dy) (m) away from."""
     r = math.sqrt(dx * dx + dy * dy)
-    return sources.mass[b] / sources.density[b] * kernel_value(sources.function, r, sources.smoothing_length)
+    return sources.mass[b] / sources.density[b] * functions.kernel_value(sources.function, r, sources.smoothing_length)
 
 
 @kernel
 def radial_factor(sources: Sources, dx: float, dy: float) -> float:
     """Return W'/r (1/m^4), so that grad_a W_ab = W'/r (r_a - r_b); zero where particles coincide."""
     r = math.sqrt(dx * dx + dy * dy)
-    return kernel_slope(sources.function, r, sources.smoothing_length) / r if r > 0.0 else 0.0
+    return functions.kernel_slope(sources.function, r, sources.smoothing_length) / r if r > 0.0 else 0.0
 
 
 @rare_kernel
@@ -285,23 +284,23 @@ class Particles:
             positions=places,
             mass=_positive(mass, "mass", count).copy(),
             density=_positive(density, "density", count).copy(),
-            function=_code(kernel, KERNEL_CODES),
+            function=_code(kernel, functions.KERNEL_CODES),
             smoothing_length=float(_positive(smoothing_length, "smoothing_length", 1)[0]),
         )
 
     @property
     def support_radius(self) -> float:
         """Distance (m) from which on a particle has no influence."""
-        return support_radius(self.sources.function, self.sources.smoothing_length)
+        return functions.support_radius(self.sources.function, self.sources.smoothing_length)
 
     @cached_property
-    def neighbours(self) -> Neighbours:
+    def neighbours(self) -> cells.Neighbours:
         """Neighbours of every particle within its support, itself among them."""
         return self.neighbours_of(self.sources.positions)
 
-    def neighbours_of(self, points: Floats) -> Neighbours:
+    def neighbours_of(self, points: Floats) -> cells.Neighbours:
         """Return the particles within the support of each of the points (m, 2)."""
-        return find_neighbours(self.sources.positions, points, self.support_radius)
+        return cells.find_neighbours(self.sources.positions, points, self.support_radius)
 
 
 def interpolate(

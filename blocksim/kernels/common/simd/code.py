@@ -13,31 +13,10 @@ from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model
 
-from blocksim.kernels.common.simd.functions import (
-    WIDTH,
-    branch,
-    fields_0,
-    fields_4,
-    fields_8,
-    fields_12,
-    fields_16,
-    four,
-    greater,
-    is_all,
-    lesser,
-    load,
-    root,
-    select,
-    split,
-    spread,
-    store,
-    write_fields_0,
-    write_fields_4,
-    write_fields_8,
-)
+from blocksim.kernels.common.simd import functions
 
 DOUBLE = ir.DoubleType()
-VECTOR = ir.VectorType(DOUBLE, WIDTH)
+VECTOR = ir.VectorType(DOUBLE, functions.WIDTH)
 BYTE = ir.IntType(8)
 INDEX = ir.IntType(32)
 SIZE = ir.IntType(64)
@@ -72,7 +51,7 @@ class _LanesModel(models.PrimitiveModel):
 @register_model(MaskType)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, of: Any) -> None:
-        super().__init__(manager, of, ir.VectorType(ir.IntType(1), WIDTH))
+        super().__init__(manager, of, ir.VectorType(ir.IntType(1), functions.WIDTH))
 
 
 LIKELY = (2000, 1)  # weights of a branch that is to stay one
@@ -83,7 +62,9 @@ def _spread(builder: Any, value: Any) -> Any:
     if value.type == VECTOR:
         return value
     single = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, INDEX(0))
-    return builder.shuffle_vector(single, single, ir.Constant(ir.VectorType(INDEX, WIDTH), [0] * WIDTH))
+    return builder.shuffle_vector(
+        single, single, ir.Constant(ir.VectorType(INDEX, functions.WIDTH), [0] * functions.WIDTH)
+    )
 
 
 def _declare(function: Callable[..., Any], answer: Callable[[tuple[Any, ...]], Any]) -> None:
@@ -117,7 +98,7 @@ def _transposed(builder: Any, four: list[Any]) -> list[Any]:
     """Return the columns of four vectors."""
 
     def mixed(x: Any, y: Any, *places: int) -> Any:
-        return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(INDEX, WIDTH), list(places)))
+        return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(INDEX, functions.WIDTH), list(places)))
 
     even = [mixed(four[k], four[k + 1], 0, 4, 2, 6) for k in (0, 2)]
     odd = [mixed(four[k], four[k + 1], 1, 5, 3, 7) for k in (0, 2)]
@@ -128,7 +109,7 @@ def _transposed(builder: Any, four: list[Any]) -> list[Any]:
 def _one_of(builder: Any, lane: Any, places: list[Any]) -> Any:
     """Return the place in a lane; of a lane that is known the optimization leaves nothing but that."""
     chosen = places[0]
-    for k in range(1, WIDTH):
+    for k in range(1, functions.WIDTH):
         chosen = builder.select(builder.icmp_signed("==", lane, ir.Constant(lane.type, k)), places[k], chosen)
     return chosen
 
@@ -138,12 +119,12 @@ def _record_pointers(context: Any, builder: Any, signature: Any, arguments: Any,
     array, field = signature.args[1:3]
     start = builder.bitcast(context.make_array(array)(context, builder, arguments[1]).data, BYTE.as_pointer())
     if isinstance(field, types.UniTuple):
-        places = cgutils.unpack_tuple(builder, arguments[2], WIDTH)
+        places = cgutils.unpack_tuple(builder, arguments[2], functions.WIDTH)
         if signature.args[0] != types.none:
             places = [_one_of(builder, arguments[0], places)]
     else:
         first = context.make_array(field)(context, builder, arguments[2]).data
-        lanes = [INDEX(k) for k in range(WIDTH)] if signature.args[0] == types.none else arguments[:1]
+        lanes = [INDEX(k) for k in range(functions.WIDTH)] if signature.args[0] == types.none else arguments[:1]
         places = [builder.load(builder.gep(first, [lane])) for lane in lanes]
     pointers = []
     for place in places:
@@ -162,7 +143,7 @@ def _read_fields(part: int) -> Callable[..., Any]:
             four = [builder.load(builder.gep(one, [INDEX(part)]), align=ALIGNMENT) for one in pointers]
             return context.make_tuple(builder, signature.return_type, _transposed(builder, four))
         (one,) = _record_pointers(context, builder, signature, arguments, DOUBLE)
-        numbers = [builder.load(builder.gep(one, [INDEX(WIDTH * part + k)])) for k in range(WIDTH)]
+        numbers = [builder.load(builder.gep(one, [INDEX(functions.WIDTH * part + k)])) for k in range(functions.WIDTH)]
         return context.make_tuple(builder, signature.return_type, numbers)
 
     return generate
@@ -173,7 +154,7 @@ def _write_fields(part: int) -> Callable[..., Any]:
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         mask = arguments[3]
-        columns = cgutils.unpack_tuple(builder, arguments[4], WIDTH)
+        columns = cgutils.unpack_tuple(builder, arguments[4], functions.WIDTH)
         if signature.args[0] == types.none:
             pointers = _record_pointers(context, builder, signature, arguments, VECTOR)
             for k, four in enumerate(_transposed(builder, columns)):
@@ -183,19 +164,19 @@ def _write_fields(part: int) -> Callable[..., Any]:
             (one,) = _record_pointers(context, builder, signature, arguments, DOUBLE)
             with builder.if_then(mask, likely=True):
                 for k, column in enumerate(columns):
-                    builder.store(column, builder.gep(one, [INDEX(WIDTH * part + k)]))
+                    builder.store(column, builder.gep(one, [INDEX(functions.WIDTH * part + k)]))
         return context.get_dummy_value()
 
     return generate
 
 
 def _split(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    numbers = [builder.extract_element(arguments[0], INDEX(k)) for k in range(WIDTH)]
+    numbers = [builder.extract_element(arguments[0], INDEX(k)) for k in range(functions.WIDTH)]
     return context.make_tuple(builder, signature.return_type, numbers)
 
 
 def _repeat(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    return context.make_tuple(builder, signature.return_type, WIDTH * list(arguments))
+    return context.make_tuple(builder, signature.return_type, functions.WIDTH * list(arguments))
 
 
 def _four(_: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -235,7 +216,7 @@ def _called(name: str, kind: Any) -> Callable[..., Any]:
 
 
 def _all(builder: Any, mask: Any) -> Any:
-    bits = builder.bitcast(mask, ir.IntType(WIDTH))
+    bits = builder.bitcast(mask, ir.IntType(functions.WIDTH))
     return builder.icmp_unsigned("==", bits, ir.Constant(bits.type, -1))
 
 
@@ -273,17 +254,17 @@ def _define_all() -> None:
     _define(operator.and_, MASK, lambda builder, x, y: builder.and_(x, y), (MASK, MASK))
     _define(operator.or_, MASK, lambda builder, x, y: builder.or_(x, y), (MASK, MASK))
     _define(operator.xor, MASK, lambda builder, x, y: builder.xor(x, y), (MASK, MASK))
-    _define(is_all, types.boolean, _all, (MASK,))
-    _define(is_all, types.boolean, lambda _, flag: flag, (types.boolean,))
+    _define(functions.is_all, types.boolean, _all, (MASK,))
+    _define(functions.is_all, types.boolean, lambda _, flag: flag, (types.boolean,))
     _define(operator.neg, LANES, lambda builder, x: builder.fneg(x), (LANES,))
     _define(abs, LANES, _called("llvm.fabs.v4f64", VECTOR), (LANES,))
-    _define(root, LANES, _called("llvm.sqrt.v4f64", VECTOR), (LANES,))
-    _define(root, types.float64, _called("llvm.sqrt.f64", DOUBLE), (types.float64,))
-    _define(spread, LANES, _spread, (types.float64,))
-    _two(greater, LANES, _chosen(">"))
-    _two(lesser, LANES, _chosen("<"))
-    _define(greater, types.float64, _chosen(">"), (types.float64, types.float64))
-    _define(lesser, types.float64, _chosen("<"), (types.float64, types.float64))
+    _define(functions.root, LANES, _called("llvm.sqrt.v4f64", VECTOR), (LANES,))
+    _define(functions.root, types.float64, _called("llvm.sqrt.f64", DOUBLE), (types.float64,))
+    _define(functions.spread, LANES, _spread, (types.float64,))
+    _two(functions.greater, LANES, _chosen(">"))
+    _two(functions.lesser, LANES, _chosen("<"))
+    _define(functions.greater, types.float64, _chosen(">"), (types.float64, types.float64))
+    _define(functions.lesser, types.float64, _chosen("<"), (types.float64, types.float64))
 
 
 def _define_select() -> None:
@@ -293,10 +274,12 @@ def _define_select() -> None:
         return builder.select(mask, _spread(builder, yes), _spread(builder, no))
 
     one = types.float64
-    for function in (select, branch):
+    for function in (functions.select, functions.branch):
         _define(function, LANES, choose, (MASK, LANES, LANES), (MASK, LANES, one), (MASK, one, LANES), (MASK, one, one))
-    _define(select, one, lambda builder, mask, yes, no: builder.select(mask, yes, no), (types.boolean, one, one))
-    _define(branch, one, _branched, (types.boolean, one, one))
+    _define(
+        functions.select, one, lambda builder, mask, yes, no: builder.select(mask, yes, no), (types.boolean, one, one)
+    )
+    _define(functions.branch, one, _branched, (types.boolean, one, one))
 
 
 def _define_memory() -> None:
@@ -310,26 +293,34 @@ def _define_memory() -> None:
         _declare(function, answer)
         return lower_builtin(function, *kinds)
 
-    columns, single = types.UniTuple(LANES, WIDTH), types.UniTuple(types.float64, WIDTH)
-    for function, part in ((fields_0, 0), (fields_4, 1), (fields_8, 2), (fields_12, 3), (fields_16, 4)):
+    columns, single = types.UniTuple(LANES, functions.WIDTH), types.UniTuple(types.float64, functions.WIDTH)
+    for function, part in (
+        (functions.fields_0, 0),
+        (functions.fields_4, 1),
+        (functions.fields_8, 2),
+        (functions.fields_12, 3),
+        (functions.fields_16, 4),
+    ):
         typed(function, columns, types.NoneType, types.Array, types.NestedArray)(_read_fields(part))
         typed(function, columns, types.NoneType, types.Array, types.UniTuple)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.NestedArray)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.UniTuple)(_read_fields(part))
     end = (MaskType, types.UniTuple)
-    for writer, part in ((write_fields_0, 0), (write_fields_4, 1), (write_fields_8, 2)):
+    for writer, part in ((functions.write_fields_0, 0), (functions.write_fields_4, 1), (functions.write_fields_8, 2)):
         typed(writer, types.none, types.NoneType, types.Array, types.NestedArray, *end)(_write_fields(part))
         typed(writer, types.none, types.NoneType, types.Array, types.UniTuple, *end)(_write_fields(part))
     single_end = (types.Boolean, types.UniTuple)
-    typed(write_fields_0, types.none, types.Integer, types.Array, types.NestedArray, *single_end)(_write_fields(0))
-    typed(split, single, LanesType)(_split)
-    typed(split, single, types.Float)(_repeat)
-    typed(four, LANES, types.NoneType, *[types.Float] * WIDTH)(_four)
-    typed(four, types.float64, types.Integer, *[types.Float] * WIDTH)(_four)
-    typed(load, LANES, types.NoneType, types.NestedArray)(_load)
-    typed(load, types.float64, types.Integer, types.NestedArray)(_load)
-    typed(store, types.none, types.NoneType, types.NestedArray, LanesType)(_store)
-    typed(store, types.none, types.Integer, types.NestedArray, types.Float)(_store)
+    typed(functions.write_fields_0, types.none, types.Integer, types.Array, types.NestedArray, *single_end)(
+        _write_fields(0)
+    )
+    typed(functions.split, single, LanesType)(_split)
+    typed(functions.split, single, types.Float)(_repeat)
+    typed(functions.four, LANES, types.NoneType, *[types.Float] * functions.WIDTH)(_four)
+    typed(functions.four, types.float64, types.Integer, *[types.Float] * functions.WIDTH)(_four)
+    typed(functions.load, LANES, types.NoneType, types.NestedArray)(_load)
+    typed(functions.load, types.float64, types.Integer, types.NestedArray)(_load)
+    typed(functions.store, types.none, types.NoneType, types.NestedArray, LanesType)(_store)
+    typed(functions.store, types.none, types.Integer, types.NestedArray, types.Float)(_store)
 
 
 def teach_compiler() -> None:

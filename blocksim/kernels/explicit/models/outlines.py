@@ -33,22 +33,8 @@ import numpy as np
 from blocksim.kernels.common.arrays import CONTACTS, NO_FACE, Integers, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import relative_pose, slab_depth, to_world
+from blocksim.kernels.explicit import outlines
 from blocksim.kernels.explicit.models.surface import CLOSE, PARALLEL, drop_point, keeps_first
-from blocksim.kernels.explicit.outlines import (
-    MOST_CORNERS,
-    UPPER,
-    WIDEST_CONE,
-    cone_of,
-    corner_of,
-    corner_vector,
-    into_frame,
-    is_piece,
-    next_number,
-    number_before,
-    number_of_corners,
-    side_along,
-    side_normal,
-)
 
 # calibrated: of the overlap. What an end holds changes by twice that times the tilt (0.01) as it changes hands, 4e-4 of
 # it; stacks at rest stay flush within less
@@ -58,9 +44,9 @@ HAND_OVER = 0.02
 @kernel
 def from_middle(body: Record, number: int, table: Records, nx: float, ny: float) -> float:
     """Return the place (m) of a corner along the tangent (-ny, nx), from the middle of the face that looks along n."""
-    side = corner_of(body, table, side_along(body, table, nx, ny))
-    corner = corner_of(body, table, number)
-    tx, ty = into_frame(body, -ny, nx)
+    side = outlines.corner_of(body, table, outlines.side_along(body, table, nx, ny))
+    corner = outlines.corner_of(body, table, number)
+    tx, ty = outlines.into_frame(body, -ny, nx)
     x = corner.x - side.x + side.half * side.ny
     y = corner.y - side.y - side.half * side.nx
     return tx * x + ty * y
@@ -74,22 +60,22 @@ def is_same_end(of_a: Record, of_b: Record, a: Record, b: Record, table: Records
     if nx * of_b.nx + ny * of_b.ny < PARALLEL:
         return False
     end_a = -from_middle(a, of_a.slot, table, -nx, -ny)
-    return end_a * from_middle(b, of_b.slot - MOST_CORNERS, table, nx, ny) > 0.0
+    return end_a * from_middle(b, of_b.slot - outlines.MOST_CORNERS, table, nx, ny) > 0.0
 
 
 @rare_kernel
 def place_on(point: Record, touched: Record, table: Records) -> tuple[float, float]:
     """Return where a point is along the face it touches, from the middle of that (m), and half of its length (m)."""
     face: Any = np.int64(point.face)
-    side = corner_of(touched, table, face)
-    x, y = into_frame(touched, point.x - touched.x, point.y - touched.y)
+    side = outlines.corner_of(touched, table, face)
+    x, y = outlines.into_frame(touched, point.x - touched.x, point.y - touched.y)
     return side.nx * y - side.ny * x - side.middle, side.half
 
 
 @rare_kernel
 def way_beyond(point: Record, a: Record, b: Record, table: Records) -> float:
     """Return how far (m) the corner of a point is beyond the end of its face, less what it may be."""
-    along, half = place_on(point, b if point.slot < MOST_CORNERS else a, table)
+    along, half = place_on(point, b if point.slot < outlines.MOST_CORNERS else a, table)
     return abs(along) - half - HAND_OVER * point.depth
 
 
@@ -102,7 +88,7 @@ def keeps_inner(
     On a piece of ground the end of a face is none.
     """
     first = keeps_first(one, two, pair, contacts, oblique)
-    if oblique or is_piece(a) or is_piece(b):
+    if oblique or outlines.is_piece(a) or outlines.is_piece(b):
         return first
     beyond_one = way_beyond(one, a, b, table)
     beyond_two = way_beyond(two, a, b, table)
@@ -119,14 +105,14 @@ def has_inner(duplicates: int, of_b: bool, touched: Record, face: int, along: fl
     """
     if beyond <= 0.0:
         return False
-    end = next_number(touched, face) if along > 0.0 else face
-    return (duplicates >> (end + MOST_CORNERS if of_b else end)) & 1 == 1
+    end = outlines.next_number(touched, face) if along > 0.0 else face
+    return (duplicates >> (end + outlines.MOST_CORNERS if of_b else end)) & 1 == 1
 
 
 @rare_kernel
 def has_passed(point: Record, duplicates: int, a: Record, b: Record, table: Records) -> bool:
     """Return True if a point is farther out than the corner that was dropped as its duplicate, if there is one."""
-    of_b = bool(point.slot < MOST_CORNERS)
+    of_b = bool(point.slot < outlines.MOST_CORNERS)
     touched = b if of_b else a
     face: Any = np.int64(point.face)
     along, half = place_on(point, touched, table)
@@ -154,8 +140,8 @@ class Corner(NamedTuple):
 def corner_seen(owner: Record, number: int, touched: Record, table: Records) -> Corner:
     """Return a corner of a body as the frame of the touched one has it."""
     x0, y0, c, s = relative_pose(owner, touched)
-    ahead = corner_of(owner, table, number)
-    back = corner_of(owner, table, number_before(owner, number))
+    ahead = outlines.corner_of(owner, table, number)
+    back = outlines.corner_of(owner, table, outlines.number_before(owner, number))
     return Corner(
         x0 + c * ahead.x - s * ahead.y,
         y0 + s * ahead.x + c * ahead.y,
@@ -183,8 +169,8 @@ def side_below(corner: Corner, touched: Record, table: Records, cone: float) -> 
     face = NO_FACE
     depth = math.inf
     beside = math.inf
-    for k in range(number_of_corners(touched)):
-        side = corner_of(touched, table, k)
+    for k in range(outlines.number_of_corners(touched)):
+        side = outlines.corner_of(touched, table, k)
         over = side.distance - (side.nx * corner.x + side.ny * corner.y)
         if over < 0.0:
             return side_over_end(corner, k, over, touched, table, cone)
@@ -221,11 +207,11 @@ def side_over_end(
 
     `beyond` (m, negative) is the overlap with that face. Deep under the end of another it is no end of an interval.
     """
-    count = number_of_corners(touched)
-    side = corner_of(touched, table, passed)
+    count = outlines.number_of_corners(touched)
+    side = outlines.corner_of(touched, table, passed)
     for step in (1, count - 1):
         k = (passed + step) % count
-        level = corner_of(touched, table, k)
+        level = outlines.corner_of(touched, table, k)
         over = level.distance - (level.nx * corner.x + level.ny * corner.y)
         cosine = level.nx * side.nx + level.ny * side.ny
         is_under = 0.0 < over < DEEPEST * touched.radius and beyond >= over * cosine
@@ -242,8 +228,8 @@ def side_over_end(
 @rare_kernel
 def is_behind_others(corner: Corner, one: int, two: int, touched: Record, table: Records) -> bool:
     """Return True if a corner is behind all faces of a body but two, whichever side of those it is on."""
-    for k in range(number_of_corners(touched)):
-        side = corner_of(touched, table, k)
+    for k in range(outlines.number_of_corners(touched)):
+        side = outlines.corner_of(touched, table, k)
         if k != one and k != two and side.nx * corner.x + side.ny * corner.y > side.distance:
             return False
     return True
@@ -252,9 +238,9 @@ def is_behind_others(corner: Corner, one: int, two: int, touched: Record, table:
 @kernel
 def face_met(corner: Corner, touched: Record, table: Records, cone: float) -> tuple[int, float, float]:
     """Return as side_below the face that a corner touches, of a piece of ground the upper one."""
-    if not is_piece(touched):
+    if not outlines.is_piece(touched):
         return side_below(corner, touched, table, cone)
-    face = UPPER if can_touch(corner, 0.0, 1.0, cone) else NO_FACE
+    face = outlines.UPPER if can_touch(corner, 0.0, 1.0, cone) else NO_FACE
     return face, slab_depth(corner.x, corner.y, touched), math.inf
 
 
@@ -274,7 +260,7 @@ def add_corner(
     point.slot = number
     point.face = face
     point.x, point.y = to_world(touched, corner.x, corner.y)
-    point.nx, point.ny = side_normal(touched, table, face)
+    point.nx, point.ny = outlines.side_normal(touched, table, face)
     point.depth = depth
     point.beside = beside
     return count + 1
@@ -283,9 +269,9 @@ def add_corner(
 @kernel
 def add_slot(a: Record, b: Record, slot: int, table: Records, cone: float, points: Records, count: int) -> int:
     """Append the corner of a slot of two bodies if it touches; return the new point count."""
-    if slot < MOST_CORNERS:
+    if slot < outlines.MOST_CORNERS:
         return add_corner(a, slot, b, table, cone, points, count)
-    end = add_corner(b, slot - MOST_CORNERS, a, table, cone, points, count)
+    end = add_corner(b, slot - outlines.MOST_CORNERS, a, table, cone, points, count)
     if end > count:
         point = points[count]
         point.slot = slot
@@ -299,11 +285,11 @@ def ground_points(owner: Record, near: int, candidates: Integers, level: float, 
     """Collect the candidate corners of `owner` below the ground, y < level (m). Return how many there are."""
     count = 0
     for m in range(near):
-        ox, oy = corner_vector(owner, table, candidates[m])
+        ox, oy = outlines.corner_vector(owner, table, candidates[m])
         if owner.y + oy < level:
             point = points[count]
             point.slot = candidates[m]
-            point.face = UPPER
+            point.face = outlines.UPPER
             point.x = owner.x + ox
             point.y = owner.y + oy
             point.nx = 0.0
@@ -317,8 +303,8 @@ def ground_points(owner: Record, near: int, candidates: Integers, level: float, 
 @rare_kernel
 def are_oblique(a: Record, b: Record, nx: float, ny: float, table: Records, cone: float) -> bool:
     """Return True if the faces of two bodies that look at each other along a normal are not nearly parallel."""
-    ax, ay = side_normal(a, table, side_along(a, table, -nx, -ny))
-    bx, by = side_normal(b, table, side_along(b, table, nx, ny))
+    ax, ay = outlines.side_normal(a, table, outlines.side_along(a, table, -nx, -ny))
+    bx, by = outlines.side_normal(b, table, outlines.side_along(b, table, nx, ny))
     return abs(ax * by - ay * bx) > cone or ax * bx + ay * by > 0.0
 
 
@@ -327,7 +313,7 @@ def do_meet(one: Record, two: Record, cone: float) -> bool:
     """Return True if two corners meet: they are as near to one another as two faces outside the cone can have them."""
     dx = one.x - two.x
     dy = one.y - two.y
-    reach = CLOSE * WIDEST_CONE / cone * max(one.depth, two.depth)
+    reach = CLOSE * outlines.WIDEST_CONE / cone * max(one.depth, two.depth)
     return dx * dx + dy * dy < reach * reach
 
 
@@ -337,11 +323,11 @@ def drop_duplicates(
 ) -> int:
     """Keep one of two corners that are one contact, mark the other in `pair`; return how many points are left."""
     i = 0
-    while i < count and points[i].slot < MOST_CORNERS:
+    while i < count and points[i].slot < outlines.MOST_CORNERS:
         for j in range(i + 1, count):
             one = points[i]
             two = points[j]
-            if two.slot >= MOST_CORNERS:
+            if two.slot >= outlines.MOST_CORNERS:
                 near = one if one.depth <= two.depth else two
                 oblique = are_oblique(a, b, near.nx, near.ny, table, cone)
                 if do_meet(one, two, cone) if oblique else is_same_end(one, two, a, b, table):
@@ -360,12 +346,12 @@ def block_points(
     a: Record, b: Record, pair: Record, candidates: Integers, contacts: Records, points: Records, table: Records
 ) -> int:
     """Fill `points` with the contact points of two bodies and return how many there are."""
-    cone = cone_of(a, b, table)
+    cone = outlines.cone_of(a, b, table)
     count = 0
     of_a = 0
     for m in range(pair.near):
         count = add_slot(a, b, candidates[m], table, cone, points, count)
-        if candidates[m] < MOST_CORNERS:
+        if candidates[m] < outlines.MOST_CORNERS:
             of_a = count
     pair.duplicates = 0
     if of_a > 0 and count > of_a:
@@ -396,8 +382,8 @@ def find_points(world: World, p: int, table: Records) -> int:
 @rare_kernel
 def is_within(corner: Corner, touched: Record, reach: float, table: Records) -> bool:
     """Return True if a corner lies inside a body grown by `reach` (m)."""
-    for k in range(number_of_corners(touched)):
-        side = corner_of(touched, table, k)
+    for k in range(outlines.number_of_corners(touched)):
+        side = outlines.corner_of(touched, table, k)
         if side.nx * corner.x + side.ny * corner.y > side.distance + reach:
             return False
     return True
@@ -408,8 +394,8 @@ def corners_near(
     owner: Record, touched: Record, reach: float, first: int, out: Integers, count: int, table: Records
 ) -> int:
     """Append the corners of `owner` inside `touched` grown by `reach` (m), as slots from `first`; return the count."""
-    for number in range(number_of_corners(owner)):
-        is_there = not is_piece(owner) or (owner.corners >> number) & 1 == 1
+    for number in range(outlines.number_of_corners(owner)):
+        is_there = not outlines.is_piece(owner) or (owner.corners >> number) & 1 == 1
         if is_there and is_within(corner_seen(owner, number, touched, table), touched, reach, table):
             out[count] = first + number
             count += 1
@@ -423,13 +409,13 @@ def near_slots(world: World, a: int, b: int, reach: float, out: Integers, table:
     two = world.bodies[b]
     count = 0
     if b == world.bodies.size - 1:
-        for number in range(number_of_corners(one)):
-            if one.y + corner_vector(one, table, number)[1] <= two.y + reach:
+        for number in range(outlines.number_of_corners(one)):
+            if one.y + outlines.corner_vector(one, table, number)[1] <= two.y + reach:
                 out[count] = number
                 count += 1
         return count
     count = corners_near(one, two, reach, 0, out, 0, table)
-    return corners_near(two, one, reach, MOST_CORNERS, out, count, table)
+    return corners_near(two, one, reach, outlines.MOST_CORNERS, out, count, table)
 
 
 @rare_kernel
@@ -437,16 +423,16 @@ def slot_normal(world: World, pair: Record, slot: int, face: int, table: Records
     """Return the normal, from b to a, of the contact of a corner with a face of the other body."""
     if pair.b == world.bodies.size - 1:
         return 0.0, 1.0
-    if slot < MOST_CORNERS:
-        return side_normal(world.bodies[pair.b], table, face)
-    nx, ny = side_normal(world.bodies[pair.a], table, face)
+    if slot < outlines.MOST_CORNERS:
+        return outlines.side_normal(world.bodies[pair.b], table, face)
+    nx, ny = outlines.side_normal(world.bodies[pair.a], table, face)
     return -nx, -ny
 
 
 @rare_kernel
 def slot_place(world: World, pair: Record, slot: int, table: Records) -> tuple[float, float]:
     """Return the place (m) of the corner of a slot."""
-    is_own = slot < MOST_CORNERS
+    is_own = slot < outlines.MOST_CORNERS
     owner = world.bodies[pair.a] if is_own else world.bodies[pair.b]
-    ox, oy = corner_vector(owner, table, slot if is_own else slot - MOST_CORNERS)
+    ox, oy = outlines.corner_vector(owner, table, slot if is_own else slot - outlines.MOST_CORNERS)
     return owner.x + ox, owner.y + oy

@@ -18,15 +18,13 @@ A contact has the stiffness of a face, two corner contacts, times the mean of th
 
 import math
 
-from blocksim.kernels.common.arrays import ALL, Integers, Record, World
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import relative_pose, to_world
+from blocksim.kernels.common import arrays, jit, shapes
 
 ROWS = 4
 FACE = 2.0  # stiffness of a face contact over that of a corner contact
 
 
-@kernel
+@jit.kernel
 def row_direction(row: int) -> tuple[float, float]:
     """Return the direction of a row of particles in the body frame; its outward normal is (dy, -dx)."""
     if row == 0:
@@ -38,14 +36,14 @@ def row_direction(row: int) -> tuple[float, float]:
     return 0.0, -1.0
 
 
-@kernel
-def row_intervals(body: Record, row: int) -> int:
+@jit.kernel
+def row_intervals(body: arrays.Record, row: int) -> int:
     """Return the number of intervals between the particles of a row, from corner to corner."""
     return body.row_x if row % 2 == 0 else body.row_y
 
 
-@kernel
-def seen_from_row(body: Record, inset: float, row: int, px: float, py: float) -> tuple[float, float, float]:
+@jit.kernel
+def seen_from_row(body: arrays.Record, inset: float, row: int, px: float, py: float) -> tuple[float, float, float]:
     """Return where a point of the body frame lies as a row sees it: along from its start, above (outside); spacing (m).
 
     `inset` (m) is how far the row lies inside the face.
@@ -60,35 +58,35 @@ def seen_from_row(body: Record, inset: float, row: int, px: float, py: float) ->
     return dx * x + dy * y, dy * x - dx * y, side / row_intervals(body, row)
 
 
-@kernel
+@jit.kernel
 def first_within(along: float, width: float, spacing: float) -> int:
     """Return the first particle of a row that is nearer than `width` (m) to a place along it."""
     return max(0, math.ceil((along - width) / spacing))
 
 
-@kernel
+@jit.kernel
 def last_within(along: float, width: float, spacing: float, last: int) -> int:
     """Return the last particle of a row that is nearer than `width` (m) to a place along it, at most `last`."""
     return min(last, math.floor((along + width) / spacing))
 
 
-@rare_kernel
-def is_particle_near(owner: Record, particle: Record, touched: Record, reach: float) -> bool:
+@jit.rare_kernel
+def is_particle_near(owner: arrays.Record, particle: arrays.Record, touched: arrays.Record, reach: float) -> bool:
     """Return True if a particle of `owner` lies inside the rectangle `touched` grown by `reach` (m) on every side."""
-    x0, y0, c, s = relative_pose(owner, touched)
+    x0, y0, c, s = shapes.relative_pose(owner, touched)
     px = x0 + c * particle.x - s * particle.y
     py = y0 + s * particle.x + c * particle.y
     return abs(px) <= touched.half_x + reach and abs(py) <= touched.half_y + reach
 
 
-@rare_kernel
-def particle_height(body: Record, particle: Record) -> float:
+@jit.rare_kernel
+def particle_height(body: arrays.Record, particle: arrays.Record) -> float:
     """Return the height (m) of a particle over y = 0."""
     return body.y + body.sin * particle.x + body.cos * particle.y
 
 
-@rare_kernel
-def near_particles(world: World, a: int, b: int, reach: float, out: Integers) -> int:
+@jit.rare_kernel
+def near_particles(world: arrays.World, a: int, b: int, reach: float, out: arrays.Integers) -> int:
     """Write the particles of body a that are within reach (m) of body b into `out` and return how many there are."""
     one = world.bodies[a]
     two = world.bodies[b]
@@ -109,8 +107,8 @@ def near_particles(world: World, a: int, b: int, reach: float, out: Integers) ->
 PER_PARTICLE = 4  # slots of a particle; it touches neighbours in a row, which differ modulo four
 
 
-@rare_kernel
-def add_touch(world: World, count: int, k: int, j: int, dx: float, dy: float, reach: float) -> bool:
+@jit.rare_kernel
+def add_touch(world: arrays.World, count: int, k: int, j: int, dx: float, dy: float, reach: float) -> bool:
     """Fill a point for the particle of slot group k at `point.x, y`, seen from the centre of disc j at (dx, dy).
 
     `reach` (m) is the distance of centres at which they touch. Returns True if they do.
@@ -129,15 +127,15 @@ def add_touch(world: World, count: int, k: int, j: int, dx: float, dy: float, re
     return True
 
 
-@rare_kernel
-def touch_ground(world: World, p: int, k: int, count: int) -> int:
+@jit.rare_kernel
+def touch_ground(world: arrays.World, p: int, k: int, count: int) -> int:
     """Add the contacts of particle k of a block with the discs of the ground; return the new count."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     ground = world.bodies[pair.b]
     size = world.controls[0].particle_size
     particle = world.particles[a.first_particle + k]
-    x, y = to_world(a, particle.x, particle.y)
+    x, y = shapes.to_world(a, particle.x, particle.y)
     height = y - ground.y + 0.5 * size
     nearest = math.floor((x - ground.x) / size)
     for j in range(nearest, nearest + 2):
@@ -151,8 +149,8 @@ def touch_ground(world: World, p: int, k: int, count: int) -> int:
     return count
 
 
-@rare_kernel
-def touch_row(world: World, p: int, k: int, row: int, first: int, count: int) -> int:
+@jit.rare_kernel
+def touch_row(world: arrays.World, p: int, k: int, row: int, first: int, count: int) -> int:
     """Add the contacts of particle k of body a with one row of body b, whose first particle is number `first`.
 
     The last corner of a row is the first particle of the next one. Return the new count.
@@ -162,7 +160,7 @@ def touch_row(world: World, p: int, k: int, row: int, first: int, count: int) ->
     b = world.bodies[pair.b]
     size = world.controls[0].particle_size
     particle = world.particles[a.first_particle + k]
-    x, y = to_world(a, particle.x, particle.y)
+    x, y = shapes.to_world(a, particle.x, particle.y)
     px = b.cos * (x - b.x) + b.sin * (y - b.y)
     py = b.cos * (y - b.y) - b.sin * (x - b.x)
     along, above, spacing = seen_from_row(b, 0.5 * size, row, px, py)
@@ -183,8 +181,8 @@ def touch_row(world: World, p: int, k: int, row: int, first: int, count: int) ->
     return count
 
 
-@rare_kernel
-def touch_block(world: World, p: int, k: int, count: int) -> int:
+@jit.rare_kernel
+def touch_block(world: arrays.World, p: int, k: int, count: int) -> int:
     """Add the contacts of particle k of body a with the particles of body b; return the new count."""
     b = world.bodies[world.pairs[p].b]
     first = 0
@@ -194,14 +192,14 @@ def touch_block(world: World, p: int, k: int, count: int) -> int:
     return count
 
 
-@rare_kernel
-def touch_slab(world: World, p: int, k: int, count: int) -> int:
+@jit.rare_kernel
+def touch_slab(world: arrays.World, p: int, k: int, count: int) -> int:
     """Add the contact of particle k of a block with a piece of ground, which is straight; return the new count."""
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     slab = world.bodies[pair.b]
     particle = world.particles[a.first_particle + k]
-    x, y = to_world(a, particle.x, particle.y)
+    x, y = shapes.to_world(a, particle.x, particle.y)
     dx = x - slab.x
     dy = y - slab.y
     along = slab.cos * dx + slab.sin * dy
@@ -220,12 +218,12 @@ def touch_slab(world: World, p: int, k: int, count: int) -> int:
     return count
 
 
-@rare_kernel
-def find_points(world: World, p: int) -> int:
+@jit.rare_kernel
+def find_points(world: arrays.World, p: int) -> int:
     """Find the contact points of pair p and return how many there are."""
     pair = world.pairs[p]
     is_ground = pair.b == world.bodies.size - 1
-    is_slab = world.bodies[pair.b].faces != ALL
+    is_slab = world.bodies[pair.b].faces != arrays.ALL
     count = 0
     for m in range(pair.near):
         k = world.candidates[p, m]
@@ -238,7 +236,7 @@ def find_points(world: World, p: int) -> int:
     return count
 
 
-@rare_kernel
-def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int:
+@jit.rare_kernel
+def near_slots(world: arrays.World, a: int, b: int, reach: float, out: arrays.Integers) -> int:
     """Write the particles of a that are within reach (m) of b into `out` and return how many there are."""
     return near_particles(world, a, b, reach + world.controls[0].particle_size, out)

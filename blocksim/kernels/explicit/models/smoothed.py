@@ -27,16 +27,7 @@ import math
 from blocksim.kernels.common.arrays import ALL, Integers, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import slab_depth, to_world
-from blocksim.kernels.explicit.models.particles import (
-    FACE,
-    ROWS,
-    first_within,
-    last_within,
-    near_particles,
-    row_direction,
-    row_intervals,
-    seen_from_row,
-)
+from blocksim.kernels.explicit.models import particles
 from blocksim.kernels.sph.functions import kernel_value
 
 NO_SUM = 1e-30
@@ -47,15 +38,17 @@ LEAST_FACING = 1e-9  # of two normals that oppose one another; at right angles t
 @rare_kernel
 def add_row(px: float, py: float, facing: float, body: Record, row: int, controls: Record, sums: Record) -> None:
     """Add the particles of one row of `body`, seen from (px, py) in its frame, to the sums of weighted_sums."""
-    along, above, spacing = seen_from_row(body, 0.0, row, px, py)
+    along, above, spacing = particles.seen_from_row(body, 0.0, row, px, py)
     if abs(above) >= controls.support:
         return
-    dx, dy = row_direction(row)
+    dx, dy = particles.row_direction(row)
     width = math.sqrt(controls.support * controls.support - above * above)
-    last = row_intervals(body, row)
+    last = particles.row_intervals(body, row)
     total = 0.0
     shift = 0.0
-    for j in range(first_within(along, width, spacing), last_within(along, width, spacing, last) + 1):
+    for j in range(
+        particles.first_within(along, width, spacing), particles.last_within(along, width, spacing, last) + 1
+    ):
         offset = along - j * spacing
         r = math.sqrt(offset * offset + above * above)
         end = 0.5 if j == 0 or j == last else 1.0
@@ -72,7 +65,7 @@ def add_row(px: float, py: float, facing: float, body: Record, row: int, control
 @kernel
 def depth_below_row(px: float, py: float, body: Record, row: int) -> float:
     """Return how far (m) a point of the body frame lies inside the face of a row."""
-    dx, dy = row_direction(row)
+    dx, dy = particles.row_direction(row)
     half = body.half_y if row % 2 == 0 else body.half_x
     return half - (dy * px - dx * py)
 
@@ -86,8 +79,8 @@ def least_depth(px: float, py: float, nx: float, ny: float, mx: float, my: float
     """
     is_corner = nx != mx or ny != my
     least = math.inf
-    for row in range(ROWS):
-        dx, dy = row_direction(row)
+    for row in range(particles.ROWS):
+        dx, dy = particles.row_direction(row)
         opposes = ny * dx - nx * dy > LEAST_FACING or my * dx - mx * dy > LEAST_FACING
         if opposes or not is_corner:
             least = min(least, depth_below_row(px, py, touched, row))
@@ -108,8 +101,8 @@ def weighted_sums(
     sums.nx = 0.0
     sums.ny = 0.0
     sums.weight = 0.0
-    for row in range(ROWS):
-        dx, dy = row_direction(row)
+    for row in range(particles.ROWS):
+        dx, dy = particles.row_direction(row)
         facing = ny * dx - nx * dy
         if facing > LEAST_FACING and depth_below_row(px, py, body, row) <= deepest:
             add_row(px, py, facing, body, row, controls, sums)
@@ -154,7 +147,7 @@ def resolve_particle(owner: Record, particle: Record, touched: Record, world: Wo
     point.ny = touched.sin * mx + touched.cos * my
     point.depth = depth
     facing = -(nx * mx + ny * my)
-    point.share = FACE * facing * particle.share
+    point.share = particles.FACE * facing * particle.share
     return depth > 0.0 and facing > LEAST_FACING
 
 
@@ -178,7 +171,7 @@ def ground_points(world: World, p: int) -> int:
             point.nx = 0.0
             point.ny = 1.0
             point.depth = level - y
-            point.share = FACE * facing * particle.share
+            point.share = particles.FACE * facing * particle.share
             count += 1
     return count
 
@@ -225,10 +218,10 @@ def find_points(world: World, p: int) -> int:
 def near_slots(world: World, a: int, b: int, reach: float, out: Integers) -> int:
     """Write the slots of a pair whose particles are within reach (m) into `out` and return how many there are."""
     of_b = world.bodies[a].particle_count
-    count = near_particles(world, a, b, reach, out)
+    count = particles.near_particles(world, a, b, reach, out)
     if b == world.bodies.size - 1:
         return count
-    more = near_particles(world, b, a, reach, out[count:])
+    more = particles.near_particles(world, b, a, reach, out[count:])
     for m in range(count, count + more):
         out[m] += of_b
     return count + more
