@@ -43,10 +43,14 @@ def compile_set(name: str) -> None:
 def _run_smallest(name: str) -> None:
     from blocksim.scenario import scenario_from_mapping  # noqa: PLC0415
     from blocksim.simulation import run_ensemble  # noqa: PLC0415
-    from blocksim.simulation.compilation import SMALLEST_SCENE, compile_kernels  # noqa: PLC0415
-    from blocksim.simulation.schemes import SCHEMES, build_scene  # noqa: PLC0415
+    from blocksim.simulation.schemes import (  # noqa: PLC0415  # noqa: PLC0415
+        SCHEMES,
+        SMALLEST_SCENE,
+        Team,
+        build_scene,
+        compile_kernels,
+    )
     from blocksim.simulation.schemes.explicit import PARTICLES, SURFACE_OF_OUTLINES  # noqa: PLC0415
-    from blocksim.simulation.team import Team  # noqa: PLC0415
 
     compile_kernels(name)
     if name in {PARTICLES, SURFACE_OF_OUTLINES}:  # few tests have ensembles and teams of those, and compile them
@@ -59,8 +63,7 @@ def _run_smallest(name: str) -> None:
 
 
 def _run_soil() -> None:
-    from blocksim.simulation.schemes import build_scene, measure_row  # noqa: PLC0415
-    from blocksim.simulation.team import ALONE, Team  # noqa: PLC0415
+    from blocksim.simulation.schemes import ALONE, Team, build_scene, measure_row  # noqa: PLC0415  # noqa: PLC0415
     from tests.soils import column, scene  # noqa: PLC0415
 
     soil = scene(column(0.05, 0.05, 0.005), end=1e-4)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.simulation.frames import CONTACT_ROW, UNITS, Contacts, Floats, Frames
+from blocksim.simulation.trajectory import CONTACT_ROW, UNITS, Contacts, Floats, Frames
 
 MILLI = 1e3
 MOTION = {  # quantity of a frame: its name in tables, and SI -> that unit

@@ -12,8 +12,7 @@ from blocksim.errors import BlocksimError, ExitCode
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.models.timeline import IMPULSES, Nonsmooth
 from blocksim.simulation.loop import BY_CODE, Outcome
-from blocksim.simulation.schemes import AnyScene, build_scene
-from blocksim.simulation.team import ALONE, Team
+from blocksim.simulation.schemes import ALONE, AnyScene, Team, build_scene
 from blocksim.world.build import arrays_of
 
 Table = Mapping[str, object]

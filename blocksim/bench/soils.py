@@ -6,8 +6,7 @@ from blocksim.bench.measurement import Findings, Measurement, Number, Setting, s
 from blocksim.bench.scenes import MATERIAL, PUSH, SIDES, Rerun
 from blocksim.bench.walls import THREADS, Size, explicit_wall, thread_numbers
 from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation.schemes import BODIES_A_THREAD
-from blocksim.simulation.team import useful_threads
+from blocksim.simulation.schemes import BODIES_A_THREAD, useful_threads
 
 RODS = {"unit_weight": 20e3, "young_modulus": 5.84e6, "poisson_ratio": 0.3, "friction_angle": "21.9 deg"}  # N/m3, Pa
 SPACING = 2.5e-3  # m

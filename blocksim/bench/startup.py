@@ -13,7 +13,7 @@ from blocksim.errors import BlocksimError
 from blocksim.scenario import scenario_to_toml
 
 MAIN = "from blocksim.cli.app import main; main()"
-COMPILE = "from blocksim.simulation.compilation import compile_kernels; compile_kernels()"
+COMPILE = "from blocksim.simulation.schemes import compile_kernels; compile_kernels()"
 
 
 class StartError(BlocksimError):

@@ -10,8 +10,7 @@ import numpy as np
 from blocksim.bench import measurement, scenes
 from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
 from blocksim.simulation.loop import last_step_of
-from blocksim.simulation.schemes import SCHEMES
-from blocksim.simulation.team import Team, useful_threads
+from blocksim.simulation.schemes import SCHEMES, Team, useful_threads
 
 
 class Size(NamedTuple):

@@ -10,7 +10,7 @@ from blocksim.bench import measurement, measurements
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import OutputError
 from blocksim.options import Option, Replace
-from blocksim.simulation import atomic, folder
+from blocksim.simulation import files
 from blocksim.verification.case import number
 
 COLUMNS = ("quantity", "unit", "median", "smallest", "largest")
@@ -46,7 +46,7 @@ def bench_command(
     if out is not None:  # checked before minutes of measuring
         if out.is_dir() or not out.absolute().parent.is_dir():
             raise OutputError(f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}")
-        folder.refuse_foreign(out, overwrite=overwrite)
+        files.refuse_foreign(out, overwrite=overwrite)
     machine = measurement.this_machine()
     prepare.announce_compilation("surface", quiet=screen.silent)
     outcomes: list[measurement.Outcome] = []
@@ -57,7 +57,7 @@ def bench_command(
         if outcomes:
             data = measurement.report(machine, outcomes)
             if out is not None:
-                atomic.write_text(out, json.dumps(data, indent=2) + "\n")
+                files.write_text(out, json.dumps(data, indent=2) + "\n")
             written = [] if out is None else [f"written: {out}"]
             notes = [
                 *_notes(outcomes),

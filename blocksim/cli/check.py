@@ -15,7 +15,7 @@ from blocksim.scenario.models.loads import AnyLoad, Constant, Force, Gravity, Ho
 from blocksim.scenario.models.timeline import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
 from blocksim.scenario.motion import drives_of, greatest_rate, settles
 from blocksim.scenario.resolution import DEFAULT, MATERIALS
-from blocksim.simulation.probes import bytes_of_series
+from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study.rows import check_experiment
 from blocksim.world import free_memory, memory
 from blocksim.world.describe import Description, PairDescription, StepLimits, describe

@@ -14,7 +14,7 @@ from blocksim.cli.prepare import ScenarioInput, announce_compilation
 from blocksim.errors import ExitCode
 from blocksim.options import Option, Replace
 from blocksim.scenario.spelling import list_names
-from blocksim.simulation import compilation, folder
+from blocksim.simulation import files, schemes
 from blocksim.study import converge, pictures, rows
 from blocksim.view import style
 from blocksim.view.studies import refuse_small_page
@@ -53,13 +53,13 @@ def converge_command(
 
     paper = page.paper
     with source.built() as ready:
-        path = out or folder.RESULTS / ready.name / "converge.png"
+        path = out or files.RESULTS / ready.name / "converge.png"
         style.picture_path(path)
         if picture:
             refuse_small_page(len(converge.refinements_of(ready, options.studies)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture
-                folder.refuse_foreign(path, overwrite=overwrite)
-        announce_compilation(compilation.kernels_of(ready), quiet=screen.silent)
+                files.refuse_foreign(path, overwrite=overwrite)
+        announce_compilation(schemes.kernels_of(ready), quiet=screen.silent)
         result = converge.converge(ready, replace(options, jobs=jobs, on_run=tell))
         drawn = path if picture and pictures.draw_convergence(result, ready, path, paper) else None
     lines = []

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from blocksim.cli import command_line, prepare, progress
-from blocksim.simulation.compilation import kernels_of
+from blocksim.simulation.schemes import kernels_of
 from blocksim.study import fragility, fragility_plan
 
 

@@ -12,7 +12,7 @@ from blocksim.cli import command_line, prepare, progress
 from blocksim.options import Option
 from blocksim.scenario.check import implausible_values
 from blocksim.scenario.models.timeline import SPRINGS
-from blocksim.simulation.compilation import kernels_of
+from blocksim.simulation.schemes import kernels_of
 from blocksim.study import answer, criterion, limit, limit_answer, limit_margin, limit_plan, rows
 
 AT_ONCE = (

@@ -11,7 +11,7 @@ from blocksim.cli import command_line, output
 from blocksim.errors import OutputError, OutputExistsError
 from blocksim.options import Option
 from blocksim.scenario import json_schema, spelling
-from blocksim.simulation.atomic import write_text
+from blocksim.simulation.files import write_text
 
 TEMPLATES = "templates"
 PLACE = "@NAME@"

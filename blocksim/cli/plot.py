@@ -8,8 +8,8 @@ from blocksim.cli import command_line, output, progress
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.options import Option, Replace
 from blocksim.silence import silent
-from blocksim.simulation import folder as files
-from blocksim.simulation.folder import refuse_foreign
+from blocksim.simulation import files
+from blocksim.simulation.files import refuse_foreign
 from blocksim.simulation.stores.exports import format_named
 from blocksim.study import compare, pictures, reporting, stored_run
 

@@ -45,7 +45,7 @@ def warn_of_values(scenario: Scenario) -> None:
 def announce_compilation(kernels: str, *, quiet: bool) -> None:
     """Compile a set of kernels unless that is done, and report it: it is not part of a run."""
     from blocksim.kernels.common import jit
-    from blocksim.simulation.compilation import compile_kernels, is_compiled
+    from blocksim.simulation.schemes import compile_kernels, is_compiled
 
     if is_compiled(kernels):
         with process.pause_collector():

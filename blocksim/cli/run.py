@@ -10,7 +10,7 @@ from itertools import islice
 import typer
 
 from blocksim.cli import command_line, compare, output, prepare, progress
-from blocksim.simulation import Result, folder, frames, loop, observables
+from blocksim.simulation import Result, files, loop, observables, trajectory
 from blocksim.simulation.run import RunCallbacks
 from blocksim.study.compare import compare_run
 from blocksim.study.rows import FINISHED
@@ -47,7 +47,7 @@ def run_command(
     with source.built() as ready, progress.run_progress(quiet=screen.silent) as on_progress:
         if not screen.silent:
             prepare.warn_of_values(ready)
-        out = options.out or folder.default_folder(ready)
+        out = options.out or files.default_folder(ready)
         if context.obj is not None:  # imports and compiling are waited for too
             over = time.monotonic() - context.obj
             options = replace(options, precautions=replace(options.precautions, time_over=over))
@@ -64,12 +64,12 @@ def cores() -> int:
 
 def _report(result: Result) -> command_line.Report:
     """Return the final table, with the measured ranges if the scenario names an experiment."""
-    endings = {name: frames.rows_of(table) for name, table in result.endings.items()}
+    endings = {name: trajectory.rows_of(table) for name, table in result.endings.items()}
     summary = result.summary.model_dump()
     is_whole = result.status == FINISHED
     return command_line.Report(
         _answer_lines(result),
-        {"folder": str(result.folder), "final": frames.rows_of(result.columns), **endings, "summary": summary},
+        {"folder": str(result.folder), "final": trajectory.rows_of(result.columns), **endings, "summary": summary},
         before=_end_lines(result),
         notes=[f"results: {result.folder}"] if is_whole else [],
         always=() if is_whole else _way_on(result),

@@ -12,7 +12,7 @@ from blocksim.cli import command_line, prepare, progress
 from blocksim.cli.output import number, table_lines
 from blocksim.errors import OutputExistsError
 from blocksim.options import Option
-from blocksim.simulation.atomic import write_text
+from blocksim.simulation.files import write_text
 from blocksim.study.sensitivity import INDICATOR, Indices, Sensitivity, SensitivityOptions, sensitivity
 
 DIGITS = 3

@@ -9,8 +9,8 @@ from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.options import Option
 from blocksim.scenario import load_stored
-from blocksim.simulation.compilation import kernels_of
-from blocksim.simulation.folder import SCENARIO
+from blocksim.simulation.files import SCENARIO
+from blocksim.simulation.schemes import kernels_of
 from blocksim.study import answer, manifest, stored_run, sweep, sweep_folder, verify
 from blocksim.study.run import Threads
 

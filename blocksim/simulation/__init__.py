@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from blocksim.simulation.ensemble import MemberEnd, MemberFailure, run_ensemble, run_in_batches
-    from blocksim.simulation.frames import Frames
     from blocksim.simulation.loop import Progress, Watcher
-    from blocksim.simulation.result import Result, Summary, read_result, renew_copies
+    from blocksim.simulation.results import Result, Summary, read_result, renew_copies
     from blocksim.simulation.run import simulate, simulate_into
+    from blocksim.simulation.trajectory import Frames
 
 __all__ = [
     "Frames",
@@ -29,9 +29,9 @@ __all__ = [
 # found when first asked for, so that stored results can be read without waiting for numba and the kernels
 _HOMES = {
     "ensemble": ("MemberEnd", "MemberFailure", "run_ensemble", "run_in_batches"),
-    "frames": ("Frames",),
+    "trajectory": ("Frames",),
     "loop": ("Progress", "Watcher"),
-    "result": ("Result", "Summary", "read_result", "renew_copies"),
+    "results": ("Result", "Summary", "read_result", "renew_copies"),
     "run": ("simulate", "simulate_into"),
 }
 

@@ -21,9 +21,9 @@ from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
 from blocksim.scenario import Scenario, load_stored, resolution, units
 from blocksim.scenario.units import TIME
-from blocksim.simulation import atomic, folder as files, provenance, result
-from blocksim.simulation.folder import CHECKPOINTS
-from blocksim.simulation.recorder import Recorder
+from blocksim.simulation import files, provenance, results
+from blocksim.simulation.files import CHECKPOINTS
+from blocksim.simulation.instruments import Recorder
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stores.hdf5 import read_probes, read_rows
 from blocksim.world.build import arrays_of, with_parts
@@ -45,9 +45,9 @@ class Position(BaseModel, frozen=True):
     solver_seconds: float  # of wall time, in all parts so far
     total_seconds: float = 0.0
     threads: int  # that it ran on; it can continue with any number
-    settled: result.RestState | None = None  # how it came to rest before time zero, where it did
+    settled: results.RestState | None = None  # how it came to rest before time zero, where it did
     resumed_from: tuple[int, ...] = ()  # steps at which earlier parts of the run were resumed
-    events: tuple[result.EventRecord, ...] = ()  # that have happened so far
+    events: tuple[results.EventRecord, ...] = ()  # that have happened so far
 
 
 class Origin(BaseModel, frozen=True):
@@ -99,7 +99,7 @@ def write_checkpoint(path: Path, scene: AnyScene, position: Position, origin: Or
     types = tuple(ArrayType(str(array.dtype), array.shape) for array in arrays)
     head = CheckpointHead(format=FORMAT, position=position, origin=origin, arrays=types)
     digest = hashlib.sha256()
-    with atomic.atomic_file(path) as file:
+    with files.atomic_file(path) as file:
         for array in (None, *arrays):
             part = io.BytesIO()
             if array is None:
@@ -214,7 +214,7 @@ class Past:
     resumed_from: tuple[int, ...] = ()
     checkpoint: Path | None = None  # from which this part continues
     step: int | None = None  # of that checkpoint
-    settled: result.RestState | None = None  # how it came to rest before time zero, where it did
+    settled: results.RestState | None = None  # how it came to rest before time zero, where it did
 
 
 @dataclass

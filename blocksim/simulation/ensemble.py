@@ -15,11 +15,11 @@ from blocksim.kernels.common import arrays, compiler, frame_times, systems
 from blocksim.kernels.common.members import Watched
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
-from blocksim.simulation import compilation, events, loop, probes, recorder, settling, team
-from blocksim.simulation.frames import COLUMNS, Columns, Frames, as_frame, final_values
-from blocksim.simulation.ledger import EnergyLedger, adds_up, energy_ledger, ledger_of, next_energy_check, start_energy
+from blocksim.simulation import instruments, loop, observables, rest_state, schemes
+from blocksim.simulation.balance import EnergyLedger, adds_up, energy_ledger, ledger_of, next_energy_check, start_energy
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measure_row, measured_systems, scheme_of
+from blocksim.simulation.trajectory import COLUMNS, Columns, Frames, as_frame, final_values
 from blocksim.world.build import Refusal, SceneStack, member, stack_of_one
 from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
 
@@ -40,13 +40,13 @@ class MemberEnd:
     columns: Columns  # the final table, as `final.csv` has it
     placed: Placed = field(repr=False)
     time_step: float  # s
-    rows: recorder.Rows = field(repr=False)  # one: the last
+    rows: instruments.FrameRows = field(repr=False)  # one: the last
     observables: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
 
     @cached_property
     def frames(self) -> Frames:
         """One: the last."""
-        return recorder.frames_from_rows((blocks_placed(self.placed),), self.time_step, self.rows)
+        return instruments.frames_from_rows((blocks_placed(self.placed),), self.time_step, self.rows)
 
     @property
     def final(self) -> "pd.DataFrame":
@@ -123,7 +123,7 @@ def member_ends(
             columns=dict(zip(COLUMNS, ([body.name for body in placed[m]], *tables[m]), strict=True)),
             placed=placed[m],
             time_step=time_steps[m],
-            rows=recorder.Rows(steps[m], (motion[some],), measured[some], names),
+            rows=instruments.FrameRows(steps[m], (motion[some],), measured[some], names),
             observables=observables[m],
         )
     return ends
@@ -172,8 +172,8 @@ def run_in_batches(
 def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: bool) -> Iterator[list[EnsembleEnd]]:
     with ThreadPoolExecutor(threads) as pool:
         for batch in _batches(scenarios, most):
-            for kernels in dict.fromkeys(map(compilation.kernels_of, batch)):
-                compilation.compile_kernels(kernels)
+            for kernels in dict.fromkeys(map(schemes.kernels_of, batch)):
+                schemes.compile_kernels(kernels)
             ends: dict[int, EnsembleEnd] = {}
             for one in build_stacks(batch):
                 if isinstance(one, Refusal):
@@ -182,7 +182,7 @@ def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: b
                 first, stack = batch[one.numbers[0]], one
                 try:
                     if settles(first):  # it has one scene
-                        scene, _ = settling.initial_scene(member(one.scenes, 0), first, one.placed[0], team.ALONE)
+                        scene, _ = rest_state.initial_scene(member(one.scenes, 0), first, one.placed[0], schemes.ALONE)
                         stack = one._replace(scenes=stack_of_one(scene))
                 except BlocksimError as error:
                     ends[one.numbers[0]] = MemberFailure(error)
@@ -223,13 +223,13 @@ class Ensemble:
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
         own = [scenarios[number] for number in stack.numbers]
         whole = [*zip(own, self.placed, self.time_steps, strict=True)]
-        self.timelines = [events.Timeline(*one) if one[0].events else None for one in whole]
+        self.timelines = [loop.Timeline(*one) if one[0].events else None for one in whole]
         self.last_steps = np.array([loop.last_step_of(one.time.end, step) for one, _, step in whole], dtype=np.int64)
         self.starts = np.zeros((len(own), len(self.scheme.measured)))
         self.codes = np.zeros(len(own), dtype=np.int64)
         self.periods = np.array([max(one.output.every / step, 1.0) for one, _, step in whole])
         start = self._positions(self.scenes, slice(None))
-        self.supports = [probes.MovingSupport(one) for one in own]
+        self.supports = [observables.MovingSupport(one) for one in own]
         self.watch = Watch(self.placed, self.supports, start)
         steps, places = np.zeros(len(own), dtype=np.int64), np.zeros_like(start)
         shapes = self.watch.shapes
@@ -298,7 +298,7 @@ class Ensemble:
     def _positions(self, scenes: AnyScene, which: list[int] | slice) -> NDArray[np.float64]:
         """Return x, y (m) and angle (rad) of the blocks of some scenes of a stack, (k, 3, b)."""
         bodies = scenes.world.bodies.view(np.ndarray)  # a record array takes five times as long for a field
-        return np.stack([bodies[name][which, : len(self.placed[0])] for name in recorder.POSITION], axis=1)
+        return np.stack([bodies[name][which, : len(self.placed[0])] for name in instruments.POSITION], axis=1)
 
     def _measured(self, members: Steps) -> NDArray[np.float64]:
         """Return rows as `measured` of the scheme names them: a call that goes to no further step only measures."""
@@ -331,7 +331,7 @@ class Ensemble:
         code, continues = arrays.REACHED, True
         try:
             if not scene.world.clock[0].is_started:
-                scene, _ = team.ALONE.advance(self.scheme.with_more_room(scene), 0)
+                scene, _ = schemes.ALONE.advance(self.scheme.with_more_room(scene), 0)
                 start = start_energy(scene)
             while continues:
                 done = int(scene.world.clock[0].steps)
@@ -339,10 +339,10 @@ class Ensemble:
                 # frames count until something has moved, and on a support that moves until a block is removed
                 if self.supports[m].moves or not self.watch.first[m]:
                     stop = min(stop, frame_times.next_frame(done, self.periods[m]))
-                event = events.NEVER if timeline is None else timeline.next_step(done)
-                scene, code = team.ALONE.advance(scene, min(stop, event))
+                event = loop.NEVER if timeline is None else timeline.next_step(done)
+                scene, code = schemes.ALONE.advance(scene, min(stop, event))
                 if timeline is not None:
-                    scene, code = timeline.act(scene, team.ALONE, code)
+                    scene, code = timeline.act(scene, schemes.ALONE, code)
                 now = int(scene.world.clock[0].steps)
                 is_under_way = code == arrays.REACHED and now < last
                 continues = is_under_way and (now != look or adds_up(energy_ledger(scene, start)))

@@ -1,21 +1,188 @@
-"""The one time loop, and how it can end: compiled code runs until a frame, an energy check or a checkpoint is due."""
+"""The one time loop, events on the way, and how it can end.
+
+Compiled code runs until a frame, an energy check, an event or a checkpoint is due. Events fall on fixed steps, so that
+no output, checkpoint or number of threads decides about them. What happens is written into the arrays; then the pair
+list is made anew, with springs the forces at the same moment too, and what the scene holds less afterwards is booked as
+an entry of its own in the ledger.
+"""
 
 import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from blocksim.errors import ExitCode
 from blocksim.kernels.common import arrays
-from blocksim.scenario import PlacedBody
-from blocksim.simulation import checkpoint, ledger as books, result
-from blocksim.simulation.events import Timeline
-from blocksim.simulation.recorder import MOTION, Recorder
-from blocksim.simulation.schemes import AnyScene, measure_row, scheme_of
-from blocksim.simulation.team import ALONE, Team
+from blocksim.scenario import PlacedBody, Scenario, events
+from blocksim.scenario.models.timeline import Event
+from blocksim.simulation import balance, checkpoint, results, schemes
+from blocksim.simulation.instruments import MOTION, Recorder
+
+NEVER = np.iinfo(np.int64).max
+NO_SIZE = -1e12  # m: half sides of what is not there: farther than that from everything
+NOT_THERE = {"mass", "inertia", "inverse_mass", "inverse_inertia"}
+RATES = ("vx", "vy", "spin")
+ACCELERATIONS = ("ax", "ay", "spin_rate")
+OF_CONTACTS = ("fx", "fy", "torque", "pairs_now", "pairs_before", "pairs_changed")
+OF_PIECES = ("seats", "coming", "is_asked", "sums_changed")  # see kernels/explicit/inertia.py
+
+
+class Timeline:
+    """The events of one run, and how far they have come."""
+
+    def __init__(self, scenario: Scenario, placed: Sequence[PlacedBody], step: float) -> None:
+        """Take the bodies as placed and the time step (s)."""
+        self.events, self.placed, self.step = scenario.events, placed, step
+        self.names = {body.name: number for number, body in enumerate(placed)}
+        self.walls = events.wall_names(scenario)
+        self.loads = [load.name for load in scenario.loads]
+        self.records: tuple[results.EventRecord, ...] = ()
+        order = events.in_order(self.events)
+        timed = ((self.events[number].at, number) for number in order)
+        self.timed = [(max(1, round(at / step)), number) for at, number in timed if at is not None]
+        self.at_rest = [number for number in order if self.events[number].at is None]
+
+    @property
+    def pending(self) -> list[int]:
+        """Numbers of the events that have not happened."""
+        done = {one.event for one in self.records}
+        return [number for number in range(len(self.events)) if number not in done]
+
+    def next_step(self, done: int) -> int:
+        """Return the next step after `done` at which an event is due."""
+        return min((step for step, _ in self.timed if step > done), default=NEVER)
+
+    def act(self, scene: schemes.AnyScene, team: schemes.Team, status: int) -> tuple[schemes.AnyScene, int]:
+        """Let happen what is due at the step that a scene has come to; return it and the status code.
+
+        Rest ends no run to which anything has yet to happen.
+        """
+        pending = self.pending
+        if not pending or status not in (arrays.REACHED, arrays.AT_REST):
+            return scene, status
+        done = int(scene.world.clock[0].steps)
+        due = [number for step, number in self.timed if step == done and number in pending]
+        if status == arrays.AT_REST:
+            due = due or [number for number in self.at_rest if number in pending][:1]
+            scene.world.clock[0].checks_at_rest = 0
+            status = arrays.REACHED
+        for number in due:
+            scene, status = self._happen(scene, team, number)
+        return scene, status
+
+    def _happen(self, scene: schemes.AnyScene, team: schemes.Team, number: int) -> tuple[schemes.AnyScene, int]:
+        """Change the arrays and have the pair list made anew, and the contacts of this moment where the scheme asks."""
+        before, event, bodies = balance.start_energy(scene), self.events[number], scene.world.bodies.copy()
+        scene, status = self._changed(scene, event), arrays.REACHED
+        clock = scene.world.clock[0]
+        clock.rebuilds = 0
+        if schemes.scheme_of(scene).after_event(scene, bodies):
+            scene, status = team.advance(scene, int(clock.steps))
+        clock, energy = scene.world.clock[0], before - balance.start_energy(scene)
+        clock.checks_at_rest = 0
+        scene.world.ledger[0].events += energy
+        steps = int(clock.steps)
+        what, seconds = events.describe_event(event), steps * self.step
+        record = results.EventRecord(event=number, step=steps, time_s=seconds, what=what, energy_J=energy)
+        self.records = (*self.records, record)
+        return scene, status
+
+    def _changed(self, scene: Any, event: Event) -> Any:
+        """Return the scene with what an event does in its arrays."""
+        world = scene.world
+        for name in event.remove:
+            # walls are the last before the half-plane
+            walls = {wall: world.bodies.size - 1 - k for k, wall in enumerate(reversed(self.walls), start=1)}
+            world = remove_body(world, {**walls, **self.names}[name])
+        for name in event.fix:
+            world = fix_body(world, self.names[name])
+        for name in event.free:
+            world = free_body(world, self.names[name], self.placed[self.names[name]])
+        for name in event.unload:
+            end_load(world, self.loads.index(name))
+        if event.velocity is not None:
+            body = world.bodies[self.names[event.velocity.body]]
+            for rate in RATES if body.inverse_mass > 0.0 else ():
+                if (value := getattr(event.velocity, rate)) is not None:
+                    body[rate] = value
+        return world if isinstance(scene, arrays.World) else scene._replace(world=world)
+
+
+def remove_body(world: arrays.World, number: int) -> arrays.World:
+    """Return a world without a body: it stays where it is, touches nothing, has no mass and never moves."""
+    body = world.bodies[number]
+    world = _without(world, number)
+    body.is_moved = arrays.REMOVED
+    body.half_x = body.half_y = NO_SIZE
+    body.faces = body.corners = body.particle_count = 0
+    _hold(body)
+    return world
+
+
+def fix_body(world: arrays.World, number: int) -> arrays.World:
+    """Return a world with a body that moves with the support from now on; what is not there or fixed is left."""
+    body = world.bodies[number]
+    if body.is_moved in (arrays.SUPPORT, arrays.REMOVED):
+        return world
+    world = _without(world, number)
+    _hold(body)
+    body.is_moved = arrays.SUPPORT
+    ground, controls = world.bodies[-1], world.controls[0]
+    body.vx, body.vy = ground.vx, ground.vy
+    clock = world.clock[0]
+    time, first = float(clock.steps * controls.step), int(clock.motion_piece)
+    initial = int(np.searchsorted(world.motion["start"][first:], time, side="right"))
+    piece = world.motion[first + max(0, initial - 1)]
+    t = time - piece.start
+    moved = float(piece.c0 + t * (piece.c1 + t * (piece.c2 + t * piece.c3)))  # m, of the support so far
+    extended = arrays.zeros(world.moved.size + 1, world.moved.dtype)
+    extended[1:] = world.moved  # those of the support come first
+    first = extended[0]
+    first.body, first.x, first.y = number, body.x - controls.motion_x * moved, body.y - controls.motion_y * moved
+    return world._replace(moved=extended)
+
+
+def free_body(world: arrays.World, number: int, placed: PlacedBody) -> arrays.World:
+    """Return a world with a body that is free from now on, as fast as it is; what is not there or free is left."""
+    body = world.bodies[number]
+    if body.is_moved not in (arrays.SUPPORT, arrays.DRIVEN):
+        return world
+    world = _without(world, number)
+    body.is_moved = 0
+    body.mass, body.inertia = placed.mass, placed.inertia
+    body.inverse_mass, body.inverse_inertia = 1.0 / placed.mass, 1.0 / placed.inertia
+    return world
+
+
+def end_load(world: arrays.World, number: int) -> None:
+    """Let a load be zero from now on, and steady."""
+    load, clock, controls = world.loads[number], world.clock[0], world.controls[0]
+    last = int(load.last_piece) - 1
+    piece = world.load_pieces[last]
+    piece.start, piece.value, piece.rate = clock.steps * controls.step, 0.0, 0.0
+    load.first_piece = last
+    controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()
+
+
+def _hold(body: arrays.Record) -> None:
+    """Take mass, motion and forces from a body."""
+    for name in (*NOT_THERE, *RATES, *ACCELERATIONS, *OF_CONTACTS, *OF_PIECES):
+        body[name] = 0
+
+
+def _without(world: arrays.World, number: int) -> arrays.World:
+    """Return a world whose support and paths do not move a body."""
+    kept = world.moved["body"] != number
+    if kept.all():
+        return world
+    moved = arrays.zeros(int(np.count_nonzero(kept)), world.moved.dtype)
+    moved[:] = world.moved[kept]
+    world.controls[0].driven = np.count_nonzero(moved["shift_end"])
+    return world._replace(moved=moved)
+
 
 MILLI = 1e3
 
@@ -32,7 +199,7 @@ class Outcome:
 END_OF_TIME = Outcome("finished", "end of simulated time", ExitCode.SUCCESS)
 REST = Outcome("finished", "at rest", ExitCode.SUCCESS)
 RESIDUAL = Outcome(
-    "failed", f"energy residual above {books.RESIDUAL_LIMIT:.0%} of the energy in play", ExitCode.NUMERICAL_FAILURE
+    "failed", f"energy residual above {balance.RESIDUAL_LIMIT:.0%} of the energy in play", ExitCode.NUMERICAL_FAILURE
 )
 
 BY_CODE = {
@@ -46,11 +213,11 @@ BY_CODE = {
 }
 
 
-def diagnose(outcome: Outcome, code: int, scene: AnyScene, placed: Sequence[PlacedBody]) -> Outcome:
+def diagnose(outcome: Outcome, code: int, scene: schemes.AnyScene, placed: Sequence[PlacedBody]) -> Outcome:
     """Return the outcome of a run that failed with the step and the block in its reason; of others as it is."""
     if outcome.status != "failed":
         return outcome
-    scheme, world, reason, who = scheme_of(scene), scene.world, outcome.reason, ""
+    scheme, world, reason, who = schemes.scheme_of(scene), scene.world, outcome.reason, ""
     bodies = world.bodies[: len(placed)]
     with np.errstate(all="ignore"):  # not finite numbers are what is searched for
         if code == arrays.OVERLAP_LIMIT:
@@ -72,7 +239,7 @@ def diagnose(outcome: Outcome, code: int, scene: AnyScene, placed: Sequence[Plac
     return replace(outcome, reason=f"{reason} ({who}, step {int(world.clock[0].steps)})")
 
 
-def _lost_system(scene: AnyScene) -> str:
+def _lost_system(scene: schemes.AnyScene) -> str:
     """Return the first of the further systems that has a number which is not finite; empty where none has."""
     for system in getattr(scene, "systems", ()):
         for array in system:
@@ -128,13 +295,13 @@ class LoopResult:
     `overlap` (m) is the largest one of all contacts at the end.
     """
 
-    scene: AnyScene
+    scene: schemes.AnyScene
     outcome: Outcome
-    ledger: books.EnergyLedger
+    ledger: balance.EnergyLedger
     solver_seconds: float
     threads: int
     overlap: float
-    events: tuple[result.EventRecord, ...] = ()
+    events: tuple[results.EventRecord, ...] = ()
     pending: tuple[int, ...] = ()  # numbers of events that have not happened
 
 
@@ -143,18 +310,18 @@ def last_step_of(end: float, step: float) -> int:
     return max(1, round(end / step))
 
 
-def outcome_of(code: int, ledger: books.EnergyLedger) -> Outcome:
+def outcome_of(code: int, ledger: balance.EnergyLedger) -> Outcome:
     """Return what a run came to that was not interrupted: its status code, and whether its energy adds up."""
     outcome = BY_CODE[code]
-    return RESIDUAL if outcome.status == "finished" and not books.adds_up(ledger) else outcome
+    return RESIDUAL if outcome.status == "finished" and not balance.adds_up(ledger) else outcome
 
 
 def run_loop(
-    scene: AnyScene,
+    scene: schemes.AnyScene,
     recorder: Recorder,
     end: float,
     *,
-    team: Team = ALONE,
+    team: schemes.Team = schemes.ALONE,
     control: RunControl = UNCONTROLLED,
     since: checkpoint.Position | None = None,
 ) -> LoopResult:
@@ -171,10 +338,10 @@ def run_loop(
     if why:
         run.write_checkpoint()
     recorder.sample(run.scene)  # wherever it ended
-    ledger = books.energy_ledger(run.scene, run.start)
+    ledger = balance.energy_ledger(run.scene, run.start)
     outcome = Outcome("interrupted", why, ExitCode.STOPPED_EARLY) if why else outcome_of(run.status, ledger)
     outcome = diagnose(outcome, run.status, run.scene, recorder.placed)
-    overlap, timeline = float(measure_row(run.scene)[-1]), control.timeline
+    overlap, timeline = float(schemes.measure_row(run.scene)[-1]), control.timeline
     records, pending = ((), ()) if timeline is None else (timeline.records, tuple(timeline.pending))
     return LoopResult(run.scene, outcome, ledger, run.seconds, team.threads, overlap, records, pending)
 
@@ -194,10 +361,10 @@ class _Run:
 
     def __init__(
         self,
-        scene: AnyScene,
+        scene: schemes.AnyScene,
         recorder: Recorder,
         end: float,
-        team: Team,
+        team: schemes.Team,
         control: RunControl,
         since: checkpoint.Position | None,
     ) -> None:
@@ -216,7 +383,7 @@ class _Run:
                 self.timeline.records = since.events
             return
         self._advance(0)
-        self.start = books.start_energy(self.scene)
+        self.start = balance.start_energy(self.scene)
         self.recorder.sample(self.scene)
         self.recorder.probes.sample(self.scene)
 
@@ -228,7 +395,7 @@ class _Run:
     def advance_towards(self, wanted: int) -> None:
         """Advance towards a step at which a frame is wanted, as far as one call goes."""
         done, before = self.done, time.perf_counter()
-        look = books.next_energy_check(done, self.bodies)
+        look = balance.next_energy_check(done, self.bodies)
         event = wanted if self.timeline is None else self.timeline.next_step(done)
         checkpoints = self.control.checkpoints
         due = checkpoint.NEVER if checkpoints is None else checkpoints.next_step(done)
@@ -241,9 +408,9 @@ class _Run:
             self.recorder.sink.keep_up()  # with the samples
         if self.done == wanted:
             self.recorder.sample(self.scene)
-        ledger = books.energy_ledger(self.scene, self.start)
-        self.is_lost = self.done == look and not books.adds_up(ledger)
-        is_sound = self.status == arrays.REACHED and books.adds_up(ledger) and self.done < self.last
+        ledger = balance.energy_ledger(self.scene, self.start)
+        self.is_lost = self.done == look and not balance.adds_up(ledger)
+        is_sound = self.status == arrays.REACHED and balance.adds_up(ledger) and self.done < self.last
         if is_sound and checkpoints is not None and checkpoints.is_due(self.done):
             self.write_checkpoint()
         self.control.on_progress(Progress(self.done * self.step, self.end, self.done, ledger.relative_residual))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blocksim.scenario import Scenario, scenario_hash
-from blocksim.simulation.ledger import compiled
+from blocksim.simulation.balance import solver_module
 
 if TYPE_CHECKING:
     from blocksim.simulation.schemes import AnyScene
@@ -31,7 +31,7 @@ def code_version() -> str:
 @functools.cache
 def code_hashes() -> dict[str, str]:
     """Return a hash of the code of each room that decides the bits of a run, with the versions it is compiled with."""
-    jit, package = compiled("kernels.common.jit"), Path(__file__).resolve().parents[1]
+    jit, package = solver_module("kernels.common.jit"), Path(__file__).resolve().parents[1]
     return {room: jit.source_hash(package / room) for room in ROOMS}
 
 

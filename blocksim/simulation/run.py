@@ -18,26 +18,15 @@ from blocksim.scenario import PlacedBody, Scenario, motion, placement, scenario_
 from blocksim.scenario.events import describe_event
 from blocksim.scenario.models.motion import Pulse
 from blocksim.silence import silent
-from blocksim.simulation import (
-    checkpoint,
-    compilation,
-    events,
-    folder as files,
-    ledger,
-    loop,
-    observables,
-    provenance,
-    settling,
-)
-from blocksim.simulation.folder import CHECKPOINTS, folder_lock, keep_scenario, probe_tables, read_tables
-from blocksim.simulation.frames import final_columns
-from blocksim.simulation.probes import MovingSupport, bytes_of_series, probes_of
-from blocksim.simulation.recorder import Recorder
-from blocksim.simulation.result import RestState, Result, Summary, keep_result
-from blocksim.simulation.schemes import AnyScene, build, ledger_names, measure_row, scheme_of
-from blocksim.simulation.stopping import WallTime, stop_requests
+from blocksim.simulation import balance, checkpoint, files, loop, observables, provenance, rest_state, schemes
+from blocksim.simulation.files import CHECKPOINTS, folder_lock, keep_scenario, probe_tables, read_tables
+from blocksim.simulation.instruments import Recorder, bytes_of_series, probes_of
+from blocksim.simulation.interruption import WallTime, stop_requests
+from blocksim.simulation.observables import MovingSupport
+from blocksim.simulation.results import RestState, Result, Summary, keep_result
+from blocksim.simulation.schemes import ALONE, AnyScene, Team, build, ledger_names, measure_row, scheme_of, team_for
 from blocksim.simulation.stores.hdf5 import FrameFile
-from blocksim.simulation.team import ALONE, Team, team_for
+from blocksim.simulation.trajectory import final_columns
 from blocksim.world.build import InitialScene, arrays_of
 from blocksim.world.free_memory import readable
 from blocksim.world.memory import is_shorter_than_step, output_count, recorded_contacts, run_bytes
@@ -143,7 +132,7 @@ def simulate(
     began += _compiled(scenario)
     recorder = _recorder(scenario, built)
     with _attended(built.scene, scenario, recorder, threads, limit, on_progress) as (team, control):
-        scene, settled = settling.initial_scene(built.scene, scenario, built.placed, team, control.stop)
+        scene, settled = rest_state.initial_scene(built.scene, scenario, built.placed, team, control.stop)
         ended = loop.run_loop(scene, recorder, scenario.time.end, team=team, control=control)
     return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
 
@@ -179,7 +168,7 @@ def simulate_into(
         recorder, stored = _recorder(scenario, built), resumption.checkpoint
         with _attended(built.scene, scenario, recorder, threads, limit, on_progress) as (team, control):
             if stored is None:
-                scene, settled = settling.initial_scene(built.scene, scenario, built.placed, team, control.stop)
+                scene, settled = rest_state.initial_scene(built.scene, scenario, built.placed, team, control.stop)
                 past = checkpoint.Past(settled=settled)
                 files.prepare_folder(folder, overwrite=overwrite or resume)
             else:
@@ -219,9 +208,9 @@ def simulate_into(
 def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> float:
     """Compile what a run needs and return the seconds it took, which are no part of the run. Raises OutputError."""
     began = time.perf_counter()
-    kernels = compilation.kernels_of(scenario)
+    kernels = schemes.kernels_of(scenario)
     listener.on_start(kernels)
-    compilation.compile_kernels(kernels)
+    schemes.compile_kernels(kernels)
     if scenario.systems:  # these need code of their own
         with compiling():
             measure_row(ALONE.advance(build(scenario).scene, 0)[0])
@@ -234,7 +223,7 @@ def _attended(
 ) -> Iterator[tuple[Team, loop.RunControl]]:
     """Give the threads of a run, its events, and what stops it: a signal, or the limit of wall time."""
     elements = sum(one.count for one in others_of(scenario))
-    timeline = events.Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
+    timeline = loop.Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
     with stop_requests() as requests, team_for(scene, threads, elements) as team:
         yield team, loop.RunControl(on_progress, lambda: requests.reason() or limit.reason(), timeline=timeline)
 
@@ -267,7 +256,7 @@ def _result(
         time_step_s=step,
         simulated_time_s=steps * step,
         ended_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        compile_seconds=compilation.compile_kernels(compilation.kernels_of(scenario, recorder.placed)),
+        compile_seconds=schemes.compile_kernels(schemes.kernels_of(scenario, recorder.placed)),
         solver_seconds=ended.solver_seconds,
         total_seconds=seconds,
         energy_J=ended.ledger,
@@ -288,8 +277,8 @@ def _warnings(
     scenario: Scenario, placed: Sequence[PlacedBody], ended: loop.LoopResult, settled: RestState | None
 ) -> Iterator[str]:
     residual, every = ended.ledger.relative_residual, scenario.output.every
-    if residual > ledger.RESIDUAL_PROMISE:
-        yield f"relative energy error {residual:.1e}, above {ledger.RESIDUAL_PROMISE:g}"
+    if residual > balance.RESIDUAL_PROMISE:
+        yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
     if is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from warnings_of(scenario)

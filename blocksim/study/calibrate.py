@@ -17,7 +17,7 @@ from blocksim.scenario import Document, Source, document_of, scenario_hash, scen
 from blocksim.scenario.document import locate
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import KeyPath, follow, format_key, with_value
-from blocksim.simulation import atomic, compilation, folder as files, stopping
+from blocksim.simulation import files, interruption, schemes
 from blocksim.study import calibrate_plan
 from blocksim.study.executors.ensemble import run_members
 
@@ -198,7 +198,7 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
     on Ctrl-C.
     """
     plan = calibrate_plan.calibration_plan(document_of(scenario), options)
-    options.on_start(compilation.kernels_of(plan.base))
+    options.on_start(schemes.kernels_of(plan.base))
     resume, overwrite = options.resume, options.overwrite
     name = hashlib.sha256(str(plan.fingerprint()).encode()).hexdigest()[:12]
     path = Path(options.out or files.RESULTS / plan.base.name / f"calibrate-{name}" / WRITTEN)
@@ -219,7 +219,7 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
     head = f"{Path(plan.document.source.where).name} calibrated by blocksim: {which}{shown}"
     text = fitted_text(plan.document, best.values, _provenance(fit), path.parent, head, note)
     if kept is None:
-        atomic.write_text(path, text)
+        files.write_text(path, text)
     elif kept.read_bytes() != text.encode():
         raise OutputExistsError(TAKEN.format(kept))
     return fit
@@ -256,7 +256,7 @@ def _searched(
         members = calibrate_plan.members_of(plan.scatter, values, plan.members, plan.seed)
         return calibrate_plan.score_of(run_members(plan.bare, members), plan.ranges)
 
-    with calibrate_plan.open_journal(journal, plan.fingerprint()) as study, stopping.interruptible():
+    with calibrate_plan.open_journal(journal, plan.fingerprint()) as study, interruption.interruptible():
         done = len(calibrate_plan.finished_trials(study))
         if kept is not None and done < trials:  # they would change the file
             raise OutputExistsError(TAKEN.format(kept))

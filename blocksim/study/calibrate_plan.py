@@ -22,7 +22,7 @@ from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, Sweep, input_files, overrides, scenario_hash, units
 from blocksim.scenario.models.study import Normal, Uniform, toml_number
 from blocksim.silence import silent
-from blocksim.simulation import atomic, folder, provenance
+from blocksim.simulation import files, provenance
 from blocksim.study import compare, plan as plans
 from blocksim.study.executors.ensemble import Member
 from blocksim.study.rows import Range, check_experiment, ranges_of, si_number, values_at
@@ -170,7 +170,7 @@ class CalibrationPlan:
             "scenario": scenario_hash(self.base),
             "priors": [str((one.key, one.low, one.high, one.unit, one.log)) for one in self.priors],
             "scatter": None if self.scatter is None else str(self.scatter.as_table()),
-            "experiment": atomic.sha256_of(Path(self.table.source)),
+            "experiment": files.sha256_of(Path(self.table.source)),
             "members": self.members,
             "seed": self.seed,
             "code": provenance.code_hash(),
@@ -441,7 +441,7 @@ def open_journal(journal: Path, plan: Mapping[str, object]) -> "Iterator[Study]"
     optuna.logging.set_verbosity(logging.ERROR)
     try:
         with journal.open("ab") as file:
-            if not folder.takes_lock(file.fileno()):
+            if not files.takes_lock(file.fileno()):
                 where = "wait for it, or choose another file with --out"
                 raise OutputExistsError(f"{journal}: another calibration is running here; {where}")
             refuse_other_file(journal)

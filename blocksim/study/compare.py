@@ -10,15 +10,15 @@ from blocksim.analysis.metrics import Judgement, Settings, judge
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
 from blocksim.scenario import load_scenario, load_stored
-from blocksim.simulation import Result, folder as files
-from blocksim.simulation.result import read_final, read_summary
+from blocksim.simulation import Result, files
+from blocksim.simulation.results import read_final, read_summary
 from blocksim.study import manifest, rows, stored_run, sweep_folder
 from blocksim.study.manifest import SweepResult
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from blocksim.simulation.frames import Columns
+    from blocksim.simulation.trajectory import Columns
 
 ExperimentTablePath = Annotated[
     Path | str | None,

@@ -31,7 +31,7 @@ from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, start
 from blocksim.silence import silent
-from blocksim.simulation import compilation, folder as files, provenance, result, schemes, stopping
+from blocksim.simulation import files, interruption, provenance, results, schemes
 from blocksim.study.executors import Setting, Task, processes
 from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance
@@ -326,7 +326,7 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     check_experiment(scenario)
     schemes.build_scene(scenario)
     refinements = refinements_of(scenario, studies)
-    compilation.compile_kernels(compilation.kernels_of(scenario))
+    schemes.compile_kernels(schemes.kernels_of(scenario))
     folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / FOLDER
     runs = LevelRuns(scenario, folder, options.jobs or os.cpu_count() or 1, options.on_run)
     found = runs.refine(refinements, tolerance_mm, levels)
@@ -359,13 +359,13 @@ class LevelRuns:
         jobs = min(self.jobs, len(tasks))
         run = processes.run_tasks if jobs > 1 else processes.run_here
         try:
-            with stopping.interruptible(), closing(run(iter(tasks), Setting(jobs, folder=self.folder))) as batches:
+            with interruption.interruptible(), closing(run(iter(tasks), Setting(jobs, folder=self.folder))) as batches:
                 for task, row in (pair for batch in batches for pair in zip(batch.tasks, batch.rows, strict=True)):
                     kept = {**row, "reason": DIED} if row == processes.DEAD else row.copy()
                     with suppress(BlocksimError):  # what the setting decides: time in compiled code, without files
                         if row != processes.DEAD:
                             path = self.folder / task.name / files.SUMMARY
-                            kept["seconds"] = result.read_summary(path).solver_seconds
+                            kept["seconds"] = results.read_summary(path).solver_seconds
                     self.rows[task.name] = kept
                     self.on_run(named[task.name][0], kept)
         except KeyboardInterrupt:

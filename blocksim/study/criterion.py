@@ -18,7 +18,7 @@ from enum import StrEnum
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import units as q
 from blocksim.scenario.spelling import did_you_mean_or_list
-from blocksim.simulation import observables, result
+from blocksim.simulation import observables, results
 from blocksim.study.rows import FINISHED
 
 STANDS = "--stands"
@@ -72,7 +72,7 @@ class Criterion:
 
 def falls_before_zero(row: Mapping[str, object]) -> bool:
     """Return True for the row of a run that did not come to rest before time zero (`start.settle`)."""
-    return result.NOT_AT_REST in str(row.get("reason", ""))
+    return results.NOT_AT_REST in str(row.get("reason", ""))
 
 
 def read_criterion(text: str, option: str = STANDS) -> Criterion:

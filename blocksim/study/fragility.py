@@ -21,7 +21,7 @@ from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.extras import load_module
 from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of
-from blocksim.simulation import compilation, observables
+from blocksim.simulation import observables, schemes
 from blocksim.study import criterion, fragility_plan, manifest, sweep, sweep_folder
 from blocksim.study.answer import Answer, Overview, Study, with_unit
 from blocksim.study.executors import Execution
@@ -225,7 +225,7 @@ def run_fragility(
     base = plan.document.build()
     cases, kind = plan.cases, FragilityAnswer.files
     folder = make_folder(options.out, base, kind, plan.name, overwrite=options.overwrite)
-    compilation.compile_kernels(compilation.kernels_of(base))
+    schemes.compile_kernels(schemes.kernels_of(base))
     with closing(manifest.Manifest(folder / shard.file(manifest.MANIFEST), "fragility study")) as kept:
         share = sweep.SweepRun(cases, shard, kept, options.on_row, kind=kind, table=MEMBERS_TABLE)
         if options.retry_failed:

@@ -21,8 +21,8 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
-from blocksim.simulation import atomic, observables
-from blocksim.simulation.folder import brief_lock, takes_lock
+from blocksim.simulation import files as atomic, observables
+from blocksim.simulation.files import brief_lock, takes_lock
 from blocksim.study import plan, rows
 
 if TYPE_CHECKING:

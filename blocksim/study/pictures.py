@@ -17,8 +17,8 @@ from blocksim.options import Option, Replace, takes
 from blocksim.scenario import Scenario, input_files, load_scenario, load_stored, overrides, spelling, units
 from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.silence import silent
-from blocksim.simulation import folder as files
-from blocksim.simulation.folder import refuse_foreign
+from blocksim.simulation import files
+from blocksim.simulation.files import refuse_foreign
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import answer, compare, manifest, stored_run, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, is_angle, quarter_turns

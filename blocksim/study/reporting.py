@@ -10,8 +10,8 @@ from blocksim.analysis.experiment import load_table
 from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import input_files, load_stored
-from blocksim.simulation import folder as files
-from blocksim.simulation.folder import refuse_foreign
+from blocksim.simulation import files
+from blocksim.simulation.files import refuse_foreign
 from blocksim.study import answer, compare, manifest, stored_run, sweep_folder
 from blocksim.study.pictures import read_sweep_data
 from blocksim.study.rows import FINISHED, TABLE

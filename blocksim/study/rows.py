@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 from blocksim.analysis import compare, experiment
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.scenario import Scenario, Sweep, place_bodies, units
-from blocksim.simulation.frames import COLUMNS, Columns
+from blocksim.simulation.trajectory import COLUMNS, Columns
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from blocksim.simulation.loop import Outcome
-    from blocksim.simulation.result import Summary
+    from blocksim.simulation.results import Summary
 
 Row = dict[str, object]
 FINISHED = "finished"  # status of a run that has come to its end

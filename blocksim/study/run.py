@@ -9,17 +9,8 @@ from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.silence import silent
-from blocksim.simulation import (
-    Result,
-    Watcher,
-    checkpoint,
-    folder as files,
-    read_result,
-    renew_copies,
-    simulate,
-    simulate_into,
-)
-from blocksim.simulation.result import changed_results, read_summary
+from blocksim.simulation import Result, Watcher, checkpoint, files, read_result, renew_copies, simulate, simulate_into
+from blocksim.simulation.results import changed_results, read_summary
 from blocksim.simulation.run import NO_CALLBACKS, RunCallbacks
 from blocksim.study import rows, stored_run
 

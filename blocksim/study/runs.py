@@ -11,7 +11,7 @@ from typing import Self, TypeVar
 from blocksim.errors import BlocksimError, InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Document, Scenario
 from blocksim.silence import silent
-from blocksim.simulation import compilation, folder as files, provenance, stopping
+from blocksim.simulation import files, interruption, provenance, schemes
 from blocksim.study.executors import Batch, Execution, Run, Setting, Task
 from blocksim.study.manifest import MANIFEST, PATTERN, Entry, Manifest, read_entries, values_hash
 from blocksim.study.rows import Row, check_experiment, invalid_row
@@ -55,7 +55,7 @@ class Runs:
                 yield Task(number, provenance.run_hash(scenario), wanted[key], scenario)
 
         try:
-            with stopping.stop_requests() as is_stopped:
+            with interruption.stop_requests() as is_stopped:
                 setting = replace(self._setting, is_stopped=is_stopped)
                 with closing(self._run(tasks(), setting)) as batches:
                     for batch in batches:
@@ -88,7 +88,7 @@ def runs_of(
     """
     _, setting = execution.ready()
     folder = make_folder(out, base, kind, name, overwrite=overwrite)
-    compilation.compile_kernels(compilation.kernels_of(base))
+    schemes.compile_kernels(schemes.kernels_of(base))
     what = kind.what.split(" ", 1)[1]
     with closing(Manifest(folder / MANIFEST, what)) as manifest, execution.for_rounds() as run:
         yield Runs(manifest, document, run, replace(setting, peaks=peaks))

@@ -16,7 +16,7 @@ from blocksim.options import Option, takes
 from blocksim.scenario import Source, Sweep, document_of
 from blocksim.scenario.models.study import Normal, Variation
 from blocksim.silence import silent
-from blocksim.simulation import compilation, frames
+from blocksim.simulation import schemes, trajectory
 from blocksim.study import plan as plans
 from blocksim.study.executors.ensemble import run_members
 from blocksim.study.rows import quarter_turns, ranges_of, values_at
@@ -142,7 +142,7 @@ class Output(NamedTuple):
     values: Floats
 
 
-def outputs_of(finals: Sequence[frames.Columns], table: ExperimentTable | None) -> list[Output]:
+def outputs_of(finals: Sequence[trajectory.Columns], table: ExperimentTable | None) -> list[Output]:
     """Return every measured quantity (without a table: x of the first blocks), and indicators of the outcome."""
     blocks = finals[0]["block"]
     outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
@@ -297,7 +297,7 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
         raise InvalidInputError(f"nothing to vary: give {form}, or a [sweep] table with distributions")
     document = document.without_sweep()
     base = document.build()
-    options.on_start(compilation.kernels_of(base))
+    options.on_start(schemes.kernels_of(base))
     table = None if base.experiment is None else load_table(base.experiment.table)
     count = method.samples if options.samples is None else options.samples
     if count < LEAST_BLOCKS:

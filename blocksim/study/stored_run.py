@@ -10,10 +10,10 @@ from typing import NamedTuple, Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored, spelling
-from blocksim.simulation import folder as files
-from blocksim.simulation.frames import Frames
-from blocksim.simulation.result import EventRecord, read_summary
+from blocksim.simulation import files
+from blocksim.simulation.results import EventRecord, read_summary
 from blocksim.simulation.stores.hdf5 import read_frames
+from blocksim.simulation.trajectory import Frames
 from blocksim.study.rows import FINISHED, TABLE
 
 MOST_FOLDERS = 5  # named in a message

@@ -19,7 +19,7 @@ from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
 from blocksim.scenario.models.study import Sweep
 from blocksim.silence import silent
-from blocksim.simulation import compilation, folder as files, provenance, stopping
+from blocksim.simulation import files, interruption, provenance, schemes as compilation
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.study import executors, manifest, plan as plans, rows, sweep_folder
 
@@ -177,7 +177,7 @@ class SweepRun:
     def run(self, executor: executors.Run, setting: executors.Setting, *, fail_fast: bool = False) -> None:
         """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
         try:
-            with stopping.stop_requests() as is_stopped:
+            with interruption.stop_requests() as is_stopped:
                 setting = replace(setting, is_stopped=is_stopped)
                 # closed here and now: left to the garbage collector, workers would continue
                 with closing(executor(self._tasks(), setting)) as batches:

@@ -16,8 +16,8 @@ from pydantic import BaseModel, ValidationError
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario, input_files, overrides, spelling
 from blocksim.scenario.models.motion import TABLED, FromTable, content_of
-from blocksim.simulation import atomic, folder as files, provenance
-from blocksim.simulation.folder import is_resolved
+from blocksim.simulation import files, provenance
+from blocksim.simulation.files import is_resolved
 
 MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each
 log = logging.getLogger(__name__)
@@ -115,7 +115,7 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: F
                 tables={},
             )
             text = origin.model_copy(update={"sha256": sums}).model_dump_json(indent=2)
-            atomic.write_text(folder / kind.origin, text + "\n")
+            files.write_text(folder / kind.origin, text + "\n")
 
 
 def read_origin(folder: Path, kind: FolderKind = SWEEP) -> Origin | None:
@@ -197,15 +197,15 @@ def note_table(path: Path, written: Path, kind: FolderKind) -> None:
         noted = origin.model_copy(update={"tables": {**(origin.tables or {}), path.name: holds}})
         kept = json.loads(input_files.read_limited(path.parent / kind.origin, input_files.MEGABYTE))
         data = {**kept, "tables": noted.model_dump(mode="json")["tables"]}
-        atomic.write_text(path.parent / kind.origin, json.dumps(data, indent=2) + "\n")
+        files.write_text(path.parent / kind.origin, json.dumps(data, indent=2) + "\n")
 
 
 def write_table(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]]) -> None:
     """Write a table of a study, heads first, one row after the other. Raises as `note_table`."""
-    with atomic.atomic_path(path) as temporary:
+    with files.atomic_path(path) as temporary:
         with temporary.open("w", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows(rows)
-        atomic.sync_file(temporary)
+        files.sync_file(temporary)
         note_table(path, temporary, kind)
 
 
@@ -214,7 +214,7 @@ def write_answer(path: Path, kind: FolderKind, rows: Iterable[Sequence[object]],
     write_table(path, kind, rows)
     origin = read_origin(path.parent, kind)
     begun = {} if origin is None else origin.model_dump(mode="json", exclude_none=True)
-    atomic.write_text(path.parent / kind.origin, json.dumps({**begun, **answer}, indent=2) + "\n")
+    files.write_text(path.parent / kind.origin, json.dumps({**begun, **answer}, indent=2) + "\n")
 
 
 def case_folder(sweep: Path, case: str) -> Path | None:
@@ -257,4 +257,4 @@ def keep_varied(folder: Path, document: Document, vary: Mapping[str, object], *,
             if copy.exists() and not overwrite and copy.read_bytes() != content:
                 raise OutputExistsError(f"{copy}: is not the table of this sweep; --overwrite replaces it")
             files.make_folder(copy.parent)
-            atomic.write_bytes(copy, content)
+            files.write_bytes(copy, content)

@@ -28,15 +28,15 @@ from blocksim.silence import silent
 from blocksim.simulation import (
     Watcher,
     checkpoint,
-    folder as files,
+    files,
+    instruments,
     observables,
-    probes,
     provenance,
     read_result,
-    result,
+    results,
     simulate,
 )
-from blocksim.simulation.frames import csv_text
+from blocksim.simulation.trajectory import csv_text
 from blocksim.study import answer, manifest, plan, stored_run, sweep, sweep_folder
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row
@@ -66,7 +66,7 @@ class EntryDifference:
 
 
 def differing_entries(
-    folder: Path, then: result.Summary, now: result.Summary, *, same_code: bool
+    folder: Path, then: results.Summary, now: results.Summary, *, same_code: bool
 ) -> tuple[EntryDifference, ...]:
     """Return which entries of a run's folder are not those of its repetition; some of them only for the same code.
 
@@ -104,7 +104,7 @@ def apart(file: str, entry: str, stored: Any, now: Any) -> Iterator[EntryDiffere
 
 
 def differing_samples(
-    stored: Mapping[str, probes.ProbeSeries], again: Mapping[str, probes.ProbeSeries]
+    stored: Mapping[str, instruments.ProbeSeries], again: Mapping[str, instruments.ProbeSeries]
 ) -> Iterator[EntryDifference]:
     """Yield where the samples of each probe first are others, in the column that comes first."""
     for name, now in again.items():
@@ -127,7 +127,7 @@ def differing_samples(
 def _read_entries(path: Path) -> dict[str, Any]:
     """Return the entries of a file. Raises InputMissingError or InvalidInputError."""
     try:
-        entries = json.loads(input_files.read_limited(path, result.MOST_BYTES))
+        entries = json.loads(input_files.read_limited(path, results.MOST_BYTES))
     except (ValueError, RecursionError) as error:
         raise InvalidInputError(f"{path}: not the entries of a run: {error}") from error
     if not isinstance(entries, dict):
@@ -175,8 +175,8 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     InvalidInputError (ScenarioError) for files that cannot be read, StoppedEarlyError where the repetition is stopped.
     """
     folder = stored_run.find_run(place)
-    summary = result.read_summary(folder / files.SUMMARY)
-    changed = result.changed_files(folder, summary)
+    summary = results.read_summary(folder / files.SUMMARY)
+    changed = results.changed_files(folder, summary)
     try:
         stored = read_result(folder)
     except InvalidInputError as error:  # what cannot be read because it was changed is reported as such

@@ -20,8 +20,8 @@ from blocksim.analysis.compare import Verdict, compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_properties, load_table
 from blocksim.errors import BlocksimError, OutputError
 from blocksim.scenario import Scenario, load_scenario
-from blocksim.simulation.atomic import write_text
-from blocksim.simulation.result import Result
+from blocksim.simulation.files import write_text
+from blocksim.simulation.results import Result
 from blocksim.simulation.run import simulate
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.reference import markdown

@@ -15,7 +15,7 @@ from typing import Any
 
 from blocksim.scenario.key_table import with_part
 from blocksim.scenario.models.timeline import IMPULSES
-from blocksim.simulation.atomic import write_text
+from blocksim.simulation.files import write_text
 from blocksim.verification.case import Case, Row, Setting, run_case
 from blocksim.verification.cases import CASES, choose_cases, excluded_cases
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import REACHED, World
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.simulation import ledger, team
+from blocksim.simulation import balance, schemes
 from blocksim.simulation.schemes import AnyScene, build_scene, measure_row, scheme_of
 from blocksim.verification import closed_forms as forms
 from blocksim.world.build import arrays_of
@@ -43,7 +43,7 @@ class Simulation:
         self.scene = scene
         self.status = REACHED
         self.to_step(0)
-        self.start_energy = ledger.start_energy(self.scene)  # J, of all that it holds and has lost: constant
+        self.start_energy = balance.start_energy(self.scene)  # J, of all that it holds and has lost: constant
 
     @property
     def bodies(self) -> Any:
@@ -79,7 +79,7 @@ class Simulation:
 
     def to_step(self, last_step: int) -> Self:
         """Advance to a step number."""
-        self.scene, self.status = team.ALONE.advance(self.scene, last_step)
+        self.scene, self.status = schemes.ALONE.advance(self.scene, last_step)
         return self
 
     def to_time(self, time: float) -> Self:
@@ -108,7 +108,7 @@ class Simulation:
 
     def residual(self) -> float:
         """Return the residual of the ledger, as a share of the energy in play."""
-        return ledger.energy_ledger(self.scene, self.start_energy).relative_residual
+        return balance.energy_ledger(self.scene, self.start_energy).relative_residual
 
     def state(self) -> NDArray[np.float64]:
         """Return x, y, angle, vx, vy, spin of all bodies, one row a body."""

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError, OutputError, UnavailableError
-from blocksim.simulation.atomic import atomic_path, write_bytes
-from blocksim.simulation.folder import NAME
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.files import NAME, atomic_path, write_bytes
+from blocksim.simulation.trajectory import Frames
 from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.paint import Paint, by_block, draw_key
 

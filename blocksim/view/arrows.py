@@ -9,7 +9,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.models.loads import Force, Gravity, Horizontal, Moment, Pressure
 from blocksim.scenario.start import NORMALS
-from blocksim.simulation.frames import Contacts, Frames, Rows, forces_on_a
+from blocksim.simulation.trajectory import Contacts, Frames, Rows, forces_on_a
 from blocksim.view import style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices, Support, rotate_points
 from blocksim.view.scene import Canvas

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.trajectory import Frames
 from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.paint import Paint, by_block, draw_key
 

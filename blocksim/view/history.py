@@ -10,7 +10,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
-from blocksim.simulation.frames import Frames, force_on_supports
+from blocksim.simulation.trajectory import Frames, force_on_supports
 from blocksim.view import arrows, final, run_data, style, time_panels
 from blocksim.view.paint import Paint, by_block
 from blocksim.world.systems.blocks import BLOCKS

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.simulation.frames import SUPPORT, Frames, Rows
 from blocksim.simulation.observables import MOVED_SHARE
+from blocksim.simulation.trajectory import SUPPORT, Frames, Rows
 from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.paint import by_displacement, displacements, draw_key
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.trajectory import Frames
 from blocksim.view import run_data, style
 
 SPEED_COLOURS = "YlGnBu"  # light at rest; darker in steps that are seen in grey as well

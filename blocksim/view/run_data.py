@@ -13,8 +13,8 @@ from blocksim.scenario import PlacedSegment, Scenario, place_bodies, placement
 from blocksim.scenario.events import wall_names
 from blocksim.scenario.models.loads import AnyLoad, OnBody, Stretch, stretches_of
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
-from blocksim.simulation.frames import Frames
-from blocksim.simulation.result import EventRecord
+from blocksim.simulation.results import EventRecord
+from blocksim.simulation.trajectory import Frames
 from blocksim.world.systems.blocks import boxes_around, least_widths, local_corners, radii
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.scenario import PlacedSegment, placement
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.trajectory import Frames
 from blocksim.view import run_data, style
 from blocksim.view.paint import Paint
 from blocksim.world.systems.blocks import are_removed, local_corners, placed_points

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.trajectory import Frames
 from blocksim.view import arrows, final, run_data, scene, style
 from blocksim.view.paint import Paint, by_block, draw_key
 

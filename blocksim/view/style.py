@@ -14,7 +14,7 @@ from unicodedata import east_asian_width
 
 from blocksim.errors import InvalidInputError
 from blocksim.options import Option
-from blocksim.simulation.atomic import write_bytes
+from blocksim.simulation.files import write_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

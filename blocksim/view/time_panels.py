@@ -10,7 +10,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import motion, spelling, units
-from blocksim.simulation import probes
+from blocksim.simulation import instruments
 from blocksim.view import style
 from blocksim.view.run_data import MILLIMETRES, Floats, Indices, Support
 
@@ -162,7 +162,7 @@ MOST_USUAL, CUT = 3.0, 1.5  # times what they hardly exceed: forces beyond are c
 
 
 def draw_probes(
-    series: Mapping[str, probes.ProbeSeries],
+    series: Mapping[str, instruments.ProbeSeries],
     path: Path,
     title: str | None = None,
     names: Sequence[str] = (),
@@ -188,7 +188,7 @@ def draw_probes(
         style.save_figure(figure, path)
 
 
-def probe_picture(probe: probes.ProbeSeries) -> bytes:
+def probe_picture(probe: instruments.ProbeSeries) -> bytes:
     """Return the picture (PNG) of one probe, for a report; nothing of one without samples."""
     panels = panels_of(probe)
     if not panels:
@@ -197,7 +197,7 @@ def probe_picture(probe: probes.ProbeSeries) -> bytes:
         return style.figure_bytes(figure, ".png")
 
 
-def panels_of(probe: probes.ProbeSeries) -> list[TimePanel]:
+def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
     """Return the panels of a probe; none of one without samples."""
 
     def panel(quantity: str, unit: str, factor: float, columns: Mapping[str, Floats]) -> TimePanel:
@@ -211,14 +211,14 @@ def panels_of(probe: probes.ProbeSeries) -> list[TimePanel]:
 
     if not len(probe):
         return []
-    if probe.kind == probes.JOINT:
+    if probe.kind == instruments.JOINT:
         ends = {f"opening at {one} end": probe[f"opening_{one}"] for one in ("first", "last")}  # not in time
         return [panel("joint", "mm", MILLIMETRES, {**ends, "slip": probe["slip"]})]
-    if probe.kind == probes.ENERGY:
+    if probe.kind == instruments.ENERGY:
         energies = energy_groups(probe.columns, np.arange(len(probe)))
         factor, unit = unit_for(max((_largest(one) for one in energies.values()), default=0.0), "J")
         return [panel("energy", unit, factor, energies)] if energies else []
-    if probe.kind == probes.POINT:
+    if probe.kind == instruments.POINT:
         moves = any(not np.array_equal(probe[one], probe[f"relative_{one}"]) for one in ("dx", "dy"))
         places, velocities = (columns(*(f"{'relative_' * moves}{one}{axis}" for axis in "xy")) for one in "dv")
         return [

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blocksim.analysis.bits import differences
-from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, UNITS, Frames, join_contacts
+from blocksim.simulation.trajectory import CONTACT_ROW, SUPPORT, UNITS, Frames, join_contacts
 
 COUNT, BLOCKS = 5, 3
 

@@ -12,7 +12,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from blocksim.cli.app import app
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.trajectory import Frames
 from blocksim.view.report.page import write_report
 from blocksim.view.report.subjects import StudyPage, read_stored, run_subject, study_subject
 from tests.browser.conftest import PLAYER, Open, Opened

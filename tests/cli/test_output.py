@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.cli.output import note, number, print_json, table_lines
 from blocksim.cli.prepare import announce_compilation
-from blocksim.simulation import compilation
+from blocksim.simulation import schemes
 
 
 def test_columns_line_up() -> None:
@@ -51,8 +51,8 @@ def test_notes_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> No
 def test_compiled_solver_that_cannot_be_kept_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(compilation, "is_compiled", lambda _: False)
-    monkeypatch.setattr(compilation, "compile_kernels", lambda _: 30.0)
+    monkeypatch.setattr(schemes, "is_compiled", lambda _: False)
+    monkeypatch.setattr(schemes, "compile_kernels", lambda _: 30.0)
     monkeypatch.setattr("blocksim.kernels.common.jit.cache_folder", lambda: Path("/disk/blocksim/0123"))
     announce_compilation("surface", quiet=False)
     told = capsys.readouterr().err.splitlines()

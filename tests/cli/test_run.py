@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.simulation.folder import folder_lock
+from blocksim.simulation.files import folder_lock
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
 RUN = ("run", "scenarios/three_blocks_nominal.toml", *SOFT)
@@ -181,7 +181,7 @@ def test_the_end_of_a_run_reads_none_of_its_frames(blocksim: Command, monkeypatc
     def read(*_: object) -> None:
         pytest.fail("frames are read again")
 
-    monkeypatch.setattr("blocksim.simulation.result.read_frames", read)
+    monkeypatch.setattr("blocksim.simulation.results.read_frames", read)
     answer = blocksim("run", "scenarios/three_blocks_nonsmooth.toml", "--set", "time.end=0.02", "--out", "run")
     assert answer.code in {0, 1}
     assert "results: run" in answer.err

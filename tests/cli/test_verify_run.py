@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from blocksim.cli.app import app
-from blocksim.simulation.atomic import sha256_of
+from blocksim.simulation.files import sha256_of
 from blocksim.study.fragility import fragility
 from blocksim.study.limit import limit, limit_curve
 from blocksim.study.manifest import read_entries

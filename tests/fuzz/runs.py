@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from blocksim.scenario import load_scenario, place_bodies
-from blocksim.simulation.recorder import Frame, Recorder
+from blocksim.simulation.instruments import Frame, Recorder
 from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.common.shapes import place_corners
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
-from blocksim.simulation.team import Team
+from blocksim.simulation.schemes import Team
 from blocksim.verification.scene import scenario_of
 from blocksim.world.build import build_world
 

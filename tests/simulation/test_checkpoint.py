@@ -19,8 +19,7 @@ from blocksim.simulation.checkpoint import (
     restore_scene,
     write_checkpoint,
 )
-from blocksim.simulation.schemes import build_scene
-from blocksim.simulation.team import ALONE
+from blocksim.simulation.schemes import ALONE, build_scene
 from blocksim.world.build import arrays_of
 from tests.simulation.sliding import MODELS, sliding
 

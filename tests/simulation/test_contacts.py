@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation import Result, simulate, simulate_into
-from blocksim.simulation.frames import SUPPORT, Contacts, force_on_supports, forces_on_a
 from blocksim.simulation.stores.hdf5 import read_frames
+from blocksim.simulation.trajectory import SUPPORT, Contacts, force_on_supports, forces_on_a
 from tests.simulation.conftest import Shipped
 
 EVERY_STEP = 1e-9  # s; no step is shorter

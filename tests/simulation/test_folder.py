@@ -14,8 +14,7 @@ import pytest
 
 from blocksim.errors import OutputError, OutputExistsError
 from blocksim.simulation import Result, renew_copies, simulate_into
-from blocksim.simulation.atomic import write_text
-from blocksim.simulation.folder import (
+from blocksim.simulation.files import (
     clear_remains,
     default_folder,
     folder_lock,
@@ -23,8 +22,9 @@ from blocksim.simulation.folder import (
     make_folder,
     newest_finished,
     prepare_folder,
+    write_text,
 )
-from blocksim.simulation.frames import COLUMNS, csv_text
+from blocksim.simulation.trajectory import COLUMNS, csv_text
 from tests.simulation.conftest import SCENARIOS, Shipped
 from tests.simulation.sliding import MODELS, interrupted_at, sliding
 
@@ -242,7 +242,7 @@ def test_a_read_only_file_system_is_reported(read_only: Path) -> None:
 HOLD = """
 import sys
 from pathlib import Path
-from blocksim.simulation.folder import folder_lock
+from blocksim.simulation.files import folder_lock
 with folder_lock(Path(sys.argv[1])):
     print("folder_lock", flush=True)
     sys.stdin.read()

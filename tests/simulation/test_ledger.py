@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from blocksim.simulation import run_ensemble, simulate, simulate_into
+from blocksim.simulation.balance import BODY_STEPS, FIRST_CHECK, EnergyLedger, next_energy_check
 from blocksim.simulation.checkpoint import CheckpointPolicy
-from blocksim.simulation.ledger import BODY_STEPS, FIRST_CHECK, EnergyLedger, next_energy_check
 
 if TYPE_CHECKING:
     from pathlib import Path

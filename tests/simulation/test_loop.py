@@ -6,8 +6,8 @@ import pytest
 
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.simulation import loop, simulate
+from blocksim.simulation.instruments import Recorder
 from blocksim.simulation.loop import CALL_SECONDS, MOST_GROWTH, steps_of_call
-from blocksim.simulation.recorder import Recorder
 from blocksim.world.build import build_world
 from tests.simulation.conftest import Shipped
 
@@ -40,7 +40,7 @@ def test_last_step_is_the_nearest_and_at_least_one(end: float, step: float, last
 
 
 def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blocksim.simulation.ledger.RESIDUAL_LIMIT", 1e-30)
+    monkeypatch.setattr("blocksim.simulation.balance.RESIDUAL_LIMIT", 1e-30)
     scenario = soft(time__end=0.25)
     world = build_world(scenario)
     recorder = Recorder(place_bodies(scenario), 1e-2, float(world.controls[0].step))

@@ -11,8 +11,7 @@ from blocksim.scenario import PlacedBody, Scenario, load_scenario, place_bodies
 from blocksim.simulation import simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
-from blocksim.simulation.observables import Movement, Response, Watch
-from blocksim.simulation.probes import AT_REST, MovingSupport
+from blocksim.simulation.observables import AT_REST, Movement, MovingSupport, Response, Watch
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FALLING = {"contact.stiffness_scale": 0.001, "time.end": 0.2, "output.every": 0.005}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import OutputError, OutputExistsError
-from blocksim.simulation.folder import refuse_foreign
+from blocksim.simulation.files import refuse_foreign
 from blocksim.view.animation import write_gif, write_mp4
 from blocksim.view.style import save_figure, styled_figure
 

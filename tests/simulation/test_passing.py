@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from blocksim.scenario import Scenario
-    from blocksim.simulation.result import Result
+    from blocksim.simulation.results import Result
 
 WIDTH, HEIGHT = 0.032, 0.025  # m, of the block that is thrown
 LONG = 0.4  # m, of the plate that it is thrown at

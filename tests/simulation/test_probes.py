@@ -10,8 +10,8 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.simulation import Result, loop, simulate, simulate_into
-from blocksim.simulation.folder import prepare_folder
-from blocksim.simulation.probes import ProbeSeries
+from blocksim.simulation.files import prepare_folder
+from blocksim.simulation.instruments import ProbeSeries
 from blocksim.simulation.stores.hdf5 import read_probes
 from tests.simulation.sliding import interrupted_at
 

@@ -11,7 +11,7 @@ import pytest
 
 from blocksim.kernels.common.jit import source_hash
 from blocksim.simulation import Result, provenance
-from blocksim.simulation.result import read_summary
+from blocksim.simulation.results import read_summary
 from tests.simulation.conftest import Shipped
 
 NEW = ("llvmlite", "cpu", "cpu_features", "code_kernels", "code_scenario", "code_simulation", "code_world")

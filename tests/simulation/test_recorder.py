@@ -2,7 +2,7 @@
 
 import pytest
 
-from blocksim.simulation.recorder import Recorder
+from blocksim.simulation.instruments import Recorder
 
 
 def steps_of(recorder: Recorder, last: int) -> list[int]:

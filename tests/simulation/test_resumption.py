@@ -16,8 +16,7 @@ from blocksim.scenario import load_scenario
 from blocksim.simulation import simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy, find_resumption, read_checkpoint
 from blocksim.simulation.provenance import code_hashes
-from blocksim.simulation.schemes import build_scene
-from blocksim.simulation.team import Team
+from blocksim.simulation.schemes import Team, build_scene
 from blocksim.world.build import arrays_of
 from tests.simulation.sliding import MODELS, assert_same, interrupted_at, sliding
 from tests.sizes import in_all

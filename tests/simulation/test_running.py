@@ -18,9 +18,8 @@ import pytest
 from blocksim.errors import InputMissingError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, load_scenario, placement
 from blocksim.simulation import Progress, Result, read_result, simulate, simulate_into
-from blocksim.simulation.compilation import compile_kernels
 from blocksim.simulation.run import RunCallbacks, bytes_needed
-from blocksim.simulation.schemes import build_scene
+from blocksim.simulation.schemes import build_scene, compile_kernels
 from blocksim.world.step import StepError
 from tests.simulation.sliding import sliding
 

@@ -11,7 +11,7 @@ import pytest
 
 from blocksim.scenario import load_scenario
 from blocksim.simulation import Progress, simulate_into
-from blocksim.simulation.ledger import RESIDUAL_PROMISE
+from blocksim.simulation.balance import RESIDUAL_PROMISE
 from tests.simulation.conftest import SCENARIOS
 
 SIZE = {} if os.environ.get("BLOCKSIM_SOAK") == "full" else {"structures.0.rows": 10, "structures.0.columns": 25}

@@ -213,7 +213,7 @@ def test_blocks_and_soil_act_on_one_another_with_opposite_forces() -> None:
 def test_bits_do_not_depend_on_the_number_of_threads_nor_on_interruptions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("blocksim.simulation.team.useful_threads", lambda threads, *_: threads)
+    monkeypatch.setattr("blocksim.simulation.schemes.useful_threads", lambda threads, *_: threads)
     blocks = {"any": {"width": 0.04, "height": 0.04, "length": DEPTH, "material": "smooth"}}
     carried = [{"block": "any", "x": 0.07, "y": 0.02}, {"block": "any", "x": 0.02, "y": 0.121}]
     scenario = scene(

@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.simulation import Result
-from blocksim.simulation.result import read_summary
+from blocksim.simulation.results import read_summary
 
 
 def test_missing_summary_is_reported(tmp_path: Path) -> None:

@@ -17,12 +17,10 @@ from blocksim.scenario import Scenario, json_schema, load_scenario, scenario_fro
 from blocksim.scenario.models.base import SYSTEMS
 from blocksim.simulation import run_ensemble
 from blocksim.simulation.checkpoint import CheckpointPolicy
-from blocksim.simulation.compilation import SMALLEST_SCENE
-from blocksim.simulation.frames import data_set, tidy_table
 from blocksim.simulation.loop import BY_CODE, diagnose
-from blocksim.simulation.schemes import build
+from blocksim.simulation.schemes import ALONE, SMALLEST_SCENE, build, team_for
 from blocksim.simulation.stores.exports import write_frames_csv, write_vtkhdf
-from blocksim.simulation.team import ALONE, team_for
+from blocksim.simulation.trajectory import data_set, tidy_table
 from blocksim.view import style
 from blocksim.view.animation import Animation, Look
 from blocksim.view.report import player

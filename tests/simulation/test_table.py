@@ -10,7 +10,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.simulation import Frames, Result
-from blocksim.simulation.frames import COLUMNS, as_frame, csv_text, final_columns, read_table
+from blocksim.simulation.trajectory import COLUMNS, as_frame, csv_text, final_columns, read_table
 
 
 def frames_of(angle: float, start_angle: float) -> Frames:

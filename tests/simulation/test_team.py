@@ -12,8 +12,7 @@ from blocksim.bench.scenes import pushed_wall
 from blocksim.errors import InvalidInputError
 from blocksim.simulation import simulate
 from blocksim.simulation.provenance import state_hash
-from blocksim.simulation.schemes import BODIES_A_THREAD
-from blocksim.simulation.team import ALONE, Team, team_for, useful_threads
+from blocksim.simulation.schemes import ALONE, BODIES_A_THREAD, Team, team_for, useful_threads
 from blocksim.world import build
 from blocksim.world.build import build_world
 

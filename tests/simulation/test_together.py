@@ -15,7 +15,7 @@ import pytest
 
 from blocksim.scenario import Scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.simulation import simulate_into
-from blocksim.simulation.folder import CHECKPOINTS
+from blocksim.simulation.files import CHECKPOINTS
 from tests.simulation.sliding import assert_same, interrupted_at
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import blocksim
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import Result
-from blocksim.simulation.probes import bytes_of_series
+from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study import run as single
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run

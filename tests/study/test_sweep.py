@@ -18,7 +18,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document, load_scenario
-from blocksim.simulation.folder import is_resolved
+from blocksim.simulation.files import is_resolved
 from blocksim.simulation.observables import table_columns
 from blocksim.study.executors.ensemble import run_case
 from blocksim.study.fragility import fragility

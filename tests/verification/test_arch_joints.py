@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from blocksim.simulation.frames import Frames
+    from blocksim.simulation.trajectory import Frames
     from blocksim.study.limit_answer import LimitAnswer
 
 HINGE, SLIP = 0.99, 0.999  # of half a joint from its middle, and of the friction that a joint has

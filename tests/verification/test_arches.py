@@ -13,8 +13,8 @@ import pytest
 from blocksim.scenario import load_scenario
 from blocksim.scenario.geometry import centre_outline
 from blocksim.simulation import simulate
+from blocksim.simulation.rest_state import SettleError
 from blocksim.simulation.schemes import build_scene
-from blocksim.simulation.settling import SettleError
 from blocksim.study.limit import limit_curve
 from blocksim.verification.arches import COCCHETTI_RIZZI, HEAD, VOUSSOIRS, least_thickness
 from blocksim.verification.scene import Simulation

@@ -3,7 +3,7 @@
 At the onset of slip the base of a block follows the support until the contacts have built up the limiting shear force:
 springs need a time of sqrt(m/k) for that, in which a block of some height tilts on its normal springs as well; rigid
 contacts are as soft as their substep is long. The velocity that is gained stays until the block sticks again. A pulse
-that begins at its peak at time zero therefore finds contacts that carry its inertial force already (settling.py): its
+that begins at its peak at time zero therefore finds contacts that carry its inertial force already (rest_state.py): its
 slip is then right to 1e-4 with springs of any stiffness, whatever the proportions of the block. Without that, slips are
 too large by 2.1 to 5.9 % at the stone's own stiffness, in proportion to 1/sqrt(stiffness), as they are in a pulse that
 begins so abruptly later on; run.json warns of it.

@@ -28,7 +28,7 @@ from tests.view.sweeps.made_up import grid, made_up, samples
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.simulation.frames import Frames
+    from blocksim.simulation.trajectory import Frames
     from blocksim.view.style import Paper
     from blocksim.view.sweeps.data import SweepData
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
-from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, Contacts, Frames
+from blocksim.simulation.trajectory import CONTACT_ROW, SUPPORT, Contacts, Frames
 
 HOSTILE = (
     "<script>alert(1)</script>",

@@ -12,7 +12,7 @@ from PIL.GifImagePlugin import GifImageFile
 from blocksim.errors import InvalidInputError, OutputError, UnavailableError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.motion import MotionPieces
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.trajectory import Frames
 from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, draw_animation, frame_times, ticks
 from blocksim.view.paint import PAINTS
 from blocksim.view.run_data import Support

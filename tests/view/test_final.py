@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from blocksim.simulation.frames import final_columns
+from blocksim.simulation.trajectory import final_columns
 from blocksim.view.final import draw_final
 from blocksim.view.history import Choice, draw_history
 from blocksim.view.paint import by_turn

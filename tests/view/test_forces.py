@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.frames import CONTACT_ROW, Contacts
+from blocksim.simulation.trajectory import CONTACT_ROW, Contacts
 from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.arrows import FORCES, ForceScale, arrows, force_scale, round_down
 from blocksim.view.kinds import RUN_KINDS

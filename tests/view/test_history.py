@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
-from blocksim.simulation.frames import force_on_supports
+from blocksim.simulation.trajectory import force_on_supports
 from blocksim.view import style
 from blocksim.view.history import ENERGY_LOOKS, Choice, draw_history, line_looks
 from blocksim.view.paint import by_speed

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation.result import EventRecord
+from blocksim.simulation.results import EventRecord
 from blocksim.view.arrows import FORCE, PRESSURE, SPEED, Actions, Arrows, actions_on, with_room
 from blocksim.view.run_data import Support, extent_of, support_of
 from tests.view.made_up import blocks_at
@@ -16,7 +16,7 @@ from tests.view.made_up import blocks_at
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from blocksim.simulation.frames import Frames
+    from blocksim.simulation.trajectory import Frames
 
 WIDTH, HEIGHT = 0.2, 0.4  # m
 QUARTER = 0.5 * np.pi

@@ -7,7 +7,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation import simulate_into
-from blocksim.simulation.probes import COLUMNS, ENERGY, ProbeSeries, series_of
+from blocksim.simulation.instruments import COLUMNS, ENERGY, ProbeSeries, series_of
 from blocksim.view.report.page import page_text
 from blocksim.view.report.subjects import read_stored, run_subject
 from blocksim.view.time_panels import draw_probes, panels_of

@@ -8,8 +8,8 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_to_toml
-from blocksim.simulation.frames import Frames
-from blocksim.simulation.result import EventRecord
+from blocksim.simulation.results import EventRecord
+from blocksim.simulation.trajectory import Frames
 from blocksim.view.run_data import Support, drawable_frames, moments_at, moments_by_motion, path_travelled, support_of
 from tests.view.made_up import blocks_at
 

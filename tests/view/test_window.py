@@ -5,7 +5,7 @@ import pytest
 
 from blocksim.scenario import PlacedSegment
 from blocksim.scenario.motion import MotionPieces
-from blocksim.simulation.frames import Frames
+from blocksim.simulation.trajectory import Frames
 from blocksim.view.run_data import Extent, Support, extent_of, parts_within, rotate_points
 from blocksim.view.scene import corners
 from tests.view.made_up import blocks_at

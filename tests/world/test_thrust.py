@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from blocksim.scenario import load_scenario, place_bodies
-from blocksim.simulation.schemes import build
-from blocksim.simulation.settling import SettleError, settle
-from blocksim.simulation.team import ALONE
+from blocksim.simulation.rest_state import SettleError, settle
+from blocksim.simulation.schemes import ALONE, build
 from blocksim.world.bodies import layout_of
 from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.rigid_step import USUAL_STEP, thrust_shift

@@ -1,43 +1,38 @@
-"""The stepping schemes: what each is to the rest of the simulation, and how to find that of a scene.
+"""The stepping schemes: what each is to the rest of the simulation; building, compiling and advancing scenes of any.
 
 A new one is one file of this folder and one line in `blocksim.scenario.models.timeline.SCHEMES`. Nothing outside this
 folder and the kernels asks which scheme a scene is of: it asks the scheme.
 """
 
+import functools
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any, NamedTuple, TypeVar
+from types import TracebackType
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.errors import BlocksimError
-from blocksim.kernels.common.arrays import ALL, OUTLINE, Records, World
+from blocksim.errors import BlocksimError, InvalidInputError, OutputError
+from blocksim.kernels.common import arrays, compiler, jit
 from blocksim.kernels.common.systems import Coupled, measure_systems, plan_of
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.scenario import PlacedBody, Scenario, overlap
+from blocksim.scenario import PlacedBody, Scenario, overlap, placement, scenario_from_mapping
 from blocksim.scenario.models.timeline import SCHEMES as TABLES
 from blocksim.scenario.motion import settles
 from blocksim.silence import silent
-from blocksim.simulation.frames import CONTACT_ROW, Rows
+from blocksim.simulation import trajectory
 from blocksim.world import build as scenes
-from blocksim.world.build import (
-    Construction,
-    InitialScene,
-    Refusal,
-    SceneStack,
-    build_one,
-    couple,
-    group_equal,
-    stack_of_one,
-)
 from blocksim.world.systems import others_of
 
-AnyScene = World | Nonsmooth
+AnyScene = arrays.World | Nonsmooth
 """The arrays of a scene under way; `world` are those that all schemes share."""
-Scene = TypeVar("Scene", bound=World | Nonsmooth | Coupled)
+Scene = TypeVar("Scene", bound=arrays.World | Nonsmooth | Coupled)
 
 BODIES_A_THREAD = 100
 """With fewer, threads of the usual schemes wait for one another longer than they work."""
@@ -70,11 +65,11 @@ class SettlingSteps(NamedTuple):
 SHORT_STEPS = SettlingSteps()
 
 
-def outlines_of(world: World) -> overlap.Outlines:
+def outlines_of(world: arrays.World) -> overlap.Outlines:
     """Return the outlines of all bodies, those of polygons in boxes about their centroids."""
     bodies = world.bodies
     outlines = overlap.Outlines.rectangles(*(bodies[name] for name in ("x", "y", "half_x", "half_y", "cos", "sin")))
-    polygons = np.flatnonzero(bodies["faces"] == OUTLINE)
+    polygons = np.flatnonzero(bodies["faces"] == arrays.OUTLINE)
     if not polygons.size:
         return outlines
     shapes, shape_of = np.unique(bodies[["first_corner", "corner_count"]][polygons], return_inverse=True)
@@ -85,10 +80,10 @@ def outlines_of(world: World) -> overlap.Outlines:
     return outlines._replace(polygons=np.stack([rows["x"], rows["y"]], axis=-1))
 
 
-def smallest_sides(world: World, one: NDArray[Any], other: NDArray[Any]) -> Floats:
+def smallest_sides(world: arrays.World, one: NDArray[Any], other: NDArray[Any]) -> Floats:
     """Return the smallest side (m) of each pair of bodies, infinite where neither has any."""
     half = np.minimum(world.bodies["half_x"], world.bodies["half_y"])
-    side = np.where((half > 0.0) & (world.bodies["faces"] == ALL), 2.0 * half, np.inf)
+    side = np.where((half > 0.0) & (world.bodies["faces"] == arrays.ALL), 2.0 * half, np.inf)
     smallest: Floats = np.minimum(side[one], side[other])
     return smallest
 
@@ -119,7 +114,7 @@ class Scheme:
     # building
     name: str  # time.scheme
     scene_type: type
-    construction: Construction  # of its scenes at time zero
+    construction: scenes.Construction  # of its scenes at time zero
     with_systems: "Scheme | None" = None  # the same for scenes with systems beside blocks and supports
 
     # advancing
@@ -132,7 +127,7 @@ class Scheme:
     with_threads: Callable[[Any, int], Any] = lambda scene, *_: scene  # with room for what they exchange
     threads_of: Callable[[Any], int] = lambda _: 1  # for how many threads there is such room
     for_another_thread: Callable[[Any], Any] = lambda scene, *_: scene  # the same scene with work space of its own
-    after_event: Callable[[Any, Records], bool] = lambda *_: False
+    after_event: Callable[[Any, arrays.Records], bool] = lambda *_: False
     # brings its arrays up to date with bodies that an event has changed, given these before; whether a call that goes
     # to no further step is to evaluate contacts anew
 
@@ -156,7 +151,8 @@ class Scheme:
     # recording and diagnosis
     ledger: tuple[str, ...]  # energies (J) that are measured
     measure: Callable[[Any, Any], None]  # writes energies, number of contacts and largest overlap into a row
-    contacts: Callable[[Any, int], Rows] = lambda *_: np.zeros(0, CONTACT_ROW)  # of a scene with so many blocks
+    contacts: Callable[[Any, int], trajectory.Rows] = lambda *_: np.zeros(0, trajectory.CONTACT_ROW)
+    # of a scene with so many blocks
     overlaps: Callable[[Any], Overlaps] = lambda _: NO_OVERLAPS  # of a scene that an overlap has ended
     lost_contact: Callable[[Any, Overlaps], str] = lambda *_: ""
     # why it has ended, where not by contact.max_overlap
@@ -199,14 +195,14 @@ def build_scene(scenario: Scenario) -> AnyScene:
     return scene
 
 
-def build(scenario: Scenario) -> InitialScene:
+def build(scenario: Scenario) -> scenes.InitialScene:
     """Return the same scene with the blocks as they were placed."""
-    built = build_one(scenario, SCHEMES[scenario.time.scheme].construction)
+    built = scenes.build_one(scenario, SCHEMES[scenario.time.scheme].construction)
     others = others_of(scenario)
-    return built._replace(scene=couple(scenario, built.scene, others)) if others else built
+    return built._replace(scene=scenes.couple(scenario, built.scene, others)) if others else built
 
 
-def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[SceneStack | Refusal]:
+def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[scenes.SceneStack | scenes.Refusal]:
     """Build the scenes of scenarios at time zero, those of one scheme and shape together.
 
     A scene with systems beside blocks and supports, one of a scheme without a way to advance members together, and one
@@ -217,7 +213,7 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[SceneStack | Refusal
         scheme = SCHEMES[scenario.time.scheme]
         is_alone = scenario.systems or scenario.events or scheme.advance_members is None or settles(scenario)
         keys.append(None if is_alone else scheme.name)
-    for places in group_equal(keys):
+    for places in scenes.group_equal(keys):
         key = keys[places[0]]
         if key is not None:
             some = [scenarios[i] for i in places]
@@ -227,9 +223,9 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[SceneStack | Refusal
             try:
                 built = build(scenarios[i])
             except BlocksimError as error:
-                yield Refusal(i, error)
+                yield scenes.Refusal(i, error)
             else:
-                yield SceneStack([i], [built.placed], stack_of_one(built.scene))
+                yield scenes.SceneStack([i], [built.placed], scenes.stack_of_one(built.scene))
 
 
 def ledger_names(scene: AnyScene | Coupled) -> tuple[str, ...]:
@@ -258,3 +254,129 @@ def measured_systems(scene: AnyScene | Coupled) -> tuple[Floats, float]:
     row, masses = np.zeros(sum(counts)), np.cumsum(counts) - 1  # a mass after the energies of each
     measure_systems(scene, row)
     return np.delete(row, masses), sum(row[masses].tolist(), 0.0)
+
+
+START_SECONDS = 60.0
+
+
+def useful_threads(threads: int, bodies: int, least_bodies: int = BODIES_A_THREAD) -> int:
+    """Return how many of `threads` are of use for a scene; the result is the same for any number, bit for bit.
+
+    `bodies` are blocks and elements of further systems, `least_bodies` is the scheme's.
+    """
+    most = 1 if jit.config.DISABLE_JIT else max(1, bodies // least_bodies)
+    return min(threads, most)
+
+
+def team_for(scene: AnyScene, threads: int, elements: int = 0) -> "Team":
+    """Return a team of as many of `threads` as are of use for a scene with so many elements of further systems.
+
+    Raises ValueError for less than one.
+    """
+    bodies = scene.world.bodies.size - 1 + elements
+    return Team(useful_threads(threads, bodies, scheme_of(scene).least_bodies))
+
+
+class Team:
+    """A fixed number of threads that advance a world, this one among them."""
+
+    def __init__(self, threads: int = 1) -> None:
+        """Take as many as are asked for, however many cores there are. Raises ValueError for less than one."""
+        if threads < 1:
+            raise ValueError(f"threads must be at least 1, not {threads}")
+        self.threads = threads
+        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
+
+    def __enter__(self) -> Self:
+        """Start the other threads. Raises InvalidInputError where the system does not give that many."""
+        if self._pool is not None:
+            everybody = threading.Barrier(self.threads, timeout=START_SECONDS)
+            try:
+                for _ in range(self.threads - 1):
+                    self._pool.submit(everybody.wait)
+                everybody.wait()
+            except RuntimeError as error:  # no more threads, or one that does not start
+                everybody.abort()
+                raise InvalidInputError(f"{self.threads} threads cannot be started here: {error}") from error
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the other threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def advance(self, scene: Scene, last_step: int) -> tuple[Scene, int]:
+        """Advance to a step, giving the pair lists more room as often as needed; return scene and status code."""
+        scheme = scheme_of(scene)
+        if scheme.threads_of(scene) != self.threads:
+            scene = scheme.with_threads(scene, self.threads)
+        status = self._advance(scene, last_step)
+        while status == arrays.PAIRS_FULL:
+            scene = scheme.with_more_room(scene)
+            status = self._advance(scene, last_step)
+        return scene, status
+
+    def _advance(self, scene: Scene, last_step: int) -> int:
+        scheme = scheme_of(scene)
+        if self._pool is None:
+            return scheme.advance(scene, last_step)
+        scene.world.team[arrays.TEAM_SIZE] = self.threads
+        others = [scheme.for_another_thread(scene) for _ in range(1, self.threads)]
+        for k, other in enumerate(others, start=1):
+            self._pool.submit(scheme.advance_in_team, other, last_step, k)
+        return int(scheme.advance_in_team(scene, last_step, 0))
+
+
+ALONE = Team()
+
+
+DEFAULT = "surface"  # the set without a mark of its own in the cache
+SMALLEST_SCENE = {
+    "schema": 1,
+    "name": "compile",
+    "materials": {"any": {"density": 1000.0, "young_modulus": 1e9, "poisson_ratio": 0.3}},
+    "blocks": {"any": {"width": 1.0, "height": 1.0, "length": 1.0, "material": "any"}},
+    "bodies": [{"block": "any", "x": 0.0, "y": 0.5}],
+}
+
+
+def kernels_of(scenario: Scenario, placed: Sequence[PlacedBody] | None = None) -> str:
+    """Return which set of kernels a scenario needs; `placed` are its bodies, where they are known."""
+    scheme = SCHEMES[scenario.time.scheme]
+    kernels = scheme.kernels(scenario.contact.model)
+    if placement.has_outlines(scenario):
+        kernels = scheme.of_outlines.get(kernels, kernels)
+    return scheme.kernel_variant(kernels, scenario, placed)
+
+
+@functools.cache
+def compile_kernels(kernels: str = DEFAULT) -> float:
+    """Compile a set of kernels, or load it from the cache on disk; return the seconds it took.
+
+    Works once a process. Raises OutputError where the disk of the cache fails.
+    """
+    began = time.perf_counter()
+    try:
+        with compiler.compiling():
+            changes = next(
+                scheme.kernel_sets.get(kernels, {"time": {"scheme": scheme.name}})
+                for scheme in SCHEMES.values()
+                if kernels in (*scheme.kernel_sets, scheme.kernels(""))
+            )
+            scene, _ = ALONE.advance(build_scene(scenario_from_mapping({**SMALLEST_SCENE, **changes})), 0)
+            measure_row(scene)
+            if kernels != DEFAULT:
+                jit.mark(kernels)
+    except OSError as error:
+        raise OutputError(
+            f"{jit.cache_folder()}: the compiled solver cannot be stored there: {error.strerror or error}; "
+            "free some space, or set BLOCKSIM_CACHE_DIR to a folder on another disk"
+        ) from error
+    return time.perf_counter() - began
+
+
+def is_compiled(kernels: str = DEFAULT) -> bool:
+    """Return True if a set of kernels lies in the cache (or nothing has to be compiled)."""
+    return jit.is_compiled() if kernels == DEFAULT else jit.is_marked(kernels)

@@ -14,8 +14,8 @@ from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
 from blocksim.kernels.explicit.models import KERNEL, SURFACE as SURFACE_MODEL
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.scenario.overlap import penetration
-from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, UNITS, Rows
 from blocksim.simulation.schemes import BODIES_A_THREAD, Overlaps, Scheme, outlines_of, smallest_sides
+from blocksim.simulation.trajectory import CONTACT_ROW, SUPPORT, UNITS, Rows
 from blocksim.world import build
 
 WORK_SPACE = ("points", "matrices", "before", "action")

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import REMOVED, Records
 from blocksim.kernels.nonsmooth import arrays, energy, step
-from blocksim.simulation import frames, schemes
+from blocksim.simulation import schemes, trajectory
 from blocksim.world import nonsmooth, sag
 
 Floats = NDArray[np.float64]
 
 
-def nonsmooth_contacts(scene: arrays.Nonsmooth, blocks: int) -> frames.Rows:
+def nonsmooth_contacts(scene: arrays.Nonsmooth, blocks: int) -> trajectory.Rows:
     """Return all points that press, those of a manifold beside one another; bodies from `blocks` on are the support."""
     stepping = scene.contacts.stepping[0]
     manifolds = scene.contacts.constraints[: int(stepping.constraint_count)]
@@ -26,17 +26,17 @@ def nonsmooth_contacts(scene: arrays.Nonsmooth, blocks: int) -> frames.Rows:
     rows = points[points["normal_force"] > 0.0]
     for name in ("normal_force", "shear_force"):
         rows[name] /= float(stepping.substep)
-    rows["body_b"][rows["body_b"] >= blocks] = frames.SUPPORT
+    rows["body_b"][rows["body_b"] >= blocks] = trajectory.SUPPORT
     return rows
 
 
-def _points(scene: arrays.Nonsmooth, manifolds: Any, which: str, along: float) -> frames.Rows:
+def _points(scene: arrays.Nonsmooth, manifolds: Any, which: str, along: float) -> trajectory.Rows:
     """Return one point of every manifold, with impulses (N s); `along` counts widths from point one."""
     nx, ny = manifolds["nx"], manifolds["ny"]
     body = scene.world.bodies[manifolds["a"]]
     above, beside = manifolds["shear_arm_a"], along * manifolds["width"] - manifolds["arm_a"]
     normal, total = manifolds[f"normal_{which}"], manifolds["normal_one"] + manifolds["normal_two"]
-    rows = np.zeros(len(manifolds), frames.CONTACT_ROW)
+    rows = np.zeros(len(manifolds), trajectory.CONTACT_ROW)
     rows["body_a"], rows["body_b"] = manifolds["a"], manifolds["b"]
     rows["x"], rows["y"] = body["x"] + above * nx - beside * ny, body["y"] + above * ny + beside * nx
     rows["normal_x"], rows["normal_y"] = nx, ny

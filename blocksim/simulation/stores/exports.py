@@ -18,14 +18,14 @@ from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.structures.polygons import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
-from blocksim.simulation import atomic, folder, probes
-from blocksim.simulation.frames import BODIES, UNITS, Contacts, Frames, forces_on_a, join_contacts
+from blocksim.simulation import files, instruments
+from blocksim.simulation.trajectory import BODIES, UNITS, Contacts, Frames, forces_on_a, join_contacts
 from blocksim.world.systems.blocks import BLOCKS, are_removed, distinct, local_corners, placed_points, supports_track
 from blocksim.world.systems.system import Floats, Track
 
 FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
 CONTACT_NUMBERS = sorted(UNITS, key=lambda name: "m1N".index(UNITS[name]))  # lengths, directions, forces
-CONTACT_COLUMNS = ("time_s", *BODIES, *(f"{name}{probes.TABLE_UNITS[UNITS[name]][0]}" for name in CONTACT_NUMBERS))
+CONTACT_COLUMNS = ("time_s", *BODIES, *(f"{name}{instruments.TABLE_UNITS[UNITS[name]][0]}" for name in CONTACT_NUMBERS))
 NOBODY = ""
 """Name of what is no block: the ground, or a wall."""
 
@@ -55,7 +55,7 @@ def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
     names = np.array([*frames.names, NOBODY], dtype=object)  # the support has number -1
 
     def table(rows: NDArray[Any]) -> Iterator[tuple[Any, ...]]:
-        columns = [probes.TABLE_UNITS[UNITS[name]][1] * rows[name] for name in CONTACT_NUMBERS]
+        columns = [instruments.TABLE_UNITS[UNITS[name]][1] * rows[name] for name in CONTACT_NUMBERS]
         return zip(*(names[rows[name]] for name in BODIES), *(column.tolist() for column in columns), strict=True)
 
     _write(path, CONTACT_COLUMNS, frames.time, (table(contacts.at(k)) for k in range(len(contacts))))
@@ -64,7 +64,7 @@ def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
 
 def _write(path: Path, heads: Sequence[str], times: Floats, tables: Iterable[Iterable[tuple[Any, ...]]]) -> None:
     """Write a table of rows at each of the times (s); what is not finite is an empty cell."""
-    with atomic.atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+    with files.atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(heads)
         for time, rows in zip(times.tolist(), tables, strict=True):
@@ -98,7 +98,7 @@ def write_geojson(path: Path, frames: Frames, scenario: Scenario) -> int:
         for corners, body, rotation in _last_blocks(frames, scenario)
     ]
     lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
-    atomic.write_text(path, f'{{{folder.GEOJSON_MARK}, "type": "FeatureCollection", "features": [\n{lines}\n]}}\n')
+    files.write_text(path, f'{{{files.GEOJSON_MARK}, "type": "FeatureCollection", "features": [\n{lines}\n]}}\n')
     return len(features)
 
 
@@ -111,7 +111,7 @@ def write_dxf(path: Path, frames: Frames, scenario: Scenario) -> int:
     ezdxf = load_module("ezdxf", f"writing {path.name}", DXF)
     blocks = [*_last_blocks(frames, scenario)]
     document = ezdxf.new("R2010", units=METRES)
-    document.header.custom_vars.append(*folder.DXF_PROPERTY)
+    document.header.custom_vars.append(*files.DXF_PROPERTY)
     document.appids.new(DXF_APPLICATION)
     space = document.modelspace()
     for corners, body, _ in blocks:
@@ -119,7 +119,7 @@ def write_dxf(path: Path, frames: Frames, scenario: Scenario) -> int:
         line = space.add_lwpolyline(corners.tolist(), close=True, dxfattribs=layer)
         name = CONTROLS.sub("_", body.name)[:MOST_LETTERS]
         line.set_xdata(DXF_APPLICATION, [(DXF_TEXT, name), (DXF_INTEGER, int(body.fixed))])
-    with atomic.atomic_path(path) as temporary:
+    with files.atomic_path(path) as temporary:
         document.saveas(temporary)
     return len(blocks)
 
@@ -215,7 +215,7 @@ def write_contacts_vtkhdf(path: Path, frames: Frames, contacts: Contacts) -> int
     data: dict[str, Any] = {name: rows[name].astype(np.int64) + 1 for name in BODIES}
     data["force_on_a_N"] = np.pad(force, ((0, 0), (0, 1)))
     for name in CONTACT_NUMBERS:
-        suffix, factor = probes.TABLE_UNITS[UNITS[name]]
+        suffix, factor = instruments.TABLE_UNITS[UNITS[name]]
         data[f"{name}{suffix}"] = factor * rows[name]
     with _grid(path, frames, chosen) as group:
         for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
@@ -255,7 +255,7 @@ def _grid(path: Path, frames: Frames, chosen: Indices) -> Iterator[Any]:
             group.create_dataset("FieldData/block_names", data=names, dtype=h5py.string_dtype("ascii"))
             steps["FieldDataOffsets/block_names"] = np.zeros(times, dtype=np.int64)
             steps["FieldDataSizes/block_names"] = np.array([[1, len(names)]] * times, dtype=np.int64)
-    atomic.write_bytes(path, content.getbuffer())
+    files.write_bytes(path, content.getbuffer())
 
 
 def _finite(frames: Frames) -> Indices:

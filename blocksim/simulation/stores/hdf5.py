@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.scenario import Scenario, events, input_files, place_bodies
-from blocksim.simulation import atomic, probes
-from blocksim.simulation.frames import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames
-from blocksim.simulation.recorder import Frame, Recorder, Rows, frames_from_rows
+from blocksim.simulation import files, instruments
+from blocksim.simulation.instruments import Frame, FrameRows, Recorder, frames_from_rows
+from blocksim.simulation.trajectory import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems import blocks, others_of
 from blocksim.world.systems.system import System, SystemInScene
@@ -51,7 +51,7 @@ class DataSet:
     of: Callable[[Any], Values]  # its rows in frames, or in a ProbeSeries
     kind: Any = np.float64
     row: tuple[int, ...] = ()  # shape of a row
-    chunk: int = probes.CHUNK_ROWS  # rows
+    chunk: int = instruments.CHUNK_ROWS  # rows
     is_sum: bool = False  # what it counts goes on from its last row
 
 
@@ -262,7 +262,7 @@ def refuse_too_many(path: Path, sets: dict[str, Any], rows: int, what: str = "fr
         )
 
 
-def read_probes(path: Path, scenario: Scenario) -> dict[str, probes.ProbeSeries]:
+def read_probes(path: Path, scenario: Scenario) -> dict[str, instruments.ProbeSeries]:
     """Return the samples of all probes of a scenario in a run file, by name.
 
     Raises InputMissingError, or InvalidInputError for a damaged file or one without these probes.
@@ -274,7 +274,7 @@ def read_probes(path: Path, scenario: Scenario) -> dict[str, probes.ProbeSeries]
         return {name: _samples(path, file, name) for name in names}
 
 
-def _samples(path: Path, file: Any, name: str) -> probes.ProbeSeries:
+def _samples(path: Path, file: Any, name: str) -> instruments.ProbeSeries:
     place = f"{PROBES}/{name}"
     count = int(data_set(file, f"{place}/{COMMITTED}", 0)[()])
     sets = {one: data_set(file, f"{place}/{one}", 1) for one in group(file, place) if one != COMMITTED}
@@ -287,7 +287,7 @@ def _samples(path: Path, file: Any, name: str) -> probes.ProbeSeries:
     times = np.asarray(sets.pop(PROBE_TIME)[:count], dtype=np.float64)
     columns = {one: np.asarray(data[:count], dtype=np.float64) for one, data in sets.items()}
     units = {one: str(data.attrs["unit"]) for one, data in sets.items()}
-    return probes.ProbeSeries(name, kind, steps, times, columns, units)
+    return instruments.ProbeSeries(name, kind, steps, times, columns, units)
 
 
 def read_frames(path: Path, scenario: Scenario) -> Frames:
@@ -300,7 +300,7 @@ def read_frames(path: Path, scenario: Scenario) -> Frames:
     return frames_from_rows(systems, time_step, rows)
 
 
-def read_rows(path: Path, systems: Sequence[SystemInScene]) -> tuple[float, Rows]:
+def read_rows(path: Path, systems: Sequence[SystemInScene]) -> tuple[float, FrameRows]:
     """Return step (s) and committed frames of a run file of these systems, blocks first. Raises as `read_frames`.
 
     What a run that continues writes at this moment may look like damage: a file without an end is tried a few times.
@@ -325,7 +325,7 @@ def is_left_open(path: Path) -> bool:
         return False
 
 
-def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, Rows]:
+def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, FrameRows]:
     """Return step (s) and rows of all committed frames, after looking at what would be read."""
     count = int(data_set(file, COMMITTED, 0)[()])
     ledger = tuple(name for name in group(file, OBSERVABLES) if name not in COUNTED_UNITS)
@@ -350,7 +350,7 @@ def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[floa
         np.stack([values[place] for place in places_of(one.system)], axis=1, dtype=np.float64) for one in systems
     )
     contacts = _contacts(path, file, count, systems[0].count)
-    return time_step, Rows(steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts)
+    return time_step, FrameRows(steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts)
 
 
 def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | None:
@@ -420,7 +420,7 @@ class FrameFile:
                 self.waiting.extend(recorder.held)
                 if self.waiting:  # and with them the samples of probes
                     self.sync()
-                unnamed.chmod(atomic.permissions_of(path) or atomic.permissions_of(unnamed) or atomic.PERMISSIONS)
+                unnamed.chmod(files.permissions_of(path) or files.permissions_of(unnamed) or files.PERMISSIONS)
                 unnamed.replace(path)
             except BaseException:
                 with suppress(OSError, RuntimeError):
@@ -542,4 +542,4 @@ class FrameFile:
             with self.path.open("r+b") as file:  # cut off what was reserved, which HDF5 knows nothing of
                 *_, end, _, _ = SUPERBLOCK.unpack(file.read(SUPERBLOCK.size))
                 file.truncate(end)
-            atomic.sync_file(self.path)  # no mark of a finished run may outlive its frames
+            files.sync_file(self.path)  # no mark of a finished run may outlive its frames

@@ -16,8 +16,8 @@ from queue import SimpleQueue
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.simulation import MemberFailure, Summary, folder as files, frames, provenance, run_in_batches
-from blocksim.simulation.result import changed_results, read_summary
+from blocksim.simulation import MemberFailure, Summary, files, provenance, run_in_batches, trajectory
+from blocksim.simulation.results import changed_results, read_summary
 from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
 from blocksim.study.run import run
@@ -76,7 +76,7 @@ def rows_of(scenarios: Sequence[Scenario], threads: int, *, peaks: bool = False)
 class Member:
     """The end of one member: its final table, or the reason why it has none."""
 
-    final: frames.Columns | None
+    final: trajectory.Columns | None
     problem: str = ""
 
 
@@ -112,7 +112,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
             # a case that failed has come to its end too
             has_ended = (folder / files.DONE).is_file() if summary.status == FINISHED else summary.status != INTERRUPTED
             if has_ended and summary.run == provenance.run_hash(scenario) and not changed_results(folder, summary):
-                return _row_of(summary, frames.read_table(folder / files.FINAL))
+                return _row_of(summary, trajectory.read_table(folder / files.FINAL))
         try:
             result = run(scenario, out=folder, resume=True)
         except (InvalidInputError, InputMissingError, OutputExistsError):  # it cannot be taken up, or there was none
@@ -122,7 +122,7 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
         return row_of_error(error)
 
 
-def _row_of(summary: Summary, final: frames.Columns) -> Row:
+def _row_of(summary: Summary, final: trajectory.Columns) -> Row:
     moved = summary.movement
     return row_of(summary, summary.simulated_time_s, {} if moved is None else moved.row, final)
 

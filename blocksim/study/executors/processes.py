@@ -14,7 +14,7 @@ from multiprocessing import active_children, get_context, parent_process, resour
 from os import _exit
 from typing import Any, NamedTuple
 
-from blocksim.simulation import provenance, stopping
+from blocksim.simulation import interruption, provenance
 from blocksim.study.executors import Batch, BatchSize, Run, Setting, Task, ensemble, take
 from blocksim.study.rows import Row
 
@@ -60,7 +60,7 @@ def _signals_held() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, stopping.FOR_ALL)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, interruption.FOR_ALL)
     try:
         yield
     finally:
@@ -69,7 +69,7 @@ def _signals_held() -> Iterator[None]:
 
 def _start_worker() -> None:
     """Leave to the parent what a terminal sends to all processes, and end with it."""
-    for number in stopping.FOR_ALL:
+    for number in interruption.FOR_ALL:
         signal.signal(number, signal.SIG_IGN)
 
     def end_with_parent() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from blocksim.scenario.overrides import KeyPath, format_key
-from blocksim.simulation.atomic import write_bytes
+from blocksim.simulation.files import write_bytes
 from blocksim.view.report.subjects import Subject
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario
-from blocksim.simulation.frames import Frames
-from blocksim.simulation.result import EventRecord
+from blocksim.simulation.results import EventRecord
+from blocksim.simulation.trajectory import Frames
 from blocksim.view import arrows, paint, run_data, style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices
 from blocksim.view.scene import upper_sides

@@ -17,10 +17,10 @@ import numpy as np
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, document, input_files, load_stored
-from blocksim.simulation import folder as files, observables, result
-from blocksim.simulation.frames import Columns, Frames, read_table, rows_of
-from blocksim.simulation.probes import ProbeSeries
+from blocksim.simulation import files, observables, results as result
+from blocksim.simulation.instruments import ProbeSeries
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
+from blocksim.simulation.trajectory import Columns, Frames, read_table, rows_of
 from blocksim.view import kinds, run_data, style, time_panels
 from blocksim.view.history import draw_history_page
 from blocksim.view.report.player import MOST_BYTES, pack_forces, pack_frames, pack_loads, scene_data

@@ -10,7 +10,7 @@ import numpy as np
 
 from blocksim.bench.scenes import Rerun
 from blocksim.simulation.loop import last_step_of
-from blocksim.simulation.team import ALONE
+from blocksim.simulation.schemes import ALONE
 from tests.bench.peers.engine import Final, Scene, timed
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 from blocksim.kernels.common.arrays import BODY, Records, zeros
 from blocksim.kernels.common.frame_times import next_frame
 from blocksim.kernels.common.members import Watched, frame_to_watch, step_of_next, watch
-from blocksim.simulation.recorder import POSITION
+from blocksim.simulation.instruments import POSITION
 
 THRESHOLD, REACH = 1e-3, 0.03  # m
 

@@ -6,7 +6,7 @@ import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import Scenario, json_schema, scenario_from_mapping
-from blocksim.simulation.folder import RESULTS, default_folder
+from blocksim.simulation.files import RESULTS, default_folder
 from tests.scenario.conftest import data_of
 
 HOSTILE = (

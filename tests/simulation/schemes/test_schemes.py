@@ -12,8 +12,7 @@ from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario.models import timeline
 from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
 from blocksim.simulation.provenance import run_hash
-from blocksim.simulation.schemes import SCHEMES, build_scene, build_stacks, measure_row, scheme_of
-from blocksim.simulation.team import ALONE, Team
+from blocksim.simulation.schemes import ALONE, SCHEMES, Team, build_scene, build_stacks, measure_row, scheme_of
 from blocksim.world import build
 from blocksim.world.build import SceneStack, arrays_of, member, only_stack
 from blocksim.world.nonsmooth import build_nonsmooth

@@ -13,7 +13,7 @@ from blocksim.scenario.document import Document
 from blocksim.scenario.models.timeline import SCHEMES
 from blocksim.simulation import run_ensemble
 from blocksim.simulation.checkpoint import CheckpointPolicy
-from blocksim.simulation.compilation import SMALLEST_SCENE
+from blocksim.simulation.schemes import SMALLEST_SCENE
 from tests.simulation.flight import STEP, FlightTime
 
 END = 0.1

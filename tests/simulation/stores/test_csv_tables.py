@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from blocksim.errors import OutputError
-from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, Contacts, Frames
 from blocksim.simulation.stores.exports import CONTACT_COLUMNS, FRAME_COLUMNS, write_contacts_csv, write_frames_csv
+from blocksim.simulation.trajectory import CONTACT_ROW, SUPPORT, Contacts, Frames
 from tests.view.made_up import HOSTILE, toppling
 
 

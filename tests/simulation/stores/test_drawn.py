@@ -10,7 +10,7 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.scenario.structures.polygons import read_drawing
-from blocksim.simulation.folder import refuse_foreign
+from blocksim.simulation.files import refuse_foreign
 from blocksim.simulation.stores.exports import write_dxf, write_geojson
 from blocksim.view.scene import corners
 from tests.view.made_up import polygons, toppling

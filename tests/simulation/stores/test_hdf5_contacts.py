@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from blocksim.scenario import place_bodies
-from blocksim.simulation.frames import CONTACT_ROW, Rows
-from blocksim.simulation.recorder import MOTION, Frame, Recorder
+from blocksim.simulation.instruments import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
+from blocksim.simulation.trajectory import CONTACT_ROW, Rows
 from tests.simulation.conftest import Shipped
 
 MEASURED = SCHEMES["explicit"].measured

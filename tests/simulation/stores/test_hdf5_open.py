@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
-from blocksim.simulation.recorder import MOTION, Frame, Recorder
+from blocksim.simulation.instruments import MOTION, Frame, Recorder
 from blocksim.simulation.stores.hdf5 import SUPERBLOCK, FrameFile, is_left_open, lookup3, open_hdf5, read_frames
 
 FRAMES = 300

@@ -12,7 +12,7 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError, OutputError
 from blocksim.scenario import place_bodies
 from blocksim.simulation import Result
-from blocksim.simulation.recorder import MOTION, Frame, Recorder
+from blocksim.simulation.instruments import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 from tests.simulation.conftest import Shipped

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 
 from blocksim.scenario import place_bodies
-from blocksim.simulation.recorder import MOTION, Frame, Recorder
+from blocksim.simulation.instruments import MOTION, Frame, Recorder
 from blocksim.simulation.schemes import SCHEMES
 from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 from tests.simulation.conftest import Shipped

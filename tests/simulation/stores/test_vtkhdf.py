@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.geometry import regular
-from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, UNITS, Frames, forces_on_a, join_contacts
 from blocksim.simulation.stores import exports
 from blocksim.simulation.stores.exports import write_contacts_vtkhdf, write_vtkhdf
+from blocksim.simulation.trajectory import CONTACT_ROW, SUPPORT, UNITS, Frames, forces_on_a, join_contacts
 from blocksim.view.scene import corners
 from blocksim.world.systems.blocks import support_quads
 from tests.view.made_up import HOSTILE, polygons, toppling

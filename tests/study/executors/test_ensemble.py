@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.simulation import folder as files, simulate
+from blocksim.simulation import files, simulate
 from blocksim.simulation.checkpoint import CheckpointPolicy
-from blocksim.simulation.result import read_summary
+from blocksim.simulation.results import read_summary
 from blocksim.study.executors.ensemble import BATCH, rows_of, run_case, run_members
 from blocksim.study.run import run
 

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario, load_scenario, place_bodies
-from blocksim.simulation import folder as files
-from blocksim.simulation.folder import keep_scenario, read_tables
-from blocksim.simulation.frames import CONTACT_ROW, SUPPORT, Frames, Rows, csv_text, final_columns
-from blocksim.simulation.ledger import EnergyLedger
-from blocksim.simulation.recorder import Frame, Recorder
-from blocksim.simulation.result import Summary
+from blocksim.simulation import files
+from blocksim.simulation.balance import EnergyLedger
+from blocksim.simulation.files import keep_scenario, read_tables
+from blocksim.simulation.instruments import Frame, Recorder
+from blocksim.simulation.results import Summary
 from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
+from blocksim.simulation.trajectory import CONTACT_ROW, SUPPORT, Frames, Rows, csv_text, final_columns
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 LEDGER = ("kinetic", "potential", "friction")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.simulation.ledger import EnergyLedger
+from blocksim.simulation.balance import EnergyLedger
 from blocksim.simulation.observables import Movement, Response
 from blocksim.view.report.page import labels, page_text
 from blocksim.view.report.subjects import CaseTable, Subject, read_stored, run_subject, sweep_subject

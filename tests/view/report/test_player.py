@@ -10,7 +10,7 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.geometry import regular
-from blocksim.simulation.result import EventRecord
+from blocksim.simulation.results import EventRecord
 from blocksim.view.report.player import boundary_particles, pack_frames, scene_data
 from blocksim.world.build import build_world
 from tests.view.made_up import polygons, toppling

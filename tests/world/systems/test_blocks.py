@@ -10,8 +10,8 @@ import pytest
 
 import blocksim
 from blocksim.simulation import Result
-from blocksim.simulation.frames import data_set, tidy_table
 from blocksim.simulation.stores.exports import write_frames_csv, write_vtkhdf
+from blocksim.simulation.trajectory import data_set, tidy_table
 from blocksim.view.history import MOTIONS, FramesInView
 from blocksim.view.run_data import Support, drawable_frames
 from blocksim.world.systems.blocks import placed_points

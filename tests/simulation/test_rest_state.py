@@ -13,9 +13,8 @@ from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
-from blocksim.simulation.schemes import build, scheme_of
-from blocksim.simulation.settling import SettleError, initial_scene, settle
-from blocksim.simulation.team import ALONE
+from blocksim.simulation.rest_state import SettleError, initial_scene, settle
+from blocksim.simulation.schemes import ALONE, build, scheme_of
 from blocksim.study.criterion import DEFAULT, Verdict, read_criterion
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

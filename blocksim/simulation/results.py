@@ -12,11 +12,11 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, input_files, load_stored, place_bodies
-from blocksim.simulation import atomic, folder as files, ledger, observables
-from blocksim.simulation.folder import PROBE, keep_scenario, probe_tables, read_tables
-from blocksim.simulation.frames import Columns, Frames, as_frame, csv_text, data_set, read_table, tidy_table
-from blocksim.simulation.probes import ProbeSeries
+from blocksim.simulation import balance, files, observables
+from blocksim.simulation.files import PROBE, keep_scenario, probe_tables, read_tables
+from blocksim.simulation.instruments import ProbeSeries
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
+from blocksim.simulation.trajectory import Columns, Frames, as_frame, csv_text, data_set, read_table, tidy_table
 from blocksim.world.systems import systems_of
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Summary(BaseModel, frozen=True):
     threads: int = 1
     resumed_from: tuple[int, ...] = ()  # steps at which parts of the run after the first one began
     last_checkpoint: int | None = None  # step of the last good one, where the run did not finish
-    energy_J: ledger.EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
+    energy_J: balance.EnergyLedger  # noqa: N815 - the unit of energy is a capital letter
     settled: RestState | None = None  # how it came to rest before time zero, where it did
     events: tuple[EventRecord, ...] = ()  # in the order in which they have happened
     movement: observables.Movement | None = None  # None in runs of earlier versions and without blocks
@@ -101,7 +101,7 @@ def changed_files(folder: Path, summary: Summary) -> tuple[str, ...]:
     return tuple(
         name
         for name, digest in summary.sha256.items()
-        if not (folder / Path(name).name).is_file() or atomic.sha256_of(folder / Path(name).name) != digest
+        if not (folder / Path(name).name).is_file() or files.sha256_of(folder / Path(name).name) != digest
     )
 
 
@@ -212,22 +212,22 @@ def read_final(folder: Path, scenario: Scenario) -> Columns:
 
 def _with_checksums(summary: Summary, folder: Path, tables: Iterable[str]) -> Summary:
     names = (files.SCENARIO, *files.COPIES, files.FINAL, files.SOILS, files.FRAMES, *tables)
-    sums = {name: atomic.sha256_of(folder / name) for name in names if (folder / name).is_file()}
+    sums = {name: files.sha256_of(folder / name) for name in names if (folder / name).is_file()}
     return summary.model_copy(update={"sha256": sums})
 
 
 def keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     """Keep the tables and the summary of a run that has ended in its folder, beside its frames. Raises OutputError."""
-    atomic.write_text(folder / files.FINAL, csv_text(result.columns))
+    files.write_text(folder / files.FINAL, csv_text(result.columns))
     for name, table in result.endings.items():
-        atomic.write_text(folder / f"{name}.csv", csv_text(table))
+        files.write_text(folder / f"{name}.csv", csv_text(table))
     tables = probe_tables(result.scenario)
     for name, series in zip(tables, read_probes(folder / files.FRAMES, result.scenario).values(), strict=True):
-        atomic.write_text(folder / name, "".join(series.csv_lines()))
+        files.write_text(folder / name, "".join(series.csv_lines()))
     summary = _with_checksums(summary, folder, tables)
-    atomic.write_text(folder / files.SUMMARY, summary.to_json())
+    files.write_text(folder / files.SUMMARY, summary.to_json())
     if result.status == "finished":
-        atomic.write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
+        files.write_text(folder / files.DONE, json.dumps({"run": summary.run, "status": summary.status}) + "\n")
         files.clear_remains(folder, files.CHECKPOINTS)
     return Result(result.name, result.columns, summary, result.scenario, folder)
 
@@ -247,4 +247,4 @@ def renew_copies(scenario: Scenario, folder: Path) -> None:
     if old != contents():
         summary = read_summary(folder / files.SUMMARY)
         names = [name for name in summary.sha256 if name.startswith(PROBE)]
-        atomic.write_text(folder / files.SUMMARY, _with_checksums(summary, folder, names).to_json())
+        files.write_text(folder / files.SUMMARY, _with_checksums(summary, folder, names).to_json())

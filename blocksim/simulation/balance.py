@@ -82,20 +82,20 @@ class EnergyLedger(BaseModel, frozen=True, extra="allow"):
 
 
 @cache
-def compiled(module: str) -> Any:
+def solver_module(module: str) -> Any:
     """Return a module of blocksim that needs the compiler: who reads stored runs never asks for it."""
     return import_module(f"blocksim.{module}")
 
 
 def start_energy(scene: "AnyScene") -> float:
     """Return all energy (J) that a scene holds and has lost: constant, if the ledger is complete."""
-    schemes = compiled("simulation.schemes")
+    schemes = solver_module("simulation.schemes")
     return float(schemes.measure_row(scene)[: len(schemes.ledger_names(scene))].sum())
 
 
 def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start."""
-    schemes, book = compiled("simulation.schemes"), scene.world.ledger[0]
+    schemes, book = solver_module("simulation.schemes"), scene.world.ledger[0]
     mass = float(np.sum(scene.world.bodies.mass)) + schemes.measured_systems(scene)[1]
     moved = float(book.largest_kinetic + book.travel_work)
     return ledger_of(schemes.ledger_names(scene), schemes.measure_row(scene), start, mass, moved)

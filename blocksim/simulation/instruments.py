@@ -1,5 +1,9 @@
-"""Probes: time histories of forces, points, joints and energies, sampled between compiled calls."""
+"""What samples a run, and never changes it: frames of the world at output times, probes at steps of their own.
 
+Probes are time histories of forces, points, joints and energies, sampled between compiled calls.
+"""
+
+import hashlib
 import math
 import sys
 from bisect import bisect_right
@@ -7,64 +11,33 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.scenario import PlacedBody, Scenario, events, motion, place_segments
+from blocksim.scenario import PlacedBody, Scenario, events, place_segments
 from blocksim.scenario.models.timeline import STEP, ForceProbe, JointProbe, PointProbe
-from blocksim.simulation.frames import CONTACT_ROW, forces_on_a
-from blocksim.simulation.ledger import compiled
+from blocksim.simulation.balance import solver_module
+from blocksim.simulation.observables import AT_REST, MovingSupport, Watch
+from blocksim.simulation.trajectory import (
+    CONTACT_ROW,
+    Contacts,
+    Frames,
+    Rows as ContactRows,
+    forces_on_a,
+    join_contacts,
+)
 from blocksim.world.systems import systems_of
+from blocksim.world.systems.blocks import BLOCKS, blocks_placed
+from blocksim.world.systems.system import BodyContacts, Floats, System, SystemInScene, Track
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from blocksim.simulation.schemes import AnyScene
-    from blocksim.world.systems.system import BodyContacts, System
+    from blocksim.simulation.stores.hdf5 import FrameFile
 
-
-class MovingSupport:
-    """Motion of the support."""
-
-    def __init__(self, scenario: Scenario | None) -> None:
-        """Work out the pieces of its motion once; without a scenario, or without a motion, it rests."""
-        self.times: list[float] = []
-        self.coefficients: list[list[float]] = []
-        self.direction = (1.0, 0.0)
-        if scenario is not None and scenario.motion is not None:
-            pieces = motion.motion_pieces(scenario)
-            self.direction = motion.motion_direction(scenario)
-            self.times, self.coefficients = pieces.times.tolist(), pieces.coefficients.tolist()
-
-    @property
-    def moves(self) -> bool:
-        """Whether it does not rest all the time."""
-        return bool(self.coefficients)
-
-    def at(self, time: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return displacement (m) and velocity (m/s) along x and y at a time (s)."""
-        if not self.coefficients:
-            return (0.0, 0.0), (0.0, 0.0)
-        piece = min(max(bisect_right(self.times, time) - 1, 0), len(self.coefficients) - 1)
-        s = time - self.times[piece]
-        c0, c1, c2, c3 = self.coefficients[piece]
-        moved, speed = c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * s * c3)
-        (x, y) = self.direction
-        return (moved * x, moved * y), (speed * x, speed * y)
-
-    def way(self, time: float) -> tuple[float, float]:
-        """Return how far (m) it has come along x and y since the start, at a time (s)."""
-        (x, y), _ = self.at(time)
-        (x0, y0), _ = self.at(0.0)
-        return x - x0, y - y0
-
-
-AT_REST = MovingSupport(None)
-
-
-Floats = NDArray[np.float64]
 
 FORCE, POINT, JOINT, ENERGY = "force", "point", "joint", "energy"
 TABLE_UNITS = {"m": ("_mm", 1e3), "m/s": ("_mm_s", 1e3), "rad": ("_deg", math.degrees(1.0)), "N": ("_N", 1.0),
@@ -174,7 +147,7 @@ Sampler = Callable[["Moment"], Values]
 class Moment:
     """The scene at a step; what several probes need is worked out once."""
 
-    def __init__(self, scene: "AnyScene", support: MovingSupport, parts: "Sequence[tuple[System, int]]" = ()) -> None:
+    def __init__(self, scene: "AnyScene", support: MovingSupport, parts: Sequence[tuple[System, int]] = ()) -> None:
         """Take the scene as it is now, with the systems beside blocks and supports and the numbers of their parts."""
         self.scene, self.parts = scene, parts
         self.bodies = scene.world.bodies
@@ -189,7 +162,7 @@ class Moment:
 
         Parts of further systems have numbers after all bodies.
         """
-        rows = compiled("simulation.schemes").scheme_of(self.scene).contacts(self.scene, self.bodies.size)
+        rows = solver_module("simulation.schemes").scheme_of(self.scene).contacts(self.scene, self.bodies.size)
         classes = self.bodies["contact_class"]
         table = self.scene.world.interactions["static_friction"]
         friction = table[classes[rows["body_a"]], classes[rows["body_b"]]]
@@ -205,12 +178,12 @@ class Moment:
     @cached_property
     def energies(self) -> Values:
         """Energies (J) of the ledger."""
-        schemes = compiled("simulation.schemes")
+        schemes = solver_module("simulation.schemes")
         energies: list[float] = schemes.measure_row(self.scene)[: len(schemes.ledger_names(self.scene))].tolist()
         return energies
 
 
-def rows_of(touching: "BodyContacts") -> Any:
+def rows_of(touching: BodyContacts) -> Any:
     """Return contacts of a system as those of bodies a with parts b."""
     rows = np.zeros(len(touching.body), CONTACT_ROW)
     rows["body_a"], rows["body_b"] = touching.body, touching.part
@@ -296,7 +269,7 @@ class Probe:
 
     def next_step(self, done: int) -> int:
         """Return the next step to sample after `done` steps."""
-        return int(compiled("kernels.common.frame_times").next_frame(done, self.period))
+        return int(solver_module("kernels.common.frame_times").next_frame(done, self.period))
 
     def sample(self, moment: Moment) -> None:
         """Add a sample if one is due at this step, wherever the run ends, and it is not there yet."""
@@ -329,7 +302,7 @@ class Probes:
         probes: Sequence[Probe],
         support: MovingSupport,
         time_step: float,
-        parts: "Sequence[tuple[System, int]]" = (),
+        parts: Sequence[tuple[System, int]] = (),
     ) -> None:
         """Take the probes, the motion of the support, the step (s), further systems and the number of their parts."""
         self.all, self.support, self.time_step, self.parts = tuple(probes), support, time_step, tuple(parts)
@@ -400,3 +373,145 @@ def _numbers(scenario: Scenario, placed: Sequence[PlacedBody], parts: Sequence[s
         **{part: [number] for number, part in enumerate(parts, start=count)},
         **{body.name: [number] for number, body in enumerate(placed)},
     }
+
+
+MOTION = tuple(one.name for one in BLOCKS.quantities)
+POSITION = MOTION[:3]
+
+
+class Frame(NamedTuple):
+    """One recorded state of all systems, SI."""
+
+    step: int
+    states: tuple[Floats, ...]  # (q, b) of each system, as its `quantities`; blocks first
+    measured: NDArray[np.float64]  # energies, number of contacts, largest overlap
+    contacts: ContactRows | None = None  # where they are recorded
+
+    def digest(self, before: bytes = b"") -> bytes:
+        """Return the SHA-256 of all its bits, and of the digest of the frame before it."""
+        states = (state.tobytes() for state in self.states)
+        contacts = b"" if self.contacts is None else self.contacts.tobytes()
+        parts = (before, np.int64(self.step).tobytes(), *states, self.measured.tobytes(), contacts)
+        return hashlib.sha256(b"".join(parts)).digest()
+
+
+class Recorder:
+    """Frames, growing as the run continues; with a sink only the last one, so that long runs need no more memory."""
+
+    def __init__(
+        self,
+        placed: Sequence[PlacedBody],
+        every: float,
+        step: float,
+        *,
+        others: Sequence[SystemInScene] = (),
+        contacts: bool = False,
+        probes: Probes = NO_PROBES,
+        support: MovingSupport = AT_REST,
+    ) -> None:
+        """Record every `every` seconds, at the nearest step of length `step` (s).
+
+        `others` are the systems beside the blocks. With `contacts` the contacts of every frame are recorded as well.
+        `probes` are sampled at steps of their own. What has moved is seen from the `support`.
+        """
+        self.placed = tuple(placed)
+        self.systems = (blocks_placed(placed), *others)
+        self.time_step = step
+        self.sink: FrameFile | None = None  # where frames go but the last, from when on it is there
+        self.steps_per_frame = max(every / step, 1.0)
+        self.steps: list[int] = []
+        self.digests: list[bytes] = []  # of each frame and all before it
+        self.altered: list[int] = []  # steps of frames of an earlier part that have come out otherwise when repeated
+        self.held: list[Frame] = []  # the last ones: all, or one
+        self.ledger: tuple[str, ...] = ()
+        self.with_contacts = contacts
+        self.probes = probes
+        self.watch = Watch([self.placed], [support])
+
+    def next_step(self, done: int) -> int:
+        """Return the next step to record after `done` steps, wherever those end."""
+        return int(solver_module("kernels.common.frame_times").next_frame(done, self.steps_per_frame))
+
+    def count_until(self, step: int) -> int:
+        """Return the number of frames up to a step."""
+        return bisect_right(self.steps, step)
+
+    def digest_until(self, step: int) -> str:
+        """Return the SHA-256 of all frames up to a step."""
+        count = self.count_until(step)
+        return self.digests[count - 1].hex() if count else ""
+
+    def take_over(self, rows: "FrameRows") -> None:
+        """Begin with the frames of an earlier part of the run at output times, which are not recorded again.
+
+        Those after its checkpoint are among them, as the run would only repeat them; that of the moment at which it was
+        stopped is not.
+        """
+        tables = [None if rows.contacts is None else rows.contacts.at(k) for k in range(len(rows.steps))]
+        states = zip(*rows.states, strict=True)
+        frames = (Frame(*one) for one in zip(rows.steps.tolist(), states, rows.measured, tables, strict=True))
+        self.held = [one for one in frames if one.step == 0 or self.next_step(one.step - 1) == one.step]
+        self.steps, self.digests, self.ledger = [frame.step for frame in self.held], [], rows.ledger
+        for frame in self.held:
+            self.watch.follow([0], frame.states[0][None], [frame.step * self.time_step])
+            self.digests.append(frame.digest(self.digests[-1] if self.digests else b""))
+
+    def sample(self, scene: "AnyScene") -> None:
+        """Add a frame of the present state, unless this step has one already: then look whether that is the same."""
+        schemes, step = solver_module("simulation.schemes"), int(scene.world.clock[0].steps)
+        row = schemes.measure_row(scene)
+        arrays = (scene.world, *getattr(scene, "systems", ()))
+        states = tuple(one.system.state(its, one.count) for one, its in zip(self.systems, arrays, strict=True))
+        self.watch.follow([0], states[0][None], [step * self.time_step])
+        self.ledger = schemes.ledger_names(scene)
+        touching = schemes.scheme_of(scene).contacts(scene, len(self.placed)) if self.with_contacts else None
+        frame = Frame(step, states, row, touching)
+        if self.steps and self.steps[-1] >= step:
+            place = self.count_until(step) - 1
+            before = self.digests[place - 1] if place > 0 else b""
+            if self.steps[place] == step and frame.digest(before) != self.digests[place]:
+                self.altered.append(step)
+            return
+        self.steps.append(step)
+        self.digests.append(frame.digest(self.digests[-1] if self.digests else b""))
+        if self.sink is not None:
+            self.sink.append(frame)
+            self.held.clear()
+        self.held.append(frame)
+
+    def frames(self) -> Frames:
+        """Return all frames that are held: those so far, or, with a sink, the last one."""
+        steps, states, measured, tables = zip(*self.held, strict=True)
+        contacts = join_contacts(tables) if self.with_contacts else None
+        values = tuple(np.stack(one) for one in zip(*states, strict=True))
+        rows = FrameRows(np.array(steps, dtype=np.int64), values, np.stack(measured), self.ledger, contacts)
+        return frames_from_rows(self.systems, self.time_step, rows)
+
+
+class FrameRows(NamedTuple):
+    """What n frames of all systems consist of."""
+
+    steps: NDArray[np.int64]  # (n,)
+    states: tuple[Floats, ...]  # (n, q, b) of each system, as its `quantities`; blocks first
+    measured: NDArray[np.float64]  # (n, e + 2): energies, number of contacts, largest overlap
+    ledger: tuple[str, ...]  # names of the e energies
+    contacts: Contacts | None = None  # of all frames
+
+
+def frames_from_rows(systems: Sequence[SystemInScene], time_step: float, rows: FrameRows) -> Frames:
+    """Return frames of systems, blocks first, with these steps (s)."""
+    columns = rows.measured.T
+    blocks, *others = (Track(one, values) for one, values in zip(systems, rows.states, strict=True))
+    return Frames(
+        step=rows.steps,
+        time=np.multiply(rows.steps, time_step, dtype=np.float64),
+        **{name: blocks[name] for name in (*MOTION, "size_x", "size_y", "mass", "inertia")},
+        energy=dict(zip(rows.ledger, columns, strict=False)),
+        contact_count=columns[-2],
+        largest_overlap=columns[-1],
+        names=blocks.names,
+        start_angle=blocks.at_start("angle"),
+        contacts=rows.contacts,
+        others=tuple(others),
+        outlines=blocks.present.elements.outlines,
+    )

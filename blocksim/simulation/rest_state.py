@@ -31,9 +31,8 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
 from blocksim.kernels.common.arrays import REACHED
 from blocksim.scenario import PlacedBody, Scenario, motion, overlap, placement
-from blocksim.simulation.result import NOT_AT_REST, RestState
-from blocksim.simulation.schemes import AnyScene, corner_ways, outlines_of, scheme_of
-from blocksim.simulation.team import Team
+from blocksim.simulation.results import NOT_AT_REST, RestState
+from blocksim.simulation.schemes import AnyScene, Team, corner_ways, outlines_of, scheme_of
 from blocksim.world.build import arrays_of
 
 PARTS = 50  # in which gravity and loads grow

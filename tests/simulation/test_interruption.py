@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from blocksim.simulation.stopping import WallTime, interruptible, stop_requests
+from blocksim.simulation.interruption import WallTime, interruptible, stop_requests
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1])
