@@ -20,6 +20,7 @@ Systems without owners, such as Windows, keep a user's cache in a folder of that
 import contextlib
 import functools
 import hashlib
+import importlib
 import logging
 import multiprocessing
 import os
@@ -120,6 +121,7 @@ class KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled version for a signature, None where there is none that is whole."""
+        _import_array_functions()
         target_context.refresh()
         key = self._key(sig, target_context.codegen())
         content = _read(self._path(key))
@@ -145,6 +147,22 @@ class KernelCache(FunctionCache):
     def _path(self, key: tuple[object, ...]) -> Path:
         digest = hashlib.sha256(repr(key).encode()).hexdigest()[:NAME_DIGITS]
         return self.folder / f"{self.name}.{digest}{SUFFIX}"
+
+
+@functools.cache
+def _import_array_functions() -> None:
+    """Have numba import its array functions without scipy.linalg, which takes a tenth of a short run.
+
+    They import it only to see that there is a BLAS; whoever compiles a function that calls one has it imported then.
+    """
+    linalg: Any = importlib.import_module("numba.np.linalg")
+    ensure_blas = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        array_functions: Any = importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = ensure_blas
+    array_functions.ensure_blas = ensure_blas
 
 
 def _sources(sig: Any) -> Iterator[tuple[str, int, int]]:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import logging
+import os
+import subprocess
+import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -133,3 +136,23 @@ def test_user_without_a_home_folder_can_compile(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(jit, "cache_root", fail)
     assert jit.cache_folder.__wrapped__() is not None
+
+
+def test_kernel_starts_without_the_blas_that_a_function_of_the_user_still_finds(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text("""
+import sys
+import numba, numpy as np
+from blocksim.kernels.common import jit
+
+@jit.entry_kernel
+def double(number):
+    return 2.0 * number
+
+assert double(1.5) == 3.0
+assert "scipy.linalg" not in sys.modules
+assert numba.njit(lambda a, b: a @ b)(np.eye(2), np.ones(2)).tolist() == [1.0, 1.0]
+assert "scipy.linalg" in sys.modules
+""")
+    environment = {**os.environ, "BLOCKSIM_CACHE_DIR": str(tmp_path / "cache")}
+    subprocess.run([sys.executable, script], check=True, timeout=120, env=environment)
