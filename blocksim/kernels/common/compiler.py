@@ -44,11 +44,6 @@ options: Any = targetconfig.ConfigStack
 NAME_DIGITS = 24
 
 
-def _no_timer(*_: Any) -> Any:
-    """Stand for a timer, of which numba installs one more for every level of calls."""
-    return contextlib.nullcontext()
-
-
 def _short_name(name: str, kinds: Any, *, abi_tags: Any = (), uid: Any = None) -> str:
     """Return the name of a compiled function, with a digest of the types of its arguments."""
     spelled = ",".join(str(kind) for kind in kinds)
@@ -111,7 +106,7 @@ def _replacements() -> list[tuple[Any, str, Any]]:
     context: Any = base.BaseContext
     flags: Any = targetconfig.TargetConfig
     return [
-        (event, "install_timer", _no_timer),
+        (event, "install_timer", lambda *_: contextlib.nullcontext()),  # else one more for every level of calls
         (funcdesc, "default_mangler", _short_name),
         (kinds, "__hash__", _known_hashes(kinds.__hash__)),
         (calls, "get_call_type", _known_calls(calls.get_call_type)),
