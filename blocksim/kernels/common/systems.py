@@ -16,7 +16,7 @@ same bits for any number of threads it gathers: what acts on one thing is summed
 """
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from numba.extending import overload
@@ -191,11 +191,6 @@ def _written(write: Callable[[Plan], Callable[..., Any]], types: Sequence[type])
     return write(PLANS[tuple(types)])
 
 
-def _classes(systems: Any) -> Iterator[type]:
-    """Yield the classes of a tuple of named tuples, as the compiler sees it."""
-    return (one.instance_class for one in systems.types)
-
-
 def step_systems(systems: Systems, world: World, k: int, step: float) -> None:
     """Advance all systems by one step (s), as thread k; the blocks have drifted, and their forces come next."""
     _written(_step, [*map(type, systems)])(systems, world, k, step)
@@ -217,7 +212,7 @@ def _compiled_as(stub: Callable[..., Any], write: Callable[[Plan], Callable[...,
     options: Any = {name: OPTIONS[name] for name in ("error_model", "_nrt")}
 
     def chosen(systems: Any, *_: Any) -> Callable[..., Any]:
-        written: Any = _written(write, [*_classes(systems)])
+        written: Any = _written(write, [one.instance_class for one in systems.types])
         found: Callable[..., Any] = written.py_func
         return found
 
