@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args
 import pydantic
 from pydantic import Field
 from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import PydanticUndefined
 
 from blocksim.scenario import input_files, spelling, units
 
@@ -27,6 +28,11 @@ class Table(pydantic.BaseModel):
 
     def _check(self) -> None:
         """Raise pydantic's error where values do not go together, each valid by itself."""
+
+
+def setting(description: str, default: Any = PydanticUndefined, **more: Any) -> Any:
+    """Return the field of a key: its meaning and its default, without which it is required; the rest as for Field."""
+    return Field(default=default, description=description, **more)
 
 
 POSITIVE_TIME = units.Quantity(units.TIME, above=0.0)

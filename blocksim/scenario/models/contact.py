@@ -4,12 +4,12 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, get_args
 
-from pydantic import ConfigDict, Field, GetJsonSchemaHandler, model_validator
+from pydantic import ConfigDict, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from blocksim.scenario import units as q
-from blocksim.scenario.models.base import OneOf, Table
+from blocksim.scenario.models.base import OneOf, Table, setting
 
 Model = Literal["surface", "particles", "kernel"]
 Law = Literal["linear", "hertz-mindlin"]
@@ -47,15 +47,13 @@ class PairFriction(_Short):
     """
 
     bare = q.FrictionCoefficient().json_schema({"type": "number"})
-    static: q.Friction = Field(description="friction coefficient at rest")
-    kinetic_ratio: q.Ratio | None = Field(
-        default=None, exclude=True, description="kinetic over static friction, in place of kinetic"
-    )
-    kinetic: q.Friction = Field(
+    static: q.Friction = setting("friction coefficient at rest")
+    kinetic_ratio: q.Ratio | None = setting("kinetic over static friction, in place of kinetic", None, exclude=True)
+    kinetic: q.Friction = setting(
+        "friction coefficient in fast sliding (default: static)",
         default_factory=lambda known: known.get("static", math.inf) * (known.get("kinetic_ratio") or 1.0),
-        description="friction coefficient in fast sliding (default: static)",
     )
-    transition_speed: q.PositiveSpeed = Field(default=0.005, description="sliding speed of the transition")
+    transition_speed: q.PositiveSpeed = setting("sliding speed of the transition", 0.005)
 
     @model_validator(mode="before")
     @classmethod
@@ -77,18 +75,16 @@ class PairFriction(_Short):
 class Friction(Table):
     """Friction between blocks, and between blocks and the ground; the defaults are the paper's."""
 
-    block_block: PairFriction = Field(default=PairFriction(static=0.31), description="friction between two blocks")
-    block_ground: PairFriction = Field(
-        default=PairFriction(static=0.38), description="friction between a block and the ground"
-    )
+    block_block: PairFriction = setting("friction between two blocks", PairFriction(static=0.31))
+    block_ground: PairFriction = setting("friction between a block and the ground", PairFriction(static=0.38))
 
 
 class Restitution(_Short):
     """Coefficients of restitution; a bare number in the file sets both."""
 
     bare: ClassVar = {"type": "number", "minimum": 0, "maximum": 1}
-    block_block: q.Share = Field(default=0.2, description="restitution between two blocks (assumed)")
-    block_ground: q.Share = Field(default=0.2, description="restitution between a block and the ground (assumed)")
+    block_block: q.Share = setting("restitution between two blocks (assumed)", 0.2)
+    block_ground: q.Share = setting("restitution between a block and the ground (assumed)", 0.2)
 
     @model_validator(mode="before")
     @classmethod
@@ -105,13 +101,11 @@ class Pair(Table):
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1})
 
-    friction: PairFriction | None = Field(default=None, description="friction, as friction.block_block")
-    restitution: q.Share | None = Field(default=None, description="restitution")
-    normal_stiffness: q.Stiffness | None = Field(
-        default=None, description="stiffness of one contact point, linear law only"
-    )
-    shear_stiffness_ratio: q.PositiveNumber | None = Field(default=None, description="shear over normal stiffness")
-    shear_damping_ratio: q.NonNegativeNumber | None = Field(default=None, description="damping ratio in shear")
+    friction: PairFriction | None = setting("friction, as friction.block_block", None)
+    restitution: q.Share | None = setting("restitution", None)
+    normal_stiffness: q.Stiffness | None = setting("stiffness of one contact point, linear law only", None)
+    shear_stiffness_ratio: q.PositiveNumber | None = setting("shear over normal stiffness", None)
+    shear_damping_ratio: q.NonNegativeNumber | None = setting("damping ratio in shear", None)
 
     def _check(self) -> None:
         if not self.model_fields_set:
@@ -121,45 +115,41 @@ class Pair(Table):
 class Contact(Table):
     """Contact model, force law and their numbers."""
 
-    model: Annotated[Model, OneOf(get_args(Model))] = Field(
-        default="surface", description="how contacts are found: surface, particles or kernel"
+    model: Annotated[Model, OneOf(get_args(Model))] = setting(
+        "how contacts are found: surface, particles or kernel", "surface"
     )
-    law: Annotated[Law, OneOf(get_args(Law))] = Field(
-        default="linear", description="how the force grows with the overlap: linear or hertz-mindlin"
+    law: Annotated[Law, OneOf(get_args(Law))] = setting(
+        "how the force grows with the overlap: linear or hertz-mindlin", "linear"
     )
-    restitution: Restitution = Field(default=Restitution(), description="rebound speed over impact speed")
-    stiffness_scale: q.PositiveNumber = Field(default=1.0, description="factor on the stiffness of every contact")
-    normal_stiffness: q.Stiffness | None = Field(
-        default=None, description="stiffness of one contact point, linear law only (default: from the materials)"
+    restitution: Restitution = setting("rebound speed over impact speed", Restitution())
+    stiffness_scale: q.PositiveNumber = setting("factor on the stiffness of every contact", 1.0)
+    normal_stiffness: q.Stiffness | None = setting(
+        "stiffness of one contact point, linear law only (default: from the materials)", None
     )
-    shear_stiffness_ratio: q.PositiveNumber | None = Field(
-        default=None, description="shear over normal stiffness (default: Mindlin, from Poisson's ratio)"
+    shear_stiffness_ratio: q.PositiveNumber | None = setting(
+        "shear over normal stiffness (default: Mindlin, from Poisson's ratio)", None
     )
-    shear_damping_ratio: q.NonNegativeNumber | None = Field(
-        default=None, description="damping ratio in shear (default: the normal one)"
-    )
-    max_overlap: q.PositiveLength | None = Field(
-        default=None,
-        description="overlap that stops the run; with springs at most half of the smallest side of a pair "
+    shear_damping_ratio: q.NonNegativeNumber | None = setting("damping ratio in shear (default: the normal one)", None)
+    max_overlap: q.PositiveLength | None = setting(
+        "overlap that stops the run; with springs at most half of the smallest side of a pair "
         "(default: 5 % of that side, 50 % for rigid contacts)",
+        None,
     )
-    skin: q.PositiveLength | None = Field(
-        default=None,
-        description="largest gap between blocks that are listed as neighbours; sets how often the list is updated and "
+    skin: q.PositiveLength | None = setting(
+        "largest gap between blocks that are listed as neighbours; sets how often the list is updated and "
         "how long it is; with springs the motion is bit-identical (default: 25 % of the smallest side of all blocks, "
         "5 % with particles)",
+        None,
     )
-    contact_radius: q.PositiveLength = Field(
-        default=0.001, description="radius of curvature R* of every contact (assumed; hertz-mindlin only)"
+    contact_radius: q.PositiveLength = setting(
+        "radius of curvature R* of every contact (assumed; hertz-mindlin only)", 0.001
     )
-    particle_spacing: q.PositiveLength = Field(
-        default=0.001, description="spacing of the boundary particles (particles, kernel)"
+    particle_spacing: q.PositiveLength = setting("spacing of the boundary particles (particles, kernel)", 0.001)
+    smoothing_length: q.PositiveLength | None = setting(
+        "smoothing length of the kernel (kernel only; default: 1.3 particle_spacing)", None
     )
-    smoothing_length: q.PositiveLength | None = Field(
-        default=None, description="smoothing length of the kernel (kernel only; default: 1.3 particle_spacing)"
-    )
-    kernel: Annotated[Kernel, OneOf(get_args(Kernel))] = Field(
-        default="wendland-c2", description="kernel function (kernel only): wendland-c2, cubic-spline or quintic-spline"
+    kernel: Annotated[Kernel, OneOf(get_args(Kernel))] = setting(
+        "kernel function (kernel only): wendland-c2, cubic-spline or quintic-spline", "wendland-c2"
     )
 
     @property

@@ -7,11 +7,11 @@ from itertools import chain, pairwise
 from typing import Annotated, Any, Literal, get_args
 
 import pydantic
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict
 from pydantic_core import PydanticKnownError
 
 from blocksim.scenario import geometry, units as q
-from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole, require_one
+from blocksim.scenario.models.base import Identifier, OneOf, Table, Whole, require_one, setting
 from blocksim.scenario.models.motion import AnyDrive
 
 Side = Literal["width", "height", "length"]
@@ -30,21 +30,17 @@ class Material(Table):
 
     model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": ["density"]}, {"required": ["unit_weight"]}]})
 
-    given_density: q.Density | None = Field(
-        default=None, alias="density", description="mass per volume; give this or unit_weight"
-    )
-    unit_weight: q.UnitWeight | None = Field(
-        default=None, description="weight per volume, divided by 9.81 m/s^2; give this or density"
-    )
-    young_modulus: q.Pressure = Field(description="Young's modulus E")
-    poisson_ratio: q.PoissonRatio = Field(description="Poisson's ratio")
-    friction_angle: q.FrictionAngle | None = Field(default=None, description="makes it a soil: its angle of friction")
-    cohesion: q.Cohesion | None = Field(default=None, description="cohesion of a soil (default: 0)")
-    dilation: q.Angle | None = Field(default=None, description="angle of dilation of a soil; only 0 is available")
-    yield_surface: Annotated[YieldSurface, OneOf(get_args(YieldSurface))] | None = Field(
-        default=None,
-        description="how Drucker and Prager's surface follows from friction angle and cohesion (default: "
+    given_density: q.Density | None = setting("mass per volume; give this or unit_weight", None, alias="density")
+    unit_weight: q.UnitWeight | None = setting("weight per volume, divided by 9.81 m/s^2; give this or density", None)
+    young_modulus: q.Pressure = setting("Young's modulus E")
+    poisson_ratio: q.PoissonRatio = setting("Poisson's ratio")
+    friction_angle: q.FrictionAngle | None = setting("makes it a soil: its angle of friction", None)
+    cohesion: q.Cohesion | None = setting("cohesion of a soil (default: 0)", None)
+    dilation: q.Angle | None = setting("angle of dilation of a soil; only 0 is available", None)
+    yield_surface: Annotated[YieldSurface, OneOf(get_args(YieldSurface))] | None = setting(
+        "how Drucker and Prager's surface follows from friction angle and cohesion (default: "
         "mohr-coulomb, which fails as they say; plane-strain-associated is the value often printed, too weak here)",
+        None,
     )
 
     def _check(self) -> None:
@@ -78,30 +74,30 @@ class Block(Table):
         json_schema_extra={"oneOf": [{"required": [*keys]} for keys in (SIDES, *OUTLINE_KEYS.values(), ["depth"])]}
     )
 
-    width: q.PositiveLength | None = Field(default=None, description="width of the block")
-    height: q.PositiveLength | None = Field(default=None, description="height of the block")
-    length: q.PositiveLength | None = Field(default=None, description="length of the block")
-    upright: Annotated[Side, OneOf(SIDES)] = Field(default="height", description="the side that stands upright")
-    along: Annotated[Side, OneOf(SIDES)] = Field(
+    width: q.PositiveLength | None = setting("width of the block", None)
+    height: q.PositiveLength | None = setting("height of the block", None)
+    length: q.PositiveLength | None = setting("length of the block", None)
+    upright: Annotated[Side, OneOf(SIDES)] = setting("the side that stands upright", "height")
+    along: Annotated[Side, OneOf(SIDES)] = setting(
+        "the side that lies along x (default: width, or length if width stands upright)",
         default_factory=lambda known: "length" if known.get("upright") == "width" else "width",
-        description="the side that lies along x (default: width, or length if width stands upright)",
     )
-    outline: tuple[Point, ...] | None = Field(
-        default=None,
-        description="corners [x, y] of a convex block, in either sense, in place of width, height and length; "
+    outline: tuple[Point, ...] | None = setting(
+        "corners [x, y] of a convex block, in either sense, in place of width, height and length; "
         "x and y of a body are those of its centroid",
+        None,
         json_schema_extra={"minItems": geometry.FEWEST, "maxItems": geometry.MOST},
     )
-    sides: Annotated[int, Whole(geometry.FEWEST, geometry.MOST)] | None = Field(
-        default=None, description="number of sides of a regular block, the lowest level, in place of an outline"
+    sides: Annotated[int, Whole(geometry.FEWEST, geometry.MOST)] | None = setting(
+        "number of sides of a regular block, the lowest level, in place of an outline", None
     )
-    radius: q.PositiveLength | None = Field(default=None, description="distance of its corners from its centre")
-    given_depth: q.PositiveLength | None = Field(
-        default=None,
+    radius: q.PositiveLength | None = setting("distance of its corners from its centre", None)
+    given_depth: q.PositiveLength | None = setting(
+        "extent out of the plane of a block with an outline or sides, or with a shape from its structure",
+        None,
         alias="depth",
-        description="extent out of the plane of a block with an outline or sides, or with a shape from its structure",
     )
-    material: str = Field(description="the name of the block's material")
+    material: str = setting("the name of the block's material")
 
     @pydantic.model_validator(mode="before")
     @classmethod
@@ -186,15 +182,15 @@ class Block(Table):
 class BodySpec(Table):
     """One body placed by hand."""
 
-    block: str = Field(description="the name of a block")
-    x: q.Length = Field(description="centre along the ground")
-    y: q.Length = Field(description="centre above the ground")
-    angle: q.Angle = Field(default=0.0, description="rotation, counter-clockwise positive")
-    velocity: tuple[q.Speed, q.Speed] = Field(default=(0.0, 0.0), description="velocity of the centre along x and y")
-    spin: q.Spin = Field(default=0.0, description="angular velocity, counter-clockwise positive")
-    fixed: bool = Field(default=False, description="true for a body that never moves")
-    motion: AnyDrive | None = Field(default=None, description="prescribed motion of this body alone")
-    name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
+    block: str = setting("the name of a block")
+    x: q.Length = setting("centre along the ground")
+    y: q.Length = setting("centre above the ground")
+    angle: q.Angle = setting("rotation, counter-clockwise positive", 0.0)
+    velocity: tuple[q.Speed, q.Speed] = setting("velocity of the centre along x and y", (0.0, 0.0))
+    spin: q.Spin = setting("angular velocity, counter-clockwise positive", 0.0)
+    fixed: bool = setting("true for a body that never moves", default=False)
+    motion: AnyDrive | None = setting("prescribed motion of this body alone", None)
+    name: Identifier | None = setting("name in tables (default: its number, from 1)", None)
 
     def _check(self) -> None:
         if self.fixed and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
@@ -208,11 +204,11 @@ class BodySpec(Table):
 class Ground(Table):
     """The half-plane below y = 0, or the region below a profile; a tilt turns gravity, x stays along the ground."""
 
-    tilt: q.TiltAngle = Field(default=0.0, description="slope of the ground, positive where its +x end is raised")
-    material: str | None = Field(default=None, description="the name of its material (default: the blocks' own)")
-    profile: tuple[Point, ...] | None = Field(
-        default=None,
-        description="points [x, y] of its surface towards +x, level beyond both ends (default: level at y = 0)",
+    tilt: q.TiltAngle = setting("slope of the ground, positive where its +x end is raised", 0.0)
+    material: str | None = setting("the name of its material (default: the blocks' own)", None)
+    profile: tuple[Point, ...] | None = setting(
+        "points [x, y] of its surface towards +x, level beyond both ends (default: level at y = 0)",
+        None,
         json_schema_extra={"minItems": 2},
     )
 
@@ -237,11 +233,9 @@ class Ground(Table):
 class Wall(Table):
     """Straight segment of boundary with one face: the solid is on the right of the way from `from` to `to`."""
 
-    start: Point = Field(
-        alias="from", description="[x, y] of its start; the solid is on the right of the way to its end"
-    )
-    end: Point = Field(alias="to", description="[x, y] of its end")
-    material: str | None = Field(default=None, description="the name of its material (default: as the ground)")
+    start: Point = setting("[x, y] of its start; the solid is on the right of the way to its end", alias="from")
+    end: Point = setting("[x, y] of its end", alias="to")
+    material: str | None = setting("the name of its material (default: as the ground)", None)
 
     def _check(self) -> None:
         if self.start == self.end:

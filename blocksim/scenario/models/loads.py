@@ -39,7 +39,7 @@ class Stretch(NamedTuple):
 class Constant(base.Table):
     """The whole load from the beginning to the end."""
 
-    kind: Literal["constant"] = Field(description="kind of history")
+    kind: Literal["constant"] = base.setting("kind of history")
 
 
 class RampHistory(base.Table):
@@ -47,11 +47,11 @@ class RampHistory(base.Table):
 
     model_config = ConfigDict(title="Ramp")
 
-    kind: Literal["ramp"] = Field(description="kind of history")
-    start: q.NonNegativeTime = Field(default=0.0, description="begin of the ramp")
-    end: q.PositiveTime = Field(description="end of the ramp")
-    first: q.Number = Field(default=0.0, alias="from", description="factor until the ramp begins")
-    last: q.Number = Field(default=1.0, alias="to", description="factor once it has ended")
+    kind: Literal["ramp"] = base.setting("kind of history")
+    start: q.NonNegativeTime = base.setting("begin of the ramp", 0.0)
+    end: q.PositiveTime = base.setting("end of the ramp")
+    first: q.Number = base.setting("factor until the ramp begins", 0.0, alias="from")
+    last: q.Number = base.setting("factor once it has ended", 1.0, alias="to")
 
     def _check(self) -> None:
         if not self.end > self.start:
@@ -103,21 +103,21 @@ class Steps(_Sampled):
     """Factors that hold from their time on; none before the first."""
 
     least = 1
-    kind: Literal["steps"] = Field(description="kind of history")
-    times: Times = Field(description="times at which the factor changes")
-    factors: tuple[q.Number, ...] = Field(description="factor from each of these times on; 0 before")
+    kind: Literal["steps"] = base.setting("kind of history")
+    times: Times = base.setting("times at which the factor changes")
+    factors: tuple[q.Number, ...] = base.setting("factor from each of these times on; 0 before")
 
 
 class Samples(_Sampled):
     """Factors at some times, joined by straight lines: of a CSV table, or `times` and `factors`."""
 
     column = "factor"
-    kind: Literal["table"] = Field(description="kind of history")
-    table: str | None = Field(
-        default=None, description="CSV table with the columns time_s and factor, relative to the scenario file"
+    kind: Literal["table"] = base.setting("kind of history")
+    table: str | None = base.setting(
+        "CSV table with the columns time_s and factor, relative to the scenario file", None
     )
-    times: Times = Field(default=(), description="times of the factors, instead of a table")
-    factors: tuple[q.Number, ...] = Field(default=(), description="factors at these times, instead of a table")
+    times: Times = base.setting("times of the factors, instead of a table", ())
+    factors: tuple[q.Number, ...] = base.setting("factors at these times, instead of a table", ())
 
 
 AnyHistory = Annotated[Constant | RampHistory | Steps | Samples, Field(discriminator="kind")]
@@ -131,40 +131,40 @@ Face = Literal["left", "right", "top", "bottom"]
 FACES: tuple[Face, ...] = get_args(Face)
 WATER = 9810.0
 """N/m³; unit weight of water."""
-BODY = Field(description="the name of the body that it acts on (without a name, its number)")
+BODY = base.setting("the name of the body that it acts on (without a name, its number)")
 
 
 class Load(base.Table):
     """One load; every kind adds its own keys."""
 
-    name: base.Identifier | None = Field(default=None, description="name, as in `--vary loads.NAME.magnitude=1N:9N`")
+    name: base.Identifier | None = base.setting("name, as in `--vary loads.NAME.magnitude=1N:9N`", None)
 
 
 class VaryingLoad(Load):
     """A load that goes with a factor."""
 
-    history: AnyHistory = Field(default=Constant(kind="constant"), description="factor over time")
+    history: AnyHistory = base.setting("factor over time", Constant(kind="constant"))
 
 
 class Force(VaryingLoad):
     """A force on a point of a body, along fixed axes or along those of the body."""
 
-    kind: Literal["force"] = Field(description="kind of load")
+    kind: Literal["force"] = base.setting("kind of load")
     body: str = BODY
-    magnitude: q.Force = Field(description="size of the force; negative against its direction")
-    direction: q.Angle = Field(default=0.0, description="direction, counter-clockwise from +x of the axes")
-    axes: Annotated[Axes, base.OneOf(get_args(Axes))] = Field(
-        default="world", description="axes of the direction: world, or body, with which it turns"
+    magnitude: q.Force = base.setting("size of the force; negative against its direction")
+    direction: q.Angle = base.setting("direction, counter-clockwise from +x of the axes", 0.0)
+    axes: Annotated[Axes, base.OneOf(get_args(Axes))] = base.setting(
+        "axes of the direction: world, or body, with which it turns", "world"
     )
-    point: geometry.Point = Field(default=(0.0, 0.0), description="[x, y] of its point in the body, from the centre")
+    point: geometry.Point = base.setting("[x, y] of its point in the body, from the centre", (0.0, 0.0))
 
 
 class Moment(VaryingLoad):
     """A moment on a body."""
 
-    kind: Literal["moment"] = Field(description="kind of load")
+    kind: Literal["moment"] = base.setting("kind of load")
     body: str = BODY
-    magnitude: q.Moment = Field(description="size of the moment, counter-clockwise positive")
+    magnitude: q.Moment = base.setting("size of the moment, counter-clockwise positive")
 
 
 class Pressure(VaryingLoad):
@@ -173,18 +173,18 @@ class Pressure(VaryingLoad):
     The factor of a history goes with the pressure, and for water with the level: the water rises and falls.
     """
 
-    kind: Literal["pressure"] = Field(description="kind of load")
+    kind: Literal["pressure"] = base.setting("kind of load")
     body: str = BODY
-    face: Annotated[Face, base.OneOf(FACES)] = Field(
-        description="face of the body before it is turned by its angle: left, right, top or bottom"
+    face: Annotated[Face, base.OneOf(FACES)] = base.setting(
+        "face of the body before it is turned by its angle: left, right, top or bottom"
     )
-    magnitude: q.AnyPressure | None = Field(
-        default=None, description="uniform pressure, negative for suction; give this or water_level"
+    magnitude: q.AnyPressure | None = base.setting(
+        "uniform pressure, negative for suction; give this or water_level", None
     )
-    water_level: q.NonNegativeLength | None = Field(
-        default=None, description="level of the water above the origin; give this or magnitude"
+    water_level: q.NonNegativeLength | None = base.setting(
+        "level of the water above the origin; give this or magnitude", None
     )
-    unit_weight: q.UnitWeight = Field(default=WATER, description="weight per volume of the water")
+    unit_weight: q.UnitWeight = base.setting("weight per volume of the water", WATER)
 
     def _check(self) -> None:
         missing = 'the pressure is missing: give magnitude (such as "10 kPa") or water_level'
@@ -196,8 +196,8 @@ class Pressure(VaryingLoad):
 class Horizontal(VaryingLoad):
     """The same horizontal acceleration of all free bodies, in units of gravity (seismic coefficient)."""
 
-    kind: Literal["horizontal"] = Field(description="kind of load")
-    magnitude: q.Number = Field(description="acceleration over that of gravity, towards +x where positive")
+    kind: Literal["horizontal"] = base.setting("kind of load")
+    magnitude: q.Number = base.setting("acceleration over that of gravity, towards +x where positive")
 
 
 class Gravity(Load, _Sampled):
@@ -208,19 +208,16 @@ class Gravity(Load, _Sampled):
 
     needs: ClassVar = ("to", "rate")
     column, key = "tilt_deg", "tilts"
-    kind: Literal["gravity"] = Field(description="kind of load")
-    first: q.TiltAngle | None = Field(
-        default=None, alias="from", description="tilt until it begins to turn (default: ground.tilt)"
+    kind: Literal["gravity"] = base.setting("kind of load")
+    first: q.TiltAngle | None = base.setting("tilt until it begins to turn (default: ground.tilt)", None, alias="from")
+    last: q.TiltAngle | None = base.setting("tilt at which it stops", None, alias="to")
+    rate: q.PositiveSpin | None = base.setting("rate of the tilt", None)
+    start: q.NonNegativeTime = base.setting("time at which it begins to turn", 0.0)
+    table: str | None = base.setting(
+        "CSV table with the columns time_s and tilt_deg, relative to the scenario file, for to and rate", None
     )
-    last: q.TiltAngle | None = Field(default=None, alias="to", description="tilt at which it stops")
-    rate: q.PositiveSpin | None = Field(default=None, description="rate of the tilt")
-    start: q.NonNegativeTime = Field(default=0.0, description="time at which it begins to turn")
-    table: str | None = Field(
-        default=None,
-        description="CSV table with the columns time_s and tilt_deg, relative to the scenario file, for to and rate",
-    )
-    times: Times = Field(default=(), description="times of the tilts, instead of a table")
-    tilts: tuple[q.TiltAngle, ...] = Field(default=(), description="tilts at these times, instead of a table")
+    times: Times = base.setting("times of the tilts, instead of a table", ())
+    tilts: tuple[q.TiltAngle, ...] = base.setting("tilts at these times, instead of a table", ())
 
     def _check(self) -> None:
         turns = {"to": self.last, "rate": self.rate}

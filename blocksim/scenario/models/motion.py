@@ -39,7 +39,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from blocksim.errors import BlocksimError
 from blocksim.scenario import input_files, units as q
-from blocksim.scenario.models.base import PATH_SCHEMA, OneOf, Table, by_kind, require_one, table_path
+from blocksim.scenario.models.base import PATH_SCHEMA, OneOf, Table, by_kind, require_one, setting, table_path
 
 PIECES_PER_CYCLE = 200
 """The cubic pieces are then off by less than (2 pi/200)^4/384 = 3e-9 of the amplitude."""
@@ -62,15 +62,15 @@ class Harmonic(Table):
     r rises smoothly from 0 to 1 within `ramp` and falls as smoothly at the end of a duration.
     """
 
-    kind: Literal["harmonic"] = Field(description="kind of motion")
-    amplitude: q.PositiveLength = Field(description="largest displacement")
-    frequency: q.PositiveFrequency = Field(description="cycles per second")
-    phase: q.Angle = Field(default=0.0, description="phase at the start")
-    direction: q.Angle = Field(default=0.0, description="direction of the motion, counter-clockwise from +x")
-    start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the supports rest before")
-    duration: q.PositiveTime | None = Field(default=None, description="duration of the motion (default: to the end)")
-    ramp: q.PositiveTime | None = Field(
-        default=None, description="time of the smooth rise, and of the fall after a duration (default: one cycle)"
+    kind: Literal["harmonic"] = setting("kind of motion")
+    amplitude: q.PositiveLength = setting("largest displacement")
+    frequency: q.PositiveFrequency = setting("cycles per second")
+    phase: q.Angle = setting("phase at the start", 0.0)
+    direction: q.Angle = setting("direction of the motion, counter-clockwise from +x", 0.0)
+    start: q.NonNegativeTime = setting("start of the motion; the supports rest before", 0.0)
+    duration: q.PositiveTime | None = setting("duration of the motion (default: to the end)", None)
+    ramp: q.PositiveTime | None = setting(
+        "time of the smooth rise, and of the fall after a duration (default: one cycle)", None
     )
 
     @property
@@ -217,15 +217,13 @@ class FromTable(Table):
     Accelerations are joined by straight lines and integrated from rest; after the last one the velocity is constant.
     """
 
-    kind: Literal["table"] = Field(description="kind of motion")
-    table: Annotated[MotionTable, TableFile(read_motion_table, "shaking.csv"), PATH_SCHEMA] = Field(
-        description="CSV table, relative to the scenario file: time_s and displacement_m, _mm or acceleration_g, _m_s2"
+    kind: Literal["table"] = setting("kind of motion")
+    table: Annotated[MotionTable, TableFile(read_motion_table, "shaking.csv"), PATH_SCHEMA] = setting(
+        "CSV table, relative to the scenario file: time_s and displacement_m, _mm or acceleration_g, _m_s2"
     )
-    scale: q.Number = Field(default=1.0, description="factor on the table's values")
-    direction: q.Angle = Field(default=0.0, description="direction of the motion, counter-clockwise from +x")
-    start: q.NonNegativeTime = Field(
-        default=0.0, description="time at which the table's time is zero; the supports rest before"
-    )
+    scale: q.Number = setting("factor on the table's values", 1.0)
+    direction: q.Angle = setting("direction of the motion, counter-clockwise from +x", 0.0)
+    start: q.NonNegativeTime = setting("time at which the table's time is zero; the supports rest before", 0.0)
 
 
 MOST_CYCLES = 1000.0
@@ -250,18 +248,18 @@ class Pulse(Table):
     none of it; run.json warns where that makes a slip too large.
     """
 
-    kind: Literal["pulse"] = Field(description="kind of motion")
-    shape: Annotated[Shape, OneOf(get_args(Shape))] = Field(description="course of the acceleration")
-    amplitude: Acceleration = Field(description="largest acceleration; 0.5 g is written as such")
-    frequency: q.PositiveFrequency | None = Field(
-        default=None, description="cycles per second; give this or duration (a half-sine, a rectangle: half a cycle)"
+    kind: Literal["pulse"] = setting("kind of motion")
+    shape: Annotated[Shape, OneOf(get_args(Shape))] = setting("course of the acceleration")
+    amplitude: Acceleration = setting("largest acceleration; 0.5 g is written as such")
+    frequency: q.PositiveFrequency | None = setting(
+        "cycles per second; give this or duration (a half-sine, a rectangle: half a cycle)", None
     )
-    duration: q.PositiveTime | None = Field(default=None, description="duration of the whole pulse")
-    cycles: Annotated[float, q.Quantity(q.NUMBER, above=0.0, at_most=MOST_CYCLES)] = Field(
-        default=1.0, description="number of cycles of a sine or cosine, at most 1000"
+    duration: q.PositiveTime | None = setting("duration of the whole pulse", None)
+    cycles: Annotated[float, q.Quantity(q.NUMBER, above=0.0, at_most=MOST_CYCLES)] = setting(
+        "number of cycles of a sine or cosine, at most 1000", 1.0
     )
-    direction: q.Angle = Field(default=0.0, description="direction of positive acceleration, counter-clockwise from +x")
-    start: q.NonNegativeTime = Field(default=0.0, description="start of the pulse; the supports rest before")
+    direction: q.Angle = setting("direction of positive acceleration, counter-clockwise from +x", 0.0)
+    start: q.NonNegativeTime = setting("start of the pulse; the supports rest before", 0.0)
 
     @property
     def is_abrupt(self) -> bool:
@@ -298,15 +296,15 @@ MOST_BODY_TABLES = 16
 class Ramp(Table):
     """Once over a distance: at constant speed, or smoothly, u = distance (10 s^3 - 15 s^4 + 6 s^5)."""
 
-    kind: Literal["ramp"] = Field(description="kind of motion")
-    distance: q.PositiveLength = Field(description="way from start to end")
-    direction: q.Angle = Field(default=0.0, description="direction of the motion, counter-clockwise from +x")
-    duration: q.PositiveTime | None = Field(default=None, description="time from start to end; give this or speed")
-    speed: q.PositiveSpeed | None = Field(default=None, description="greatest speed; give this or duration")
-    course: Annotated[Course, OneOf(get_args(Course))] = Field(
-        default="constant", description="constant (at once at full speed) or smooth (starts and ends without a jerk)"
+    kind: Literal["ramp"] = setting("kind of motion")
+    distance: q.PositiveLength = setting("way from start to end")
+    direction: q.Angle = setting("direction of the motion, counter-clockwise from +x", 0.0)
+    duration: q.PositiveTime | None = setting("time from start to end; give this or speed", None)
+    speed: q.PositiveSpeed | None = setting("greatest speed; give this or duration", None)
+    course: Annotated[Course, OneOf(get_args(Course))] = setting(
+        "constant (at once at full speed) or smooth (starts and ends without a jerk)", "constant"
     )
-    start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the body rests before")
+    start: q.NonNegativeTime = setting("start of the motion; the body rests before", 0.0)
 
     def _check(self) -> None:
         require_one("give duration or speed", duration=self.duration, speed=self.speed)
@@ -315,17 +313,17 @@ class Ramp(Table):
 class Rotation(Table):
     """Once by an angle about a point, at constant spin or smoothly as a ramp."""
 
-    kind: Literal["rotation"] = Field(description="kind of motion")
-    angle: q.Angle = Field(description="turn from start to end, counter-clockwise positive")
-    about: tuple[q.Length, q.Length] | None = Field(
-        default=None, description="[x, y] of the point that it turns about (default: the centre of the body)"
+    kind: Literal["rotation"] = setting("kind of motion")
+    angle: q.Angle = setting("turn from start to end, counter-clockwise positive")
+    about: tuple[q.Length, q.Length] | None = setting(
+        "[x, y] of the point that it turns about (default: the centre of the body)", None
     )
-    duration: q.PositiveTime | None = Field(default=None, description="time from start to end; give this or spin")
-    spin: q.PositiveSpin | None = Field(default=None, description="greatest angular velocity; give this or duration")
-    course: Annotated[Course, OneOf(get_args(Course))] = Field(
-        default="constant", description="constant (at once at full spin) or smooth (starts and ends without a jerk)"
+    duration: q.PositiveTime | None = setting("time from start to end; give this or spin", None)
+    spin: q.PositiveSpin | None = setting("greatest angular velocity; give this or duration", None)
+    course: Annotated[Course, OneOf(get_args(Course))] = setting(
+        "constant (at once at full spin) or smooth (starts and ends without a jerk)", "constant"
     )
-    start: q.NonNegativeTime = Field(default=0.0, description="start of the motion; the body rests before")
+    start: q.NonNegativeTime = setting("start of the motion; the body rests before", 0.0)
 
     def _check(self) -> None:
         require_one("give duration or spin", duration=self.duration, spin=self.spin)
@@ -487,24 +485,22 @@ class Record(Table):
     sample the velocity is constant.
     """
 
-    kind: Literal["record"] = Field(description="kind of motion")
-    table: Annotated[RecordTable, TableFile(read_record, "record.AT2"), PATH_SCHEMA] = Field(
-        description="accelerogram, relative to the scenario file: PEER AT2, or text or CSV of time and value"
+    kind: Literal["record"] = setting("kind of motion")
+    table: Annotated[RecordTable, TableFile(read_record, "record.AT2"), PATH_SCHEMA] = setting(
+        "accelerogram, relative to the scenario file: PEER AT2, or text or CSV of time and value"
     )
-    unit: Annotated[Unit, OneOf(get_args(Unit))] | None = Field(
-        default=None, description="unit of the accelerations, g, m/s^2 or cm/s^2, where the file does not say it"
+    unit: Annotated[Unit, OneOf(get_args(Unit))] | None = setting(
+        "unit of the accelerations, g, m/s^2 or cm/s^2, where the file does not say it", None
     )
-    scale: q.Number = Field(default=1.0, description="factor on the accelerations; give this or pga")
-    pga: Acceleration | None = Field(default=None, description="largest acceleration that the record is scaled to")
-    baseline: Annotated[Baseline, OneOf(get_args(Baseline))] = Field(
-        default="rest",
-        description="correction of the accelerations: rest subtracts the straight line with which the supports end at "
+    scale: q.Number = setting("factor on the accelerations; give this or pga", 1.0)
+    pga: Acceleration | None = setting("largest acceleration that the record is scaled to", None)
+    baseline: Annotated[Baseline, OneOf(get_args(Baseline))] = setting(
+        "correction of the accelerations: rest subtracts the straight line with which the supports end at "
         "rest where they began, parabolic the parabola that makes the velocities least in the mean square, none",
+        "rest",
     )
-    direction: q.Angle = Field(default=0.0, description="direction of the motion, counter-clockwise from +x")
-    start: q.NonNegativeTime = Field(
-        default=0.0, description="time at which the record's time is zero; the supports rest before"
-    )
+    direction: q.Angle = setting("direction of the motion, counter-clockwise from +x", 0.0)
+    start: q.NonNegativeTime = setting("time at which the record's time is zero; the supports rest before", 0.0)
 
     def _check(self) -> None:
         name, said = self.table.path.name, self.table.unit

@@ -5,11 +5,10 @@ from html import escape
 from typing import Annotated, Any, Literal
 
 import pydantic
-from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from blocksim.scenario import units as q
-from blocksim.scenario.models.base import HELD, SYSTEMS, Identifier, OneOf, SystemTable, Table, read_tables
+from blocksim.scenario.models.base import HELD, SYSTEMS, Identifier, OneOf, SystemTable, Table, read_tables, setting
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
 from blocksim.scenario.models.loads import AnyLoad
@@ -29,39 +28,37 @@ class Scenario(Table):
     that named blocks and materials exist and that no bodies overlap.
     """
 
-    schema_version: Annotated[Literal[1], OneOf((SCHEMA_VERSION,))] = Field(
-        alias="schema", description="version of the file format"
+    schema_version: Annotated[Literal[1], OneOf((SCHEMA_VERSION,))] = setting(
+        "version of the file format", alias="schema"
     )
-    name: Identifier = Field(description="name of the scenario and of its results folder")
-    description: str = Field(default="", description="free text")
-    gravity: q.NonNegativeAcceleration = Field(default=q.USUAL_GRAVITY, description="acceleration of gravity")
-    materials: dict[Identifier, Material] = Field(description="materials by name, as in [materials.aluminium]")
-    blocks: dict[Identifier, Block] = Field(default={}, description="blocks by name, as in [blocks.brick]")
-    structures: tuple[AnyStructure, ...] = Field(default=(), description="generators of bodies")
-    bodies: tuple[BodySpec, ...] = Field(default=(), description="single bodies")
-    ground: Ground = Field(default=Ground(), description="the ground")
-    walls: tuple[Wall, ...] = Field(default=(), description="straight segments of boundary, in addition to the ground")
-    motion: AnyMotion | None = Field(default=None, description="prescribed motion of ground, walls and fixed bodies")
-    events: tuple[Event, ...] = Field(default=(), description="what happens to bodies and walls during the run")
-    loads: tuple[AnyLoad, ...] = Field(default=(), description="loads on bodies, and on all of them")
-    start: Start = Field(default=Start(), description="what happens before time zero")
-    friction: Friction = Field(default=Friction(), description="friction between blocks and with the ground")
-    pairs: dict[str, dict[str, Pair]] = Field(
-        default={}, description="pairs of materials that differ, as in [pairs.aluminium.ground]"
-    )
-    contact: Contact = Field(default=Contact(), description="contact model and its numbers")
-    time: AnyTime = Field(default=Explicit(), description="time stepping")
-    output: Output = Field(default=Output(), description="what is recorded")
-    probes: tuple[AnyProbe, ...] = Field(default=(), description="time histories to record")
-    experiment: Experiment | None = Field(default=None, description="measurements to compare with")
-    sweep: Sweep | None = Field(default=None, description="what `blocksim sweep` varies")
-    provenance: dict[str, str] = Field(
-        default={}, description="where values come from: dotted key and text, for calibrated or assumed values"
+    name: Identifier = setting("name of the scenario and of its results folder")
+    description: str = setting("free text", "")
+    gravity: q.NonNegativeAcceleration = setting("acceleration of gravity", q.USUAL_GRAVITY)
+    materials: dict[Identifier, Material] = setting("materials by name, as in [materials.aluminium]")
+    blocks: dict[Identifier, Block] = setting("blocks by name, as in [blocks.brick]", {})
+    structures: tuple[AnyStructure, ...] = setting("generators of bodies", ())
+    bodies: tuple[BodySpec, ...] = setting("single bodies", ())
+    ground: Ground = setting("the ground", Ground())
+    walls: tuple[Wall, ...] = setting("straight segments of boundary, in addition to the ground", ())
+    motion: AnyMotion | None = setting("prescribed motion of ground, walls and fixed bodies", None)
+    events: tuple[Event, ...] = setting("what happens to bodies and walls during the run", ())
+    loads: tuple[AnyLoad, ...] = setting("loads on bodies, and on all of them", ())
+    start: Start = setting("what happens before time zero", Start())
+    friction: Friction = setting("friction between blocks and with the ground", Friction())
+    pairs: dict[str, dict[str, Pair]] = setting("pairs of materials that differ, as in [pairs.aluminium.ground]", {})
+    contact: Contact = setting("contact model and its numbers", Contact())
+    time: AnyTime = setting("time stepping", Explicit())
+    output: Output = setting("what is recorded", Output())
+    probes: tuple[AnyProbe, ...] = setting("time histories to record", ())
+    experiment: Experiment | None = setting("measurements to compare with", None)
+    sweep: Sweep | None = setting("what `blocksim sweep` varies", None)
+    provenance: dict[str, str] = setting(
+        "where values come from: dotted key and text, for calibrated or assumed values", {}
     )
 
     systems: SkipJsonSchema[
         Annotated[dict[str, tuple[pydantic.SerializeAsAny[SystemTable], ...]], pydantic.BeforeValidator(read_tables)]
-    ] = Field(default={}, alias="(systems)", description="tables of systems beside blocks and supports, by their name")
+    ] = setting("tables of systems beside blocks and supports, by their name", {}, alias="(systems)")
 
     @pydantic.model_validator(mode="before")
     @classmethod

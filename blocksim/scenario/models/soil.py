@@ -5,10 +5,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import numpy as np
-from pydantic import Field
 
 from blocksim.scenario import geometry, spelling, units as q
-from blocksim.scenario.models.base import SYSTEMS, Identifier, OneOf, SystemTable
+from blocksim.scenario.models.base import SYSTEMS, Identifier, OneOf, SystemTable, setting
 from blocksim.scenario.models.geometry import Point
 
 if TYPE_CHECKING:
@@ -32,28 +31,25 @@ class SoilTable(SystemTable):
     """A body of soil: an outline, a rectangle or a slope, filled with particles."""
 
     declared_in = "blocksim.world.systems.soils:SOILS"
-    name: Identifier = Field(description="name of the soil in tables")
-    material: str = Field(description="the name of its material, which has a friction_angle")
-    kind: Annotated[Kind, OneOf(get_args(Kind))] = Field(
-        default="outline",
-        description="what is given of its shape: an outline, x and y of a rectangle, or these and the angle of a slope",
+    name: Identifier = setting("name of the soil in tables")
+    material: str = setting("the name of its material, which has a friction_angle")
+    kind: Annotated[Kind, OneOf(get_args(Kind))] = setting(
+        "what is given of its shape: an outline, x and y of a rectangle, or these and the angle of a slope", "outline"
     )
-    outline: tuple[Point, ...] | None = Field(
-        default=None, description="corners [x, y] in order; where an edge is inclined, discs of a spacing stay inside"
+    outline: tuple[Point, ...] | None = setting(
+        "corners [x, y] in order; where an edge is inclined, discs of a spacing stay inside", None
     )
-    x: Point | None = Field(default=None, description="where a rectangle, or the base of a slope, begins and ends")
-    y: Point | None = Field(default=None, description="where it begins and ends above the ground")
-    angle: q.SlopeAngle | None = Field(
-        default=None, description="rise of the face of a slope, from its foot at the left; above 90 deg from the right"
+    x: Point | None = setting("where a rectangle, or the base of a slope, begins and ends", None)
+    y: Point | None = setting("where it begins and ends above the ground", None)
+    angle: q.SlopeAngle | None = setting(
+        "rise of the face of a slope, from its foot at the left; above 90 deg from the right", None
     )
-    spacing: q.PositiveLength = Field(description="distance of the particles at the start, the same for all soils")
-    start: Annotated[Start, OneOf(get_args(Start))] = Field(
-        default="geostatic",
-        description="geostatic: stresses of the weight above; ramp: no stress, and gravity grows over 0.1 s",
+    spacing: q.PositiveLength = setting("distance of the particles at the start, the same for all soils")
+    start: Annotated[Start, OneOf(get_args(Start))] = setting(
+        "geostatic: stresses of the weight above; ramp: no stress, and gravity grows over 0.1 s", "geostatic"
     )
-    gradient: Annotated[Gradient, OneOf(get_args(Gradient))] = Field(
-        default="corrected",
-        description="corrected, or raw: two thirds of the time, but on a rough base too little thrust on blocks",
+    gradient: Annotated[Gradient, OneOf(get_args(Gradient))] = setting(
+        "corrected, or raw: two thirds of the time, but on a rough base too little thrust on blocks", "corrected"
     )
 
     def _check(self) -> None:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import pydantic
-from pydantic import Field, GetJsonSchemaHandler
+from pydantic import GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from blocksim.scenario import spelling, units as q
-from blocksim.scenario.models.base import PATH_SCHEMA, OneOf, Table, Whole, table_path
+from blocksim.scenario.models.base import PATH_SCHEMA, OneOf, Table, Whole, setting, table_path
 
 MAX_VALUES = 100_000
 SIGNIFICANT = 12
@@ -248,7 +248,7 @@ TablePath = Annotated[Path, pydantic.BeforeValidator(_existing_table), PATH_SCHE
 class Experiment(Table):
     """Measurements to compare with."""
 
-    table: TablePath = Field(description="CSV table of the experiment, relative to the scenario file")
+    table: TablePath = setting("CSV table of the experiment, relative to the scenario file")
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,23 +287,22 @@ Values = Annotated[Variation, pydantic.PlainValidator(_variation), pydantic.With
 class Sweep(Table):
     """Scenario keys to vary; in the file every dotted key is a key in quotes next to `mode`."""
 
-    mode: Annotated[Mode, OneOf(get_args(Mode))] = Field(
-        default="grid",
-        description="grid: every combination; list: all first values, all second values …; table: rows of a file; "
+    mode: Annotated[Mode, OneOf(get_args(Mode))] = setting(
+        "grid: every combination; list: all first values, all second values …; table: rows of a file; "
         "lhs: Latin hypercube; sobol: scrambled Sobol points; normal: independent random draws",
+        "grid",
     )
-    samples: Annotated[int, Whole(1, MAX_SAMPLES), pydantic.BeforeValidator(_of_the_mode)] = Field(
-        default=128, description="number of cases to draw (lhs, sobol, normal; sobol is balanced at powers of two)"
+    samples: Annotated[int, Whole(1, MAX_SAMPLES), pydantic.BeforeValidator(_of_the_mode)] = setting(
+        "number of cases to draw (lhs, sobol, normal; sobol is balanced at powers of two)", 128
     )
-    seed: Annotated[int, Whole(0, MAX_SEED), pydantic.BeforeValidator(_of_the_mode)] = Field(
-        default=0, description="random seed (lhs, sobol, normal)"
+    seed: Annotated[int, Whole(0, MAX_SEED), pydantic.BeforeValidator(_of_the_mode)] = setting(
+        "random seed (lhs, sobol, normal)", 0
     )
-    table: Annotated[TablePath | None, pydantic.BeforeValidator(_of_the_mode)] = Field(
-        default=None,
-        description="CSV table of cases, relative to the scenario file: one column per key, units as in `overlap [mm]`",
+    table: Annotated[TablePath | None, pydantic.BeforeValidator(_of_the_mode)] = setting(
+        "CSV table of cases, relative to the scenario file: one column per key, units as in `overlap [mm]`", None
     )
-    vary: dict[str, Values] = Field(
-        description="dotted key of the scenario, and a list, { from, to, count }, { from, to }, { mean, sd } or "
+    vary: dict[str, Values] = setting(
+        "dotted key of the scenario, and a list, { from, to, count }, { from, to }, { mean, sd } or "
         '{ mean, sd, from, to }; scale = "log" with from and to'
     )
 

@@ -7,7 +7,7 @@ import pydantic
 from pydantic import Field
 
 from blocksim.scenario import spelling, units as q
-from blocksim.scenario.models.base import Identifier, OneOf, Table, TimeOr, Whole, by_kind, require_one
+from blocksim.scenario.models.base import Identifier, OneOf, Table, TimeOr, Whole, by_kind, require_one, setting
 
 Scheme = Literal["explicit", "nonsmooth"]
 SPRINGS, IMPULSES = map(str, get_args(Scheme))
@@ -34,15 +34,15 @@ class Time(Table):
     has_rigid_contacts: ClassVar[bool] = False  # whether they are impulses
     contacts: ClassVar[str] = "contacts"  # in words
     models_of_outlines: ClassVar[tuple[str, ...]] = ()  # contact models that know blocks with an outline
-    scheme: Annotated[Scheme, _WORDS] = Field(
-        default="explicit", description="time stepping: explicit (springs and dashpots) or nonsmooth (impulses)"
+    scheme: Annotated[Scheme, _WORDS] = setting(
+        "time stepping: explicit (springs and dashpots) or nonsmooth (impulses)", "explicit"
     )
-    end: q.PositiveTime = Field(default=2.0, description="simulated time")
-    step: Step = Field(default="auto", description='time step, or "auto" for the largest safe one')
-    force_step: bool = Field(default=False, description="true to accept a step above the safe limit")
-    stop_at_rest: bool = Field(default=True, description="true to end the run once everything rests")
-    rest_speed: q.PositiveSpeed = Field(default=1e-4, description="largest speed that counts as rest")
-    rest_hold: q.NonNegativeTime = Field(default=0.05, description="time that rest must last")
+    end: q.PositiveTime = setting("simulated time", 2.0)
+    step: Step = setting('time step, or "auto" for the largest safe one', "auto")
+    force_step: bool = setting("true to accept a step above the safe limit", default=False)
+    stop_at_rest: bool = setting("true to end the run once everything rests", default=True)
+    rest_speed: q.PositiveSpeed = setting("largest speed that counts as rest", 1e-4)
+    rest_hold: q.NonNegativeTime = setting("time that rest must last", 0.05)
 
     @property
     def parts(self) -> int:
@@ -58,8 +58,8 @@ class Explicit(Time):
     has_springs = True
     contacts = "springs"
     models_of_outlines = ("surface",)
-    scheme: Annotated[Literal["explicit"], _WORDS] = Field(default="explicit", description="the scheme of this table")
-    safety: q.Safety = Field(default=0.05, description="automatic step as a share of the stability limit, at most 0.1")
+    scheme: Annotated[Literal["explicit"], _WORDS] = setting("the scheme of this table", "explicit")
+    safety: q.Safety = setting("automatic step as a share of the stability limit, at most 0.1", 0.05)
 
 
 class Nonsmooth(Time):
@@ -69,21 +69,19 @@ class Nonsmooth(Time):
     has_rigid_contacts = True
     contacts = "rigid contacts"
     models_of_outlines = ("surface",)  # the model is not asked for
-    scheme: Annotated[Literal["nonsmooth"], _WORDS] = Field(description="the scheme of this table")
-    substeps: Annotated[int, Whole(1, MOST_SUBSTEPS)] = Field(
-        default=4, description="substeps; contacts are detected once per step and solved in every substep"
+    scheme: Annotated[Literal["nonsmooth"], _WORDS] = setting("the scheme of this table")
+    substeps: Annotated[int, Whole(1, MOST_SUBSTEPS)] = setting(
+        "substeps; contacts are detected once per step and solved in every substep", 4
     )
-    velocity_tolerance: Annotated[float, _TOLERANCE] | None = Field(
-        default=None,
-        description="largest change of velocity by one impulse at which a substep counts as solved (default: 1 mm/s, "
+    velocity_tolerance: Annotated[float, _TOLERANCE] | None = setting(
+        "largest change of velocity by one impulse at which a substep counts as solved (default: 1 mm/s, "
         "for a single block, and for up to 99 on supports that move, 0.001 mm/s, from 100 on 100 mm/s)",
+        None,
     )
-    velocity_sweeps: Annotated[int, Whole(1, MOST_SWEEPS)] = Field(
-        default=1000, description="maximum number of iterations over all contacts per substep"
+    velocity_sweeps: Annotated[int, Whole(1, MOST_SWEEPS)] = setting(
+        "maximum number of iterations over all contacts per substep", 1000
     )
-    restitution_threshold: q.NonNegativeSpeed = Field(
-        default=0.01, description="approach speed below which impacts do not rebound"
-    )
+    restitution_threshold: q.NonNegativeSpeed = setting("approach speed below which impacts do not rebound", 0.01)
 
 
 def scheme_of(value: object) -> str:
@@ -115,8 +113,8 @@ SCHEMES: dict[str, type[Time]] = {SPRINGS: Explicit, IMPULSES: Nonsmooth}
 class Output(Table):
     """Recording; it never changes the motion."""
 
-    every: q.PositiveTime = Field(default=0.001, description="time between recorded frames")
-    contacts: bool = Field(default=False, description="true to record all contacts and their forces in every frame")
+    every: q.PositiveTime = setting("time between recorded frames", 0.001)
+    contacts: bool = setting("true to record all contacts and their forces in every frame", default=False)
 
 
 Release = Literal["at rest", "always"]
@@ -128,17 +126,15 @@ class Start(Table):
     They also do under a pulse that begins at its peak at time zero; see `blocksim.scenario.motion.settles`.
     """
 
-    settle: bool = Field(
-        default=False, description="true to bring all to rest before time zero, with the contact forces that hold it"
+    settle: bool = setting(
+        "true to bring all to rest before time zero, with the contact forces that hold it", default=False
     )
-    hold: tuple[str, ...] = Field(
-        default=(), description="names of bodies that are kept still meanwhile and released at time zero"
-    )
+    hold: tuple[str, ...] = setting("names of bodies that are kept still meanwhile and released at time zero", ())
 
-    release: Annotated[Release, OneOf(get_args(Release))] = Field(
-        default="at rest",
-        description='what is released at time zero: a scene "at rest" only, any other ends the run; or "always", which '
+    release: Annotated[Release, OneOf(get_args(Release))] = setting(
+        'what is released at time zero: a scene "at rest" only, any other ends the run; or "always", which '
         "records how it falls",
+        "at rest",
     )
 
     def _check(self) -> None:
@@ -156,10 +152,10 @@ Names = tuple[str, ...]
 class NewVelocity(Table):
     """Velocity that a body gets; what is not given stays as it is."""
 
-    body: str = Field(description="name of a free body")
-    vx: q.Speed | None = Field(default=None, description="velocity of the centre along x (default: as it is)")
-    vy: q.Speed | None = Field(default=None, description="velocity of the centre along y (default: as it is)")
-    spin: q.Spin | None = Field(default=None, description="angular velocity (default: as it is)")
+    body: str = setting("name of a free body")
+    vx: q.Speed | None = setting("velocity of the centre along x (default: as it is)", None)
+    vy: q.Speed | None = setting("velocity of the centre along y (default: as it is)", None)
+    spin: q.Spin | None = setting("angular velocity (default: as it is)", None)
 
     def _check(self) -> None:
         if self.vx is None and self.vy is None and self.spin is None:
@@ -169,15 +165,15 @@ class NewVelocity(Table):
 class Event(Table):
     """One event: when it happens, and all that happens then."""
 
-    at: q.PositiveTime | None = Field(default=None, description="time of the event; give this or when")
-    when: Annotated[When, OneOf(("rest",))] | None = Field(
-        default=None, description='"rest": once everything rests, instead of the end of the run; give this or at'
+    at: q.PositiveTime | None = setting("time of the event; give this or when", None)
+    when: Annotated[When, OneOf(("rest",))] | None = setting(
+        '"rest": once everything rests, instead of the end of the run; give this or at', None
     )
-    remove: Names = Field(default=(), description='names of bodies and walls ("wall 1" is the first) that go')
-    fix: Names = Field(default=(), description="names of bodies that are fixed from then on")
-    free: Names = Field(default=(), description="names of fixed or driven bodies that are free from then on")
-    unload: Names = Field(default=(), description="names of loads that end")
-    velocity: NewVelocity | None = Field(default=None, description="velocity that a body gets")
+    remove: Names = setting('names of bodies and walls ("wall 1" is the first) that go', ())
+    fix: Names = setting("names of bodies that are fixed from then on", ())
+    free: Names = setting("names of fixed or driven bodies that are free from then on", ())
+    unload: Names = setting("names of loads that end", ())
+    velocity: NewVelocity | None = setting("velocity that a body gets", None)
 
     def _check(self) -> None:
         require_one('give a time, such as at = "0.2 s", or when = "rest"', at=self.at, when=self.when)
@@ -198,48 +194,42 @@ def _two(value: object) -> object:
 class Probe(Table):
     """Something that is recorded over time; it never changes the motion."""
 
-    name: Identifier | None = Field(
-        default=None, description="name in files and pictures (default: kind and number, as in force1)"
-    )
-    every: Every | None = Field(
-        default=None, description='time between samples, or "step" for every step (default: every output time)'
-    )
+    name: Identifier | None = setting("name in files and pictures (default: kind and number, as in force1)", None)
+    every: Every | None = setting('time between samples, or "step" for every step (default: every output time)', None)
 
 
 class ForceProbe(Probe):
     """Force of contacts on something, its point of application, and the share of friction that it mobilises."""
 
-    kind: Literal["force"] = Field(description="kind of probe")
-    on: str = Field(
-        description='name of the body that it acts on; or "ground", "wall 1", "walls", or "supports": ground, walls '
+    kind: Literal["force"] = setting("kind of probe")
+    on: str = setting(
+        'name of the body that it acts on; or "ground", "wall 1", "walls", or "supports": ground, walls '
         "and fixed bodies (fx is the base shear, -fy the support force)"
     )
-    by: str | None = Field(default=None, description="body or support that exerts it (default: all that touch)")
+    by: str | None = setting("body or support that exerts it (default: all that touch)", None)
 
 
 class PointProbe(Probe):
     """Motion of a material point of a body, in place and relative to the moving support."""
 
-    kind: Literal["point"] = Field(description="kind of probe")
-    body: str = Field(description="body that the point belongs to, by name")
-    at: tuple[q.Length, q.Length] = Field(
-        default=(0.0, 0.0), description="the point [x, y] in the body's own axes, from its centre"
-    )
+    kind: Literal["point"] = setting("kind of probe")
+    body: str = setting("body that the point belongs to, by name")
+    at: tuple[q.Length, q.Length] = setting("the point [x, y] in the body's own axes, from its centre", (0.0, 0.0))
 
 
 class JointProbe(Probe):
     """Opening and slip of the joint between two faces that lie opposite each other at the start."""
 
-    kind: Literal["joint"] = Field(description="kind of probe")
-    bodies: Annotated[tuple[str, str], pydantic.BeforeValidator(_two)] = Field(
-        description="two bodies by name; the joint turns with the first"
+    kind: Literal["joint"] = setting("kind of probe")
+    bodies: Annotated[tuple[str, str], pydantic.BeforeValidator(_two)] = setting(
+        "two bodies by name; the joint turns with the first"
     )
 
 
 class EnergyProbe(Probe):
     """The energies of the ledger."""
 
-    kind: Literal["energy"] = Field(description="kind of probe")
+    kind: Literal["energy"] = setting("kind of probe")
 
 
 AnyProbe = Annotated[ForceProbe | PointProbe | JointProbe | EnergyProbe, Field(discriminator="kind")]

@@ -8,10 +8,9 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from blocksim.scenario import geometry, units as q
-from blocksim.scenario.models.base import Table, Whole
+from blocksim.scenario.models.base import Table, Whole, setting
 from blocksim.scenario.models.geometry import Block
 
 MAX_COUNT = 100_000
@@ -48,12 +47,12 @@ class UnfitError(ValueError):
 class Structure(Table, ABC):
     """A generator of bodies; every kind adds its `kind` literal and its own keys."""
 
-    block: str = Field(description="the name of its block")
-    left: q.Length = Field(default=0.0, description="left edge of its first block, the lowest and leftmost")
-    bottom: q.Length = Field(default=0.0, description="height of that block's lower edge")
-    velocity: tuple[q.Speed, q.Speed] = Field(default=(0.0, 0.0), description="velocity of all blocks along x and y")
-    shear_velocity: q.Speed = Field(
-        default=0.0, description="additional velocity along x at full height, in proportion to the height of the centre"
+    block: str = setting("the name of its block")
+    left: q.Length = setting("left edge of its first block, the lowest and leftmost", 0.0)
+    bottom: q.Length = setting("height of that block's lower edge", 0.0)
+    velocity: tuple[q.Speed, q.Speed] = setting("velocity of all blocks along x and y", (0.0, 0.0))
+    shear_velocity: q.Speed = setting(
+        "additional velocity along x at full height, in proportion to the height of the centre", 0.0
     )
 
     counted_by: ClassVar[tuple[str, ...]] = ("count",)
@@ -93,7 +92,7 @@ class Courses(Structure):
     """A structure of several courses, one above the other."""
 
     stacked_by = "rows"
-    rows: Count = Field(description="number of courses, one above the other")
+    rows: Count = setting("number of courses, one above the other")
 
     def _check(self) -> None:
         if self.size > MAX_BLOCKS:

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict
 
 from blocksim.scenario import geometry, units as q
-from blocksim.scenario.models.base import Whole, require_one
+from blocksim.scenario.models.base import Whole, require_one, setting
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure, Seed, UnfitError, draws
 
@@ -27,15 +27,15 @@ class Arch(PolygonStructure):
 
     model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": ["radius"]}, {"required": ["span"]}]})
 
-    kind: Literal["arch"] = Field(description="kind of structure")
-    radius: q.PositiveLength | None = Field(default=None, description="mean radius; give this or span")
-    span: q.PositiveLength | None = Field(
-        default=None, description="clear distance of the springings of the intrados; give this or radius"
+    kind: Literal["arch"] = setting("kind of structure")
+    radius: q.PositiveLength | None = setting("mean radius; give this or span", None)
+    span: q.PositiveLength | None = setting(
+        "clear distance of the springings of the intrados; give this or radius", None
     )
-    thickness: q.PositiveLength = Field(description="thickness of the ring")
-    embrace: q.Embrace = Field(default=math.pi, description="angle between the springing joints")
-    count: Annotated[int, Whole(1, MOST_VOUSSOIRS)] = Field(description="number of voussoirs")
-    abutments: bool = Field(default=True, description="whether fixed blocks hold the springings")
+    thickness: q.PositiveLength = setting("thickness of the ring")
+    embrace: q.Embrace = setting("angle between the springing joints", math.pi)
+    count: Annotated[int, Whole(1, MOST_VOUSSOIRS)] = setting("number of voussoirs")
+    abutments: bool = setting("whether fixed blocks hold the springings", default=True)
 
     def _check(self) -> None:
         missing = "the size is missing: give radius (of the middle of the ring) or span"
@@ -78,11 +78,11 @@ MOST_DRUMS = 1000
 class Column(PolygonStructure):
     """Drums of equal height one above the other, their sides on straight lines from the lower to the upper width."""
 
-    kind: Literal["column"] = Field(description="kind of structure")
-    count: Annotated[int, Whole(1, MOST_DRUMS)] = Field(description="number of drums")
-    tall: q.PositiveLength = Field(alias="height", description="height of the column")
-    width: q.PositiveLength = Field(description="width at its foot")
-    top_width: q.PositiveLength | None = Field(default=None, description="width at its top (default: width)")
+    kind: Literal["column"] = setting("kind of structure")
+    count: Annotated[int, Whole(1, MOST_DRUMS)] = setting("number of drums")
+    tall: q.PositiveLength = setting("height of the column", alias="height")
+    width: q.PositiveLength = setting("width at its foot")
+    top_width: q.PositiveLength | None = setting("width at its top (default: width)", None)
 
     def divide(self) -> Sequence[Cell]:
         """Return the drums from the ground up."""
@@ -115,21 +115,21 @@ class Voronoi(PolygonStructure):
         json_schema_extra={"oneOf": [{"required": ["width", "height"]}, {"required": ["region"]}]}
     )
 
-    kind: Literal["voronoi"] = Field(description="kind of structure")
-    count: Annotated[int, Whole(1, MOST_CELLS)] = Field(description="number of cells, before small ones are rejected")
-    width: q.PositiveLength | None = Field(default=None, description="width of a wall; give this and height, or region")
-    tall: q.PositiveLength | None = Field(default=None, alias="height", description="height of a wall")
-    region: tuple[Point, ...] | None = Field(
-        default=None,
-        description="corners [x, y] of a convex region, such as a slope",
+    kind: Literal["voronoi"] = setting("kind of structure")
+    count: Annotated[int, Whole(1, MOST_CELLS)] = setting("number of cells, before small ones are rejected")
+    width: q.PositiveLength | None = setting("width of a wall; give this and height, or region", None)
+    tall: q.PositiveLength | None = setting("height of a wall", None, alias="height")
+    region: tuple[Point, ...] | None = setting(
+        "corners [x, y] of a convex region, such as a slope",
+        None,
         json_schema_extra={"minItems": geometry.FEWEST, "maxItems": geometry.MOST},
     )
-    seed: Seed = Field(default=1, description="seed of the random points")
-    relax: Annotated[int, Whole(0, 20)] = Field(
-        default=2, description="how often points move to the centroids of their cells, which makes cells more alike"
+    seed: Seed = setting("seed of the random points", 1)
+    relax: Annotated[int, Whole(0, 20)] = setting(
+        "how often points move to the centroids of their cells, which makes cells more alike", 2
     )
-    smallest: q.PositiveLength | None = Field(
-        default=None, description="least width of a cell (default: a tenth of the side of a square of the mean area)"
+    smallest: q.PositiveLength | None = setting(
+        "least width of a cell (default: a tenth of the side of a square of the mean area)", None
     )
 
     def _check(self) -> None:
@@ -186,22 +186,16 @@ class Rubble(PolygonStructure):
     between the smallest and the largest: the number of blocks above d goes with d^-exponent.
     """
 
-    kind: Literal["rubble"] = Field(description="kind of structure")
-    count: Annotated[int, Whole(1, MOST_BLOCKS)] = Field(description="number of blocks")
-    columns: Annotated[int, Whole(1, MOST_BLOCKS)] = Field(description="number of blocks in a row")
-    smallest: q.PositiveLength = Field(description="size of the smallest block")
-    largest: q.PositiveLength = Field(description="size of the largest block")
-    exponent: q.NonNegativeNumber = Field(
-        default=2.0, description="of the power law of sizes; 0: even in the logarithm"
-    )
-    fewest_sides: Annotated[int, Whole(geometry.FEWEST, MOST_SIDES)] = Field(
-        default=4, description="least number of sides"
-    )
-    most_sides: Annotated[int, Whole(geometry.FEWEST, MOST_SIDES)] = Field(
-        default=8, description="most number of sides"
-    )
-    gap: q.NonNegativeLength = Field(default=0.0, description="least distance of neighbours")
-    seed: Seed = Field(default=1, description="seed of shapes and sizes")
+    kind: Literal["rubble"] = setting("kind of structure")
+    count: Annotated[int, Whole(1, MOST_BLOCKS)] = setting("number of blocks")
+    columns: Annotated[int, Whole(1, MOST_BLOCKS)] = setting("number of blocks in a row")
+    smallest: q.PositiveLength = setting("size of the smallest block")
+    largest: q.PositiveLength = setting("size of the largest block")
+    exponent: q.NonNegativeNumber = setting("of the power law of sizes; 0: even in the logarithm", 2.0)
+    fewest_sides: Annotated[int, Whole(geometry.FEWEST, MOST_SIDES)] = setting("least number of sides", 4)
+    most_sides: Annotated[int, Whole(geometry.FEWEST, MOST_SIDES)] = setting("most number of sides", 8)
+    gap: q.NonNegativeLength = setting("least distance of neighbours", 0.0)
+    seed: Seed = setting("seed of shapes and sizes", 1)
 
     def _check(self) -> None:
         if self.smallest > self.largest:

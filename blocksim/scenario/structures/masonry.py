@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, get_args
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator
 
 from blocksim.scenario import units as q
 from blocksim.scenario.models import base, geometry
@@ -15,9 +15,9 @@ from blocksim.scenario.structures.base import Count, Courses, Pose, Seed, Struct
 class Stack(Structure):
     """Block i (from 0) has its left edge at left + i offset and its lower edge at bottom + i size_y."""
 
-    kind: Literal["stack"] = Field(description="kind of structure")
-    count: Count = Field(description="number of blocks")
-    offset: q.Length = Field(default=0.0, description="shift of each block relative to the one below")
+    kind: Literal["stack"] = base.setting("kind of structure")
+    count: Count = base.setting("number of blocks")
+    offset: q.Length = base.setting("shift of each block relative to the one below", 0.0)
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
@@ -28,9 +28,9 @@ class Stack(Structure):
 class Staircase(Structure):
     """Block i (from 0) has its left edge at left + i (size_x - overlap) and its lower edge at bottom + i size_y."""
 
-    kind: Literal["staircase"] = Field(description="kind of structure")
-    count: Count = Field(description="number of blocks")
-    overlap: q.PositiveLength = Field(description="length over which a block lies on the one below")
+    kind: Literal["staircase"] = base.setting("kind of structure")
+    count: Count = base.setting("number of blocks")
+    overlap: q.PositiveLength = base.setting("length over which a block lies on the one below")
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
@@ -63,20 +63,20 @@ class BlockWall(Courses):
     which fall into the hole as far as their neighbours allow.
     """
 
-    kind: Literal["wall"] = Field(description="kind of structure")
-    columns: Count = Field(description="number of blocks in a course")
-    bond: Annotated[Bond, base.OneOf(get_args(Bond))] = Field(
-        default="running", description="running: every second course is shifted by half a block; stack: none is"
+    kind: Literal["wall"] = base.setting("kind of structure")
+    columns: Count = base.setting("number of blocks in a course")
+    bond: Annotated[Bond, base.OneOf(get_args(Bond))] = base.setting(
+        "running: every second course is shifted by half a block; stack: none is", "running"
     )
-    gap: q.NonNegativeLength = Field(default=0.0, description="gap between neighbours in a course")
-    holes: tuple[Hole, ...] = Field(
-        default=(), description="blocks to leave out, [row, column] from 1, the lowest and leftmost first"
+    gap: q.NonNegativeLength = base.setting("gap between neighbours in a course", 0.0)
+    holes: tuple[Hole, ...] = base.setting(
+        "blocks to leave out, [row, column] from 1, the lowest and leftmost first", ()
     )
-    missing: q.Share = Field(default=0.0, description="share of the other blocks to leave out at random")
-    offset: q.NonNegativeLength = Field(
-        default=0.0, description="largest random shift of a block along x, to either side; at most half of the gap"
+    missing: q.Share = base.setting("share of the other blocks to leave out at random", 0.0)
+    offset: q.NonNegativeLength = base.setting(
+        "largest random shift of a block along x, to either side; at most half of the gap", 0.0
     )
-    seed: Seed = Field(default=0, description="random seed of shifts and blocks left out")
+    seed: Seed = base.setting("random seed of shifts and blocks left out", 0)
 
     def _check(self) -> None:
         super()._check()
@@ -124,8 +124,8 @@ class BlockWall(Courses):
 class Pyramid(Courses):
     """Course i (from 0) has rows - i blocks, each in the middle above two of the course below."""
 
-    kind: Literal["pyramid"] = Field(description="kind of structure")
-    gap: q.NonNegativeLength = Field(default=0.0, description="gap between neighbours in a course")
+    kind: Literal["pyramid"] = base.setting("kind of structure")
+    gap: q.NonNegativeLength = base.setting("gap between neighbours in a course", 0.0)
 
     @property
     def size(self) -> int:
@@ -150,11 +150,11 @@ class Dominoes(Structure):
     """
 
     stacked_by = None
-    kind: Literal["dominoes"] = Field(description="kind of structure")
-    count: Count = Field(description="number of blocks")
-    spacing: q.PositiveLength = Field(description="clear distance between neighbours")
-    push: q.Speed = Field(
-        default=0.0, description="speed along x of the centre of the first domino, which turns about its lower edge"
+    kind: Literal["dominoes"] = base.setting("kind of structure")
+    count: Count = base.setting("number of blocks")
+    spacing: q.PositiveLength = base.setting("clear distance between neighbours")
+    push: q.Speed = base.setting(
+        "speed along x of the centre of the first domino, which turns about its lower edge", 0.0
     )
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
@@ -177,15 +177,15 @@ class Grid(Courses):
     """
 
     counted_by = ("rows", "columns")
-    kind: Literal["grid"] = Field(description="kind of structure")
-    columns: Count = Field(description="number of blocks in a row")
-    gap_x: q.NonNegativeLength = Field(description="gap between neighbours along x, before they are shifted and turned")
-    gap_y: q.NonNegativeLength = Field(description="gap between neighbours along y, before they are shifted and turned")
-    offset: q.NonNegativeLength = Field(
-        default=0.0, description="largest random shift of a block along x and along y, to either side"
+    kind: Literal["grid"] = base.setting("kind of structure")
+    columns: Count = base.setting("number of blocks in a row")
+    gap_x: q.NonNegativeLength = base.setting("gap between neighbours along x, before they are shifted and turned")
+    gap_y: q.NonNegativeLength = base.setting("gap between neighbours along y, before they are shifted and turned")
+    offset: q.NonNegativeLength = base.setting(
+        "largest random shift of a block along x and along y, to either side", 0.0
     )
-    turn: q.HalfTurn = Field(default=0.0, description="largest random angle of a block, to either side")
-    seed: Seed = Field(default=0, description="random seed of shifts and angles")
+    turn: q.HalfTurn = base.setting("largest random angle of a block, to either side", 0.0)
+    seed: Seed = base.setting("random seed of shifts and angles", 0)
 
     def height(self, block: geometry.Block) -> float:
         """All rows, before blocks are shifted and turned."""

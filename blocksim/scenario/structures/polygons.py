@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import ValidationInfo, model_validator
 
 from blocksim.errors import BlocksimError
 from blocksim.extras import load_module
 from blocksim.scenario import geometry, input_files, units as q
-from blocksim.scenario.models.base import Identifier, Table, table_path
+from blocksim.scenario.models.base import Identifier, Table, setting, table_path
 from blocksim.scenario.models.geometry import Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure
 
@@ -165,13 +165,13 @@ MOST_SHRINK = 0.01  # of the least width of a block
 class DrawnBlock(Table):
     """One block of a drawing."""
 
-    outline: tuple[Point, ...] = Field(
-        description="corners [x, y] of a convex block, in either sense",
+    outline: tuple[Point, ...] = setting(
+        "corners [x, y] of a convex block, in either sense",
         json_schema_extra={"minItems": geometry.FEWEST, "maxItems": geometry.MOST},
     )
-    block: str | None = Field(default=None, description="the name of its block (default: that of the structure)")
-    fixed: bool = Field(default=False, description="true for a body that never moves")
-    name: Identifier | None = Field(default=None, description="name in tables (default: its number, from 1)")
+    block: str | None = setting("the name of its block (default: that of the structure)", None)
+    fixed: bool = setting("true for a body that never moves", default=False)
+    name: Identifier | None = setting("name in tables (default: its number, from 1)", None)
 
     def _check(self) -> None:
         for number, message in geometry.faults(self.outline):
@@ -185,16 +185,15 @@ class Polygons(PolygonStructure):
     name of its block. The block has the material, and [pairs] of materials say how joints behave.
     """
 
-    kind: Literal["polygons"] = Field(description="kind of structure")
-    cells_given: tuple[DrawnBlock, ...] = Field(
-        default=(), alias="cells", description="blocks, each with its outline; give these or table"
+    kind: Literal["polygons"] = setting("kind of structure")
+    cells_given: tuple[DrawnBlock, ...] = setting(
+        "blocks, each with its outline; give these or table", (), alias="cells"
     )
-    table: str | None = Field(default=None, description="GeoJSON or DXF file with an outline for each block")
-    unit: q.PositiveLength = Field(default=1.0, description="unit of the coordinates in the file")
-    in_place: bool = Field(default=False, description="true keeps all coordinates, whatever left and bottom are")
-    shrink: q.NonNegativeLength = Field(
-        default=0.0,
-        description="how far every edge moves inwards, so that rounded coordinates, or blocks at rest, do not overlap",
+    table: str | None = setting("GeoJSON or DXF file with an outline for each block", None)
+    unit: q.PositiveLength = setting("unit of the coordinates in the file", 1.0)
+    in_place: bool = setting("true keeps all coordinates, whatever left and bottom are", default=False)
+    shrink: q.NonNegativeLength = setting(
+        "how far every edge moves inwards, so that rounded coordinates, or blocks at rest, do not overlap", 0.0
     )
 
     @model_validator(mode="before")
