@@ -70,14 +70,16 @@ def _wrong_pairs(data: overrides.Data) -> Iterator[mistakes.Mistake]:
 
 
 def unfit_choices(scenario: Scenario) -> Iterator[mistakes.Mistake]:
-    """Find contact model and force law that the non-smooth scheme does not have.
+    """Find contact model and force law that the non-smooth scheme, soil or outlines do not have, and blocks of soil.
 
     Numbers of springs and dashpots are not refused, so that a scenario can be run by both schemes; they have no effect.
     """
     for name in () if scenario.time.has_systems else scenario.systems:
         message = f"{name} need another scheme: {units.toml(scenario.time.scheme)} advances blocks and supports only"
         yield mistakes.Mistake((name,), message, at="key", relation=True)
-    yield from start.unfit_soils(scenario)
+    if scenario.systems.get("soils") and scenario.contact.model != "surface":
+        message = f'{units.toml(scenario.contact.model)} does not go with soil; use model = "surface"'
+        yield mistakes.Mistake(("contact", "model"), message, relation=True)
     if scenario.start.settle and scenario.systems:
         message = f"{', '.join(scenario.systems)} cannot settle: blocks and supports alone can"
         yield mistakes.Mistake(("start", "settle"), message, relation=True)
@@ -91,19 +93,20 @@ def unfit_choices(scenario: Scenario) -> Iterator[mistakes.Mistake]:
     elif scenario.systems:
         why = f"outlines are not modelled beside {', '.join(scenario.systems)}, whose particles meet rectangles only"
     for name, block in scenario.blocks.items():
+        if scenario.materials[block.material].friction_angle is not None:
+            message = f"{units.toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
+            yield mistakes.Mistake(("blocks", name, "material"), message, relation=True)
         if why and block.polygon:
             key = "outline" if block.outline is not None else "sides"
             yield mistakes.Mistake(("blocks", name, key), why, at="key", relation=True)
-    for number, structure in enumerate(scenario.structures):
-        if why and isinstance(structure, PolygonStructure):
-            yield mistakes.Mistake(("structures", number, "kind"), why, relation=True)
-    springs = next(name for name, one in timeline.SCHEMES.items() if one.has_springs)
+    polygonal = [i for i, structure in enumerate(scenario.structures) if isinstance(structure, PolygonStructure)]
+    for number in polygonal if why else ():
+        yield mistakes.Mistake(("structures", number, "kind"), why, relation=True)
+    springs = units.toml(next(name for name, one in timeline.SCHEMES.items() if one.has_springs))
     for key in () if scenario.time.has_springs else SPRING_CHOICES:
         chosen = getattr(scenario.contact, key)
         if chosen != contact.Contact.model_fields[key].default:
-            message = (
-                f"{units.toml(chosen)} needs springs, time.scheme = {units.toml(springs)}; here contacts are rigid"
-            )
+            message = f"{units.toml(chosen)} needs springs, time.scheme = {springs}; here contacts are rigid"
             yield mistakes.Mistake(("contact", key), message, relation=True)
 
 
@@ -230,9 +233,8 @@ def _sweep(data: overrides.Data, folder: Path) -> Iterator[mistakes.Mistake]:
     if not isinstance(sweep, Mapping):
         return
     if len(sweep) > MAX_VARIED:
-        yield mistakes.Mistake(
-            ("sweep",), f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied", at="key"
-        )
+        message = f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied"
+        yield mistakes.Mistake(("sweep",), message, at="key")
         return
     trial = _trial(data, folder)
     mode = {"mode": sweep["mode"]} if sweep.get("mode") in MODES else {}

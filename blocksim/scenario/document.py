@@ -259,16 +259,13 @@ class Document:
             content = input_files.read_head(path, MAX_BYTES + 1, links=not is_stored)
         except input_files.NoSuchFileError as error:
             raise InputMissingError(f"{error}{_similar_file(path)}") from None
-        if len(content) > MAX_BYTES:
-            raise ScenarioError(
-                [Problem(str(path), f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario")]
-            )
+        message = f"larger than {MAX_BYTES // 1_000_000} MB; this is not a scenario" if len(content) > MAX_BYTES else ""
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
-            raise ScenarioError([Problem(str(path), "not a text file in UTF-8")]) from None
-        if "\0" in text:
-            raise ScenarioError([Problem(str(path), "not a text file")])
+            text, message = "", message or "not a text file in UTF-8"
+        if message or "\0" in text:
+            raise ScenarioError([Problem(str(path), message or "not a text file")])
         return replace(cls.parse(text, str(path), path.parent), is_stored=is_stored)
 
     @classmethod
@@ -305,9 +302,8 @@ class Document:
 
     def with_values(self, values: Mapping[str, object]) -> Self:
         """Set values by dotted key; raises ScenarioError where a key leads nowhere."""
-        return self._with(
-            [(f"value {key}", f"{key} = {units.toml(value)}", (key, value)) for key, value in values.items()]
-        )
+        pairs = [*values.items()]
+        return self._with([(f"value {key}", f"{key} = {units.toml(value)}", (key, value)) for key, value in pairs])
 
     def with_settings(self, settings: Sequence[str]) -> Self:
         """Set values as --set takes them ("contact.stiffness_scale=0.1"); raises ScenarioError."""
@@ -338,15 +334,12 @@ class Document:
         """Validate; raises ScenarioError with every mistake, those in the file first and by line."""
         with input_files.file_access(anywhere=self.allow_outside, links=not self.is_stored):
             scenario, findings = check.examine(self.data, self.folder)
-        if scenario is None:
-            raise ScenarioError(self._problems(findings))
-        return scenario
-
-    def _problems(self, findings: Sequence[mistakes.Mistake]) -> list[Problem]:
+        if scenario is not None:
+            return scenario
         problems = list(dict.fromkeys(self.problem(finding) for finding in findings))
         problems.sort(key=lambda p: (p.line_number is None, p.line_number or 0, p.caret_start))
         more = [Problem(self.source.where, "more mistakes follow")] if len(problems) > MAX_PROBLEMS else []
-        return [*problems[:MAX_PROBLEMS], *more]
+        raise ScenarioError([*problems[:MAX_PROBLEMS], *more])
 
     def problem(self, finding: mistakes.Mistake) -> Problem:
         """Show a finding where it can be corrected: in a value set from outside, or else in the text."""

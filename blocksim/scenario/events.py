@@ -177,10 +177,9 @@ def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[M
                 for place, name in enumerate(probe.bodies):
                     yield from unknown((*path, "bodies", place), "body", bodies, name)
                 if bodies.keys() >= {*probe.bodies} and joint_between(*(bodies[name] for name in probe.bodies)) is None:
-                    message = (
-                        f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no faces that lie opposite each other"
-                    )
-                    yield Mistake((*path, "bodies"), f"{message} at the start, parallel within {LEAST_ANGLE:g} deg")
+                    faces = f"faces that lie opposite each other at the start, parallel within {LEAST_ANGLE:g} deg"
+                    message = f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no {faces}"
+                    yield Mistake((*path, "bodies"), message)
 
 
 class Joint(NamedTuple):

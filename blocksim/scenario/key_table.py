@@ -70,11 +70,10 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
     place, _, note = prefix.partition(", ")
     shared = next((base.model_fields for base in SHARED if issubclass(model, base) and model is not base), {})
     for name, info in model.model_fields.items():
-        has_rows_of_its_own = (
-            _is_table(info) and model not in {contact.Friction, contact.Pair, study.Sweep} and name != "provenance"
-        )
-        if name == "kind" or info.alias == HELD or name in shared or has_rows_of_its_own:
+        if name in {"kind", *shared} or info.alias == HELD:
             continue
+        if _is_table(info) and name != "provenance" and model not in {contact.Friction, contact.Pair, study.Sweep}:
+            continue  # it has rows of its own
         key = f"{place}.{info.alias or name}" if place else (info.alias or name)
         if model is study.Sweep and name == "vary":
             key = 'sweep."KEY"'
@@ -85,9 +84,8 @@ def _rows(prefix: str, model: type[BaseModel]) -> Iterator[str]:
 
 def _is_table(info: FieldInfo) -> bool:
     kind = typing.get_origin(info.annotation) or info.annotation
-    is_model = (
-        isinstance(kind, type) and issubclass(kind, dict | tuple | BaseModel) and "Speed" not in str(info.annotation)
-    )
+    is_model = isinstance(kind, type) and issubclass(kind, dict | tuple | BaseModel)
+    is_model &= "Speed" not in str(info.annotation)
     parts = list(options(info.annotation))
     optional = len(parts) > 1 and any(isinstance(part, type) and issubclass(part, BaseModel) for part in parts)
     has_values = re.search(r"\b(float|int)\b|tuple\[str", str(info.annotation)) is not None

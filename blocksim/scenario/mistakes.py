@@ -131,16 +131,11 @@ def _missing(path: KeyPath, data: object) -> Mistake:
 
 def _unknown_key(path: KeyPath, data: object) -> Mistake:
     schemes = [word for word, table in timeline.SCHEMES.items() if path[0] == "time" and path[-1] in fields_of(table)]
+    present = timeline.scheme_of(follow(data, path[:-1]))
     if schemes:
-        present = timeline.scheme_of(follow(data, path[:-1]))
-        return Mistake(
-            path, f"this key belongs to scheme {toml(schemes[0])}; the scheme here is {toml(present)}", at="key"
-        )
-    table = (
-        timeline.SCHEMES[timeline.scheme_of(follow(data, path[:-1]))]
-        if path[0] == "time"
-        else table_at(path[:-1], data)
-    )
+        message = f"this key belongs to scheme {toml(schemes[0])}; the scheme here is {toml(present)}"
+        return Mistake(path, message, at="key")
+    table = timeline.SCHEMES[present] if path[0] == "time" else table_at(path[:-1], data)
     known = fields_of(table) if table is not None else {}
     meant = meant_word(str(path[-1]), known)
     is_typing_error = nearest(str(path[-1]), known, most=1) is not None
@@ -170,9 +165,8 @@ def _wrong_type(entry: ErrorDetails, path: KeyPath) -> str:
             double = f"; write [{path[-1]}] with single brackets" if isinstance(value, list | tuple) else ""
             return f"{toml(value)} is not a table{double}"
         case "tuple_type":
-            double = (
-                f"; write [[{path[-1]}]] with double brackets" if isinstance(value, Mapping) and len(path) == 1 else ""
-            )
+            is_single = isinstance(value, Mapping) and len(path) == 1
+            double = f"; write [[{path[-1]}]] with double brackets" if is_single else ""
             return f"{toml(value)} is not a list{double}"
         case "too_long":
             return f"this list is too long; {TWO_VALUES}"

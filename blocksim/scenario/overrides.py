@@ -126,15 +126,10 @@ def field_at(path: Sequence[str | int], data: object) -> FieldInfo | None:
 def field_of(key: str, scenario: Scenario) -> FieldInfo | None:
     """Return the field that a dotted key leads to in a scenario, None where it leads to none."""
     data = scenario.model_dump(by_alias=True, exclude={"sweep"})
-    path: KeyPath = ()
-    for part in parse_key(key):
-        entries = follow(data, path)
-        place: str | int = part
-        if isinstance(entries, list | tuple):  # an entry of a list is meant by its number, or by its name
-            named = (i for i, one in enumerate(entries) if isinstance(one, Mapping) and one.get("name") == part)
-            place = int(part) if part.isdecimal() else next(named, part)
-        path = (*path, place)
-    return field_at(path, data)
+    try:
+        return field_at(with_value(data, key, None)[1], data)
+    except UnfitOverrideError:
+        return None
 
 
 def is_known(path: Sequence[str | int], data: object) -> bool:

@@ -134,12 +134,8 @@ def has_outlines(scenario: Scenario) -> bool:
 
 def placement_of(scenario: Scenario) -> Placement:
     """Return all bodies of a scenario and where each comes from; raises as `place_bodies`."""
-    if not _latest or _latest[0].scenario() is not scenario:
-        _latest[:] = [_placed(scenario)]
-    return _latest[0]
-
-
-def _placed(scenario: Scenario) -> Placement:
+    if _latest and _latest[0].scenario() is scenario:
+        return _latest[0]
     freed = {name for event in scenario.events for name in event.free}
     bodies: list[PlacedBody] = []
     origins: list[overrides.KeyPath] = []
@@ -154,7 +150,8 @@ def _placed(scenario: Scenario) -> Placement:
         body = _placed_block(scenario, spec.block, [(name, pose)], fixed=spec.fixed or is_driven)[0]
         bodies.append(body._replace(driven=is_driven, freed=name in freed) if is_driven or freed else body)
         origins.append(("bodies", number))
-    return Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins)
+    _latest[:] = [Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins)]
+    return _latest[0]
 
 
 def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedBody]:

@@ -159,18 +159,6 @@ def _boundaries(soil: SoilTable, scenario: Scenario) -> Iterator[str]:
             yield f"the solid side of wall {number}, right of the way from its `from` to its `to`: exchange the two"
 
 
-def unfit_soils(scenario: Scenario) -> Iterator[Mistake]:
-    """Find blocks of soil, and a contact model that soil does not go with."""
-    for name, block in scenario.blocks.items():
-        material = scenario.materials.get(block.material)
-        if material is not None and material.friction_angle is not None:
-            message = f"{toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
-            yield Mistake(("blocks", name, "material"), message, relation=True)
-    if scenario.systems.get("soils") and scenario.contact.model != "surface":
-        message = f'{toml(scenario.contact.model)} does not go with soil; use model = "surface"'
-        yield Mistake(("contact", "model"), message, relation=True)
-
-
 MAX_SEGMENTS = 1000
 SHAPES = "give it width, height and length, an outline, or sides"
 MAX_OVERLAPS = 20

@@ -40,10 +40,9 @@ POSITIVE_TIME = units.Quantity(units.TIME, above=0.0)
 
 @dataclass(frozen=True)
 class OneOf(units.FieldReader):
-    """Annotation of a literal field: the words that are available, and those that are planned."""
+    """Annotation of a literal field: the words that are available."""
 
     available: tuple[str | int, ...]
-    planned: tuple[str, ...] = ()
 
     @property
     def wanted(self) -> str:
@@ -54,8 +53,6 @@ class OneOf(units.FieldReader):
         """Pass an available word; raises a pydantic error that lists the available words."""
         if type(value) in (str, int) and value in self.available:
             return value
-        if isinstance(value, str) and value in self.planned:
-            raise units.invalid(f"{units.toml(value)} is not available yet; use {self.wanted}")
         words = [word for word in self.available if isinstance(word, str)]
         similar = spelling.nearest(value, words, most=2) if isinstance(value, str) else None
         hint = f"did you mean {units.toml(similar)}?" if similar else f"use {self.wanted}"
@@ -137,10 +134,8 @@ def _identifier(value: object) -> object:
         raise units.invalid(f"{units.toml(value)} is not a string in quotes")
     allowed = value.isascii() and all(c.isalnum() or c in "._-" for c in value)
     if not allowed or not 1 <= len(value) <= MAX_NAME or value[0] in ".-":
-        message = (
-            f"{units.toml(value)} is not a name; 1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
-        )
-        raise units.invalid(message)
+        characters = f"1 to {MAX_NAME} of a-z A-Z 0-9 . _ - are allowed, no . or - first"
+        raise units.invalid(f"{units.toml(value)} is not a name; {characters}")
     if value.endswith(".") or value.partition(".")[0].upper() in DEVICES:
         raise units.invalid(f"{units.toml(value)} is not a name: some systems reserve it")
     return value

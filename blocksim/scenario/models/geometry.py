@@ -48,9 +48,8 @@ class Material(Table):
         require_one(missing, density=self.given_density, unit_weight=self.unit_weight)
         for key in () if self.friction_angle is not None else ("cohesion", "dilation", "yield_surface"):
             if getattr(self, key) is not None:
-                raise q.invalid(
-                    'only soil has this; give friction_angle too, "0 deg" where there is none', key, at="key"
-                )
+                message = 'only soil has this; give friction_angle too, "0 deg" where there is none'
+                raise q.invalid(message, key, at="key")
         if self.dilation:
             raise q.invalid("soil that dilates is not available; leave dilation out", "dilation")
 

@@ -22,6 +22,7 @@ from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
 from blocksim.scenario import units as q
 from blocksim.scenario.models import base, geometry, motion
+from blocksim.scenario.models.base import setting
 
 MAX_BYTES = 1_000_000
 MAX_ROWS = 10_000
@@ -39,7 +40,7 @@ class Stretch(NamedTuple):
 class Constant(base.Table):
     """The whole load from the beginning to the end."""
 
-    kind: Literal["constant"] = base.setting("kind of history")
+    kind: Literal["constant"] = setting("kind of history")
 
 
 class RampHistory(base.Table):
@@ -47,11 +48,11 @@ class RampHistory(base.Table):
 
     model_config = ConfigDict(title="Ramp")
 
-    kind: Literal["ramp"] = base.setting("kind of history")
-    start: q.NonNegativeTime = base.setting("begin of the ramp", 0.0)
-    end: q.PositiveTime = base.setting("end of the ramp")
-    first: q.Number = base.setting("factor until the ramp begins", 0.0, alias="from")
-    last: q.Number = base.setting("factor once it has ended", 1.0, alias="to")
+    kind: Literal["ramp"] = setting("kind of history")
+    start: q.NonNegativeTime = setting("begin of the ramp", 0.0)
+    end: q.PositiveTime = setting("end of the ramp")
+    first: q.Number = setting("factor until the ramp begins", 0.0, alias="from")
+    last: q.Number = setting("factor once it has ended", 1.0, alias="to")
 
     def _check(self) -> None:
         if not self.end > self.start:
@@ -75,10 +76,10 @@ class _Sampled(base.Table):
             if other in value:
                 raise q.invalid(f"table and {other} are both given; keep one of them", other)
         path = base.table_path(value["table"], (info.context or {}).get("folder", ""), "load.csv")
+        needed = f"{motion.TIME},{cls.column}"
         try:
-            _, times, values = motion.read_series(
-                motion.content_of(path, MAX_BYTES), (cls.column,), f"{motion.TIME},{cls.column}", MAX_ROWS
-            )
+            content = motion.content_of(path, MAX_BYTES)
+            _, times, values = motion.read_series(content, (cls.column,), needed, MAX_ROWS)
         except motion.MotionTableError as error:
             raise q.invalid(f"{path.name}: {error}", "table") from None
         kept = {name: entry for name, entry in value.items() if name != "table"}
@@ -88,10 +89,8 @@ class _Sampled(base.Table):
     def _check(self) -> None:
         times, values = (getattr(self, name) for name in ("times", self.key))
         if len(times) < self.least:
-            message = (
-                f"{len(times)} times are too few; at least {self.least} {'is' if self.least == 1 else 'are'} needed"
-            )
-            raise q.invalid(message, "times")
+            least = f"at least {self.least} {'is' if self.least == 1 else 'are'} needed"
+            raise q.invalid(f"{len(times)} times are too few; {least}", "times")
         if len(times) != len(values):
             raise q.invalid(f"{len(values)} {self.key} for {len(times)} times; every time needs one", self.key)
         for number, (one, other) in enumerate(pairwise(times), start=1):
@@ -103,21 +102,19 @@ class Steps(_Sampled):
     """Factors that hold from their time on; none before the first."""
 
     least = 1
-    kind: Literal["steps"] = base.setting("kind of history")
-    times: Times = base.setting("times at which the factor changes")
-    factors: tuple[q.Number, ...] = base.setting("factor from each of these times on; 0 before")
+    kind: Literal["steps"] = setting("kind of history")
+    times: Times = setting("times at which the factor changes")
+    factors: tuple[q.Number, ...] = setting("factor from each of these times on; 0 before")
 
 
 class Samples(_Sampled):
     """Factors at some times, joined by straight lines: of a CSV table, or `times` and `factors`."""
 
     column = "factor"
-    kind: Literal["table"] = base.setting("kind of history")
-    table: str | None = base.setting(
-        "CSV table with the columns time_s and factor, relative to the scenario file", None
-    )
-    times: Times = base.setting("times of the factors, instead of a table", ())
-    factors: tuple[q.Number, ...] = base.setting("factors at these times, instead of a table", ())
+    kind: Literal["table"] = setting("kind of history")
+    table: str | None = setting("CSV table with the columns time_s and factor, relative to the scenario file", None)
+    times: Times = setting("times of the factors, instead of a table", ())
+    factors: tuple[q.Number, ...] = setting("factors at these times, instead of a table", ())
 
 
 AnyHistory = Annotated[Constant | RampHistory | Steps | Samples, Field(discriminator="kind")]
@@ -131,40 +128,40 @@ Face = Literal["left", "right", "top", "bottom"]
 FACES: tuple[Face, ...] = get_args(Face)
 WATER = 9810.0
 """N/m³; unit weight of water."""
-BODY = base.setting("the name of the body that it acts on (without a name, its number)")
+BODY = setting("the name of the body that it acts on (without a name, its number)")
 
 
 class Load(base.Table):
     """One load; every kind adds its own keys."""
 
-    name: base.Identifier | None = base.setting("name, as in `--vary loads.NAME.magnitude=1N:9N`", None)
+    name: base.Identifier | None = setting("name, as in `--vary loads.NAME.magnitude=1N:9N`", None)
 
 
 class VaryingLoad(Load):
     """A load that goes with a factor."""
 
-    history: AnyHistory = base.setting("factor over time", Constant(kind="constant"))
+    history: AnyHistory = setting("factor over time", Constant(kind="constant"))
 
 
 class Force(VaryingLoad):
     """A force on a point of a body, along fixed axes or along those of the body."""
 
-    kind: Literal["force"] = base.setting("kind of load")
+    kind: Literal["force"] = setting("kind of load")
     body: str = BODY
-    magnitude: q.Force = base.setting("size of the force; negative against its direction")
-    direction: q.Angle = base.setting("direction, counter-clockwise from +x of the axes", 0.0)
-    axes: Annotated[Axes, base.OneOf(get_args(Axes))] = base.setting(
+    magnitude: q.Force = setting("size of the force; negative against its direction")
+    direction: q.Angle = setting("direction, counter-clockwise from +x of the axes", 0.0)
+    axes: Annotated[Axes, base.OneOf(get_args(Axes))] = setting(
         "axes of the direction: world, or body, with which it turns", "world"
     )
-    point: geometry.Point = base.setting("[x, y] of its point in the body, from the centre", (0.0, 0.0))
+    point: geometry.Point = setting("[x, y] of its point in the body, from the centre", (0.0, 0.0))
 
 
 class Moment(VaryingLoad):
     """A moment on a body."""
 
-    kind: Literal["moment"] = base.setting("kind of load")
+    kind: Literal["moment"] = setting("kind of load")
     body: str = BODY
-    magnitude: q.Moment = base.setting("size of the moment, counter-clockwise positive")
+    magnitude: q.Moment = setting("size of the moment, counter-clockwise positive")
 
 
 class Pressure(VaryingLoad):
@@ -173,18 +170,16 @@ class Pressure(VaryingLoad):
     The factor of a history goes with the pressure, and for water with the level: the water rises and falls.
     """
 
-    kind: Literal["pressure"] = base.setting("kind of load")
+    kind: Literal["pressure"] = setting("kind of load")
     body: str = BODY
-    face: Annotated[Face, base.OneOf(FACES)] = base.setting(
+    face: Annotated[Face, base.OneOf(FACES)] = setting(
         "face of the body before it is turned by its angle: left, right, top or bottom"
     )
-    magnitude: q.AnyPressure | None = base.setting(
-        "uniform pressure, negative for suction; give this or water_level", None
-    )
-    water_level: q.NonNegativeLength | None = base.setting(
+    magnitude: q.AnyPressure | None = setting("uniform pressure, negative for suction; give this or water_level", None)
+    water_level: q.NonNegativeLength | None = setting(
         "level of the water above the origin; give this or magnitude", None
     )
-    unit_weight: q.UnitWeight = base.setting("weight per volume of the water", WATER)
+    unit_weight: q.UnitWeight = setting("weight per volume of the water", WATER)
 
     def _check(self) -> None:
         missing = 'the pressure is missing: give magnitude (such as "10 kPa") or water_level'
@@ -196,8 +191,8 @@ class Pressure(VaryingLoad):
 class Horizontal(VaryingLoad):
     """The same horizontal acceleration of all free bodies, in units of gravity (seismic coefficient)."""
 
-    kind: Literal["horizontal"] = base.setting("kind of load")
-    magnitude: q.Number = base.setting("acceleration over that of gravity, towards +x where positive")
+    kind: Literal["horizontal"] = setting("kind of load")
+    magnitude: q.Number = setting("acceleration over that of gravity, towards +x where positive")
 
 
 class Gravity(Load, _Sampled):
@@ -208,16 +203,16 @@ class Gravity(Load, _Sampled):
 
     needs: ClassVar = ("to", "rate")
     column, key = "tilt_deg", "tilts"
-    kind: Literal["gravity"] = base.setting("kind of load")
-    first: q.TiltAngle | None = base.setting("tilt until it begins to turn (default: ground.tilt)", None, alias="from")
-    last: q.TiltAngle | None = base.setting("tilt at which it stops", None, alias="to")
-    rate: q.PositiveSpin | None = base.setting("rate of the tilt", None)
-    start: q.NonNegativeTime = base.setting("time at which it begins to turn", 0.0)
-    table: str | None = base.setting(
+    kind: Literal["gravity"] = setting("kind of load")
+    first: q.TiltAngle | None = setting("tilt until it begins to turn (default: ground.tilt)", None, alias="from")
+    last: q.TiltAngle | None = setting("tilt at which it stops", None, alias="to")
+    rate: q.PositiveSpin | None = setting("rate of the tilt", None)
+    start: q.NonNegativeTime = setting("time at which it begins to turn", 0.0)
+    table: str | None = setting(
         "CSV table with the columns time_s and tilt_deg, relative to the scenario file, for to and rate", None
     )
-    times: Times = base.setting("times of the tilts, instead of a table", ())
-    tilts: tuple[q.TiltAngle, ...] = base.setting("tilts at these times, instead of a table", ())
+    times: Times = setting("times of the tilts, instead of a table", ())
+    tilts: tuple[q.TiltAngle, ...] = setting("tilts at these times, instead of a table", ())
 
     def _check(self) -> None:
         turns = {"to": self.last, "rate": self.rate}

@@ -158,10 +158,8 @@ def _levels(value: object, tables: str) -> tuple[Any, ...]:
 def _refuse_slips(value: Mapping[str, Any], known: tuple[str, ...], needed: tuple[str, ...]) -> None:
     """Refuse keys that a variation does not have, and report missing ones."""
     if not set(value) & set(known):
-        message = (
-            f"{q.toml(value)} is not a variation; write a list or {{ {', '.join(needed)} }}, and the key in quotes"
-        )
-        raise q.invalid(message)
+        table = f"{{ {', '.join(needed)} }}"
+        raise q.invalid(f"{q.toml(value)} is not a variation; write a list or {table}, and the key in quotes")
     for key in value:
         if key not in known:
             meant = spelling.nearest(str(key), known, most=2)

@@ -163,10 +163,9 @@ class Voronoi(PolygonStructure):
             points = [point for point, stays in zip(points, is_large, strict=True) if stays]
             if not points:
                 break
-        message = (
-            f"no division into cells of at least {1e3 * least:g} mm was found; give a smaller width, or fewer cells"
-        )
-        raise UnfitError("count" if self.smallest is None else "smallest", message)
+        message = f"no division into cells of at least {1e3 * least:g} mm was found"
+        key = "count" if self.smallest is None else "smallest"
+        raise UnfitError(key, f"{message}; give a smaller width, or fewer cells")
 
 
 MOST_BLOCKS = 20_000

@@ -9,15 +9,16 @@ from pydantic import BeforeValidator
 
 from blocksim.scenario import units as q
 from blocksim.scenario.models import base, geometry
+from blocksim.scenario.models.base import setting
 from blocksim.scenario.structures.base import Count, Courses, Pose, Seed, Structure, UnfitError, draws, poses_at
 
 
 class Stack(Structure):
     """Block i (from 0) has its left edge at left + i offset and its lower edge at bottom + i size_y."""
 
-    kind: Literal["stack"] = base.setting("kind of structure")
-    count: Count = base.setting("number of blocks")
-    offset: q.Length = base.setting("shift of each block relative to the one below", 0.0)
+    kind: Literal["stack"] = setting("kind of structure")
+    count: Count = setting("number of blocks")
+    offset: q.Length = setting("shift of each block relative to the one below", 0.0)
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
@@ -28,16 +29,15 @@ class Stack(Structure):
 class Staircase(Structure):
     """Block i (from 0) has its left edge at left + i (size_x - overlap) and its lower edge at bottom + i size_y."""
 
-    kind: Literal["staircase"] = base.setting("kind of structure")
-    count: Count = base.setting("number of blocks")
-    overlap: q.PositiveLength = base.setting("length over which a block lies on the one below")
+    kind: Literal["staircase"] = setting("kind of structure")
+    count: Count = setting("number of blocks")
+    overlap: q.PositiveLength = setting("length over which a block lies on the one below")
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
         if self.overlap > block.size_x:
-            raise UnfitError(
-                "overlap", f"{self.overlap * 1e3:g} mm is more than the block's {block.size_x * 1e3:g} mm along x"
-            )
+            message = f"{self.overlap * 1e3:g} mm is more than the block's {block.size_x * 1e3:g} mm along x"
+            raise UnfitError("overlap", message)
         step = block.size_x - self.overlap
         first = self.left + block.size_x / 2
         return [Pose(first + i * step, self.bottom + (i + 0.5) * block.size_y) for i in range(self.count)]
@@ -63,20 +63,18 @@ class BlockWall(Courses):
     which fall into the hole as far as their neighbours allow.
     """
 
-    kind: Literal["wall"] = base.setting("kind of structure")
-    columns: Count = base.setting("number of blocks in a course")
-    bond: Annotated[Bond, base.OneOf(get_args(Bond))] = base.setting(
+    kind: Literal["wall"] = setting("kind of structure")
+    columns: Count = setting("number of blocks in a course")
+    bond: Annotated[Bond, base.OneOf(get_args(Bond))] = setting(
         "running: every second course is shifted by half a block; stack: none is", "running"
     )
-    gap: q.NonNegativeLength = base.setting("gap between neighbours in a course", 0.0)
-    holes: tuple[Hole, ...] = base.setting(
-        "blocks to leave out, [row, column] from 1, the lowest and leftmost first", ()
-    )
-    missing: q.Share = base.setting("share of the other blocks to leave out at random", 0.0)
-    offset: q.NonNegativeLength = base.setting(
+    gap: q.NonNegativeLength = setting("gap between neighbours in a course", 0.0)
+    holes: tuple[Hole, ...] = setting("blocks to leave out, [row, column] from 1, the lowest and leftmost first", ())
+    missing: q.Share = setting("share of the other blocks to leave out at random", 0.0)
+    offset: q.NonNegativeLength = setting(
         "largest random shift of a block along x, to either side; at most half of the gap", 0.0
     )
-    seed: Seed = base.setting("random seed of shifts and blocks left out", 0)
+    seed: Seed = setting("random seed of shifts and blocks left out", 0)
 
     def _check(self) -> None:
         super()._check()
@@ -124,8 +122,8 @@ class BlockWall(Courses):
 class Pyramid(Courses):
     """Course i (from 0) has rows - i blocks, each in the middle above two of the course below."""
 
-    kind: Literal["pyramid"] = base.setting("kind of structure")
-    gap: q.NonNegativeLength = base.setting("gap between neighbours in a course", 0.0)
+    kind: Literal["pyramid"] = setting("kind of structure")
+    gap: q.NonNegativeLength = setting("gap between neighbours in a course", 0.0)
 
     @property
     def size(self) -> int:
@@ -150,12 +148,10 @@ class Dominoes(Structure):
     """
 
     stacked_by = None
-    kind: Literal["dominoes"] = base.setting("kind of structure")
-    count: Count = base.setting("number of blocks")
-    spacing: q.PositiveLength = base.setting("clear distance between neighbours")
-    push: q.Speed = base.setting(
-        "speed along x of the centre of the first domino, which turns about its lower edge", 0.0
-    )
+    kind: Literal["dominoes"] = setting("kind of structure")
+    count: Count = setting("number of blocks")
+    spacing: q.PositiveLength = setting("clear distance between neighbours")
+    push: q.Speed = setting("speed along x of the centre of the first domino, which turns about its lower edge", 0.0)
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from left to right."""
@@ -177,15 +173,13 @@ class Grid(Courses):
     """
 
     counted_by = ("rows", "columns")
-    kind: Literal["grid"] = base.setting("kind of structure")
-    columns: Count = base.setting("number of blocks in a row")
-    gap_x: q.NonNegativeLength = base.setting("gap between neighbours along x, before they are shifted and turned")
-    gap_y: q.NonNegativeLength = base.setting("gap between neighbours along y, before they are shifted and turned")
-    offset: q.NonNegativeLength = base.setting(
-        "largest random shift of a block along x and along y, to either side", 0.0
-    )
-    turn: q.HalfTurn = base.setting("largest random angle of a block, to either side", 0.0)
-    seed: Seed = base.setting("random seed of shifts and angles", 0)
+    kind: Literal["grid"] = setting("kind of structure")
+    columns: Count = setting("number of blocks in a row")
+    gap_x: q.NonNegativeLength = setting("gap between neighbours along x, before they are shifted and turned")
+    gap_y: q.NonNegativeLength = setting("gap between neighbours along y, before they are shifted and turned")
+    offset: q.NonNegativeLength = setting("largest random shift of a block along x and along y, to either side", 0.0)
+    turn: q.HalfTurn = setting("largest random angle of a block, to either side", 0.0)
+    seed: Seed = setting("random seed of shifts and angles", 0)
 
     def height(self, block: geometry.Block) -> float:
         """All rows, before blocks are shifted and turned."""
@@ -200,10 +194,8 @@ class Grid(Courses):
         for key, (count, gap, growth) in needs.items():
             least = 2.0 * self.offset + growth
             if count > 1 and gap < least:
-                message = (
-                    f"{gap * 1e3:g} mm is too small for such random shifts and angles; at least {least * 1e3:g} mm"
-                )
-                raise UnfitError(key, f"{message} is needed")
+                message = f"{gap * 1e3:g} mm is too small for such random shifts and angles"
+                raise UnfitError(key, f"{message}; at least {least * 1e3:g} mm is needed")
         shift_x, shift_y, turn = 2.0 * draws(self.seed, 3, self.rows, self.columns) - 1.0
         row, column = np.indices((self.rows, self.columns))
         x = self.left + 0.5 * block.size_x + column * (block.size_x + self.gap_x) + self.offset * shift_x
