@@ -7,7 +7,7 @@ member of a stack. `couple` adds systems beside blocks and supports.
 """
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -96,6 +96,9 @@ class Refusal(NamedTuple):
     error: BlocksimError
 
 
+Stacks = Iterator[SceneStack | Refusal]
+
+
 def build_one(scenario: Scenario, construction: Construction) -> InitialScene:
     """Build the scene of one scenario.
 
@@ -108,7 +111,7 @@ def build_one(scenario: Scenario, construction: Construction) -> InitialScene:
 
 def build_stacks(
     scenarios: Sequence[Scenario], construction: Construction, numbers: Sequence[int] | None = None
-) -> Iterator[SceneStack | Refusal]:
+) -> Stacks:
     """Build scenarios of one scheme; those of one shape come in as few stacks as memory allows.
 
     A scenario whose step, skin or size is refused does not stop the others. Stacks name them by `numbers`, by their
@@ -134,9 +137,7 @@ def build_stacks(
                 yield from _stacks([chosen[k] for k in some], parts, [strides[k] for k in some], construction)
 
 
-def _stacks(
-    numbers: list[int], parts: Parts, strides: list[Stride], construction: Construction
-) -> Iterator[SceneStack | Refusal]:
+def _stacks(numbers: list[int], parts: Parts, strides: list[Stride], construction: Construction) -> Stacks:
     """Build scenes of one shape, as many at a time as have room."""
     size = construction.size(parts)
     count = max(1, MOST_BYTES // size.bytes)
@@ -221,7 +222,7 @@ def take_members(records: arrays.Records, numbers: Sequence[int]) -> arrays.Reco
     return chosen
 
 
-def only_stack(stacks: Iterable[SceneStack | Refusal]) -> SceneStack:
+def only_stack(stacks: Stacks) -> SceneStack:
     """Return the one stack that was built. Raises what refused it."""
     (one,) = stacks
     if isinstance(one, Refusal):

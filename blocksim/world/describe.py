@@ -127,6 +127,10 @@ def describe(scenario: Scenario) -> Description:
     contacts = memory.recorded_contacts(count, touching) if scenario.output.contacts else 0
     more = sum(one.count * one.system.cost.memory for one in others)
     of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
+    limits, of_others = None, largest_step(scenario)
+    if scenario.time.has_springs and of_others < math.inf:
+        of_blocks = step_of_contacts(layout, bounds, speeds)
+        limits = StepLimits(of_blocks, of_others, scenario.contact.stiffness_scale * (of_blocks / of_others) ** 2)
     motion = None
     if scenario.motion is not None:
         peaks = motion_peaks(motion_pieces(scenario), scenario.time.end)
@@ -147,7 +151,7 @@ def describe(scenario: Scenario) -> Description:
         skin=float(world.controls[0].skin),
         rigid=_rigid(layout, bounds, speeds, step) if has_rigid else None,
         systems={one.system.name: one.count for one in others},
-        limits=_limits(layout, bounds, speeds) if others else None,
+        limits=limits,
         warnings=tuple(warnings_of(scenario)),
     )
 
@@ -162,14 +166,6 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
     rectangles = blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
     return OUTLINES_COST * rectangles if placement.has_outlines(scenario) else rectangles
-
-
-def _limits(layout: Layout, bounds: Bounds, speeds: Speeds) -> StepLimits | None:
-    systems = largest_step(layout.scenario)
-    if not layout.scenario.time.has_springs or systems == math.inf:
-        return None
-    blocks = step_of_contacts(layout, bounds, speeds)
-    return StepLimits(blocks, systems, layout.scenario.contact.stiffness_scale * (blocks / systems) ** 2)
 
 
 def _rigid(layout: Layout, bounds: Bounds, speeds: Speeds, step: float) -> SagDescription:

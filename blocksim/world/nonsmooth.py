@@ -67,9 +67,7 @@ def has_row(placed: Sequence[PlacedBody]) -> bool:
         and min(one.top, other.top) > max(one.bottom, other.bottom) + near
         for one, other in combinations(boxes, 2)
     )
-    return any(touching) and not any(
-        load.lower is not None and not placed[load.lower].fixed for load in sag.loads_at_rest(placed, 1.0)
-    )
+    return any(touching) and all(one.lower is None or placed[one.lower].fixed for one in sag.loads_at_rest(placed, 1.0))
 
 
 def has_impacts_in_rounds(

@@ -429,9 +429,8 @@ def _reasons_of_sag(layout: Layout, bounds: Bounds) -> Iterator[Reason]:
     crushed = CALM * CRUSHED_SHARE * bounds.smallest
     allowed = CALM * WARNING_SHARE * bounds.smallest
     least = crushed if max(masses) >= UNLIKE * min(masses) else allowed
-    compliance = max(
-        kind.inverse_mass + max(kind.half_x, kind.half_y) ** 2 * kind.inverse_inertia for kind in bounds.kinds
-    )
+    arms = ((kind, max(kind.half_x, kind.half_y)) for kind in bounds.kinds)
+    compliance = max(kind.inverse_mass + arm**2 * kind.inverse_inertia for kind, arm in arms)
     if 2.0 * compliance * gravity * bounds.mass > soft_contact(substep).frequency ** 2 * least:
         sag = scene_sag(substep, layout.placed, gravity)
         for found, most in ((sag.crushed, crushed), (sag.overlap, allowed)):
@@ -445,10 +444,8 @@ def _reasons_of_thrust(layout: Layout) -> Iterator[Reason]:
     square = soft_contact(USUAL_STEP / layout.scenario.time.parts).frequency ** 2
     parts = math.ceil(math.sqrt(thrust_shift(layout) / square / SHIFT))
     if parts > 1:
-        why = (
-            "at rest joints move across their thrust by no more than {:.2g} % of their widths, "
-            "in columns and walls {:.2g} %"
-        )
+        why = "at rest joints move across their thrust by no more than {:.2g} % of their widths"
+        why += ", in columns and walls {:.2g} %"
         yield Reason(USUAL_STEP / parts, why, (PERCENT * SHIFT, PERCENT * SHIFT / COURSED))
 
 

@@ -32,6 +32,7 @@ DRIFT = 25.0  # substeps: time constant of the soft contact, 2 zeta / w
 STILL = 0.1  # of an overlap, that it may change by in that time at rest
 UPRIGHT = 0.1  # cosine of the angle between a normal and the vertical, from which on one body lies on the other
 MILLI, PERCENT = 1e3, 1e2
+Courses = dict[int, list[tuple[float, int]]]  # right ends (m) and numbers of blocks by the heights of their upper faces
 
 
 class Box(NamedTuple):
@@ -67,7 +68,7 @@ def loads_at_rest(placed: Sequence[PlacedBody], gravity: float) -> list[EndLoad]
     """Return what the ends of all contacts below free blocks carry, from above downwards."""
     boxes = [box_of(body) for body in placed]
     near = TOUCHING * placement.smallest_width(placed)
-    courses: dict[int, list[tuple[float, int]]] = defaultdict(list)  # blocks by the heights of their upper faces
+    courses: Courses = defaultdict(list)
     for i, box in enumerate(boxes):
         courses[math.floor(box.top / near)].append((box.right, i))
     for course in courses.values():
@@ -98,9 +99,7 @@ def loads_at_rest(placed: Sequence[PlacedBody], gravity: float) -> list[EndLoad]
     return loads
 
 
-def _supports(
-    box: Box, boxes: Sequence[Box], courses: dict[int, list[tuple[float, int]]], near: float
-) -> Iterator[int]:
+def _supports(box: Box, boxes: Sequence[Box], courses: Courses, near: float) -> Iterator[int]:
     """Yield the blocks that reach under a box; a course is sorted by right ends, and does not overlap."""
     level = math.floor(box.bottom / near)
     for course in (courses.get(level + k, []) for k in (-1, 0, 1)):

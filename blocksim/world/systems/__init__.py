@@ -12,7 +12,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.base import SYSTEMS
 from blocksim.world.systems.blocks import BLOCKS, SUPPORTS
-from blocksim.world.systems.soils import SOILS, soils_and
+from blocksim.world.systems.soils import SOILS, soil_kernels
 from blocksim.world.systems.system import System, SystemInScene
 
 IN_WORLD = (BLOCKS, SUPPORTS)
@@ -20,22 +20,15 @@ IN_WORLD = (BLOCKS, SUPPORTS)
 Function = Callable[..., None]
 Interaction = Callable[[], Function] | None
 """Gives the compiled function of a pair (`Act` in kernels/common/systems.py); None: nothing happens between the two."""
-
-
-def by_scheme() -> Function:
-    """Stand for contacts that every scheme has in its own steps."""
-    raise NotImplementedError("contacts of blocks and supports are stages of each scheme")
-
-
 INTERACTIONS: dict[tuple[str, str], Interaction] = {
-    (BLOCKS.name, BLOCKS.name): by_scheme,
-    (BLOCKS.name, SUPPORTS.name): by_scheme,
-    (SUPPORTS.name, SUPPORTS.name): None,
-    (SOILS.name, SOILS.name): soils_and("soils"),
-    (SOILS.name, BLOCKS.name): soils_and("blocks"),
-    (SOILS.name, SUPPORTS.name): soils_and("supports"),
+    (SOILS.name, SOILS.name): lambda: soil_kernels().ACTS["soils"],
+    (SOILS.name, BLOCKS.name): lambda: soil_kernels().ACTS["blocks"],
+    (SOILS.name, SUPPORTS.name): lambda: soil_kernels().ACTS["supports"],
 }
-"""By the names of both; a system comes before blocks and supports, whose function gets the world as its partner."""
+"""By the names of both; a system comes before blocks and supports, whose function gets the world as its partner.
+
+Contacts of blocks and supports with one another are stages of each scheme.
+"""
 
 
 def systems_of(scenario: Scenario) -> tuple[System, ...]:
@@ -70,11 +63,11 @@ def acts_of(systems: Sequence[System]) -> Iterator[tuple[int, int | None, Any]]:
     for i, one in enumerate(systems):
         partners: list[tuple[int | None, System]] = [(None, other) for other in IN_WORLD]
         for number, other in (*partners, *enumerate(systems[i:], i)):
-            pair, turned = (one.name, other.name), (other.name, one.name)
-            is_turned = pair not in INTERACTIONS
-            if is_turned and turned not in INTERACTIONS:
+            pairs = [pair for pair in ((one.name, other.name), (other.name, one.name)) if pair in INTERACTIONS]
+            if not pairs:
                 message = "cannot be in one scene: what happens between them is not modelled"
                 raise InvalidInputError(f"{one.name} and {other.name} {message}")
-            interaction = INTERACTIONS[turned if is_turned else pair]
+            interaction = INTERACTIONS[pairs[0]]
             if interaction is not None:
-                yield (number, i, interaction()) if is_turned and number is not None else (i, number, interaction())
+                ends = (number, i) if pairs[0][0] != one.name and number is not None else (i, number)
+                yield *ends, interaction()

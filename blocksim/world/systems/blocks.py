@@ -16,21 +16,9 @@ from blocksim.scenario.motion import displacement_and_velocity, motion_direction
 from blocksim.world.systems import system
 
 MILLI, DEGREES = 1e3, float(np.degrees(1.0))
-QUANTITIES = (
-    system.Dataset("x", "m"),  # centre
-    system.Dataset("y", "m"),
-    system.Dataset("angle", "rad"),  # of the body axes, counter-clockwise, never wrapped
-    system.Dataset("vx", "m/s"),
-    system.Dataset("vy", "m/s"),
-    system.Dataset("spin", "rad/s"),
-)
-CONSTANTS = (
-    system.Dataset("size_x", "m"),  # along the body's own axes
-    system.Dataset("size_y", "m"),
-    system.Dataset("depth", "m"),
-    system.Dataset("mass", "kg"),
-    system.Dataset("inertia", "kg m2"),
-)
+# of the centre, the angle that of the body axes, counter-clockwise, never wrapped; sizes are along these axes
+QUANTITIES = system.datasets(x="m", y="m", angle="rad", vx="m/s", vy="m/s", spin="rad/s")
+CONSTANTS = system.datasets(size_x="m", size_y="m", depth="m", mass="kg", inertia="kg m2")
 UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
@@ -160,20 +148,14 @@ def blocks_placed(placed: Sequence[PlacedBody]) -> system.SystemInScene:
     """Return the blocks of a scene that were placed so."""
     constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
     start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
-    return system.SystemInScene(
-        BLOCKS, system.Elements(tuple(body.name for body in placed), constants, start, outlines_of(placed))
-    )
+    names = tuple(body.name for body in placed)
+    return system.SystemInScene(BLOCKS, system.Elements(names, constants, start, outlines_of(placed)))
 
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks
 THICKNESS = 0.25  # of the smallest side of all blocks
 CORNERS = tuple(system.Dataset(f"{axis}{corner}", "m") for corner in range(4) for axis in "xy")  # at rest
-SUPPORT_QUANTITIES = (
-    system.Dataset("dx", "m"),
-    system.Dataset("dy", "m"),
-    system.Dataset("vx", "m/s"),
-    system.Dataset("vy", "m/s"),
-)
+SUPPORT_QUANTITIES = system.datasets(dx="m", dy="m", vx="m/s", vy="m/s")
 
 
 def _moved(track: system.Track, chosen: system.Indices) -> system.Floats:

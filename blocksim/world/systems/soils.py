@@ -9,7 +9,7 @@ lacks anything from 8 rows on. Soil at rest presses as it should.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
@@ -43,33 +43,13 @@ TOLERATED = 0.03  # of the thrust
 # calibrated with a smooth wall drawn back from 8 to 40 rows: a, b of the share a/rows - b
 LACK = {"raw": (2.2, 0.0), "corrected": (1.0, 0.035)}
 COURANT = 0.4  # step in smoothing lengths that a wave passes
-# J, as kernels/soil/energy.py measures them; the last six are losses
-ENERGIES = (
-    "kinetic",
-    "potential",
-    "elastic",
-    "contact",
-    "plastic",
-    "viscosity",
-    "dashpot",
-    "friction",
-    "settling",
-    "ramp",
-)
+LOSSES = ("plastic", "viscosity", "dashpot", "friction", "settling", "ramp")
+ENERGIES = ("kinetic", "potential", "elastic", "contact", *LOSSES)  # J, as kernels/soil/energy.py measures them
 COST = system.Cost(seconds=200e-9, memory=395)  # measured, with raw gradients
 GRADIENT_COST = {"raw": 1.0, "corrected": 1.5}  # time of a step over that, measured
-QUANTITIES = (
-    system.Dataset("x", "m"),
-    system.Dataset("y", "m"),
-    system.Dataset("vx", "m/s"),
-    system.Dataset("vy", "m/s"),
-    system.Dataset("sxx", "Pa"),  # tension positive
-    system.Dataset("syy", "Pa"),
-    system.Dataset("szz", "Pa"),
-    system.Dataset("sxy", "Pa"),
-    system.Dataset("plastic", "1"),  # accumulated plastic shear strain
-)
-CONSTANTS = (system.Dataset("mass", "kg"), system.Dataset("spacing", "m"))
+# places and velocities, stresses (tension positive), accumulated plastic shear strain
+QUANTITIES = system.datasets(x="m", y="m", vx="m/s", vy="m/s", sxx="Pa", syy="Pa", szz="Pa", sxy="Pa", plastic="1")
+CONSTANTS = system.datasets(mass="kg", spacing="m")
 
 
 def lame_constants(material: Material) -> tuple[float, float]:
@@ -192,9 +172,8 @@ def body_contacts(soils: Any, world: Any) -> system.BodyContacts:
     apart = float(soils.controls["radius"][0]) - touches["depth"]
     centre = np.stack([soils.points["x"][particle], soils.points["y"][particle]], axis=-1)
     friction = soils.interactions["static_friction"][kind, world.bodies["contact_class"][body]]
-    return system.BodyContacts(
-        body.astype(np.intp), kind.astype(np.intp), centre - apart[:, None] * normal, -normal, push, -rub, friction
-    )
+    place, numbers = centre - apart[:, None] * normal, (body.astype(np.intp), kind.astype(np.intp))
+    return system.BodyContacts(*numbers, place, -normal, push, -rub, friction)
 
 
 def parts_of(track: system.Track) -> dict[str, system.Indices]:
@@ -331,19 +310,15 @@ def places_of(scenario: Scenario) -> list[system.Floats]:
 def elements_of(scenario: Scenario) -> system.Elements:
     """Return the particles of all soils of a scenario."""
     tables, places = soil_tables(scenario), places_of(scenario)
-    names = tuple(
-        f"{table.name}.{number}" for table, one in zip(tables, places, strict=True) for number in range(1, len(one) + 1)
-    )
+    soils = [*zip(tables, places, strict=True)]
+    names = tuple(f"{table.name}.{number}" for table, one in soils for number in range(1, len(one) + 1))
     depth = depth_of_scene(scenario)
-    densities = [scenario.materials[table.material].density for table in tables]
-    each = [density * table.spacing**2 * depth for density, table in zip(densities, tables, strict=True)]
+    each = [scenario.materials[table.material].density * table.spacing**2 * depth for table in tables]
     masses = np.repeat(each, [len(one) for one in places])
     constants = np.stack([masses, np.full(len(names), tables[0].spacing)])
     start = np.zeros((len(QUANTITIES), len(names)))
     start[:2] = np.concatenate(places).T
-    start[4:8] = np.concatenate(
-        [geostatic_stress(scenario, table, one) for table, one in zip(tables, places, strict=True)], axis=1
-    )
+    start[4:8] = np.concatenate([geostatic_stress(scenario, *one) for one in soils], axis=1)
     return system.Elements(names, constants, start)
 
 
@@ -364,18 +339,9 @@ def _largest_step(scenario: Scenario) -> float:
     return min(courant * SMOOTHING * table.spacing / wave_speed(scenario.materials[table.material]) for table in tables)
 
 
-def _arrays(name: str) -> Any:
-    """Return what is called so in soil_arrays.py: readers of stored runs compile nothing."""
-    return getattr(import_module("blocksim.world.systems.soil_arrays"), name)
-
-
-def _build(scenario: Scenario) -> Any:
-    return _arrays("build_soils")(scenario)
-
-
-def soils_and(other: str) -> Callable[[], Any]:
-    """Return what gives the function by which soils and another system act on one another."""
-    return lambda: _arrays("ACTS")[other]
+def soil_kernels() -> Any:
+    """Return the module soil_arrays.py, only once it is needed: readers of stored runs compile nothing."""
+    return import_module("blocksim.world.systems.soil_arrays")
 
 
 SOILS = system.System(
@@ -400,9 +366,9 @@ SOILS = system.System(
     state=_state,
     outlines=lambda track, chosen: system.discs(track, chosen, 0.5 * track["spacing"]),
     energies=ENERGIES,
-    build=_build,
+    build=lambda scenario: soil_kernels().build_soils(scenario),
     largest_step=_largest_step,
-    stages=lambda: _arrays("STAGES"),
+    stages=lambda: soil_kernels().STAGES,
     cost=COST,
     dearer=lambda scenario: max(GRADIENT_COST[table.gradient] for table in soil_tables(scenario)),
     parts=lambda scenario: tuple(table.name for table in soil_tables(scenario)),

@@ -34,6 +34,11 @@ class Dataset:
         return self.unit.replace("/s", " s-1")
 
 
+def datasets(**units: str) -> tuple[Dataset, ...]:
+    """Return numbers by their names and units."""
+    return tuple(Dataset(name, unit) for name, unit in units.items())
+
+
 @dataclass(frozen=True)
 class Channel:
     """A number of every element that exports, tables and pictures of histories show."""
