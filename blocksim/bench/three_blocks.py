@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, repeat
-from blocksim.bench.scenes import FRICTION, RESTITUTION, Rerun, Stepping, Table, three_blocks
+from blocksim.bench import harness
 from blocksim.scenario import Scenario
 from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
 from blocksim.scenario.structures.base import draws
@@ -24,40 +23,43 @@ MEMBERS, QUICK_MEMBERS = 256, 8
 SCATTER = 0.1  # of both coefficients of friction, uniform
 SEED = 1
 THREADS = (1, 2)
-CONVERGED = Stepping(5e-4, substeps=1)
-SETTINGS: dict[str, tuple[Table, Table, str]] = {
+CONVERGED = harness.TimeSteps(5e-4, substeps=1)
+SETTINGS: dict[str, tuple[harness.Table, harness.Table, str]] = {
     SPRINGS: ({"stiffness_scale": 3e-4}, {"safety": 0.1}, "stiffness_scale 0.0003, safety 0.1"),
     IMPULSES: ({}, CONVERGED.time(), CONVERGED.setting),
 }
 """Tables [contact] and [time] of each scheme, and their text: the cheapest that end within 0.2 mm, as found below."""
 
 
-def measure_ensemble(setting: Setting) -> Findings:
+def measure_ensemble(effort: harness.Effort) -> harness.Readings:
     """Advance the same members on one thread and on two, by either scheme."""
-    count = QUICK_MEMBERS if setting.quick else MEMBERS
-    numbers: list[Number] = []
+    count = QUICK_MEMBERS if effort.quick else MEMBERS
+    numbers: list[harness.Number] = []
     for scheme in SETTINGS:
         members = scatter_friction(count, scheme)
-        alone, together = (rates(members, threads, setting.repeats) for threads in THREADS)
+        alone, together = (rates(members, threads, effort.repeats) for threads in THREADS)
         found = (*alone, together[1])
-        numbers += [Number(f"{scheme}: {number.quantity}", number.unit, number.samples) for number in found]
+        numbers += [harness.Number(f"{scheme}: {number.quantity}", number.unit, number.samples) for number in found]
     converged = "; ".join(f"{scheme}: {text}" for scheme, (*_, text) in SETTINGS.items())
     note = (
         f"{count} members with friction scattered by {SCATTER:.0%}, until rest, each scheme within 0.2 mm of its own "
         f"finest run ({converged}); building the scenes is not counted"
     )
-    return Findings(tuple(numbers), notes=(note,))
+    return harness.Readings(tuple(numbers), notes=(note,))
 
 
 def scatter_friction(count: int, scheme: str) -> list[Scenario]:
     """Return three blocks with different friction, by the converged setting of a scheme."""
     contact, stepping, _ = SETTINGS[scheme]
-    scatter = SCATTER * (2.0 * draws(SEED, count, len(FRICTION)) - 1.0)
-    values = np.array([*FRICTION.values()]) * (1.0 + scatter)
-    return [three_blocks(contact, stepping, dict(zip(FRICTION, row, strict=True))) for row in values.tolist()]
+    scatter = SCATTER * (2.0 * draws(SEED, count, len(harness.FRICTION)) - 1.0)
+    values = np.array([*harness.FRICTION.values()]) * (1.0 + scatter)
+    return [
+        harness.three_blocks(contact, stepping, dict(zip(harness.FRICTION, row, strict=True)))
+        for row in values.tolist()
+    ]
 
 
-def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[Number, Number]:
+def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[harness.Number, harness.Number]:
     """Return collapses per CPU second, and per second of the clock."""
     run_ensemble(members[:1])  # compiles what single runs do not need
     clock: list[float] = []
@@ -70,11 +72,11 @@ def rates(members: Sequence[Scenario], threads: int, repeats: int) -> tuple[Numb
             clock.append(len(members) / (time.perf_counter() - began))
             return len(members) / (time.process_time() - cpu)
 
-    rate = repeat("a second and core", "1/s", sample, repeats)
-    return rate, Number(f"a second, {threads} thread{'s' if threads > 1 else ''}", "1/s", tuple(clock))
+    rate = harness.repeat("a second and core", "1/s", sample, repeats)
+    return rate, harness.Number(f"a second, {threads} thread{'s' if threads > 1 else ''}", "1/s", tuple(clock))
 
 
-ENSEMBLE = Measurement("ensemble", "many collapses together", measure_ensemble, quick="8 members instead of 256")
+ENSEMBLE = harness.Benchmark("ensemble", "many collapses together", measure_ensemble, quick="8 members instead of 256")
 
 
 CLOSE = 0.2e-3  # m
@@ -82,7 +84,7 @@ DURATION, QUICK_DURATION = 0.4, 0.01  # s
 SCALES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)
 QUICK_SCALES = (1e-4, 1e-3, 1e-2)
 SAFETIES = (0.1, 0.05)
-ONE_SWEEP = Stepping(1e-3, substeps=1, sweeps=1)  # enough without restitution
+ONE_SWEEP = harness.TimeSteps(1e-3, substeps=1, sweeps=1)  # enough without restitution
 STEPS = (1e-3, 5e-4, 2e-4, 1e-4)  # s
 QUICK_STEPS = (1e-3, 5e-4)
 SUBSTEPS = (1, 2, 4)
@@ -90,7 +92,7 @@ FINEST, QUICK_FINEST = 1e-5, 2e-4  # s
 
 
 @dataclass(frozen=True)
-class Level:
+class Solution:
     """One way to compute the collapse."""
 
     setting: Mapping[str, float]  # its keys of the scenario
@@ -103,15 +105,15 @@ class Level:
         """For people."""
         return ", ".join(f"{name} {value:g}" for name, value in self.setting.items())
 
-    def off(self, other: "Level") -> float:
+    def off(self, other: "Solution") -> float:
         """Return the largest distance (m) between final positions of a block by this and another way."""
         return float(np.hypot(*(self.centres - other.centres)).max())
 
-    def number(self, quantity: str) -> Number:
+    def number(self, quantity: str) -> harness.Number:
         """Return its CPU time for the table."""
-        return Number(quantity, "CPU ms", tuple(1e3 * one for one in self.seconds))
+        return harness.Number(quantity, "CPU ms", tuple(1e3 * one for one in self.seconds))
 
-    def detail(self, finest: "Level") -> dict[str, object]:
+    def detail(self, finest: "Solution") -> dict[str, object]:
         """Return it for programs."""
         return {
             **self.setting,
@@ -122,36 +124,38 @@ class Level:
         }
 
 
-def converged_levels(levels: Sequence[Level], finest: Level) -> list[Level]:
+def converged_levels(levels: Sequence[Solution], finest: Solution) -> list[Solution]:
     """Return the levels, coarse to fine, that are close to the finest, all finer ones too: one can be so by chance."""
     return list(itertools.takewhile(lambda level: level.off(finest) <= CLOSE, reversed(levels)))
 
 
-def solve_level(setting: Mapping[str, float], scenario: Scenario, repeats: int) -> Level:
+def solve_level(setting: Mapping[str, float], scenario: Scenario, repeats: int) -> Solution:
     """Run until the blocks rest."""
-    scene = Rerun(scenario)
+    scene = harness.Rerun(scenario)
     last = last_step_of(scenario.time.end, scene.step)
     runs = [scene.run(last) for _ in range(repeats)]
     bodies = runs[-1].bodies  # every run ends with the same bits
-    return Level(setting, np.array([bodies.x, bodies.y]), tuple(run.seconds for run in runs), runs[-1].steps)
+    return Solution(setting, np.array([bodies.x, bodies.y]), tuple(run.seconds for run in runs), runs[-1].steps)
 
 
-def measure_explicit(setting: Setting) -> Findings:
+def measure_explicit(effort: harness.Effort) -> harness.Readings:
     """Measure a step at full stiffness, and the cheapest collapse that greater stiffnesses confirm."""
-    scales = QUICK_SCALES if setting.quick else SCALES
+    scales = QUICK_SCALES if effort.quick else SCALES
     rows = []
     for safety in SAFETIES:
         keys = [{"stiffness_scale": scale, "safety": safety} for scale in scales]
-        scenarios = [three_blocks({"stiffness_scale": scale}, {"safety": safety}) for scale in scales]
-        rows.append([solve_level(*one, setting.repeats) for one in zip(keys, scenarios, strict=True)])
+        scenarios = [harness.three_blocks({"stiffness_scale": scale}, {"safety": safety}) for scale in scales]
+        rows.append([solve_level(*one, effort.repeats) for one in zip(keys, scenarios, strict=True)])
     levels = [level for row in rows for level in row]
     finest = levels[-1]
     close = [level for row in rows for level in converged_levels(row, finest)]
     cheapest = min(close, key=lambda level: statistics.median(level.seconds))
-    scene = Rerun(three_blocks(time={"stop_at_rest": False}))  # the blocks are at rest for the last quarter
-    last = last_step_of(QUICK_DURATION if setting.quick else DURATION, scene.step)
+    scene = harness.Rerun(
+        harness.three_blocks(time={"stop_at_rest": False})
+    )  # the blocks are at rest for the last quarter
+    last = last_step_of(QUICK_DURATION if effort.quick else DURATION, scene.step)
     numbers = (
-        repeat("a step", "ns", lambda: 1e9 * scene.run(last).seconds / last, setting.repeats),
+        harness.repeat("a step", "ns", lambda: 1e9 * scene.run(last).seconds / last, effort.repeats),
         cheapest.number("time to a converged answer"),
         finest.number("the stiffest run, its measure"),
     )
@@ -160,32 +164,32 @@ def measure_explicit(setting: Setting) -> Findings:
         f"run ({finest.text}); the cheapest of {len(close)} such settings of {len(levels)} has {cheapest.text}, "
         f"{cheapest.steps} steps, and is off by {1e3 * cheapest.off(finest):.2f} mm"
     )
-    return Findings(numbers, notes=(note,), details=tuple(level.detail(finest) for level in levels))
+    return harness.Readings(numbers, notes=(note,), details=tuple(level.detail(finest) for level in levels))
 
 
-def measure_nonsmooth(setting: Setting) -> Findings:
+def measure_nonsmooth(effort: harness.Effort) -> harness.Readings:
     """Measure a collapse without restitution in few long steps, and one with restitution that finer steps confirm."""
 
-    def solve(stepping: Stepping, restitution: float = RESTITUTION) -> Level:
-        scenario = three_blocks({"restitution": restitution}, stepping.time())
-        return solve_level(stepping.keys, scenario, setting.repeats)
+    def solve(stepping: harness.TimeSteps, restitution: float = harness.RESTITUTION) -> Solution:
+        scenario = harness.three_blocks({"restitution": restitution}, stepping.time())
+        return solve_level(stepping.keys, scenario, effort.repeats)
 
     without = solve(ONE_SWEEP, 0.0)
-    steps, finest_step = (QUICK_STEPS, QUICK_FINEST) if setting.quick else (STEPS, FINEST)
-    finest = solve(Stepping(finest_step, substeps=1))
-    rows = [[solve(Stepping(step, parts)) for step in steps] for parts in SUBSTEPS]
+    steps, finest_step = (QUICK_STEPS, QUICK_FINEST) if effort.quick else (STEPS, FINEST)
+    finest = solve(harness.TimeSteps(finest_step, substeps=1))
+    rows = [[solve(harness.TimeSteps(step, parts)) for step in steps] for parts in SUBSTEPS]
     close = [level for row in rows for level in converged_levels(row, finest)] or [finest]
     cheapest = min(close, key=lambda level: statistics.median(level.seconds))
-    members = QUICK_MEMBERS if setting.quick else MEMBERS
+    members = QUICK_MEMBERS if effort.quick else MEMBERS
     numbers, ends = [], []
-    for restitution, level in ((0.0, without), (RESTITUTION, cheapest)):
-        scenario = three_blocks({"restitution": restitution}, {"scheme": IMPULSES, **level.setting})
-        together, _ = rates([scenario] * members, 1, setting.repeats)
+    for restitution, level in ((0.0, without), (harness.RESTITUTION, cheapest)):
+        scenario = harness.three_blocks({"restitution": restitution}, {"scheme": IMPULSES, **level.setting})
+        together, _ = rates([scenario] * members, 1, effort.repeats)
         name, (_, two, three) = f"e = {restitution:g}", 1e3 * level.centres[0]
         numbers += [
             level.number(f"{name}: alone"),
-            Number(f"{name}: among many", "CPU ms", tuple(1e3 / one for one in together.samples)),
-            Number(f"{name}: collapses a second and core", "1/s", together.samples),
+            harness.Number(f"{name}: among many", "CPU ms", tuple(1e3 / one for one in together.samples)),
+            harness.Number(f"{name}: collapses a second and core", "1/s", together.samples),
         ]
         at = f"blocks 2 and 3 at x = {two:.2f} and {three:.2f} mm"
         ends.append(f"{name}: {level.text}, {level.steps} steps, {at}; ")
@@ -196,16 +200,16 @@ def measure_nonsmooth(setting: Setting) -> Findings:
     )
     details = [level.detail(finest) for row in rows for level in row]
     details += [finest.detail(finest), without.detail(without)]
-    return Findings(tuple(numbers), notes=(ends[0] + meaning, ends[1] + converged), details=tuple(details))
+    return harness.Readings(tuple(numbers), notes=(ends[0] + meaning, ends[1] + converged), details=tuple(details))
 
 
-EXPLICIT = Measurement(
+EXPLICIT = harness.Benchmark(
     "three-blocks",
     "collapse of the three blocks",
     measure_explicit,
     quick="0.01 s instead of 0.4 s at full stiffness, converged answer against a hundredth of the stiffness",
 )
-NONSMOOTH = Measurement(
+NONSMOOTH = harness.Benchmark(
     "nonsmooth-blocks",
     "collapse of the three blocks, non-smooth",
     measure_nonsmooth,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.bench import measurement, measurements
+from blocksim.bench import harness, registry
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import OutputError
 from blocksim.options import Option, Replace
@@ -30,7 +30,7 @@ def bench_command(
         ),
     ] = None,
     quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,
-    repeats: Annotated[int, Option("Samples of each number.", metavar="N", least=1)] = measurement.REPEATS,
+    repeats: Annotated[int, Option("Samples of each number.", metavar="N", least=1)] = harness.REPEATS,
     out: Annotated[Path | None, Option("Write everything as JSON.", metavar="FILE")] = None,
     overwrite: Replace = False,
     screen: command_line.Screen,
@@ -42,33 +42,33 @@ def bench_command(
 
     Example: blocksim bench walls --out bench.json
     """
-    wanted = measurements.choose(names or [])
+    wanted = registry.choose(names or [])
     if out is not None:  # checked before minutes of measuring
         if out.is_dir() or not out.absolute().parent.is_dir():
             raise OutputError(f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}")
         files.refuse_foreign(out, overwrite=overwrite)
-    machine = measurement.this_machine()
+    machine = harness.this_machine()
     prepare.announce_compilation("surface", quiet=screen.silent)
-    outcomes: list[measurement.Outcome] = []
+    outcomes: list[harness.BenchmarkRun] = []
     try:
         under_way = progress.one_by_one(wanted, lambda one: f"{one.name}: {one.title}", quiet=screen.silent)
-        outcomes.extend(one.run(measurement.Setting(quick, repeats)) for one in under_way)
+        outcomes.extend(one.run(harness.Effort(quick, repeats)) for one in under_way)
     finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
         if outcomes:
-            data = measurement.report(machine, outcomes)
+            data = harness.report(machine, outcomes)
             if out is not None:
                 files.write_text(out, json.dumps(data, indent=2) + "\n")
             written = [] if out is None else [f"written: {out}"]
             notes = [
                 *_notes(outcomes),
-                *measurement.machine_lines(machine),
+                *harness.machine_lines(machine),
                 f"{sum(one.seconds for one in outcomes):.0f} s",
                 *written,
             ]
             screen.print(command_line.Report(output.grouped_lines(COLUMNS, _groups(outcomes), left=2), data, notes))
 
 
-def _groups(outcomes: list[measurement.Outcome]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+def _groups(outcomes: list[harness.BenchmarkRun]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
     """Yield the name and the rows of each measurement."""
 
     def shown(value: float) -> str:
@@ -82,7 +82,7 @@ def _groups(outcomes: list[measurement.Outcome]) -> Iterator[tuple[str, list[tup
         yield f"{one.measurement.name}: {one.measurement.title}", rows
 
 
-def _notes(outcomes: list[measurement.Outcome]) -> Iterator[str]:
+def _notes(outcomes: list[harness.BenchmarkRun]) -> Iterator[str]:
     for outcome in outcomes:
         yield from (f"{outcome.measurement.name}: {text}" for text in outcome.findings.notes)
         if outcome.shortened:

@@ -9,12 +9,11 @@ from typing import Annotated
 
 from blocksim.cli import command_line, output, prepare
 from blocksim.options import Option
-from blocksim.scenario import PlacedBody, Scenario, check, place_bodies, scenario_to_toml, units
+from blocksim.scenario import PlacedBody, Scenario, check, place_bodies, resolution, scenario_to_toml, units
 from blocksim.scenario.events import describe_event, in_order, probe_names
 from blocksim.scenario.models.loads import AnyLoad, Constant, Force, Gravity, Horizontal, Moment, Pressure, RampHistory
 from blocksim.scenario.models.timeline import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
 from blocksim.scenario.motion import drives_of, greatest_rate, settles
-from blocksim.scenario.resolution import DEFAULT, MATERIALS
 from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study.rows import check_experiment
 from blocksim.world import free_memory, memory
@@ -270,7 +269,7 @@ def _rules(pairs: Sequence[PairDescription]) -> list[str]:
     found: dict[str, dict[str, None]] = {}
     for pair in pairs:
         for key in pair.rules.values():
-            if key not in {DEFAULT, MATERIALS}:
+            if key not in {resolution.DEFAULT, resolution.MATERIALS}:
                 found.setdefault(key, {})[" - ".join(pair.materials).replace(" ", HARD_SPACE)] = None
     room = max(LEAST_ROOM, output.width_of_screen() - len(output.GAP) - max(map(len, found), default=0))
     rows = [

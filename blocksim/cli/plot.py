@@ -9,7 +9,6 @@ from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.options import Option, Replace
 from blocksim.silence import silent
 from blocksim.simulation import files
-from blocksim.simulation.files import refuse_foreign
 from blocksim.simulation.stores.exports import format_named
 from blocksim.study import compare, pictures, reporting, stored_run
 
@@ -101,7 +100,7 @@ def report_command(
 
     Example: blocksim report scenarios/three_blocks.toml --out three_blocks.html
     """
-    refuse_foreign(out, overwrite=overwrite)
+    files.refuse_foreign(out, overwrite=overwrite)
     table = None if experiment is None else Path(experiment)
     size, problems = reporting.report_on(places, out, table, members, silent if screen.quiet else output.note)
     screen.note(f"report: {out} ({size / MEGABYTE:.1f} MB)")
@@ -138,9 +137,9 @@ def export_command(
     beside = file.with_name(f"{file.stem}_contacts{file.suffix}")
     if file.name in files.OURS and file.resolve().parent == stored.folder.resolve():
         raise OutputExistsError(f"{file}: belongs to the run; choose another name with --out")
-    refuse_foreign(file, overwrite=overwrite)
+    files.refuse_foreign(file, overwrite=overwrite)
     if form.write_contacts is not None and contacts is not None:
-        refuse_foreign(beside, overwrite=overwrite)
+        files.refuse_foreign(beside, overwrite=overwrite)
     older = pictures.OLDER if file.exists() else ""
     notes = [f"file: {file} ({older}{form.write(file, stored.frames, stored.scenario)} {form.counted})"]
     if form.write_contacts is not None and contacts is not None:

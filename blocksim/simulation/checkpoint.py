@@ -21,9 +21,7 @@ from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
 from blocksim.scenario import Scenario, load_stored, resolution, units
 from blocksim.scenario.units import TIME
-from blocksim.simulation import files, provenance, results
-from blocksim.simulation.files import CHECKPOINTS
-from blocksim.simulation.instruments import Recorder
+from blocksim.simulation import files, instruments, provenance, results
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stores.hdf5 import read_probes, read_rows
 from blocksim.world.build import arrays_of, with_parts
@@ -230,7 +228,9 @@ class CheckpointWriter:
 
     def __post_init__(self) -> None:
         """Write nothing yet; the checkpoint that the run continues from is the last one to be replaced."""
-        self.paths = sorted((self.folder / name for name in CHECKPOINTS), key=lambda path: path == self.past.checkpoint)
+        self.paths = sorted(
+            (self.folder / name for name in files.CHECKPOINTS), key=lambda path: path == self.past.checkpoint
+        )
         self.last_step = self.past.step
         self.began = self.written_at = time.monotonic()
 
@@ -321,7 +321,7 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
     return Resumption(newest, tuple(remarks), (note,))
 
 
-def take_over(stored: StoredCheckpoint, scenario: Scenario, recorder: Recorder) -> None:
+def take_over(stored: StoredCheckpoint, scenario: Scenario, recorder: instruments.Recorder) -> None:
     """Let a recorder begin with the frames at output times, and samples of probes, that earlier parts have left.
 
     Raises what reading them raises, and InvalidInputError where some before the checkpoint are missing, or are not as

@@ -15,11 +15,9 @@ from blocksim.kernels.common import arrays, compiler, frame_times, systems
 from blocksim.kernels.common.members import Watched
 from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
-from blocksim.simulation import instruments, loop, observables, rest_state, schemes
-from blocksim.simulation.balance import EnergyLedger, adds_up, energy_ledger, ledger_of, next_energy_check, start_energy
+from blocksim.simulation import balance, instruments, loop, observables, rest_state, schemes, trajectory
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measure_row, measured_systems, scheme_of
-from blocksim.simulation.trajectory import COLUMNS, Columns, Frames, as_frame, final_values
 from blocksim.world.build import Refusal, SceneStack, member, stack_of_one
 from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
 
@@ -35,23 +33,23 @@ class MemberEnd:
     """Where one member ended and how."""
 
     outcome: loop.Outcome
-    ledger: EnergyLedger
+    ledger: balance.EnergyLedger
     seconds: float  # simulated
-    columns: Columns  # the final table, as `final.csv` has it
+    columns: trajectory.Columns  # the final table, as `final.csv` has it
     placed: Placed = field(repr=False)
     time_step: float  # s
     rows: instruments.FrameRows = field(repr=False)  # one: the last
     observables: dict[str, Value] = field(default_factory=dict)  # observables of rows, by name
 
     @cached_property
-    def frames(self) -> Frames:
+    def frames(self) -> trajectory.Frames:
         """One: the last."""
         return instruments.frames_from_rows((blocks_placed(self.placed),), self.time_step, self.rows)
 
     @property
     def final(self) -> "pd.DataFrame":
         """The final table for people who know pandas."""
-        return as_frame(self.columns)
+        return trajectory.as_frame(self.columns)
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ def member_ends(
     sides = np.array([(one.size_x, one.size_y, one.angle) for one in bodies]).reshape(count, -1, 3).swapaxes(1, 2)
     corners = outlines_of(bodies)  # (m, b, k, 2); None where all are rectangles
     corners = None if corners is None else corners.reshape(count, -1, *corners.shape[1:])
-    tables = final_values(motion, sides, corners).tolist()
+    tables = trajectory.final_values(motion, sides, corners).tolist()
     support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
     in_rows = [name for name, one in OBSERVABLES.items() if one.in_rows]
     observables = observe(watch.ends(motion, support, seconds, turned), in_rows)
@@ -112,7 +110,7 @@ def member_ends(
     for m, (code, in_play) in enumerate(zip(codes, in_play_of(scenes, range(count)), strict=True)):
         if code == arrays.PAIRS_FULL:
             continue
-        some, ledger = slice(m, m + 1), ledger_of(names, measured[m], starts[m], *in_play)
+        some, ledger = slice(m, m + 1), balance.ledger_of(names, measured[m], starts[m], *in_play)
         outcome = loop.outcome_of(code, ledger)
         if outcome.status != "finished":
             outcome = loop.diagnose(outcome, code, member(scenes, m), placed[m])
@@ -120,7 +118,7 @@ def member_ends(
             outcome=outcome,
             ledger=ledger,
             seconds=seconds[m],
-            columns=dict(zip(COLUMNS, ([body.name for body in placed[m]], *tables[m]), strict=True)),
+            columns=dict(zip(trajectory.COLUMNS, ([body.name for body in placed[m]], *tables[m]), strict=True)),
             placed=placed[m],
             time_step=time_steps[m],
             rows=instruments.FrameRows(steps[m], (motion[some],), measured[some], names),
@@ -260,7 +258,7 @@ class Ensemble:
         rows, stops = self.starts, np.zeros_like(self.codes)
         done = 0
         while members.size:
-            done = next_energy_check(done, self.bodies)
+            done = balance.next_energy_check(done, self.bodies)
             np.minimum(self.last_steps, done, out=stops)
             rides = np.array([self.supports[m].moves for m in members.tolist()])
             self._advance_members(members[~rides], stops, rows, self.codes)
@@ -271,10 +269,12 @@ class Ensemble:
             if members.size:
                 measured, which = self._measured(members), members.tolist()
                 ledgers = (
-                    ledger_of(self.names, measured[m], float(self.starts[m, : len(self.scheme.ledger)].sum()), *own)
+                    balance.ledger_of(
+                        self.names, measured[m], float(self.starts[m, : len(self.scheme.ledger)].sum()), *own
+                    )
                     for m, own in zip(which, in_play_of(self.scenes, which), strict=True)
                 )
-                members = members[[*map(adds_up, ledgers)]]
+                members = members[[*map(balance.adds_up, ledgers)]]
 
     def _advance_watching(self, m: int, stop: int, rows: NDArray[np.float64]) -> None:
         """Advance a member on a moving support to a step, from frame to frame until something has moved there."""
@@ -332,10 +332,10 @@ class Ensemble:
         try:
             if not scene.world.clock[0].is_started:
                 scene, _ = schemes.ALONE.advance(self.scheme.with_more_room(scene), 0)
-                start = start_energy(scene)
+                start = balance.start_energy(scene)
             while continues:
                 done = int(scene.world.clock[0].steps)
-                look = stop = min(next_energy_check(done, self.bodies), last)
+                look = stop = min(balance.next_energy_check(done, self.bodies), last)
                 # frames count until something has moved, and on a support that moves until a block is removed
                 if self.supports[m].moves or not self.watch.first[m]:
                     stop = min(stop, frame_times.next_frame(done, self.periods[m]))
@@ -345,7 +345,7 @@ class Ensemble:
                     scene, code = timeline.act(scene, schemes.ALONE, code)
                 now = int(scene.world.clock[0].steps)
                 is_under_way = code == arrays.REACHED and now < last
-                continues = is_under_way and (now != look or adds_up(energy_ledger(scene, start)))
+                continues = is_under_way and (now != look or balance.adds_up(balance.energy_ledger(scene, start)))
                 if not continues or frame_times.next_frame(now - 1, self.periods[m]) == now:
                     motion = motion_of(stack_of_one(scene).world.bodies[[0], : len(self.placed[0])])
                     self.watch.follow([m], motion, [now * self.time_steps[m]])

@@ -18,16 +18,7 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody, Scenario, events, place_segments
 from blocksim.scenario.models.timeline import STEP, ForceProbe, JointProbe, PointProbe
-from blocksim.simulation.balance import solver_module
-from blocksim.simulation.observables import AT_REST, MovingSupport, Watch
-from blocksim.simulation.trajectory import (
-    CONTACT_ROW,
-    Contacts,
-    Frames,
-    Rows as ContactRows,
-    forces_on_a,
-    join_contacts,
-)
+from blocksim.simulation import balance, observables, trajectory
 from blocksim.world.systems import systems_of
 from blocksim.world.systems.blocks import BLOCKS, blocks_placed
 from blocksim.world.systems.system import BodyContacts, Floats, System, SystemInScene, Track
@@ -147,7 +138,9 @@ Sampler = Callable[["Moment"], Values]
 class Moment:
     """The scene at a step; what several probes need is worked out once."""
 
-    def __init__(self, scene: "AnyScene", support: MovingSupport, parts: Sequence[tuple[System, int]] = ()) -> None:
+    def __init__(
+        self, scene: "AnyScene", support: observables.MovingSupport, parts: Sequence[tuple[System, int]] = ()
+    ) -> None:
         """Take the scene as it is now, with the systems beside blocks and supports and the numbers of their parts."""
         self.scene, self.parts = scene, parts
         self.bodies = scene.world.bodies
@@ -162,7 +155,7 @@ class Moment:
 
         Parts of further systems have numbers after all bodies.
         """
-        rows = solver_module("simulation.schemes").scheme_of(self.scene).contacts(self.scene, self.bodies.size)
+        rows = balance.solver_module("simulation.schemes").scheme_of(self.scene).contacts(self.scene, self.bodies.size)
         classes = self.bodies["contact_class"]
         table = self.scene.world.interactions["static_friction"]
         friction = table[classes[rows["body_a"]], classes[rows["body_b"]]]
@@ -173,19 +166,19 @@ class Moment:
                 rows = np.concatenate([rows, rows_of(touching._replace(part=first + touching.part))])
                 friction = np.concatenate([friction, touching.friction])
             first += count
-        return rows, forces_on_a(rows), friction
+        return rows, trajectory.forces_on_a(rows), friction
 
     @cached_property
     def energies(self) -> Values:
         """Energies (J) of the ledger."""
-        schemes = solver_module("simulation.schemes")
+        schemes = balance.solver_module("simulation.schemes")
         energies: list[float] = schemes.measure_row(self.scene)[: len(schemes.ledger_names(self.scene))].tolist()
         return energies
 
 
 def rows_of(touching: BodyContacts) -> Any:
     """Return contacts of a system as those of bodies a with parts b."""
-    rows = np.zeros(len(touching.body), CONTACT_ROW)
+    rows = np.zeros(len(touching.body), trajectory.CONTACT_ROW)
     rows["body_a"], rows["body_b"] = touching.body, touching.part
     (rows["x"], rows["y"]), (rows["normal_x"], rows["normal_y"]) = touching.place.T, touching.normal.T
     rows["normal_force"], rows["shear_force"] = touching.normal_force, touching.shear_force
@@ -269,7 +262,7 @@ class Probe:
 
     def next_step(self, done: int) -> int:
         """Return the next step to sample after `done` steps."""
-        return int(solver_module("kernels.common.frame_times").next_frame(done, self.period))
+        return int(balance.solver_module("kernels.common.frame_times").next_frame(done, self.period))
 
     def sample(self, moment: Moment) -> None:
         """Add a sample if one is due at this step, wherever the run ends, and it is not there yet."""
@@ -300,7 +293,7 @@ class Probes:
     def __init__(
         self,
         probes: Sequence[Probe],
-        support: MovingSupport,
+        support: observables.MovingSupport,
         time_step: float,
         parts: Sequence[tuple[System, int]] = (),
     ) -> None:
@@ -323,7 +316,7 @@ class Probes:
         return {one.name: series_of(one.name, one.kind, one.units, one.rows, self.time_step) for one in self.all}
 
 
-NO_PROBES = Probes((), AT_REST, 1.0)
+NO_PROBES = Probes((), observables.AT_REST, 1.0)
 
 
 def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float, ledger: Sequence[str]) -> Probes:
@@ -357,7 +350,7 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
         columns = dict.fromkeys(ledger, "J") if probe.kind == ENERGY else COLUMNS[probe.kind]
         made.append(Probe(name, probe.kind, columns, period, sampler))
     systems = [(one, len(parts_of)) for one, parts_of in parts]
-    return Probes(made, MovingSupport(scenario if made else None), time_step, systems)
+    return Probes(made, observables.MovingSupport(scenario if made else None), time_step, systems)
 
 
 def _numbers(scenario: Scenario, placed: Sequence[PlacedBody], parts: Sequence[str]) -> dict[str, Sequence[int]]:
@@ -385,7 +378,7 @@ class Frame(NamedTuple):
     step: int
     states: tuple[Floats, ...]  # (q, b) of each system, as its `quantities`; blocks first
     measured: NDArray[np.float64]  # energies, number of contacts, largest overlap
-    contacts: ContactRows | None = None  # where they are recorded
+    contacts: trajectory.Rows | None = None  # where they are recorded
 
     def digest(self, before: bytes = b"") -> bytes:
         """Return the SHA-256 of all its bits, and of the digest of the frame before it."""
@@ -407,7 +400,7 @@ class Recorder:
         others: Sequence[SystemInScene] = (),
         contacts: bool = False,
         probes: Probes = NO_PROBES,
-        support: MovingSupport = AT_REST,
+        support: observables.MovingSupport = observables.AT_REST,
     ) -> None:
         """Record every `every` seconds, at the nearest step of length `step` (s).
 
@@ -426,11 +419,11 @@ class Recorder:
         self.ledger: tuple[str, ...] = ()
         self.with_contacts = contacts
         self.probes = probes
-        self.watch = Watch([self.placed], [support])
+        self.watch = observables.Watch([self.placed], [support])
 
     def next_step(self, done: int) -> int:
         """Return the next step to record after `done` steps, wherever those end."""
-        return int(solver_module("kernels.common.frame_times").next_frame(done, self.steps_per_frame))
+        return int(balance.solver_module("kernels.common.frame_times").next_frame(done, self.steps_per_frame))
 
     def count_until(self, step: int) -> int:
         """Return the number of frames up to a step."""
@@ -458,7 +451,7 @@ class Recorder:
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a frame of the present state, unless this step has one already: then look whether that is the same."""
-        schemes, step = solver_module("simulation.schemes"), int(scene.world.clock[0].steps)
+        schemes, step = balance.solver_module("simulation.schemes"), int(scene.world.clock[0].steps)
         row = schemes.measure_row(scene)
         arrays = (scene.world, *getattr(scene, "systems", ()))
         states = tuple(one.system.state(its, one.count) for one, its in zip(self.systems, arrays, strict=True))
@@ -479,10 +472,10 @@ class Recorder:
             self.held.clear()
         self.held.append(frame)
 
-    def frames(self) -> Frames:
+    def frames(self) -> trajectory.Frames:
         """Return all frames that are held: those so far, or, with a sink, the last one."""
         steps, states, measured, tables = zip(*self.held, strict=True)
-        contacts = join_contacts(tables) if self.with_contacts else None
+        contacts = trajectory.join_contacts(tables) if self.with_contacts else None
         values = tuple(np.stack(one) for one in zip(*states, strict=True))
         rows = FrameRows(np.array(steps, dtype=np.int64), values, np.stack(measured), self.ledger, contacts)
         return frames_from_rows(self.systems, self.time_step, rows)
@@ -495,14 +488,14 @@ class FrameRows(NamedTuple):
     states: tuple[Floats, ...]  # (n, q, b) of each system, as its `quantities`; blocks first
     measured: NDArray[np.float64]  # (n, e + 2): energies, number of contacts, largest overlap
     ledger: tuple[str, ...]  # names of the e energies
-    contacts: Contacts | None = None  # of all frames
+    contacts: trajectory.Contacts | None = None  # of all frames
 
 
-def frames_from_rows(systems: Sequence[SystemInScene], time_step: float, rows: FrameRows) -> Frames:
+def frames_from_rows(systems: Sequence[SystemInScene], time_step: float, rows: FrameRows) -> trajectory.Frames:
     """Return frames of systems, blocks first, with these steps (s)."""
     columns = rows.measured.T
     blocks, *others = (Track(one, values) for one, values in zip(systems, rows.states, strict=True))
-    return Frames(
+    return trajectory.Frames(
         step=rows.steps,
         time=np.multiply(rows.steps, time_step, dtype=np.float64),
         **{name: blocks[name] for name in (*MOTION, "size_x", "size_y", "mass", "inertia")},

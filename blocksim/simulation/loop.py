@@ -18,8 +18,7 @@ from blocksim.errors import ExitCode
 from blocksim.kernels.common import arrays
 from blocksim.scenario import PlacedBody, Scenario, events
 from blocksim.scenario.models.timeline import Event
-from blocksim.simulation import balance, checkpoint, results, schemes
-from blocksim.simulation.instruments import MOTION, Recorder
+from blocksim.simulation import balance, checkpoint, instruments, results, schemes
 
 NEVER = np.iinfo(np.int64).max
 NO_SIZE = -1e12  # m: half sides of what is not there: farther than that from everything
@@ -230,7 +229,7 @@ def diagnose(outcome: Outcome, code: int, scene: schemes.AnyScene, placed: Seque
             most = f", more than half of a side of {2.0 * limit:.3g} mm" if is_capped else ""
             who = f"{pair} by {depth:.3g} mm{most}"
         elif code == arrays.NOT_FINITE:
-            lost = ~np.all([np.isfinite(bodies[name]) for name in MOTION], axis=0)
+            lost = ~np.all([np.isfinite(bodies[name]) for name in instruments.MOTION], axis=0)
             who = f"block {placed[int(np.argmax(lost))].name}" if lost.any() else _lost_system(scene)
         if not who:
             speed = np.hypot(bodies["vx"], bodies["vy"])
@@ -318,7 +317,7 @@ def outcome_of(code: int, ledger: balance.EnergyLedger) -> Outcome:
 
 def run_loop(
     scene: schemes.AnyScene,
-    recorder: Recorder,
+    recorder: instruments.Recorder,
     end: float,
     *,
     team: schemes.Team = schemes.ALONE,
@@ -362,7 +361,7 @@ class _Run:
     def __init__(
         self,
         scene: schemes.AnyScene,
-        recorder: Recorder,
+        recorder: instruments.Recorder,
         end: float,
         team: schemes.Team,
         control: RunControl,

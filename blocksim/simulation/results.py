@@ -12,11 +12,8 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import Scenario, input_files, load_stored, place_bodies
-from blocksim.simulation import balance, files, observables
-from blocksim.simulation.files import PROBE, keep_scenario, probe_tables, read_tables
-from blocksim.simulation.instruments import ProbeSeries
+from blocksim.simulation import balance, files, instruments, observables, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
-from blocksim.simulation.trajectory import Columns, Frames, as_frame, csv_text, data_set, read_table, tidy_table
 from blocksim.world.systems import systems_of
 
 if TYPE_CHECKING:
@@ -118,20 +115,22 @@ class Result:
     """One run: columns of the final table (mm, degrees), frames (SI), and the summary that run.json holds."""
 
     name: str
-    columns: Columns
+    columns: trajectory.Columns
     summary: Summary
     scenario: Scenario
     folder: Path | None = None
-    held: Frames | None = field(default=None, repr=False)  # frames in memory, where they are
-    held_probes: dict[str, ProbeSeries] | None = field(default=None, repr=False)  # samples in memory, where they are
+    held: trajectory.Frames | None = field(default=None, repr=False)  # frames in memory, where they are
+    held_probes: dict[str, instruments.ProbeSeries] | None = field(
+        default=None, repr=False
+    )  # samples in memory, where they are
 
     @cached_property
-    def frames(self) -> Frames:
+    def frames(self) -> trajectory.Frames:
         """The frames, read from the folder when first asked for. Raises what reading them raises."""
         return read_frames(self._run_file, self.scenario) if self.held is None else self.held
 
     @cached_property
-    def probes(self) -> dict[str, ProbeSeries]:
+    def probes(self) -> dict[str, instruments.ProbeSeries]:
         """The samples of probes by name, read from the folder when first asked for. Raises what reading them raises."""
         return read_probes(self._run_file, self.scenario) if self.held_probes is None else self.held_probes
 
@@ -141,7 +140,7 @@ class Result:
         return self.folder / files.FRAMES
 
     @cached_property
-    def endings(self) -> dict[str, Columns]:
+    def endings(self) -> dict[str, trajectory.Columns]:
         """Where the systems beside the blocks ended, by their names: tables as in NAME.csv of a run folder."""
         if all(system.ending is None for system in systems_of(self.scenario)):
             return {}  # frames are many, and nothing of them is asked for
@@ -154,15 +153,15 @@ class Result:
     @cached_property
     def final(self) -> "pd.DataFrame":
         """The final table, one row per block."""
-        return as_frame(self.columns)
+        return trajectory.as_frame(self.columns)
 
     def to_frame(self) -> "pd.DataFrame":
         """Return the trajectories, one row per frame and block: time_s, block, x_mm, y_mm, rotation_deg, velocities."""
-        return tidy_table(self.frames)
+        return trajectory.tidy_table(self.frames)
 
     def to_xarray(self) -> "xr.Dataset":
         """Return the trajectories as an xarray.Dataset (time, block) in SI. Raises UnavailableError without xarray."""
-        return data_set(self.frames, self.name)
+        return trajectory.data_set(self.frames, self.name)
 
     def __repr__(self) -> str:
         """Return a line: name, status and reason, blocks, simulated time, folder."""
@@ -201,10 +200,10 @@ def read_result(folder: Path) -> Result:
     return Result(scenario.name, read_final(folder, scenario), summary, scenario, folder, frames)
 
 
-def read_final(folder: Path, scenario: Scenario) -> Columns:
+def read_final(folder: Path, scenario: Scenario) -> trajectory.Columns:
     """Return the final table in the folder of a run of a scenario. Raises InputMissingError or InvalidInputError."""
     path = folder / files.FINAL
-    columns = read_table(path)
+    columns = trajectory.read_table(path)
     if columns["block"] != [body.name for body in place_bodies(scenario)]:
         raise InvalidInputError(f"{path}: its blocks are not those of {files.SCENARIO}")
     return columns
@@ -218,10 +217,10 @@ def _with_checksums(summary: Summary, folder: Path, tables: Iterable[str]) -> Su
 
 def keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     """Keep the tables and the summary of a run that has ended in its folder, beside its frames. Raises OutputError."""
-    files.write_text(folder / files.FINAL, csv_text(result.columns))
+    files.write_text(folder / files.FINAL, trajectory.csv_text(result.columns))
     for name, table in result.endings.items():
-        files.write_text(folder / f"{name}.csv", csv_text(table))
-    tables = probe_tables(result.scenario)
+        files.write_text(folder / f"{name}.csv", trajectory.csv_text(table))
+    tables = files.probe_tables(result.scenario)
     for name, series in zip(tables, read_probes(folder / files.FRAMES, result.scenario).values(), strict=True):
         files.write_text(folder / name, "".join(series.csv_lines()))
     summary = _with_checksums(summary, folder, tables)
@@ -242,9 +241,9 @@ def renew_copies(scenario: Scenario, folder: Path) -> None:
         paths = [folder / name for name in (files.SCENARIO, *files.COPIES)]
         return [path.read_bytes() if path.is_file() else None for path in paths]
 
-    tables, old = read_tables(scenario), contents()
-    keep_scenario(scenario, tables, folder)
+    tables, old = files.read_tables(scenario), contents()
+    files.keep_scenario(scenario, tables, folder)
     if old != contents():
         summary = read_summary(folder / files.SUMMARY)
-        names = [name for name in summary.sha256 if name.startswith(PROBE)]
+        names = [name for name in summary.sha256 if name.startswith(files.PROBE)]
         files.write_text(folder / files.SUMMARY, _with_checksums(summary, folder, names).to_json())

@@ -14,8 +14,7 @@ import numpy as np
 from blocksim.errors import OutputError
 from blocksim.kernels.common.arrays import World
 from blocksim.kernels.common.compiler import compiling
-from blocksim.scenario import PlacedBody, Scenario, motion, placement, scenario_hash
-from blocksim.scenario.events import describe_event
+from blocksim.scenario import PlacedBody, Scenario, events, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
 from blocksim.silence import silent
 from blocksim.simulation import balance, checkpoint, files, loop, observables, provenance, rest_state, schemes
@@ -283,7 +282,8 @@ def _warnings(
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from warnings_of(scenario)
     for number in ended.pending if ended.outcome.status == "finished" else ():
-        yield f"events.{number} has not happened, as nothing came to rest: {describe_event(scenario.events[number])}"
+        what = events.describe_event(scenario.events[number])
+        yield f"events.{number} has not happened, as nothing came to rest: {what}"
     if ended.outcome.status == "finished" and placed:
         sunk = scheme_of(ended.scene).warning(ended.scene, ended.overlap, placement.smallest_width(placed))
         if sunk:

@@ -5,18 +5,18 @@ import json
 
 import pytest
 
-from blocksim.bench.measurement import (
-    Findings,
-    Measurement,
+from blocksim.bench.harness import (
+    Benchmark,
+    Effort,
     Number,
-    Setting,
+    Readings,
     machine_lines,
     repeat,
     report,
     single,
     this_machine,
 )
-from blocksim.bench.measurements import MEASUREMENTS, UnknownMeasurementError, choose
+from blocksim.bench.registry import MEASUREMENTS, UnknownMeasurementError, choose
 from blocksim.errors import ExitCode
 
 
@@ -48,8 +48,8 @@ def test_unknown_names_are_wrong_usage(name: str, told: str) -> None:
 
 def test_the_report_is_json_without_numbers_that_json_lacks() -> None:
     numbers = (Number("there", "s", (1.0, 2.0)), single("never", "s", float("inf")))
-    measurement = Measurement("made-up", "made up", lambda _: Findings(numbers, ("said",)), quick="less")
-    data = report(this_machine(), [measurement.run(Setting(quick=True))])
+    measurement = Benchmark("made-up", "made up", lambda _: Readings(numbers, ("said",)), quick="less")
+    data = report(this_machine(), [measurement.run(Effort(quick=True))])
     (found,) = json.loads(json.dumps(data, allow_nan=False))["measurements"]
     assert (found["shortened"], found["notes"]) == ("less", ["said"])
     there, never = found["numbers"]

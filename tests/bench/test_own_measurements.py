@@ -6,18 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.bench import soils, startup, three_blocks, walls
-from blocksim.bench.measurement import Setting, single
-from blocksim.bench.measurements import choose
-from blocksim.bench.startup import StartError
-from blocksim.bench.three_blocks import CLOSE, Level, converged_levels
+from blocksim.bench import registry, three_blocks, walls
+from blocksim.bench.harness import Effort, single
+from blocksim.bench.registry import StartError, choose
+from blocksim.bench.three_blocks import CLOSE, Solution, converged_levels
 
-QUICK = Setting(quick=True, repeats=2)
+QUICK = Effort(quick=True, repeats=2)
 
 
-def level(scale: float, x: float) -> Level:
+def level(scale: float, x: float) -> Solution:
     """Return one whose third block ends at x (m)."""
-    return Level({"scale": scale}, np.array([[0.0, 0.0, x], [0.0, 0.0, 0.0]]), (3.0, 1.0, 2.0), 10)
+    return Solution({"scale": scale}, np.array([[0.0, 0.0, x], [0.0, 0.0, 0.0]]), (3.0, 1.0, 2.0), 10)
 
 
 def test_levels_count_as_converged_from_where_all_finer_ones_agree() -> None:
@@ -90,7 +89,7 @@ def test_rigid_walls_tell_times_growth_and_where_the_first_one_ends() -> None:
 
 
 def test_soils_tell_times_beside_a_wall_memory_and_what_two_threads_gain() -> None:
-    found = {one.quantity: one for one in soils.SOILS.measure(QUICK).numbers}
+    found = {one.quantity: one for one in walls.SOILS.measure(QUICK).numbers}
     names = ("", ", over a block of a wall", ", memory")
     wanted = [f"{count} particles{name}" for name in names for count in (256, 484)]
     assert [*found] == [*wanted, "484 particles, 2 threads", "484 particles, speed-up"]
@@ -117,8 +116,8 @@ def test_threads_tell_by_how_much_they_are_faster_and_leave_small_walls_alone(
 
 def test_starts_are_timed_in_processes_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    version, run = startup.START_UP.measure(Setting(quick=True, repeats=1)).numbers
+    version, run = registry.START_UP.measure(Effort(quick=True, repeats=1)).numbers
     assert 0.01 < version.median < run.median
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(StartError, match=r"rnu: exit code 2: .*No such command 'rnu'"):
-        startup._seconds(startup.MAIN, "rnu")
+        registry._seconds(registry.MAIN, "rnu")

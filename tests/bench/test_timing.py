@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import Rerun, RunFailedError, three_blocks
+from blocksim.bench.harness import Rerun, RunFailedError, three_blocks
 
 SOFT = {"stiffness_scale": 1e-4}
 

@@ -5,27 +5,27 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.bench import measurements
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting, single
+from blocksim.bench import registry
+from blocksim.bench.harness import Benchmark, Effort, Number, Readings, single
 from tests.cli.conftest import Command
 
 
-def measured(setting: Setting) -> Findings:
-    numbers = (Number("a step", "ns", (3.0, 1.0, 2.0)[: setting.repeats]), single("memory", "bytes/block", 5000.0))
-    return Findings(numbers, notes=("soft",), details=({"quick": setting.quick},))
+def measured(effort: Effort) -> Readings:
+    numbers = (Number("a step", "ns", (3.0, 1.0, 2.0)[: effort.repeats]), single("memory", "bytes/block", 5000.0))
+    return Readings(numbers, notes=("soft",), details=({"quick": effort.quick},))
 
 
-def stopped(_: Setting) -> Findings:
+def stopped(_: Effort) -> Readings:
     raise KeyboardInterrupt
 
 
 @pytest.fixture(autouse=True)
-def registry(monkeypatch: pytest.MonkeyPatch) -> None:
+def table_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
     table = (
-        Measurement("first", "made up", measured, quick="half of it"),
-        Measurement("stop", "stopped", stopped, quick=""),
+        Benchmark("first", "made up", measured, quick="half of it"),
+        Benchmark("stop", "stopped", stopped, quick=""),
     )
-    monkeypatch.setattr(measurements, "MEASUREMENTS", table)
+    monkeypatch.setattr(registry, "MEASUREMENTS", table)
 
 
 def test_table_fits_80_columns_and_names_the_machine(blocksim: Command) -> None:

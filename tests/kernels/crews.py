@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.bench.scenes import pushed_wall
+from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import MOTION_PIECE, PAIRS_FULL, TEAM_SIZE, World, zeros
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.step import advance, advance_in_team

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import pushed_wall
+from blocksim.bench.harness import pushed_wall
 from blocksim.errors import ExitCode
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import ensemble, simulate

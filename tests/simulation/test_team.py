@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import pushed_wall
+from blocksim.bench.harness import pushed_wall
 from blocksim.errors import InvalidInputError
 from blocksim.simulation import simulate
 from blocksim.simulation.provenance import state_hash

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import pushed_wall
+from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import REACHED
 from blocksim.kernels.explicit.broad_phase import list_reach
 from blocksim.verification.scene import Simulation

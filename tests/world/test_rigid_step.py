@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.bench.scenes import pushed_wall, three_blocks
+from blocksim.bench.harness import pushed_wall, three_blocks
 from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world.describe import describe

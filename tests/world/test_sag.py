@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from blocksim.bench.scenes import three_blocks
+from blocksim.bench.harness import three_blocks
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.simulation.run import simulate
 from blocksim.simulation.schemes import build_scene

@@ -26,9 +26,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError, OutputError
 from blocksim.scenario import Scenario, events, input_files, place_bodies
-from blocksim.simulation import files, instruments
-from blocksim.simulation.instruments import Frame, FrameRows, Recorder, frames_from_rows
-from blocksim.simulation.trajectory import BODIES, CONTACT_ROW, SUPPORT, UNITS, Contacts, Frames
+from blocksim.simulation import files, instruments, trajectory
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems import blocks, others_of
 from blocksim.world.systems.system import System, SystemInScene
@@ -95,8 +93,8 @@ def sets_of_frames(
 
 def sets_of_contacts() -> Iterator[DataSet]:
     """Yield the data sets with a row a contact."""
-    none = np.zeros(0, CONTACT_ROW)
-    for name, unit in {**dict.fromkeys(BODIES, "1"), **UNITS}.items():
+    none = np.zeros(0, trajectory.CONTACT_ROW)
+    for name, unit in {**dict.fromkeys(trajectory.BODIES, "1"), **trajectory.UNITS}.items():
         yield DataSet(
             f"{CONTACTS}/{name}",
             unit,
@@ -106,7 +104,7 @@ def sets_of_contacts() -> Iterator[DataSet]:
                 ),
                 name,
             ),
-            CONTACT_ROW[name],
+            trajectory.CONTACT_ROW[name],
         )
 
 
@@ -290,17 +288,17 @@ def _samples(path: Path, file: Any, name: str) -> instruments.ProbeSeries:
     return instruments.ProbeSeries(name, kind, steps, times, columns, units)
 
 
-def read_frames(path: Path, scenario: Scenario) -> Frames:
+def read_frames(path: Path, scenario: Scenario) -> trajectory.Frames:
     """Return the committed frames of a run file; `scenario` is the one that lies beside it.
 
     Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty.
     """
     systems = (blocks.blocks_placed(place_bodies(scenario)), *others_of(scenario))
     time_step, rows = read_rows(path, systems)
-    return frames_from_rows(systems, time_step, rows)
+    return instruments.frames_from_rows(systems, time_step, rows)
 
 
-def read_rows(path: Path, systems: Sequence[SystemInScene]) -> tuple[float, FrameRows]:
+def read_rows(path: Path, systems: Sequence[SystemInScene]) -> tuple[float, instruments.FrameRows]:
     """Return step (s) and committed frames of a run file of these systems, blocks first. Raises as `read_frames`.
 
     What a run that continues writes at this moment may look like damage: a file without an end is tried a few times.
@@ -325,7 +323,7 @@ def is_left_open(path: Path) -> bool:
         return False
 
 
-def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, FrameRows]:
+def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[float, instruments.FrameRows]:
     """Return step (s) and rows of all committed frames, after looking at what would be read."""
     count = int(data_set(file, COMMITTED, 0)[()])
     ledger = tuple(name for name in group(file, OBSERVABLES) if name not in COUNTED_UNITS)
@@ -350,10 +348,12 @@ def _read(path: Path, file: Any, systems: Sequence[SystemInScene]) -> tuple[floa
         np.stack([values[place] for place in places_of(one.system)], axis=1, dtype=np.float64) for one in systems
     )
     contacts = _contacts(path, file, count, systems[0].count)
-    return time_step, FrameRows(steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts)
+    return time_step, instruments.FrameRows(
+        steps, states, np.stack(measured, axis=1, dtype=np.float64), ledger, contacts
+    )
 
 
-def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | None:
+def _contacts(path: Path, file: Any, frames: int, bodies: int) -> trajectory.Contacts | None:
     """Return the contacts of the first frames of a file, None where none were stored.
 
     Raises KeyError or ValueError where columns are missing, do not go together or name no body.
@@ -366,13 +366,13 @@ def _contacts(path: Path, file: Any, frames: int, bodies: int) -> Contacts | Non
     count = int(ends[-1]) if frames else 0
     sets = {one.name: data_set(file, one.name, 1) for one in sets_of_contacts()}
     refuse_too_many(path, sets, count, "contacts")
-    rows = np.zeros(count, CONTACT_ROW)
+    rows = np.zeros(count, trajectory.CONTACT_ROW)
     for name, one in sets.items():
         rows[name.removeprefix(f"{CONTACTS}/")] = one[:count]
-    for name, least in zip(BODIES, (0, SUPPORT), strict=True):
+    for name, least in zip(trajectory.BODIES, (0, trajectory.SUPPORT), strict=True):
         if count and not (least <= rows[name].min() and rows[name].max() < bodies):
             raise ValueError(f"{CONTACTS}/{name} names bodies that are not among the {bodies}")
-    return Contacts(ends, rows)
+    return trajectory.Contacts(ends, rows)
 
 
 FLUSH_SECONDS = 0.25
@@ -383,7 +383,7 @@ RESERVE = 1 << 18  # bytes
 class FrameFile:
     """Writes frames as they come; use as a context manager."""
 
-    def __init__(self, path: Path, recorder: Recorder, scenario_toml: str, ledger: Sequence[str]) -> None:
+    def __init__(self, path: Path, recorder: instruments.Recorder, scenario_toml: str, ledger: Sequence[str]) -> None:
         """Create the file with all its data sets, `ledger` names the energies; raises OutputError when that fails.
 
         It begins with the frames that the recorder holds from an earlier part of the run. Only with those on the disk
@@ -402,7 +402,7 @@ class FrameFile:
         }
         self.count = 0
         self.is_broken = False
-        self.waiting: list[Frame] = []
+        self.waiting: list[instruments.Frame] = []
         self.flushed_at = -np.inf
         self.flush_seconds = 0.0
         unnamed = path.with_name(f".{path.name}.new")
@@ -459,7 +459,7 @@ class FrameFile:
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(self.file.id.get_vfd_handle(), self.file.id.get_filesize(), size + RESERVE)
 
-    def append(self, frame: Frame) -> None:
+    def append(self, frame: instruments.Frame) -> None:
         """Take one frame; writes what has come together a few times a second. Raises OutputError."""
         self.waiting.append(frame)
         self.keep_up()

@@ -8,10 +8,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.bench.measurement import REPEATS, Outcome, Setting, machine_lines, report, this_machine
-from blocksim.bench.measurements import choose
+from blocksim.bench.harness import REPEATS, BenchmarkRun, Effort, machine_lines, report, this_machine
+from blocksim.bench.registry import choose
 from blocksim.errors import BlocksimError
-from tests.bench.peers.engine import Findings
+from tests.bench.peers.engine import Readings
 from tests.bench.peers.heap import HEAP
 from tests.bench.peers.three_blocks import PAPER, WITHOUT_RESTITUTION
 from tests.bench.peers.wall import WALL
@@ -41,20 +41,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         wanted = choose(asked.names, PEERS)
     except BlocksimError as error:
         parser.error(str(error))
-    outcomes = [one.run(Setting(asked.quick, max(1, asked.repeats))) for one in wanted]
+    outcomes = [one.run(Effort(asked.quick, max(1, asked.repeats))) for one in wanted]
     _print(outcomes)
     machine = this_machine()
     print(*machine_lines(machine), sep="\n")  # noqa: T201 - the output of a script
     if asked.out is not None:
         asked.out.write_text(json.dumps(report(machine, outcomes), indent=2) + "\n", encoding="utf-8")
-        found = [one.findings.panel for one in outcomes if isinstance(one.findings, Findings)]
+        found = [one.findings.panel for one in outcomes if isinstance(one.findings, Readings)]
         panels = [panel for panel in found if panel is not None]
         if panels:
             title = "Accuracy for computing time, each engine against itself"
             draw_work_precision(panels, asked.out.with_suffix(".png"), title=title)
 
 
-def _print(outcomes: Sequence[Outcome]) -> None:
+def _print(outcomes: Sequence[BenchmarkRun]) -> None:
     for outcome in outcomes:
         rows = [
             f"  {one.quantity:<54} {one.unit:<6} {one.median:9.4g} {min(one.samples):9.4g} {max(one.samples):9.4g}"

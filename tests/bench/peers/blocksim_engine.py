@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.bench.scenes import Rerun
+from blocksim.bench.harness import Rerun
 from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import ALONE
 from tests.bench.peers.engine import Final, Scene, timed
@@ -16,7 +16,7 @@ from tests.bench.peers.engine import Final, Scene, timed
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.bench.scenes import Stepping
+    from blocksim.bench.harness import TimeSteps
 
 CALLS = 1000  # that are timed with nothing to do
 Table = dict[str, object]
@@ -79,7 +79,7 @@ class Explicit(Blocksim):
 class Nonsmooth(Blocksim):
     """One step and its parts, also where it is longer than what is safe: the error will tell."""
 
-    stepping: Stepping
+    stepping: TimeSteps
 
     @property
     def setting(self) -> str:

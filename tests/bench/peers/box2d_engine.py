@@ -12,7 +12,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from blocksim.bench.scenes import FRICTION
+from blocksim.bench.harness import FRICTION
 from blocksim.scenario.geometry import edges_of
 from tests.bench.peers.engine import Stepper
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.bench import measurement
+from blocksim.bench import harness
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ CALLS = 20_000  # that are timed on an empty scene
 
 
 @dataclass(frozen=True)
-class Findings(measurement.Findings):
+class Readings(harness.Readings):
     """Result of a measurement, with its part of the work-precision picture."""
 
     panel: Panel | None = None

@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.measurement import Findings, Measurement, Number, Setting
-from blocksim.bench.scenes import FRICTION, SIDES, WALL_RESTITUTION, Table, one_structure
+from blocksim.bench.harness import (
+    FRICTION,
+    SIDES,
+    WALL_RESTITUTION,
+    Benchmark,
+    Effort,
+    Number,
+    Readings,
+    Table,
+    one_structure,
+)
 from tests.bench.peers.engine import Final, Scene
 from tests.bench.peers.series import heap_racers
 from tests.bench.peers.wall import distances
@@ -55,16 +64,16 @@ def hexagon_heap(columns: int, rows: int, contact: Table | None = None, time: Ta
 FULL, SMALL = Heap(40, 25, 1.0), Heap(5, 4, 0.1)
 
 
-def measure(setting: Setting) -> Findings:
+def measure(effort: Effort) -> Readings:
     """Measure the engines in turns, so that what else the machine does slows all of them."""
-    heap = SMALL if setting.quick else FULL
+    heap = SMALL if effort.quick else FULL
     racers = heap_racers()
     rounds = [
         {name: solver.solve(heap.scene()) for name, solver in racers.items()}
-        for _ in range(min(ROUNDS, setting.repeats))
+        for _ in range(min(ROUNDS, effort.repeats))
     ]
     meaning = f"{heap.columns * heap.rows} random hexagons of 20 to 40 mm that fall, {heap.end:g} s"
-    return Findings(tuple(_numbers(racers, rounds)), notes=(meaning, *_compared(rounds[-1])))
+    return Readings(tuple(_numbers(racers, rounds)), notes=(meaning, *_compared(rounds[-1])))
 
 
 def _numbers(racers: Mapping[str, Solver], rounds: Sequence[Mapping[str, Final]]) -> Iterator[Number]:
@@ -83,7 +92,7 @@ def _compared(finals: Mapping[str, Final]) -> Iterator[str]:
         yield f"{name}: mean height of the centres {1e3 * final.y.mean():.1f} mm, {x:.1f} and {y:.1f} mm off in x and y"
 
 
-HEAP = Measurement(
+HEAP = Benchmark(
     "heap",
     "heap of hexagons, also by pymunk and Box2D",
     measure,

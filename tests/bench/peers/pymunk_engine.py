@@ -6,7 +6,7 @@ import math
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from blocksim.bench.scenes import FRICTION
+from blocksim.bench.harness import FRICTION
 from tests.bench.peers.engine import Stepper
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from blocksim.bench.scenes import UNTIL_SOLVED, Stepping
+from blocksim.bench.harness import UNTIL_SOLVED, TimeSteps
 from tests.bench.peers.blocksim_engine import Explicit, Nonsmooth
 from tests.bench.peers.box2d_engine import Box2D
 from tests.bench.peers.engine import Series
@@ -37,7 +37,7 @@ def three_blocks_series(restitution: float, *, quick: bool) -> tuple[Series, ...
         PYMUNK: Pymunk(finest, 30) if quick else Pymunk(5e-6, 100),
         BOX2D: Box2D(finest, 30) if quick else Box2D(2e-5, 50),
         EXPLICIT: Explicit(SCALES[QUICK_LEVELS], 0.1) if quick else Explicit(1.0, 0.05),
-        NONSMOOTH: Nonsmooth(Stepping(finest if quick else 5e-6, 1, sweeps)),
+        NONSMOOTH: Nonsmooth(TimeSteps(finest if quick else 5e-6, 1, sweeps)),
     }
     found: list[tuple[str, str, tuple[Solver, ...]]] = [
         *((PYMUNK, f"pymunk, {n} iterations", _stepped(Pymunk, steps, n)) for n in (10, 30)),
@@ -64,7 +64,7 @@ def wall_series(*, quick: bool) -> tuple[Series, ...]:
 def wall_racers() -> dict[str, Solver]:
     """Return those that are timed in turns at the same step, the non-smooth scheme first."""
     return {
-        NONSMOOTH: Nonsmooth(Stepping(RACE_STEP)),
+        NONSMOOTH: Nonsmooth(TimeSteps(RACE_STEP)),
         **{f"{PYMUNK}, {n} iterations": Pymunk(RACE_STEP, n) for n in (10, 30)},
         f"{BOX2D}, 10 iterations": Box2D(RACE_STEP, 10),
     }
@@ -73,7 +73,7 @@ def wall_racers() -> dict[str, Solver]:
 def heap_racers() -> dict[str, Solver]:
     """Return those that are timed in turns on the heap, the non-smooth scheme first."""
     return {
-        NONSMOOTH: Nonsmooth(Stepping(RACE_STEP)),
+        NONSMOOTH: Nonsmooth(TimeSteps(RACE_STEP)),
         f"{BOX2D}, 10 iterations": Box2D(RACE_STEP, 10),
         f"{PYMUNK}, 10 iterations": Pymunk(RACE_STEP, 10),
     }
@@ -88,7 +88,7 @@ def _explicit(scales: tuple[float, ...], safety: float) -> tuple[Solver, ...]:
 
 
 def _nonsmooth(steps: tuple[float, ...], parts: int, sweeps: int) -> tuple[Solver, ...]:
-    return tuple(Nonsmooth(Stepping(step, parts, sweeps)) for step in steps)
+    return tuple(Nonsmooth(TimeSteps(step, parts, sweeps)) for step in steps)
 
 
 def _parts(count: int) -> str:

@@ -9,15 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.bench.measurement import Measurement, Setting, single
-from blocksim.bench.scenes import Stepping, three_blocks
+from blocksim.bench.harness import Benchmark, Effort, TimeSteps, single, three_blocks
 from blocksim.scenario import Scenario
 from blocksim.scenario.geometry import edges_of
 from tests.bench.peers import __main__ as script, three_blocks as three_blocks_peers, wall
 from tests.bench.peers.__main__ import main
 from tests.bench.peers.blocksim_engine import Explicit, Nonsmooth
 from tests.bench.peers.box2d_engine import Box2D
-from tests.bench.peers.engine import Final, Findings, Scene, Series, Solver, Stepper
+from tests.bench.peers.engine import Final, Readings, Scene, Series, Solver, Stepper
 from tests.bench.peers.heap import HEAP, SMALL as SMALL_HEAP, Heap
 from tests.bench.peers.pymunk_engine import Pymunk
 from tests.bench.peers.series import three_blocks_series, wall_racers, wall_series
@@ -31,11 +30,11 @@ ENGINES = pytest.mark.parametrize(
         ("pymunk", Pymunk(2e-4, 30)),
         ("Box2D", Box2D(2e-4, 30)),
         ("blocksim", Explicit(1e-3, 0.1)),
-        ("blocksim", Nonsmooth(Stepping(2e-4))),
+        ("blocksim", Nonsmooth(TimeSteps(2e-4))),
     ],
     ids=["pymunk", "Box2D", "explicit", "non-smooth"],
 )
-QUICK = Setting(quick=True)
+QUICK = Effort(quick=True)
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ def test_hexagons_have_their_own_mass_and_inertia_in_every_engine(engine: Steppe
 def test_a_heap_of_hexagons_is_timed_and_compared() -> None:
     for module in ("pymunk", "Box2D"):
         pytest.importorskip(module, exc_type=ImportError)
-    found = HEAP.measure(Setting(quick=True, repeats=2))
+    found = HEAP.measure(Effort(quick=True, repeats=2))
     own, *others = found.numbers
     assert own.quantity == "non-smooth, step 1 ms / 4"
     assert [one.quantity for one in others] == [f"{name}, 10 iterations: times that" for name in ("Box2D", "pymunk")]
@@ -149,7 +148,7 @@ def test_error_is_the_distance_from_the_reference_of_the_same_start(monkeypatch:
     assert best.quantity == "made up, a: by 0.00205"  # of two that are close it takes less time
     assert best.median == pytest.approx(2.05)
     assert (none.quantity, none.median) == ("b: none", np.inf)
-    assert isinstance(found, Findings)
+    assert isinstance(found, Readings)
     assert found.panel is not None
     assert [curve.label for curve in found.panel.curves] == ["made up, a", "b"]
 
@@ -177,9 +176,9 @@ def test_others_are_reported_as_multiples_of_the_non_smooth_scheme_with_and_with
 
 def test_blocksim_is_called_once_a_run_and_the_others_once_a_step() -> None:
     (scene,) = starts(1)
-    assert Nonsmooth(Stepping(1e-3)).calls(scene) == Explicit(1.0, 0.1).calls(scene) == 1
+    assert Nonsmooth(TimeSteps(1e-3)).calls(scene) == Explicit(1.0, 0.1).calls(scene) == 1
     assert Pymunk(1e-3, 10).calls(scene) == Box2D(1e-3, 10).calls(scene) == 400
-    assert 0.0 < Nonsmooth(Stepping(1e-3)).call_time(scene) < 0.01
+    assert 0.0 < Nonsmooth(TimeSteps(1e-3)).call_time(scene) < 0.01
 
 
 @pytest.mark.parametrize(("restitution", "quick"), [(0.0, False), (0.2, True)])
@@ -272,8 +271,8 @@ def test_the_script_writes_numbers_and_draws_the_picture_beside_them(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     panel = Panel("made up", "error (mm)", (Curve("a", "a", np.ones(2), np.ones(2)),))
-    findings = Findings((single("time", "CPU ms", 1.0),), panel=panel)
-    monkeypatch.setattr(script, "PEERS", (Measurement("drawn", "made up", lambda _: findings, quick="less"),))
+    findings = Readings((single("time", "CPU ms", 1.0),), panel=panel)
+    monkeypatch.setattr(script, "PEERS", (Benchmark("drawn", "made up", lambda _: findings, quick="less"),))
     for module in ("pymunk", "Box2D"):
         monkeypatch.setitem(sys.modules, module, sys)
     main(["--quick", "--out", str(tmp_path / "peers.json")])

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from blocksim.bench.measurement import Measurement, Number, Setting, single
-from blocksim.bench.scenes import RESTITUTION, Stepping, Table, three_blocks
+from blocksim.bench.harness import RESTITUTION, Benchmark, Effort, Number, Table, TimeSteps, single, three_blocks
 from blocksim.scenario.structures.base import draws
 from tests.bench.peers.blocksim_engine import Nonsmooth
 from tests.bench.peers.box2d_engine import Box2D, empty_world
-from tests.bench.peers.engine import Final, Findings, Scene, Series, Solver, call_time
+from tests.bench.peers.engine import Final, Readings, Scene, Series, Solver, call_time
 from tests.bench.peers.pymunk_engine import Pymunk, empty_space
 from tests.bench.peers.series import BOX2D, NONSMOOTH, PYMUNK, three_blocks_series
 from tests.bench.peers.work_precision import Curve, Panel
@@ -70,12 +69,12 @@ def starts(count: int, restitution: float = RESTITUTION) -> list[Scene]:
     return [Scene(make, JITTER * (2.0 * row - 1.0), restitution, END) for row in draws(SEED, count, 3)]
 
 
-def measure(restitution: float, setting: Setting) -> Findings:
+def measure(restitution: float, effort: Effort) -> Readings:
     """Measure all engines."""
-    scenes = starts(QUICK_STARTS if setting.quick else STARTS, restitution)
+    scenes = starts(QUICK_STARTS if effort.quick else STARTS, restitution)
     references: dict[str, list[Final]] = {}
     curves, answers, details = [], [], []
-    for series in three_blocks_series(restitution, quick=setting.quick):
+    for series in three_blocks_series(restitution, quick=effort.quick):
         if series.engine not in references:
             references[series.engine] = [series.reference.solve(scene) for scene in scenes]
         levels = [_level(solver, scenes, references[series.engine]) for solver in series.levels]
@@ -91,7 +90,7 @@ def measure(restitution: float, setting: Setting) -> Findings:
     )
     notes = (meaning, *(_ends(engine, finals) for engine, finals in references.items()))
     panel = Panel(f"three blocks, restitution {restitution:g}", "error (mm)", tuple(curves), CLOSE, f"{CLOSE:g} mm")
-    return Findings(tuple(numbers), notes=notes, details=tuple(details), panel=panel)
+    return Readings(tuple(numbers), notes=notes, details=tuple(details), panel=panel)
 
 
 def _level(solver: Solver, scenes: list[Scene], references: list[Final]) -> Level:
@@ -110,7 +109,7 @@ def _calls(scene: Scene) -> dict[str, float]:
     return {
         PYMUNK: call_time(Pymunk(1e-3, 1), empty_space()),
         BOX2D: call_time(Box2D(1e-3, 1), empty_world()),
-        NONSMOOTH: Nonsmooth(Stepping(1e-3)).call_time(scene),
+        NONSMOOTH: Nonsmooth(TimeSteps(1e-3)).call_time(scene),
     }
 
 
@@ -161,12 +160,12 @@ def _detail(series: Series, level: Level) -> dict[str, object]:
     }
 
 
-PAPER = Measurement(
+PAPER = Benchmark(
     "three-blocks",
     "three blocks to within 0.2 mm, also by pymunk and Box2D",
     functools.partial(measure, RESTITUTION),
     quick="2 starts and three coarse levels of each engine, against a level that is not much finer",
 )
-WITHOUT_RESTITUTION = Measurement(
+WITHOUT_RESTITUTION = Benchmark(
     "three-blocks-e0", "the same without restitution", functools.partial(measure, 0.0), quick=PAPER.quick
 )

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from blocksim.bench.measurement import Measurement, Number, Setting, single
-from blocksim.bench.scenes import LOW_COURSES, WALL_RESTITUTION, pushed_wall
+from blocksim.bench.harness import LOW_COURSES, WALL_RESTITUTION, Benchmark, Effort, Number, pushed_wall, single
 from blocksim.scenario.structures.base import draws
-from tests.bench.peers.engine import Final, Findings, Scene, Series, Solver
+from tests.bench.peers.engine import Final, Readings, Scene, Series, Solver
 from tests.bench.peers.series import wall_racers, wall_series
 from tests.bench.peers.work_precision import Curve, Panel
 
@@ -75,12 +74,12 @@ def distances(one: Final, two: Final) -> tuple[float, float]:
     return 1e3 * wasserstein(one.x, two.x), 1e3 * wasserstein(one.y, two.y)
 
 
-def measure(setting: Setting) -> Findings:
+def measure(effort: Effort) -> Readings:
     """Measure all engines; one run a level, as each takes seconds to a minute."""
-    size = SMALL if setting.quick else FULL
-    computed = [_computed(series, size) for series in wall_series(quick=setting.quick)]
+    size = SMALL if effort.quick else FULL
+    computed = [_computed(series, size) for series in wall_series(quick=effort.quick)]
     numbers = [number for one in computed for number in _numbers(one)]
-    numbers += raced(wall_racers(), size, min(ROUNDS, setting.repeats))
+    numbers += raced(wall_racers(), size, min(ROUNDS, effort.repeats))
     last = computed[-1]  # the explicit one
     meaning = (
         f"{size.columns * size.rows} blocks, {size.end:g} s; change: mean distance of the sorted final x "
@@ -95,7 +94,7 @@ def measure(setting: Setting) -> Findings:
     scatter = max(one.scatter[0] for one in computed)
     panel = Panel("pushed wall", "change of final x at half the step (mm)", curves, scatter, "starts within 1 µm")
     details = tuple(detail for one in computed for detail in _details(one))
-    return Findings(tuple(numbers), notes=notes, details=details, panel=panel)
+    return Readings(tuple(numbers), notes=notes, details=details, panel=panel)
 
 
 def _computed(series: Series, size: Size) -> Computed:
@@ -159,7 +158,7 @@ def _details(one: Computed) -> list[dict[str, object]]:
     ]
 
 
-WALL = Measurement(
+WALL = Benchmark(
     "wall",
     "pushed wall, also by pymunk and Box2D",
     measure,

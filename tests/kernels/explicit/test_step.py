@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import pushed_wall
+from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import AT_REST, GROUP, MOTION_PIECE, NOT_FINITE, OVERLAP_LIMIT, REACHED, zeros
 from blocksim.kernels.explicit.energy import tallied
 from blocksim.verification.scene import Simulation

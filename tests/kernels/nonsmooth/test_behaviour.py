@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from blocksim.bench.scenes import pushed_wall, three_blocks
+from blocksim.bench.harness import pushed_wall, three_blocks
 from blocksim.kernels.common.arrays import AT_REST, REACHED, TEAM_SIZE
 from blocksim.kernels.common.members import Watched
 from blocksim.kernels.nonsmooth.cone import solve_two

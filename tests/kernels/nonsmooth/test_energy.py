@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import pushed_wall
+from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.verification.scene import HEIGHT, Simulation

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.bench.scenes import pushed_wall, three_blocks
+from blocksim.bench.harness import pushed_wall, three_blocks
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario.models import timeline
 from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
