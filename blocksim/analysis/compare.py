@@ -188,7 +188,7 @@ def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: Ex
         for i, name in enumerate(names)
         for quantity in columns
     ]
-    return Comparison(tuple(rows), table.source, (*table.messages, *table.unmeasured(names)))
+    return Comparison(tuple(rows), table.source, (*table.messages, *table.absence_messages(names)))
 
 
 def limits(quantity: str, mean: float, minimum: float, maximum: float) -> tuple[float, float]:

@@ -45,7 +45,7 @@ class Members:
         if missing:
             message = f"{self.source}: not the table of a sweep: no column {' and '.join(missing)}"
             raise InvalidInputError(message)
-        if not self.finished.any():
+        if not self.has_ended.any():
             message = f"{self.source}: none of the {self.count} cases has finished; nothing to compare"
             raise InvalidInputError(message)
 
@@ -55,14 +55,14 @@ class Members:
         return len(self.table)
 
     @property
-    def finished(self) -> "NDArray[np.bool_]":
+    def has_ended(self) -> "NDArray[np.bool_]":
         """Whether each member has a result, shape (count,)."""
         return (self.table["status"] == FINISHED).to_numpy(dtype=bool)
 
     @property
     def failures(self) -> tuple[Failure, ...]:
         """The members without a result, in the order of the table."""
-        rows = np.flatnonzero(~self.finished)
+        rows = np.flatnonzero(~self.has_ended)
         failed = self.table.iloc[rows]
         reasons = failed["reason"].fillna("") if "reason" in failed else [""] * len(rows)
         columns = zip(rows, failed["case"].fillna(""), failed["status"].fillna("no status"), reasons, strict=True)
@@ -97,7 +97,7 @@ class Members:
             row = int(texts[0])
             message = f"{self.source}: {name}: '{column.iloc[row]}' in row {row + 1} is not a number"
             raise InvalidInputError(message)
-        values = np.where(self.finished, numbers.to_numpy(dtype=float, na_value=np.nan), np.nan)
+        values = np.where(self.has_ended, numbers.to_numpy(dtype=float, na_value=np.nan), np.nan)
         return np.where(np.isfinite(values), values, np.nan)
 
 
@@ -117,7 +117,7 @@ class Form(StrEnum):
 
 
 @dataclass(frozen=True)
-class Column:
+class Datum:
     """One number of a metric: its name for programs, its head in a table (none: not shown), its meaning."""
 
     name: str
@@ -127,7 +127,7 @@ class Column:
     digits: int = 2
 
 
-class Pair(NamedTuple):
+class SamplePair(NamedTuple):
     """One measured quantity of one block: m repeats, and the value of each of n members."""
 
     measured: experiment.Statistics
@@ -153,8 +153,8 @@ class Evidence(NamedTuple):
 
     members: Members
     u_num: float  # mm, standard uncertainty of the numerical solution
-    pairs: tuple[Pair, ...]  # of block and quantity, in the order of the experiment's table
-    lengths: tuple[Pair, ...]  # those of positions in mm, not of angles
+    pairs: tuple[SamplePair, ...]  # of block and quantity, in the order of the experiment's table
+    lengths: tuple[SamplePair, ...]  # those of positions in mm, not of angles
     inside: NDArray[np.bool_]  # whether each member is within all measured ranges
 
 
@@ -169,7 +169,7 @@ def evidence_of(members: Members, table: experiment.ExperimentTable, u_num: floa
         limits = compare.limits(row.quantity, row.mean, row.minimum, row.maximum)
         head: Row = {"block": row.block, "quantity": row.quantity, "unit": row.unit}
         name, known = f"{row.quantity} of block {row.block}", values[np.isfinite(values)]
-        pairs.append(Pair(row, repeats[row.block, row.quantity], values, known, limits, name, head))
+        pairs.append(SamplePair(row, repeats[row.block, row.quantity], values, known, limits, name, head))
     inside: NDArray[np.bool_] = np.all([pair.between(pair.limits) for pair in pairs], axis=0)
     return Evidence(members, u_num, tuple(pairs), tuple(one for one in pairs if one.measured.unit == "mm"), inside)
 
@@ -188,18 +188,18 @@ class Metric:
 
     name: str
     meaning: str
-    columns: tuple[Column, ...]
+    columns: tuple[Datum, ...]
     find: Callable[[Evidence], Findings]
 
 
 BLOCK = (
-    Column("block", "block", Form.TEXT, "name of the block"),
-    Column("quantity", "quantity", Form.TEXT, "measured quantity"),
-    Column("unit", "", Form.TEXT, "unit of the numbers: mm or deg"),
+    Datum("block", "block", Form.TEXT, "name of the block"),
+    Datum("quantity", "quantity", Form.TEXT, "measured quantity"),
+    Datum("unit", "", Form.TEXT, "unit of the numbers: mm or deg"),
 )
 
 
-def complete_repeats(pairs: Sequence[Pair]) -> tuple[Floats, str]:
+def complete_repeats(pairs: Sequence[SamplePair]) -> tuple[Floats, str]:
     """Return the replicates in which all p pairs were measured, shape (n, p), and a list of the others."""
     every = sorted({replicate for pair in pairs for replicate in pair.repeats})
     complete = [replicate for replicate in every if all(replicate in pair.repeats for pair in pairs)]

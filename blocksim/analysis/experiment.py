@@ -23,7 +23,7 @@ MOST_NAMES = 8  # that a message lists
 
 
 @dataclass(frozen=True)
-class Quantity:
+class MeasuredQuantity:
     """A measured quantity of a block: its stored unit and its column in the final table."""
 
     unit: str
@@ -32,11 +32,11 @@ class Quantity:
 
 
 QUANTITIES = {
-    "x": Quantity("mm", "x_mm", "centre along the ground"),
-    "y": Quantity("mm", "y_mm", "centre above the ground"),
-    "rotation": Quantity("deg", "rotation_deg", "rotation, counter-clockwise positive"),
-    "left": Quantity("mm", "left_mm", "leftmost point"),
-    "right": Quantity("mm", "right_mm", "rightmost point"),
+    "x": MeasuredQuantity("mm", "x_mm", "centre along the ground"),
+    "y": MeasuredQuantity("mm", "y_mm", "centre above the ground"),
+    "rotation": MeasuredQuantity("deg", "rotation_deg", "rotation, counter-clockwise positive"),
+    "left": MeasuredQuantity("mm", "left_mm", "leftmost point"),
+    "right": MeasuredQuantity("mm", "right_mm", "rightmost point"),
 }
 
 
@@ -123,7 +123,7 @@ class ExperimentTable:
             message = f"{self.source} measures block {quote_names(unknown)}, {known}"
             raise InvalidInputError(message)
 
-    def unmeasured(self, blocks: Sequence[str]) -> tuple[str, ...]:
+    def absence_messages(self, blocks: Sequence[str]) -> tuple[str, ...]:
         """Return a message that names those of `blocks` that are not in the table; none where all are."""
         names = [block for block in blocks if block not in self.blocks]
         if len(names) > 1:

@@ -36,8 +36,8 @@ FEWEST = 4  # values of a sample that is worth resampling
 SMALLEST_EIGENVALUE = 1e-9  # of the correlation matrix: below it, one position follows from the others
 Places = NDArray[np.int64]
 SHARE = (
-    facts.Column("share", "share", facts.Form.SHARE, "inside / of", 1),
-    facts.Column("interval", "95 %", facts.Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+    facts.Datum("share", "share", facts.Form.SHARE, "inside / of", 1),
+    facts.Datum("interval", "95 %", facts.Form.SHARE, "Clopper-Pearson limits of the probability", 1),
 )
 
 
@@ -57,7 +57,7 @@ def _find_outcome(evidence: facts.Evidence) -> facts.Findings:
         return facts.Findings((), ("not computed: the sweep has no rotations",))
     rotations = np.column_stack([members.values(block, ROTATION) for block in blocks])
     repeats, incomplete = facts.complete_repeats(measured)
-    ends = zip(rotations.tolist(), members.finished, strict=True)
+    ends = zip(rotations.tolist(), members.has_ended, strict=True)
     found = Counter(outcome(row) if has_ended else FAILED for row, has_ended in ends)
     seen = Counter(map(outcome, repeats.tolist()))
     rows: list[facts.Row] = []
@@ -89,14 +89,14 @@ OUTCOME = facts.Metric(
     "outcome",
     "final rotations, rounded to quarter turns (deg)",
     (
-        facts.Column("outcome", "outcome", facts.Form.TEXT, "rotation of each block, rounded to 90 degrees"),
-        facts.Column("members", "samples", facts.Form.COUNT, "samples with this outcome"),
-        facts.Column("of", "of", facts.Form.COUNT, "all samples, failed ones included"),
-        facts.Column("share", "share", facts.Form.SHARE, "samples / of", 1),
-        facts.Column("interval", "95 %", facts.Form.SHARE, "Clopper-Pearson limits of the probability", 1),
-        facts.Column("measured", "measured", facts.Form.COUNT, "repeats with this outcome"),
-        facts.Column("repeats", "of", facts.Form.COUNT, "all repeats"),
-        facts.Column("lower_bound", "at least", facts.Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) if all n agree", 1),
+        facts.Datum("outcome", "outcome", facts.Form.TEXT, "rotation of each block, rounded to 90 degrees"),
+        facts.Datum("members", "samples", facts.Form.COUNT, "samples with this outcome"),
+        facts.Datum("of", "of", facts.Form.COUNT, "all samples, failed ones included"),
+        facts.Datum("share", "share", facts.Form.SHARE, "samples / of", 1),
+        facts.Datum("interval", "95 %", facts.Form.SHARE, "Clopper-Pearson limits of the probability", 1),
+        facts.Datum("measured", "measured", facts.Form.COUNT, "repeats with this outcome"),
+        facts.Datum("repeats", "of", facts.Form.COUNT, "all repeats"),
+        facts.Datum("lower_bound", "at least", facts.Form.SHARE, "one-sided 95 % limit: 0.05^(1/n) if all n agree", 1),
     ),
     _find_outcome,
 )
@@ -126,7 +126,7 @@ def _find_inside(evidence: facts.Evidence) -> facts.Findings:
         ranged += [n] if has_range else []
         row: facts.Row = {**pair.head, "limits": pair.limits, "inside": count, "of": total, **_share(count, total)}
         rows.append({**row, "repeat_passes": repeat_passes(n) if has_range else None})
-    count, failed = int(evidence.inside.sum()), total - int(evidence.members.finished.sum())
+    count, failed = int(evidence.inside.sum()), total - int(evidence.members.has_ended.sum())
     last: facts.Row = {"block": ALL, "quantity": "", "unit": "", "limits": None, "inside": count, "of": total}
     rows.append({**last, **_share(count, total), "repeat_passes": repeat_passes_all(ranged)})
     text = f"shares are of all {total} samples" + (f"; {failed} did not finish and count as outside" if failed else "")
@@ -150,11 +150,11 @@ INSIDE = facts.Metric(
     "samples inside the measured limits, by the rules for single runs",
     (
         *facts.BLOCK,
-        facts.Column("limits", "limits", facts.Form.NUMBER, "limits of inside, as for a single run"),
-        facts.Column("inside", "inside", facts.Form.COUNT, "samples inside; failed ones count as outside"),
-        facts.Column("of", "", facts.Form.COUNT, "all samples, failed ones included"),
+        facts.Datum("limits", "limits", facts.Form.NUMBER, "limits of inside, as for a single run"),
+        facts.Datum("inside", "inside", facts.Form.COUNT, "samples inside; failed ones count as outside"),
+        facts.Datum("of", "", facts.Form.COUNT, "all samples, failed ones included"),
         *SHARE,
-        facts.Column(
+        facts.Datum(
             "repeat_passes", "repeat", facts.Form.SHARE, "probability that the next repeat is inside: (n-1)/(n+1)", 0
         ),
     ),
@@ -165,9 +165,9 @@ PREDICTION = facts.Metric(
     "samples inside the 95 % prediction interval for the next test (mm)",
     (
         *facts.BLOCK,
-        facts.Column("prediction", "next test", facts.Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
-        facts.Column("inside", "inside", facts.Form.COUNT, "samples in it; failed ones count as outside"),
-        facts.Column("of", "of", facts.Form.COUNT, "all samples, failed ones included"),
+        facts.Datum("prediction", "next test", facts.Form.NUMBER, "mean +- t s sqrt(1 + 1/n) of the n repeats"),
+        facts.Datum("inside", "inside", facts.Form.COUNT, "samples in it; failed ones count as outside"),
+        facts.Datum("of", "of", facts.Form.COUNT, "all samples, failed ones included"),
         *SHARE,
     ),
     _find_predicted,
@@ -201,15 +201,15 @@ VALIDATION = facts.Metric(
     "error and uncertainty after ASME V&V 20 (mm)",
     (
         *facts.BLOCK,
-        facts.Column("members", "", facts.Form.COUNT, "samples with a value, used for S and u_input"),
-        facts.Column("S", "S", facts.Form.NUMBER, "mean of the samples"),
-        facts.Column("D", "D", facts.Form.NUMBER, "mean of the repeats"),
-        facts.Column("E", "E", facts.Form.NUMBER, "S - D"),
-        facts.Column("u_num", "", facts.Form.NUMBER, "standard uncertainty of the numerical solution (--u-num)"),
-        facts.Column("u_input", "u_input", facts.Form.NUMBER, "standard deviation of the samples"),
-        facts.Column("u_D", "u_D", facts.Form.NUMBER, "of D: sqrt(s^2/n + 0.5^2), reading included"),
-        facts.Column("u_val", "u_val", facts.Form.NUMBER, "sqrt(u_num^2 + u_input^2 + u_D^2)"),
-        facts.Column("within", "|E|<=2u", facts.Form.TEXT, "|E| <= 2 u_val: no error of the model is detected"),
+        facts.Datum("members", "", facts.Form.COUNT, "samples with a value, used for S and u_input"),
+        facts.Datum("S", "S", facts.Form.NUMBER, "mean of the samples"),
+        facts.Datum("D", "D", facts.Form.NUMBER, "mean of the repeats"),
+        facts.Datum("E", "E", facts.Form.NUMBER, "S - D"),
+        facts.Datum("u_num", "", facts.Form.NUMBER, "standard uncertainty of the numerical solution (--u-num)"),
+        facts.Datum("u_input", "u_input", facts.Form.NUMBER, "standard deviation of the samples"),
+        facts.Datum("u_D", "u_D", facts.Form.NUMBER, "of D: sqrt(s^2/n + 0.5^2), reading included"),
+        facts.Datum("u_val", "u_val", facts.Form.NUMBER, "sqrt(u_num^2 + u_input^2 + u_D^2)"),
+        facts.Datum("within", "|E|<=2u", facts.Form.TEXT, "|E| <= 2 u_val: no error of the model is detected"),
     ),
     _find_validation,
 )
@@ -278,12 +278,12 @@ AREA = facts.Metric(
     "area between the distributions of samples and repeats (mm)",
     (
         *facts.BLOCK,
-        facts.Column("members", "samples", facts.Form.COUNT, "samples with a value"),
-        facts.Column("repeats", "repeats", facts.Form.COUNT, "repeats with a value"),
-        facts.Column(
+        facts.Datum("members", "samples", facts.Form.COUNT, "samples with a value"),
+        facts.Datum("repeats", "repeats", facts.Form.COUNT, "repeats with a value"),
+        facts.Datum(
             "area", "area", facts.Form.NUMBER, "integral of |F_samples - F_repeats| dx: 0 where they are equal"
         ),
-        facts.Column("interval", "95 %", facts.Form.NUMBER, "bootstrap interval of the area, both samples resampled"),
+        facts.Datum("interval", "95 %", facts.Form.NUMBER, "bootstrap interval of the area, both samples resampled"),
     ),
     _find_area,
 )
@@ -372,16 +372,16 @@ JOINT = facts.Metric(
     "joint",
     "do the means of all positions agree? Hotelling's T2, two samples",
     (
-        facts.Column("positions", "positions", facts.Form.TEXT, "blocks and quantities taken together"),
-        facts.Column("repeats", "n", facts.Form.COUNT, "repeats in which all of them were measured"),
-        facts.Column("members", "N", facts.Form.COUNT, "samples that have all of them"),
-        facts.Column("T2", "T2", facts.Form.NUMBER, "squared distance of the means in units of their scatter"),
-        facts.Column("critical", "5 %", facts.Form.NUMBER, "T2 that is exceeded by chance in 5 % of experiments"),
-        facts.Column("F", "", facts.Form.NUMBER, "T2 scaled to follow the F distribution"),
-        facts.Column("dof_1", "", facts.Form.NUMBER, "its degrees of freedom: number of positions"),
-        facts.Column("dof_2", "dof", facts.Form.NUMBER, "its degrees of freedom: n - p for large ensembles", 1),
-        facts.Column("p_value", "p", facts.Form.NUMBER, "probability of such a T2 if the true means agree", 3),
-        facts.Column("within", "agree", facts.Form.TEXT, "T2 <= critical T2"),
+        facts.Datum("positions", "positions", facts.Form.TEXT, "blocks and quantities taken together"),
+        facts.Datum("repeats", "n", facts.Form.COUNT, "repeats in which all of them were measured"),
+        facts.Datum("members", "N", facts.Form.COUNT, "samples that have all of them"),
+        facts.Datum("T2", "T2", facts.Form.NUMBER, "squared distance of the means in units of their scatter"),
+        facts.Datum("critical", "5 %", facts.Form.NUMBER, "T2 that is exceeded by chance in 5 % of experiments"),
+        facts.Datum("F", "", facts.Form.NUMBER, "T2 scaled to follow the F distribution"),
+        facts.Datum("dof_1", "", facts.Form.NUMBER, "its degrees of freedom: number of positions"),
+        facts.Datum("dof_2", "dof", facts.Form.NUMBER, "its degrees of freedom: n - p for large ensembles", 1),
+        facts.Datum("p_value", "p", facts.Form.NUMBER, "probability of such a T2 if the true means agree", 3),
+        facts.Datum("within", "agree", facts.Form.TEXT, "T2 <= critical T2"),
     ),
     _find_joint,
 )
@@ -483,7 +483,7 @@ def judge(
     """
     settings = settings or Settings()
     table.refuse_unknown(members.blocks, "the sweep")
-    evidence, finished = facts.evidence_of(members, table, settings.u_num), int(members.finished.sum())
+    evidence, finished = facts.evidence_of(members, table, settings.u_num), int(members.has_ended.sum())
     incomplete = (  # measured quantities of which finished samples have no value
         f"{finished - pair.known.size} finished samples have no {pair.name}: they count as outside"
         for pair in evidence.pairs
@@ -497,5 +497,5 @@ def judge(
         failures=members.failures,
         settings=settings,
         findings={name: metric.find(evidence) for name, metric in METRICS.items()},
-        messages=(*messages, *table.messages, *table.unmeasured(members.blocks), *incomplete),
+        messages=(*messages, *table.messages, *table.absence_messages(members.blocks), *incomplete),
     )

@@ -146,7 +146,7 @@ def _table(metric: evidence.Metric, found: evidence.Findings) -> list[str]:
     return [*lines, f"... and {more} more rows (--json has all)"] if more else lines
 
 
-def _cell(row: evidence.Row, column: evidence.Column) -> str:
+def _cell(row: evidence.Row, column: evidence.Datum) -> str:
     """Return a value for people; a dash where there is none."""
     value, is_share = row[column.name], column.form is evidence.Form.SHARE
     scale = PERCENT if is_share else 1.0

@@ -26,6 +26,6 @@ def fragility_command(
         prepare.warn_of_values(base)
     prepare.announce_compilation(kernels_of(base), quiet=screen.silent)
     heads = {head.key: head for head in plan.cases.heads}
-    with progress.exit_when_stopped(), progress.case_progress(heads.values(), quiet=screen.silent) as on_row:
+    with progress.exit_on_stop(), progress.case_progress(heads.values(), quiet=screen.silent) as on_row:
         found = fragility.run_fragility(plan, replace(options, on_row=on_row))
     return command_line.report_of([found], {"folder": str(found.folder), **found.to_dict()})

@@ -53,7 +53,7 @@ def limit_command(
             at = f"{curve.head.key} = {answer.with_unit(value, curve.head.unit, 6)}"
             screen.note(f"{at}: {search.runs} runs, {search.run} of them now")
 
-        with progress.exit_when_stopped():
+        with progress.exit_on_stop():
             points = limit.find_curve(curve, of_curve, tell_limit)
         return command_line.report_of([points], {"folder": str(points.folder), **points.to_dict()})
     documents = limit_plan.variants(document, both_laws=both_laws)
@@ -84,7 +84,7 @@ def limit_command(
         if stiffer and name != limit_plan.NAMES[SPRINGS]:
             stiffer = None
         of_plan = replace(options, out=out, stiffer=stiffer, keep_runs=not no_runs, on_run=tell_run)
-        with progress.exit_when_stopped():
+        with progress.exit_on_stop():
             found[name] = limit.find_limit(plan, of_plan, on_other=tell_search)
     searches = [{"contacts": name, "folder": str(one.folder), **one.to_dict()} for name, one in found.items()]
     report = command_line.report_of(list(found.values()), searches)

@@ -119,7 +119,7 @@ def one_by_one(items: Sequence[T], told: Callable[[T], str], *, quiet: bool) -> 
 
 
 @contextmanager
-def exit_when_stopped() -> Iterator[None]:
+def exit_on_stop() -> Iterator[None]:
     """End the process at once where a study is stopped early, without waiting for a case that takes minutes."""
     from blocksim.study.executors.ensemble import THREAD
 

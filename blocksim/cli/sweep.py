@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from blocksim.cli import command_line, output, prepare
-from blocksim.cli.progress import case_progress, cell_text, exit_when_stopped
+from blocksim.cli.progress import case_progress, cell_text, exit_on_stop
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario import Document
@@ -81,7 +81,7 @@ def sweep_command(
     for kernels in kernels_for(document):
         prepare.announce_compilation(kernels, quiet=screen.silent)
     heads = () if base.sweep is None else heads_of(base.sweep)
-    with exit_when_stopped(), case_progress(heads, quiet=screen.silent) as on_row:
+    with exit_on_stop(), case_progress(heads, quiet=screen.silent) as on_row:
         result = run_sweep(document, replace(options, on_row=on_row))
     return _table_report(result)
 

@@ -96,7 +96,7 @@ def start_energy(scene: "AnyScene") -> float:
 def energy_ledger(scene: "AnyScene", start: float) -> EnergyLedger:
     """Return the ledger of the present state; `start` is the energy (J) at the start."""
     schemes, book = solver_module("simulation.schemes"), scene.world.ledger[0]
-    mass = float(np.sum(scene.world.bodies.mass)) + schemes.measured_systems(scene)[1]
+    mass = float(np.sum(scene.world.bodies.mass)) + schemes.system_totals(scene)[1]
     moved = float(book.largest_kinetic + book.travel_work)
     return ledger_of(schemes.ledger_names(scene), schemes.measure_row(scene), start, mass, moved)
 

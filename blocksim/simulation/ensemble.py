@@ -17,7 +17,7 @@ from blocksim.scenario import PlacedBody, Scenario
 from blocksim.scenario.motion import settles
 from blocksim.simulation import balance, instruments, loop, observables, rest_state, schemes, trajectory
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
-from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measure_row, measured_systems, scheme_of
+from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measure_row, scheme_of, system_totals
 from blocksim.world.build import Refusal, SceneStack, member, stack_of_one
 from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
 
@@ -69,9 +69,7 @@ EnsembleEnd = MemberEnd | MemberFailure
 
 def in_play_of(scenes: AnyScene | systems.Coupled, members: Sequence[int]) -> list[tuple[float, float]]:
     """Return mass (kg) and energy moved (J), which decide the energy in play, of some members of a stack."""
-    further = (
-        measured_systems(member(scenes, 0))[1] if isinstance(scenes, systems.Coupled) else 0.0
-    )  # in a stack of one
+    further = system_totals(member(scenes, 0))[1] if isinstance(scenes, systems.Coupled) else 0.0  # in a stack of one
     mass = scenes.world.bodies.view(np.ndarray)["mass"]
     masses = [float(np.sum(mass[m])) + further for m in members]  # one by one: the order matters
     book = scenes.world.ledger[:, 0]
@@ -223,7 +221,7 @@ class Ensemble:
         whole = [*zip(own, self.placed, self.time_steps, strict=True)]
         self.timelines = [loop.Timeline(*one) if one[0].events else None for one in whole]
         self.last_steps = np.array([loop.last_step_of(one.time.end, step) for one, _, step in whole], dtype=np.int64)
-        self.starts = np.zeros((len(own), len(self.scheme.measured)))
+        self.starts = np.zeros((len(own), len(self.scheme.row_names)))
         self.codes = np.zeros(len(own), dtype=np.int64)
         self.periods = np.array([max(one.output.every / step, 1.0) for one, _, step in whole])
         start = self._positions(self.scenes, slice(None))

@@ -192,7 +192,7 @@ def is_own(path: Path, records: Iterable[TableRecord]) -> bool:
     return _is_of_kind(path, lambda _: TableRecord.of(path) in records)
 
 
-def columns_added(path: Path, records: Iterable[TableRecord]) -> list[str] | None:
+def extra_columns(path: Path, records: Iterable[TableRecord]) -> list[str] | None:
     """Return the columns that a table has beyond those that were written, where these are known.
 
     None where some of those are not there: it is another table.
@@ -553,7 +553,7 @@ def remove_run(folder: Path) -> None:
         folder.rmdir()
 
 
-def newest_finished(folder: Path) -> Path | None:
+def newest_run(folder: Path) -> Path | None:
     """Return the newest finished run right below a folder, or None."""
     finished = [path.parent for path in folder.glob(f"*/{DONE}")]
     return max(finished, key=lambda path: (path / DONE).stat().st_mtime_ns, default=None)

@@ -80,7 +80,7 @@ class ProbeSeries:
         """Return a line: name, kind, samples, columns."""
         return f"<Probe {self.name}: {self.kind}, {len(self)} samples of {', '.join(self.columns)}>"
 
-    def written(self) -> dict[str, Floats]:
+    def table_values(self) -> dict[str, Floats]:
         """Return the columns as tables for people have them, in mm, degrees, N and J, by names with their units."""
         return {
             f"{name}{TABLE_UNITS[self.units[name]][0]}": TABLE_UNITS[self.units[name]][1] * values
@@ -91,11 +91,11 @@ class ProbeSeries:
         """Return a pandas table, one row per sample: time_s, then the columns in mm, degrees, N and J."""
         import pandas as pd
 
-        return pd.DataFrame({"time_s": self.time, **self.written()})
+        return pd.DataFrame({"time_s": self.time, **self.table_values()})
 
     def csv_lines(self) -> Iterator[str]:
         """Yield the CSV in parts: step, time_s and the columns; numbers read back exactly, nan where there is none."""
-        columns = self.written()
+        columns = self.table_values()
         yield ",".join(["step", "time_s", *columns]) + "\n"
         for first in range(0, len(self), ROWS_AT_ONCE):
             part = slice(first, first + ROWS_AT_ONCE)
@@ -132,10 +132,10 @@ def series_of(
 
 
 Values = Sequence[float]
-Sampler = Callable[["Moment"], Values]
+Sampler = Callable[["Snapshot"], Values]
 
 
-class Moment:
+class Snapshot:
     """The scene at a step; what several probes need is worked out once."""
 
     def __init__(
@@ -188,7 +188,7 @@ def rows_of(touching: BodyContacts) -> Any:
 def force_sampler(on: NDArray[np.bool_], by: NDArray[np.bool_]) -> Sampler:
     """Return what samples the force on some bodies by others, both as flags of all bodies, (n,)."""
 
-    def sample(moment: Moment) -> Values:
+    def sample(moment: Snapshot) -> Values:
         rows, forces, friction = moment.contacts
         a, b = rows["body_a"], rows["body_b"]
         is_of_a, is_of_b = on[a] & by[b], on[b] & by[a]
@@ -213,7 +213,7 @@ def point_sampler(body: int, placed: PlacedBody, at: tuple[float, float]) -> Sam
     ax, ay = _arm(placed.angle, at)
     start = placed.x + ax, placed.y + ay
 
-    def sample(moment: Moment) -> Values:
+    def sample(moment: Snapshot) -> Values:
         record = moment.bodies[body]
         angle, spin = float(record.angle), float(record.spin)
         rx, ry = _arm(angle, at)
@@ -230,7 +230,7 @@ def joint_sampler(bodies: tuple[int, int], placed: tuple[PlacedBody, PlacedBody]
     """Return what samples the joint between two bodies by number."""
     turned = placed[1].angle - placed[0].angle
 
-    def sample(moment: Moment) -> Values:
+    def sample(moment: Snapshot) -> Values:
         a, b = (moment.bodies[one] for one in bodies)
         cosine, sine = math.cos(a.angle), math.sin(a.angle)
         opening, slip = [], []
@@ -251,7 +251,7 @@ def _arm(angle: float, at: tuple[float, float]) -> tuple[float, float]:
     return cosine * at[0] - sine * at[1], sine * at[0] + cosine * at[1]
 
 
-class Probe:
+class ProbeChannel:
     """One probe and its samples that are held: a row each, step and values."""
 
     def __init__(self, name: str, kind: str, units: Mapping[str, str], period: float, sampler: Sampler) -> None:
@@ -264,7 +264,7 @@ class Probe:
         """Return the next step to sample after `done` steps."""
         return int(balance.solver_module("kernels.common.frame_times").next_frame(done, self.period))
 
-    def sample(self, moment: Moment) -> None:
+    def sample(self, moment: Snapshot) -> None:
         """Add a sample if one is due at this step, wherever the run ends, and it is not there yet."""
         step = moment.step
         if step > self.last and (step == 0 or self.next_step(step - 1) == step):
@@ -292,7 +292,7 @@ class Probes:
 
     def __init__(
         self,
-        probes: Sequence[Probe],
+        probes: Sequence[ProbeChannel],
         support: observables.MovingSupport,
         time_step: float,
         parts: Sequence[tuple[System, int]] = (),
@@ -307,7 +307,7 @@ class Probes:
     def sample(self, scene: "AnyScene") -> None:
         """Add a sample of the present state to all probes that are due."""
         if self.all:
-            moment = Moment(scene, self.support, self.parts)
+            moment = Snapshot(scene, self.support, self.parts)
             for probe in self.all:
                 probe.sample(moment)
 
@@ -348,7 +348,7 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
         every = scenario.output.every if probe.every is None else probe.every
         period = 1.0 if every == STEP else max(float(every) / time_step, 1.0)
         columns = dict.fromkeys(ledger, "J") if probe.kind == ENERGY else COLUMNS[probe.kind]
-        made.append(Probe(name, probe.kind, columns, period, sampler))
+        made.append(ProbeChannel(name, probe.kind, columns, period, sampler))
     systems = [(one, len(parts_of)) for one, parts_of in parts]
     return Probes(made, observables.MovingSupport(scenario if made else None), time_step, systems)
 

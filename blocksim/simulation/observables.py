@@ -100,7 +100,7 @@ class FirstMove(NamedTuple):
     time: float
 
 
-class Shapes(NamedTuple):
+class BlockLengths(NamedTuple):
     """Lengths of the blocks (m) of m scenes, and which of them can move: (m, b) each."""
 
     shortest: Floats
@@ -108,7 +108,7 @@ class Shapes(NamedTuple):
     is_free: Flags
 
     @classmethod
-    def of(cls, placed: Sequence[Sequence[PlacedBody]]) -> "Shapes":
+    def of(cls, placed: Sequence[Sequence[PlacedBody]]) -> "BlockLengths":
         """Return those of scenes with the same number of blocks."""
         bodies = [body for scene in placed for body in scene]
         sides = np.array([(body.size_x, body.size_y) for body in bodies], dtype=np.float64).reshape(-1, 2)
@@ -132,7 +132,7 @@ class Ends:
     """How m scenes with b blocks each began and ended, and what was seen on the way; SI."""
 
     placed: Sequence[Sequence[PlacedBody]]
-    shapes: Shapes
+    shapes: BlockLengths
     start: Floats  # (m, 3, b) x, y, angle
     motion: Floats  # (m, 6, b) x, y, angle and their rates
     carried: Floats  # (m, 2, b) way of the support, as long as a block was there
@@ -159,7 +159,7 @@ class Ends:
         return np.asarray(np.abs(np.degrees(self.motion[:, 2] - drawn) - np.degrees(self.start[:, 2] - drawn)))
 
     @cached_property
-    def turning(self) -> Floats:
+    def corner_speed(self) -> Floats:
         """Speed of the corners of free blocks by their spin, (m, b)."""
         return np.where(self.shapes.is_free, np.abs(self.motion[:, 5]) * self.shapes.reach, 0.0)
 
@@ -167,7 +167,7 @@ class Ends:
     def speed(self) -> Floats:
         """Speed of free blocks relative to the support, or that of their corners by their spin, (m, b)."""
         velocity = np.hypot(self.motion[:, 3] - self.support[:, :1], self.motion[:, 4] - self.support[:, 1:])
-        return np.where(self.shapes.is_free, np.fmax(velocity, self.turning), 0.0)
+        return np.where(self.shapes.is_free, np.fmax(velocity, self.corner_speed), 0.0)
 
     def go_on(self, speed: Floats) -> list[bool]:
         """Return which scenes have a block that would soon have left its place, at speeds (m, b)."""
@@ -189,7 +189,7 @@ def _outcomes(ends: Ends) -> list[Response]:
     is_down = (turn > FALLEN_TURN) | (-ends.shift[:, 1] > FALLEN_SHARE * shapes.shortest)
     fell = np.any(shapes.is_free & is_down, axis=1)
     moved = np.any(shapes.shares(ends.way, turn) > 1.0, axis=1)
-    turns_on, is_still = ends.go_on(ends.turning), [one is None for one in ends.first]
+    turns_on, is_still = ends.go_on(ends.corner_speed), [one is None for one in ends.first]
     responses = [Response.FELL, Response.ROCKING, Response.SLID, Response.STANDS]
     names = np.select([fell, moved & turns_on, moved, is_still], responses, Response.ROCKED)
     return [Response(name) for name in names.tolist()]
@@ -272,7 +272,7 @@ _ALL = (
     Observable("fastest_m_s", _fastest, "m/s", in_rows=False),
     Observable(END_SPEED, lambda ends: MILLI * _fastest(ends), "mm/s"),
     Observable(MOVES_ON, lambda ends: ends.go_on(ends.speed)),
-    Observable("turns_on", lambda ends: ends.go_on(ends.turning), in_rows=False),
+    Observable("turns_on", lambda ends: ends.go_on(ends.corner_speed), in_rows=False),
     Observable(
         PEAK,  # as largest_rotation_deg
         lambda ends: None if ends.turned is None else np.degrees(ends.largest(ends.turned)),
@@ -315,7 +315,7 @@ class Watch:
         count, blocks = len(placed), len(placed[0])
         self.placed, self.start = placed, start
         self.supports = supports or [AT_REST] * count
-        self.shapes = Shapes.of(placed)
+        self.shapes = BlockLengths.of(placed)
         self.first: list[FirstMove | None] = [None] * count
         self.carried = np.zeros((count, 2, blocks))  # m: way of the support, as long as a block was there
         self.moved, self.turned = np.zeros((count, blocks)), np.zeros((count, blocks))  # largest seen so far: m, rad
@@ -361,7 +361,7 @@ class Watch:
         """Note what has moved first, where nothing had before."""
         if not way.size or all(self.first[m] for m in scenes):
             return
-        shares = Shapes._make(one[scenes] for one in self.shapes).shares(way, turn)
+        shares = BlockLengths._make(one[scenes] for one in self.shapes).shares(way, turn)
         for m, block, share, time in zip(scenes, shares.argmax(axis=1), shares.max(axis=1), times, strict=True):
             if share > threshold and self.first[m] is None:
                 self.first[m] = FirstMove(self.placed[m][block].name, time)

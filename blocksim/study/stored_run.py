@@ -59,7 +59,7 @@ def find_run(place: Path | str, needed: Sequence[str] = (files.SUMMARY,)) -> Pat
     folder = files.default_folder(load_scenario(place))
     if not (folder / files.DONE).is_file():
         message = f"{place}: no finished run of this scenario without changes; first: blocksim run {place}"
-        newest = files.newest_finished(folder.parent) if folder.parent.is_dir() else None
+        newest = files.newest_run(folder.parent) if folder.parent.is_dir() else None
         if newest is not None:
             others = "runs with other values (--set, or an older file) are in"
             message += f"\n{others} {folder.parent}; the newest: {newest}"
@@ -74,7 +74,7 @@ def _run_in(place: Path, needed: Sequence[str]) -> Path:
     if (place / files.SCENARIO).is_file():
         message = f"{place}: this run is not complete (no {missing[0]}); repeat it with blocksim run --overwrite"
         raise InputMissingError(message)
-    newest = files.newest_finished(place)
+    newest = files.newest_run(place)
     if newest is not None:
         return newest
     if (place / TABLE).is_file():

@@ -168,7 +168,7 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
     changed = [path for path in present if kind.kind_of(path.name) and not kind.is_ours(path)]
     told = []
     for path in changed:
-        added = files.columns_added(path, kind.records_of(path) or ())  # None: it is no table of the study any more
+        added = files.extra_columns(path, kind.records_of(path) or ())  # None: it is no table of the study any more
         shown = spelling.list_names([repr(name[:LONGEST_NAME]) for name in added or ()], MOST_SHOWN)
         which = f" (columns added: {shown})" if added else ""
         text = f"{path}: changed since {whose} wrote it{which}; "

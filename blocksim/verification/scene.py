@@ -201,7 +201,7 @@ class Thrower:
         self.world = self.scene.world
         self.scheme = scheme_of(self.scene)
         self.fresh = [array.copy() for array in arrays_of(self.scene)]
-        self.row = np.zeros(len(self.scheme.measured))
+        self.row = np.zeros(len(self.scheme.row_names))
 
     def throw(self, throw: Throw, poll: int = POLL) -> Any:
         """Throw the block; return its record after the impact, once it has no contact at the end of `poll` steps."""

@@ -20,7 +20,7 @@ from blocksim.simulation.files import (
     folder_lock,
     holds_run,
     make_folder,
-    newest_finished,
+    newest_run,
     prepare_folder,
     write_text,
 )
@@ -164,12 +164,12 @@ def test_rubbish_in_done_is_no_finished_run(copy: Path, soft: Shipped, text: str
 
 def test_newest_finished_run_is_found(kept: Result, tmp_path: Path) -> None:
     assert kept.folder is not None
-    assert newest_finished(tmp_path) is None
+    assert newest_run(tmp_path) is None
     for number, name in enumerate(("b", "c", "a")):
         done = Path(shutil.copytree(kept.folder, tmp_path / name)) / "done.json"
         os.utime(done, (1e9 + number, 1e9 + number))
     (tmp_path / "a" / "done.json").unlink()
-    assert newest_finished(tmp_path) == tmp_path / "c"
+    assert newest_run(tmp_path) == tmp_path / "c"
 
 
 def test_what_changes_the_result_changes_the_default_folder(soft: Shipped) -> None:

@@ -196,7 +196,7 @@ def test_the_tables_of_probes_are_files_of_the_run(tmp_path: Path, whole: Result
     folder = tmp_path / "whole"
     table = (folder / "probe-joint4.csv").read_text().splitlines()
     assert table[0] == "step,time_s,opening_mm,opening_first_mm,opening_last_mm,slip_mm,rotation_deg"
-    last = [values[-1] for values in whole.probes["joint4"].written().values()]
+    last = [values[-1] for values in whole.probes["joint4"].table_values().values()]
     assert [float(cell) for cell in table[-1].split(",")[2:]] == last
     assert [*whole.probes["force2"].to_frame().columns[:3]] == ["time_s", "fx_N", "fy_N"]
     prepare_folder(folder, overwrite=True)

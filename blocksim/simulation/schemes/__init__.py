@@ -160,7 +160,7 @@ class Scheme:
     # of contacts in a scene that has finished, given the largest overlap and the smallest side of a block (m)
 
     @property
-    def measured(self) -> tuple[str, ...]:
+    def row_names(self) -> tuple[str, ...]:
         """Names of the entries of a measured row of a scene without further systems."""
         return (*self.ledger, *COUNTED)
 
@@ -239,14 +239,14 @@ def ledger_names(scene: AnyScene | Coupled) -> tuple[str, ...]:
 def measure_row(scene: AnyScene | Coupled) -> NDArray[np.float64]:
     """Return energies (J) as `ledger_names` has them, number of contacts and largest overlap (m)."""
     scheme = scheme_of(scene)
-    row = np.zeros(len(scheme.measured))
+    row = np.zeros(len(scheme.row_names))
     scheme.measure(scene, row)
     if not isinstance(scene, Coupled):
         return row
-    return np.concatenate([row[: -len(COUNTED)], measured_systems(scene)[0], row[-len(COUNTED) :]])
+    return np.concatenate([row[: -len(COUNTED)], system_totals(scene)[0], row[-len(COUNTED) :]])
 
 
-def measured_systems(scene: AnyScene | Coupled) -> tuple[Floats, float]:
+def system_totals(scene: AnyScene | Coupled) -> tuple[Floats, float]:
     """Return energies (J) of the systems beside the blocks, one after the other, and the mass (kg) of them all."""
     if not isinstance(scene, Coupled):
         return np.zeros(0), 0.0

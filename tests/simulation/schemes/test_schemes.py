@@ -50,7 +50,7 @@ def test_every_scheme_of_the_file_can_be_run() -> None:
     for name, scheme in SCHEMES.items():
         scene = build_scene(three_blocks(time={"scheme": name}))
         assert scheme_of(scene) is scheme
-        assert len(measure_row(ALONE.advance(scene, 0)[0])) == len(scheme.measured)
+        assert len(measure_row(ALONE.advance(scene, 0)[0])) == len(scheme.row_names)
 
 
 def test_schemes_are_different_runs() -> None:

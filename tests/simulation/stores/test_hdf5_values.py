@@ -17,7 +17,7 @@ STEP = 1e-6  # s
 def test_every_number_comes_back_under_its_name(soft: Shipped, tmp_path: Path) -> None:
     scheme, scenario = SCHEMES["explicit"], soft()
     random = np.random.default_rng(1)
-    rows = [(random.random((len(MOTION), 3)), random.random(len(scheme.measured))) for _ in range(3)]
+    rows = [(random.random((len(MOTION), 3)), random.random(len(scheme.row_names))) for _ in range(3)]
     written = [Frame(step, (motion,), measured) for step, (motion, measured) in zip((0, 5, 7), rows, strict=True)]
     path = tmp_path / "run.h5"
     with FrameFile(path, Recorder(place_bodies(scenario), 1.0, STEP), "schema = 1\n", scheme.ledger) as file:
@@ -37,7 +37,7 @@ def test_frames_beyond_what_was_committed_do_not_count(soft: Shipped, tmp_path: 
     scheme, scenario, path = SCHEMES["explicit"], soft(), tmp_path / "run.h5"
     with FrameFile(path, Recorder(place_bodies(scenario), 1.0, STEP), "schema = 1\n", scheme.ledger) as file:
         for step in range(3):
-            file.append(Frame(step, (np.zeros((len(MOTION), 3)),), np.zeros(len(scheme.measured))))
+            file.append(Frame(step, (np.zeros((len(MOTION), 3)),), np.zeros(len(scheme.row_names))))
     with h5py.File(path, "r+") as stored:
         stored["n_committed"][()] = 2  # killed after the third was written, before it was announced
     back = read_frames(path, scenario)
