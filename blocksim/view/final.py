@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,6 @@ from blocksim.simulation.trajectory import Frames
 from blocksim.view import arrows, run_data, scene, style
 from blocksim.view.paint import Paint, by_block, draw_key
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-
 NARROWEST = 0.35  # width over height
 RANGE_GAP = 0.06  # part of the width that two measured ranges in one row keep apart
 
@@ -23,22 +19,20 @@ RANGE_GAP = 0.06  # part of the width that two measured ranges in one row keep a
 class MeasuredTable(Protocol):
     """The part of a measured table that pictures need."""
 
-    def statistics(self) -> "pd.DataFrame":
-        """Return one row a block and quantity: block, quantity, mean, minimum, maximum (mm), ..."""
+    def summaries(self) -> Sequence[Any]:
+        """Return what has block, quantity, mean, minimum and maximum (mm or degrees), one a block and quantity."""
         ...
 
 
 def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float) -> list[scene.MeasuredRange]:
     """Return the measured centres (mm) of the blocks, in rows without overlap; `width` (mm) is shown."""
-    statistics = measured.statistics()
-    centres = statistics[(statistics["quantity"] == "x") & statistics["block"].isin(names)]
+    centres = [one for one in measured.summaries() if one.quantity == "x" and one.block in names]
     row_ends: list[float] = []
     ranges = []
-    for line in centres.sort_values("minimum", kind="stable").itertuples():
-        mean, minimum, maximum = (float(getattr(line, key)) for key in ("mean", "minimum", "maximum"))
-        row = next((row for row, end in enumerate(row_ends) if end < minimum), len(row_ends))
-        row_ends[row : row + 1] = [maximum + RANGE_GAP * width]
-        ranges.append(scene.MeasuredRange(str(line.block), mean, minimum, maximum, row))
+    for one in sorted(centres, key=lambda one: one.minimum):
+        row = next((row for row, end in enumerate(row_ends) if end < one.minimum), len(row_ends))
+        row_ends[row : row + 1] = [one.maximum + RANGE_GAP * width]
+        ranges.append(scene.MeasuredRange(one.block, one.mean, one.minimum, one.maximum, row))
     return ranges
 
 

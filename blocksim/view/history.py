@@ -283,15 +283,14 @@ def _draw_measured(
     axes: "style.Axes", seen: FramesInView, motion: Motion, measured: final.MeasuredTable, names: Sequence[str]
 ) -> None:
     """Draw mean and range of the repeats at the end of the lines of blocks."""
-    statistics = measured.statistics()
-    rows = statistics[(statistics["quantity"] == motion.quantity) & statistics["block"].isin(names)]
+    rows = [one for one in measured.summaries() if one.quantity == motion.quantity and one.block in names]
     x = float(seen.frames.time[-1]) * 1.02
     line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "linewidth": 1.2, "zorder": 4.0}
     known = [motion.values.ravel()]
-    for mean, low, high in rows[["mean", "minimum", "maximum"]].to_numpy(dtype=float):
-        axes.plot([x, x], [low, high], marker="_", markersize=4.0, **line)
-        axes.plot(x, mean, marker="o", markersize=3.2, **line)
-        known.append(np.array([low, high]))
+    for one in rows:
+        axes.plot([x, x], [one.minimum, one.maximum], marker="_", markersize=4.0, **line)
+        axes.plot(x, one.mean, marker="o", markersize=3.2, **line)
+        known.append(np.array([one.minimum, one.maximum]))
     axes.set_ylim(*time_panels.limits_of(np.concatenate(known)))
 
 

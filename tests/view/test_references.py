@@ -6,9 +6,9 @@ reference; look at it, and rename it if it is better: NAME.new.png to NAME.png.
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
@@ -34,10 +34,11 @@ FRAMES = pressed(toppling(3))
 class Repeats:
     """Measured centres of two blocks."""
 
-    def statistics(self) -> pd.DataFrame:
+    def summaries(self) -> list[SimpleNamespace]:
         """Return mean and range (mm)."""
         rows = [("x", "2", 98.0, 104.0, 110.0), ("x", "3", 139.0, 141.5, 145.0), ("rotation", "2", -90.0, -90.0, -90.0)]
-        return pd.DataFrame(rows, columns=["quantity", "block", "minimum", "mean", "maximum"])
+        names = ("quantity", "block", "minimum", "mean", "maximum")
+        return [SimpleNamespace(**dict(zip(names, row, strict=True))) for row in rows]
 
 
 def tornado(path: Path) -> None:

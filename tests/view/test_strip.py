@@ -3,8 +3,8 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
-import pandas as pd
 import pytest
 
 from blocksim.view import final, strip
@@ -20,12 +20,12 @@ class Table:
     def __init__(self, **ranges: tuple[float, float, float]) -> None:
         self.ranges = ranges
 
-    def statistics(self) -> pd.DataFrame:
+    def summaries(self) -> list[SimpleNamespace]:
         rows = [
-            {"block": block[1:], "quantity": "x", "mean": mean, "minimum": minimum, "maximum": maximum}
+            SimpleNamespace(block=block[1:], quantity="x", mean=mean, minimum=minimum, maximum=maximum)
             for block, (minimum, mean, maximum) in self.ranges.items()
         ]
-        return pd.DataFrame([*rows, {"block": "1", "quantity": "rotation", "mean": 0.0}])
+        return [*rows, SimpleNamespace(block="1", quantity="rotation", mean=0.0)]
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import SimpleNamespace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -26,9 +27,6 @@ from blocksim.view.history import draw_history_page
 from blocksim.view.report.player import MOST_BYTES, pack_forces, pack_frames, pack_loads, scene_data
 from blocksim.view.sweeps import outcome_map
 from blocksim.view.sweeps.data import SweepData, short_names
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 ROOT = r"(?:/|[A-Za-z]:[\\/])"
 ABSOLUTE = re.compile(rf"'(?P<quoted>{ROOT}[^']+)'|(?<![^\s=,(\"])(?P<bare>{ROOT}[^\s'\",:;()]+)")
@@ -146,17 +144,17 @@ class Repeats:
 
     rows: Sequence[Mapping[str, Any]]
 
-    def statistics(self) -> "pd.DataFrame":
-        """Return one row a block and quantity."""
-        import pandas as pd
-
-        known = [row for row in self.rows if row["mean"] is not None]
-        return pd.DataFrame(known, columns=["block", "quantity", "mean", "minimum", "maximum"])
+    def summaries(self) -> list[Any]:
+        """Return the rows that have repeats."""
+        return [SimpleNamespace(**row) for row in self.rows if row["mean"] is not None]
 
 
 def embedded(figure: "style.Figure") -> str:
-    """Return a figure as the address of an SVG within the page; coordinates to a hundredth of a point."""
-    svg = style.figure_bytes(figure, ".svg").decode()
+    """Return a figure as the address of an SVG within the page: letters as text, coordinates to 0.01 points."""
+    from matplotlib import rc_context
+
+    with rc_context({"svg.fonttype": "none"}):
+        svg = style.figure_bytes(figure, ".svg").decode()
     short = COORDINATES.sub(lambda found: DIGITS.sub(r"\1", found[0]).replace("\n", ""), svg)
     return f"data:image/svg+xml;base64,{b64encode(short.encode()).decode()}"
 
