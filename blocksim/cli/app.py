@@ -22,6 +22,7 @@ def __getattr__(name: str) -> Any:
 def main() -> None:
     """Run the command line; every error becomes a message and an exit code."""
     began = time.monotonic()
+    gc.set_threshold(50_000)  # what imports and pictures make by the thousand lives to the end
     take_interrupts()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
