@@ -30,7 +30,7 @@ def open_study_figure(
     before the panel is given, and OutputError when the file cannot be written.
     """
     path = style.picture_path(path)
-    with style.open_panels(paper, (1, 1), PANEL, LEAST, SIDES, title=title, notes=" ".join(notes)) as opened:
+    with style.open_panels(paper, [1], PANEL, LEAST, SIDES, title=title, notes=" ".join(notes)) as opened:
         figure, ((axes,),) = opened
         axes.spines[["right", "top"]].set_visible(False)
         yield axes
@@ -72,7 +72,7 @@ def draw_law(law: Law, path: Path | str, title: str, paper: style.Paper = style.
     """
     path = style.picture_path(path)
     difference, is_known = law.simulated - law.expected, np.isfinite(law.expected)
-    with style.open_panels(paper, (2, 1), LAW_PANEL, LAW_LEAST, LAW_SIDES, (0.0, LAW_GAP), title=title) as opened:
+    with style.open_panels(paper, [1, 1], LAW_PANEL, LAW_LEAST, LAW_SIDES, (0.0, LAW_GAP), title=title) as opened:
         figure, ((above,), (below,)) = opened
         above.plot(law.time, law.simulated, label="simulated", **SIMULATED)
         above.plot(law.time, law.expected, label=law.formula, **EXPECTED)
@@ -294,8 +294,8 @@ def draw_tornado(
     sides, gaps = (left, right, 0.08 + style.LINE * most, BAR_FOOT), (0.0, BAR_GAP + style.LINE * (most - 1))
     pairs = zip((MAIN_COLOUR, FIRST_COLOUR), labels, strict=True)
     handles = [Patch(color=colour, label=label) for colour, label in pairs if label]
-    shape = len(panels), 1
-    with style.open_panels(paper, shape, own, least, sides, gaps, title=title, handles=handles) as (figure, drawn):
+    counts = [1] * len(panels)
+    with style.open_panels(paper, counts, own, least, sides, gaps, title=title, handles=handles) as (figure, drawn):
         up = float(figure.get_figheight())
         for panel, heading, (axes,) in zip(panels, titles, drawn, strict=True):
             place = axes.get_position()
@@ -422,7 +422,7 @@ def _open_levels(
     handles.append(Line2D([], [], **LARGEST, label="largest, with turns"))
     more: dict[str, Any] = {"handles": handles, "columns": max(1, int(paper.width(width) / LEGEND_ENTRY))}
     with style.open_panels(
-        paper, (1, panels), LEVEL_PANEL, LEVEL_LEAST, LEVEL_SIDES, (LEVEL_GAP, 0.0), title=title, **more
+        paper, [panels], LEVEL_PANEL, LEVEL_LEAST, LEVEL_SIDES, (LEVEL_GAP, 0.0), title=title, **more
     ) as opened:
         figure, (row,) = opened
         yield figure, row

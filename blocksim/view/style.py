@@ -1,5 +1,6 @@
 """Colours, fonts and pages: sizes that people ask for, panels with title, notes and legend, picture files."""
 
+import functools
 import re
 import warnings
 from bisect import bisect_left, bisect_right
@@ -55,6 +56,7 @@ SETTINGS: dict[Any, Any] = {
     "font.sans-serif": FONT,
     "font.size": FONT_SIZE,
     "axes.titlesize": FONT_SIZE,
+    "axes.titley": 1.0,  # else measured from all labels above a panel, where there are none
     "axes.linewidth": LINE_WIDTH,
     "axes.edgecolor": FAINT_INK,
     "axes.labelcolor": INK,
@@ -151,6 +153,7 @@ def shorten(text: str, letters: int) -> str:
     return f"{line[: bisect_right(ends, letters - 1)]}…"
 
 
+@functools.cache
 def width_of(text: str, size: float, *, bold: bool = False) -> float:
     """Return the width (points) of one line of text at a font size (points), as it is on paper."""
     from matplotlib import font_manager, textpath
@@ -181,7 +184,8 @@ def break_lines(text: str, room: float, size: float = FONT_SIZE, *, bold: bool =
         return width_of(line.rstrip(), size, bold=bold) > points
 
     lines = [""]
-    for part in PARTS.findall(shorten(text, MOST_LETTERS)):
+    text = shorten(text, MOST_LETTERS)
+    for part in PARTS.findall(text) if is_wide(text) else [text]:
         for piece in PIECES.findall(part) if is_wide(part) else [part]:
             if lines[-1] and is_wide(f"{lines[-1]}{piece}"):
                 lines.append("")
@@ -345,7 +349,7 @@ Sides = tuple[float, float, float, float]
 @contextmanager
 def open_panels(
     paper: Paper,
-    shape: tuple[int, int],
+    counts: "Sequence[int]",
     panel: tuple[float, float],
     least: tuple[float, float],
     sides: Sides,
@@ -358,10 +362,11 @@ def open_panels(
 ) -> Iterator[tuple["Figure", list[list["Axes"]]]]:
     """Give a figure with rows and columns of panels, a title above them, a legend and notes below them.
 
-    `panel` is the width and height of one, `least` that on a page whose size was asked for, `gaps` those between
-    columns and rows, `columns` those of the legend. All in inches. Raises InvalidInputError for too small a page.
+    `counts` are the panels of each row, `panel` is the width and height of one, `least` that on a page whose size was
+    asked for, `gaps` those between columns and rows, `columns` those of the legend. All lengths in inches. Raises
+    InvalidInputError for too small a page.
     """
-    (rows, across), (left, right, head, foot) = shape, sides
+    (left, right, head, foot), rows, across = sides, len(counts), max(counts)
     beside = left + right + (across - 1) * gaps[0]
     width = paper.width(beside + across * panel[0], beside + across * least[0])
     inside = SURE * (width - 2.0 * EDGE)
@@ -380,9 +385,9 @@ def open_panels(
         panels = [
             [
                 add_axes(figure, left + k * (column + gaps[0]), height - head - row - n * (row + gaps[1]), column, row)
-                for k in range(across)
+                for k in range(count)
             ]
-            for n in range(rows)
+            for n, count in enumerate(counts)
         ]
         write_text(figure, EDGE, height - EDGE, "\n".join(heading), va="top", fontsize=TITLE_SIZE)
         write_text(figure, EDGE, EDGE, "\n".join(lines), va="bottom", color=FAINT_INK)

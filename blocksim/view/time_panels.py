@@ -72,8 +72,8 @@ def open_time_panels(
     start, end = span or (min(times), max(times))
     texts = (panel.note.count("\n") + 2 + len(panel.lines) * (panel.legend is not None) for panel in panels)
     size = WIDTH - sum(SIDES[:2]), own or max(PANEL, style.LINE * max(texts))
-    shape, least = (len(panels), 1), (NARROWEST, LOWEST)
-    with style.open_panels(paper, shape, size, least, SIDES, (0.0, GAP), title=title, notes=notes) as (figure, rows):
+    counts, least = [1] * len(panels), (NARROWEST, LOWEST)
+    with style.open_panels(paper, counts, size, least, SIDES, (0.0, GAP), title=title, notes=notes) as (figure, rows):
         for panel, (axes,) in zip(panels, rows, strict=True):
             axes.spines[["right", "top"]].set_visible(False)
             axes.tick_params(axis="x", labelbottom=axes is rows[-1][0])

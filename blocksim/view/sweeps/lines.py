@@ -118,8 +118,8 @@ def draw_series(
     texts += [f"{len(series) - count} more series."] if len(series) > count else []
     own, least = (panel, ROW_HEIGHT), (NARROWEST, LOWEST)
     sides, gaps = (LEFT, RIGHT, head, foot), (COLUMN_GAP, ROW_GAP + style.LINE * (lines - 1))
-    shape = len(rows), count
-    with style.open_panels(paper, shape, own, least, sides, gaps, title=title, notes=" ".join(texts)) as opened:
+    counts = [count] * len(rows)
+    with style.open_panels(paper, counts, own, least, sides, gaps, title=title, notes=" ".join(texts)) as opened:
         figure, panels = opened
         for row, (block, of_block) in enumerate(zip(rows, panels, strict=True)):
             band = measured.get(blocks[block])

@@ -232,10 +232,10 @@ def draw_map(
     headings = [style.break_lines(heading, (width - beside) / count, bold=True) for heading, _ in found.columns]
     head = HEADING + (style.LINE * max(map(len, headings)) + 0.05 if count > 1 else 0.0)
     foot = FOOT + style.LINE * (len(style.break_lines(found.axes[0].label, width - LEFT)) - 1)
-    shape, gaps = (len(found.blocks) + 1, count), (COLUMN_GAP, ROW_GAP)
+    counts, gaps = [count] * (len(found.blocks) + 1), (COLUMN_GAP, ROW_GAP)
     own_size, least, sides = (own, ROW_HEIGHT), (LEAST, LOWEST), (LEFT, RIGHT, head, foot)
     more: dict[str, Any] = {"notes": _notes(found), "handles": handles, "columns": 1 if count == 1 else 2}
-    opened = style.open_panels(paper, shape, own_size, least, sides, gaps, title=sweep.title, **more)
+    opened = style.open_panels(paper, counts, own_size, least, sides, gaps, title=sweep.title, **more)
     with opened as (figure, panels):
         found.panels.extend(panels)
         for block, row in zip(found.blocks, panels[:-1], strict=True):
@@ -262,7 +262,8 @@ def _draw_row(
     for axes, (_, cases) in zip(row, found.columns, strict=True):
         plane, failed = found.plane(cases), ~found.sweep.finished[cases]
         draw_panel(axes, plane, numbers[cases], look, None if agrees is None else agrees[cases])
-        axes.scatter(plane.x[failed], plane.y[failed], **FAILED)
+        if failed.any():
+            axes.scatter(plane.x[failed], plane.y[failed], **FAILED)
         style.number_axis(axes.xaxis, 4, is_log=found.axes[0].is_log)
         style.number_axis(axes.yaxis, 4, is_log=found.axes[1].is_log)
         axes.tick_params(labelleft=axes is row[0], labelbottom=axes in found.panels[-1])

@@ -73,11 +73,9 @@ def draw_matrix(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[s
     right = max(_right_of(variables, size), room - left - _grid(count, size))
     own, least, sides = (size, size), (LOWEST, LOWEST), (left, right, HEAD, foot)
     more: dict[str, Any] = {"title": sweep.title, "handles": _entries(sweep), "columns": 4}
-    with style.open_panels(paper, (count, count), own, least, sides, (GAP, GAP), **more) as (figure, panels):
+    with style.open_panels(paper, range(1, count + 1), own, least, sides, (GAP, GAP), **more) as (figure, panels):
         for row, (up, axes_of_row) in enumerate(zip(variables, panels, strict=True)):
-            for axes in axes_of_row[row + 1 :]:
-                axes.remove()
-            for column, (across, axes) in enumerate(zip(variables, axes_of_row[: row + 1], strict=False)):
+            for column, (across, axes) in enumerate(zip(variables, axes_of_row, strict=False)):
                 _draw_panel(axes, sweep, up, across)
                 _finish(axes, up, across, is_left=column == 0 < row, is_last=row == count - 1)
             beside: dict[str, Any] = {"transform": axes_of_row[row].transAxes, "va": "center", "fontsize": NAME_FONT}
@@ -143,7 +141,8 @@ def _draw_panel(axes: "style.Axes", sweep: SweepData, up: Variable, across: Vari
     inside = sweep.finished if sweep.inside is None else sweep.inside
     outside = sweep.finished & ~inside
     for cases, look in ((outside, OUTSIDE), (~sweep.finished, FAILED), (inside, INSIDE)):
-        axes.scatter(across.values[cases], up.values[cases], **look)
+        if cases.any():
+            axes.scatter(across.values[cases], up.values[cases], **look)
     if up.repeats is not None and across.repeats is not None and len(up.repeats) == len(across.repeats):
         axes.scatter(across.repeats, up.repeats, **REPEAT)
         return
@@ -234,7 +233,7 @@ def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterato
     blocks = sweep.moving[-MOST_HISTOGRAMS:]
     own = style.COLUMN_WIDTH - sum(SIDES[:2]), PANEL_HEIGHT
     more: dict[str, Any] = {"title": sweep.title, "handles": _entries_histogram(sweep), "columns": 2}
-    with style.open_panels(paper, (len(blocks), 1), own, LEAST_PANEL, SIDES, (0.0, ROW_GAP), **more) as opened:
+    with style.open_panels(paper, [1] * len(blocks), own, LEAST_PANEL, SIDES, (0.0, ROW_GAP), **more) as opened:
         figure, rows = opened
         for block, (axes,) in zip(blocks, rows, strict=True):
             _draw_block(axes, sweep, block, ROOM / (style.size_of(axes)[1] - ROOM))

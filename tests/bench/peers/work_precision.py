@@ -83,7 +83,7 @@ def _opened(panels: int, curves: int, title: str | None, paper: Paper) -> Iterat
     width = paper.width(beside + panels * PANEL[0], beside + panels * LEAST[0])
     columns = int(((width - beside) / panels + GAP) / LEGEND_ENTRY)
     sides = LEFT, RIGHT, HEAD, FOOT + LEGEND_ROW * -(-curves // columns)
-    with style.open_panels(paper, (1, panels), PANEL, LEAST, sides, (GAP, 0.0), title=title) as (figure, (row,)):
+    with style.open_panels(paper, [panels], PANEL, LEAST, sides, (GAP, 0.0), title=title) as (figure, (row,)):
         yield figure, row, columns
 
 
