@@ -101,7 +101,7 @@ def main(arguments: Sequence[str]) -> None:
     if "--measure" in arguments:
         rows = []
         for finding in FINDINGS:
-            print(finding.command, file=sys.stderr, flush=True)  # noqa: T201
+            print(finding.command, file=sys.stderr, flush=True)  # noqa: T201 - progress
             rows.append(measure_finding(finding))
         store.write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     text = page.read_text(encoding="utf-8")

@@ -132,7 +132,7 @@ def measure(store: Path, heads: Sequence[str]) -> None:
         for case in cases_of(head):
             outcome = run_case(case, setting)
             name = f"{setting.scheme} {setting.model} {setting.law} {case.id}"
-            print(f"{name}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201
+            print(f"{name}: {outcome.seconds:.1f} s", file=sys.stderr, flush=True)  # noqa: T201 - progress
             column[case.id] = [asdict(row) for row in outcome.rows]
         stored = {**(read_store(store) if store.is_file() else {}), head: column}
         finite = json.loads(

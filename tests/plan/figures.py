@@ -15,6 +15,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import permutations
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -27,6 +28,8 @@ SHAPE_QUESTION = re.compile(
 SCHEME_QUESTION = re.compile(
     r"isinstance\([^)]*\b(?:Explicit|Nonsmooth)\b|scheme\s*(?:==|!=)|\bis_rigid\b|\.rigid\b|[\"'](?:nonsmooth|explicit)[\"']"
 )
+NOQA_ALONE = re.compile(r"# noqa(?!: [A-Z0-9, ]+ - \w)")
+MOST_IN_COMMON = 8
 OWNERS_OF_SCHEMES = ("simulation/schemes/", "kernels/")
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -152,6 +155,33 @@ def called_once(modules: list[Module]) -> list[str]:
     return sorted(name for name in names if calls[name] == 1)
 
 
+def classes_of_one_name(modules: list[Module]) -> list[str]:
+    """Return the names of public classes, outside kernels, that stand in more than one module."""
+    counts = Counter(
+        node.name
+        for one in modules
+        if not one.path.startswith("kernels/")
+        for node in ast.walk(one.tree)
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    return sorted(name for name, count in counts.items() if count > 1)
+
+
+def repeated_lists(modules: list[Module]) -> list[str]:
+    """Return the functions and dataclasses that have more than eight parameters or fields in common with another."""
+    lists: dict[str, set[str]] = {}
+    for one in modules:
+        for node in ast.walk(one.tree):
+            if isinstance(node, Function):
+                arguments = (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
+                lists[f"{one.path}:{node.name}"] = {argument.arg for argument in arguments}
+            elif isinstance(node, ast.ClassDef):
+                fields = (line.target for line in node.body if isinstance(line, ast.AnnAssign))
+                lists[f"{one.path}:{node.name}"] = {field.id for field in fields if isinstance(field, ast.Name)}
+    long = {name: names - {"self"} for name, names in lists.items() if len(names) > MOST_IN_COMMON}
+    return sorted({one for one, other in permutations(long, 2) if len(long[one] & long[other]) > MOST_IN_COMMON})
+
+
 def questions(modules: list[Module], pattern: re.Pattern[str], *, outside: tuple[str, ...] = ()) -> list[str]:
     """Return the lines, as path:number, that match a pattern."""
     return [
@@ -177,7 +207,10 @@ FIGURES: Mapping[str, Callable[[list[Module]], float]] = {
     "functions called once": lambda modules: len(called_once(modules)),
     "modules of one neighbour": lambda modules: len(one_neighbour(modules)),
     "file names used twice": lambda modules: len(repeated_names(modules)),
+    "class names used twice": lambda modules: len(classes_of_one_name(modules)),
+    "lists of parameters that stand twice": lambda modules: len(repeated_lists(modules)),
     "noqa": _count("# noqa"),
+    "noqa without a reason": lambda modules: len(questions(modules, NOQA_ALONE)),
     "lines that ask for the shape": lambda modules: len(questions(modules, SHAPE_QUESTION)),
     "lines that ask for the scheme": lambda modules: len(
         questions(modules, SCHEME_QUESTION, outside=OWNERS_OF_SCHEMES)

@@ -97,7 +97,7 @@ def _same_flags(one: Any, other: Any) -> Any:
     """Return True if two sets of options are the same."""
     if type(one) is not type(other):
         return NotImplemented
-    return one._values == other._values or one.values() == other.values()  # noqa: SLF001
+    return one._values == other._values or one.values() == other.values()  # noqa: SLF001 - numba's own
 
 
 def _replacements() -> list[tuple[Any, str, Any]]:
@@ -212,8 +212,8 @@ class InnerLibrary(CodeLibrary):  # type: ignore[misc]  # Any
 
 def _restored(generator: Any, name: str, bitcode: bytes) -> InnerLibrary:
     library = InnerLibrary(generator, name)
-    library._final_module = library._shared_module = binding.parse_bitcode(bitcode)  # noqa: SLF001
-    library._finalize_final_module()  # noqa: SLF001
+    library._final_module = library._shared_module = binding.parse_bitcode(bitcode)  # noqa: SLF001 - numba's own
+    library._finalize_final_module()  # noqa: SLF001 - as numba does
     return library
 
 
@@ -244,7 +244,7 @@ def rebuilt(target: Any, parts: tuple[Any, ...]) -> Any:
     """Return a compiled function from what was kept of it, as numba's own `_rebuild` does for machine code."""
     (name, kind, data), *others = parts
     if kind != INNER:
-        return CompileResult._rebuild(target, *parts)  # noqa: SLF001
+        return CompileResult._rebuild(target, *parts)  # noqa: SLF001 - as numba does
     fndesc, environment, signature, objectmode, lifted, annotation, reload_init, referenced_envs = others
     library = _restored(target.codegen(), name, data)
     return CompileResult(

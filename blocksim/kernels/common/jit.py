@@ -80,7 +80,7 @@ def _others_write(state: os.stat_result) -> bool:
 def _is_group_of_one(number: int) -> bool:
     """Return True for the group that many systems give each user, with nobody else in it."""
     import grp  # noqa: PLC0415 - not there without owners
-    import pwd  # noqa: PLC0415
+    import pwd  # noqa: PLC0415 - not on Windows
 
     with contextlib.suppress(KeyError):
         user, group = pwd.getpwuid(os.getuid()), grp.getgrgid(number)
