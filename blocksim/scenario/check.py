@@ -16,8 +16,7 @@ from blocksim.scenario.structures import polygons
 from blocksim.scenario.structures.base import PolygonStructure
 
 BLOCKS_BY_NAME = ("structures", "bodies")
-SPRING_CHOICES = ("model", "law")
-"""Keys of [contact] that rigid contacts do not have."""
+SPRING_CHOICES = ("model", "law")  # keys of [contact] that rigid contacts do not have
 
 
 def wrong_names(data: overrides.Data) -> Iterator[mistakes.Mistake]:

@@ -20,11 +20,9 @@ MAX_EVENTS = 1000
 GROUPS = ("remove", "fix", "free")
 FREE, FIXED, DRIVEN, GONE = "free", "fixed", "driven", "removed"
 RESULTS = {"remove": GONE, "fix": FIXED, "free": FREE}
-LISTED = 6
-"""Names of bodies that a line about an event has; of more it has the number."""
+LISTED = 6  # names of bodies that a line about an event has; of more it has the number
 RATES = {"vx": "m/s", "vy": "m/s", "spin": "rad/s"}
-MANY = 50
-"""Names of bodies beyond which a message does not list them all."""
+MANY = 50  # names of bodies beyond which a message does not list them all
 
 
 def wall_names(scenario: Scenario) -> list[str]:

@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Corner = tuple[float, float]
-Corners = tuple[Corner, ...]
-"""Corners (m) counter-clockwise."""
-ROUND_OFF = 1e-9
-"""m; polygons that overlap by less touch."""
-DISC_SHARE = 0.5 * (1.0 - 1e-6)
-"""Radius of a particle in spacings, less what round-off may take."""
+Corners = tuple[Corner, ...]  # corners (m) counter-clockwise
+ROUND_OFF = 1e-9  # m; polygons that overlap by less touch
+DISC_SHARE = 0.5 * (1.0 - 1e-6)  # radius of a particle in spacings, less what round-off may take
 
 
 def corners_of(points: Sequence[Corner]) -> Floats:
@@ -136,8 +133,7 @@ RECTANGLE = 4
 SHORTEST = 1e-3
 """Least length of an edge, and least thickness, in shares of the diagonal of the bounding box: below, contact would
 have to tell corners apart that lie closer to one another than the accuracy of a step."""
-STRAIGHT = math.radians(0.1)
-"""Least turn of the outline at a corner."""
+STRAIGHT = math.radians(0.1)  # least turn of the outline at a corner
 LEAST = 1e-6  # m; a thousand times the distance at which things touch
 
 
@@ -308,8 +304,7 @@ def dot(a: Corner, b: Corner) -> float:
     return a[0] * b[0] + a[1] * b[1]
 
 
-NEAREST = 48
-"""Neighbours that are tried first; they decide nearly all cells."""
+NEAREST = 48  # neighbours that are tried first; they decide nearly all cells
 
 
 def voronoi(points: Sequence[Corner], region: Sequence[Corner]) -> list[list[Corner]]:
@@ -325,13 +320,6 @@ def voronoi(points: Sequence[Corner], region: Sequence[Corner]) -> list[list[Cor
             cell = _cut(cell, dx, dy)
         cells.append([(x + u, y + v) for u, v in cell])
     return cells
-
-
-def relax_points(points: Sequence[Corner], region: Sequence[Corner], times: int) -> list[Corner]:
-    """Return points moved to the centroids of their cells, so many times (Lloyd): cells become more alike."""
-    for _ in range(times):
-        points = [centroid(cell) for cell in voronoi(points, region)]
-    return [*points]
 
 
 def _around(number: int, places: Floats) -> Iterator[Corner]:

@@ -219,7 +219,7 @@ class CsvTable:
     where: str
     notes: tuple[str, ...]
     header: Line
-    heads: tuple[TableCell, ...]  # of the header, whose own column is empty
+    heads: tuple[TableCell, ...]  # of the header; their own column is empty where any columns may be there
     rows: list[dict[str, TableCell]] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
 
@@ -241,18 +241,16 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
         raise_problems([line.problem(f"columns are separated by semicolons; {DIALECT}")])
     if places is None:
         raise_problems([line.problem(_shape_complaint(line, places, 0))])
-    heads = tuple(TableCell("", *place) for place in places)
+    heads = tuple(TableCell(place[0] if columns else "", *place) for place in places)
     names = [head.text for head in heads]
     problems = []
     for index, head in enumerate(heads):
-        key = head.text if columns else ""
         if head.text in names[:index] and (head.text or columns):
-            problems.append(line.problem("column given twice", key, head.start, head.length))
+            problems.append(head.problem("column given twice"))
         elif columns and head.text not in columns:
-            message = f"unknown column, {suggestion(head.text, columns)}"
-            problems.append(line.problem(message, key, head.start, head.length))
+            problems.append(head.problem(f"unknown column, {suggestion(head.text, columns)}"))
         elif not head.text:
-            problems.append(line.problem("this column has no name", key, head.start, head.length))
+            problems.append(head.problem("this column has no name"))
     missing = [column for column in columns if column not in names]
     if missing:
         plural = "s" if len(missing) > 1 else ""

@@ -1,8 +1,7 @@
 """Mistakes in the data of a scenario, in plain words, with the path of the key concerned."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Any, Literal, NamedTuple, cast
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -14,8 +13,7 @@ from blocksim.scenario.structures import KINDS
 from blocksim.scenario.units import toml
 
 TWO_VALUES = "two values are needed, one along x and one along y"
-MAX_MISTAKES = 200
-"""Mistakes that are examined; a file of a million mistakes must not take minutes."""
+MAX_MISTAKES = 200  # mistakes that are examined; a file of a million mistakes must not take minutes
 KINDS_IN: dict[str | int, Iterable[str]] = {
     "structures": KINDS,
     "motion": motion.MOTIONS,
@@ -29,8 +27,7 @@ KINDS_IN: dict[str | int, Iterable[str]] = {
 Place = Literal["key", "value"]
 
 
-@dataclass(frozen=True, slots=True)
-class Mistake:
+class Mistake(NamedTuple):
     """One mistake: its place in the data, its message, and the part of the line to mark with a caret.
 
     `relation` is true where each value is valid and only their combination is not; `meant` is the path that a

@@ -58,10 +58,8 @@ def correct_baseline(times: Floats, acceleration: Floats, baseline: Baseline) ->
     return np.asarray(acceleration - (parts[0] + s * (parts[1] + s * parts[2])))
 
 
-BEYOND = 1.01
-"""Extent of the pieces, in ends of the scenario: the last step may end a little later."""
-SHORTEST_SHARE = 1e-9
-"""Joints closer together than this share of a cycle are one."""
+BEYOND = 1.01  # extent of the pieces, in ends of the scenario: the last step may end a little later
+SHORTEST_SHARE = 1e-9  # joints closer together than this share of a cycle are one
 
 
 class MotionPieces(NamedTuple):

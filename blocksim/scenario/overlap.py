@@ -14,15 +14,11 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Pairs = tuple[Integers, Integers]
 
-MOST_AT_ONCE = 1_000_000
-"""Pairs that are examined together; more only takes more memory."""
-FEW = 32
-"""Number of boxes up to which all pairs are examined; sorting into cells would take longer."""
+MOST_AT_ONCE = 1_000_000  # pairs that are examined together; more only takes more memory
+FEW = 32  # number of boxes up to which all pairs are examined; sorting into cells would take longer
 ROOM = 1.01
-RECTANGLE = -1
-"""Number of the polygon of what is a rectangle."""
-POLYGONS_AT_ONCE = 10_000
-"""Pairs with a polygon that are examined together; each takes up to 2 kB."""
+RECTANGLE = -1  # number of the polygon of what is a rectangle
+POLYGONS_AT_ONCE = 10_000  # pairs with a polygon that are examined together; each takes up to 2 kB
 
 
 class Outlines(NamedTuple):

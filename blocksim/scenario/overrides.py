@@ -5,8 +5,7 @@ import re
 import tomllib
 import types
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
@@ -15,8 +14,7 @@ from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.units import Kind, Quantity, toml
 
-KeyPath = tuple[str | int, ...]
-"""Path in a scenario, such as ("structures", 0, "overlap")."""
+KeyPath = tuple[str | int, ...]  # path in a scenario, such as ("structures", 0, "overlap")
 
 NAMED: dict[str | int, int] = {
     "materials": 2,
@@ -31,14 +29,11 @@ NAMED: dict[str | int, int] = {
 }
 """Tables of named or numbered entries: how many parts of a path lead to one entry."""
 
-TAGS = ("kind", "scheme")
-"""Keys whose word selects one of several tables."""
+TAGS = ("kind", "scheme")  # keys whose word selects one of several tables
 
-MISSING = object()
-"""What `follow` returns where there is nothing."""
+MISSING = object()  # what `follow` returns where there is nothing
 
-MAX_PARTS = 64
-"""Of a dotted key; the time of tomllib grows with their square."""
+MAX_PARTS = 64  # of a dotted key; the time of tomllib grows with their square
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _BASIC = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"')
@@ -208,8 +203,7 @@ class UnfitOverrideError(ValueError):
     """A dotted key or a value cannot be set; the text has the reason."""
 
 
-@dataclass(frozen=True, slots=True)
-class Override:
+class Override(NamedTuple):
     """One value set from outside: its name in messages, its text, and the path that it sets."""
 
     label: str

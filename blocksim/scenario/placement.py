@@ -3,7 +3,6 @@
 import math
 import weakref
 from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -147,7 +146,7 @@ def placement_of(scenario: Scenario) -> Placement:
         pose = Pose(spec.x, spec.y, spec.angle, *spec.velocity, spec.spin)
         name = spec.name or str(len(bodies) + 1)
         is_driven = spec.motion is not None
-        body = _placed_block(scenario, spec.block, [(name, pose)], fixed=spec.fixed or is_driven)[0]
+        body = place_blocks(scenario, spec.block, [(name, pose)], fixed=spec.fixed or is_driven)[0]
         bodies.append(body._replace(driven=is_driven, freed=name in freed) if is_driven or freed else body)
         origins.append(("bodies", number))
     _latest[:] = [Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins)]
@@ -172,7 +171,7 @@ def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedB
     if x or y:  # structures place the middle of the bounding box, bodies are placed by their centroid
         poses = [_moved(pose, -x, -y) for pose in poses]
     named = ((str(index), pose) for index, pose in enumerate(poses, start=first))
-    return _placed_block(scenario, structure.block, named, fixed=False)
+    return place_blocks(scenario, structure.block, named, fixed=False)
 
 
 def _moved(pose: Pose, x: float, y: float) -> Pose:
@@ -182,25 +181,21 @@ def _moved(pose: Pose, x: float, y: float) -> Pose:
     return pose._replace(x=pose.x + dx, y=pose.y + dy, vx=pose.vx - pose.spin * dy, vy=pose.vy + pose.spin * dx)
 
 
-def _placed_block(scenario: Scenario, key: str, named: Iterable[tuple[str, Pose]], *, fixed: bool) -> list[PlacedBody]:
+def place_blocks(scenario: Scenario, key: str, named: Iterable[tuple[str, Pose]], *, fixed: bool) -> list[PlacedBody]:
     """Return bodies of one kind of block by their names and poses; looking up its sides every time would be slow."""
     block = scenario.blocks[key]
     what = block.material, block.size_x, block.size_y, block.depth, scenario.materials[block.material].density
     return [PlacedBody(name, key, *what, *pose, fixed, outline=block.polygon) for name, pose in named]
 
 
-ENDLESS = 1e5
-"""m; how far the level ground beyond the ends of a profile is drawn."""
-STRAIGHT = 1e-12
-"""Sine of the turn below which two pieces are in one line."""
-TOLERANCE = 1e-9
-"""m; things at this distance touch, and ends at this distance are one."""
+ENDLESS = 1e5  # m; how far the level ground beyond the ends of a profile is drawn
+STRAIGHT = 1e-12  # sine of the turn below which two pieces are in one line
+TOLERANCE = 1e-9  # m; things at this distance touch, and ends at this distance are one
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class PlacedSegment:
+class PlacedSegment(NamedTuple):
     """One piece of boundary in m, solid on the right hand from start to end.
 
     `material` is None where it is as the ground. `extends_*`: a neighbour or the ground covers this end, so that

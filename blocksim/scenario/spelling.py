@@ -4,13 +4,11 @@ import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 
-MIN_BEGINNING = 3
-"""Letters that a word needs before a similar word is suggested."""
+MIN_BEGINNING = 3  # letters that a word needs before a similar word is suggested
 MAX_COMPARED = 1000
 """Known words that a misspelt one is compared with; a file of a million mistakes must not take minutes."""
 MAX_LISTED = 10
-LEAST_SHARE = 0.6
-"""Of letters that two similar words have in common."""
+LEAST_SHARE = 0.6  # of letters that two similar words have in common
 ROUND_OFF = 1e-9
 USUAL: Mapping[str, tuple[str, ...]] = {
     "vx": ("velocity",),

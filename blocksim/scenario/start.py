@@ -7,14 +7,13 @@ from operator import attrgetter
 
 import numpy as np
 
-from blocksim.scenario import events, geometry, overlap, placement, resolution
+from blocksim.scenario import events, geometry, overlap, overrides, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.overrides import KeyPath
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.structures import base, polygons
 from blocksim.scenario.units import toml
@@ -164,13 +163,11 @@ SHAPES = "give it width, height and length, an outline, or sides"
 MAX_OVERLAPS = 20
 ROUNDING = 0.01  # of the least width of two bodies: by no more do rounded drawings overlap
 MAX_PIECES = 1_000_000
-MAX_INTERVALS = 65_000
-"""Of particles along one side; the solver counts them in 16 bits."""
+MAX_INTERVALS = 65_000  # of particles along one side; the solver counts them in 16 bits
 MAX_PROBES = 200
 """Each has a table, and a data set a column; a run would end seconds after its last step."""
 MAX_PARTICLES = 1_000_000
-SHORTEST_SHARE = 0.01
-"""Least length of a segment of boundary, in smallest sides of the blocks."""
+SHORTEST_SHARE = 0.01  # least length of a segment of boundary, in smallest sides of the blocks
 LEAST_SKIN = 1e-4
 """Least skin, in smallest sides of the blocks. Below it the list of neighbours is updated at every step, even where
 steps are as short as with the full stiffness of a metal: at 1 m/s a block moves 1e-5 of its side in one of them, and a
@@ -216,7 +213,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
 
 def _too_many(scenario: Scenario) -> Iterator[Mistake]:
     bodies = sum(structure.size for structure in scenario.structures) + len(scenario.bodies)
-    counts: tuple[tuple[KeyPath, int, str, int], ...] = (
+    counts: tuple[tuple[overrides.KeyPath, int, str, int], ...] = (
         (("structures",), bodies, "bodies", base.MAX_BLOCKS),
         (("walls",), len(scenario.walls), "walls", MAX_SEGMENTS),
         (("ground", "profile"), len(scenario.ground.profile or ()), "points", MAX_SEGMENTS),
@@ -230,7 +227,7 @@ def _too_many(scenario: Scenario) -> Iterator[Mistake]:
 
 def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
     """Find blocks without a shape where one is needed, and drawn blocks that do not exist."""
-    needing: list[tuple[KeyPath, str]]
+    needing: list[tuple[overrides.KeyPath, str]]
     needing = [(("bodies", number, "block"), spec.block) for number, spec in enumerate(scenario.bodies)]
     for number, structure in enumerate(scenario.structures):
         if not isinstance(structure, base.PolygonStructure):
@@ -244,7 +241,7 @@ def _shapeless(scenario: Scenario) -> Iterator[Mistake]:
 
 def _unfit_tables(scenario: Scenario) -> Iterator[Mistake]:
     """Find vibrations of too many cycles, too many tables, stiffnesses without a law, and masses beyond all numbers."""
-    motions: list[tuple[KeyPath, object]] = [((), scenario.motion)]
+    motions: list[tuple[overrides.KeyPath, object]] = [((), scenario.motion)]
     motions += [(("bodies", number), body.motion) for number, body in enumerate(scenario.bodies)]
     for path, motion in motions:
         pieces = sum(count for *_, count in motion.sections(scenario.time.end)) if isinstance(motion, Harmonic) else 0
@@ -258,24 +255,19 @@ def _unfit_tables(scenario: Scenario) -> Iterator[Mistake]:
         for one, partners in scenario.pairs.items():
             for other in (name for name, pair in partners.items() if pair.normal_stiffness is not None):
                 yield Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
-    for name, block in scenario.blocks.items():
-        if block.size_x == 0.0:
-            continue
-        density = scenario.materials[block.material].density
-        mass = density * block.size_x * block.size_y * block.depth
-        inertia = mass * (block.size_x * block.size_x + block.size_y * block.size_y) / 12.0
-        if block.polygon:
-            mass, inertia = (density * block.depth * moment for moment in geometry.section_of(block.polygon))
-        if why := _why_impossible(mass, inertia):
+    for name in [name for name, block in scenario.blocks.items() if block.size_x > 0.0]:
+        (body,) = placement.place_blocks(scenario, name, [(name, base.Pose(0.0, 0.0))], fixed=False)
+        if why := _why_impossible(body):
             yield Mistake(("blocks", name), f"{why}; check its sides and density")
 
 
-def _why_impossible(mass: float, inertia: float) -> str:
+def _why_impossible(body: PlacedBody) -> str:
+    mass, inertia = body.mass, body.inertia
     is_possible = 0.0 < inertia < math.inf and 0.0 < mass < math.inf
     return "" if is_possible else f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
 
 
-def _endless(origins: Sequence[KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
+def _endless(origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find bodies with places or velocities beyond all numbers, or else outlines with such masses; one an origin."""
     numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
     values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
@@ -286,9 +278,9 @@ def _endless(origins: Sequence[KeyPath], bodies: Sequence[PlacedBody]) -> Iterat
             f"({body.vx:g}, {body.vy:g}) m/s and a spin of {body.spin:g} rad/s; check the keys of its structure"
         )
         yield Mistake(origin, message)
-    told: set[KeyPath] = set()
+    told: set[overrides.KeyPath] = set()
     for origin, body in () if lost else zip(origins, bodies, strict=True):
-        if body.outline and origin not in told and (why := _why_impossible(body.mass, body.inertia)):
+        if body.outline and origin not in told and (why := _why_impossible(body)):
             told.add(origin)
             yield Mistake(origin, f"body {body.name}: {why}")
 
@@ -326,7 +318,7 @@ def _unfit_lengths(scenario: Scenario, smallest: float, farthest: float) -> Iter
         message = f"{_mm(skin)} is too small; at least {_mm(least)} is needed, {why}"
         yield Mistake(("contact", "skin"), message, relation=True)
     points = scenario.ground.profile or ()
-    pieces: list[tuple[KeyPath, float]]
+    pieces: list[tuple[overrides.KeyPath, float]]
     pieces = [(("ground", "profile", number), math.dist(*two)) for number, two in enumerate(pairwise(points), start=1)]
     pieces += [(("walls", number), math.dist(wall.start, wall.end)) for number, wall in enumerate(scenario.walls)]
     for path, size in pieces:
@@ -336,7 +328,9 @@ def _unfit_lengths(scenario: Scenario, smallest: float, farthest: float) -> Iter
             yield Mistake(path, message, relation=True)
 
 
-def _overlaps(scenario: Scenario, origins: Sequence[KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
+def _overlaps(
+    scenario: Scenario, origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody]
+) -> Iterator[Mistake]:
     """Find bodies in the ground, each with its largest depth, bodies in walls, and bodies in one another."""
     if scenario.ground.profile is None:
         bottom = overlap.Outlines.of(bodies).bottom

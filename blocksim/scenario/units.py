@@ -17,8 +17,7 @@ Dimension = tuple[int, int, int, int]
 
 USUAL_GRAVITY = 9.81
 """m/s²; the default of scenarios; turns a unit weight into a density, as in the paper, whatever gravity there is."""
-STANDARD_GRAVITY = 9.80665
-"""m/s²; the g of accelerograms, and the unit g0."""
+STANDARD_GRAVITY = 9.80665  # m/s²; the g of accelerograms, and the unit g0
 DEGREE = Fraction(math.pi) / 180
 """One degree in radians; built on the float pi, so that "180 deg" is `math.pi` to the last bit."""
 
@@ -82,8 +81,7 @@ _EXPRESSION = re.compile(rf"{_FACTOR}(?:[ ]?[*/·][ ]?{_FACTOR}|[ ]{_FACTOR})*")
 _PART = re.compile(r"([*/·]?)[ ]?([A-Za-zµμ°_]+[0-9]?)(?:\^(-?[0-9]+))?")
 _SUPERSCRIPTS = str.maketrans({"²": "^2", "³": "^3"})
 _MAX_LENGTH = 40
-LEAST_SHARE = 0.5
-"""Of letters that a unit has in common with one that is suggested for it."""
+LEAST_SHARE = 0.5  # of letters that a unit has in common with one that is suggested for it
 
 
 def parse_unit(text: str) -> Unit:

@@ -167,8 +167,7 @@ class SystemTable(Table):
         yield from ()
 
 
-SYSTEMS: dict[str, type[SystemTable]] = {}
-"""Table of a scenario and its model."""
+SYSTEMS: dict[str, type[SystemTable]] = {}  # table of a scenario and its model
 
 
 def read_tables(held: Any, info: pydantic.ValidationInfo) -> dict[str, tuple[SystemTable, ...]]:

@@ -17,8 +17,7 @@ Kernel = Literal["wendland-c2", "cubic-spline", "quintic-spline"]
 
 SUPPORT: dict[Kernel, float] = {"wendland-c2": 2.0, "cubic-spline": 2.0, "quintic-spline": 3.0}
 """Radius at which a kernel function ends, in smoothing lengths."""
-SPACINGS_PER_LENGTH = 1.3
-"""Smoothing length by default, in particle spacings."""
+SPACINGS_PER_LENGTH = 1.3  # smoothing length by default, in particle spacings
 LEAST_SPACINGS = 0.8
 """Least smoothing length, in particle spacings; below it a particle may have no neighbour on a flat side."""
 NO_FIXED_STIFFNESS = 'law "hertz-mindlin" takes it from the materials and contact_radius; use stiffness_scale'

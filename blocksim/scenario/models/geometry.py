@@ -20,8 +20,7 @@ SIDES: tuple[Side, ...] = ("width", "height", "length")
 RECTANGLE_KEYS = (*SIDES, "upright", "along")
 OUTLINE_KEYS = {"outline": ("outline", "depth"), "sides": ("sides", "radius", "depth")}
 """What a block needs that is no rectangle, by the key that tells so."""
-ABSENT = object()
-"""In place of a value that is missing."""
+ABSENT = object()  # in place of a value that is missing
 Point = tuple[q.Length, q.Length]
 
 

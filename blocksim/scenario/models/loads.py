@@ -126,8 +126,7 @@ HISTORIES: dict[str, type[base.Table]] = base.by_kind(AnyHistory)
 Axes = Literal["world", "body"]
 Face = Literal["left", "right", "top", "bottom"]
 FACES: tuple[Face, ...] = get_args(Face)
-WATER = 9810.0
-"""N/m³; unit weight of water."""
+WATER = 9810.0  # N/m³; unit weight of water
 BODY = setting("the name of the body that it acts on (without a name, its number)")
 
 
@@ -229,10 +228,8 @@ class Gravity(Load, _Sampled):
 
 AnyLoad = Annotated[Force | Moment | Pressure | Horizontal | Gravity, Field(discriminator="kind")]
 """Any load, distinguished by its `kind`."""
-LOADS: dict[str, type[Load]] = base.by_kind(AnyLoad)
-"""Class by kind, as written in a scenario."""
-OnBody = Force | Moment | Pressure
-"""Those that act on one body."""
+LOADS: dict[str, type[Load]] = base.by_kind(AnyLoad)  # class by kind, as written in a scenario
+OnBody = Force | Moment | Pressure  # those that act on one body
 
 
 def stretches_of(load: AnyLoad, tilt: float) -> tuple[Stretch, ...]:

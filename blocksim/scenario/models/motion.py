@@ -228,10 +228,8 @@ class FromTable(Table):
 
 MOST_CYCLES = 1000.0
 Shape = Literal["sine", "half-sine", "rectangular", "cosine"]
-SINGLE = ("half-sine", "rectangular")
-"""Shapes of half a cycle, which do not repeat."""
-ABRUPT = ("rectangular", "cosine")
-"""Shapes that begin at their largest acceleration."""
+SINGLE = ("half-sine", "rectangular")  # shapes of half a cycle, which do not repeat
+ABRUPT = ("rectangular", "cosine")  # shapes that begin at their largest acceleration
 Acceleration = Annotated[float, q.Quantity(q.ACCELERATION, above=0.0)]
 
 
@@ -351,14 +349,10 @@ _AT2 = re.compile(r"NPTS\s*=\s*(\d+)\s*,?\s*DT\s*=\s*([0-9.]+(?:[ED][+-]?\d+)?)"
 _OLD_AT2 = re.compile(r"^\s*(\d+)\s+([0-9.]+(?:[ED][+-]?\d+)?)\s+NPTS\s*,?\s*DT", re.IGNORECASE)
 _OTHER = re.compile(r"\b(velocity|displacement)\b", re.IGNORECASE)
 _IN_UNITS = re.compile(r"\bUNITS?\b(?:\s+OF|\s*[:=])?\s*(.*)$", re.IGNORECASE)
-HEAD_LINES = 8
-"""Lines among which the one with NPTS and DT is looked for."""
-GAP = 1.5
-"""Steps between two samples above which some are missing."""
-UNEVEN = 0.25
-"""Steps by which a time may be off from a constant step: files round them."""
-Line = tuple[int, str]
-"""Number (from 1) and text of a line of the file."""
+HEAD_LINES = 8  # lines among which the one with NPTS and DT is looked for
+GAP = 1.5  # steps between two samples above which some are missing
+UNEVEN = 0.25  # steps by which a time may be off from a constant step: files round them
+Line = tuple[int, str]  # number (from 1) and text of a line of the file
 
 
 @dataclass(frozen=True)
@@ -516,7 +510,5 @@ class Record(Table):
 
 AnyMotion = Annotated[Harmonic | FromTable | Pulse | Record, Field(discriminator="kind")]
 """Any prescribed motion, distinguished by its `kind`."""
-MOTIONS: dict[str, type[Table]] = by_kind(AnyMotion)
-"""Class by kind, as written in a scenario."""
-TABLED = (FromTable, Record)
-"""Those that read a file, named by the key `table`."""
+MOTIONS: dict[str, type[Table]] = by_kind(AnyMotion)  # class by kind, as written in a scenario
+TABLED = (FromTable, Record)  # those that read a file, named by the key `table`

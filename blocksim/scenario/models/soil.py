@@ -20,8 +20,7 @@ Start = Literal["geostatic", "ramp"]
 Gradient = Literal["raw", "corrected"]
 MOST_PARTICLES = 1_000_000
 LEAST_ACROSS = 4
-SPACINGS_A_SIDE = 8
-"""Least number of spacings along the smallest side of all blocks."""
+SPACINGS_A_SIDE = 8  # least number of spacings along the smallest side of all blocks
 MILLI = 1e3
 SHAPES: dict[str, tuple[str, ...]] = {"outline": ("outline",), "rectangle": ("x", "y"), "slope": ("x", "y", "angle")}
 """Keys that give the shape, by kind."""

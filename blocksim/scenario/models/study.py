@@ -226,8 +226,7 @@ MAX_SAMPLES = 1_000_000
 MAX_SEED = 2**53
 
 Mode = Literal["grid", "list", "table", "lhs", "sobol", "normal"]
-SAMPLED = ("lhs", "sobol", "normal")
-"""Modes that draw `samples` values of every key."""
+SAMPLED = ("lhs", "sobol", "normal")  # modes that draw `samples` values of every key
 KEYS_OF = {"samples": SAMPLED, "seed": SAMPLED, "table": ("table",)}
 """Keys of [sweep] that only some modes have."""
 

@@ -17,8 +17,7 @@ MOST_SLIPS = 2
 """Most typing errors of a scheme, so that its keys are checked as those of the scheme meant."""
 MOST_SUBSTEPS = 1000
 MOST_SWEEPS = 1_000_000
-LEAST_TOLERANCE = 1e-12
-"""Of velocities in m/s; sums of impulses are not more exact."""
+LEAST_TOLERANCE = 1e-12  # of velocities in m/s; sums of impulses are not more exact
 _TOLERANCE = q.Quantity(q.SPEED, at_least=LEAST_TOLERANCE)
 
 
@@ -234,5 +233,4 @@ class EnergyProbe(Probe):
 
 AnyProbe = Annotated[ForceProbe | PointProbe | JointProbe | EnergyProbe, Field(discriminator="kind")]
 """Any probe, distinguished by its `kind`."""
-PROBES: dict[str, type[Probe]] = by_kind(AnyProbe)
-"""Class by kind, as written in a scenario."""
+PROBES: dict[str, type[Probe]] = by_kind(AnyProbe)  # class by kind, as written in a scenario

@@ -16,5 +16,4 @@ AnyStructure = Annotated[
 ]
 """Any structure of a scenario, distinguished by its `kind`."""
 
-KINDS: dict[str, type[Structure]] = by_kind(AnyStructure)
-"""Class by kind, as written in a scenario."""
+KINDS: dict[str, type[Structure]] = by_kind(AnyStructure)  # class by kind, as written in a scenario

@@ -13,10 +13,8 @@ from blocksim.scenario import geometry, units as q
 from blocksim.scenario.models.base import Table, Whole, setting
 from blocksim.scenario.models.geometry import Block
 
-MAX_COUNT = 100_000
-"""Of courses, or of blocks in a row."""
-MAX_BLOCKS = 1_000_000
-"""In a structure, and in a scenario."""
+MAX_COUNT = 100_000  # of courses, or of blocks in a row
+MAX_BLOCKS = 1_000_000  # in a structure, and in a scenario
 MAX_SEED = 2**32 - 1
 
 Floats = NDArray[np.float64]

@@ -98,8 +98,7 @@ class Column(PolygonStructure):
 
 MOST_CELLS = 5000
 MOST_ROUNDS = 20
-TRIALS = 8
-"""Random points in the box for each cell; a thin region has fewer cells."""
+TRIALS = 8  # random points in the box for each cell; a thin region has fewer cells
 LEAST_EDGE, LEAST_WIDTH = 0.02, 0.1
 """Shortest edge of a cell and its least width by default, in sides of a square of the mean area."""
 
@@ -152,7 +151,9 @@ class Voronoi(PolygonStructure):
         random = draws(self.seed, TRIALS * self.count, 2).tolist()
         places = ((left + u * (right - left), bottom + v * (top - bottom)) for u, v in random)
         inside = [place for place in places if geometry.holds(whole, place, 0.0)]
-        points = geometry.relax_points(inside[: self.count] or [geometry.centroid(whole)], whole, self.relax)
+        points = inside[: self.count] or [geometry.centroid(whole)]
+        for _ in range(self.relax):  # Lloyd
+            points = [geometry.centroid(cell) for cell in geometry.voronoi(points, whole)]
         side = math.sqrt(geometry.area_of(whole) / self.count)
         least = LEAST_WIDTH * side if self.smallest is None else self.smallest
         for _ in range(MOST_ROUNDS if points else 0):
@@ -170,12 +171,9 @@ class Voronoi(PolygonStructure):
 
 MOST_BLOCKS = 20_000
 MOST_SIDES = 10
-JITTER = 0.35
-"""Largest shift of a corner along its ellipse, in distances of corners."""
-FLATTEST = 0.6
-"""Shorter over longer axis of the flattest ellipse."""
-PER_BLOCK = 4
-"""Random numbers of a block beside those of its corners."""
+JITTER = 0.35  # largest shift of a corner along its ellipse, in distances of corners
+FLATTEST = 0.6  # shorter over longer axis of the flattest ellipse
+PER_BLOCK = 4  # random numbers of a block beside those of its corners
 
 
 class Rubble(PolygonStructure):

@@ -22,8 +22,13 @@ class Stack(Structure):
 
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from the ground up."""
-        first = self.left + block.size_x / 2
-        return [Pose(first + i * self.offset, self.bottom + (i + 0.5) * block.size_y) for i in range(self.count)]
+        return _pile(self, block, self.count, self.offset)
+
+
+def _pile(structure: Structure, block: geometry.Block, count: int, step: float) -> Sequence[Pose]:
+    """Return the poses of blocks on one another, from the ground up, each a step (m) farther along x."""
+    first = structure.left + block.size_x / 2
+    return [Pose(first + i * step, structure.bottom + (i + 0.5) * block.size_y) for i in range(count)]
 
 
 class Staircase(Structure):
@@ -38,9 +43,7 @@ class Staircase(Structure):
         if self.overlap > block.size_x:
             message = f"{self.overlap * 1e3:g} mm is more than the block's {block.size_x * 1e3:g} mm along x"
             raise UnfitError("overlap", message)
-        step = block.size_x - self.overlap
-        first = self.left + block.size_x / 2
-        return [Pose(first + i * step, self.bottom + (i + 0.5) * block.size_y) for i in range(self.count)]
+        return _pile(self, block, self.count, block.size_x - self.overlap)
 
 
 Bond = Literal["running", "stack"]

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
-Table = dict[str, list[Any]]
-"""Columns of a table by their names."""
+Table = dict[str, list[Any]]  # columns of a table by their names
 
 
 @dataclass(frozen=True)
