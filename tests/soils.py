@@ -88,4 +88,4 @@ class Soil(Simulation):
 
     def entries(self) -> dict[str, float]:
         """Return the entries (J) of the ledger."""
-        return dict(zip(ledger_names(self.scene), self.measured().tolist(), strict=False))
+        return dict(zip(ledger_names(self.scene), self.ledger_row().tolist(), strict=False))

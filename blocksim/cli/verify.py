@@ -9,8 +9,8 @@ from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
 from blocksim.simulation.schemes import SCHEMES
-from blocksim.verification.case import Outcome, Setting, run_case
-from blocksim.verification.cases import choose_cases, excluded_cases
+from blocksim.verification.case import CaseOutcome, Setting, run_case
+from blocksim.verification.cases import choose_cases, exclusions
 
 COLUMNS = ("quantity", "expected", "measured", "error", "tolerance", "verdict")
 
@@ -38,7 +38,7 @@ def verify_command(
     setting = Setting(model, law, quick, scheme)
     wanted = choose_cases(cases or [], setting, soil=soil)
     prepare.announce_compilation(SCHEMES[setting.scheme].kernels(setting.model), quiet=screen.silent)
-    outcomes: list[Outcome] = []
+    outcomes: list[CaseOutcome] = []
     try:
         under_way = progress.one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=screen.silent)
         outcomes.extend(run_case(case, setting) for case in under_way)
@@ -47,11 +47,11 @@ def verify_command(
             screen.print(_report(outcomes))
         raise
     report = _report(outcomes)
-    missing = () if cases or soil else excluded_cases(setting.scheme)
+    missing = () if cases or soil else exclusions(setting.scheme)
     return replace(report, notes=[*report.notes, f"left out: {'; '.join(missing)}"]) if missing else report
 
 
-def _report(outcomes: list[Outcome]) -> command_line.Report:
+def _report(outcomes: list[CaseOutcome]) -> command_line.Report:
     groups = []
     for outcome in outcomes:
         case, texts = outcome.case, [row.texts for row in outcome.rows]
@@ -65,7 +65,7 @@ def _report(outcomes: list[Outcome]) -> command_line.Report:
     )
 
 
-def _notes(outcomes: list[Outcome]) -> Iterator[str]:
+def _notes(outcomes: list[CaseOutcome]) -> Iterator[str]:
     missed = [outcome for outcome in outcomes if not outcome.inside]
     for outcome in missed:
         count = sum(not row.is_inside for row in outcome.rows)

@@ -41,7 +41,7 @@ over,limit [m],series
 Point = tuple[float, float]
 
 
-class Joint(NamedTuple):
+class ArchJoint(NamedTuple):
     """A joint at an angle (rad) from the crown, weight of what is between both, and its moment about the crown."""
 
     angle: float
@@ -49,14 +49,14 @@ class Joint(NamedTuple):
     moment: float
 
 
-def voussoirs(count: int, thickness: float) -> list[Joint]:
+def voussoirs(count: int, thickness: float) -> list[ArchJoint]:
     """Return the joints on one side of an arch of mean radius 1; faces of voussoirs are straight between joints."""
     inner, outer = 1.0 - 0.5 * thickness, 1.0 + 0.5 * thickness
     turn = pi / count
     first = [0.0] if count % 2 else []  # the crown is in the middle of a voussoir
     angles = [*first, *(turn * (number + 0.5 * (count % 2)) for number in range(count // 2 + 1))]
     weight = moment = 0.0
-    joints = [] if first else [Joint(0.0, 0.0, 0.0)]
+    joints = [] if first else [ArchJoint(0.0, 0.0, 0.0)]
     for begin, end in pairwise(angles):
         places = [(inner, end), (outer, end), (outer, begin), (inner, begin)]
         corners = [(radius * sin(angle), radius * cos(angle)) for radius, angle in places]
@@ -64,17 +64,17 @@ def voussoirs(count: int, thickness: float) -> list[Joint]:
             corners[2:] = [(0.0, outer * cos(end)), (0.0, inner * cos(end))]
         weight += area_of(corners)
         moment += area_of(corners) * centroid(corners)[0]
-        joints.append(Joint(end, weight, moment))
+        joints.append(ArchJoint(end, weight, moment))
     return joints
 
 
-def ring(count: int) -> list[Joint]:
+def ring(count: int) -> list[ArchJoint]:
     """Return so many joints of a ring whose weight lies on its centre line, as Cocchetti and Rizzi have it."""
     angles = np.linspace(0.0, 0.5 * pi, count).tolist()
-    return [Joint(angle, angle, 1.0 - cos(angle)) for angle in angles]
+    return [ArchJoint(angle, angle, 1.0 - cos(angle)) for angle in angles]
 
 
-def stands(joints: Sequence[Joint], thickness: float, friction: float) -> bool:
+def stands(joints: Sequence[ArchJoint], thickness: float, friction: float) -> bool:
     """Return True where some thrust and moment at the crown let every joint carry what is above it.
 
     A joint needs a thrust + b moment >= c, for both senses of sliding and both of its ends. Normal force N = H cos +

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from blocksim.kernels.common.arrays import World
@@ -63,19 +64,10 @@ class Row:
         }
 
 
-def absolute(quantity: str, unit: str, expected: float, measured: float, tolerance: float) -> Row:
-    """Return a row whose tolerance is in the unit."""
-    return Row(quantity, unit, float(expected), float(measured), tolerance)
-
-
-def relative(quantity: str, unit: str, expected: float, measured: float, tolerance: float) -> Row:
-    """Return a row whose tolerance is a share of the expected number."""
-    return Row(quantity, unit, float(expected), float(measured), tolerance, relative=True)
-
-
-def at_least(quantity: str, unit: str, bound: float, measured: float) -> Row:
-    """Return a row that is inside where the measured number is not below the bound."""
-    return Row(quantity, unit, bound, float(measured), 0.0, at_least=True)
+relative = partial(Row, relative=True)
+"""A row whose tolerance is a share of the expected number."""
+at_least = partial(Row, tolerance=0.0, at_least=True)
+"""A row that is inside where the measured number is not below the expected one."""
 
 
 def count(quantity: str, expected: int, measured: int) -> Row:
@@ -144,7 +136,7 @@ def farthest(expected: float, values: Iterable[float]) -> float:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CaseOutcome:
     """Measurements of a case."""
 
     case: Case
@@ -187,9 +179,9 @@ class Outcome:
         ]
 
 
-def run_case(case: Case, setting: Setting) -> Outcome:
+def run_case(case: Case, setting: Setting) -> CaseOutcome:
     """Run one case; with rigid contacts in full, as that is quick."""
     setting = setting if setting.has_springs else replace(setting, quick=False)
     began = time.perf_counter()
     rows = tuple(case.measure(setting))
-    return Outcome(case, setting, rows, time.perf_counter() - began)
+    return CaseOutcome(case, setting, rows, time.perf_counter() - began)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.scenario.models.timeline import IMPULSES
-from blocksim.verification import collapse, energy, impacts, resting, toppling
+from blocksim.verification import collapse, energy, impacts, statics, toppling
 from blocksim.verification.case import Case, Setting
 from blocksim.verification.soil import SOIL_CASES
 
@@ -44,7 +44,7 @@ CASES = (
         "V2",
         "static overlap on the ground",
         "weight = contact force",
-        resting.static_overlap,
+        statics.static_overlap,
         remarks=SETTLING,
         not_for={IMPULSES: "rigid blocks have no stiffness; their overlap follows from the step, see blocksim check"},
     ),
@@ -59,13 +59,13 @@ CASES = (
     ),
     Case("V5", "corner impact without friction", "impulse and moment", impacts.frictionless_corner, remarks=ROUNDING),
     Case("V6", "corner impact that sticks", "impulse and moment", impacts.sticking_corner),
-    Case("V7", "sliding to a stop on level ground", "Eq 13", resting.sliding_to_rest, remarks=BUMPS),
-    Case("V8", "sliding down a slope of 30°", "g (sin a − μ cos a)", resting.slope, remarks=BUMPS),
+    Case("V7", "sliding to a stop on level ground", "Eq 13", statics.sliding_to_rest, remarks=BUMPS),
+    Case("V8", "sliding down a slope of 30°", "g (sin a − μ cos a)", statics.slope, remarks=BUMPS),
     Case(
         "V9",
         "sticking below the friction angle, sliding above",
         "arctan μ",
-        resting.friction_angle,
+        statics.friction_angle,
         "creep over 1–2 s instead of 5–10 s",
         BUMPS,
     ),
@@ -76,7 +76,7 @@ CASES = (
         "V13",
         "overhanging stacks at their limit",
         "moments about edges",
-        resting.overhanging_stacks,
+        statics.overhanging_stacks,
         "linear law: a hundredth of the stiffness",
         ROUNDING | FEW_AT_EDGES,
     ),
@@ -84,7 +84,7 @@ CASES = (
         "V14",
         "stack of ten blocks",
         "rest",
-        resting.tower,
+        statics.tower,
         "creep over 0.5–1 s instead of 5–10 s, a hundredth of the stiffness",
     ),
     Case("V15", "kinetic energy in 4950 impacts", "no gain", energy.impacts),
@@ -155,12 +155,12 @@ def choose_cases(ids: Sequence[str], setting: Setting, *, soil: bool = False) ->
         known = f"{CASES[0].id} to {CASES[-1].id}"
         wrong = f"case of soil; choose {', '.join(case.id for case in table)}" if soil else f"case; choose {known}"
         raise UnknownCaseError(f"{', '.join(unknown)}: no such {wrong}")
-    foreign = [reason for reason in excluded_cases(scheme) if reason.split()[0] in wanted]
+    foreign = [reason for reason in exclusions(scheme) if reason.split()[0] in wanted]
     if foreign:
         raise SettingError(f"not for --scheme {scheme}: {'; '.join(foreign)}")
     return tuple(case for case in table if scheme not in case.not_for and (not wanted or case.id in wanted))
 
 
-def excluded_cases(scheme: str) -> tuple[str, ...]:
+def exclusions(scheme: str) -> tuple[str, ...]:
     """Return the cases that do not apply to a scheme, each with the reason."""
     return tuple(f"{case.id} ({case.not_for[scheme]})" for case in CASES if scheme in case.not_for)

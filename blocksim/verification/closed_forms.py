@@ -121,7 +121,7 @@ def harmonic_offsets(count: int, width: float) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True)
-class Motion:
+class Velocity:
     """Velocity of the centre (m/s) and spin (rad/s, counter-clockwise positive)."""
 
     vx: float
@@ -137,8 +137,8 @@ def lowest_corner(width: float, height: float, tilt: float) -> tuple[float, floa
 
 
 def corner_impact(
-    mass: float, inertia: float, arm: tuple[float, float], before: Motion, restitution: float, *, sticks: bool
-) -> Motion:
+    mass: float, inertia: float, arm: tuple[float, float], before: Velocity, restitution: float, *, sticks: bool
+) -> Velocity:
     """Return the motion after an impact at the corner `arm` (m from the centre), without friction or where it sticks.
 
     Without friction the impulse J along y changes the corner's normal velocity by J (1/m + r_x^2/I), which must be
@@ -154,7 +154,7 @@ def corner_impact(
         coupling = -x * y / inertia
         inverse_mass = np.array([[1.0 / mass + y * y / inertia, coupling], [coupling, 1.0 / mass + x * x / inertia]])
         along, up = np.linalg.solve(inverse_mass, np.array([0.0, -restitution * corner[1]]) - corner).tolist()
-    return Motion(before.vx + along / mass, before.vy + up / mass, before.spin + (x * up - y * along) / inertia)
+    return Velocity(before.vx + along / mass, before.vy + up / mass, before.spin + (x * up - y * along) / inertia)
 
 
 def rocking_quarter_time(width: float, height: float, tilt: float, gravity: float = GRAVITY) -> float:

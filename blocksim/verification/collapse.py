@@ -7,9 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import World
-from blocksim.verification import closed_forms as forms
-from blocksim.verification.case import Row, Setting, absolute, at_least
-from blocksim.verification.resting import CONTACT_RADIUS, resting_overlap
+from blocksim.verification import case, closed_forms as forms, statics
 from blocksim.verification.scene import HEIGHT, Simulation, Throw, Thrower
 
 SIZES = {"width": 0.032, "height": 0.05, "length": 0.025}  # m, upright = "length"
@@ -30,14 +28,14 @@ def staircase(order: Sequence[int] = (0, 1, 2), side: float = 1.0, shift: float 
     return [{"x": shift + side * (0.016 + STEP_X * level), "y": 0.025 + 0.05 * level, **SIZES} for level in order]
 
 
-def collapse(setting: Setting, restitution: float, spacing: float = 1e-3, scale: float = 1.0) -> Simulation:
+def collapse(setting: case.Setting, restitution: float, spacing: float = 1e-3, scale: float = 1.0) -> Simulation:
     """Let go of the three blocks; they stop once they rest."""
     contact = {"particle_spacing": spacing, "stiffness_scale": scale}
     time = {"stop_at_rest": True, "end": LONGEST}
     return setting.start(staircase(), restitution=restitution, contact=contact, time=time)
 
 
-def before_impact(setting: Setting) -> Iterator[Row]:
+def before_impact(setting: case.Setting) -> Iterator[case.Row]:
     """Compare positions and angles of blocks 2 and 3 at four times; the farthest off counts.
 
     Restitution 0, as in V22: no impact yet, but the weight comes suddenly upon the springs at the start, and the rigid
@@ -48,17 +46,17 @@ def before_impact(setting: Setting) -> Iterator[Row]:
         upper = scene.to_time(time).bodies[1:]
         places = np.array([1e3 * upper.x, 1e3 * upper.y, np.degrees(upper.angle)]).T
         off = np.abs(places - np.array(blocks)).max(axis=0)
-        yield absolute(f"{time:.2f} s, place off by", "mm", 0.0, max(off[0], off[1]), 0.1)
-        yield absolute(f"{time:.2f} s, angle off by", "°", 0.0, off[2], 0.15)
+        yield case.Row(f"{time:.2f} s, place off by", "mm", 0.0, max(off[0], off[1]), 0.1)
+        yield case.Row(f"{time:.2f} s, angle off by", "°", 0.0, off[2], 0.15)
 
 
-def at_rest(setting: Setting) -> Iterator[Row]:
+def at_rest(setting: case.Setting) -> Iterator[case.Row]:
     """Compare the final places with those that ten independent engines agree on."""
     bodies = collapse(setting, 0.0).to_time(LONGEST).bodies
     for block, x, tolerance, angle in FINAL:
         allowed = HERTZ_TOLERANCE if setting.hertzian else tolerance
-        yield absolute(f"block {block}, x", "mm", x, 1e3 * bodies[block - 1].x, allowed)
-        yield absolute(f"block {block}, angle", "°", angle, np.degrees(bodies[block - 1].angle), 0.5)
+        yield case.Row(f"block {block}, x", "mm", x, 1e3 * bodies[block - 1].x, allowed)
+        yield case.Row(f"block {block}, angle", "°", angle, np.degrees(bodies[block - 1].angle), 0.5)
 
 
 BEFORE, AFTER = 0.2, 0.45  # s: just before the first impact; all impacts are over
@@ -70,7 +68,7 @@ SAME, REORDERED = 1e-9, 1e-6  # m, before impacts
 SOLVED = {"velocity_tolerance": 1e-12}  # m/s: round-off may decide on one sweep more or less of rigid contacts
 
 
-def symmetries(setting: Setting) -> Iterator[Row]:
+def symmetries(setting: case.Setting) -> Iterator[case.Row]:
     """Let the three blocks collapse in a mirror, under other numbers, and one metre aside.
 
     Rigid contacts are gone through one after the other, in an order that goes by the numbers of blocks, once a position
@@ -98,8 +96,8 @@ def symmetries(setting: Setting) -> Iterator[Row]:
         ),
     ):
         before, after = (distance(one, two) for one, two in zip(usual, others, strict=True))
-        yield absolute(f"{name}, before impacts", "m", 0.0, before, allowed)
-        yield absolute(f"{name}, at the end", "mm", 0.0, 1e3 * after, 0.05)
+        yield case.Row(f"{name}, before impacts", "m", 0.0, before, allowed)
+        yield case.Row(f"{name}, at the end", "mm", 0.0, 1e3 * after, 0.05)
 
 
 def distance(one: NDArray[np.float64], two: NDArray[np.float64]) -> float:
@@ -108,7 +106,7 @@ def distance(one: NDArray[np.float64], two: NDArray[np.float64]) -> float:
     return float(max(apart[:, :2].max(), CORNER * apart[:, 2].max()))
 
 
-def fixed_block(setting: Setting) -> Iterator[Row]:
+def fixed_block(setting: case.Setting) -> Iterator[case.Row]:
     """Let a tilted block slide and tumble over the ground and over a fixed block, at one step: the same motion."""
     body = {"y": HEIGHT, "angle": 0.4, "velocity": [0.3, -0.5]}
     fixed = {"x": 0.0, "y": 0.05, "width": 1.0, "height": 0.1, "fixed": True}
@@ -118,7 +116,7 @@ def fixed_block(setting: Setting) -> Iterator[Row]:
     for time in np.linspace(0.0, LANDING, 31)[1:]:
         one, two = (scene.to_time(float(time)).state()[:1] for scene in (ground, plinth))
         apart = max(apart, distance(one, two - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])))
-    yield absolute("motions apart", "µm", 0.0, 1e6 * apart, 1.0)
+    yield case.Row("motions apart", "µm", 0.0, 1e6 * apart, 1.0)
 
 
 ORDER = 1.8
@@ -132,19 +130,19 @@ RUN_OUT_BOUND = 1.0  # mm
 SOFT = 0.01  # stiffness scale of the run-out
 
 
-def convergence(setting: Setting) -> Iterator[Row]:
+def convergence(setting: case.Setting) -> Iterator[case.Row]:
     """Order in dt of an oscillation and of the restitution; change of the run-out when the spacing is halved."""
     coarse, middle, fine = (oscillation(setting, refinement) for refinement in REFINEMENTS)
-    yield at_least("oscillation, order in dt", "", ORDER, np.log2(rms(coarse - middle) / rms(middle - fine)))
+    yield case.at_least("oscillation, order in dt", "", ORDER, np.log2(rms(coarse - middle) / rms(middle - fine)))
     errors = []
     for safety in SAFETIES:  # of flat impacts that begin at different phases of a step
         thrower = Thrower(setting, RESTITUTION, time={"safety": safety})
         throws = [thrower.throw(Throw(phase=(k + 0.5) / PHASES)).vy for k in range(PHASES)]
         errors.append(rms(np.array(throws) - RESTITUTION))
     order = np.log2(errors[0] / errors[-1]) / np.log2(SAFETIES[0] / SAFETIES[-1])
-    yield at_least("restitution, order in dt", "", ORDER, order)
+    yield case.at_least("restitution, order in dt", "", ORDER, order)
     one, half = (collapse(setting, 0.2, spacing, SOFT).to_time(LONGEST).bodies.x for spacing in (1e-3, 5e-4))
-    yield absolute("run-out, spacing halved", "mm", 0.0, 1e3 * float(np.abs(one - half).max()), RUN_OUT_BOUND)
+    yield case.Row("run-out, spacing halved", "mm", 0.0, 1e3 * float(np.abs(one - half).max()), RUN_OUT_BOUND)
 
 
 def rms(values: NDArray[np.float64]) -> float:
@@ -152,16 +150,16 @@ def rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def oscillation(setting: Setting, refinement: int) -> NDArray[np.float64]:
+def oscillation(setting: case.Setting, refinement: int) -> NDArray[np.float64]:
     """Return heights (m) at fixed times of an undamped block that starts half of its overlap too high: no lift-off."""
-    overlap = resting_overlap(setting)
+    overlap = statics.weight_overlap(setting)
     frequency = sqrt((1.5 if setting.hertzian else 1.0) * forms.GRAVITY / overlap)  # slope of d^1.5: 1.5 force/overlap
     step = COARSEST / frequency / refinement
 
     def press(world: World) -> None:
         world.bodies[0].y -= 0.5 * overlap
 
-    contact = {"contact_radius": CONTACT_RADIUS} if setting.hertzian else {}
+    contact = {"contact_radius": statics.CONTACT_RADIUS} if setting.hertzian else {}
     time = {"step": step, "force_step": True}
     scene = setting.start([{"y": HEIGHT / 2}], press, restitution=1.0, contact=contact, time=time)
     every = refinement * round(2.0 * np.pi / COARSEST * PERIODS / SAMPLES)

@@ -9,8 +9,7 @@ from pathlib import Path
 from blocksim.kernels.common.arrays import AT_REST, REACHED
 from blocksim.scenario import Document, Scenario, place_bodies
 from blocksim.simulation.schemes import build_scene
-from blocksim.verification.case import Row, Setting, absolute, at_least
-from blocksim.verification.scene import GOLDEN, Simulation, Throw, Thrower, kinetic_energy
+from blocksim.verification import case, scene
 
 ANGLES = tuple(range(90))  # degrees
 FRICTIONS = tuple(tenth / 10 for tenth in range(11))
@@ -33,40 +32,40 @@ CROWD_END_PARTICLES = 0.002  # s, for the models with boundary particles, which 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 
-def impacts(setting: Setting) -> Iterator[Row]:
+def impacts(setting: case.Setting) -> Iterator[case.Row]:
     """Throw a block at 90 angles with 11 frictions and 5 restitutions; the largest gain counts.
 
     With springs, also how fast the gain of elastic impacts without friction falls with the step.
     """
     throws = [
-        Throw(radians(angle), friction, (GOLDEN * number) % 1.0)
+        scene.Throw(radians(angle), friction, (scene.GOLDEN * number) % 1.0)
         for number, (angle, friction) in enumerate(product(ANGLES, FRICTIONS))
     ]
-    lossy = max(largest_gain(Thrower(setting, e), throws) for e in LOSSY)
-    yield absolute("gain, e ≤ 0.9", "", 0.0, max(lossy, 0.0), ROUND_OFF)
+    lossy = max(largest_gain(scene.Thrower(setting, e), throws) for e in LOSSY)
+    yield case.Row("gain, e ≤ 0.9", "", 0.0, max(lossy, 0.0), ROUND_OFF)
     bound = (2.0 * SAFETY) ** 2 / 4.0 if setting.has_springs else ROUND_OFF
-    yield absolute("gain, e = 1", "", 0.0, max(largest_gain(Thrower(setting, 1.0), throws), 0.0), bound)
+    yield case.Row("gain, e = 1", "", 0.0, max(largest_gain(scene.Thrower(setting, 1.0), throws), 0.0), bound)
     if setting.has_springs:
-        smooth = [Throw(radians(angle), phase=phase) for angle, phase in product(ANGLES[::9], PHASES)]
+        smooth = [scene.Throw(radians(angle), phase=phase) for angle, phase in product(ANGLES[::9], PHASES)]
         safeties = (2.0 * SAFETY, SAFETY / 2.0)
-        coarse, fine = (largest_gain(Thrower(setting, 1.0, time={"safety": one}), smooth) for one in safeties)
-        yield at_least("gain, e = 1, order in dt", "", 1.8, log2(coarse / fine) / 2.0 if fine > 0.0 else nan)
+        coarse, fine = (largest_gain(scene.Thrower(setting, 1.0, time={"safety": one}), smooth) for one in safeties)
+        yield case.at_least("gain, e = 1, order in dt", "", 1.8, log2(coarse / fine) / 2.0 if fine > 0.0 else nan)
 
 
-def largest_gain(thrower: Thrower, throws: Iterable[Throw]) -> float:
+def largest_gain(thrower: scene.Thrower, throws: Iterable[scene.Throw]) -> float:
     """Return the largest gain of kinetic energy in an impact, as a share of that before; negative for a loss."""
     before = 0.5 * float(thrower.world.bodies[0].mass)  # 1 m/s
-    return max(kinetic_energy(thrower.throw(throw)) / before - 1.0 for throw in throws)
+    return max(scene.kinetic_energy(thrower.throw(throw)) / before - 1.0 for throw in throws)
 
 
-def ledgers(setting: Setting) -> Iterator[Row]:
+def ledgers(setting: case.Setting) -> Iterator[case.Row]:
     """Run every shipped scenario, large ones for their first moments, and check the ledger at every output.
 
     The largest residual of a run counts, as a share of the energy in play; NaN where the run fails. A scenario keeps
     its own model and law unless the setting asks for others than the defaults, or has rigid contacts; and its own step.
     All can have rigid contacts; those that ship with them have no springs.
     """
-    usual = Setting()
+    usual = case.Setting()
     for path in sorted(SCENARIOS.glob("*.toml")):
         document = Document.read(path)
         own = document.build()
@@ -95,12 +94,12 @@ def ledgers(setting: Setting) -> Iterator[Row]:
             stiffness_scale = changes.get("contact.stiffness_scale", own.contact.stiffness_scale)
             changes["contact.stiffness_scale"] = STIFFER * float(str(stiffness_scale))
         scenario = document.with_values(changes).build()
-        yield absolute(name, "", 0.0, worst_residual(scenario), tolerance)
+        yield case.Row(name, "", 0.0, worst_residual(scenario), tolerance)
 
 
 def worst_residual(scenario: Scenario) -> float:
     """Return the largest residual of a run at its outputs, as a share of the energy in play; NaN where it fails."""
-    run, worst = Simulation(build_scene(scenario)), 0.0
+    run, worst = scene.Simulation(build_scene(scenario)), 0.0
     for k in range(1, round(scenario.time.end / scenario.output.every) + 1):
         worst = max(worst, run.to_time(k * scenario.output.every).residual())
         if run.status != REACHED:

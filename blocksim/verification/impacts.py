@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.verification import closed_forms as forms
-from blocksim.verification.case import Row, Setting, absolute, farthest, relative
+from blocksim.verification.case import Row, Setting, farthest, relative
 from blocksim.verification.scene import GOLDEN, HEIGHT, POLL, WIDTH, PaperBlock, Simulation, Throw, Thrower
 
 SPACINGS = (5e-4, 1e-3, 2e-3, 4e-3)  # m, of boundary particles
@@ -25,10 +25,10 @@ def free_flight(setting: Setting) -> Iterator[Row]:
     t, body = flight.time, flight.bodies[0]
     round_off = LARGEST * flight.steps * float(np.finfo(float).eps)
     aside, above = body.x - 1.5 * t, body.y - (2.0 + 2.5 * t - forms.fall_distance(t))
-    yield absolute("off the parabola", "m", 0.0, max(abs(aside), abs(above)), round_off)
-    yield absolute("off the speed", "m/s", 0.0, max(abs(body.vx - 1.5), abs(body.vy - 2.5 + 9.81 * t)), round_off)
-    yield absolute("off the angle", "rad", 0.0, abs(body.angle - 0.4 - 30.0 * t), round_off)
-    yield absolute("change of spin", "rad/s", 0.0, abs(body.spin - 30.0), round_off)
+    yield Row("off the parabola", "m", 0.0, max(abs(aside), abs(above)), round_off)
+    yield Row("off the speed", "m/s", 0.0, max(abs(body.vx - 1.5), abs(body.vy - 2.5 + 9.81 * t)), round_off)
+    yield Row("off the angle", "rad", 0.0, abs(body.angle - 0.4 - 30.0 * t), round_off)
+    yield Row("change of spin", "rad/s", 0.0, abs(body.spin - 30.0), round_off)
 
 
 def bounces(setting: Setting) -> Iterator[Row]:
@@ -73,7 +73,7 @@ ASKED = tuple(tenth / 10 for tenth in range(11))
 SPEEDS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # m/s
 LANDINGS = {"flat": 0.0, "corner": atan2(WIDTH, HEIGHT)}  # rad; the centre comes down upon the corner
 TILT = radians(30.0)
-FALLING = forms.Motion(0.0, -1.0, 0.0)
+FALLING = forms.Velocity(0.0, -1.0, 0.0)
 STICKING = 2.0  # friction coefficient
 EXACT = 1e-9  # m/s, rad/s: rigid impacts are those of the closed forms
 COLLISION_STEPS = 20_000
@@ -93,8 +93,8 @@ def restitution(setting: Setting) -> Iterator[Row]:
             body = thrower.throw(Throw(angle, phase=(GOLDEN * (number + 1 + 10 * asked)) % 1.0))
             errors[asked].append(float(body.vy) / speed - asked)
         worst = farthest(0.0, [error for asked in ASKED[1:] for error in errors[asked]])
-        yield absolute(f"{landing}, e ≥ 0.1, off by", "", 0.0, worst, 0.01)
-        yield absolute(f"{landing}, e = 0, rebound", "", 0.0, farthest(0.0, errors[0.0]), 0.01)
+        yield Row(f"{landing}, e ≥ 0.1, off by", "", 0.0, worst, 0.01)
+        yield Row(f"{landing}, e = 0, rebound", "", 0.0, farthest(0.0, errors[0.0]), 0.01)
 
 
 def frictionless_corner(setting: Setting) -> Iterator[Row]:
@@ -103,8 +103,8 @@ def frictionless_corner(setting: Setting) -> Iterator[Row]:
     for e in (0.0, 0.5):
         body = Thrower(setting, e).throw(Throw(TILT), POLL if setting.has_springs else 1)
         expected = forms.corner_impact(block.mass, block.inertia, arm, FALLING, e, sticks=False)
-        yield absolute(f"v_y at e = {e:g}", "m/s", expected.vy, body.vy, 0.01 if setting.has_springs else EXACT)
-        yield absolute(f"spin at e = {e:g}", "rad/s", expected.spin, body.spin, 0.5 if setting.has_springs else EXACT)
+        yield Row(f"v_y at e = {e:g}", "m/s", expected.vy, body.vy, 0.01 if setting.has_springs else EXACT)
+        yield Row(f"spin at e = {e:g}", "rad/s", expected.spin, body.spin, 0.5 if setting.has_springs else EXACT)
 
 
 def sticking_corner(setting: Setting) -> Iterator[Row]:
@@ -145,10 +145,10 @@ def two_blocks(setting: Setting) -> Iterator[Row]:
     mass = float(scenes[0].bodies.mass.sum())
     round_off = steps * float(np.finfo(float).eps) * mass  # speeds of 1 m/s
     turning = 0.1 * round_off if setting.has_springs else step * 0.25 * mass * 2.0  # arms of 0.1 m
-    yield absolute("momentum", "kg m/s", 0.0, max(worst[0], worst[1]), round_off)
-    yield absolute("angular momentum", "kg m²/s", 0.0, worst[2], turning)
+    yield Row("momentum", "kg m/s", 0.0, max(worst[0], worst[1]), round_off)
+    yield Row("angular momentum", "kg m²/s", 0.0, worst[2], turning)
     if not setting.has_springs:
-        yield from (absolute(f"rebound at e = {e:g}", "", e, rebound(collision(setting, e)), REBOUND) for e in REBOUNDS)
+        yield from (Row(f"rebound at e = {e:g}", "", e, rebound(collision(setting, e)), REBOUND) for e in REBOUNDS)
 
 
 def rebound(scene: Simulation) -> float:
@@ -163,13 +163,13 @@ def rebound(scene: Simulation) -> float:
     place, time = before.copy(), 0.0
     if scene.scene.contacts.stepping[0].is_divided:
         for _ in range(10):  # Newton's method
-            gap, speed = facing(before, place)
+            gap, speed = gap_and_speed(before, place)
             time -= gap / speed
             place[:, :3] = before[:, :3] + time * before[:, 3:]
-    return -facing(after, place)[1] / facing(before, place)[1]
+    return -gap_and_speed(after, place)[1] / gap_and_speed(before, place)[1]
 
 
-def facing(state: NDArray[np.float64], place: NDArray[np.float64]) -> tuple[float, float]:
+def gap_and_speed(state: NDArray[np.float64], place: NDArray[np.float64]) -> tuple[float, float]:
     """Return the gap (m) between corner and face, and the speed (m/s) in a state at which they part.
 
     Places and angles are those of another state.
@@ -205,12 +205,12 @@ def seats(setting: Setting) -> Iterator[Row]:
     for name, ends in SEATS.items():
         landings = [(asked, land(setting, ends, asked)) for asked in SEAT_RESTITUTIONS]
         rebounds = [vy - asked for asked, (vy, _) in landings]
-        yield absolute(f"{name}, e off by", "", 0.0, farthest(0.0, rebounds), 0.01)
-        yield absolute(f"{name}, spin", "rad/s", 0.0, farthest(0.0, [spin for _, (_, spin) in landings]), 0.05)
+        yield Row(f"{name}, e off by", "", 0.0, farthest(0.0, rebounds), 0.01)
+        yield Row(f"{name}, spin", "rad/s", 0.0, farthest(0.0, [spin for _, (_, spin) in landings]), 0.05)
     if setting.law == "linear":
         vy, spin = land(setting, LOOSE, 1.0, fixed=False)
-        yield absolute("two loose blocks, elastic, speed", "m/s", 0.5, vy, 0.01)
-        yield absolute("two loose blocks, elastic, spin", "rad/s", 0.0, spin, 0.05)
+        yield Row("two loose blocks, elastic, speed", "m/s", 0.5, vy, 0.01)
+        yield Row("two loose blocks, elastic, spin", "rad/s", 0.0, spin, 0.05)
 
 
 def land(setting: Setting, ends: Sequence[float], restitution: float, *, fixed: bool = True) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from blocksim.scenario.key_table import with_part
 from blocksim.scenario.models.timeline import IMPULSES
 from blocksim.simulation.files import write_text
 from blocksim.verification.case import Case, Row, Setting, run_case
-from blocksim.verification.cases import CASES, choose_cases, excluded_cases
+from blocksim.verification.cases import CASES, choose_cases, exclusions
 
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"
@@ -41,7 +41,7 @@ def cases_of(head: str) -> tuple[Case, ...]:
     return choose_cases([], SETTINGS[head], soil=head == SOIL)
 
 
-def stored_rows(stored: Stored, head: str, case: Case) -> list[Row]:
+def rows_of(stored: Stored, head: str, case: Case) -> list[Row]:
     """Return the kept rows of one case in one setting; a number that is not finite is kept as None."""
     rows = stored.get(head, {}).get(case.id, [])
     return [Row(**{**row, "measured": float("nan") if row["measured"] is None else row["measured"]}) for row in rows]
@@ -57,7 +57,7 @@ def table(stored: Stored) -> str:
     """Return the tables of blocks as Markdown, with the reasons for misses of models and for cases left out."""
     rows = []
     for case in CASES:
-        columns = [{row.quantity: row for row in stored_rows(stored, head, case)} for head in COLUMNS]
+        columns = [{row.quantity: row for row in rows_of(stored, head, case)} for head in COLUMNS]
         name = f"{case.id} {case.title}"
         for quantity, row in columns[0].items():
             others = [column.get(quantity) for column in columns]
@@ -74,7 +74,7 @@ def table(stored: Stored) -> str:
         "",
         markdown((*heads, "measured"), list(_rows(stored, RIGID))),
         "",
-        f"Left out: {'; '.join(excluded_cases(scheme))}.",
+        f"Left out: {'; '.join(exclusions(scheme))}.",
     ]
     return "\n".join([markdown((*heads, *COLUMNS), rows), *reasons, "", *rigid])
 
@@ -92,7 +92,7 @@ def _rows(stored: Stored, head: str) -> Iterator[list[str]]:
     """Yield the rows of a table of one column; that of soil has the sources and errors too."""
     for case in cases_of(head):
         names = [f"{case.id} {case.title}", *([case.source] if head == SOIL else [])]
-        for row in stored_rows(stored, head, case):
+        for row in rows_of(stored, head, case):
             texts = row.texts
             errors = [texts["error"]] if head == SOIL else []
             yield [*names, texts["quantity"], texts["expected"], texts["tolerance"], _cell(row), *errors]
@@ -107,7 +107,7 @@ def _reasons(stored: Stored, head: str, before: str = "") -> Iterator[str]:
     """Yield the reasons of cases that miss a tolerance."""
     model = SETTINGS[head].model
     for case in cases_of(head):
-        if model in case.remarks and not all(row.is_inside for row in stored_rows(stored, head, case)):
+        if model in case.remarks and not all(row.is_inside for row in rows_of(stored, head, case)):
             yield f"* {before}{case.id}: {case.remarks[model]}"
 
 

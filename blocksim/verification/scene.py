@@ -56,7 +56,7 @@ class Simulation:
         return self.scene.world
 
     @property
-    def touching(self) -> Any:
+    def contact_records(self) -> Any:
         """Records of all contacts, pair after pair; of the explicit scheme."""
         count = int(self.world.clock[0].pair_count)
         is_active = np.arange(self.world.contacts.shape[1]) < self.world.pairs.active[:count, np.newaxis]
@@ -86,25 +86,25 @@ class Simulation:
         """Advance to the step nearest to a time (s)."""
         return self.to_step(round(time / self.step))
 
-    def measured(self) -> NDArray[np.float64]:
+    def ledger_row(self) -> NDArray[np.float64]:
         """Return the energies (J) of the scheme's ledger, the number of contacts and the largest overlap (m)."""
         return measure_row(self.scene)
 
     @property
     def kinetic(self) -> float:
         """Kinetic energy (J)."""
-        return float(self.measured()[0])
+        return float(self.ledger_row()[0])
 
     @property
     def mechanical(self) -> float:
         """Kinetic, potential and stored energy (J): the entries that any ledger begins with."""
         held = sum(name in HELD for name in scheme_of(self.scene).ledger)
-        return float(self.measured()[:held].sum())
+        return float(self.ledger_row()[:held].sum())
 
     @property
     def contacts(self) -> int:
         """Number of contact points."""
-        return int(self.measured()[-2])
+        return int(self.ledger_row()[-2])
 
     def residual(self) -> float:
         """Return the residual of the ledger, as a share of the energy in play."""

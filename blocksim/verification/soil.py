@@ -17,7 +17,7 @@ from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.soil import arrays, stress
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes import build_scene, ledger_names
-from blocksim.verification.case import Case, Row, Setting, absolute, at_least, count, relative
+from blocksim.verification.case import Case, Row, Setting, at_least, count, relative
 from blocksim.verification.scene import Simulation
 from blocksim.world.systems.soils import connected_span
 
@@ -121,7 +121,7 @@ class SoilScene(Simulation):
 
     def entries(self) -> dict[str, float]:
         """Return the entries (J) of the ledger."""
-        return dict(zip(ledger_names(self.scene), self.measured().tolist(), strict=False))
+        return dict(zip(ledger_names(self.scene), self.ledger_row().tolist(), strict=False))
 
 
 def pressure_share(force: float, height: float) -> float:
@@ -175,7 +175,7 @@ def path(_setting: Setting) -> Iterator[Row]:
         stress.strain(state, kind, 0.0, -spin, spin, 0.0, STEP)
     sxx, syy, szz, sxy = TURNED_FROM
     off = max(abs(float(state[name]) - to) for name, to in zip(STRESSES, (syy, sxx, szz, -sxy), strict=True))
-    yield absolute("turn by 90°: stress off / stress", "", 0.0, off / abs(sxx), 0.005)
+    yield Row("turn by 90°: stress off / stress", "", 0.0, off / abs(sxx), 0.005)
 
 
 TOPPLED, LEANING, TURNING = math.radians(45.0), math.radians(10.0), math.radians(1.0)
@@ -262,7 +262,7 @@ def shear_band(setting: Setting) -> Iterator[Row]:
         rise = np.polyfit(np.array([(row + 0.5) * pitch for row in among]), ends, 1)[0]
         name = f"{prefix}inclination, Roscoe to Coulomb, s {1e3 * spacing:g} mm"
         found = math.degrees(math.atan2(1.0, rise))
-        yield absolute(name, "°", 0.5 * (45.0 + coulomb), found, 0.5 * (coulomb - 45.0))
+        yield Row(name, "°", 0.5 * (45.0 + coulomb), found, 0.5 * (coulomb - 45.0))
 
 
 def wall_of(blocks: int, spacing: float, base: float = ROUGH, load: float = 0.0, **values: Any) -> SoilScene:
@@ -282,7 +282,7 @@ def wall_of(blocks: int, spacing: float, base: float = ROUGH, load: float = 0.0,
     )
 
 
-def friction_needed(setting: Setting) -> Iterator[Row]:
+def friction_demand(setting: Setting) -> Iterator[Row]:
     """Let three blocks hold 75 mm with a ground friction 6 % below and above what the active thrust needs."""
     retained = 3.0 * HEIGHT
     needed = 0.5 * ACTIVE * UNIT_WEIGHT * retained**2 / (DENSITY * GRAVITY * WIDTH * retained)
@@ -315,7 +315,7 @@ def toppling(setting: Setting) -> Iterator[Row]:
             yield count(f"{prefix}{blocks} blocks: lowest that turns", 1, lowest)
         else:
             moved = float(np.hypot(own["vx"], own["vy"]).max())
-            yield absolute(f"{prefix}{blocks} blocks: speed at the end", "mm/s", 0.0, 1e3 * moved, 1.0)
+            yield Row(f"{prefix}{blocks} blocks: speed at the end", "mm/s", 0.0, 1e3 * moved, 1.0)
 
 
 def surcharge(setting: Setting) -> Iterator[Row]:
@@ -347,7 +347,7 @@ def conservation(_: Setting) -> Iterator[Row]:
         before = column.entries()
         after = column.to_time(0.25).entries()
         share = (sum(after.values()) - sum(before.values())) / before["soils_potential"]
-        yield absolute(f"{prefix}energy off / at the start", "", 0.0, share, 0.002)
+        yield Row(f"{prefix}energy off / at the start", "", 0.0, share, 0.002)
 
         striker = {"block": "striker", "x": -0.6 * STRIKER, "y": 0.52, "velocity": [THROWN, -0.3 * THROWN]}
         blocks = {"striker": block(STRIKER, STRIKER)}
@@ -363,7 +363,7 @@ def conservation(_: Setting) -> Iterator[Row]:
             body = throw.to_time(time).bodies[0]
             momenta.append([mass_of_block * body[name] + mass[0] * throw.points[name].sum() for name in ("vx", "vy")])
         gained = float(np.hypot(*(np.array(momenta[1]) - momenta[0]))) / moving
-        yield absolute(f"{prefix}momentum gained / moving", "", 0.0, gained, 1e-12)
+        yield Row(f"{prefix}momentum gained / moving", "", 0.0, gained, 1e-12)
 
 
 def columns_of_rods(setting: Setting) -> Iterator[Row]:
@@ -391,7 +391,7 @@ def columns_of_rods(setting: Setting) -> Iterator[Row]:
         yield relative(f"{head}: run-out, connected", "", run_out, (front - place) / place, 0.15)
 
 
-def energy_kept(setting: Setting) -> Iterator[Row]:
+def energy_share(setting: Setting) -> Iterator[Row]:
     """Let a column 200 x 100 mm collapse: potential energy left over that at the start.
 
     SPHinXsys has one yield surface, that called plane-strain-associated here: a weaker soil, sin(phi) = 3 a.
@@ -405,7 +405,7 @@ def energy_kept(setting: Setting) -> Iterator[Row]:
         scene = SoilScene((0.2, TALL), spacing, walls=(0.0,), wall=ROUGH, material=material, gradient=gradient)
         before = scene.entries()["soils_potential"]
         left = scene.to_time(1.0).entries()["soils_potential"] / before
-        yield absolute(f"{dict(GRADIENTS)[gradient]}{name}, energy left, s {1e3 * spacing:g} mm", "", 0.691, left, 0.03)
+        yield Row(f"{dict(GRADIENTS)[gradient]}{name}, energy left, s {1e3 * spacing:g} mm", "", 0.691, left, 0.03)
 
 
 WALLS = {
@@ -439,7 +439,7 @@ SOIL_CASES = (
         "S5",
         "three blocks hold 75 mm",
         "½ K_a γ H² / W, for a smooth base",
-        friction_needed,
+        friction_demand,
         "smooth base, raw gradient",
         ROUGH_BASE,
     ),
@@ -454,6 +454,6 @@ SOIL_CASES = (
         "one column, 5 mm",
         SHORT,
     ),
-    Case("S10", "energy that a column 200 × 100 mm keeps", "SPHinXsys", energy_kept, "5 mm, raw", ONE_SPACING),
+    Case("S10", "energy that a column 200 × 100 mm keeps", "SPHinXsys", energy_share, "5 mm, raw", ONE_SPACING),
     Case("S11", "surcharge behind two blocks", "moments about the toe", surcharge, "0.4 s, raw"),
 )

@@ -15,8 +15,7 @@ from math import asin, cos, degrees, hypot, radians, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.verification import closed_forms as forms
-from blocksim.verification.case import Row, Setting, absolute, count, relative
+from blocksim.verification import case, closed_forms as forms
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation
 
 SLENDER, TALL = 0.010, 0.040  # m
@@ -26,7 +25,7 @@ SETTLED = 1e-3  # s after the impact
 GRAVITY = forms.GRAVITY
 
 
-def start_rocking(setting: Setting, restitution: float) -> Simulation:
+def start_rocking(setting: case.Setting, restitution: float) -> Simulation:
     """Let go of a slender block that stands on its right corner, turned by half the angle of balance."""
     tilt = forms.toppling_slope(SLENDER, TALL) / 2
     # the corner stays at x = SLENDER/2, y = 0; turned clockwise
@@ -40,11 +39,11 @@ def start_rocking(setting: Setting, restitution: float) -> Simulation:
     return setting.start([body], restitution=restitution, ground_friction=NO_SLIP)
 
 
-def quarter_period(setting: Setting) -> Iterator[Row]:
+def quarter_period(setting: case.Setting) -> Iterator[case.Row]:
     """Time the way from release to standing upright."""
     time = until_upright(start_rocking(setting, 0.2))
     expected = forms.rocking_quarter_time(SLENDER, TALL, forms.toppling_slope(SLENDER, TALL) / 2)
-    yield relative("time to upright", "s", expected, time, 0.005)
+    yield case.relative("time to upright", "s", expected, time, 0.005)
 
 
 def until_upright(scene: Simulation) -> float:
@@ -58,7 +57,7 @@ def until_upright(scene: Simulation) -> float:
     return (steps + share * (scene.steps - steps)) * scene.step
 
 
-def housner(setting: Setting) -> Iterator[Row]:
+def housner(setting: case.Setting) -> Iterator[case.Row]:
     """Compare the spin about the new corner with that before the impact, both reckoned to the upright position.
 
     The impact takes a while; until it is over the block has turned a little, and the spin at the upright position
@@ -70,7 +69,7 @@ def housner(setting: Setting) -> Iterator[Row]:
     lifted = 1.5 * GRAVITY / half * (cos(alpha - abs(block.angle)) - cos(alpha))
     before = (1.5 * GRAVITY / half * (cos(alpha - alpha / 2) - cos(alpha))) ** 0.5  # let go at half of alpha
     after = (block.spin**2 + lifted) ** 0.5
-    yield relative("spin ratio", "", forms.housner_ratio(SLENDER, TALL), after / before, 0.05)
+    yield case.relative("spin ratio", "", forms.housner_ratio(SLENDER, TALL), after / before, 0.05)
 
 
 ROUGH = 2.0  # friction coefficient at which no slope of this chart lets a block slide before it topples
@@ -83,7 +82,7 @@ SLIPPED = 1e-4  # rad, of turning
 WALL = 0.2  # m, thickness
 
 
-def motion(setting: Setting, width: float, height: float, angle: float, friction: float) -> tuple[bool, bool]:
+def motion(setting: case.Setting, width: float, height: float, angle: float, friction: float) -> tuple[bool, bool]:
     """Return whether a block (m) on a slope (rad) slides, and whether it topples; the slope goes down towards +x.
 
     Sliding is seen while the block has hardly turned: a block that has toppled falls on its side and slides then.
@@ -99,20 +98,20 @@ def motion(setting: Setting, width: float, height: float, angle: float, friction
     return slides, topples
 
 
-def chart(setting: Setting) -> Iterator[Row]:
+def chart(setting: case.Setting) -> Iterator[case.Row]:
     """Find the limits of sliding and toppling on a slope, and one point of every regime.
 
     The regimes are of a block on end. Steeper than both limits it slides without toppling where mu < b/h (friction, not
     gravity, turns it), topples first where mu is above `rolling_friction_limit`, and does both in between.
     """
 
-    def row(name: str, width: float, height: float, friction: float, expected: float) -> Row:
+    def row(name: str, width: float, height: float, friction: float, expected: float) -> case.Row:
         def goes(angle: float) -> bool:
             slides, topples = motion(setting, width, height, angle, friction)
             return topples if friction == ROUGH else slides
 
         found = limit(goes, expected - BRACKET, expected + BRACKET, SLOPE_HALVINGS)
-        return absolute(name, "°", degrees(expected), degrees(found), 0.2)
+        return case.Row(name, "°", degrees(expected), degrees(found), 0.2)
 
     for friction in (0.31, 0.38):
         yield row(f"slides, μ = {friction:g}", WIDTH, HEIGHT, friction, forms.sliding_slope(friction))
@@ -129,10 +128,10 @@ def chart(setting: Setting) -> Iterator[Row]:
         (steep, 1.1 * needed, (False, True)),
     )
     as_expected = [motion(setting, width, height, angle, friction) == moves for angle, friction, moves in points]
-    yield count("regimes", len(points), sum(as_expected))
+    yield case.count("regimes", len(points), sum(as_expected))
 
 
-def ladder(setting: Setting) -> Iterator[Row]:
+def ladder(setting: case.Setting) -> Iterator[case.Row]:
     """Find the ground friction below which a ladder at a smooth wall slips: its foot is to the right of the wall."""
     along, across = (cos(LADDER_SLOPE), sin(LADDER_SLOPE)), (sin(LADDER_SLOPE), cos(LADDER_SLOPE))
     rod = {
@@ -150,7 +149,7 @@ def ladder(setting: Setting) -> Iterator[Row]:
 
     expected = forms.ladder_friction(LADDER_SLOPE, LADDER_THICKNESS / LADDER)
     found = limit(stays, 0.9 * expected, 1.1 * expected, LADDER_HALVINGS)
-    yield relative("friction needed", "", expected, found, 0.02)
+    yield case.relative("friction needed", "", expected, found, 0.02)
 
 
 def limit(outcome: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
@@ -178,7 +177,7 @@ POLL = 2e-4  # s
 LONGEST_WAVE = 2.0  # s
 
 
-class Dominoes:
+class DominoModel:
     """A row of dominoes, in units of their height."""
 
     def __init__(self, thickness: float, gap: float) -> None:
@@ -187,7 +186,7 @@ class Dominoes:
         self.inertia = (1.0 + thickness**2) / 3.0  # about the lower edge, per mass
         self.strike = asin(gap)  # rad: angle at which a domino strikes the next, still upright one
 
-    def leaning(self, foremost: float, count: int) -> tuple[Floats, Floats]:
+    def lean(self, foremost: float, count: int) -> tuple[Floats, Floats]:
         """Return angles of `count` dominoes that lean on one another, foremost first, and d angle/d foremost.
 
         The upper front edge of one touches the back of the next: sin(a - b) = (s + d) cos b - d, a behind b.
@@ -204,8 +203,8 @@ class Dominoes:
 
     def struck_spin(self, fallen: int, spin: float) -> float:
         """Return the spin of the domino that is struck by the foremost of `fallen` ones turning with `spin`."""
-        _, before = self.leaning(self.strike, fallen)
-        _, after = self.leaning(0.0, fallen + 1)
+        _, before = self.lean(self.strike, fallen)
+        _, after = self.lean(0.0, fallen + 1)
         return spin * float(before @ after[1:]) / float(after @ after)
 
     def collision_times(self, count: int, spin: float) -> Floats:
@@ -216,7 +215,7 @@ class Dominoes:
         time, times = 0.0, []
         nodes = self.strike * np.linspace(0.0, 1.0, STEPS + 1)  # of the foremost one, from upright to the next
         for fallen in range(1, count + 1):
-            states = [self.leaning(float(angle), fallen) for angle in nodes]
+            states = [self.lean(float(angle), fallen) for angle in nodes]
             masses = np.array([0.5 * self.inertia * float(rates @ rates) for _, rates in states])
             heights = np.array(  # sums of those of all centres
                 [float(0.5 * np.sum(np.cos(angles) + self.thickness * np.sin(angles))) for angles, _ in states]
@@ -236,7 +235,7 @@ class Dominoes:
         return (last - first) * (self.gap + self.thickness) / float(times[last - 1] - times[first - 1])
 
 
-def dominoes(setting: Setting) -> Iterator[Row]:
+def dominoes(setting: case.Setting) -> Iterator[case.Row]:
     """Push the first of 24 dominoes, about its lower front edge; time the wave from collision 10 to collision 20.
 
     A domino strikes the next when that one starts to turn.
@@ -257,5 +256,5 @@ def dominoes(setting: Setting) -> Iterator[Row]:
             for i in np.flatnonzero(scene.bodies.spin[1:] < -moving):
                 times[i] = scene.time if np.isnan(times[i]) else times[i]
         speed = (LAST - FIRST) * pitch / (times[LAST - 1] - times[FIRST - 1])
-        model = Dominoes(THICK / DOMINO_TALL, gap).wave_speed(FIRST, LAST, PUSH) * sqrt(GRAVITY * DOMINO_TALL)
-        yield relative(f"gap {gap:g} h, speed", "m/s", model, speed, 0.05)
+        model = DominoModel(THICK / DOMINO_TALL, gap).wave_speed(FIRST, LAST, PUSH) * sqrt(GRAVITY * DOMINO_TALL)
+        yield case.relative(f"gap {gap:g} h, speed", "m/s", model, speed, 0.05)

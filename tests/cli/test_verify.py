@@ -5,7 +5,7 @@ import json
 import pytest
 
 from blocksim.verification import cases
-from blocksim.verification.case import Case, Row, Setting, absolute
+from blocksim.verification.case import Case, Row, Setting
 from tests.cli.conftest import Command
 from tests.golden import Golden
 
@@ -48,11 +48,11 @@ def test_json_has_every_number_unrounded(blocksim: Command) -> None:
 
 
 def missed(_: Setting) -> list[Row]:
-    return [absolute("half", "m", 1.0, 0.5, 0.1), absolute("whole", "m", 1.0, 1.0, 0.1)]
+    return [Row("half", "m", 1.0, 0.5, 0.1), Row("whole", "m", 1.0, 1.0, 0.1)]
 
 
 def shortened(setting: Setting) -> list[Row]:
-    return [absolute("quick", "", 1.0, float(setting.quick), 0.0)]
+    return [Row("quick", "", 1.0, float(setting.quick), 0.0)]
 
 
 def stopped(_: Setting) -> list[Row]:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from blocksim.verification.case import Outcome, Row
+    from blocksim.verification.case import CaseOutcome, Row
 
 SHARE = 0.2  # of its tolerance by which a measured number may differ from the kept one
 ORDER_SHARE = 0.1  # of its bound, for a number with a lower bound only
 
 
-def missed(outcome: Outcome) -> list[Row]:
+def missed(outcome: CaseOutcome) -> list[Row]:
     return [row for row in outcome.rows if not row.is_inside]
 
 

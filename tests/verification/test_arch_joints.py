@@ -18,9 +18,9 @@ from scipy.optimize import linprog
 from blocksim.scenario import Document, load_scenario
 from blocksim.scenario.geometry import area_of, centroid
 from blocksim.simulation import simulate
-from blocksim.study.criterion import Verdict
+from blocksim.study.criterion import Stability
 from blocksim.study.limit import limit
-from blocksim.study.stored_run import load_stored_run
+from blocksim.study.run_folder import read_run
 from blocksim.study.sweep_folder import CASES
 from blocksim.verification.arches import least_thickness
 from tests.simulation.conftest import SCENARIOS
@@ -150,9 +150,9 @@ def test_limit_on_springs_finds_the_least_thickness_and_what_stands_above_it(tmp
     ends = {"from": "1.4 m", "to": "1.6 m"}
     found = searched("arch", 0.35, {"structures.0.thickness": ends}, tmp_path / "limit")
     (change,) = found.limits
-    assert (change.below, change.above) == (Verdict.FALLS, Verdict.STANDS)
+    assert (change.below, change.above) == (Stability.FALLS, Stability.STANDS)
     assert 0.99 * least < change.low < change.high < 1.01 * least
-    stands = load_stored_run(found.folder / CASES / found.kept[change.high])
+    stands = read_run(found.folder / CASES / found.case_folders[change.high])
     assert_same(joints_of(stands.frames, 27, 0.35), expected)
 
 
@@ -160,6 +160,6 @@ def test_limit_on_springs_finds_the_least_thickness_and_what_stands_above_it(tmp
 def test_limit_on_springs_finds_the_tilt_at_which_an_arch_falls(tmp_path: Path) -> None:
     found = searched("tilting_arch", 0.75, {"ground.tilt": {"from": "20 deg", "to": "21 deg"}}, tmp_path / "limit")
     (change,) = found.limits
-    assert (change.below, change.above) == (Verdict.STANDS, Verdict.FALLS)
+    assert (change.below, change.above) == (Stability.STANDS, Stability.FALLS)
     low, high = (math.tan(math.radians(degrees)) for degrees in (change.low, change.high))
     assert 0.99 * PULL < low < high < 1.01 * PULL

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.verification.case import Case, Outcome, Row, Setting, at_least, run_case
+from blocksim.verification.case import Case, CaseOutcome, Row, Setting, at_least, run_case
 from blocksim.verification.cases import CASES, choose_cases
 from blocksim.verification.reference import (
     BEGIN,
@@ -15,7 +15,7 @@ from blocksim.verification.reference import (
     STORE,
     cases_of,
     read_store,
-    stored_rows,
+    rows_of,
     table,
     with_table,
 )
@@ -34,7 +34,7 @@ HEADS = [
 ]  # make test has the linear law; tests of Hertz' law are in tests/kernels, its cases are for make test-long
 
 
-def outcome(case_id: str, law: str, *, quick: bool) -> Outcome:
+def outcome(case_id: str, law: str, *, quick: bool) -> CaseOutcome:
     (case,) = choose_cases([case_id], Setting())
     return run_case(case, Setting(law=law, quick=quick))
 
@@ -45,7 +45,7 @@ def test_case_is_inside_its_tolerances_and_what_the_readme_says(case: Case, head
     found = outcome(case.id, LAWS[head], quick=True)
     assert found.rows
     assert missed(found) == []
-    kept = {row.quantity: row for row in stored_rows(read_store(ROOT / STORE), head, case)}
+    kept = {row.quantity: row for row in rows_of(read_store(ROOT / STORE), head, case)}
     assert case.quick or list(kept) == [row.quantity for row in found.rows], "run: make verify-table"
     for row in found.rows:
         assert same_kind(kept[row.quantity], row), "run: make verify-table"

@@ -139,11 +139,11 @@ def test_lowest_corner_is_the_lowest_of_four() -> None:
     assert y < 0.0
 
 
-Impact = Callable[[float, float, tuple[float, float], forms.Motion, float], forms.Motion]
+Impact = Callable[[float, float, tuple[float, float], forms.Velocity, float], forms.Velocity]
 FRICTIONLESS = partial(forms.corner_impact, sticks=False)
 STICKING = partial(forms.corner_impact, sticks=True)
 ARM = forms.lowest_corner(0.032, 0.025, radians(30))
-FALLING = forms.Motion(0.0, -1.0, 0.0)
+FALLING = forms.Velocity(0.0, -1.0, 0.0)
 
 
 def test_frictionless_impact_is_that_of_a_stiff_spring() -> None:
@@ -168,7 +168,7 @@ def test_frictionless_impact_is_that_of_a_stiff_spring() -> None:
 
 
 def test_sticking_impact_is_that_of_a_strong_dashpot_at_the_corner() -> None:
-    before = forms.Motion(0.4, -1.0, 20.0)
+    before = forms.Velocity(0.4, -1.0, 20.0)
 
     def dashpot(_: float, state: np.ndarray) -> list[float]:
         along, up, spin = state
@@ -181,11 +181,11 @@ def test_sticking_impact_is_that_of_a_strong_dashpot_at_the_corner() -> None:
     assert [after.vx, after.vy, after.spin] == pytest.approx(list(stopped), rel=1e-6)
 
 
-def kinetic_energy(motion: forms.Motion) -> float:
+def kinetic_energy(motion: forms.Velocity) -> float:
     return 0.5 * MASS * (motion.vx**2 + motion.vy**2) + 0.5 * INERTIA * motion.spin**2
 
 
-def angular_momentum_about_corner(motion: forms.Motion) -> float:
+def angular_momentum_about_corner(motion: forms.Velocity) -> float:
     return INERTIA * motion.spin + MASS * (-ARM[0] * motion.vy + ARM[1] * motion.vx)
 
 
@@ -194,7 +194,7 @@ def angular_momentum_about_corner(motion: forms.Motion) -> float:
 def test_impacts_keep_angular_momentum_about_the_corner_and_obey_restitution(
     impact: Impact, restitution: float
 ) -> None:
-    before = forms.Motion(0.4, -1.0, 20.0)
+    before = forms.Velocity(0.4, -1.0, 20.0)
     after = impact(MASS, INERTIA, ARM, before, restitution)
     assert angular_momentum_about_corner(after) == pytest.approx(angular_momentum_about_corner(before))
     assert after.vy + after.spin * ARM[0] == pytest.approx(-restitution * (before.vy + before.spin * ARM[0]))
@@ -205,7 +205,7 @@ def test_impacts_keep_angular_momentum_about_the_corner_and_obey_restitution(
     [(FRICTIONLESS, 0.0), (FRICTIONLESS, 0.6), (STICKING, 0.0)],
 )
 def test_impacts_lose_energy_but_the_elastic_one(impact: Impact, restitution: float) -> None:
-    before = forms.Motion(0.4, -1.0, 20.0)
+    before = forms.Velocity(0.4, -1.0, 20.0)
     assert kinetic_energy(impact(MASS, INERTIA, ARM, before, restitution)) < 0.99 * kinetic_energy(before)
     elastic = FRICTIONLESS(MASS, INERTIA, ARM, before, 1.0)
     assert kinetic_energy(elastic) == pytest.approx(kinetic_energy(before), rel=1e-14)

@@ -78,7 +78,7 @@ def with_skin(skin: float) -> Callable[[World], None]:
 def motion_bits(scene: Simulation) -> dict[str, bytes]:
     """Return the bits of all that moves, and of what the contacts remember."""
     names = ("x", "y", "angle", "cos", "sin", "vx", "vy", "spin", "ax", "ay", "spin_rate")
-    return {name: scene.bodies[name].tobytes() for name in names} | {"contacts": scene.touching.tobytes()}
+    return {name: scene.bodies[name].tobytes() for name in names} | {"contacts": scene.contact_records.tobytes()}
 
 
 CROWDS = [
@@ -131,7 +131,7 @@ def test_friction_history_survives_a_new_pair_list(
     assert seldom.world.clock[0].rebuilds == 1
     assert not slides or often.world.clock[0].rebuilds > 10_000
     assert motion_bits(seldom) == motion_bits(often)
-    assert abs(often.touching.shear_force).min() > 0.05
+    assert abs(often.contact_records.shear_force).min() > 0.05
 
 
 @pytest.mark.parametrize("slope", [0.3, 0.5])
@@ -143,6 +143,6 @@ def test_friction_force_does_not_jump_at_a_new_pair_list(start: Start, paper_blo
             scene.world.clock[0].next_update = scene.steps
             scene.bodies.list_x[0] += 1.0  # as if it had come that far
         scene.to_step(scene.steps + 1)
-        forces.append(scene.touching.shear_force.copy())
+        forces.append(scene.contact_records.shear_force.copy())
     assert scene.world.clock[0].rebuilds == 21
     assert max(np.abs(b - a).max() for a, b in pairwise(forces)) < 1e-6

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from blocksim.verification.toppling import Dominoes
+from blocksim.verification.toppling import DominoModel
 
-ROW = Dominoes(thickness=7.5 / 48.0, gap=0.3)
+ROW = DominoModel(thickness=7.5 / 48.0, gap=0.3)
 UNIT = sqrt(9.81 * 0.048)  # m/s
 
 
 @pytest.mark.parametrize("foremost", [0.0, 0.1, 0.3])
 def test_upper_edges_lie_on_the_backs_of_the_next(foremost: float) -> None:
-    angles, _ = ROW.leaning(foremost, 6)
+    angles, _ = ROW.lean(foremost, 6)
     for next_one, behind in pairwise(angles):
         edge = np.array([sin(behind), cos(behind)]) - (ROW.gap + ROW.thickness, 0.0)  # from the next one's foot
         assert edge @ (-cos(next_one), sin(next_one)) == pytest.approx(ROW.thickness)
@@ -23,8 +23,8 @@ def test_upper_edges_lie_on_the_backs_of_the_next(foremost: float) -> None:
 
 
 def test_rates_are_derivatives_of_the_angles() -> None:
-    (low, _), (high, _) = (ROW.leaning(0.2 + d, 6) for d in (-1e-6, 1e-6))
-    assert ROW.leaning(0.2, 6)[1] == pytest.approx((high - low) / 2e-6, rel=1e-6)
+    (low, _), (high, _) = (ROW.lean(0.2 + d, 6) for d in (-1e-6, 1e-6))
+    assert ROW.lean(0.2, 6)[1] == pytest.approx((high - low) / 2e-6, rel=1e-6)
 
 
 def test_the_first_domino_falls_as_integrated() -> None:
@@ -51,8 +51,8 @@ def test_a_plastic_strike_on_an_upright_domino_leaves_both_half_of_the_spin() ->
 
 @pytest.mark.parametrize("fallen", [2, 5, 9])
 def test_a_strike_loses_energy_and_no_other_spin_would_be_nearer_to_the_old_ones(fallen: int) -> None:
-    before = np.append(0.0, ROW.leaning(ROW.strike, fallen)[1])  # the struck domino first, at rest
-    rates = ROW.leaning(0.0, fallen + 1)[1]
+    before = np.append(0.0, ROW.lean(ROW.strike, fallen)[1])  # the struck domino first, at rest
+    rates = ROW.lean(0.0, fallen + 1)[1]
     spin = ROW.struck_spin(fallen, 1.0)
     left = [float(np.sum((before - other * rates) ** 2)) for other in (0.99 * spin, spin, 1.01 * spin)]
     assert left[1] < min(left[0], left[2])
@@ -61,7 +61,7 @@ def test_a_strike_loses_energy_and_no_other_spin_would_be_nearer_to_the_old_ones
 
 @pytest.mark.parametrize(("gap", "speed"), [(0.2, 1.35), (0.3, 1.26), (0.5, 1.16), (0.7, 1.09)])
 def test_stationary_speeds_of_the_verification_table_whatever_the_push(gap: float, speed: float) -> None:
-    slow, fast = (Dominoes(7.5 / 48.0, gap).wave_speed(32, 36, push) for push in (1.0, 5.0))
+    slow, fast = (DominoModel(7.5 / 48.0, gap).wave_speed(32, 36, push) for push in (1.0, 5.0))
     assert slow * UNIT == pytest.approx(speed, rel=5e-3)
     assert slow == pytest.approx(fast, rel=2e-3)
 

@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.scenario import load_scenario, scenario_from_mapping
 from blocksim.simulation import simulate
-from blocksim.study.criterion import Verdict
+from blocksim.study.criterion import Stability
 from blocksim.study.limit import limit
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def test_a_dam_turns_over_and_slides_at_its_base_of_statics(
     width = ratio * HEIGHT
     within = {"blocks.b.width": {"from": 0.99 * width, "to": 1.01 * width, "count": 2}}
     (change,) = limit(dam, within, tolerance=0.03, out=tmp_path / "limit", jobs=1, keep_runs=False).limits
-    assert (change.below, change.above) == (Verdict.FALLS, Verdict.STANDS)
+    assert (change.below, change.above) == (Stability.FALLS, Stability.STANDS)
 
 
 LOW = ((0.1, 0.05), math.degrees(math.atan(0.38)))

@@ -12,8 +12,8 @@ import pytest
 
 from blocksim.verification import energy
 from blocksim.verification.case import Case, Row, Setting, run_case
-from blocksim.verification.cases import CASES, SettingError, choose_cases, excluded_cases
-from blocksim.verification.reference import RIGID, STORE, read_store, stored_rows
+from blocksim.verification.cases import CASES, SettingError, choose_cases, exclusions
+from blocksim.verification.reference import RIGID, STORE, read_store, rows_of
 from blocksim.verification.scene import HEIGHT, Scene, Throw, Thrower
 from blocksim.world import nonsmooth
 from tests.verification.rocking import rocking_peaks
@@ -37,7 +37,7 @@ def test_case_is_inside_its_tolerances_and_what_the_readme_says_with_rigid_conta
     found = run_case(case, SETTING)
     assert found.rows
     assert missed(found) == []
-    kept = stored_rows(read_store(ROOT / STORE), RIGID, case)
+    kept = rows_of(read_store(ROOT / STORE), RIGID, case)
     assert len(kept) == len(found.rows), "run: make verify-table"
     for old, new in zip(kept, found.rows, strict=True):
         assert same_kind(old, new)
@@ -88,8 +88,8 @@ def test_rocking_peaks_of_blocks_that_hop_are_those_of_exact_impact_times(width:
 
 def test_what_is_about_springs_is_left_out_and_says_why() -> None:
     assert [case.id for case in CASES if case not in APPLY] == ["V2", "V20", "V25"]
-    assert all(len(reason) > 20 for reason in excluded_cases(SETTING.scheme))
-    assert excluded_cases("explicit") == ()
+    assert all(len(reason) > 20 for reason in exclusions(SETTING.scheme))
+    assert exclusions("explicit") == ()
     with pytest.raises(SettingError, match=r"V20 \(.*springs"):
         choose_cases(["V1", "v20"], SETTING)
 

@@ -30,7 +30,7 @@ def test_shear_force_never_leaves_the_static_cone(start_shipped: Callable[..., S
         pairs: Any = scene.world.pairs[: scene.world.clock[0].pair_count]
         ground = pairs.b == len(scene.bodies)
         static = np.where(ground, 0.38, 0.31).repeat(pairs.active)
-        contacts = scene.touching
+        contacts = scene.contact_records
         assert np.all(np.abs(contacts.shear_force) <= static * contacts.normal_force * (1.0 + 1e-12))
         assert np.all(contacts.normal_force >= 0.0)
         shears += int(np.count_nonzero(contacts.shear_force))

@@ -6,7 +6,7 @@ import pytest
 
 from blocksim.verification.case import Case, Setting, run_case
 from blocksim.verification.cases import UnknownCaseError, choose_cases
-from blocksim.verification.reference import SOIL, STORE, read_store, stored_rows
+from blocksim.verification.reference import SOIL, STORE, read_store, rows_of
 from blocksim.verification.soil import SOIL_CASES
 
 ROOT = Path(__file__).parents[2]
@@ -39,7 +39,7 @@ def test_energy_momentum_and_the_law_itself_are_exact_with_both_gradients(name: 
 @pytest.mark.long
 @pytest.mark.parametrize("case", SOIL_CASES, ids=lambda case: case.id)
 def test_cases_are_as_the_table_has_them(case: Case) -> None:
-    kept = stored_rows(read_store(ROOT / STORE), SOIL, case)
+    kept = rows_of(read_store(ROOT / STORE), SOIL, case)
     assert outside(case, Setting()) == [row.quantity for row in kept if not row.is_inside]
 
 

@@ -75,7 +75,7 @@ def test_heavy_blocks_sink_into_light_ones_by_what_is_reported(scenario: Scenari
     sunk = before - float(run.to_time(2.0).bodies.y[heavy])
     assert told is not None
     assert sunk == pytest.approx(told.sag, rel=0.05)
-    assert run.measured()[-1] == pytest.approx(told.overlap, rel=0.1)
+    assert run.ledger_row()[-1] == pytest.approx(told.overlap, rel=0.1)
     assert bool(told.warning) is is_warned
 
 
@@ -93,7 +93,7 @@ def test_automatic_step_keeps_light_blocks_from_being_crushed(ratio: float) -> N
     told = describe(scenario).rigid
     assert told is not None
     assert (told.warning, "light blocks carry heavy ones" in told.why) == ("", True)
-    assert Simulation(build_scene(scenario)).to_time(0.1).measured()[-1] < 0.011 * 0.025
+    assert Simulation(build_scene(scenario)).to_time(0.1).ledger_row()[-1] < 0.011 * 0.025
 
 
 @pytest.mark.parametrize("ratio", [30.0, 1e4])

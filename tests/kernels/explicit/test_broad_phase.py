@@ -168,8 +168,8 @@ def test_history_of_a_pair_is_carried_over_and_that_of_a_lost_pair_is_gone(start
     world.bodies[0].y += 1.0
     assert rebuild_pairs(world)
     assert world.clock[0].pair_count == 1
-    assert scene.touching.tobytes() == held.tobytes()
+    assert scene.contact_records.tobytes() == held.tobytes()
     world.bodies[0].y -= 1.0
     assert rebuild_pairs(world)
     assert world.pairs.active[:2].tolist() == [0, 2]
-    assert scene.touching.tobytes() == held.tobytes()
+    assert scene.contact_records.tobytes() == held.tobytes()

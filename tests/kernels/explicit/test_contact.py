@@ -75,7 +75,7 @@ def test_dashpots_are_void_where_others_bear_a_body_now_and_corners_know_how_sti
 
 def test_sticking_block_pulls_its_shear_springs_against_the_slope(start: Start, paper_block: PaperBlock) -> None:
     rest = start([{"y": paper_block.height / 2}], tilt=-SLOPE, contact=SOFT).to_time(0.05)
-    touching = rest.touching
+    touching = rest.contact_records
     assert touching.slot.tolist() == [0, 1]
     weight = paper_block.mass * 9.81
     assert touching.normal_force.sum() == pytest.approx(weight * cos(SLOPE), rel=1e-3)
@@ -87,7 +87,7 @@ def test_sticking_block_pulls_its_shear_springs_against_the_slope(start: Start, 
 
 def test_sliding_block_has_its_springs_at_the_cone(start: Start, paper_block: PaperBlock) -> None:
     slide = start([{"y": paper_block.height / 2, "velocity": [-0.5, 0.0]}], contact=SOFT).to_time(0.02)
-    world, touching = slide.world, slide.touching
+    world, touching = slide.world, slide.contact_records
     stiffness = float(world.interactions[1, 0].normal_stiffness * world.interactions[1, 0].shear_ratio)
     assert touching.size == 2
     assert abs(touching.shear_force) == pytest.approx(0.38 * touching.normal_force, rel=1e-12)
@@ -113,7 +113,7 @@ def test_kinetic_friction_slows_a_sliding_block_and_static_friction_holds_it(
 
 def test_contact_never_pulls_while_it_ends(start: Start, paper_block: PaperBlock) -> None:
     impact = start([{"y": paper_block.height / 2 + 1e-7, "velocity": [0.0, -1.0]}], restitution=0.1, gravity=0.0)
-    forces = [impact.to_step(step).touching.normal_force.copy() for step in range(1, 300)]
+    forces = [impact.to_step(step).contact_records.normal_force.copy() for step in range(1, 300)]
     assert min(force.min(initial=0.0) for force in forces) == 0.0
     assert any(force.size and force.max() == 0.0 for force in forces)  # in contact, and clipped
     assert max(force.max(initial=0.0) for force in forces) > 1e3

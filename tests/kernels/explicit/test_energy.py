@@ -38,7 +38,7 @@ def test_resting_block_holds_its_weight_in_two_springs(start: Start, paper_block
 def test_sticking_block_on_a_slope_holds_its_pull_in_shear_springs(start: Start, paper_block: PaperBlock) -> None:
     rest = start([{"y": paper_block.height / 2}], tilt=-0.2, contact=SOFT).to_time(0.05)
     world = rest.world
-    springs = rest.touching.spring
+    springs = rest.contact_records.spring
     assert springs.size == 2
     stiffness = float(world.interactions[1, 0].normal_stiffness * world.interactions[1, 0].shear_ratio)
     assert stiffness * abs(springs.sum()) == pytest.approx(paper_block.mass * 9.81 * sin(0.2), rel=1e-3)

@@ -166,18 +166,18 @@ def test_corner_was_in_contact_on_whichever_face(pose: Pose) -> None:
 def test_broken_contact_tallies_its_shear_springs_and_forgets_everything(start: Start, paper_block: PaperBlock) -> None:
     soft = {"stiffness_scale": 1e-4}
     scene = start([{"y": paper_block.height / 2}], tilt=-0.2, contact=soft).to_time(0.05)
-    springs = scene.touching.spring.copy()
+    springs = scene.contact_records.spring.copy()
     stiffness = float(scene.world.interactions[1, 0].normal_stiffness * scene.world.interactions[1, 0].shear_ratio)
     assert np.abs(springs).min() > 0.0
     assert springs.size == 2
     scene.world.bodies[0].y += 1e-4
     scene.to_step(scene.steps + 1)
     assert scene.contacts == 0
-    assert scene.touching.size == 0
+    assert scene.contact_records.size == 0
     assert scene.world.ledger[0].broken == pytest.approx(0.5 * stiffness * float((springs**2).sum()), rel=1e-2)
     assert (scene.world.pairs[0].normal_left, scene.world.pairs[0].shear_left) == (0, 0)
     scene.world.bodies[0].y -= 1e-4
-    touching = scene.to_step(scene.steps + 1).touching
+    touching = scene.to_step(scene.steps + 1).contact_records
     assert touching.size == 2
     assert np.abs(touching.spring).max() < 0.01 * np.abs(springs).min()
 
@@ -193,8 +193,8 @@ def test_friction_continues_where_corners_pass_one_another(start: Start, paper_b
     while slide.bodies[1].x < 1e-4:
         slide.to_step(slide.steps + 1)
         assert slide.contacts == 2
-        owners.add(tuple(sorted(slide.touching.slot.tolist())))
-        assert abs(slide.touching.shear_force.sum()) == pytest.approx(0.31 * weight, rel=0.05)
+        owners.add(tuple(sorted(slide.contact_records.slot.tolist())))
+        assert abs(slide.contact_records.shear_force.sum()) == pytest.approx(0.31 * weight, rel=0.05)
     assert len(owners) == 2
     assert slide.bodies[1].vx == pytest.approx(0.2 - 0.31 * 9.81 * slide.time, rel=1e-3)
     assert slide.residual() < 1e-6

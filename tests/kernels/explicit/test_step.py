@@ -46,7 +46,7 @@ def test_overlap_beyond_the_limit_or_a_share_of_the_smallest_side_stops_the_run(
     thrown = {**body, "velocity": [0.0, -1.0]}
     scene = start([thrown], contact={"normal_stiffness": 1e4, **contact}).to_time(1.0)
     assert scene.status == OVERLAP_LIMIT
-    assert limit < scene.measured()[-1] < limit + 2.0 * scene.step
+    assert limit < scene.ledger_row()[-1] < limit + 2.0 * scene.step
 
 
 @pytest.mark.usefixtures("compiler")  # the cosine of infinity is an exception in Python, not a number in IEEE
@@ -123,8 +123,8 @@ def test_one_call_for_all_steps_gives_the_bits_of_one_call_a_step(
     assert at_once.world.clock[0].rebuilds == one_by_one.world.clock[0].rebuilds
     for name in ("bodies", "clock", "ledger", "pairs", "operators"):
         assert bits(getattr(at_once.world, name)) == bits(getattr(one_by_one.world, name)), name
-    assert bits(at_once.touching) == bits(one_by_one.touching)
-    assert at_once.touching.size > 10
+    assert bits(at_once.contact_records) == bits(one_by_one.contact_records)
+    assert at_once.contact_records.size > 10
 
 
 @pytest.mark.usefixtures("compiler")

@@ -21,7 +21,7 @@ ON_GROUND = HEIGHT / 2
 
 
 def entries(run: Simulation) -> dict[str, float]:
-    return dict(zip((*NONSMOOTH_LEDGER, "contacts", "overlap"), run.measured().tolist(), strict=True))
+    return dict(zip((*NONSMOOTH_LEDGER, "contacts", "overlap"), run.ledger_row().tolist(), strict=True))
 
 
 def test_impact_takes_what_newton_says_and_friction_what_coulomb_says(single: Callable[..., Simulation]) -> None:

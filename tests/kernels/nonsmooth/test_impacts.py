@@ -246,7 +246,7 @@ def test_momentum_of_blocks_in_flight_is_kept(single: Callable[..., Simulation],
 
     before = momenta()
     run.to_time(0.3 / pace)
-    assert float(run.measured()[2]) > 0.01 * run.kinetic * (1.0 - restitution)
+    assert float(run.ledger_row()[2]) > 0.01 * run.kinetic * (1.0 - restitution)
     # pushes of the position pass, which are gone after each substep, shift the arms of blocks that turn
     assert abs(momenta() - before) == pytest.approx(0.0, abs=2e-3 * float(mass.sum()))
     assert abs(momenta() - before)[:2].max() < 1e-12
@@ -274,6 +274,6 @@ def test_impacts_are_not_solved_beyond_round_off_where_the_velocity_pass_is(sing
 def test_friction_takes_from_a_block_that_slides_on_another(single: Callable[..., Simulation]) -> None:
     blocks = [{"y": ON_GROUND, "width": 0.2}, {"y": 3 * ON_GROUND, "velocity": [0.5, 0.0]}]
     run = single(blocks, restitution=0.9, ground_friction=0.05)
-    friction = [float(run.to_step(k).measured()[3]) for k in range(1, 150)]
+    friction = [float(run.to_step(k).ledger_row()[3]) for k in range(1, 150)]
     assert np.diff(friction).min() > -1e-15
     assert friction[-1] > 1e-3

@@ -75,7 +75,7 @@ def test_block_turns_over_a_sharp_ridge_without_sinking_into_it(begin: Callable[
     ridge = {"profile": [[-0.3, 0.0], [-half, 0.0], [0.0, 0.03], [half, 0.0], [0.3, 0.0]]}
     run = begin(bare([{"x": 0.002, "y": 0.032 + HEIGHT / 2, "angle": math.radians(3.0)}], ground=ridge))
     for k in range(1, 61):  # it meets the flank after 0.15 s, turned by 60 degrees
-        assert run.to_time(0.0025 * k).measured()[-1] < DEEPEST
+        assert run.to_time(0.0025 * k).ledger_row()[-1] < DEEPEST
     assert run.bodies.angle[0] < math.radians(-45.0)
 
 

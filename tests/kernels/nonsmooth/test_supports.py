@@ -52,12 +52,12 @@ def test_block_slides_above_it_by_friction_alone(begin: Callable[..., Simulation
 def test_work_on_the_support_is_that_of_the_friction(begin: Callable[..., Simulation]) -> None:
     run = begin(shaken(4.0 * 0.38 * G), substeps=1, velocity_tolerance=1e-9).to_time(1.0)
     work, mass = 0.0, float(run.bodies.mass[0])
-    before = float(run.measured()[5])
+    before = float(run.ledger_row()[5])
     for _ in range(200):
         speed, place = float(run.bodies.vx[0]), table(run)
         run.to_step(run.steps + 1)
         work -= mass * (float(run.bodies.vx[0]) - speed) / run.step * (table(run) - place)
-    assert run.measured()[5] - before == pytest.approx(work, rel=1e-2)
+    assert run.ledger_row()[5] - before == pytest.approx(work, rel=1e-2)
     assert abs(work) > 1e-3
 
 

@@ -57,7 +57,7 @@ def test_elastic_impact_lasts_and_reaches_as_hertz_says(start: Start, paper_bloc
     depths = []
     while scene.contacts or scene.bodies[0].vy < 0.0:
         scene.to_step(scene.steps + 1)
-        depths.append(float(scene.measured()[-1]))
+        depths.append(float(scene.ledger_row()[-1]))
     assert max(depths) == pytest.approx(deepest, rel=1e-3)
     assert scene.time == pytest.approx(duration, abs=3.0 * scene.step)
     assert scene.bodies[0].vy == pytest.approx(speed, rel=1e-3)
@@ -77,4 +77,4 @@ def test_static_overlap_carries_the_weight(start: Start, paper_block: PaperBlock
     rest = start([{"y": paper_block.height / 2}], restitution=0.0, contact=SOFT).to_time(0.05)
     stiffness = float(rest.world.interactions[1, 0].normal_stiffness)
     expected = (paper_block.mass * 9.81 / (2.0 * stiffness)) ** (2.0 / 3.0)
-    assert rest.touching.depth == pytest.approx(np.full(2, expected), rel=0.01)
+    assert rest.contact_records.depth == pytest.approx(np.full(2, expected), rel=0.01)

@@ -123,7 +123,7 @@ def test_no_friction_force_leaves_the_cone(start: Start, model: str, law: str) -
     scene = start(lowered, friction=friction, ground_friction=friction, contact=contact_of(model, law))
     greatest = 0.0
     for _ in range(STEPS):
-        touching = scene.to_step(scene.steps + 1).touching
+        touching = scene.to_step(scene.steps + 1).contact_records
         assert (np.abs(touching.shear_force) <= friction * touching.normal_force * (1.0 + 1e-12)).all()
         assert (touching.normal_force >= 0.0).all()
         assert (touching.depth > 0.0).all()
@@ -141,7 +141,7 @@ def test_block_stands_by_friction_on_a_slope_below_its_friction_angle(start: Sta
     assert float(np.hypot(scene.bodies[0].vx, scene.bodies[0].vy)) < 2e-3
     assert abs(scene.bodies[0].x) < 2e-4
     weight = float(scene.bodies[0].mass) * 9.81
-    touching = scene.touching
+    touching = scene.contact_records
     nx, ny = (touching.nx, touching.ny) if model != "surface" else (0.0, 1.0)
     push = [
         (touching.normal_force * nx + touching.shear_force * ny).sum(),

@@ -219,7 +219,7 @@ def test_no_end_of_a_face_is_lost_between_two_sharp_corners() -> None:
             world.bodies[1].y -= depth
 
         run = Scene(bodies, gravity=0.0, restitution=1.0).start(press)
-        contacts = run.touching
+        contacts = run.contact_records
         assert contacts.depth == pytest.approx([depth, depth], rel=1e-6)
         assert run.bodies[1].ay * run.bodies[1].mass == pytest.approx(contacts.normal_force.sum(), rel=1e-9)
         assert abs(run.bodies[1].spin_rate) * 0.03 < 1e-3 * run.bodies[1].ay

@@ -109,7 +109,7 @@ def test_straight_pieces_of_ground_have_no_bumps(tilt: float) -> None:
     lying = {"y": HEIGHT / 2, "velocity": [0.3 * cos(tilt), 0.0]}
     profile = {"profile": [[-1.0, 0.0], [1.0, 0.0]]}
     scene = Simulation(build_world(scenario_of([lying], contact=contact, ground=profile)))
-    touching = scene.to_time(2e-3).touching
+    touching = scene.to_time(2e-3).contact_records
     assert len(touching) == COUNT
     assert np.abs(touching.nx).max() < 1e-12
 

@@ -7,7 +7,7 @@ from math import degrees, radians
 import numpy as np
 
 from blocksim.verification import closed_forms as forms
-from blocksim.verification.case import Row, Setting, absolute, count, farthest, relative
+from blocksim.verification.case import Row, Setting, count, farthest, relative
 from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, Simulation
 
 CONTACT_RADIUS = 1e-3  # m
@@ -25,11 +25,11 @@ def static_overlap(setting: Setting) -> Iterator[Row]:
     """Let a block settle on the ground under its weight."""
     contact = {"contact_radius": CONTACT_RADIUS} if setting.hertzian else {}
     rest = setting.start([{"y": HEIGHT / 2}], contact=contact).to_time(0.05)
-    expected = resting_overlap(setting)
+    expected = weight_overlap(setting)
     yield relative("overlap", "nm", 1e9 * expected, 1e9 * float(HEIGHT / 2 - rest.bodies[0].y), 1e-3)
 
 
-def resting_overlap(setting: Setting) -> float:
+def weight_overlap(setting: Setting) -> float:
     """Return the overlap (m) of the paper's block that rests on its face."""
     block = PaperBlock()
     if setting.hertzian:
@@ -86,8 +86,8 @@ def tower(setting: Setting) -> Iterator[Row]:
         halves.append((stack.time, stack.state()[:, :2]))
     (begin, before), (end, after) = halves
     fall = float(stack.bodies.mass.sum()) * 9.81 * 1e-3
-    yield absolute("creep", "µm/s", 0.0, 1e6 * (np.abs(after - before).max() / (end - begin)), 1.0)
-    yield absolute("energy gained / m g 1 mm", "", 0.0, gain / fall, 1e-3)
+    yield Row("creep", "µm/s", 0.0, 1e6 * (np.abs(after - before).max() / (end - begin)), 1.0)
+    yield Row("energy gained / m g 1 mm", "", 0.0, gain / fall, 1e-3)
 
 
 SPACINGS = (5e-4, 1e-3, 4e-3)  # m
@@ -138,7 +138,7 @@ def friction_angle(setting: Setting) -> Iterator[Row]:
         rest = on_slope(setting, limit - MARGIN, friction).to_time(begin)
         time, place = rest.time, float(rest.bodies[0].x)
         creep = (float(rest.to_time(end).bodies[0].x) - place) / (rest.time - time)
-        yield absolute(f"{name} − 0.5°, creep", "µm/s", 0.0, 1e6 * creep, 1.0)
+        yield Row(f"{name} − 0.5°, creep", "µm/s", 0.0, 1e6 * creep, 1.0)
         expected = forms.fall_distance(0.5, forms.incline_acceleration(limit + MARGIN, friction))
         way = float(on_slope(setting, limit + MARGIN, friction).to_time(0.5).bodies[0].x)
         yield relative(f"{name} + 0.5°, way in 0.5 s", "mm", 1e3 * expected, 1e3 * way, 0.02)
