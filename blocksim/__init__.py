@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from blocksim.study.limit import limit, limit_curve
     from blocksim.study.manifest import read_sweep as open_sweep
     from blocksim.study.pictures import animate, plot
-    from blocksim.study.reporting import report
+    from blocksim.study.report import report
     from blocksim.study.run import open_run, run
     from blocksim.study.sensitivity import sensitivity
     from blocksim.study.sweep import sweep
@@ -64,7 +64,7 @@ _HOMES = {
     "open_sweep": ("blocksim.study.manifest", "read_sweep"),
     "plot": ("blocksim.study.pictures", "plot"),
     "replace": ("blocksim.scenario", "replace_values"),
-    "report": ("blocksim.study.reporting", "report"),
+    "report": ("blocksim.study.report", "report"),
     "run": ("blocksim.study.run", "run"),
     "sensitivity": ("blocksim.study.sensitivity", "sensitivity"),
     "sweep": ("blocksim.study.sweep", "sweep"),

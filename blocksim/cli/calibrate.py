@@ -39,7 +39,7 @@ def calibrate_command(
         ),
     )
     nothing = []
-    if not found.found:  # how far the nearest values are off, by quantity
+    if not found.agrees:  # how far the nearest values are off, by quantity
         rows = [
             [
                 f"{hit.range.column} of {hit.range.block}",
@@ -59,7 +59,7 @@ def calibrate_command(
         [*_values(found), "", *_probability(found), *nothing],
         found.to_dict(),
         _notes(found),
-        code=ExitCode.SUCCESS if found.found else ExitCode.OUTSIDE,
+        code=ExitCode.SUCCESS if found.agrees else ExitCode.OUTSIDE,
     )
 
 

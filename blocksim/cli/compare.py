@@ -12,7 +12,7 @@ from blocksim.cli.output import number, table_lines, width_of_screen
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.input_files import relative_path
-from blocksim.study import manifest, stored_run
+from blocksim.study import manifest, run_folder
 from blocksim.study.compare import ExperimentTablePath, compare_run, compare_sweep
 
 COLUMNS = ("block", "quantity", "simulated", "mean ± s", "[min, max]", "error", "verdict")
@@ -64,7 +64,7 @@ def compare_command(
             data.append(judgement.to_dict())
             judged.append(judgement.inside)
         else:
-            head = stored_run.find_run(place)
+            head = run_folder.find_run(place)
             comparison = compare_run(head, experiment)
             source, lines = comparison.source, [*comparison_table(comparison), *verdict_lines(comparison)]
             data.append({"run": str(head), **comparison.to_dict()})

@@ -68,7 +68,7 @@ def converge_command(
     lines += [*result.notes, ""] if result.notes else []
     lines += _recommendation(result, source)
     studies = [
-        {**asdict(study), "recommended": None if study.recommended is None else study.recommended.value}
+        {**asdict(study), "recommended": None if study.recommendation is None else study.recommendation.value}
         for study in result.studies
     ]
     shown = None if drawn is None else str(drawn)
@@ -82,14 +82,14 @@ def converge_command(
 
 def _table(result: converge.Convergence, study: converge.RefinementStudy) -> list[str]:
     """Return the levels of a study with the blocks whose final x its refinement moves most, in their order."""
-    finished = np.array([level.x_mm for level in study.levels if level.is_finished])
+    finished = np.array([level.x_mm for level in study.levels if level.x_mm])
     chosen: list[int] = []
     if finished.size:
         chosen = sorted(np.argsort(-np.ptp(finished, axis=0), kind="stable")[:MOST_BLOCKS].tolist())
 
     def cells(level: converge.Level) -> tuple[str, ...]:
         value = f"{level.value:g} (own)" if level.is_own else f"{level.value:g}"
-        places = [number(level.x_mm[block], 3) if level.is_finished else level.status for block in chosen]
+        places = [number(level.x_mm[block], 3) if level.x_mm else level.status for block in chosen]
         return (value, *places, number(level.change_mm, 4), number(level.order, 1), number(level.seconds))
 
     heads = [f"{_short(result.blocks[block])}: x mm" for block in chosen]
@@ -115,8 +115,9 @@ def _verdict(study: converge.RefinementStudy) -> list[str]:
             flips.append(f"outcome differs between {before.value:g} and {level.value:g}: {blocks} {named}")
     match study.verdict:
         case converge.ConvergenceVerdict.CONVERGED:
-            found = f"converged: the last two refinements move no block by more than {_small(study.last_change_mm)};"
-            best, coarsest = study.recommended, "the scenario's own value is the coarsest that is fine enough"
+            last = max(level.change_mm for level in study.levels[-2:])
+            found = f"converged: the last two refinements move no block by more than {_small(last)};"
+            best, coarsest = study.recommendation, "the scenario's own value is the coarsest that is fine enough"
             if best is not None and not best.is_own:
                 coarsest = f"{best.value:g} is fine enough (within {_small(best.to_finest_mm)} of the finest level)"
             return [found, coarsest, *flips]
@@ -135,7 +136,7 @@ def _verdict(study: converge.RefinementStudy) -> list[str]:
                 *flips,
             ]
         case converge.ConvergenceVerdict.FAILED:
-            failed = [level for level in study.levels if not level.is_finished]
+            failed = [level for level in study.levels if not level.x_mm]
             count = f"{len(failed)} of {len(study.levels)} levels did not finish"
             return [f"not judged: {count}; the first, {failed[0].value:g}: {failed[0].reason}"]
 
@@ -153,7 +154,7 @@ def _recommendation(result: converge.Convergence, source: ScenarioInput) -> list
     if joint is None:
         if not result.converged:
             return ["no recommendation before every study has converged"]
-        if all(study.recommended == study.own for study in result.studies):
+        if all(study.recommendation == study.own for study in result.studies):
             return ["recommended: the scenario as it is"]
         return ["no recommendation: no other setting stays near all finest levels"]
     share = 1.0 - joint.seconds / max(joint.own_seconds, 1e-9)

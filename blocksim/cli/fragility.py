@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from blocksim.cli import command_line, prepare, progress
 from blocksim.simulation.schemes import kernels_of
-from blocksim.study import fragility, fragility_plan
+from blocksim.study import fragility
 
 
 def fragility_command(
-    source: prepare.ScenarioInput, options: fragility_plan.FragilityOptions, screen: command_line.Screen
+    source: prepare.ScenarioInput, options: fragility.FragilityOptions, screen: command_line.Screen
 ) -> command_line.Report:
     """Find the probability of collapse over an intensity.
 
@@ -20,7 +20,7 @@ def fragility_command(
 
     Example: blocksim fragility mine.toml --intensity motion.scale=0.5:2:7 --scatter friction.block_block=0.6+-0.05
     """
-    plan = fragility_plan.read_fragility(source.document(), options)
+    plan = fragility.read_fragility(source.document(), options)
     base = plan.document.build()
     if not screen.silent:
         prepare.warn_of_values(base)

@@ -13,7 +13,7 @@ from blocksim.options import Option
 from blocksim.scenario.check import implausible_values
 from blocksim.scenario.models.timeline import SPRINGS
 from blocksim.simulation.schemes import kernels_of
-from blocksim.study import answer, criterion, limit, limit_answer, limit_margin, limit_plan, rows
+from blocksim.study import answer, criterion, limit, limit_answer, limit_plan, rows
 
 AT_ONCE = (
     "start.settle = false: loads that come at once shift limits of arches and walls by 0.2 to 4 %; leave it out, and "
@@ -45,7 +45,7 @@ def limit_command(
             raise typer.BadParameter(
                 "a curve of limits is searched with one law; leave --both-laws out", param_hint=limit_plan.OVER
             )
-        of_curve = limit_plan.CurveOptions(**options.shared, over=over)
+        of_curve = limit_plan.CurveOptions(**options.search_options, over=over)
         curve = limit_plan.read_curve(document, of_curve)
         _warn(next(iter(curve.searches.values())), screen)
 
@@ -59,21 +59,21 @@ def limit_command(
     documents = limit_plan.variants(document, both_laws=both_laws)
     plans = {name: limit_plan.read_limit(one, options) for name, one in documents.items()}
     if options.stiffer:
-        limit_margin.refuse_without_springs(*plans.values())
+        limit.refuse_without_springs(*plans.values())
     _warn(next(iter(plans.values())), screen)
     found = {}
     for name, plan in plans.items():
         prepare.announce_compilation(kernels_of(plan.scenario_at(plan.span.low)), quiet=screen.silent)
 
         def tell_run(
-            value: float, verdict: criterion.Verdict, row: rows.Row, plan: limit_plan.LimitPlan = plan
+            value: float, verdict: criterion.Stability, row: rows.Row, plan: limit_plan.LimitPlan = plan
         ) -> None:
             screen.note(f"{answer.with_unit(value, plan.unit)}: {verdict.value} ({row['reason']})")
 
         def tell_search(plan: limit_plan.LimitPlan) -> None:
-            scale, step = (plan.apart.get(key) for key in (limit_margin.STIFFNESS, limit.STEP))
+            scale, step = (plan.apart.get(key) for key in (limit.STIFFNESS, limit.STEP))
             if scale is not None:
-                changed = f"springs shift this limit, or may: once more with {limit_margin.STIFFNESS} = {scale:g}"
+                changed = f"springs shift this limit, or may: once more with {limit.STIFFNESS} = {scale:g}"
             else:
                 changed = f"both sides once more with half the time step, {limit.STEP} = {step:.3g} s"
             screen.note(changed)

@@ -10,7 +10,7 @@ from blocksim.options import Option, Replace
 from blocksim.silence import silent
 from blocksim.simulation import files
 from blocksim.simulation.stores.exports import format_named
-from blocksim.study import compare, pictures, reporting, stored_run
+from blocksim.study import compare, pictures, report, run_folder
 
 MEGABYTE = 1e6
 RunPath = Annotated[
@@ -86,7 +86,7 @@ def report_command(
     members: Annotated[
         int,
         Option("Maximum number of runs of a sweep in the page.", flags=("--runs", "--members"), metavar="N", least=0),
-    ] = reporting.MEMBERS,
+    ] = report.MEMBERS,
     overwrite: Replace = False,
     screen: command_line.TextScreen,
 ) -> command_line.Report:
@@ -102,7 +102,7 @@ def report_command(
     """
     files.refuse_foreign(out, overwrite=overwrite)
     table = None if experiment is None else Path(experiment)
-    size, problems = reporting.report_on(places, out, table, members, silent if screen.quiet else output.note)
+    size, problems = report.report_on(places, out, table, members, silent if screen.quiet else output.note)
     screen.note(f"report: {out} ({size / MEGABYTE:.1f} MB)")
     if problems:
         raise InvalidInputError("\n".join([*problems, "the report shows everything else"]))
@@ -131,7 +131,7 @@ def export_command(
     Example: blocksim export scenarios/three_blocks.toml --format vtkhdf
     """
     form = format_named(kind)
-    stored = stored_run.load_stored_run(run)
+    stored = run_folder.read_run(run)
     contacts = stored.frames.contacts
     file = out or Path(f"{stored.scenario.name}.{kind}")
     beside = file.with_name(f"{file.stem}_contacts{file.suffix}")

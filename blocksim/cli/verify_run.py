@@ -11,7 +11,7 @@ from blocksim.options import Option
 from blocksim.scenario import load_stored
 from blocksim.simulation.files import SCENARIO
 from blocksim.simulation.schemes import kernels_of
-from blocksim.study import answer, manifest, stored_run, sweep, sweep_folder, verify
+from blocksim.study import answer, manifest, run_folder, sweep, sweep_folder, verify
 from blocksim.study.run import Threads
 
 INDENT = "  "
@@ -67,7 +67,7 @@ def _verified(place: Path, threads: int, sample: int, seed: int, screen: command
             kernels = (
                 [*sweep.kernels_for(sweep_folder.read_plan(place))]
                 if manifest.is_sweep(place)
-                else [kernels_of(load_stored(stored_run.find_run(place) / SCENARIO))]
+                else [kernels_of(load_stored(run_folder.find_run(place) / SCENARIO))]
             )
         for one in kernels:
             prepare.announce_compilation(one, quiet=screen.silent)
@@ -182,7 +182,7 @@ def _cells(verdict: verify.SweepVerdict) -> Iterator[str]:
     yield from _changes(verdict.origins)
 
 
-def _changes(origins: tuple[verify.Origin, ...]) -> Iterator[str]:
+def _changes(origins: tuple[verify.OriginDifference, ...]) -> Iterator[str]:
     """Yield what has changed since the results were made; of long lists only what was removed or added."""
     if not origins:
         yield "code, versions and processor are unchanged"

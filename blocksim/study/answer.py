@@ -1,6 +1,6 @@
 """Studies: what one has come to, which there are, and what is done with their folders, whoever made them.
 
-A study plans its runs, has them done by `runs_of` (runs.py), and makes an `Answer` of their rows: one model that is
+A study plans its runs, has them done by `runs_of` (sweep.py), and makes an `Answer` of their rows: one model that is
 written as NAME.json beside the table NAME.csv, read back from there, printed, drawn and put into reports. A new study
 is a module with its search, another with its answer, and a line in STUDIES.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from blocksim.study.pictures import PlotOptions
-    from blocksim.study.runs import Replay
+    from blocksim.study.sweep import Replay
 
 MOST_BYTES = 50 * input_files.MEGABYTE
 STUDIES = {
@@ -142,10 +142,10 @@ class Study(NamedTuple):
 
 def study_in(place: Path | str) -> Study | None:
     """Return the study whose answer a folder holds, None for anything else."""
-    return next((study_named(name) for name in STUDIES if (Path(place) / f"{name}.json").is_file()), None)
+    return next((load_study(name) for name in STUDIES if (Path(place) / f"{name}.json").is_file()), None)
 
 
-def study_named(name: str) -> Study:
+def load_study(name: str) -> Study:
     """Return a study."""
     module, _, kind = STUDIES[name].partition(":")
     return getattr(import_module(module), kind)  # type: ignore[no-any-return]
@@ -161,7 +161,7 @@ def draw_study(folder: Path, study: Study, options: "PlotOptions") -> Path:
     if options.kind not in {None, kind.picture}:
         raise InvalidInputError(f"{folder}: {kind.files.what} is drawn as {kind.picture!r}, not as {options.kind!r}")
     if published is not None and not kind.takes_table:
-        takers = [one.files.what for one in (study_named(name).answer for name in STUDIES) if one.takes_table]
+        takers = [one.files.what for one in (load_study(name).answer for name in STUDIES) if one.takes_table]
         message = f"{published}: a table is drawn beside {takers[0]} only, and {folder} is {kind.files.what}"
         raise InvalidInputError(message)
     scenario = load_stored(folder / kind.files.plan)

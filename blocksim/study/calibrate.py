@@ -28,7 +28,7 @@ _COMMENT = re.compile(r"""([^#"']*?)(\s*)(?:#\s*(.*?)\s*)?""")
 """What stands behind a value: the end of its list or table, blanks, and a comment."""
 
 
-def fitted_text(
+def scenario_text(
     document: Document,
     values: Mapping[str, object],
     provenance: Mapping[str, str],
@@ -135,7 +135,7 @@ class Fit:
     ties: tuple[calibrate_plan.Trial, ...] = ()  # all that are as good as the best, the best among them
 
     @property
-    def found(self) -> bool:
+    def agrees(self) -> bool:
         """Return True if a member of the best trial or a fresh one is inside all ranges; if not, it is the nearest."""
         return self.best.score.inside + self.score.inside > 0
 
@@ -149,7 +149,7 @@ class Fit:
         low, high = self.score.interval
         return {
             "scenario": str(self.path),
-            "found": self.found,
+            "found": self.agrees,
             "fitted": [
                 {
                     "key": prior.key,
@@ -161,7 +161,7 @@ class Fit:
                 }
                 for prior in self.plan.priors
             ],
-            "scatter": calibrate_plan.described(self.plan.scatter),
+            "scatter": calibrate_plan.scatter_texts(self.plan.scatter),
             "experiment": self.plan.table.source,
             "trials": self.trials,
             "members": self.plan.members,
@@ -217,7 +217,7 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
     which = f"one of {len(ties)} equally good trials: " if len(fit.ties) > 1 else ""
     shown = ", ".join(f"{key} = {value}" for key, value in best.values.items())
     head = f"{Path(plan.document.source.where).name} calibrated by blocksim: {which}{shown}"
-    text = fitted_text(plan.document, best.values, _provenance(fit), path.parent, head, note)
+    text = scenario_text(plan.document, best.values, _provenance(fit), path.parent, head, note)
     if kept is None:
         files.write_text(path, text)
     elif kept.read_bytes() != text.encode():
@@ -257,7 +257,7 @@ def _searched(
         return calibrate_plan.score_of(run_members(plan.bare, members), plan.ranges)
 
     with calibrate_plan.open_journal(journal, plan.fingerprint()) as study, interruption.interruptible():
-        done = len(calibrate_plan.finished_trials(study))
+        done = len(calibrate_plan.complete_trials(study))
         if kept is not None and done < trials:  # they would change the file
             raise OutputExistsError(TAKEN.format(kept))
         try:
@@ -267,7 +267,7 @@ def _searched(
                     options.on_trial(trial, max(tried, key=lambda one: one.score.value), trials)
         except KeyboardInterrupt:
             raise StoppedEarlyError(
-                f"stopped after {len(calibrate_plan.finished_trials(study))} of {trials} trials; --resume runs the rest"
+                f"stopped after {len(calibrate_plan.complete_trials(study))} of {trials} trials; --resume runs the rest"
             ) from None
     if not tried:
         raise InvalidInputError("at least one trial is needed")
@@ -287,13 +287,13 @@ def _provenance(fit: Fit) -> dict[str, str]:
         found = f"seed {plan.seed}, {fit.trials} trials of one run, {inside} all ranges of {table}"
     else:
         low, high = score.interval
-        scatter = ", ".join(f"{key} {words}" for key, words in calibrate_plan.described(plan.scatter).items())
+        scatter = ", ".join(f"{key} {words}" for key, words in calibrate_plan.scatter_texts(plan.scatter).items())
         found = (
             f"seed {plan.seed}, {fit.trials} trials of {plan.members} samples, P(inside all ranges) "
             f"{score.share_inside:.3f} [{low:.3f}, {high:.3f}] of {score.members} fresh samples, {table}, "
             f"scatter (SI): {scatter}"
         )
-    verb = "calibrated" if fit.found else "not calibrated (nothing inside all ranges, nearest values)"
+    verb = "calibrated" if fit.agrees else "not calibrated (nothing inside all ranges, nearest values)"
     texts = {}
     for prior in plan.priors:
         span = prior.range_of(*fit.equally_good(prior))

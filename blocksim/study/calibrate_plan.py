@@ -135,7 +135,7 @@ def centre_on_fit(distribution: Uniform | Normal, drawn: object, fitted: object)
     return toml_number(moved, angle=distribution.angle)
 
 
-def described(scatter: Sweep | None) -> dict[str, str]:
+def scatter_texts(scatter: Sweep | None) -> dict[str, str]:
     """Return every key with its distribution in words, in SI, for a message or for provenance."""
     words = {}
     for key, values in scatter.vary.items() if scatter else ():
@@ -391,7 +391,7 @@ Evaluate = Callable[[Mapping[str, object]], Score]
 def search(priors: Sequence[Prior], evaluate: Evaluate, study: "Study", *, trials: int, seed: int) -> Iterator[Trial]:
     """Yield every trial up to `trials`, first those that the study has; a new one is in the journal when it comes."""
     optuna, qmc = load_module("optuna", PURPOSE), load_module("scipy.stats.qmc", PURPOSE)
-    done = finished_trials(study)
+    done = complete_trials(study)
     yield from done
     spread = {one.key: optuna.distributions.FloatDistribution(one.low, one.high, log=one.log) for one in priors}
     for number in range(len(done), trials):
@@ -418,7 +418,7 @@ def search(priors: Sequence[Prior], evaluate: Evaluate, study: "Study", *, trial
         yield Trial(number + 1, values, score)
 
 
-def finished_trials(study: "Study") -> list[Trial]:
+def complete_trials(study: "Study") -> list[Trial]:
     """Return the trials of a study that came to an end, in order; one that was cut off is none."""
     state = load_module("optuna", PURPOSE).trial.TrialState.COMPLETE
     with_ends = [trial.user_attrs for trial in study.get_trials(deepcopy=False) if trial.state is state]

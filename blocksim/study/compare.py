@@ -12,7 +12,7 @@ from blocksim.options import Option
 from blocksim.scenario import load_scenario, load_stored
 from blocksim.simulation import Result, files
 from blocksim.simulation.results import read_final, read_summary
-from blocksim.study import manifest, rows, stored_run, sweep_folder
+from blocksim.study import manifest, rows, run_folder, sweep_folder
 from blocksim.study.manifest import SweepResult
 
 if TYPE_CHECKING:
@@ -92,14 +92,14 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
     elif not isinstance(run, Path | str):
         name, summary, final, named = "", None, run, None
     else:
-        folder = stored_run.find_run(run)
+        folder = run_folder.find_run(run)
         name, summary, was = str(folder), read_summary(folder / files.SUMMARY), load_stored(folder / files.SCENARIO)
         final = read_final(folder, was) if summary.status == rows.FINISHED else {}
         # a scenario file may name another table by now than it did when it was run
         now = (load_scenario(run) if Path(run).is_file() else was).experiment
         named = now.table if now else None
     if summary is not None and summary.status != rows.FINISHED:
-        how = stored_run.ending_text(summary.status, summary.reason)
+        how = run_folder.ending_text(summary.status, summary.reason)
         raise InvalidInputError(f"{name}: {how}; only a finished run can be compared")
     table = experiment or named
     if table is None:

@@ -32,7 +32,7 @@ from blocksim.options import Option, takes
 from blocksim.scenario import Scenario, Source, load_scenario, place_bodies, start
 from blocksim.silence import silent
 from blocksim.simulation import files, interruption, provenance, results, schemes
-from blocksim.study.executors import Setting, Task, processes
+from blocksim.study.executors import RunSetting, Task, processes
 from blocksim.study.rows import FINISHED, Row, check_experiment
 from blocksim.world.nonsmooth import velocity_tolerance
 from blocksim.world.step import safety_of
@@ -99,11 +99,6 @@ class Level:
     to_finest_mm: float  # distance to the finest level that finished
     flipped: tuple[str, ...] = ()  # blocks whose outcome is another one than at the level before
 
-    @property
-    def is_finished(self) -> bool:
-        """Return True if the run came to its proper end."""
-        return self.status == FINISHED
-
 
 @dataclass(frozen=True)
 class RefinementStudy:
@@ -123,7 +118,7 @@ class RefinementStudy:
         return next(level for level in self.levels if level.is_own)
 
     @property
-    def recommended(self) -> Level | None:
+    def recommendation(self) -> Level | None:
         """The coarsest level that stays within the tolerance of the finest, with all levels between them."""
         if self.verdict is not ConvergenceVerdict.CONVERGED:
             return None
@@ -133,11 +128,6 @@ class RefinementStudy:
                 break
             chosen = level
         return chosen
-
-    @property
-    def last_change_mm(self) -> float:
-        """The larger of the last two changes; NaN where there are none."""
-        return max((level.change_mm for level in self.levels[-2:]), default=nan)
 
 
 @dataclass(frozen=True)
@@ -164,7 +154,7 @@ class Convergence:
     @property
     def failed(self) -> bool:
         """Return True if the scenario does not even run as it is."""
-        return not self.studies[0].own.is_finished
+        return not self.studies[0].own.x_mm
 
     @property
     def converged(self) -> bool:
@@ -196,7 +186,7 @@ class Coordinates:
             return NO_COORDINATES
         return np.concatenate([end[0], np.radians(end[2]) * self._reach])
 
-    def flipped(self, before: Row, row: Row) -> tuple[str, ...]:
+    def flips(self, before: Row, row: Row) -> tuple[str, ...]:
         """Return the blocks whose outcome differs between two runs; none where one of them did not finish."""
         ends = self.end(before), self.end(row)
         if ends[0] is None or ends[1] is None:
@@ -245,7 +235,7 @@ def judge(
                 change_mm=distance(points[i - 1], points[i]) if i else nan,
                 order=observed_order(points[i - 2 : i + 1], refinement.factor) if i > 1 else nan,
                 to_finest_mm=distance(points[i], finest),
-                flipped=coordinates.flipped(rows[order[i - 1]], row) if i else (),
+                flipped=coordinates.flips(rows[order[i - 1]], row) if i else (),
             )
         )
     verdict = verdict_of(levels, tolerance_mm)
@@ -331,9 +321,9 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     runs = LevelRuns(scenario, folder, options.jobs or os.cpu_count() or 1, options.on_run)
     found = runs.refine(refinements, tolerance_mm, levels)
     notes, recommended = runs.notes(studies), None  # notes are about the levels
-    if found[0].own.is_finished and not any(study.verdict in UNRELIABLE for study in found):
+    if found[0].own.x_mm and not any(study.verdict in UNRELIABLE for study in found):
         # all recommended values together, then each alone, the cheapest first; None where none holds the tolerance
-        changed = [(level, study.key) for study in found if (level := study.recommended) and not level.is_own]
+        changed = [(level, study.key) for study in found if (level := study.recommendation) and not level.is_own]
         together = {key: level.value for level, key in changed}
         singles = [{key: level.value} for level, key in sorted(changed, key=lambda pair: pair[0].seconds)]
         candidates = (runs.joint(settings, found) for settings in (together, *singles) if settings)
@@ -359,7 +349,10 @@ class LevelRuns:
         jobs = min(self.jobs, len(tasks))
         run = processes.run_tasks if jobs > 1 else processes.run_here
         try:
-            with interruption.interruptible(), closing(run(iter(tasks), Setting(jobs, folder=self.folder))) as batches:
+            with (
+                interruption.interruptible(),
+                closing(run(iter(tasks), RunSetting(jobs, folder=self.folder))) as batches,
+            ):
                 for task, row in (pair for batch in batches for pair in zip(batch.tasks, batch.rows, strict=True)):
                     kept = {**row, "reason": DIED} if row == processes.DEAD else row.copy()
                     with suppress(BlocksimError):  # what the setting decides: time in compiled code, without files

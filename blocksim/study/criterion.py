@@ -38,7 +38,7 @@ COMPARISONS: dict[str, Callable[[float, float], bool]] = {
 }  # fmt: skip
 
 
-class Verdict(StrEnum):
+class Stability(StrEnum):
     """What a run says about the structure."""
 
     STANDS = "stands"
@@ -59,15 +59,15 @@ class Criterion:
         """Return True if a row of a finished run meets all conditions."""
         return all(holds(row) for holds in self.conditions)
 
-    def verdict(self, row: Mapping[str, object]) -> Verdict:
+    def verdict(self, row: Mapping[str, object]) -> Stability:
         """Judge a row of a sweep."""
         if falls_before_zero(row):
-            return Verdict.FALLS
+            return Stability.FALLS
         if row["status"] != FINISHED:
-            return Verdict.FAILED
+            return Stability.FAILED
         if not self.holds(row):
-            return Verdict.FALLS
-        return Verdict.UNDECIDED if row.get(observables.MOVES_ON) else Verdict.STANDS
+            return Stability.FALLS
+        return Stability.UNDECIDED if row.get(observables.MOVES_ON) else Stability.STANDS
 
 
 def falls_before_zero(row: Mapping[str, object]) -> bool:

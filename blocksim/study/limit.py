@@ -1,35 +1,60 @@
 """At which value of a key a structure falls: scan and narrowing; and the same at each value of another key.
 
 Where springs shift a limit by more than SHIFT, the same limit is searched with springs ten times as stiff, near where
-it is foretold, and the answer is that of stiff contacts (limit_margin.py). Where they may shift it, but nothing says by
-how much, two runs with stiffer springs tell, one beyond either side of the bracket.
+it is foretold, and the answer is that of stiff contacts. Where they may shift it, but nothing says by how much, two
+runs with stiffer springs tell, one beyond either side of the bracket.
 
 Steps of rigid contacts are chosen before a run, and what they take away from a limit goes with the step, as blocks turn
 about edges that move on by v h in a step h. So both sides of a bracket are run with half of it. Where they come to the
 same, the limit is that of any shorter step, within its bracket; where they do not, it is searched again, and the answer
 holds both brackets, and beyond the second one as much as lies between them.
+
+**Springs.** What topples on springs has turned before, as its toe sinks in, and needs so much less tilt: the critical
+tilt of a block is atan(b/h) less the angle F/(k b) that it has turned by when all its weight F is on one corner of
+stiffness k. In a wall the part that topples turns as a whole, as the load leaves the heel. So the largest turn on the
+standing side of a bracket is the shift. A structure that has moved, or rocked back, has turned otherwise too. Of that
+only a bound is known, if everything rests on one corner of the softest contact; and none where supports move: what
+impacts of a rocking block leave depends on the springs too, and a pulse that begins at its peak while springs carry
+none of it makes it slip too far, with the root of 1/stiffness (simulation/run.py).
+
+**Stiff contacts.** All that is linear in 1/k where it is small, and so is what it takes away from a limit:
+L(k) = L - a/k. Of two stiffnesses, one r times the other, L = (r L(r k) - L(k))/(r - 1). With the law of Hertz a
+contact gives way as k^(-2/3), so that r is 10^(2/3) for a ratio of 10. What is left out is of second order: for
+L(k) = L (1 - s - c s^2) it is c s^2/r of L, and c is about one for a block that topples about its toe. That much is
+added to both sides of the bracket. Where gravity comes at once, a scene falls on its springs by F/k, and with the
+velocity that it has then, which goes as 1/k^(1/2), it rocks. Without a start at rest the answer is therefore a bracket
+that holds the extrapolations of both powers.
+
+**Rest.** What falls under a load a little above its limit begins with a small acceleration a. A run takes it for rest
+where it is slower than `time.rest_speed` for `time.rest_hold`, so for a < rest_speed/rest_hold; and to its end T it
+comes no farther than a T^2/2, so that it stands where that is less than what the criterion names, and less than a tenth
+of the time more would take it beyond. Over gravity, that acceleration is the part of a horizontal load, of the tangent
+of a tilt or of a coefficient of friction that is not decided (a block that slides), and about that part of a ratio of
+lengths (one that topples). Limits are reported too far on the falling side by it. What has settled before time zero
+rests within 1e-8 of gravity, and where supports move a limit is none of rest.
 """
 
+import math
 import shutil
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.options import takes
-from blocksim.scenario import Document, Source, document_of, motion
+from blocksim.scenario import Document, Scenario, Source, document_of, motion, place_bodies, placement
+from blocksim.scenario.models import motion as motions, timeline
 from blocksim.silence import silent
-from blocksim.simulation.observables import PEAK, Response, table_columns
-from blocksim.simulation.provenance import run_hash
-from blocksim.simulation.schemes import build
-from blocksim.study import limit_answer, limit_margin, limit_plan, sweep_folder
+from blocksim.simulation import observables, provenance, schemes
+from blocksim.study import limit_answer, limit_plan, sweep, sweep_folder
 from blocksim.study.answer import Study
-from blocksim.study.criterion import Verdict, falls_before_zero
+from blocksim.study.criterion import Stability, falls_before_zero
 from blocksim.study.executors import Execution, ensemble
 from blocksim.study.limit_plan import Change, LimitPlan, Number
 from blocksim.study.rows import FINISHED, Head, Row
-from blocksim.study.runs import Replay, Runs, make_folder, runs_of, short_hash
+from blocksim.world.interactions import contact_classes, interactions_of
 
 SHIFT = 2.5e-3  # share of a limit by which springs may shift it unasked: half of what is warned of, as it is foretold
 MOST_LEVELS = 4  # stiffnesses
@@ -40,10 +65,23 @@ STEP = "time.step"
 NO_STIFFER = "with springs {ratio:g} times as stiff there is no such limit in the range"
 NO_FINER = "with half the time step there is no such limit in the range"
 STILL_FAR = "limits of the last two stiffnesses are too far apart to be extrapolated well; give stiffer springs"
-BOTH = {Verdict.STANDS, Verdict.FALLS}
+BOTH = {Stability.STANDS, Stability.FALLS}
+STANDS = observables.Response.STANDS.value
 OnOther = Callable[[LimitPlan], None]
 OnLimit = Callable[[float, limit_answer.LimitAnswer], None]
 Rows = Mapping[Number, Row]
+RATIO = 10.0  # of stiffness between a search and the next one
+BEYOND = 10.0 / 9.0  # of the way to stiff contacts over that to springs ten times as stiff
+FAR = 0.08  # of a limit: two of them that are no farther apart are extrapolated
+HERTZ_POWER = 2.0 / 3.0
+AIM = 0.07  # of the way to the next limit, by which that may be elsewhere
+TILT = "ground.tilt"
+ROTATION = ".rotation_deg"
+COEFFICIENTS = ("friction.", ".friction")
+HORIZONTAL = "loads."
+STIFFNESS = "contact.stiffness_scale"
+OF_STIFFNESS = ("stiffness", "young_modulus", "poisson_ratio", "contact_radius", "time.")
+NO_SPRINGS = f"rigid contacts have no stiffness: --stiffer is for springs (time.scheme {timeline.SPRINGS})"
 
 
 @takes(limit_plan.LimitOptions)
@@ -51,7 +89,7 @@ def limit(scenario: Source, options: limit_plan.LimitOptions) -> limit_answer.Li
     """Find the values of a key at which a structure stops, or begins, to stand.
 
     There may be several changes, but those of an island between two scanned values are not seen. `stands`: see
-    `blocksim.study.criterion`. Runs are kept, with `keep_runs` those of both sides of a bracket with frames and
+    `blocksim.study.criterion`. sweep.Runs are kept, with `keep_runs` those of both sides of a bracket with frames and
     contacts, for `plot` and `report`; the same call again does only what is missing. Under sustained loads runs begin
     at rest, unless the scenario has `start.settle = false`. The executor does not change the answer. `on_run` is called
     with each value, verdict and row. Raises ScenarioError, InvalidInputError, OutputExistsError where the folder is not
@@ -80,10 +118,12 @@ def find_limit(
     `on_other` is called before the first run of another stiffness or step.
     """
     if options.stiffer:
-        limit_margin.refuse_without_springs(plan)
+        refuse_without_springs(plan)
     base, kind, execution = plan.scenario_at(plan.span.low), limit_answer.LimitAnswer.files, execution or options
     overwrite = options.overwrite
-    with runs_of(plan.document, base, options.out, kind, plan.name, execution, overwrite=overwrite, peaks=True) as runs:
+    with sweep.runs_of(
+        plan.document, base, options.out, kind, plan.name, execution, overwrite=overwrite, peaks=True
+    ) as runs:
         answer = _Search(plan, runs, options.stiffer, options.on_run, on_other).answer()
         answer.write()  # first: the runs beside it may not fit on the disk
         if options.keep_runs:
@@ -98,16 +138,16 @@ def find_curve(
     """Search as planned, one value after the other, each in a folder of its own; see `limit_curve`."""
     options.ready()
     if options.stiffer:
-        limit_margin.refuse_without_springs(*plan.searches.values())
+        refuse_without_springs(*plan.searches.values())
     one = next(iter(plan.searches.values()))
     base, kind = one.scenario_at(one.span.low), limit_answer.CurveAnswer.files
-    name = short_hash([plan.head.key, *(search.name for search in plan.searches.values())])
-    folder = make_folder(options.out, base, kind, name, overwrite=options.overwrite)
+    name = sweep.short_hash([plan.head.key, *(search.name for search in plan.searches.values())])
+    folder = sweep.make_folder(options.out, base, kind, name, overwrite=options.overwrite)
     found: dict[float, limit_answer.LimitAnswer] = {}
     for number, search in plan.searches.items():
         place = folder / limit_answer.place_of(number, plan.head.unit)
         found[number] = find_limit(
-            search, limit_plan.LimitOptions(**{**options.shared, "out": place, "keep_runs": False})
+            search, limit_plan.LimitOptions(**{**options.search_options, "out": place, "keep_runs": False})
         )
         on_limit(number, found[number])
     answer = limit_answer.CurveAnswer.of(plan.head, folder, found)
@@ -115,12 +155,177 @@ def find_curve(
     return answer
 
 
+@dataclass(frozen=True)
+class Levels:
+    """One limit at the stiffness given, then at RATIO times the one before; why there are no more, if some lack."""
+
+    levels: tuple[limit_answer.StiffnessLevel, ...]
+    ratio: float  # by which springs of the next stiffness give way less
+    is_at_rest: bool = True  # at the start
+    problem: str = ""
+
+    @property
+    def is_far(self) -> bool:
+        """True where the last two are too far apart to be extrapolated, or there is only one."""
+        if len(self.levels) == 1:
+            return True
+        before, last = (level.middle for level in self.levels[-2:])
+        return abs(last - before) > FAR * abs(last)
+
+    @property
+    def stiff(self) -> tuple[float, float] | None:
+        """The bracket of stiff contacts, from the last two; None where there is only one."""
+        if len(self.levels) == 1:
+            return None
+        before, last = self.levels[-2:]
+        ratios = (self.ratio,) if self.is_at_rest else (self.ratio, math.sqrt(self.ratio))
+        low = min(extrapolate_limit(before.high, last.low, ratio) for ratio in ratios)
+        high = max(extrapolate_limit(before.low, last.high, ratio) for ratio in ratios)
+        middle = extrapolate_limit(before.middle, last.middle, self.ratio)
+        unknown = (middle - before.middle) ** 2 / self.ratio / abs(middle) if middle else 0.0
+        return low - unknown, high + unknown
+
+    def aim(self, share: float, tolerance: float) -> tuple[float, float]:
+        """Return between which values to look for the limit of the next stiffness.
+
+        `share` of the limit is by how much stiff contacts have another one, where only one stiffness is known.
+        """
+        last = self.levels[-1].middle
+        if len(self.levels) > 1:
+            share = extrapolate_limit(self.levels[-2].middle, last, self.ratio) / last - 1.0 if last else 0.0
+        way = last * share * (1.0 - 1.0 / self.ratio)
+        margin = max(AIM * abs(way), tolerance * abs(last))
+        return last + way - margin, last + way + margin
+
+
+def extrapolate_limit(softer: float, stiffer: float, ratio: float) -> float:
+    """Return the value of stiff contacts from two that springs are off by, the second `ratio` times less."""
+    return (ratio * stiffer - softer) / (ratio - 1.0)
+
+
+def ratio_of(scenario: Scenario) -> float:
+    """Return by how much less springs of RATIO times the stiffness give way."""
+    return float(RATIO**HERTZ_POWER) if scenario.contact.law == "hertz-mindlin" else RATIO
+
+
+def can_be_stiffer(plan: LimitPlan) -> bool:
+    """Return True for springs, unless the key is one of stiffness or a system has its own, or whole numbers only."""
+    has_springs = plan.scenario.time.has_springs and not plan.scenario.systems
+    return has_springs and not plan.span.is_whole and not any(part in plan.key for part in OF_STIFFNESS)
+
+
+def refuse_without_springs(*plans: LimitPlan) -> None:
+    """Raise InvalidInputError where none of the plans can be searched with stiffer springs."""
+    if any(can_be_stiffer(plan) for plan in plans):
+        return
+    if not any(plan.scenario.time.has_springs for plan in plans):
+        raise InvalidInputError(NO_SPRINGS)
+    springs = limit_plan.NAMES[timeline.SPRINGS]
+    raise InvalidInputError(f"--stiffer: {springs} are not made stiffer for a limit of {plans[0].key}, or beside soil")
+
+
+class StandingSide:
+    """The end of a bracket at which nothing has fallen."""
+
+    def __init__(self, plan: LimitPlan, change: Change[Stability], rows: Mapping[Number, Row]) -> None:
+        """Take a change of a search and all its rows."""
+        self.plan, self.change = plan, change
+        self.value = change.high if change.below is Stability.FALLS else change.low
+        self.scenario, row = plan.scenario_at(self.value), rows[self.value]
+        self.give: limit_answer.Give | None = None  # how far springs have given way, where what stands there says so
+        if plan.scenario.time.has_springs and row.get("outcome") == STANDS:  # what rocked back has turned too
+            turn = max(abs(float(str(row[name]))) for name in row if name.endswith(ROTATION))
+            # of the load k that topples a block by k g along the ground, atan k = a, a turn d takes away 2 d/sin(2 a) k
+            slope = (float(self.scenario.ground.tilt) or math.inf) if plan.key == TILT else 0.5
+            self.give = limit_answer.Give(self.value, turn, math.radians(turn) / slope)
+
+    @property
+    def most_shift(self) -> float:
+        """A bound of the share of a limit that springs take away, by their load and how slender blocks are."""
+        scenario = self.scenario
+        slender = slenderness(scenario)
+        is_late = (
+            isinstance(scenario.motion, motions.Pulse) and scenario.motion.is_abrupt and not motion.settles(scenario)
+        )
+        if self.give is not None and not is_late:
+            return max(self.give.share, 2.0 * math.radians(self.give.turn) / slender)
+        if is_late or (scenario.motion is not None and scenario.contact.stiffness_scale < 1.0):
+            return math.inf
+        sink = largest_static_compression(scenario)
+        width = min(min(body.size_x, body.size_y) for body in place_bodies(scenario))
+        moved = self.plan.criterion.least_moved
+        return max(2.0 * sink / (width * slender), sink / moved if moved else 0.0)
+
+    def margin(self, levels: Levels | None, probed: float, *, as_given: bool) -> limit_answer.Margin:
+        """Return the shares of the limit that are not decided.
+
+        `probed` is the share within which stiffer springs were searched; with `as_given` the limit is that of springs.
+        """
+        plan, scenario = self.plan, self.scenario
+        rest = rest_acceleration(scenario, plan.criterion.least_moved)
+        if rest:  # over gravity it is a share of a tilt (rad), of a coefficient; of one for other keys
+            is_coefficient = any(part in plan.key for part in COEFFICIENTS) or plan.key.startswith(HORIZONTAL)
+            load = 1.0
+            if plan.key == TILT:
+                load = min(abs(float(scenario.ground.tilt)), 1.0) or 1.0
+            elif is_coefficient and not plan.unit:
+                load = min(abs(self.value), 1.0) or 1.0
+            rest = rest / scenario.gravity / load
+        if as_given or not plan.scenario.time.has_springs:
+            return limit_answer.Margin(rest=rest, springs=0.0)
+        if levels is not None:
+            is_known = levels.stiff is not None or levels.problem
+            return limit_answer.Margin(rest=rest, springs=0.0 if is_known else BEYOND * probed)
+        most = self.most_shift if self.give is None else self.give.share
+        return limit_answer.Margin(rest=rest, springs=most if math.isfinite(most) else 0.0)
+
+
+def slenderness(scenario: Scenario) -> float:
+    """Return sin(2 a) of the most slender block or of all of them together, tan a = width/height; 1 for squat ones."""
+    placed = [body for body in place_bodies(scenario) if not body.fixed]
+    sizes = [(body.size_x, body.size_y) for body in placed]
+    xs = [body.x + side * body.size_x for body in placed for side in (-0.5, 0.5)]
+    ys = [body.y + side * body.size_y for body in placed for side in (-0.5, 0.5)]
+    sizes.append((max(xs) - min(xs), max(ys) - min(ys)))
+    return min(math.sin(2.0 * math.atan2(min(width, height), height)) for width, height in sizes)
+
+
+def largest_static_compression(scenario: Scenario) -> float:
+    """Return how far (m) the softest contact gives way under the weight of all free blocks, in shear if softer."""
+    placed = place_bodies(scenario)
+    weight = scenario.gravity * sum(body.mass for body in placed if not body.fixed)
+    table = interactions_of(scenario, contact_classes(scenario, tuple(placed)))
+    stiffness = min(
+        one.normal_stiffness * min(1.0, one.shear_ratio) for row in table for one in row if one.normal_stiffness > 0.0
+    )
+    power = HERTZ_POWER if scenario.contact.law == "hertz-mindlin" else 1.0
+    return float((weight / stiffness) ** power)
+
+
+def rest_acceleration(scenario: Scenario, least_moved: float | None) -> float:
+    """Return the acceleration (m/s2) below which a run cannot be told from rest; `least_moved` (m) is the criterion's.
+
+    Zero where blocks settle before time zero, supports move, or nothing pulls.
+    """
+    time = scenario.time
+    if motion.settles(scenario) or scenario.motion is not None or not scenario.gravity > 0.0:
+        return 0.0
+    moved = observables.MOVED_SHARE * placement.smallest_width(
+        body for body in place_bodies(scenario) if not body.fixed
+    )
+    way = moved if least_moved is None else least_moved
+    of_end = min(2.0 * way, moved / observables.FURTHER) / time.end**2
+    hold = max(time.rest_hold, 0.0)
+    of_rest = time.rest_speed / hold if time.stop_at_rest and hold > 0.0 else 0.0
+    return max(of_end, of_rest)
+
+
 @dataclass
 class _Search:
     """The runs of a search, as planned and with other stiffnesses or steps."""
 
     plan: LimitPlan
-    runs: Runs
+    runs: sweep.Runs
     stiffer: bool | None
     on_run: limit_plan.OnRun
     on_other: OnOther
@@ -133,7 +338,8 @@ class _Search:
         has_islands = plan.scenario.motion is not None  # a value may fall between others that stand: supports move
 
         def choose(rows: Rows) -> list[Number]:
-            peaks = {at: float(str(row[PEAK])) for at, row in rows.items() if has_islands and PEAK in row}
+            known = rows.items() if has_islands else ()
+            peaks = {at: float(str(row[observables.PEAK])) for at, row in known if observables.PEAK in row}
             return limit_plan.next_values(plan.span, plan.verdicts(rows), plan.tolerance, peaks)
 
         rows = self._searched(plan, choose)
@@ -148,36 +354,50 @@ class _Search:
         rows: dict[Number, Row] = {}
         while values := choose(rows):
             wanted = {value: plan.settings(value) for value in values}
-            rows |= self.runs.rows(wanted, lambda at, row: self.on_run(at, plan.criterion.verdict(row), row))
+            rows |= self.runs.rows_of(wanted, lambda at, row: self.on_run(at, plan.criterion.verdict(row), row))
         return rows
 
-    def _bracket(self, change: Change[Verdict], rows: Rows) -> limit_answer.Bracket:
+    def _bracket(self, change: Change[Stability], rows: Rows) -> limit_answer.Bracket:
         """Return a change as it is with stiff contacts and short steps, as far as known, and as wide as is unknown."""
         plan, is_corrected = self.plan, self.stiffer is not False
-        below, above = (limit_answer.Side.of(value, verdict, rows[value]) for value, verdict in
-                        ((change.low, change.below), (change.high, change.above)))  # fmt: skip
+        below = limit_answer.Side.of(change.low, change.below, rows[change.low])
+        above = limit_answer.Side.of(change.high, change.above, rows[change.high])
         given = limit_answer.Bracket(low=change.low, high=change.high, below=below, above=above)
-        if not BOTH | {Verdict.UNDECIDED} >= {change.below, change.above} > {Verdict.FALLS}:
+        if not BOTH | {Stability.UNDECIDED} >= {change.below, change.above} > {Stability.FALLS}:
             return given
-        side = limit_margin.StandingSide(plan, change, rows)
+        side = StandingSide(plan, change, rows)
         least, levels, half = max(SHIFT, plan.tolerance), None, None
-        if is_corrected and limit_margin.can_be_stiffer(plan):
+        if is_corrected and can_be_stiffer(plan):
             levels = self._levels(side, least) if self.stiffer or side.most_shift > least else None
         elif is_corrected and not plan.scenario.time.has_springs and not plan.key.startswith("time."):
             half = self._half(change)
         margin = side.margin(levels, least, as_given=not is_corrected)
         give = side.give if {change.below, change.above} == BOTH else None
-        return given.corrected(levels, half, margin, give)
+        fields: dict[str, Any] = {"undecided": margin, "give": give}
+        low, high = given.low, given.high
+        if levels is not None:
+            stiff = levels.stiff
+            fields |= {"extrapolated": stiff is not None, "levels": levels.levels, "problem": levels.problem}
+            fields["stiff"] = stiff
+            low, high = stiff or (low, high)
+        if half is not None:
+            fields["half_step"] = half
+            if (half.low, half.high) != (low, high):
+                on = max(half.low - high, 0.0) + min(half.high - low, 0.0)  # what lies between both
+                low, high = min(low, half.low + min(on, 0.0)), max(high, half.high + max(on, 0.0))
+        ends = (margin.rest, margin.springs) if change.above is Stability.FALLS else (margin.springs, margin.rest)
+        fields |= {"low": low - ends[0] * abs(low), "high": high + ends[1] * abs(high)}
+        return given.model_copy(update=fields)
 
     def _again(
         self,
         plan: LimitPlan,
-        near: Change[Verdict],
+        near: Change[Stability],
         known: dict[float, dict[Number, Row]],
         place: float,
         *,
         may_stay: bool = False,
-    ) -> Change[Verdict] | None:
+    ) -> Change[Stability] | None:
         """Search the limit once more near a bracket with other settings, and return it if there is one.
 
         Its rows are kept as `known[place]`. With `may_stay` nothing more is run where both ends came to the same again.
@@ -197,36 +417,36 @@ class _Search:
         changes = limit_plan.changes_in(_fallen(self.plan.verdicts(rows)))
         return changes[0] if len(changes) == 1 and {changes[0].below, changes[0].above} == BOTH else None
 
-    def _half(self, change: Change[Verdict]) -> limit_answer.HalfStep:
+    def _half(self, change: Change[Stability]) -> limit_answer.HalfStep:
         """Search a limit with half the time step."""
         ends = (change.low, change.high)
-        steps = (build(self.plan.scenario_at(value)).scene.world.controls[0].step for value in ends)
+        steps = (schemes.build(self.plan.scenario_at(value)).scene.world.controls[0].step for value in ends)
         step = HALF * float(min(steps))
         found = self._again(replace(self.plan, apart={STEP: step}), change, self.step_rows, step)
         if found is None:
             return limit_answer.HalfStep(step=step, low=change.low, high=change.high, problem=NO_FINER)
         return limit_answer.HalfStep(step=step, low=found.low, high=found.high)
 
-    def _levels(self, side: limit_margin.StandingSide, least: float) -> limit_margin.Levels:
+    def _levels(self, side: StandingSide, least: float) -> Levels:
         """Search one limit at one stiffness after the other, until two are near enough to be extrapolated.
 
         A step given by hand is shorter with stiffer springs, in proportion.
         """
         change, scenario = side.change, self.plan.scenario_at(side.change.low)
         first = scale = scenario.contact.stiffness_scale
-        given = limit_margin.Level(stiffness_scale=scale, low=change.low, high=change.high)
-        levels = limit_margin.Levels((given,), limit_margin.ratio_of(scenario), is_at_rest=motion.settles(scenario))
+        given = limit_answer.StiffnessLevel(stiffness_scale=scale, low=change.low, high=change.high)
+        levels = Levels((given,), ratio_of(scenario), is_at_rest=motion.settles(scenario))
         share = side.give.share if side.give is not None else 0.0
         while levels.is_far and len(levels.levels) < MOST_LEVELS:
-            scale *= limit_margin.RATIO
+            scale *= RATIO
             is_foretold = len(levels.levels) > 1 or share > least
             if is_foretold:
-                low, high = levels.aim(-share if change.below is Verdict.FALLS else share, self.plan.tolerance)
+                low, high = levels.aim(-share if change.below is Stability.FALLS else share, self.plan.tolerance)
             else:
                 beyond = least * max(abs(change.low), abs(change.high))
                 low, high = change.low - beyond, change.high + beyond
-            near = replace(change, low=self.plan.span.fitted(low), high=self.plan.span.fitted(high))
-            apart: dict[str, object] = {limit_margin.STIFFNESS: scale}
+            near = replace(change, low=self.plan.span.clip(low), high=self.plan.span.clip(high))
+            apart: dict[str, object] = {STIFFNESS: scale}
             if scenario.time.step != "auto":
                 apart[STEP] = scenario.time.step * (first / scale) ** 0.5
             plan = replace(self.plan, tolerance=SHARPER * self.plan.tolerance, apart=apart)
@@ -236,14 +456,16 @@ class _Search:
                 return replace(levels, problem=NO_STIFFER.format(ratio=scale / first))
             if may_stay and (found.low, found.high) == (near.low, near.high):
                 return levels
-            level = limit_margin.Level(stiffness_scale=scale, low=found.low, high=found.high)
+            level = limit_answer.StiffnessLevel(stiffness_scale=scale, low=found.low, high=found.high)
             levels = replace(levels, levels=(*levels.levels, level))
         return replace(levels, problem=STILL_FAR) if levels.is_far else levels
 
 
-def _fallen(verdicts: Mapping[Number, Verdict]) -> dict[Number, Verdict]:
+def _fallen(verdicts: Mapping[Number, Stability]) -> dict[Number, Stability]:
     """Return what runs came to, those that move on at the end without having fallen among those that stand."""
-    return {value: Verdict.STANDS if verdict is Verdict.UNDECIDED else verdict for value, verdict in verdicts.items()}
+    return {
+        value: Stability.STANDS if verdict is Stability.UNDECIDED else verdict for value, verdict in verdicts.items()
+    }
 
 
 def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
@@ -265,7 +487,7 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
         changed = {"output": {"contacts": True}, "start": release, "time": {"stop_at_rest": False} if falls else {}}
         tables = {name: getattr(scenario, name).model_copy(update=update) for name, update in changed.items()}
         scenario = scenario.model_copy(update=tables)  # not stopped where it is slow: so it may begin
-        name = run_hash(scenario)
+        name = provenance.run_hash(scenario)
         row = ensemble.run_case(scenario, answer.folder / sweep_folder.CASES / name)
         if row["status"] == ensemble.INTERRUPTED:
             raise StoppedEarlyError("stopped while the runs beside a limit were kept; rerun the command to finish")
@@ -273,8 +495,10 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
             message = f"{row['reason']}; the limit is found, its runs are not kept: rerun the command, or --no-runs"
             raise OutputError(message)
         if row["status"] == FINISHED:
-            is_seen = falls and row["outcome"] != Response.STANDS.value  # of one that was released to be seen to fall
-            update = {name: row.get(name) for name in (*table_columns(), PEAK)} if is_seen else {}
+            is_seen = falls and row["outcome"] != STANDS  # of one that was released to be seen to fall
+            update = (
+                {name: row.get(name) for name in (*observables.table_columns(), observables.PEAK)} if is_seen else {}
+            )
             sides[side.value] = side.model_copy(update={**update, "case": name})
     brackets = [
         one.model_copy(update={name: sides.get(side.value, side) for name, side in one.sides.items()})
@@ -283,7 +507,7 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
     return answer.model_copy(update={"brackets": tuple(brackets)})
 
 
-def repeat_limit(answer: limit_answer.LimitAnswer, execution: Replay, out: Path) -> limit_answer.LimitAnswer:
+def repeat_limit(answer: limit_answer.LimitAnswer, execution: sweep.Replay, out: Path) -> limit_answer.LimitAnswer:
     """Search again, with stiffer springs or not as in the first way that leads to the answer, or to any."""
     ends: dict[str, object] = {"from": answer.low, "to": answer.high}
     if answer.is_whole:
@@ -300,7 +524,8 @@ def repeat_limit(answer: limit_answer.LimitAnswer, execution: Replay, out: Path)
     for stiffer in (None, True, False):  # what was asked for is not kept
         with suppress(InvalidInputError):
             place = out / f"limit-{stiffer}"
-            again = find_limit(plan, replace(options, out=place, stiffer=stiffer), execution.anew())
+            execution.runs.clear()  # what another way has asked for
+            again = find_limit(plan, replace(options, out=place, stiffer=stiffer), execution)
             if (answer.folder / sweep_folder.CASES).is_dir():  # what these runs show; they are not run again
                 shutil.copytree(answer.folder / sweep_folder.CASES, place / sweep_folder.CASES)
                 again = with_sides(again)
@@ -313,10 +538,10 @@ def repeat_limit(answer: limit_answer.LimitAnswer, execution: Replay, out: Path)
     return tried[0]
 
 
-def repeat_curve(answer: limit_answer.CurveAnswer, _: Replay, out: Path) -> limit_answer.CurveAnswer:
+def repeat_curve(answer: limit_answer.CurveAnswer, _: sweep.Replay, out: Path) -> limit_answer.CurveAnswer:
     """Repeat all searches of a curve, and put their answers together."""
     searches = {
-        over: repeat_limit(limit_answer.LimitAnswer.read(place), Replay.of(place), out / f"{number}")
+        over: repeat_limit(limit_answer.LimitAnswer.read(place), sweep.Replay.of(place), out / f"{number}")
         for number, (over, place) in enumerate(answer.places().items())
     }
     again = limit_answer.CurveAnswer.of(Head(answer.over, answer.over_unit), out, searches)

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from pydantic import BaseModel, Field, InstanceOf, model_serializer, model_validator
 
@@ -16,26 +16,26 @@ from blocksim.errors import ExitCode, InvalidInputError, Problem
 from blocksim.scenario.input_files import raise_problems, read_table
 from blocksim.simulation.observables import PEAK, Response, table_columns
 from blocksim.study.answer import Answer, Overview, with_unit
-from blocksim.study.criterion import Verdict
-from blocksim.study.limit_margin import GIVE, Give, Level, Levels, Margin
+from blocksim.study.criterion import Stability
 from blocksim.study.limit_plan import NAMES, Change, LimitPlan, Number
 from blocksim.study.rows import Head, Row, as_cell
-from blocksim.study.stored_run import load_stored_run
+from blocksim.study.run_folder import read_run
 from blocksim.study.sweep_folder import CASES, FolderKind, case_folder
 from blocksim.view import mechanism, run_data, studies, style
 
 UNIT = r"(?: \[[^\[\]]*\])?"
 STEP = "time.step"
 HEADS = ("verdict", "outcome", "first to move", "at s", "moved mm", "turned °")
+GIVE = 5e-3  # share of a limit that is warned of
 LEAST_SAID = 1e-5  # share of a limit
-LIMIT = {Verdict.STANDS, Verdict.FALLS}
+LIMIT = {Stability.STANDS, Stability.FALLS}
 
 
 class Side(BaseModel, frozen=True, extra="allow"):
     """One side of a bracket: the value that was run, and what it came to, as it was seen."""
 
     value: float
-    verdict: Verdict
+    verdict: Stability
     outcome: str | None = None
     first_mover: str | int | None = None
     first_moved_s: float | None = None
@@ -49,7 +49,7 @@ class Side(BaseModel, frozen=True, extra="allow"):
     case: str | None = None  # its folder in `cases`, with frames
 
     @classmethod
-    def of(cls, value: Number, verdict: Verdict, row: Row) -> Self:
+    def of(cls, value: Number, verdict: Stability, row: Row) -> Self:
         """Take what a row says."""
         names = (*table_columns(), PEAK, "status", "reason")
         cells: dict[str, Any] = {name: row.get(name) for name in names}
@@ -58,7 +58,7 @@ class Side(BaseModel, frozen=True, extra="allow"):
     def cells(self) -> list[str | float]:
         """Return its row of a table for people."""
         value, nothing = f"{self.value:.8g}", [""] * 4
-        if self.verdict is Verdict.FAILED:
+        if self.verdict is Stability.FAILED:
             return [value, self.verdict.value, str(self.reason).splitlines()[0], *nothing]
         if self.outcome is None:
             return [value, self.verdict.value, "does not settle", *nothing]
@@ -67,6 +67,34 @@ class Side(BaseModel, frozen=True, extra="allow"):
         at = "" if self.first_moved_s is None else f"{self.first_moved_s:.3f}"
         moved = (self.displacement_mm or 0.0, self.turn_deg or 0.0)
         return [value, self.verdict.value, f"{self.outcome}{amplitude}", first, at, *moved]
+
+
+class StiffnessLevel(BaseModel, frozen=True):
+    """The bracket of a limit at one stiffness scale."""
+
+    stiffness_scale: float
+    low: float
+    high: float
+
+    @property
+    def middle(self) -> float:
+        """The middle of the bracket."""
+        return 0.5 * (self.low + self.high)
+
+
+class Margin(BaseModel, frozen=True):
+    """Shares of a limit by which it may lie beyond its bracket."""
+
+    rest: float  # on the standing side
+    springs: float  # on the falling side
+
+
+class Give(NamedTuple):
+    """How far contacts have given way where a structure still stands."""
+
+    value: float  # of the key, in its unit
+    turn: float  # deg, the largest of all blocks
+    share: float  # of the limit, by which it is off
 
 
 class HalfStep(BaseModel, frozen=True):
@@ -86,38 +114,20 @@ class Bracket(BaseModel, frozen=True):
     below: Side
     above: Side
     extrapolated: bool = False  # to stiff contacts, from springs of several stiffnesses
-    levels: tuple[Level, ...] = ()
+    levels: tuple[StiffnessLevel, ...] = ()
     problem: str = ""
     half_step: HalfStep | None = None
     undecided: Margin | None = None
     give: Give | None = Field(default=None, exclude=True)
     stiff: tuple[float, float] | None = Field(default=None, exclude=True)  # as extrapolated
 
-    def corrected(self, levels: Levels | None, half: HalfStep | None, margin: Margin, give: Give | None) -> "Bracket":
-        """Return it with stiff contacts and short steps, as far as known, and as wide as is unknown."""
-        fields: dict[str, Any] = {"undecided": margin, "give": give}
-        low, high = self.low, self.high
-        if levels is not None:
-            stiff = levels.stiff
-            fields |= {"extrapolated": stiff is not None, "levels": levels.levels, "problem": levels.problem}
-            fields["stiff"] = stiff
-            low, high = stiff or (low, high)
-        if half is not None:
-            fields["half_step"] = half
-            if (half.low, half.high) != (low, high):
-                on = max(half.low - high, 0.0) + min(half.high - low, 0.0)  # what lies between both
-                low, high = min(low, half.low + min(on, 0.0)), max(high, half.high + max(on, 0.0))
-        ends = (margin.rest, margin.springs) if self.above.verdict is Verdict.FALLS else (margin.springs, margin.rest)
-        fields |= {"low": low - ends[0] * abs(low), "high": high + ends[1] * abs(high)}
-        return self.model_copy(update=fields)
-
     @property
-    def given(self) -> Change[Verdict]:
+    def given(self) -> Change[Stability]:
         """Both values that were run."""
         return Change(self.below.value, self.above.value, self.below.verdict, self.above.verdict)
 
     @property
-    def change(self) -> Change[Verdict]:
+    def change(self) -> Change[Stability]:
         """The answer."""
         return replace(self.given, low=self.low, high=self.high)
 
@@ -127,7 +137,7 @@ class Bracket(BaseModel, frozen=True):
         return {"below": self.below, "above": self.above}
 
     @property
-    def verdicts(self) -> set[Verdict]:
+    def verdicts(self) -> set[Stability]:
         """What both sides came to."""
         return {self.below.verdict, self.above.verdict}
 
@@ -245,28 +255,28 @@ class LimitAnswer(Answer, frozen=True):
         )
 
     @property
-    def changes(self) -> list[Change[Verdict]]:
+    def changes(self) -> list[Change[Stability]]:
         """The brackets: of stiff contacts where springs of several stiffnesses were searched."""
         return [one.change for one in self.brackets]
 
     @property
-    def limits(self) -> list[Change[Verdict]]:
+    def limits(self) -> list[Change[Stability]]:
         """Those between standing and falling."""
         return [one.change for one in self.brackets if one.verdicts == LIMIT]
 
     @property
-    def limits_as_given(self) -> list[Change[Verdict]]:
+    def limits_as_given(self) -> list[Change[Stability]]:
         """The same for the springs and the time step of the scenario, as they were run."""
         return [one.given for one in self.brackets if one.verdicts == LIMIT]
 
     @property
     def falls(self) -> list[Bracket]:
         """The brackets on one side of which the structure falls; on the other it stands, or moves on at the end."""
-        others = {Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED}
-        return [one for one in self.brackets if others >= one.verdicts > {Verdict.FALLS}]
+        others = {Stability.STANDS, Stability.FALLS, Stability.UNDECIDED}
+        return [one for one in self.brackets if others >= one.verdicts > {Stability.FALLS}]
 
     @property
-    def kept(self) -> dict[float, str]:
+    def case_folders(self) -> dict[float, str]:
         """Folders in `cases` of runs with frames, by value."""
         sides = (side for one in self.brackets for side in one.sides.values())
         return {side.value: side.case for side in sides if side.case is not None}
@@ -282,7 +292,7 @@ class LimitAnswer(Answer, frozen=True):
             verdicts = list(plan.verdicts(self.rows).items())
             sides = [Side.of(value, verdict, self.rows[value]) for value, verdict in (verdicts[0], verdicts[-1])]
         unique = {(side.value, side.verdict): side for side in sides}
-        if plan is not None and Verdict.UNDECIDED in plan.verdicts(self.rows).values():
+        if plan is not None and Stability.UNDECIDED in plan.verdicts(self.rows).values():
             notes.append("undecided: blocks were still moving at the end; increase time.end to decide")
         notes += self.warnings()
         if plan is not None and not self.is_whole and (plan.scenario.motion is not None or not self.brackets):
@@ -291,9 +301,14 @@ class LimitAnswer(Answer, frozen=True):
             which = f"islands narrower than {spacing}, between values of the scan, are not seen"
             notes.append(f"{which}: --scan N for more values")
         notes.append(f"{self.runs} runs, {self.run} of them now: {self.folder / 'limit.csv'}")
-        if any({side.value for side in one.sides.values()} <= self.kept.keys() for one in self.falls):
+        if any({side.value for side in one.sides.values()} <= self.case_folders.keys() for one in self.falls):
             notes.append(f"picture of the mechanism: blocksim plot {self.folder}")
-        contacts, lines = NAMES.get(self.scheme, self.scheme), self._lines()
+        contacts, lines = NAMES.get(self.scheme, self.scheme), []
+        for one in self.brackets:
+            lines += one.lines(self.unit)
+        if not lines:
+            answer = "" if plan is None else f": {sides[0].verdict.value} at all {len(self.rows)} values"
+            lines = [f"no change from {with_unit(self.low, self.unit)} to {with_unit(self.high, self.unit)}{answer}"]
         about = {"key": self.key, "stands means": self.stands, "contacts": contacts, "runs": str(self.runs)}
         found = lines if self.brackets else ["nothing changes within the range"]
         return Overview(
@@ -307,16 +322,6 @@ class LimitAnswer(Answer, frozen=True):
             code=ExitCode.SUCCESS if self.brackets else ExitCode.OUTSIDE,
         )
 
-    def _lines(self) -> list[str]:
-        """Return every bracket, and what it is made from."""
-        if self.brackets:
-            return [line for one in self.brackets for line in one.lines(self.unit)]
-        span = f"no change from {with_unit(self.low, self.unit)} to {with_unit(self.high, self.unit)}"
-        if self.plan is None:
-            return [span]
-        verdict = next(iter(self.plan.verdicts(self.rows).values()))
-        return [f"{span}: {verdict.value} at all {len(self.rows)} values"]
-
     def warnings(self) -> list[str]:
         """Return what springs do to limits that are not those of stiff contacts."""
         return [text for one in self.brackets for text in one.warnings(self.unit, is_as_given=self.is_as_given)]
@@ -327,7 +332,7 @@ class LimitAnswer(Answer, frozen=True):
         for one in self.brackets:
             sides = [side for side in (one.below, one.above) if side.case and case_folder(self.folder, side.case)]
             if len(sides) == 2:
-                first, second = sorted(sides, key=lambda side: side.verdict is not Verdict.STANDS)
+                first, second = sorted(sides, key=lambda side: side.verdict is not Stability.STANDS)
                 brackets.append((self._picture_of(first), self._picture_of(second)))
         if not brackets:
             empty = "it holds no runs of both sides of a bracket"
@@ -337,13 +342,13 @@ class LimitAnswer(Answer, frozen=True):
 
     def _picture_of(self, side: Side) -> mechanism.Side:
         """Return a side whose run was kept, as it is drawn."""
-        run = load_stored_run(self.folder / CASES / Path(str(side.case)).name)
+        run = read_run(self.folder / CASES / Path(str(side.case)).name)
         first = None if side.first_mover is None else str(side.first_mover)
         head = f"{side.verdict.value} at {self.key} = {with_unit(side.value, self.unit)}"
         came = side.outcome or ""
         if first is not None:
             came = f"{came}; first to move: block {first} at {side.first_moved_s or 0.0:.3g} s"
-        support, is_mechanism = run_data.support_of(run.scenario, run.events), side.verdict is not Verdict.STANDS
+        support, is_mechanism = run_data.support_of(run.scenario, run.events), side.verdict is not Stability.STANDS
         picture = mechanism.Side(run.frames, support, first, head, is_mechanism=is_mechanism)
         return replace(picture, caption=f"{head}\n{came} (drawn at {float(run.frames.time[picture.frame]):.3g} s)")
 
@@ -449,7 +454,7 @@ class CurveAnswer(Answer, frozen=True):
         axes = [
             f"{key} ({unit})" if unit else key for key, unit in ((self.over, self.over_unit), (self.key, self.unit))
         ]
-        published = () if self.beside is None else read_published(self.beside, self.over_unit, self.unit)
+        published = () if self.beside is None else read_limits(self.beside, self.over_unit, self.unit)
         curve = studies.LimitCurve(axes[0], axes[1], points, tuple(notes), published)
         studies.draw_limit_curve(curve, path, title, paper)
 
@@ -459,7 +464,7 @@ def place_of(number: float, unit: str) -> str:
     return re.sub(r"[^A-Za-z0-9.+-]+", "-", with_unit(number, unit, 6))
 
 
-def read_published(path: Path, over_unit: str, unit: str) -> tuple[studies.Series, ...]:
+def read_limits(path: Path, over_unit: str, unit: str) -> tuple[studies.Series, ...]:
     """Return the series of a table in the order of their first rows: value of the other key, limit, and name.
 
     Its columns are `over`, `limit` and `series`, the first two with the units of the search in brackets where there

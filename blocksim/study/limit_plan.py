@@ -29,8 +29,8 @@ from blocksim.scenario.models import loads, study, timeline
 from blocksim.scenario.placement import smallest_width
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
-from blocksim.study import answer, criterion, executors, runs
-from blocksim.study.criterion import Criterion, Verdict
+from blocksim.study import answer, criterion, executors, sweep
+from blocksim.study.criterion import Criterion, Stability
 from blocksim.study.plan import RANGE, Values, Variations, build_distributions, levels_of, variations_option
 from blocksim.study.rows import Head, Row, heads_of
 
@@ -48,7 +48,7 @@ LEAST_TOLERANCE = 1e-9
 OPTION, OVER = "--vary", "--over"
 NAMES = {name: time.contacts for name, time in timeline.SCHEMES.items()}
 Number = float  # in the unit of the range
-OnRun = Callable[[Number, Verdict, Row], None]
+OnRun = Callable[[Number, Stability, Row], None]
 
 
 def read_share(text: str) -> float:
@@ -134,7 +134,7 @@ class SearchOptions(executors.Execution):
     overwrite: Overwrite = False
 
     @property
-    def shared(self) -> dict[str, Any]:
+    def search_options(self) -> dict[str, Any]:
         """What a single search and a curve of limits have in common, by name."""
         return {field.name: getattr(self, field.name) for field in fields(SearchOptions)}
 
@@ -156,7 +156,7 @@ class CurveOptions(SearchOptions):
 
 
 @dataclass(frozen=True)
-class Span:
+class SearchRange:
     """The range of a key in the unit in which it was typed, and how many values are scanned first."""
 
     low: float
@@ -180,7 +180,7 @@ class Span:
         """Return the values that divide a bracket, without its ends."""
         return [value for value in replace(self, low=low, high=high, count=parts + 1).grid() if low < value < high]
 
-    def fitted(self, value: float) -> Number:
+    def clip(self, value: float) -> Number:
         """Return a value as it is tried, the nearest within the range."""
         return float(f"{min(max(value, self.low), self.high):.{DIGITS}g}")
 
@@ -210,7 +210,7 @@ def changes_in(known: Mapping[Number, Kind]) -> list[Change[Kind]]:
 
 
 def next_values(
-    span: Span, known: Mapping[Number, Kind], tolerance: float, peaks: Mapping[Number, float] | None = None
+    span: SearchRange, known: Mapping[Number, Kind], tolerance: float, peaks: Mapping[Number, float] | None = None
 ) -> list[Number]:
     """Return the values to try next; none when every change is as narrow as wanted.
 
@@ -237,14 +237,14 @@ def next_values(
     return [value for one in wide for value in span.between(one.low, one.high)]
 
 
-def next_near(span: Span, known: Mapping[Number, Kind], near: Change[Kind], tolerance: float) -> list[Number]:
+def next_near(span: SearchRange, known: Mapping[Number, Kind], near: Change[Kind], tolerance: float) -> list[Number]:
     """Return the values to try next where a change is expected near a bracket, that of `near`, and nothing is scanned.
 
     First its ends, then on in the direction in which the change must be until it is passed, by more every time, and
     then as `next_values`. None when the change is as narrow as wanted, and where there is no such change in the range.
     """
     if not known:
-        return list(dict.fromkeys(span.fitted(value) for value in (near.low, near.high)))
+        return list(dict.fromkeys(span.clip(value) for value in (near.low, near.high)))
     changes = changes_in(known)
     if changes:
         (first, *others) = changes
@@ -253,7 +253,7 @@ def next_near(span: Span, known: Mapping[Number, Kind], near: Change[Kind], tole
         return [] if span.is_narrow(first.low, first.high, tolerance) else span.between(first.low, first.high)
     low, high = min(known), max(known)
     width = OUTWARD * ((high - low) or tolerance * abs(high))
-    beyond = span.fitted(high + width if known[low] == near.below else low - width)
+    beyond = span.clip(high + width if known[low] == near.below else low - width)
     return [] if known[low] not in (near.below, near.above) or beyond in known else [beyond]
 
 
@@ -283,7 +283,7 @@ def is_sustained(scenario: Scenario) -> bool:
     return True
 
 
-def typed_levels(document: Document, given: Variations, option: str) -> tuple[Head, dict[float, object]]:
+def numeric_levels(document: Document, given: Variations, option: str) -> tuple[Head, dict[float, object]]:
     """Return the column of the only key, and its values by their numbers in its unit, from the smallest up.
 
     Raises ScenarioError for values that the scenario cannot have, InvalidInputError for a range without a count, values
@@ -313,7 +313,7 @@ class LimitPlan:
     document: Document  # without what varies
     key: str
     unit: str  # as typed; empty for plain numbers
-    span: Span
+    span: SearchRange
     criterion: Criterion
     tolerance: float  # of a bracket, relative to its ends
     apart: Mapping[str, object] = field(default_factory=dict)  # settings in which its runs differ from the document
@@ -332,7 +332,7 @@ class LimitPlan:
         """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
         return self.document.with_values(self.settings(number)).build()
 
-    def verdicts(self, rows: Mapping[Number, Row]) -> dict[Number, Verdict]:
+    def verdicts(self, rows: Mapping[Number, Row]) -> dict[Number, Stability]:
         """Return what runs came to, from the smallest value up."""
         return {value: self.criterion.verdict(rows[value]) for value in sorted(rows)}
 
@@ -340,7 +340,7 @@ class LimitPlan:
     def name(self) -> str:
         """A hash of everything that decides the answer."""
         ends = [self.key, self.unit, *vars(self.span).values(), self.criterion.text, self.tolerance]
-        return runs.short_hash([scenario_hash(self.scenario), ends, code_hash()])
+        return sweep.short_hash([scenario_hash(self.scenario), ends, code_hash()])
 
 
 class CurvePlan(NamedTuple):
@@ -357,10 +357,10 @@ def read_curve(document: Document, options: CurveOptions) -> CurvePlan:
     if len(given) != 1:
         raise InvalidInputError(f"limits are searched over one key, not {len(given)}: give {OVER} KEY=a,b,c once")
     bare = document.without_sweep()
-    head, levels = typed_levels(bare, given, OVER)
+    head, levels = numeric_levels(bare, given, OVER)
     if len(levels) > MOST_VALUES:
         raise InvalidInputError(f"{len(levels)} values are too many; at most {MOST_VALUES} are searched")
-    one = LimitOptions(**options.shared)
+    one = LimitOptions(**options.search_options)
     return CurvePlan(head, {at: read_limit(bare.with_values({head.key: value}), one) for at, value in levels.items()})
 
 
@@ -397,7 +397,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     low, high = (float(f"{end / factor:.{DIGITS}g}") for end in (values.low, values.high))
     is_whole = takes_whole(bare, key) and all(type(ends[end]) is int for end in ("from", "to"))
     count = min(count, int(high - low) + 1) if is_whole else count  # every whole number that fits
-    span = Span(low, high, count, is_log=values.scale == "log", is_whole=is_whole)
+    span = SearchRange(low, high, count, is_log=values.scale == "log", is_whole=is_whole)
     plan = LimitPlan(bare, key, unit, span, stands, tolerance)
     at_ends = []
     for number in (low, high):

@@ -24,6 +24,7 @@ from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, 
 from blocksim.simulation import files as atomic, observables
 from blocksim.simulation.files import brief_lock, takes_lock
 from blocksim.study import plan, rows
+from blocksim.study.executors import Batch
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,10 +67,6 @@ class Shard:
     def slice(self) -> slice:
         """The numbers of its cases, among those of all cases."""
         return slice(self.index, None, self.of)
-
-    def numbers(self, count: int) -> range:
-        """Return the numbers of its cases where there are `count` in all."""
-        return range(count)[self.slice]
 
     def file(self, name: str) -> str:
         """Return the name of its own file: sweep.csv, or sweep-0-of-8.csv."""
@@ -216,7 +213,7 @@ class CaseIndex:
         """Yield number, values and entry of every case that has a row; not where the file has changed since."""
         with ExitStack() as files:
             opened = [files.enter_context(open_regular(path)) for path in self.paths]
-            for number in shard.numbers(len(cases)):
+            for number in range(len(cases))[shard.slice]:
                 settings = cases.design[number]
                 if self.holds(number, settings):
                     file = opened[int(self.sources[number])]
@@ -225,12 +222,11 @@ class CaseIndex:
                         yield number, settings, entry
 
 
-def note_timings(path: Path, executor: str, cases: Iterable[str], seconds: float, host: str) -> None:
+def note_timings(path: Path, executor: str, batch: Batch) -> None:
     """Add a line a case to a table: its share (s) of the wall time of the batch that it was run in.
 
     Raises OutputError.
     """
-    names = list(cases)
     try:
         with path.open("a+b") as file:
             size, text = file.seek(0, os.SEEK_END), io.StringIO()
@@ -239,8 +235,8 @@ def note_timings(path: Path, executor: str, cases: Iterable[str], seconds: float
                 text.write("" if file.read() == NEWLINE else "\n")
             writer = csv.writer(text, lineterminator="\n")
             writer.writerows([] if size else [TIMING_COLUMNS])
-            share = f"{seconds / max(len(names), 1):.6f}"
-            writer.writerows((name, executor, share, rows.as_cell(host)) for name in names)
+            share = f"{batch.seconds / max(len(batch.tasks), 1):.6f}"
+            writer.writerows((task.name, executor, share, rows.as_cell(batch.host)) for task in batch.tasks)
             file.write(text.getvalue().encode())
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror}") from error

@@ -20,8 +20,8 @@ from blocksim.silence import silent
 from blocksim.simulation import files
 from blocksim.simulation.files import refuse_foreign
 from blocksim.simulation.stores.hdf5 import read_probes
-from blocksim.study import answer, compare, manifest, stored_run, sweep_folder
-from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, is_angle, quarter_turns
+from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
+from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
 from blocksim.view import animation, history, run_data, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
 from blocksim.view.paint import COLOURS, paint_named
@@ -69,12 +69,12 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
         rotation_deg=rotation_deg,
         finished=finished,
         inside=None if path is None else Ranges.read(path).inside(table).to_numpy(dtype=bool) & finished,
-        measured=Measurements() if path is None else measured_of(load_table(path), blocks),
+        measured=Measurements() if path is None else measurements_of(load_table(path), blocks),
         manners=tuple(table["outcome"].fillna("").astype(str)) if "outcome" in table.columns else (),
     )
 
 
-def measured_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measurements:
+def measurements_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measurements:
     """Return repeats and prediction intervals of x (mm), and the measured class where all rotations are measured."""
     means = {row.block: row.mean for row in table.summaries() if row.quantity == "rotation"}
     turned = quarter_turns([means[block] for block in blocks if block in means])
@@ -117,7 +117,7 @@ def _input(scenario: Scenario, head: Head, column: "pd.Series", vary: Variation)
     if len(values) == len(column):
         typed = InputUnit(head.unit, head.si(1.0)) if head.unit else None
         is_even = isinstance(vary, Normal) or (isinstance(vary, Uniform) and vary.scale == "linear")
-        unit = unit_of(scenario, head.key) or ("rad" if is_angle(head.unit) else "")
+        unit = unit_of(scenario, head.key) or ("rad" if head.is_angle else "")
         return Input(head.key, unit, values, is_even=is_even, typed=typed)
     words = [units.toml(value).strip('"') for value in column]
     levels = tuple(dict.fromkeys(words))
@@ -338,12 +338,12 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
     """Draw a run, or its probes; return the picture's path and a remark on an unfinished run.
 
     The path is by default NAME.png or NAME_KIND.png. Raises InvalidInputError for an unknown kind or format and options
-    that mean nothing for it, what `stored_run` and `PlotOptions.picture` raise, OutputError.
+    that mean nothing for it, what `run_folder` and `PlotOptions.picture` raise, OutputError.
     """
     kind = options.kind or STRIP
     draw = None if kind == PROBE else run_kind(kind)
     options.refuse(kind, f"this picture is of kind {kind}")
-    stored = stored_run.load_stored_run(run)
+    stored = run_folder.read_run(run)
     scenario = stored.scenario
     table = options.table or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None or draw is None else load_table(table)
@@ -381,7 +381,7 @@ def _draw_motion(place: Path, options: PlotOptions) -> Path:
     if place.is_file():
         scenario = load_scenario(place)
     else:
-        scenario = load_stored(stored_run.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
+        scenario = load_stored(run_folder.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
     picture = options.picture(f"{scenario.name}_{MOTION}.png")
     support = run_data.support_of(scenario)
     time_panels.draw_support_motion(support, scenario.time.end, picture, f"{scenario.name}: motion", options.paper)
@@ -414,7 +414,7 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
     """Write a run as an animation, see `animate`; return its path, what it is, and a remark on an unfinished run."""
     if options.out is not None:
         animation.writer_of(Path(options.out))
-    stored = stored_run.load_stored_run(place)
+    stored = run_folder.read_run(place)
     scenario = stored.scenario
     path = Path(options.out or f"{scenario.name}.gif")
     refuse_foreign(path, overwrite=options.overwrite)
@@ -427,12 +427,12 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
 
 
 @takes(AnimateOptions)
-def animate(place: stored_run.Place, options: AnimateOptions) -> Path:
+def animate(place: run_folder.Place, options: AnimateOptions) -> Path:
     """Write a run as an animation, GIF or MP4, and return its path (default: NAME.gif in the current folder).
 
     Raises as `plot` does, and UnavailableError where nothing can write MP4.
     """
-    return draw_film(stored_run.folder_of(place), options)[0]
+    return draw_film(run_folder.folder_of(place), options)[0]
 
 
 FEWEST_LEVELS = 2  # to show a distance
@@ -446,7 +446,7 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, pape
     """
     panels = []
     for study in result.studies:
-        levels = [level for level in study.levels if level.is_finished]
+        levels = [level for level in study.levels if level.x_mm]
         if len(levels) < FEWEST_LEVELS:
             continue
         x, unit = np.array([level.x_mm for level in levels]), unit_of(scenario, study.key)
@@ -461,7 +461,7 @@ def draw_convergence(result: "Convergence", scenario: Scenario, path: Path, pape
                 largest_off_mm=np.array([level.to_finest_mm for level in levels]),
                 tolerance_mm=result.tolerance_mm,
                 own=study.own.value,
-                recommended=None if study.recommended is None else study.recommended.value,
+                recommended=None if study.recommendation is None else study.recommendation.value,
             )
         )
     if panels:
@@ -497,7 +497,7 @@ def _draw_sweep(folder: Path, options: PlotOptions) -> Path:
 
 
 @takes(PlotOptions)
-def plot(place: stored_run.Place, options: PlotOptions) -> Path:
+def plot(place: run_folder.Place, options: PlotOptions) -> Path:
     """Draw a run, a sweep, a study or a table of sensitivities.
 
     `place` is a result that is kept in a folder, a sweep, or what the command takes. Returns the path of the picture
@@ -505,7 +505,7 @@ def plot(place: stored_run.Place, options: PlotOptions) -> Path:
     and a result that was not kept, InputMissingError, OutputExistsError for a file of others unless `overwrite`,
     OutputError.
     """
-    return draw(stored_run.folder_of(place), options)[0]
+    return draw(run_folder.folder_of(place), options)[0]
 
 
 def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:

@@ -67,7 +67,7 @@ def levels_of(values: Variation) -> tuple[object, ...]:
 
 
 @dataclass(frozen=True)
-class Column:
+class CaseColumn:
     """One column: the key that it varies, its head, and cell and value of every row."""
 
     key: str
@@ -76,7 +76,7 @@ class Column:
     values: Sequence[object]
 
 
-def read_columns(path: Path) -> list[Column]:
+def read_columns(path: Path) -> list[CaseColumn]:
     """Read the columns of a table. Raises InputMissingError or InvalidInputError with the lines of all mistakes."""
     rows = read_table(path, limit=LARGEST_FILE)
     heads = rows.heads
@@ -93,7 +93,7 @@ def read_columns(path: Path) -> list[Column]:
     return columns
 
 
-def _column(head: TableCell, cells: Sequence[TableCell], problems: list[Problem]) -> Column:
+def _column(head: TableCell, cells: Sequence[TableCell], problems: list[Problem]) -> CaseColumn:
     found = HEAD.fullmatch(head.text)
     key, unit = (head.text, None) if found is None else (found["key"], found["unit"])
     complaint = variation_fault(key)
@@ -104,14 +104,14 @@ def _column(head: TableCell, cells: Sequence[TableCell], problems: list[Problem]
             complaint = str(error)
     if complaint:
         problems.append(head.problem(complaint))
-        return Column(key, head, cells, ())
+        return CaseColumn(key, head, cells, ())
     values = []
     for cell in cells:
         try:
             values.append(_cell_value(cell, unit))
         except ValueError as error:
             problems.append(cell.problem(str(error)))
-    return Column(key, head, cells, values)
+    return CaseColumn(key, head, cells, values)
 
 
 def _cell_value(cell: TableCell, unit: str | None) -> object:
@@ -135,7 +135,7 @@ def _word(text: str) -> object:
     return value
 
 
-def refuse_wrong_values(document: Document, columns: Iterable[Column]) -> None:
+def refuse_wrong_values(document: Document, columns: Iterable[CaseColumn]) -> None:
     """Try the values of each column by themselves; raises InvalidInputError with the cells of all wrong ones.
 
     Tried are the first different values, and the ends of all numbers.
@@ -256,7 +256,7 @@ ROW, ROW_OF_BLOCK = 570, 230
 
 
 @dataclass(frozen=True)
-class Case:
+class SweepCase:
     """One member of a sweep: the values of its keys, and its scenario or the reason why it has none."""
 
     settings: Settings
@@ -277,15 +277,15 @@ class Cases:
         """Return the number of cases."""
         return len(self.design)
 
-    def __getitem__(self, number: int) -> Case:
+    def __getitem__(self, number: int) -> SweepCase:
         values = self.design[number]
         try:
             scenario = self.document.with_values(values).build()
         except BlocksimError as error:  # mistakes that only show in the combination
-            return Case(values, None, problem=str(error).splitlines()[0])
-        return Case(values, scenario, name=run_hash(scenario))
+            return SweepCase(values, None, problem=str(error).splitlines()[0])
+        return SweepCase(values, scenario, name=run_hash(scenario))
 
-    def __iter__(self) -> Iterator[Case]:
+    def __iter__(self) -> Iterator[SweepCase]:
         return map(self.__getitem__, range(len(self)))
 
 
@@ -353,17 +353,24 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
         raise InvalidInputError(f"{len(design)} cases are too many for one sweep; at most {MOST_CASES} are allowed")
     refuse_wrong_draws(document, sweep, design)
     # what cases are made from has no sweep, and tables that are found, or read, once for all of them
-    scenario, data = document.build(), document.without_sweep().data
-    if scenario.experiment is not None:
-        data = {**data, "experiment": {"table": scenario.experiment.table}}
-    if isinstance(scenario.motion, TABLED):
-        data, _ = overrides.with_value(data, ("motion", "table"), scenario.motion.table)
-    cases = Cases(replace(document, data=data), design, heads_of(sweep))
+    bare = document.without_sweep()
+    cases = Cases(replace(bare, data=with_tables(bare.data, document.build())), design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
     if all(case.scenario is None for case in islice(cases, looked_at)):
         which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"
         raise InvalidInputError(f"{which} can be simulated; the first: {cases[0].problem}")
     return cases
+
+
+def with_tables(data: Mapping[str, object], scenario: Scenario) -> Mapping[str, object]:
+    """Return what a scenario is built from with the tables that it has read in place of their paths."""
+    if scenario.experiment is not None:
+        data = {**data, "experiment": {"table": scenario.experiment.table}}
+    bodies = [(("bodies", number, "motion"), body.motion) for number, body in enumerate(scenario.bodies)]
+    for path, motion in ((("motion",), scenario.motion), *bodies):
+        if isinstance(motion, TABLED):
+            data, _ = overrides.with_value(data, (*path, "table"), motion.table)
+    return data
 
 
 def refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None:

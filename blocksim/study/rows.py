@@ -80,6 +80,27 @@ class Head:
         found = HEAD.fullmatch(name)
         return cls(name) if found is None else cls(found["key"], found["unit"])
 
+    @classmethod
+    def of(cls, key: str, values: object) -> "Head":
+        """Return the column of values: with the first unit that was typed, where all are numbers."""
+        if not isinstance(values, tuple):
+            return cls(key, str(getattr(values, "unit", "")))
+        head = cls(
+            key, next((unit for value in values if isinstance(value, str) and (unit := units.unit_in(value))), "")
+        )
+        if head.is_angle and not all(isinstance(value, str) or value == 0 for value in values):
+            return cls(key)  # friction angles among friction coefficients: no unit holds for both
+        numbers = all(
+            not isinstance(value, bool) and (isinstance(value, int | float) or bool(units.unit_in(str(value))))
+            for value in values
+        )
+        return head if numbers else cls(key)
+
+    @property
+    def is_angle(self) -> bool:
+        """Return True for a unit of angles, as friction angles have it."""
+        return bool(self.unit) and units.parse_unit(self.unit).dimension == units.ANGLE.dimension
+
     def __str__(self) -> str:
         """Return the name of the column."""
         return f"{self.key} [{self.unit}]" if self.unit else self.key
@@ -97,26 +118,7 @@ class Head:
 
 def heads_of(sweep: Sweep) -> tuple[Head, ...]:
     """Return the columns of the keys that a sweep varies, in their order."""
-    return tuple(Head(key, _unit(values)) for key, values in sweep.vary.items())
-
-
-def _unit(values: object) -> str:
-    """Return the unit of a column: the first that was typed, where all values are numbers."""
-    if not isinstance(values, tuple):
-        return str(getattr(values, "unit", ""))
-    typed = next((unit for value in values if isinstance(value, str) and (unit := units.unit_in(value))), "")
-    if is_angle(typed) and not all(isinstance(value, str) or value == 0 for value in values):
-        return ""  # friction angles among friction coefficients: no unit holds for both
-    numbers = all(
-        not isinstance(value, bool) and (isinstance(value, int | float) or bool(units.unit_in(str(value))))
-        for value in values
-    )
-    return typed if numbers else ""
-
-
-def is_angle(unit: str) -> bool:
-    """Return True for a unit of angles, as friction angles have it."""
-    return bool(unit) and units.parse_unit(unit).dimension == units.ANGLE.dimension
+    return tuple(Head.of(key, values) for key, values in sweep.vary.items())
 
 
 def si_number(value: object) -> float:
@@ -175,6 +177,11 @@ class Ranges:
 
     source: str
     limits: Mapping[str, Range]
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "Ranges | None":
+        """Return the measured ranges that a scenario is compared with, if it names any."""
+        return None if scenario.experiment is None else cls.read(scenario.experiment.table)
 
     @classmethod
     def read(cls, table: Path | str) -> "Ranges":

@@ -12,7 +12,7 @@ from blocksim.silence import silent
 from blocksim.simulation import Result, Watcher, checkpoint, files, read_result, renew_copies, simulate, simulate_into
 from blocksim.simulation.results import changed_results, read_summary
 from blocksim.simulation.run import NO_CALLBACKS, RunCallbacks
-from blocksim.study import rows, stored_run
+from blocksim.study import rows, run_folder
 
 Threads = Annotated[
     int,
@@ -92,4 +92,4 @@ def open_run(place: Path | str) -> Result:
 
     Raises InputMissingError where there is none and InvalidInputError for a damaged one.
     """
-    return read_result(stored_run.find_run(place))
+    return read_result(run_folder.find_run(place))

@@ -134,7 +134,7 @@ LEAST_SHARE = 0.5  # of the blocks of a design have to be whole
 OnMember = Callable[[int, int], None]
 
 
-class Output(NamedTuple):
+class ModelOutput(NamedTuple):
     """One result of every run, shape (runs,): mm or degrees, or 1 and 0 where `unit` is "share"."""
 
     name: str
@@ -142,7 +142,7 @@ class Output(NamedTuple):
     values: Floats
 
 
-def outputs_of(finals: Sequence[trajectory.Columns], table: ExperimentTable | None) -> list[Output]:
+def outputs_of(finals: Sequence[trajectory.Columns], table: ExperimentTable | None) -> list[ModelOutput]:
     """Return every measured quantity (without a table: x of the first blocks), and indicators of the outcome."""
     blocks = finals[0]["block"]
     outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
@@ -150,12 +150,12 @@ def outputs_of(finals: Sequence[trajectory.Columns], table: ExperimentTable | No
     means: dict[str, float] = {}
     if table is None:
         places = np.array([final["x_mm"] for final in finals])
-        found = [Output(f"x of block {name}", "mm", places[:, k]) for k, name in enumerate(blocks[:MOST_BLOCKS])]
+        found = [ModelOutput(f"x of block {name}", "mm", places[:, k]) for k, name in enumerate(blocks[:MOST_BLOCKS])]
     else:
         ranges, summaries = ranges_of(table), table.summaries()
         values = [values_at(final, ranges) for final in finals]
         found = [
-            Output(f"{row.quantity} of block {row.block}", QUANTITIES[row.quantity].unit, column)
+            ModelOutput(f"{row.quantity} of block {row.block}", QUANTITIES[row.quantity].unit, column)
             for row, column in zip(summaries, np.array(values).T, strict=True)
         ]
         means = {row.block: row.mean for row in summaries if row.quantity == "rotation"}
@@ -168,7 +168,7 @@ def outputs_of(finals: Sequence[trajectory.Columns], table: ExperimentTable | No
     turned = f"({sum(angle != 0 for angle in wanted)} of {len(wanted)} blocks turned)"
     shown = "/".join(map(str, wanted)) if len(wanted) <= MOST_BLOCKS else turned
     indicators = {f"{name} {shown}": [outcome == wanted for outcome in outcomes], **inside}
-    return found + [Output(name, INDICATOR, np.array(hits, dtype=np.float64)) for name, hits in indicators.items()]
+    return found + [ModelOutput(name, INDICATOR, np.array(hits, dtype=np.float64)) for name, hits in indicators.items()]
 
 
 class TooManyFailuresError(BlocksimError):
@@ -340,7 +340,7 @@ def settings_at(points: Floats, vary: Mapping[str, Variation]) -> Iterator[dict[
     return (dict(zip(vary, row, strict=True)) for row in zip(*columns, strict=True))
 
 
-def indices_of(output: Output, points: Floats, method: Method, seed: int) -> Indices:
+def indices_of(output: ModelOutput, points: Floats, method: Method, seed: int) -> Indices:
     """Return the indices of one output of a design's runs."""
     name, unit, values = output
     sd = float(np.std(values))

@@ -2,25 +2,24 @@
 
 What has ended is in the manifest, so a sweep that is called again, after a kill too, does only what is missing. The
 table is written from the manifest: it depends neither on the executor nor on the order in which the cases ended.
+Studies whose runs follow from the rows of others (`Runs`) keep them in a manifest as well, and are repeated from there.
 """
 
 import hashlib
 import json
 import re
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
-from dataclasses import KW_ONLY, dataclass, replace
+from collections.abc import Callable, Generator, Hashable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, nullcontext, suppress
+from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self, TypeVar
 
-from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError, StoppedEarlyError, UnavailableError
+from blocksim import errors
 from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Document, Scenario, Source, document_of, scenario_hash
-from blocksim.scenario.models.study import Sweep
 from blocksim.silence import silent
-from blocksim.simulation import files, interruption, provenance, schemes as compilation
-from blocksim.simulation.schemes import SCHEMES
+from blocksim.simulation import files, interruption, provenance, schemes
 from blocksim.study import executors, manifest, plan as plans, rows, sweep_folder
 
 TIMINGS = "timings.csv"
@@ -28,6 +27,8 @@ MOST_INVALID = 500  # kept in memory before they are written
 SOONEST = 2.0  # s between two tables while the sweep runs
 SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
 OnRow = Callable[[int, int, rows.Row], None]
+Key = TypeVar("Key", bound=Hashable)
+Ended = tuple[int, str, plans.Settings, rows.Row]  # number of a case, name of its run, its values, its row
 SHARDED = re.compile(r"manifest-\d+-of-(\d+)\.jsonl")
 MOST_SHARDS = 20
 SharedCases = Annotated[
@@ -101,49 +102,35 @@ def run_sweep(document: Document, options: SweepOptions) -> manifest.SweepResult
     base = document.build()
     plan = plans.plan_of(base)
     cases = plans.cases_of(document, plan)
-    name = sweep_hash(base, plan, plans.table_digests(document, plan.vary))
+    tables = plans.table_digests(document, plan.vary)
+    about = [scenario_hash(base), plan.as_table(), *([tables] if tables else []), provenance.code_hash()]
+    name = short_hash(about)
     folder = Path(options.out) if options.out is not None else files.RESULTS / base.name / f"sweep-{name}"
-    run, setting = options.ready(folder / sweep_folder.CASES if options.keep_cases else None)
+    rounds, setting = options.ready(folder / sweep_folder.CASES if options.keep_cases else None)
     sweep_folder.prepare(folder, base, name, overwrite=options.overwrite)
-    sweep_folder.keep_varied(folder, document, plan.vary, overwrite=options.overwrite)
+    sweep_folder.copy_tables(folder, document, plan.vary, overwrite=options.overwrite)
     for kernels in kernels_for(document):
-        compilation.compile_kernels(kernels)
-    with closing(manifest.Manifest(folder / shard.file(manifest.MANIFEST))) as kept:
-        share = SweepRun(cases, shard, kept, options.on_row, measured_ranges(base))
-        if options.retry_failed:
-            share.forget_failed()
-        share.run(run, setting, fail_fast=options.fail_fast)
+        schemes.compile_kernels(kernels)
+    with closing(manifest.Manifest(folder / shard.file(manifest.MANIFEST))) as kept, rounds() as run:
+        share = SweepRun(cases, shard, kept, options.on_row, rows.Ranges.of(base))
+        share.run(run, setting, fail_fast=options.fail_fast, retry_failed=options.retry_failed)
     return manifest.SweepResult(folder, shard.file(rows.TABLE), share.count)
 
 
 def refuse_loss(shard: manifest.Shard, *, overwrite: bool) -> None:
     """Refuse that every job of an array removes what the others have done."""
     if overwrite and shard != manifest.WHOLE:
-        raise InvalidInputError("a shard cannot overwrite what other shards have done; remove the folder first")
-
-
-def measured_ranges(base: Scenario) -> rows.Ranges | None:
-    """Return the measured ranges that a scenario is compared with, if it names any."""
-    return None if base.experiment is None else rows.Ranges.read(base.experiment.table)
-
-
-def sweep_hash(base: Scenario, plan: Sweep, tables: Mapping[str, Sequence[str]]) -> str:
-    """Return the name of a sweep: a hash of its scenario, of what it varies, and of the code.
-
-    `tables` has the digests of the files that varied keys name.
-    """
-    text = json.dumps([scenario_hash(base), plan.as_table(), *([tables] if tables else []), provenance.code_hash()])
-    return hashlib.sha256(text.encode()).hexdigest()[: provenance.HASH_DIGITS]
+        raise errors.InvalidInputError("a shard cannot overwrite what other shards have done; remove the folder first")
 
 
 def kernels_for(document: Document) -> tuple[str, ...]:
     """Return the sets of kernels that the cases of a sweep need."""
     base = document.build()
     vary = base.sweep.vary if base.sweep else {}
-    schemes = (base.time.scheme, *map(str, plans.levels_of(vary.get("time.scheme", ()))))
+    names = (base.time.scheme, *map(str, plans.levels_of(vary.get("time.scheme", ()))))
     models = (base.contact.model, *map(str, plans.levels_of(vary.get("contact.model", ()))))
-    sets = (SCHEMES[scheme].kernels(model) for scheme in schemes for model in models)
-    return tuple(dict.fromkeys((compilation.kernels_of(base), *sets)))
+    sets = (schemes.SCHEMES[scheme].kernels(model) for scheme in names for model in models)
+    return tuple(dict.fromkeys((schemes.kernels_of(base), *sets)))
 
 
 class SweepRun:
@@ -166,25 +153,37 @@ class SweepRun:
         self.done = manifest.CaseIndex(self.folder, len(cases))
         self.count = len(self.done.state[shard.slice])  # cases of this share
         self.new = 0  # rows of this call
-        self.invalid: list[tuple[manifest.Entry, plans.Settings]] = []  # cases that cannot be run, not written yet
+        self.invalid: list[Ended] = []  # cases that cannot be run, not written yet
         self.next_at = time.monotonic() + SOONEST
 
-    def forget_failed(self) -> None:
-        """Have those cases run again that did not end well."""
-        state = self.done.state[self.shard.slice]
-        state[state == manifest.ENDED_BADLY] = manifest.MISSING
+    def run(
+        self,
+        runner: executors.Run,
+        setting: executors.RunSetting,
+        *,
+        fail_fast: bool = False,
+        retry_failed: bool = False,
+    ) -> None:
+        """Run what has no row yet, or that of a case that failed where these are to be run again.
 
-    def run(self, executor: executors.Run, setting: executors.Setting, *, fail_fast: bool = False) -> None:
-        """Run what has no row yet. Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept."""
+        Raises StoppedEarlyError on Ctrl-C; what has ended by then is kept.
+        """
+        state = self.done.state[self.shard.slice]
+        if retry_failed:
+            state[state == manifest.ENDED_BADLY] = manifest.MISSING
+        timings = self.folder / self.shard.file(TIMINGS)
         try:
             with interruption.stop_requests() as is_stopped:
                 setting = replace(setting, is_stopped=is_stopped)
                 # closed here and now: left to the garbage collector, workers would continue
-                with closing(executor(self._tasks(), setting)) as batches:
+                with closing(runner(self._tasks(), setting)) as batches:
                     for batch in batches:
-                        has_failed = self._keep_batch(batch, setting.executor)
+                        has_failed = bool(self.invalid) or any(row["status"] != rows.FINISHED for row in batch.rows)
+                        tasks = zip(batch.tasks, batch.rows, strict=True)
+                        self._keep([(task.number, task.name, task.settings, row) for task, row in tasks])
+                        manifest.note_timings(timings, setting.executor, batch)
                         if time.monotonic() >= self.next_at:
-                            with suppress(OutputExistsError):  # somebody has changed it: said at the end
+                            with suppress(errors.OutputExistsError):  # somebody has changed it: said at the end
                                 self._write()
                         if fail_fast and has_failed:
                             break
@@ -193,13 +192,13 @@ class SweepRun:
                 stopped = is_stopped()
         except KeyboardInterrupt:
             stopped = True
-        except UnavailableError:
+        except errors.UnavailableError:
             self._write()
             raise
         self._write()
         if stopped and self.done.count(self.shard) < self.count:
             done = f"{self.done.count(self.shard)} of {self.count} cases done"
-            raise StoppedEarlyError(f"stopped with {done}; rerun the command to finish")
+            raise errors.StoppedEarlyError(f"stopped with {done}; rerun the command to finish")
 
     def _write(self) -> None:
         """Write the table; the more rows, the longer the while until it is worth it again."""
@@ -213,44 +212,29 @@ class SweepRun:
 
     def _tasks(self) -> Iterator[executors.Task]:
         """Make one task after the other; cases that cannot be run get their rows on the way."""
-        for number in self.shard.numbers(len(self.cases)):
+        for number in range(len(self.cases))[self.shard.slice]:
             if self.done.holds(number, self.cases.design[number]):
                 continue
             case = self.cases[number]
             if case.scenario is not None:
                 yield executors.Task(number, case.name, case.settings, case.scenario)
                 continue
-            entry = manifest.Entry(
-                number, case.name, manifest.values_hash(case.settings), rows.invalid_row(case.problem)
-            )
-            self.invalid.append((entry, case.settings))
+            self.invalid.append((number, case.name, case.settings, rows.invalid_row(case.problem)))
             if len(self.invalid) >= MOST_INVALID:
                 self._keep()
 
-    def _keep_batch(self, batch: executors.Batch, executor: str) -> bool:
-        """Keep rows, and return whether one of them is of a case that failed."""
-        ended = [
-            (manifest.Entry(task.number, task.name, manifest.values_hash(task.settings), row), task.settings)
-            for task, row in zip(batch.tasks, batch.rows, strict=True)
-        ]
-        has_failed = bool(self.invalid) or any(row["status"] != rows.FINISHED for row in batch.rows)
-        self._keep(ended)
-        names = [task.name for task in batch.tasks]
-        manifest.note_timings(self.folder / self.shard.file(TIMINGS), executor, names, batch.seconds, batch.host)
-        return has_failed
-
-    def _keep(self, ended: Sequence[tuple[manifest.Entry, plans.Settings]] = ()) -> None:
+    def _keep(self, ended: Sequence[Ended] = ()) -> None:
         """Bring rows to the disk, with those of cases that cannot be run, and then report them."""
         ended, self.invalid = [*ended, *self.invalid], []
         if not ended:
             return
-        entries = [entry for entry, _ in ended]
+        entries = [manifest.Entry(one, case, manifest.values_hash(values), row) for one, case, values, row in ended]
         for start, entry in zip(self.manifest.append(entries), entries, strict=True):
             self.done.note(self.manifest.path, start, entry)
         self.new += len(ended)
         before = self.done.count(self.shard) - len(ended)
-        for position, (entry, settings) in enumerate(ended, start=1):
-            self.on_row(before + position, self.count, {"case": entry.case, **settings, **entry.row})
+        for position, (_, case, settings, row) in enumerate(ended, start=1):
+            self.on_row(before + position, self.count, {"case": case, **settings, **row})
 
 
 def merge(folder: Path | str, *, allow_missing: bool = False) -> manifest.SweepResult:
@@ -265,21 +249,146 @@ def merge(folder: Path | str, *, allow_missing: bool = False) -> manifest.SweepR
     cases = plans.cases_of(document, plans.plan_of(base))
     done = manifest.CaseIndex(folder, len(cases))
     if not done.paths:
-        raise InputMissingError(f"{folder}: no case of this sweep has run yet")
+        raise errors.InputMissingError(f"{folder}: no case of this sweep has run yet")
     for number, settings in enumerate(cases.design):
         done.holds(number, settings)
     count = len(cases)
     if done.count() < count and not allow_missing:
         lines = [f"{folder}: {count - done.count()} of {count} cases are missing; --allow-missing merges the others"]
         of = max((int(match[1]) for path in done.paths if (match := SHARDED.fullmatch(path.name))), default=1)
-        shards = [(shard, len(shard.numbers(count))) for shard in (manifest.Shard(index, of) for index in range(of))]
+        shards = [(manifest.Shard(index, of), len(range(index, count, of))) for index in range(of)]
         missing = [(shard, size - done.count(shard), size) for shard, size in shards if done.count(shard) < size]
         if of > 1:  # by shards, those of the job array with the most jobs where there were several
             lines += [f"  --shard {shard}: {left} of {size} missing" for shard, left, size in missing[:MOST_SHARDS]]
         if of > 1 and len(missing) > MOST_SHARDS:
             lines.append(f"  and {len(missing) - MOST_SHARDS} more shards")
-        raise InvalidInputError("\n".join(lines))
+        raise errors.InvalidInputError("\n".join(lines))
     sweep_folder.write_table(
-        folder / rows.TABLE, sweep_folder.SWEEP, manifest.table_rows(cases, done, measured_ranges(base))
+        folder / rows.TABLE, sweep_folder.SWEEP, manifest.table_rows(cases, done, rows.Ranges.of(base))
     )
     return manifest.SweepResult(folder, planned=len(cases))
+
+
+class Runs:
+    """The rows of a study: those in its manifest, and what an executor adds to them."""
+
+    def __init__(
+        self, kept: manifest.Manifest, document: Document, run: executors.Run, setting: executors.RunSetting
+    ) -> None:
+        """Take what is known from the manifest; all others are runs of the document with other values."""
+        self.manifest, self.document, self._run, self._setting = kept, document, run, setting
+        self.known = {entry.values: entry.row for _, entry in manifest.read_entries(kept.path)}
+        self.new = 0
+
+    def rows_of(
+        self, wanted: Mapping[Key, plans.Settings], on_row: Callable[[Key, rows.Row], None] = silent
+    ) -> dict[Key, rows.Row]:
+        """Return the rows of runs with these values, after running what is missing; each is reported as it ends.
+
+        Values that do not go together have a row that says so. Raises StoppedEarlyError on Ctrl-C.
+        """
+        names = {key: manifest.values_hash(settings) for key, settings in wanted.items()}
+        missing = {name: key for key, name in names.items() if name not in self.known}
+
+        def keep(settings: plans.Settings, case: str, row: rows.Row) -> None:
+            name = manifest.values_hash(settings)
+            # to the disk before it is reported
+            self.manifest.append([manifest.Entry(len(self.known), case, name, row)])
+            self.known[name] = row
+            self.new += 1
+            on_row(missing[name], row)
+
+        def tasks() -> Iterator[executors.Task]:
+            for number, key in enumerate(missing.values(), start=len(self.known)):
+                try:
+                    scenario = self.document.with_values(wanted[key]).build()
+                except errors.BlocksimError as error:
+                    keep(wanted[key], "", rows.invalid_row(str(error).splitlines()[0]))
+                    continue
+                yield executors.Task(number, provenance.run_hash(scenario), wanted[key], scenario)
+
+        try:
+            with interruption.stop_requests() as is_stopped:
+                setting = replace(self._setting, is_stopped=is_stopped)
+                with closing(self._run(tasks(), setting)) as batches:
+                    for batch in batches:
+                        for task, row in zip(batch.tasks, batch.rows, strict=True):
+                            keep(task.settings, task.name, row)
+                is_complete = missing.keys() <= self.known.keys()
+        except KeyboardInterrupt:
+            is_complete = False
+        if not is_complete:
+            raise errors.StoppedEarlyError(f"stopped after {len(self.known)} runs; rerun the command to finish")
+        return {key: self.known[name] for key, name in names.items()}
+
+
+@contextmanager
+def runs_of(
+    document: Document,
+    base: Scenario,
+    out: Path | str | None,
+    kind: sweep_folder.FolderKind,
+    name: str,
+    execution: executors.Execution,
+    *,
+    overwrite: bool = False,
+    peaks: bool = False,
+) -> Iterator[Runs]:
+    """Make the folder of a study, see `make_folder`, and give what runs the document.
+
+    With `peaks` rows have the largest rotation on the way. Raises OutputExistsError where the folder is not free,
+    UnavailableError for an executor that is not there.
+    """
+    rounds, setting = execution.ready()
+    folder = make_folder(out, base, kind, name, overwrite=overwrite)
+    schemes.compile_kernels(schemes.kernels_of(base))
+    what = kind.what.split(" ", 1)[1]
+    with closing(manifest.Manifest(folder / manifest.MANIFEST, what)) as kept, rounds() as run:
+        yield Runs(kept, document, run, replace(setting, peaks=peaks))
+
+
+def make_folder(
+    out: Path | str | None, base: Scenario, kind: sweep_folder.FolderKind, name: str, *, overwrite: bool
+) -> Path:
+    """Make the folder of a study of this name with its scenario: as given, or results/SCENARIO/STUDY-NAME.
+
+    Raises OutputExistsError where it is not free, and what is wrong with the scenario's experiment.
+    """
+    rows.check_experiment(base)
+    folder = Path(out) if out is not None else files.RESULTS / base.name / f"{Path(kind.plan).stem}-{name}"
+    sweep_folder.prepare(folder, base, name, overwrite=overwrite, kind=kind)
+    return folder
+
+
+def short_hash(data: object) -> str:
+    """Return a hash of data that can be written as JSON, to name a study."""
+    return hashlib.sha256(json.dumps(data, default=str).encode()).hexdigest()[: provenance.HASH_DIGITS]
+
+
+@dataclass(frozen=True)
+class Replay(executors.Execution):
+    """An executor that runs nothing: rows come from the manifests of a folder."""
+
+    entries: Mapping[int | str, manifest.Entry] = field(default_factory=dict)
+    by_number: bool = False
+    runs: list[tuple[executors.Task, manifest.Entry]] = field(default_factory=list)  # all that were asked for
+
+    @classmethod
+    def of(cls, folder: Path, *, by_number: bool = False) -> Self:
+        """Take what the manifests of a folder hold: by the numbers of runs in a design, or by their values."""
+        entries = [entry for path in sorted(folder.glob(manifest.PATTERN)) for _, entry in manifest.read_entries(path)]
+        return cls(entries={one.number if by_number else one.values: one for one in entries}, by_number=by_number)
+
+    def ready(self, _: Path | None = None, /) -> tuple[executors.Rounds, executors.RunSetting]:
+        """Return what gives the rows."""
+        return lambda: nullcontext(self._run), executors.RunSetting(1)
+
+    def _run(self, tasks: Iterator[executors.Task], _: executors.RunSetting) -> Generator[executors.Batch, None, None]:
+        """Yield every task with the row that it has. Raises InvalidInputError."""
+        for task in tasks:
+            entry = self.entries.get(task.number if self.by_number else manifest.values_hash(task.settings))
+            if entry is None:
+                values = ", ".join(f"{key} = {value}" for key, value in task.settings.items())
+                raise errors.InvalidInputError(f"the manifest has no run with {values}")
+            self.runs.append((task, entry))
+            yield executors.Batch((task,), (entry.row,), 0.0, "")

@@ -15,9 +15,10 @@ from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario, input_files, overrides, spelling
-from blocksim.scenario.models.motion import TABLED, FromTable, content_of
+from blocksim.scenario.models.motion import content_of
 from blocksim.simulation import files, provenance
 from blocksim.simulation.files import is_resolved
+from blocksim.study.plan import with_tables
 
 MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each
 log = logging.getLogger(__name__)
@@ -82,7 +83,7 @@ SWEEP = FolderKind(  # shards have tables of their own
 VARIED = "tables"  # folder of the copies of tables that a sweep varies
 
 
-class Origin(BaseModel, frozen=True):
+class StudyOrigin(BaseModel, frozen=True):
     """What sweep.json begins with: versions and machine of whoever began the study, and how cases were drawn."""
 
     began_at: str
@@ -107,7 +108,7 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: F
         files.keep_scenario(base, tables, folder, kind.plan, head)
         known = read_origin(folder, kind)  # whoever continues with a study did not begin it
         if known is None or known.sha256 != sums:
-            origin = known or Origin(
+            origin = known or StudyOrigin(
                 began_at=datetime.now(UTC).isoformat(timespec="seconds"),
                 mode=None if plan is None else plan.mode,
                 seed=plan.seed if plan is not None and plan.is_sampled else None,
@@ -118,11 +119,11 @@ def prepare(folder: Path, base: Scenario, name: str, *, overwrite: bool, kind: F
             files.write_text(folder / kind.origin, text + "\n")
 
 
-def read_origin(folder: Path, kind: FolderKind = SWEEP) -> Origin | None:
+def read_origin(folder: Path, kind: FolderKind = SWEEP) -> StudyOrigin | None:
     """Return what a study came from, None where it is older than this file. Raises InvalidInputError."""
     path = folder / kind.origin
     try:
-        return Origin.model_validate_json(input_files.read_limited(path, input_files.MEGABYTE))
+        return StudyOrigin.model_validate_json(input_files.read_limited(path, input_files.MEGABYTE))
     except InputMissingError:
         return None
     except ValidationError as error:
@@ -231,18 +232,11 @@ def read_plan(folder: Path) -> Document:
     document = Document.read(folder / PLAN, is_stored=True)
     if not (folder / VARIED).is_dir():
         return document
-    base, data = document.without_sweep().build(), document.data  # what the plan itself names lies beside it
-    if base.experiment is not None:
-        data = {**data, "experiment": {"table": base.experiment.table}}
-    if isinstance(base.motion, TABLED):
-        data, _ = overrides.with_value(data, ("motion", "table"), base.motion.table)
-    for number, body in enumerate(base.bodies):
-        if isinstance(body.motion, FromTable):
-            data, _ = overrides.with_value(data, ("bodies", number, "motion", "table"), body.motion.table)
+    data = with_tables(document.data, document.without_sweep().build())  # what the plan itself names lies beside it
     return replace(document, data=data, folder=folder / VARIED)
 
 
-def keep_varied(folder: Path, document: Document, vary: Mapping[str, object], *, overwrite: bool) -> None:
+def copy_tables(folder: Path, document: Document, vary: Mapping[str, object], *, overwrite: bool) -> None:
     """Copy the tables that varied keys name, so that the sweep can be repeated without them; see `read_plan`.
 
     They keep their names, in a folder of their own; those outside the folder of the scenario stay where they are.

@@ -37,10 +37,9 @@ from blocksim.simulation import (
     simulate,
 )
 from blocksim.simulation.trajectory import csv_text
-from blocksim.study import answer, manifest, plan, stored_run, sweep, sweep_folder
+from blocksim.study import answer, manifest, plan, run_folder, sweep, sweep_folder
 from blocksim.study.executors.ensemble import rows_of
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row
-from blocksim.study.runs import Replay
 
 INTERRUPTED = "interrupted"
 SCENARIO = "scenario"  # its hash, beside the entries of `environment`
@@ -136,7 +135,7 @@ def _read_entries(path: Path) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Origin:
+class OriginDifference:
     """One thing that the bits may depend on, as it was when the run was made and as it is now."""
 
     name: str
@@ -154,7 +153,7 @@ class RunVerdict:
     table: bool  # and final.csv the same bytes,
     status: tuple[str, str]  # and how the run ended, then and now
     frames: Differences
-    origins: tuple[Origin, ...]  # that are not the same as then
+    origins: tuple[OriginDifference, ...]  # that are not the same as then
     entries: tuple[EntryDifference, ...] = ()  # of run.json and done.json
 
     @cached_property
@@ -174,7 +173,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     A run that was interrupted is repeated as far as it got. Raises InputMissingError where no run is there,
     InvalidInputError (ScenarioError) for files that cannot be read, StoppedEarlyError where the repetition is stopped.
     """
-    folder = stored_run.find_run(place)
+    folder = run_folder.find_run(place)
     summary = results.read_summary(folder / files.SUMMARY)
     changed = results.changed_files(folder, summary)
     try:
@@ -191,9 +190,9 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     again = simulate(scenario, threads=threads, on_progress=on_progress)
     if again.status == INTERRUPTED:
         raise StoppedEarlyError(f"{folder}: stopped before the new run was complete")
-    origins, now = changed_origins(summary.environment), scenario_hash(stored.scenario)
+    origins, now = origin_differences(summary.environment), scenario_hash(stored.scenario)
     if now != summary.scenario_hash:
-        origins = (Origin(SCENARIO, summary.scenario_hash, now), *origins)
+        origins = (OriginDifference(SCENARIO, summary.scenario_hash, now), *origins)
     return RunVerdict(
         folder,
         changed,
@@ -209,17 +208,17 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     )
 
 
-def tells_of_code(found: tuple[Origin, ...]) -> bool:
+def tells_of_code(found: tuple[OriginDifference, ...]) -> bool:
     """Return True if the code is among what is not the same: what is named by its hash then has another name."""
     return any(one.name in {CODE, "blocksim"} or one.name.startswith(provenance.ROOM_PREFIX) for one in found)
 
 
-def changed_origins(then: Mapping[str, str]) -> tuple[Origin, ...]:
+def origin_differences(then: Mapping[str, str]) -> tuple[OriginDifference, ...]:
     """Return which entries of an older `environment` are others now; what it lacks cannot be compared."""
     now = provenance.environment()
     whole = () if any(name.startswith(provenance.ROOM_PREFIX) for name in then) else (CODE,)  # rooms say more
     known = [name for name in now if name in then and (name in whole or name.startswith(DECIDES))]
-    return tuple(Origin(name, then[name], now[name]) for name in known if then[name] != now[name])
+    return tuple(OriginDifference(name, then[name], now[name]) for name in known if then[name] != now[name])
 
 
 @dataclass(frozen=True)
@@ -241,7 +240,7 @@ class SweepVerdict:
     rows: int  # of the table
     checked: tuple[int, ...]  # numbers of the rows that were run again, from 1
     cells: tuple[CellDifference, ...]
-    origins: tuple[Origin, ...] = ()  # what is not the same as when the sweep was made
+    origins: tuple[OriginDifference, ...] = ()  # what is not the same as when the sweep was made
     runs: tuple[RunVerdict, ...] = ()  # of those rows whose folders were kept
     entries: tuple[EntryDifference, ...] = ()  # of the answer of a study
 
@@ -281,7 +280,7 @@ def verify_sweep(folder: Path, sample: int = SAMPLE, seed: int = 0) -> SweepVerd
     rows = _chosen(len(lines), sample, seed)
     scenarios = [case.scenario for row in rows if (case := cases[numbers[row]]).scenario is not None]
     ends = iter(rows_of(scenarios, os.cpu_count() or 1))
-    ranges = sweep.measured_ranges(base)
+    ranges = Ranges.of(base)
     origins, is_same_code = _origins(folder, sweep_folder.SWEEP)
     entries = (entry for path in sorted(folder.glob(manifest.PATTERN)) for _, entry in manifest.read_entries(path))
     names = {entry.number: entry.case for entry in entries}  # the last one of each
@@ -313,7 +312,7 @@ def verify_study(folder: Path, study: answer.Study, sample: int = SAMPLE, seed: 
 
     Raises InputMissingError or InvalidInputError for files that cannot be read or do not go together.
     """
-    stored, replay = study.answer.read(folder), Replay.of(folder, by_number=study.is_design)
+    stored, replay = study.answer.read(folder), sweep.Replay.of(folder, by_number=study.is_design)
     parts = [(place, part) for place in study.parts(stored) if (part := answer.study_in(place)) is not None]
     verdicts = [verdict for place, part in parts for verdict in verify_study(place, part, sample, seed)]
     kind = stored.files
@@ -323,29 +322,31 @@ def verify_study(folder: Path, study: answer.Study, sample: int = SAMPLE, seed: 
         tables = [path for path in sorted(again.folder.glob("*.csv")) if kind.tables.fullmatch(path.name)]
         cells = [one for path in tables for one in _cells_apart(folder / path.name, manifest.lines_in(path))]
     origins, is_same_code = _origins(folder, kind)
-    tasks = replay.tasks
-    chosen = _chosen(len(tasks), sample, seed)
-    known = [entry for number in chosen if (entry := replay.entry(tasks[number])) is not None]  # all were there
-    peaks = any(observables.PEAK in entry.row for entry in known)
-    rows = rows_of([tasks[number].scenario for number in chosen], os.cpu_count() or 1, peaks=peaks)
-    for number, entry, row in zip(chosen, known, rows, strict=True):
+    chosen = _chosen(len(replay.runs), sample, seed)
+    peaks = any(observables.PEAK in replay.runs[number][1].row for number in chosen)
+    rows = rows_of([replay.runs[number][0].scenario for number in chosen], os.cpu_count() or 1, peaks=peaks)
+    for number, row in zip(chosen, rows, strict=True):
+        task, entry = replay.runs[number]
         then: Row = {CASE: entry.case, **entry.row}
-        now: Row = {CASE: tasks[number].name if is_same_code else entry.case, **row}
+        now: Row = {CASE: task.name if is_same_code else entry.case, **row}
         texts = [(name, *(str(as_cell(one.get(name))) for one in (then, now))) for name in dict.fromkeys((*then, *now))]
         cells += [CellDifference(number + 1, entry.case, *text) for text in texts if text[1] != text[2]]
     kept = tuple(verify_run(place) for place in sorted((folder / sweep_folder.CASES).glob("*")) if place.is_dir())
     checked = tuple(number + 1 for number in chosen)
-    return (*verdicts, SweepVerdict(folder, len(tasks) or len(parts), checked, tuple(cells), origins, kept, entries))
+    return (
+        *verdicts,
+        SweepVerdict(folder, len(replay.runs) or len(parts), checked, tuple(cells), origins, kept, entries),
+    )
 
 
 def _chosen(count: int, sample: int, seed: int) -> list[int]:
     return sorted(random.Random(seed).sample(range(count), min(sample, count)))  # noqa: S311 - no secret
 
 
-def _origins(folder: Path, kind: sweep_folder.FolderKind) -> tuple[tuple[Origin, ...], bool]:
+def _origins(folder: Path, kind: sweep_folder.FolderKind) -> tuple[tuple[OriginDifference, ...], bool]:
     """Return what is not the same as when a study was made, and whether its code is known to be."""
     origin = sweep_folder.read_origin(folder, kind)
-    origins = () if origin is None else changed_origins(origin.environment)
+    origins = () if origin is None else origin_differences(origin.environment)
     return origins, origin is not None and not tells_of_code(origins)
 
 
@@ -387,7 +388,7 @@ def _numbers(folder: Path, cases: plan.Cases, count: int) -> Sequence[int]:
     return held
 
 
-def _cells(columns: Sequence[str], case: plan.Case, row: Row, ranges: Ranges | None) -> dict[str, str]:
+def _cells(columns: Sequence[str], case: plan.SweepCase, row: Row, ranges: Ranges | None) -> dict[str, str]:
     """Return the cells of a row as texts, as the table of a sweep has them."""
     heads = (head for head in map(Head.read, columns) if head.key in case.settings)
     values: Row = {CASE: case.name, **{str(head): head.cell(case.settings[head.key]) for head in heads}, **row}

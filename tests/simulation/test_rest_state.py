@@ -15,7 +15,7 @@ from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.ensemble import run_ensemble
 from blocksim.simulation.rest_state import SettleError, initial_scene, settle
 from blocksim.simulation.schemes import ALONE, build, scheme_of
-from blocksim.study.criterion import DEFAULT, Verdict, read_criterion
+from blocksim.study.criterion import DEFAULT, Stability, read_criterion
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SCHEMES = ("explicit", "nonsmooth")
@@ -101,7 +101,7 @@ def test_a_tilt_at_which_it_falls_ends_with_the_block_that_moves_and_how_fast(sc
         simulate(scenario)
     assert caught.value.exit_code == ExitCode.NUMERICAL_FAILURE
     row = {"status": "failed", "reason": str(caught.value)}
-    assert read_criterion(DEFAULT).verdict(row) is Verdict.FALLS
+    assert read_criterion(DEFAULT).verdict(row) is Stability.FALLS
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -11,7 +11,7 @@ from blocksim.silence import silent
 from blocksim.study.answer import Answer, Overview, Study
 from blocksim.study.executors import Execution
 from blocksim.study.rows import Row
-from blocksim.study.runs import Replay, runs_of
+from blocksim.study.sweep import Replay, runs_of
 from blocksim.study.sweep_folder import FolderKind
 from blocksim.view.style import Paper
 from tests.study.test_limit import SQUAT, block_on_a_slope
@@ -53,7 +53,7 @@ def slip(
     document, folder = Document.from_mapping(block_on_a_slope(SQUAT)), Path(out)
     name = "-".join(f"{tilt:g}" for tilt in tilts)
     with runs_of(document, document.build(), folder, SlipAnswer.files, name, execution or Execution()) as runs:
-        rows = runs.rows({tilt: {"ground.tilt": f"{tilt} deg"} for tilt in tilts}, on_row)
+        rows = runs.rows_of({tilt: {"ground.tilt": f"{tilt} deg"} for tilt in tilts}, on_row)
         points = tuple(Point(tilt=tilt, outcome=str(row["outcome"])) for tilt, row in rows.items())
         cells = [(one.tilt, one.outcome) for one in points]
         answer = SlipAnswer(points=points, folder=folder, run=runs.new, heads=("tilt [deg]", "outcome"), cells=cells)

@@ -3,7 +3,7 @@
 import pytest
 
 from blocksim.errors import InvalidInputError
-from blocksim.study.criterion import DEFAULT, Verdict, read_criterion
+from blocksim.study.criterion import DEFAULT, Stability, read_criterion
 
 ROW = {"status": "finished", "reason": "at rest", "outcome": "slid", "displacement_mm": 4.9, "turn_deg": 30.0}
 
@@ -24,11 +24,11 @@ ROW = {"status": "finished", "reason": "at rest", "outcome": "slid", "displaceme
     ],
 )
 def test_conditions_are_judged_in_the_units_that_were_typed(text: str, stands: bool) -> None:
-    assert (read_criterion(text).verdict(ROW) is Verdict.STANDS) is stands
+    assert (read_criterion(text).verdict(ROW) is Stability.STANDS) is stands
 
 
 def test_a_run_that_failed_neither_stands_nor_falls() -> None:
-    assert read_criterion(DEFAULT).verdict({"status": "invalid"}) is Verdict.FAILED
+    assert read_criterion(DEFAULT).verdict({"status": "invalid"}) is Stability.FAILED
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document, scenario_hash
-from blocksim.study.calibrate import fitted_text, toml_value
+from blocksim.study.calibrate import scenario_text, toml_value
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 KINETIC, RESTITUTION = "friction.block_block.kinetic", "contact.restitution"
@@ -14,7 +14,7 @@ KINETIC, RESTITUTION = "friction.block_block.kinetic", "contact.restitution"
 def written(tmp_path: Path, name: str, values: dict[str, object], *settings: str) -> str:
     """Return the text, after checking that it says what it should."""
     document = Document.read(SCENARIOS / f"{name}.toml").with_settings(settings)
-    text = fitted_text(document, values, dict.fromkeys(values, "calibrated"), tmp_path, "by a test")
+    text = scenario_text(document, values, dict.fromkeys(values, "calibrated"), tmp_path, "by a test")
     (tmp_path / "scenario.toml").write_text(text)
     found, expected = Document.read(tmp_path / "scenario.toml").build(), document.with_values(values).build()
     assert scenario_hash(found) == scenario_hash(expected)
@@ -74,7 +74,7 @@ def test_text_that_cannot_be_edited_is_written_out_resolved(tmp_path: Path) -> N
     text = (SCENARIOS / "slide.toml").read_text().replace('velocity = ["0.5 m/s", 0]', "velocity = [\n  0.5,\n  0,\n]")
     document = Document.parse(text, "slide.toml", SCENARIOS)
     values = {"bodies.0.velocity": (0.6, 0.0), "friction.block_ground": 0.3}
-    found = fitted_text(document, values, {"friction.block_ground": "calibrated"}, tmp_path, "by a test")
+    found = scenario_text(document, values, {"friction.block_ground": "calibrated"}, tmp_path, "by a test")
     assert "Resolved by blocksim" in found
     built = Document.parse(found, folder=tmp_path).build()
     assert scenario_hash(built) == scenario_hash(document.with_values(values).build())

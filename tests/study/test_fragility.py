@@ -15,8 +15,7 @@ from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
-from blocksim.study.fragility import FragilityAnswer, fragility
-from blocksim.study.fragility_plan import read_fragility
+from blocksim.study.fragility import FragilityAnswer, fragility, read_fragility
 from blocksim.study.manifest import Shard
 from tests.sizes import in_all
 

@@ -14,7 +14,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError
 from blocksim.scenario import Document
-from blocksim.study.criterion import Verdict
+from blocksim.study.criterion import Stability
 from blocksim.study.executors.processes import pool_of
 from blocksim.study.limit import limit as searched
 from blocksim.study.limit_plan import is_sustained, read_limit, variants
@@ -59,7 +59,7 @@ def test_a_block_on_a_slope_slides_at_its_friction_angle_or_topples_about_its_ed
     assert change.low == pytest.approx(degrees, rel=2e-3)
     assert change.high == pytest.approx(degrees, rel=2e-3)
     assert change.high - change.low <= 1e-3 * change.high
-    assert (change.below, change.above) == (Verdict.STANDS, Verdict.FALLS)
+    assert (change.below, change.above) == (Stability.STANDS, Stability.FALLS)
     assert found.brackets[0].above.outcome == outcome
     assert len(found.rows) <= 25
 
@@ -79,7 +79,7 @@ def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_no
     for at in (1, 5, 10, 13):
         seen: list[float] = []
 
-        def stop(value: float, _: Verdict, __: Mapping[str, object], seen: list[float] = seen, at: int = at) -> None:
+        def stop(value: float, _: Stability, __: Mapping[str, object], seen: list[float] = seen, at: int = at) -> None:
             seen.append(value)
             if len(seen) == at:  # not again when it goes on
                 raise KeyboardInterrupt

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from blocksim.scenario import Document, load_scenario
-from blocksim.study.limit import limit
-from blocksim.study.limit_margin import STIFFNESS
+from blocksim.study.limit import STIFFNESS, limit
 from blocksim.study.limit_plan import with_scheme
 from blocksim.study.run import run
 

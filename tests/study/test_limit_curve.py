@@ -11,7 +11,7 @@ from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.study.limit import limit_curve
 from blocksim.study.limit_answer import CurveAnswer
 from blocksim.study.pictures import plot
-from blocksim.study.reporting import report
+from blocksim.study.report import report
 from blocksim.view.studies import Bracket, LimitCurve, Series, join_brackets
 from tests.study.test_limit import TILT, block_on_a_slope
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.study.limit_plan import Change, Span, changes_in, next_near, next_values
+from blocksim.study.limit_plan import Change, SearchRange, changes_in, next_near, next_values
 
 
-def searched(span: Span, answer: Callable[[float], str], tolerance: float) -> dict[float, str]:
+def searched(span: SearchRange, answer: Callable[[float], str], tolerance: float) -> dict[float, str]:
     known: dict[float, str] = {}
     while values := next_values(span, known, tolerance):
         assert not set(values) & known.keys(), "no value is tried twice"
@@ -19,7 +19,7 @@ def searched(span: Span, answer: Callable[[float], str], tolerance: float) -> di
 
 @given(st.floats(20.01, 39.99), st.sampled_from([1e-2, 1e-3, 1e-5]))
 def test_one_change_is_bracketed_as_narrowly_as_wanted(limit: float, tolerance: float) -> None:
-    known = searched(Span(20.0, 40.0, 9), lambda value: "stands" if value < limit else "falls", tolerance)
+    known = searched(SearchRange(20.0, 40.0, 9), lambda value: "stands" if value < limit else "falls", tolerance)
     (change,) = changes_in(known)
     assert change.low < limit <= change.high
     assert change.high - change.low <= tolerance * change.high
@@ -30,20 +30,20 @@ def test_a_limit_to_a_thousandth_takes_at_most_25_runs() -> None:
     def below(limit: float) -> Callable[[float], str]:
         return lambda value: str(value < limit)
 
-    counts = [len(searched(Span(0.0, 45.0, 9), below(limit), 1e-3)) for limit in (20.0, 27.3, 31.7, 44.0)]
+    counts = [len(searched(SearchRange(0.0, 45.0, 9), below(limit), 1e-3)) for limit in (20.0, 27.3, 31.7, 44.0)]
     assert max(counts) <= 25
 
 
 def test_structures_that_stand_again_beyond_a_range_of_falling_have_all_changes_found() -> None:
     ends = (0.7362, 1.7066, 1.8733)  # g: a block under a one-sine pulse, Zhang and Makris
-    known = searched(Span(0.2, 2.2, 41), lambda value: str(sum(value >= end for end in ends) % 2), 1e-3)
+    known = searched(SearchRange(0.2, 2.2, 41), lambda value: str(sum(value >= end for end in ends) % 2), 1e-3)
     assert [math.isclose(one.low, end, rel_tol=1e-3) for one, end in zip(changes_in(known), ends, strict=True)]
     assert len(changes_in(known)) == len(ends)
 
 
 @pytest.mark.parametrize("is_log", [False, True])
 def test_an_island_between_two_values_of_the_scan_is_found_where_rotations_peak_beside_it(is_log: bool) -> None:
-    span = Span(0.264, 0.748, 9, is_log)
+    span = SearchRange(0.264, 0.748, 9, is_log)
     known: dict[int | float, str] = {}
     while values := next_values(span, known, 1e-3, {value: 1.0 / (0.01 + abs(value - 0.47)) for value in known}):
         known |= {value: "falls" if 0.4613 < value < 0.4815 else "stands" for value in values}
@@ -54,17 +54,17 @@ def test_an_island_between_two_values_of_the_scan_is_found_where_rotations_peak_
 
 
 def test_whole_numbers_are_tried_as_such_and_end_as_neighbours() -> None:
-    known = searched(Span(1.0, 12.0, 4, is_whole=True), lambda value: str(value > 4), 1e-3)
+    known = searched(SearchRange(1.0, 12.0, 4, is_whole=True), lambda value: str(value > 4), 1e-3)
     assert changes_in(known) == [Change(4.0, 5.0, "False", "True")]
     assert all(value.is_integer() for value in known)
 
 
 def test_logarithmic_ranges_are_divided_by_ratio() -> None:
-    assert Span(1e-3, 1e3, 7, is_log=True).grid() == [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3]
+    assert SearchRange(1e-3, 1e3, 7, is_log=True).grid() == [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3]
 
 
 def test_a_change_at_zero_does_not_go_on_for_ever() -> None:
-    known = searched(Span(-10.0, 10.0, 9), lambda value: str(value > 0.0), 1e-3)
+    known = searched(SearchRange(-10.0, 10.0, 9), lambda value: str(value > 0.0), 1e-3)
     assert len(known) < 60
 
 
@@ -72,19 +72,19 @@ def test_an_undecided_range_has_a_bracket_at_either_side() -> None:
     def answer(value: float) -> str:
         return "stands" if value < 2.0 else "undecided" if value < 3.0 else "falls"
 
-    changes = changes_in(searched(Span(0.0, 10.0, 11), answer, 1e-2))
+    changes = changes_in(searched(SearchRange(0.0, 10.0, 11), answer, 1e-2))
     assert [(one.below, one.above) for one in changes] == [("stands", "undecided"), ("undecided", "falls")]
 
 
 @pytest.mark.parametrize("answers", [["stands"] * 9, ["falls"] * 9])
 def test_nothing_is_narrowed_where_nothing_changes(answers: list[str]) -> None:
-    span = Span(0.0, 1.0, 9)
+    span = SearchRange(0.0, 1.0, 9)
     assert next_values(span, dict(zip(span.grid(), answers, strict=True)), 1e-3) == []
 
 
 @given(st.floats(20.01, 39.99), st.floats(20.0, 40.0), st.floats(0.01, 1.0))
 def test_a_change_near_a_value_is_found_wherever_it_is_in_the_range(limit: float, about: float, width: float) -> None:
-    span, near = Span(20.0, 40.0, 9), Change(about - width, about + width, "stands", "falls")
+    span, near = SearchRange(20.0, 40.0, 9), Change(about - width, about + width, "stands", "falls")
     known: dict[float, str] = {}
     while values := next_near(span, known, near, 1e-3):
         assert not set(values) & known.keys(), "no value is tried twice"
@@ -97,7 +97,7 @@ def test_a_change_near_a_value_is_found_wherever_it_is_in_the_range(limit: float
 
 @pytest.mark.parametrize("answer", ["stands", "falls", "undecided"])
 def test_a_change_that_is_not_in_the_range_is_not_looked_for_without_end(answer: str) -> None:
-    span, near = Span(20.0, 40.0, 9), Change(30.0, 31.0, "stands", "falls")
+    span, near = SearchRange(20.0, 40.0, 9), Change(30.0, 31.0, "stands", "falls")
     known: dict[float, str] = {}
     while values := next_near(span, known, near, 1e-3):
         known |= dict.fromkeys(values, answer)

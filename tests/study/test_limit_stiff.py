@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,9 @@ import pytest
 
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, document_of
-from blocksim.study.executors import Batch, Execution, Run, Setting, Task
-from blocksim.study.limit import find_limit
-from blocksim.study.limit_answer import LimitAnswer
-from blocksim.study.limit_margin import Level, Levels, ratio_of
+from blocksim.study.executors import Batch, Execution, Rounds, RunSetting, Task
+from blocksim.study.limit import Levels, find_limit, ratio_of
+from blocksim.study.limit_answer import LimitAnswer, StiffnessLevel
 from blocksim.study.limit_plan import LimitOptions, read_limit
 from blocksim.study.manifest import MANIFEST
 from tests.study.test_limit import block_on_a_slope
@@ -35,15 +34,12 @@ class Formula(Execution):
     law: Law = staticmethod(linear(0.0))
     is_known = True  # the turn
 
-    def ready(self, _: Path | None = None, /) -> tuple[Run, Setting]:
-        def run(tasks: Iterator[Task], _: Setting) -> Generator[Batch, None, None]:
+    def ready(self, _: Path | None = None, /) -> tuple[Rounds, RunSetting]:
+        def run(tasks: Iterator[Task], _: RunSetting) -> Generator[Batch, None, None]:
             for task in tasks:
                 yield Batch((task,), (self.row(task.scenario),), 0.0, "")
 
-        return run, Setting(1)
-
-    def for_rounds(self) -> AbstractContextManager[Run]:
-        return nullcontext(self.ready()[0])
+        return lambda: nullcontext(run), RunSetting(1)
 
     def row(self, scenario: Scenario) -> dict[str, object]:
         tilt, scale = math.degrees(scenario.ground.tilt), scenario.contact.stiffness_scale
@@ -190,8 +186,8 @@ def test_what_is_left_out_of_second_order_is_within_the_bracket() -> None:
     def law(s: float) -> float:
         return 1.0 - s - s * s
 
-    softer = Level(stiffness_scale=1.0, low=law(0.08), high=law(0.08))
-    stiffer = Level(stiffness_scale=10.0, low=law(0.008), high=law(0.008))
+    softer = StiffnessLevel(stiffness_scale=1.0, low=law(0.08), high=law(0.08))
+    stiffer = StiffnessLevel(stiffness_scale=10.0, low=law(0.008), high=law(0.008))
     (low, high) = Levels((softer, stiffer), 10.0).stiff or (0, 0)
     assert low < 1.0 < high
     assert high - low < 2e-3

@@ -16,7 +16,7 @@ from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study import run as single
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
-from blocksim.study.stored_run import find_run
+from blocksim.study.run_folder import find_run
 from blocksim.world.describe import describe
 from tests.golden import Golden
 from tests.study.conftest import SCENARIOS

@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.extras import load_module
 from blocksim.scenario.models.study import Normal, Uniform, Variation
-from blocksim.study.sensitivity import METHODS, Floats, Indices, Output, indices_of, settings_at, unit_cube
+from blocksim.study.sensitivity import METHODS, Floats, Indices, ModelOutput, indices_of, settings_at, unit_cube
 
 Function = Callable[..., Floats]
 G_WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0])
@@ -18,7 +18,7 @@ def indices(method: str, function: Function, vary: Mapping[str, Variation], samp
     chosen = METHODS[method]
     points = chosen.points(len(vary), samples, seed)
     rows = [[float(str(value)) for value in row.values()] for row in settings_at(points, vary)]
-    return indices_of(Output("y", "mm", function(*np.array(rows).T)), points, chosen, seed)
+    return indices_of(ModelOutput("y", "mm", function(*np.array(rows).T)), points, chosen, seed)
 
 
 def ishigami(x: Floats, y: Floats, z: Floats) -> Floats:
@@ -113,8 +113,8 @@ def test_blocks_may_be_left_out(method: str) -> None:
     points = chosen.points(3, 64, 0)
     rows = np.array([[float(str(value)) for value in row.values()] for row in settings_at(points, vary)])
     kept = np.repeat(np.arange(64) % 5 != 0, 3 + chosen.more_rows)
-    part = indices_of(Output("y", "mm", ishigami(*rows[kept].T)), points[kept], chosen, 0)
-    whole = indices_of(Output("y", "mm", ishigami(*rows.T)), points, chosen, 0)
+    part = indices_of(ModelOutput("y", "mm", ishigami(*rows[kept].T)), points[kept], chosen, 0)
+    whole = indices_of(ModelOutput("y", "mm", ishigami(*rows.T)), points, chosen, 0)
     first = next(iter(chosen.columns))
     assert part.numbers[first] == pytest.approx(whole.numbers[first], rel=0.5, abs=0.3)
 

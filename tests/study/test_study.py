@@ -12,7 +12,7 @@ from blocksim.study import answer as studies
 from blocksim.study.answer import study_in
 from blocksim.study.executors import Execution
 from blocksim.study.pictures import plot
-from blocksim.study.reporting import report
+from blocksim.study.report import report
 from blocksim.study.verify import verify_study
 from tests.study.slip import SlipAnswer, slip
 

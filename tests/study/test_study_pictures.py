@@ -10,8 +10,8 @@ from blocksim.scenario import replace_values
 from blocksim.study.fragility import FragilityAnswer, fragility
 from blocksim.study.limit import limit
 from blocksim.study.pictures import plot
-from blocksim.study.reporting import report
-from blocksim.study.stored_run import load_stored_run
+from blocksim.study.report import report
+from blocksim.study.run_folder import read_run
 from tests.study.test_fragility import FRICTION, SLIDES, SLOPE, TILTS
 from tests.study.test_limit import SQUAT, TILT, block_on_a_slope
 
@@ -76,9 +76,9 @@ def test_a_limit_is_drawn_as_its_mechanism_beside_the_last_that_stands(
     found = limit(block_on_a_slope(SQUAT), TILT, tolerance=0.02, out="found")
     (change,) = found.limits
     assert found.plan is not None
-    assert set(found.kept) == {change.low, change.high}
-    for value, name in found.kept.items():
-        run = load_stored_run(Path("found/cases") / name)
+    assert set(found.case_folders) == {change.low, change.high}
+    for value, name in found.case_folders.items():
+        run = read_run(Path("found/cases") / name)
         release = "always" if value == change.high else "at rest"  # it falls before time zero
         kept = {"output.contacts": True, "start.release": release, "time.stop_at_rest": value != change.high}
         assert run.scenario == replace_values(found.plan.scenario_at(value), kept)
@@ -88,7 +88,7 @@ def test_a_limit_is_drawn_as_its_mechanism_beside_the_last_that_stands(
     text = report(found, out="limit.html").read_text()
     assert "Both sides of every bracket" in text
     assert 'src="data:image/png;base64,' in text
-    assert limit(block_on_a_slope(SQUAT), TILT, tolerance=0.02, out="found").kept == found.kept
+    assert limit(block_on_a_slope(SQUAT), TILT, tolerance=0.02, out="found").case_folders == found.case_folders
 
 
 def test_a_limit_without_a_change_has_nothing_to_draw_and_a_report(tmp_path: Path) -> None:

@@ -21,8 +21,7 @@ from blocksim.scenario import Document, load_scenario
 from blocksim.simulation.files import is_resolved
 from blocksim.simulation.observables import table_columns
 from blocksim.study.executors.ensemble import run_case
-from blocksim.study.fragility import fragility
-from blocksim.study.fragility_plan import read_fragility
+from blocksim.study.fragility import fragility, read_fragility
 from blocksim.study.limit import limit, limit_curve
 from blocksim.study.manifest import Manifest, Shard, read_sweep
 from blocksim.study.plan import Values, with_sweep

@@ -1,9 +1,9 @@
-"""What runs the cases of a sweep. A new executor is one module with `run_tasks`, and one line here."""
+"""What runs the cases of a sweep. A new executor is one module with `for_rounds`, and one line here."""
 
 import os
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import KW_ONLY, dataclass
 from importlib import import_module
 from itertools import takewhile
@@ -51,27 +51,29 @@ class Batch:
 
 
 @dataclass(frozen=True)
-class Setting:
+class RunSetting:
     """How tasks are to be run; `is_stopped` returns True once the user wants to stop."""
 
     jobs: int  # threads or processes
     executor: str = DEFAULT
-    is_stopped: Callable[[], bool] = lambda: False
     scheduler: str | None = None  # address of a Dask cluster
     folder: Path | None = None  # where folders of runs are kept
     peaks: bool = False  # whether rows need the largest rotation on the way
+    is_stopped: Callable[[], bool] = lambda: False
 
     def folders(self, tasks: Iterable[Task]) -> list[Path]:
         """Return where runs are kept, nothing where they are not."""
         return [] if self.folder is None else [self.folder / task.name for task in tasks]
 
 
-Run = Callable[[Iterator[Task], Setting], Generator[Batch, None, None]]
+Run = Callable[[Iterator[Task], RunSetting], Generator[Batch, None, None]]
 """Take tasks one by one, as many as are needed to keep busy, and yield them in batches, in any order.
 
 A task that fails has a row that says so. Once `is_stopped`, no batch is begun, and what has not ended within a second
 is given up. Closed before the end, it stops at once.
 """
+Rounds = Callable[[], AbstractContextManager[Run]]
+"""Give what runs one round of tasks after the other, on the same processes."""
 
 
 @dataclass
@@ -81,7 +83,7 @@ class BatchSize:
     count: int = 1
     least: int = 1
 
-    def measured(self, count: int, seconds: float) -> None:
+    def adapt(self, count: int, seconds: float) -> None:
         """Go by a batch of `count` tasks that took so long (s of wall time)."""
         wanted = count * SECONDS / max(seconds, 1e-6)
         self.count = int(min(max(wanted, self.least), GROWTH * self.count, MOST))
@@ -94,11 +96,10 @@ def take(tasks: Iterator[Task], count: int, is_stopped: Callable[[], bool]) -> t
     return tuple(task for _, task in zip(numbers, tasks, strict=False))
 
 
-def executor_named(name: str) -> Any:
-    """Return the module of an executor, with `run_tasks`. Raises InvalidInputError.
+def load_executor(name: str) -> Any:
+    """Return the module of an executor, with `for_rounds`. Raises InvalidInputError.
 
-    It may have `check`, which raises UnavailableError where it cannot run, before anything is written, and
-    `for_rounds`, which gives a `run_tasks` for one round of tasks after the other.
+    It may have `check`, which raises UnavailableError where it cannot run, before anything is written.
     """
     if name not in EXECUTORS:
         raise InvalidInputError(f"unknown executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}")
@@ -122,36 +123,24 @@ class Execution:
         str | None, Option("Scheduler of a Dask cluster, such as tcp://host:8786.", metavar="ADDRESS")
     ] = None
 
-    def ready(self, folder: Path | None = None, /) -> tuple[Run, Setting]:
+    def ready(self, folder: Path | None = None, /) -> tuple[Rounds, RunSetting]:
         """Return what runs tasks, into folders where one for all is given, and its setting.
 
-        Raises InvalidInputError, UnavailableError.
+        Raises InvalidInputError where options contradict one another, UnavailableError.
         """
-        name = chosen_executor(self.executor, self.scheduler, keep_cases=folder is not None)
-        runner = executor_named(name)
-        setting = Setting(self.jobs or os.cpu_count() or 1, name, scheduler=self.scheduler, folder=folder)
+        executor, scheduler, keeps = self.executor, self.scheduler, folder is not None
+        needed = WITH_SCHEDULER if scheduler is not None else WITH_FOLDERS if keeps else executor or DEFAULT
+        if keeps and WITH_SCHEDULER in {needed, executor}:
+            raise InvalidInputError("folders of cases are kept on this machine only, not with a scheduler")
+        if executor is not None and executor != needed:
+            why = "a scheduler" if scheduler is not None else "keeping the folders of cases"
+            load_executor(executor)
+            raise InvalidInputError(f"{why} needs the executor {needed}, not {executor}")
+        if needed == WITH_SCHEDULER and scheduler is None:
+            raise InvalidInputError("the executor dask needs the address of a scheduler: --scheduler tcp://HOST:PORT")
+        if needed == WITH_FOLDERS and getattr(current_process(), "_inheriting", False):  # the script has no main guard
+            message = 'worker processes import this script: what starts them belongs below if __name__ == "__main__":'
+            raise InvalidInputError(message)
+        runner, setting = load_executor(needed), RunSetting(self.jobs or os.cpu_count() or 1, needed, scheduler, folder)
         getattr(runner, "check", silent)(setting)
-        return runner.run_tasks, setting
-
-    def for_rounds(self) -> AbstractContextManager[Run]:
-        """Give what runs the tasks of one round after the other, on the same processes. Raises InvalidInputError."""
-        runner = executor_named(chosen_executor(self.executor, self.scheduler))
-        return runner.for_rounds() if hasattr(runner, "for_rounds") else nullcontext(runner.run_tasks)
-
-
-def chosen_executor(executor: str | None, scheduler: str | None, *, keep_cases: bool = False) -> str:
-    """Return the executor that the other options ask for. Raises InvalidInputError where they contradict it."""
-    needed = WITH_SCHEDULER if scheduler is not None else WITH_FOLDERS if keep_cases else executor or DEFAULT
-    if keep_cases and WITH_SCHEDULER in {needed, executor}:
-        raise InvalidInputError("folders of cases are kept on this machine only, not with a scheduler")
-    if executor is not None and executor != needed:
-        why = "a scheduler" if scheduler is not None else "keeping the folders of cases"
-        message = f"{why} needs the executor {needed}, not {executor}"
-        executor_named(executor)
-        raise InvalidInputError(message)
-    if needed == WITH_SCHEDULER and scheduler is None:
-        raise InvalidInputError("the executor dask needs the address of a scheduler: --scheduler tcp://HOST:PORT")
-    if needed == WITH_FOLDERS and getattr(current_process(), "_inheriting", False):  # the script has no main guard
-        message = 'worker processes import this script: what starts them belongs below if __name__ == "__main__":'
-        raise InvalidInputError(message)
-    return needed
+        return runner.for_rounds, setting

@@ -9,13 +9,14 @@ import queue
 import time
 from collections import deque
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
+from functools import partial
 from typing import Any, NoReturn
 
 from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.extras import CLUSTER, load_module
 from blocksim.simulation.provenance import code_hash
-from blocksim.study.executors import Batch, BatchSize, Setting, Task, ensemble, take
+from blocksim.study.executors import Batch, BatchSize, RunSetting, Task, ensemble, take
 from blocksim.study.rows import row_of_error
 
 PATIENCE = 3.0  # s until a scheduler has answered
@@ -26,13 +27,16 @@ TALKERS = {"asyncio", "dask", "distributed", "tornado"}
 COUNT_EVERY = 2.0  # s between two examines how many workers there are
 
 
-def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
+def run_tasks(tasks: Iterator[Task], setting: RunSetting) -> Generator[Batch, None, None]:
     """Run batches on the workers of `setting.scheduler`; on leaving, what is under way is called off."""
     with dask_client(setting.scheduler or "") as client:
         yield from Submission(client, tasks, setting).batches()
 
 
-def check(setting: Setting) -> None:
+for_rounds = partial(nullcontext, run_tasks)
+
+
+def check(setting: RunSetting) -> None:
     """Check that the scheduler answers, before anything is written. Raises what `connected` raises."""
     with dask_client(setting.scheduler or ""):
         pass
@@ -76,7 +80,7 @@ def silence() -> Iterator[None]:
 class Submission:
     """Batches that are with the cluster, as many as keep its workers busy."""
 
-    def __init__(self, client: Any, tasks: Iterator[Task], setting: Setting) -> None:
+    def __init__(self, client: Any, tasks: Iterator[Task], setting: RunSetting) -> None:
         """Submit nothing yet."""
         self.client, self.tasks, self.setting = client, tasks, setting
         self.size = BatchSize()
@@ -136,7 +140,7 @@ class Submission:
                 reason = f"no worker finished it ({type(error).__name__}); --retry-failed runs it again"
                 yield Batch(tasks, ({**row_of_error(error), "reason": reason},), 0.0, "")
         else:
-            self.size.measured(len(tasks), seconds)
+            self.size.adapt(len(tasks), seconds)
             yield Batch(tasks, rows, seconds, host)
 
     def _scheduler_has_gone(self) -> NoReturn:

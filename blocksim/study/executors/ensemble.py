@@ -8,8 +8,9 @@ import platform
 import threading
 import time
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from queue import SimpleQueue
@@ -18,7 +19,7 @@ from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError,
 from blocksim.scenario import Document, Scenario
 from blocksim.simulation import MemberFailure, Summary, files, provenance, run_in_batches, trajectory
 from blocksim.simulation.results import changed_results, read_summary
-from blocksim.study.executors import Batch, BatchSize, Setting, Task, take
+from blocksim.study.executors import Batch, BatchSize, RunSetting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
 from blocksim.study.run import run
 
@@ -29,7 +30,7 @@ BATCH = 64  # members run together: enough for all cores, few enough to report p
 INTERRUPTED = "interrupted"
 
 
-def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
+def run_tasks(tasks: Iterator[Task], setting: RunSetting) -> Generator[Batch, None, None]:
     """Run batches one after the other."""
     size = BatchSize(2 * setting.jobs, least=setting.jobs)
     batch = take(tasks, size.count, setting.is_stopped)
@@ -43,12 +44,15 @@ def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None,
         thread.join(PATIENCE)
         if thread.is_alive():  # the user does not want to wait that long
             return
-        size.measured(len(batch), time.monotonic() - began)
+        size.adapt(len(batch), time.monotonic() - began)
         yield ended.get_nowait()
         batch = following
 
 
-def _run(tasks: tuple[Task, ...], setting: Setting, ended: SimpleQueue[Batch]) -> None:
+for_rounds = partial(nullcontext, run_tasks)
+
+
+def _run(tasks: tuple[Task, ...], setting: RunSetting, ended: SimpleQueue[Batch]) -> None:
     began = time.perf_counter()
     rows = rows_of([task.scenario for task in tasks], setting.jobs, peaks=setting.peaks)
     ended.put(Batch(tasks, tuple(rows), time.perf_counter() - began, platform.node()))

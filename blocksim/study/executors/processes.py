@@ -15,7 +15,7 @@ from os import _exit
 from typing import Any, NamedTuple
 
 from blocksim.simulation import interruption, provenance
-from blocksim.study.executors import Batch, BatchSize, Run, Setting, Task, ensemble, take
+from blocksim.study.executors import Batch, BatchSize, Run, RunSetting, Task, ensemble, take
 from blocksim.study.rows import Row
 
 AHEAD = 2  # batches a process: it need not wait for the next one
@@ -119,7 +119,7 @@ class LastingPool:
         """End the processes."""
         self._ended.__exit__(*error)  # type: ignore[arg-type]
 
-    def run(self, tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
+    def run(self, tasks: Iterator[Task], setting: RunSetting) -> Generator[Batch, None, None]:
         """Run batches on `setting.jobs` processes, each on one thread; a pool that dies is replaced by a new one."""
         rows: dict[str, Row | None] = {}  # by run
         later: list[Task] = []
@@ -149,13 +149,13 @@ class LastingPool:
 for_rounds = LastingPool
 
 
-def run_tasks(tasks: Iterator[Task], setting: Setting) -> Generator[Batch, None, None]:
+def run_tasks(tasks: Iterator[Task], setting: RunSetting) -> Generator[Batch, None, None]:
     """Run the tasks of one round."""
     with LastingPool() as run:
         yield from run(tasks, setting)
 
 
-def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, None]:
+def run_here(tasks: Iterable[Task], setting: RunSetting) -> Generator[Batch, None, None]:
     """Run tasks one after the other in this process, as a worker does. Raises KeyboardInterrupt on Ctrl-C."""
     for task in tasks:
         folders = setting.folders([task])
@@ -165,7 +165,7 @@ def run_here(tasks: Iterable[Task], setting: Setting) -> Generator[Batch, None, 
 class Work:
     """Tasks that are still to be run, and those that are under way."""
 
-    def __init__(self, tasks: Iterator[Task], setting: Setting) -> None:
+    def __init__(self, tasks: Iterator[Task], setting: RunSetting) -> None:
         """Begin nothing yet."""
         self.tasks, self.setting = tasks, setting
         self.size = BatchSize()
@@ -205,7 +205,7 @@ class Work:
     def _ended(self, future: Future[ensemble.BatchResult]) -> Batch:
         rows, seconds, host = future.result()
         tasks = self.pending.pop(future).tasks
-        self.size.measured(len(tasks), seconds)
+        self.size.adapt(len(tasks), seconds)
         return Batch(tasks, rows, seconds, host)
 
     def after_death(self) -> Iterator[Batch]:

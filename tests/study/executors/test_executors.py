@@ -9,7 +9,7 @@ import pytest
 from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
-from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, Setting, Task, executor_named, take
+from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, RunSetting, Task, load_executor, take
 from blocksim.study.manifest import Shard
 from blocksim.study.plan import Values
 from blocksim.study.sweep import SweepOptions, merge, sweep
@@ -82,7 +82,8 @@ def test_stopped_executor_begins_no_batch(quick: Document, name: str) -> None:
             made.append(number)
             yield Task(number, str(number), {}, quick.build())
 
-    assert list(executor_named(name).run_tasks(tasks(), Setting(2, is_stopped=lambda: True))) == []
+    with load_executor(name).for_rounds() as run:
+        assert list(run(tasks(), RunSetting(2, is_stopped=lambda: True))) == []
     assert len(made) <= 1
 
 
@@ -100,14 +101,14 @@ def test_missing_package_names_the_extra(quick: Document, tmp_path: Path, monkey
 
 def test_batch_grows_with_the_speed_and_never_without_bounds() -> None:
     size = BatchSize(2, least=2)
-    size.measured(2, 0.25)
+    size.adapt(2, 0.25)
     assert size.count == 4
-    size.measured(4, 1e-9)
+    size.adapt(4, 1e-9)
     assert size.count == 4 * GROWTH
     for _ in range(20):
-        size.measured(size.count, 1e-9)
+        size.adapt(size.count, 1e-9)
     assert size.count == MOST
-    size.measured(MOST, 1e9)
+    size.adapt(MOST, 1e9)
     assert size.count == 2
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.scenario import Document
-from blocksim.study.executors import Setting, Task
+from blocksim.study.executors import RunSetting, Task
 from blocksim.study.executors.processes import run_tasks
 
 
@@ -18,7 +18,7 @@ def test_ctrl_c_ends_the_workers_at_once(nominal: Document, tmp_path: Path) -> N
     endless = nominal.with_values({"time.end": 1e5, "time.stop_at_rest": False, "output.every": 10.0}).build()
     scenarios = {"quick": quick, "a": endless, "b": endless}
     tasks = (Task(number, name, {}, one) for number, (name, one) in enumerate(scenarios.items()))
-    batches = run_tasks(tasks, Setting(2, folder=tmp_path))
+    batches = run_tasks(tasks, RunSetting(2, folder=tmp_path))
     assert next(batches).tasks[0].name == "quick"
     before = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
     signal.setitimer(signal.ITIMER_REAL, 0.2)

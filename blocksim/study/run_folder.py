@@ -10,8 +10,7 @@ from typing import NamedTuple, Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored, spelling
-from blocksim.simulation import files
-from blocksim.simulation.results import EventRecord, read_summary
+from blocksim.simulation import files, results
 from blocksim.simulation.stores.hdf5 import read_frames
 from blocksim.simulation.trajectory import Frames
 from blocksim.study.rows import FINISHED, TABLE
@@ -96,11 +95,11 @@ class StoredRun(NamedTuple):
     folder: Path
     scenario: Scenario
     frames: Frames
-    events: tuple[EventRecord, ...]  # that have happened; none where run.json is missing or damaged
+    events: tuple[results.EventRecord, ...]  # that have happened; none where run.json is missing or damaged
     remark: str  # for whoever examines the frames; empty for a finished run that was meant for certain
 
 
-def load_stored_run(place: Path | str) -> StoredRun:
+def read_run(place: Path | str) -> StoredRun:
     """Return the run meant by a run folder, by `results/<name>` or by a scenario file; only its frames are needed.
 
     Raises InputMissingError, ScenarioError, or InvalidInputError for frames that cannot be read.
@@ -108,12 +107,12 @@ def load_stored_run(place: Path | str) -> StoredRun:
     folder = find_run(place, needed=(files.SCENARIO, files.FRAMES))
     scenario = load_stored(folder / files.SCENARIO)
     frames = read_frames(folder / files.FRAMES, scenario)
-    events: tuple[EventRecord, ...] = ()
+    events: tuple[results.EventRecord, ...] = ()
     state = "this run was killed or is still running"
     if (folder / files.SUMMARY).is_file():
         state = f"{files.SUMMARY} of this run is damaged"
         with suppress(BlocksimError):
-            summary = read_summary(folder / files.SUMMARY)
+            summary = results.read_summary(folder / files.SUMMARY)
             is_whole, events = summary.status == FINISHED, summary.events
             state = "" if is_whole else ending_text(summary.status, summary.reason)
     end = f"{folder}: {state}; its {len(frames)} frames end at {float(frames.time[-1]):.4g} s"

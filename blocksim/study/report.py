@@ -12,19 +12,17 @@ from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError,
 from blocksim.scenario import input_files, load_stored
 from blocksim.simulation import files
 from blocksim.simulation.files import refuse_foreign
-from blocksim.study import answer, compare, manifest, stored_run, sweep_folder
+from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
 from blocksim.study.pictures import read_sweep_data
 from blocksim.study.rows import FINISHED, TABLE
-from blocksim.view.report import subjects as parts
-from blocksim.view.report.page import write_report
-from blocksim.view.report.player import MOST_BYTES
+from blocksim.view.report import page, player, subjects as parts
 
 MEMBERS = 50  # of a sweep in one page
 MOST_TABLE_BYTES = 200 * input_files.MEGABYTE  # of sweep.csv
 
 
 def report(
-    *places: stored_run.Place,
+    *places: run_folder.Place,
     out: Path | str = "report.html",
     experiment: Path | str | None = None,
     overwrite: bool = False,
@@ -36,7 +34,7 @@ def report(
     path = Path(out)
     refuse_foreign(path, overwrite=overwrite)
     table = None if experiment is None else Path(experiment)
-    _, problems = report_on([stored_run.folder_of(place) for place in places], path, table)
+    _, problems = report_on([run_folder.folder_of(place) for place in places], path, table)
     if problems:
         raise InvalidInputError("\n".join(problems))
     return path
@@ -66,16 +64,16 @@ def report_on(
             subjects, damage = _sweep(key, place, experiment, members)
         else:
             is_run = place.is_dir() and any((place / name).is_file() for name in files.OURS)  # even if files lack
-            folder = place if is_run else stored_run.find_run(place)
+            folder = place if is_run else run_folder.find_run(place)
             run = parts.read_stored(folder)
             subjects, damage = [parts.run_subject(key, run, *_compared(run, experiment))], run.damage
-            remark = stored_run.choice(place, folder)
+            remark = run_folder.choice(place, folder)
             if remark:
                 on_remark(remark)
         shown += subjects
         problems += damage
     names = dict.fromkeys(subject.name for subject in shown if not subject.page.get("parent"))
-    return write_report(shown, out, title=f"{', '.join(names)} – blocksim report", version=__version__), problems
+    return page.write_report(shown, out, title=f"{', '.join(names)} – blocksim report", version=__version__), problems
 
 
 def _compared(run: parts.PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
@@ -141,7 +139,9 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
         key, table, scenario, keys, problems, list(cases)[most:], judged=judged, pictures=pictures
     )
     shown = [
-        parts.run_subject(keys[case], run, *_compared(run, experiment), most_bytes=MOST_BYTES // len(found), parent=key)
+        parts.run_subject(
+            keys[case], run, *_compared(run, experiment), most_bytes=player.MOST_BYTES // len(found), parent=key
+        )
         for case, run in found
     ]
     return [subject, *shown], tuple(text for _, run in found for text in run.damage)

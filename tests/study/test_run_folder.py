@@ -10,7 +10,7 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import simulate_into
-from blocksim.study.stored_run import load_stored_run
+from blocksim.study.run_folder import read_run
 from tests.golden import Golden
 from tests.study.conftest import SCENARIOS
 
@@ -24,29 +24,29 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_newest_of_several_finished_runs_is_named_and_one_needs_no_remark(folder: Path) -> None:
-    stored = load_stored_run(folder.parent)
+    stored = read_run(folder.parent)
     assert (stored.remark, stored.scenario.name, len(stored.frames)) == ("", "bounce", 5)
     shutil.copytree(folder, folder.parent / "older")
     os.utime(folder.parent / "older" / "done.json", (0.0, 0.0))
-    assert load_stored_run(folder.parent).remark == f"{folder.parent}: the newest of 2 runs is taken: {folder}"
-    assert load_stored_run(folder).remark == ""
+    assert read_run(folder.parent).remark == f"{folder.parent}: the newest of 2 runs is taken: {folder}"
+    assert read_run(folder).remark == ""
 
 
 def test_what_did_not_finish_is_reported(folder: Path, golden: Golden) -> None:
     summary = json.loads((folder / "run.json").read_text())
     for status in ("failed", "interrupted"):
         (folder / "run.json").write_text(json.dumps({**summary, "status": status, "reason": "why"}))
-        golden(load_stored_run(folder).remark, status)
+        golden(read_run(folder).remark, status)
     (folder / "run.json").write_text("{")
-    golden(load_stored_run(folder).remark, "damaged")
+    golden(read_run(folder).remark, "damaged")
     (folder / "run.json").unlink()
-    golden(load_stored_run(folder).remark, "gone")
+    golden(read_run(folder).remark, "gone")
 
 
 def test_missing_and_damaged_frames_are_reported(folder: Path) -> None:
     (folder / "run.h5").write_bytes((folder / "run.h5").read_bytes()[:2000])
     with pytest.raises(InvalidInputError, match=r"run\.h5: not a"):
-        load_stored_run(folder)
+        read_run(folder)
     (folder / "run.h5").unlink()
     with pytest.raises(InputMissingError, match=r"no run\.h5"):
-        load_stored_run(folder)
+        read_run(folder)
