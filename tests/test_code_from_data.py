@@ -14,7 +14,7 @@ CALLS |= {"read_pickle", "subprocess.run", "subprocess.Popen", "subprocess.call"
 FLAGS = {"shell", "allow_pickle"}
 
 EXCEPTIONS = {
-    "bench/startup.py: subprocess.run": "measures how long `blocksim --help` takes to start: its own fixed command",
+    "bench/registry.py: subprocess.run": "measures how long `blocksim --help` takes to start: its own fixed command",
     "kernels/common/jit.py: pickle": "machine code, as numba keeps it: from a cache folder of this user",
     "view/animation.py: subprocess.run": "asks the ffmpeg on the PATH which encoders it has: a fixed command",
     "view/animation.py: subprocess.Popen": "gives pixels to the ffmpeg on the PATH: fixed options, its path",

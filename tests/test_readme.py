@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from blocksim.cli.app import app
+from blocksim.cli.commands import app
 from blocksim.scenario import Document
 from blocksim.scenario.key_table import BEGIN, END, key_table, with_part
 

@@ -1,22 +1,107 @@
-"""What the command `blocksim` calls first: light, so that Ctrl-C is handled before anything heavy is imported."""
+"""What the command `blocksim` calls first, and its process: Ctrl-C where no run is in progress, the garbage collector.
 
+It is light, so that Ctrl-C is handled before anything heavy is imported.
+
+Ctrl-C may come while the program is loaded, while a command works, and while the process ends. Python would raise
+KeyboardInterrupt wherever it happens to be, and print a traceback from where nobody catches it: in the middle of an
+import, or of leaving, or in a function that the compiler or the collector calls, where it would also be lost.
+
+Packages and compiled kernels come as 200 000 objects, none of which is garbage. The collector would look at all of them
+again and again while they come in, and once more when the process ends: a fifth of the time of a short run.
+"""
+
+import atexit
 import gc
 import io
+import os
+import signal
 import sys
 import time
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, NoReturn
 
-from blocksim.cli.process import take_interrupts
-
-if TYPE_CHECKING:
-    from blocksim.cli.commands import app as app  # noqa: PLC0414 - found when first asked for, as in blocksim
+STOPPED_EARLY = 75  # the exit code; its own module takes longer to import than all that is needed here, unprotected
 
 
-def __getattr__(name: str) -> Any:
-    if name != "app":
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return import_module("blocksim.cli.commands").app
+AGAIN = 0.01  # s, after which Ctrl-C that was lost comes again: whoever lost it has gone on by then
+
+
+class Interrupts:
+    """Handler of Ctrl-C of the whole process; a part that can stop in a better way may replace it for a while."""
+
+    gives_way = True
+
+    def __init__(self) -> None:
+        """Begin to be loaded."""
+        self.has_to_clear_up = self.has_come = False
+
+    def __call__(self, _number: int, _frame: Any) -> None:
+        """Take Ctrl-C."""
+        if not self.has_to_clear_up:
+            leave_now()
+        self.has_to_clear_up, self.has_come = False, True
+        raise KeyboardInterrupt
+
+    def come_again(self, lost: Any) -> None:
+        """Take Ctrl-C that was raised where nothing can be raised; report anything else as Python does."""
+        if not issubclass(lost.exc_type, KeyboardInterrupt):
+            sys.__unraisablehook__(lost)
+            return
+        import threading
+
+        self.has_to_clear_up, self.has_come = self.has_come, False
+        again = threading.Timer(AGAIN, os.kill, (os.getpid(), signal.SIGINT))
+        again.daemon = True
+        again.start()
+
+
+def take_interrupts() -> None:
+    """Take over Ctrl-C for the rest of the process, unless it is taken or ignored."""
+    with suppress(ValueError):  # not the main thread, which alone receives signals
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            interrupts = Interrupts()
+            signal.signal(signal.SIGINT, interrupts)
+            sys.unraisablehook = interrupts.come_again
+            # Python's end would bring the system's handler back, and with it another exit code; what is ignored stays
+            atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def cleanup_state(*, wanted: bool) -> Iterator[None]:
+    """State for a while whether something has been started that must be cleared up.
+
+    If not, as during an import, Ctrl-C ends the process; else the first one raises KeyboardInterrupt.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if not isinstance(handler, Interrupts):
+        yield
+        return
+    before, handler.has_to_clear_up = handler.has_to_clear_up, wanted
+    try:
+        yield
+    finally:
+        handler.has_to_clear_up = before and not handler.has_come
+
+
+def leave_now() -> NoReturn:
+    """End the process."""
+    with suppress(OSError):
+        os.write(2, b"stopped\n")
+    os._exit(STOPPED_EARLY)
+
+
+@contextmanager
+def pause_collector() -> Iterator[None]:
+    """Keep the collector away while code is loaded, and from what has been loaded afterwards."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        if was_enabled:
+            gc.enable()
 
 
 def main() -> None:

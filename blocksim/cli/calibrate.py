@@ -7,8 +7,7 @@ from functools import partial
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode
 from blocksim.silence import silent
-from blocksim.study.calibrate import Fit, calibrate
-from blocksim.study.calibrate_plan import CalibrateOptions, Trial
+from blocksim.study import calibrate, calibrate_plan
 
 COLUMNS = ("key", "prior", "fitted")
 TIED = ("key", "prior", "equally good", "written")
@@ -16,7 +15,7 @@ TOLD_SECONDS = 2.0
 
 
 def calibrate_command(
-    source: prepare.ScenarioInput, options: CalibrateOptions, screen: command_line.Screen
+    source: prepare.ScenarioInput, options: calibrate_plan.CalibrateOptions, screen: command_line.Screen
 ) -> command_line.Report:
     """Fit inputs to measured repeats, within their priors.
 
@@ -30,7 +29,7 @@ def calibrate_command(
 
     Example: blocksim calibrate mine.toml --fit contact.restitution=0.2:0.35
     """
-    found = calibrate(
+    found = calibrate.calibrate(
         source.document(),
         replace(
             options,
@@ -63,14 +62,14 @@ def calibrate_command(
     )
 
 
-def _trial_lines() -> Callable[[Trial, Trial, int], None]:
+def _trial_lines() -> Callable[[calibrate_plan.Trial, calibrate_plan.Trial, int], None]:
     """Return a function that reports every trial that is the best so far, and others now and then.
 
     It tells the share inside or, where no trial has any, the distance: 0 at the ranges, towards 1 far from them.
     """
     is_due = progress.pace(TOLD_SECONDS, 0.0)
 
-    def tell(trial: Trial, best: Trial, trials: int) -> None:
+    def tell(trial: calibrate_plan.Trial, best: calibrate_plan.Trial, trials: int) -> None:
         if is_due() or trial is best or trial.number == trials:
             values = ", ".join(f"{'.'.join(key.split('.')[-2:])} {value}" for key, value in trial.values.items())
             told = f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
@@ -81,7 +80,7 @@ def _trial_lines() -> Callable[[Trial, Trial, int], None]:
     return tell
 
 
-def _values(found: Fit) -> list[str]:
+def _values(found: calibrate.Fit) -> list[str]:
     """Return the fitted values or, where trials tie, the ranges of those that are equally good."""
     rows = [(prior, str(found.best.values[prior.key])) for prior in found.plan.priors]
     if len(found.ties) < 2:
@@ -95,7 +94,7 @@ def _values(found: Fit) -> list[str]:
     ]
 
 
-def _probability(found: Fit) -> list[str]:
+def _probability(found: calibrate.Fit) -> list[str]:
     score, tried = found.score, found.best.score
     if found.plan.scatter is None:
         verdict = "inside all ranges" if score.inside else f"not inside all ranges ({score.miss:.3g} off)"
@@ -107,7 +106,7 @@ def _probability(found: Fit) -> list[str]:
     ]
 
 
-def _notes(found: Fit) -> Iterator[str]:
+def _notes(found: calibrate.Fit) -> Iterator[str]:
     for prior in found.plan.priors:
         value = found.best.values[prior.key]
         if prior.lies_at_bound(value):

@@ -9,15 +9,11 @@ from typing import Annotated
 
 from blocksim.cli import command_line, output, prepare
 from blocksim.options import Option
-from blocksim.scenario import PlacedBody, Scenario, check, place_bodies, resolution, scenario_to_toml, units
-from blocksim.scenario.events import describe_event, in_order, probe_names
-from blocksim.scenario.models.loads import AnyLoad, Constant, Force, Gravity, Horizontal, Moment, Pressure, RampHistory
-from blocksim.scenario.models.timeline import STEP, AnyProbe, EnergyProbe, ForceProbe, PointProbe
-from blocksim.scenario.motion import drives_of, greatest_rate, settles
+from blocksim.scenario import PlacedBody, Scenario, check, events, motion, resolution, scenario_to_toml, units
+from blocksim.scenario.models import loads, timeline
 from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study.rows import check_experiment
-from blocksim.world import free_memory, memory
-from blocksim.world.describe import Description, PairDescription, StepLimits, describe
+from blocksim.world import describe, free_memory, memory
 
 MOST_BODIES = 12
 MOST_LINES = 8  # of events, loads or probes
@@ -54,7 +50,7 @@ def check_command(
     Example: blocksim check scenarios/three_blocks.toml
     """
     with source.built() as ready:
-        description = describe(ready)
+        description = describe.describe(ready)
     check_experiment(ready)
     if screen.as_json:
         bodies = [{**body._asdict(), "mass": body.mass, "inertia": body.inertia} for body in description.bodies]
@@ -71,7 +67,7 @@ def check_command(
     return command_line.Report([] if screen.quiet else [lines], notes=notes)
 
 
-def _summary(scenario: Scenario, description: Description) -> Iterator[str]:
+def _summary(scenario: Scenario, description: describe.Description) -> Iterator[str]:
     """Yield time step, cost and size, and everything that acts, happens or is recorded."""
     yield f"time step  {description.step:.3e} s, at most {description.steps} steps"
     yield from _limits(description.limits)
@@ -92,19 +88,19 @@ def _summary(scenario: Scenario, description: Description) -> Iterator[str]:
     yield f"results    at most {description.frames} frames, about {free_memory.readable(size)}"
     if description.frames_at_every_step:
         yield f"           output.every = {scenario.output.every:.3g} s is shorter than a step: a frame at every step"
-    motion = description.motion
-    if motion is not None:
-        peaks = f"{output.number(MILLI * motion.displacement)} mm, {output.number(MILLI * motion.speed)} mm/s"
-        greatest = f"at most {peaks} and {output.number(motion.acceleration / units.STANDARD_GRAVITY)} g"
-        yield f"supports   move {greatest}; {output.number(MILLI * motion.final_speed)} mm/s at the end"
-    yield from _acting(scenario)
+    support = description.motion
+    if support is not None:
+        peaks = f"{output.number(MILLI * support.displacement)} mm, {output.number(MILLI * support.speed)} mm/s"
+        greatest = f"at most {peaks} and {output.number(support.acceleration / units.STANDARD_GRAVITY)} g"
+        yield f"supports   move {greatest}; {output.number(MILLI * support.final_speed)} mm/s at the end"
+    yield from _acting(scenario, description.bodies)
     if rigid is None:
         yield f"boundary   {description.particles} particles ({_use_of_particles(scenario)})"
     yield from (f"{name:<10} {count} particles or elements" for name, count in description.systems.items())
     yield f"neighbours checked up to {MILLI * description.skin:.3g} mm apart"
 
 
-def _limits(limits: StepLimits | None) -> list[str]:
+def _limits(limits: describe.StepLimits | None) -> list[str]:
     """Return who decides the step; where the two are far apart, what makes them equal."""
     if limits is None:
         return []
@@ -131,25 +127,24 @@ def _use_of_particles(scenario: Scenario) -> str:
             return f"at most {output.number(MILLI * contact.particle_spacing)} mm apart"
 
 
-def _acting(scenario: Scenario) -> Iterator[str]:
+def _acting(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
     """Yield lines about driven bodies, events, loads, the start and probes, the first ones of many."""
-    for drive in drives_of(scenario):
+    for drive in motion.drives_of(scenario):
         spec = scenario.bodies[drive.body - sum(structure.size for structure in scenario.structures)]
         kind = "" if spec.motion is None else f" ({spec.motion.kind})"
-        speed, spin = greatest_rate(drive.shift), math.degrees(greatest_rate(drive.turn))
+        speed, spin = motion.greatest_rate(drive.shift), math.degrees(motion.greatest_rate(drive.turn))
         rates = [f"{output.number(MILLI * speed)} mm/s"] * (speed > 0.0) + [f"{output.number(spin)} °/s"] * (spin > 0.0)
         rests = f", at rest from {drive.rest_time:.3f} s on" if math.isfinite(drive.rest_time) else ""
-        yield f"driven     {place_bodies(scenario)[drive.body].name}{kind}, at most {' and '.join(rates)}{rests}"
-    events = [scenario.events[k] for k in in_order(scenario.events)]
-    yield from _some(
-        "event", [f"{'at rest' if one.at is None else f'{one.at:.3f} s'}: {describe_event(one)}" for one in events]
-    )
-    loads = enumerate(scenario.loads)
-    yield from _some("load", [f"{load.name or f'loads.{number}'}: {_load(load)}" for number, load in loads])
-    if settles(scenario):
+        yield f"driven     {placed[drive.body].name}{kind}, at most {' and '.join(rates)}{rests}"
+    ordered = [scenario.events[k] for k in events.in_order(scenario.events)]
+    times = ["at rest" if one.at is None else f"{one.at:.3f} s" for one in ordered]
+    yield from _some("event", [f"{at}: {events.describe_event(one)}" for at, one in zip(times, ordered, strict=True)])
+    names = [load.name or f"loads.{number}" for number, load in enumerate(scenario.loads)]
+    yield from _some("load", [f"{name}: {_load(load)}" for name, load in zip(names, scenario.loads, strict=True)])
+    if motion.settles(scenario):
         held = f"; held: {', '.join(scenario.start.hold)}" if scenario.start.hold else ""
         yield from _some("start", [f"settles before time zero{held}"])
-    probes = zip(probe_names(scenario), scenario.probes, strict=True)
+    probes = zip(events.probe_names(scenario), scenario.probes, strict=True)
     yield from _some("probe", [f"{name}: {_probe(one)}" for name, one in probes])
 
 
@@ -162,31 +157,31 @@ def _some(head: str, lines: Sequence[str]) -> Iterator[str]:
         yield f"{'':<{HEAD}}and {len(lines) - MOST_LINES} more {head}s"
 
 
-def _load(load: AnyLoad) -> str:
+def _load(load: loads.AnyLoad) -> str:
     """Return what a load is, in words."""
     match load:
-        case Gravity() if load.times:
+        case loads.Gravity() if load.times:
             return f"gravity turns by {len(load.times)} samples until {load.times[-1]:g} s"
-        case Gravity():
+        case loads.Gravity():
             begin = "" if load.first is None else f" from {math.degrees(load.first):g}°"
             rate = f"{math.degrees(load.rate or 0.0):g} °/s"
             return f"gravity turns{begin} to a tilt of {math.degrees(load.last or 0.0):g}° at {rate}"
-        case Force():
+        case loads.Force():
             axes = " of its axes" if load.axes == "body" else ""
             way = f"at {math.degrees(load.direction):g}°{axes}"
             text = f"force of {_in_unit(load.magnitude, 'N')} on {load.body}, {way}"
-        case Moment():
+        case loads.Moment():
             text = f"moment of {_in_unit(load.magnitude, 'N m')} on {load.body}"
-        case Horizontal():
+        case loads.Horizontal():
             text = f"{load.magnitude:g} g on all free blocks, horizontally"
-        case Pressure(magnitude=None):
+        case loads.Pressure(magnitude=None):
             text = f"water to {load.water_level or 0.0:g} m on {load.body}, {load.face} face"
         case _:
             text = f"{_in_unit(load.magnitude or 0.0, 'Pa')} on {load.body}, {load.face} face"
     match load.history:
-        case Constant():
+        case loads.Constant():
             return text
-        case RampHistory() as ramp:
+        case loads.RampHistory() as ramp:
             return f"{text}; factor {ramp.first:g} to {ramp.last:g} from {ramp.start:g} to {ramp.end:g} s"
         case other:
             return f"{text}; {other.kind} of {len(other.times)} factors until {other.times[-1]:g} s"
@@ -197,20 +192,21 @@ def _in_unit(value: float, unit: str) -> str:
     return f"{value / factor:.4g} {prefix}{unit}"
 
 
-def _probe(probe: AnyProbe) -> str:
+def _probe(probe: timeline.AnyProbe) -> str:
     """Return what a probe records and how often, in words."""
     match probe:
-        case ForceProbe():
+        case timeline.ForceProbe():
             text = f"force on {probe.on}" + ("" if probe.by is None else f" by {probe.by}")
-        case PointProbe():
+        case timeline.PointProbe():
             text = f"point of {probe.body}"
-        case EnergyProbe():
+        case timeline.EnergyProbe():
             text = "energies"
         case _:
             text = f"joint of {' and '.join(probe.bodies)}"
     if probe.every is None:
         return f"{text}, at every output time"
-    return f"{text}, at every step" if probe.every == STEP else f"{text}, every {MILLI * float(probe.every):g} ms"
+    often = "at every step" if probe.every == timeline.STEP else f"every {MILLI * float(probe.every):g} ms"
+    return f"{text}, {often}"
 
 
 def _bodies(bodies: Sequence[PlacedBody]) -> list[str]:
@@ -242,7 +238,7 @@ def _side_cells(body: PlacedBody) -> tuple[str, ...]:
     return (*(output.number(MILLI * v) for v in lengths), f"{body.mass:.5g}", f"{body.inertia:.5g}")
 
 
-def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
+def _pairs(scenario: Scenario, pairs: Sequence[describe.PairDescription]) -> list[str]:
     """List the contact parameters of each pair of materials, and what the heads mean."""
     heads = [head for head, (name, _) in PAIR_COLUMNS.items() if getattr(pairs[0], name) is not None]
     if all(pair.shear_damping_ratio == pair.normal_damping_ratio for pair in pairs):
@@ -264,7 +260,7 @@ def _pairs(scenario: Scenario, pairs: Sequence[PairDescription]) -> list[str]:
     ]
 
 
-def _rules(pairs: Sequence[PairDescription]) -> list[str]:
+def _rules(pairs: Sequence[describe.PairDescription]) -> list[str]:
     """List the keys of the scenario that set values, with their pairs; the rest follows defaults and materials."""
     found: dict[str, dict[str, None]] = {}
     for pair in pairs:

@@ -15,7 +15,8 @@ import typer
 from typer.core import TyperGroup
 
 from blocksim import __version__
-from blocksim.cli import output, process
+from blocksim.cli import output
+from blocksim.cli.app import cleanup_state, pause_collector
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError
 
 PATH_TROUBLE = {errno.ENAMETOOLONG, errno.ELOOP, errno.ENOTDIR, errno.EACCES}
@@ -121,7 +122,8 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
     "schema": "Print the JSON Schema of scenario files, for editors.",
 }
 
-MODULES = {"animate": "plot", "report": "plot", "export": "plot", "schema": "new"}
+MODULES = dict.fromkeys(("animate", "report", "export"), "plot")
+MODULES |= {"schema": "new", "fragility": "limit", "bench": "verify"}
 GROUPS = {  # heads of the list in `blocksim --help`
     "Run": ("new", "run", "schema"),
     "Look": ("plot", "animate", "report", "export"),
@@ -156,7 +158,7 @@ class CommandGroup(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
-        with errors_as_messages(), process.cleanup_state(wanted=True):
+        with errors_as_messages(), cleanup_state(wanted=True):
             try:
                 return super().invoke(ctx)
             except UsageError as error:
@@ -178,7 +180,7 @@ def function_of(name: str) -> Any:
 
 def load_command(name: str) -> Any:
     """Return the command of a name, ready to be called."""
-    with process.pause_collector(), process.cleanup_state(wanted=False):
+    with pause_collector(), cleanup_state(wanted=False):
         from blocksim.cli.command_line import as_typer_command
 
         function = function_of(name)

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from blocksim.analysis import compare, evidence, metrics
-from blocksim.cli.command_line import Report, Screen
-from blocksim.cli.output import number, table_lines, width_of_screen
+from blocksim.cli import command_line, output
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario.input_files import relative_path
@@ -42,8 +41,8 @@ def compare_command(
         float,
         Option("For sweeps: standard uncertainty of the numerical solution, in mm.", metavar="MM", least=0.0, most=1e6),
     ] = metrics.U_NUM,
-    screen: Screen,
-) -> Report:
+    screen: command_line.Screen,
+) -> command_line.Report:
     """Compare runs with measured repeats.
 
     Exit code 1: anything is out of range. A position is inside between the smallest and the largest repeat (0.5 mm
@@ -71,7 +70,7 @@ def compare_command(
             judged.append(comparison.inside)
         is_alone = screen.quiet and len(runs) == 1
         texts.append("\n".join(lines if is_alone else (f"{head} against {relative_path(source)}:", *lines)))
-    return Report(["\n\n".join(texts)], data, code=ExitCode.SUCCESS if all(judged) else ExitCode.OUTSIDE)
+    return command_line.Report(["\n\n".join(texts)], data, code=ExitCode.SUCCESS if all(judged) else ExitCode.OUTSIDE)
 
 
 _MEANINGS: list[str] = []  # the names of all numbers, for the help
@@ -91,18 +90,18 @@ def comparison_table(comparison: compare.Comparison) -> list[str]:
             (
                 row.block,
                 f"{row.quantity} {SIGNS.get(row.unit, row.unit)}",
-                number(row.simulated, digits),
-                f"{number(row.mean, digits)} ± {number(row.s, digits)}",
-                f"[{number(row.minimum, digits)}, {number(row.maximum, digits)}]",
-                number(row.error, digits),
+                output.number(row.simulated, digits),
+                f"{output.number(row.mean, digits)} ± {output.number(row.s, digits)}",
+                f"[{output.number(row.minimum, digits)}, {output.number(row.maximum, digits)}]",
+                output.number(row.error, digits),
                 str(row.verdict),
             )
             for row in rows
         ]
-        return table_lines(COLUMNS, cells, left=2)
+        return output.table_lines(COLUMNS, cells, left=2)
 
-    tables = (table(digits) for digits in (DIGITS, DIGITS - 1))
-    return min(tables, key=lambda lines: (max(map(len, lines)) > width_of_screen(), any("…" in line for line in lines)))
+    tables, width = (table(digits) for digits in (DIGITS, DIGITS - 1)), output.width_of_screen()
+    return min(tables, key=lambda lines: (max(map(len, lines)) > width, any("…" in line for line in lines)))
 
 
 def verdict_lines(comparison: compare.Comparison) -> list[str]:
@@ -111,7 +110,7 @@ def verdict_lines(comparison: compare.Comparison) -> list[str]:
     for row in comparison.rows:
         if row.verdict == compare.Verdict.OUTSIDE:
             least = 10.0**-DIGITS  # a distance is never shown as zero
-            distance = f"less than {least:g}" if row.distance < least else number(row.distance, DIGITS)
+            distance = f"less than {least:g}" if row.distance < least else output.number(row.distance, DIGITS)
             outside.append(f"outside: {row.quantity} of block {row.block} by {distance} {row.unit}")
     return [*comparison.messages, *(outside or ["all inside"])]
 
@@ -119,7 +118,7 @@ def verdict_lines(comparison: compare.Comparison) -> list[str]:
 def _judgement_lines(judgement: metrics.Judgement) -> Iterator[str]:
     """Yield all tables and their notes, after the first samples that failed."""
     for one in judgement.failures[:MOST_FAILURES]:
-        yield textwrap.shorten(f"row {one.row}, case {one.case}: {one.status}: {one.reason}", width_of_screen())
+        yield textwrap.shorten(f"row {one.row}, case {one.case}: {one.status}: {one.reason}", output.width_of_screen())
     more = len(judgement.failures) - MOST_FAILURES
     if more > 0:
         yield f"... and {more} more did not finish (--json names all)"
@@ -141,7 +140,7 @@ def _table(metric: evidence.Metric, found: evidence.Findings) -> list[str]:
     columns = [column for column in metric.columns if column.head]
     rows = [[_cell(row, column) for column in columns] for row in found.rows[:MOST_ROWS]]
     left = next(i for i, column in enumerate(columns) if column.form is not evidence.Form.TEXT)
-    lines = table_lines([column.head for column in columns], rows, left)
+    lines = output.table_lines([column.head for column in columns], rows, left)
     more = len(found.rows) - len(rows)
     return [*lines, f"... and {more} more rows (--json has all)"] if more else lines
 
@@ -158,15 +157,15 @@ def _cell(row: evidence.Row, column: evidence.Datum) -> str:
         case bool():
             return "yes" if value else "no"
         case (low, high):
-            ends = [number(scale * end, column.digits) for end in (low, high)]
+            ends = [output.number(scale * end, column.digits) for end in (low, high)]
             text = f"{ends[0]}–{ends[1]} %" if is_share else f"[{ends[0]}, {ends[1]}]"
             return text if is_share or ends != [DASH, DASH] else DASH
         case float():
-            return number(scale * value, column.digits) + (" %" if is_share else "")
+            return output.number(scale * value, column.digits) + (" %" if is_share else "")
         case _:
             return str(value)
 
 
 def _wrapped(texts: Iterable[str]) -> list[str]:
-    width = width_of_screen()
+    width = output.width_of_screen()
     return [line for text in texts for line in textwrap.wrap(text, width, break_long_words=False)]

@@ -8,16 +8,13 @@ from typing import Annotated
 
 import numpy as np
 
-from blocksim.cli.command_line import Report, Screen
-from blocksim.cli.output import number, table_lines
-from blocksim.cli.prepare import ScenarioInput, announce_compilation
+from blocksim.cli import command_line, output, prepare
 from blocksim.errors import ExitCode
 from blocksim.options import Option, Replace
 from blocksim.scenario.spelling import list_names
 from blocksim.simulation import files, schemes
 from blocksim.study import converge, pictures, rows
-from blocksim.view import style
-from blocksim.view.studies import refuse_small_page
+from blocksim.view import studies as drawings, style
 
 MOST_BLOCKS = 3
 LONGEST_NAME = 10
@@ -26,7 +23,7 @@ PERCENT = 100.0
 
 def converge_command(
     *,
-    source: ScenarioInput,
+    source: prepare.ScenarioInput,
     options: converge.ConvergeOptions,
     jobs: Annotated[int | None, Option("Processes (default: one a core).", metavar="N", least=1)] = None,
     out: Annotated[
@@ -35,8 +32,8 @@ def converge_command(
     picture: Annotated[bool, Option("Draw a picture.", flags=("--picture/--no-picture",))] = True,
     page: style.PageOptions,
     overwrite: Replace = False,
-    screen: Screen,
-) -> Report:
+    screen: command_line.Screen,
+) -> command_line.Report:
     """Refine step, stiffness and spacing until the run-out converges.
 
     Refines time step, contact stiffness and particle spacing one at a time (with rigid contacts: step and tolerance),
@@ -56,10 +53,10 @@ def converge_command(
         path = out or files.RESULTS / ready.name / "converge.png"
         style.picture_path(path)
         if picture:
-            refuse_small_page(len(converge.refinements_of(ready, options.studies)), paper)
+            drawings.refuse_small_page(len(converge.refinements_of(ready, options.studies)), paper)
             if out is not None or path.parent.exists():  # the usual folder is made with the picture
                 files.refuse_foreign(path, overwrite=overwrite)
-        announce_compilation(schemes.kernels_of(ready), quiet=screen.silent)
+        prepare.announce_compilation(schemes.kernels_of(ready), quiet=screen.silent)
         result = converge.converge(ready, replace(options, jobs=jobs, on_run=tell))
         drawn = path if picture and pictures.draw_convergence(result, ready, path, paper) else None
     lines = []
@@ -72,7 +69,7 @@ def converge_command(
         for study in result.studies
     ]
     shown = None if drawn is None else str(drawn)
-    return Report(
+    return command_line.Report(
         lines,
         {**asdict(result), "studies": studies, "converged": result.converged, "picture": shown},
         [] if drawn is None else [f"picture: {drawn}"],
@@ -89,11 +86,12 @@ def _table(result: converge.Convergence, study: converge.RefinementStudy) -> lis
 
     def cells(level: converge.Level) -> tuple[str, ...]:
         value = f"{level.value:g} (own)" if level.is_own else f"{level.value:g}"
-        places = [number(level.x_mm[block], 3) if level.x_mm else level.status for block in chosen]
-        return (value, *places, number(level.change_mm, 4), number(level.order, 1), number(level.seconds))
+        places = [output.number(level.x_mm[block], 3) if level.x_mm else level.status for block in chosen]
+        others = (level.change_mm, 4), (level.order, 1), (level.seconds, 2)
+        return (value, *places, *(output.number(*one) for one in others))
 
     heads = [f"{_short(result.blocks[block])}: x mm" for block in chosen]
-    lines = table_lines(("value", *heads, "change mm", "order", "seconds"), map(cells, study.levels))
+    lines = output.table_lines(("value", *heads, "change mm", "order", "seconds"), map(cells, study.levels))
     if 0 < len(chosen) < len(result.blocks):
         lines.append(
             f"the {len(chosen)} of {len(result.blocks)} blocks that move most; change: the largest of all blocks"
@@ -146,7 +144,7 @@ def _small(length: float) -> str:
     return f"{length:.2g} mm" if length >= least else f"{least:g} mm"
 
 
-def _recommendation(result: converge.Convergence, source: ScenarioInput) -> list[str]:
+def _recommendation(result: converge.Convergence, source: prepare.ScenarioInput) -> list[str]:
     """Return which settings are recommended, if any, and the command that runs the scenario with them."""
     joint = result.recommended
     if result.failed:

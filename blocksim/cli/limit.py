@@ -1,4 +1,4 @@
-"""blocksim limit: the values of a key between which the structure stands and falls."""
+"""blocksim limit and fragility: where a structure stands and falls over a key, and how probably over an intensity."""
 
 import re
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from blocksim.options import Option
 from blocksim.scenario.check import implausible_values
 from blocksim.scenario.models.timeline import SPRINGS
 from blocksim.simulation.schemes import kernels_of
-from blocksim.study import answer, criterion, limit, limit_answer, limit_plan, rows
+from blocksim.study import answer, criterion, fragility, limit, limit_answer, limit_plan, rows
 
 AT_ONCE = (
     "start.settle = false: loads that come at once shift limits of arches and walls by 0.2 to 4 %; leave it out, and "
@@ -112,3 +112,27 @@ def _comparison(one: limit_answer.LimitAnswer, other: limit_answer.LimitAnswer) 
     for mine, its in zip(one.limits, other.limits, strict=True):
         middle, theirs = 0.5 * (mine.low + mine.high), 0.5 * (its.low + its.high)
         yield f"\n{second} against {first}: {(theirs - middle) / abs(middle):+.2%} (middles of the brackets)"
+
+
+def fragility_command(
+    source: prepare.ScenarioInput, options: fragility.FragilityOptions, screen: command_line.Screen
+) -> command_line.Report:
+    """Find the probability of collapse over an intensity.
+
+    Draws samples at every intensity, independently, counts those that fail with exact (Clopper-Pearson) limits, and
+    fits a lognormal curve by maximum likelihood: median, dispersion and their intervals. --stripes runs the same
+    records at every intensity, each once, and widens the intervals of the curve accordingly. Runs that do not finish
+    are listed and not counted (exit code 77). The same command again, also after a kill or with more samples, runs only
+    what is missing. Needs the extra blocksim[study]. Exit code 1: no curve fits, as nothing or everything fails.
+
+    Example: blocksim fragility mine.toml --intensity motion.scale=0.5:2:7 --scatter friction.block_block=0.6+-0.05
+    """
+    plan = fragility.read_fragility(source.document(), options)
+    base = plan.document.build()
+    if not screen.silent:
+        prepare.warn_of_values(base)
+    prepare.announce_compilation(kernels_of(base), quiet=screen.silent)
+    heads = {head.key: head for head in plan.cases.heads}
+    with progress.exit_on_stop(), progress.case_progress(heads.values(), quiet=screen.silent) as on_row:
+        found = fragility.run_fragility(plan, replace(options, on_row=on_row))
+    return command_line.report_of([found], {"folder": str(found.folder), **found.to_dict()})

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli import command_line, output, process
+from blocksim.cli import app, command_line, output
 from blocksim.errors import ScenarioError
 from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, check, mistakes
@@ -48,7 +48,7 @@ def announce_compilation(kernels: str, *, quiet: bool) -> None:
     from blocksim.simulation.schemes import compile_kernels, is_compiled
 
     if is_compiled(kernels):
-        with process.pause_collector():
+        with app.pause_collector():
             compile_kernels(kernels)
         return
     if quiet:

@@ -12,9 +12,7 @@ import typer
 from blocksim.cli import command_line, compare, output, prepare, progress
 from blocksim.simulation import Result, files, loop, observables, trajectory
 from blocksim.simulation.run import RunCallbacks
-from blocksim.study.compare import compare_run
-from blocksim.study.rows import FINISHED
-from blocksim.study.run import RunOptions, run
+from blocksim.study import compare as judgement, rows, run
 
 MOST_ROWS = 40  # of the final table on the screen; of a longer one the first FIRST_ROWS are shown
 FIRST_ROWS = 10
@@ -22,7 +20,7 @@ INTERRUPTED = "interrupted"
 
 
 def run_command(
-    context: typer.Context, source: prepare.ScenarioInput, options: RunOptions, screen: command_line.Screen
+    context: typer.Context, source: prepare.ScenarioInput, options: run.RunOptions, screen: command_line.Screen
 ) -> None:
     """Simulate a scenario and print the final positions.
 
@@ -51,8 +49,9 @@ def run_command(
         if context.obj is not None:  # imports and compiling are waited for too
             over = time.monotonic() - context.obj
             options = replace(options, precautions=replace(options.precautions, time_over=over))
-        result = run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
-    with nullcontext() if result.status == FINISHED else suppress(OSError):  # SIGHUP reports that the terminal is lost
+        result = run.run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
+    # SIGHUP reports that the terminal is lost
+    with nullcontext() if result.status == rows.FINISHED else suppress(OSError):
         screen.show(_report(result))
     raise typer.Exit(result.summary.exit_code)
 
@@ -66,7 +65,7 @@ def _report(result: Result) -> command_line.Report:
     """Return the final table, with the measured ranges if the scenario names an experiment."""
     endings = {name: trajectory.rows_of(table) for name, table in result.endings.items()}
     summary = result.summary.model_dump()
-    is_whole = result.status == FINISHED
+    is_whole = result.status == rows.FINISHED
     return command_line.Report(
         _answer_lines(result),
         {"folder": str(result.folder), "final": trajectory.rows_of(result.columns), **endings, "summary": summary},
@@ -89,14 +88,14 @@ def _way_on(result: Result) -> Iterator[str]:
 
 def _answer_lines(result: Result) -> list[str]:
     """Return the lines of the final table; of a long one the first, as all are in the run's folder."""
-    if result.experiment is not None and result.status == FINISHED:
-        comparison = compare_run(result)
+    if result.experiment is not None and result.status == rows.FINISHED:
+        comparison = judgement.compare_run(result)
         return [*compare.comparison_table(comparison), *compare.verdict_lines(comparison)]
     blocks, *values = (result.columns[name] for name in ("block", "x_mm", "y_mm", "rotation_deg"))
     count = len(blocks)
     shown = count if count <= MOST_ROWS else FIRST_ROWS
-    rows = [(block, *map(output.number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
-    lines = output.table_lines(("block", "x mm", "y mm", "rotation °"), rows) if rows else []
+    cells = [(block, *map(output.number, row)) for block, *row in islice(zip(blocks, *values, strict=True), shown)]
+    lines = output.table_lines(("block", "x mm", "y mm", "rotation °"), cells) if cells else []
     more = [] if shown == count else [f"... and {count - shown} more blocks in final.csv"]
     lines += more
     for table in result.endings.values():  # of the systems beside the blocks

@@ -8,8 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from blocksim.cli import command_line, prepare, progress
-from blocksim.cli.output import number, table_lines
+from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import OutputExistsError
 from blocksim.options import Option
 from blocksim.simulation.files import write_text
@@ -51,29 +50,29 @@ def sensitivity_command(
         writer.writerows(found.records())
         write_text(out, text.getvalue())
     lines: list[str] = []
-    for output in found.outputs:
-        if output.numbers:
-            lines += [*([""] if lines else []), *_table(found, output)]
+    for one in found.outputs:
+        if one.numbers:
+            lines += [*([""] if lines else []), *_table(found, one)]
     return command_line.Report(
         lines or ["no result varies: none of these inputs matters"], found.to_dict(), _notes(found, out)
     )
 
 
-def _table(found: Sensitivity, output: Indices) -> list[str]:
+def _table(found: Sensitivity, one: Indices) -> list[str]:
     """Return the keys of an output that varies, the most important first."""
-    sign = SIGNS.get(output.unit, output.unit)
-    what = f"{number(output.mean)} {sign} ± {number(output.sd)} (s)"
-    title = f"{output.name}: {f'in {output.mean:.0%} of the runs' if output.unit == INDICATOR else what}"
+    sign = SIGNS.get(one.unit, one.unit)
+    what = f"{output.number(one.mean)} {sign} ± {output.number(one.sd)} (s)"
+    title = f"{one.name}: {f'in {one.mean:.0%} of the runs' if one.unit == INDICATOR else what}"
     columns = tuple(found.method.columns)
-    first = output.numbers[columns[0]]
+    first = one.numbers[columns[0]]
     order = sorted(range(len(found.keys)), key=lambda i: -abs(first[i]))
-    rows = [[found.keys[i], *(number(output.numbers[column][i], DIGITS) for column in columns)] for i in order]
-    return [title, *table_lines(("key", *(column.split(" ")[0] for column in columns)), rows)]
+    rows = [[found.keys[i], *(output.number(one.numbers[column][i], DIGITS) for column in columns)] for i in order]
+    return [title, *output.table_lines(("key", *(column.split(" ")[0] for column in columns)), rows)]
 
 
 def _notes(found: Sensitivity, out: Path | None) -> Iterator[str]:
     yield from (f"{column}: {meaning}" for column, (_, meaning) in found.method.columns.items())
-    still = [output.name for output in found.outputs if not output.numbers]
+    still = [one.name for one in found.outputs if not one.numbers]
     if still:
         yield f"does not vary: {', '.join(still)}"
     if found.failed:

@@ -8,16 +8,12 @@ from typing import Annotated
 
 import typer
 
-from blocksim.cli import command_line, output, prepare
-from blocksim.cli.progress import case_progress, cell_text, exit_on_stop
+from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode
 from blocksim.options import Option
 from blocksim.scenario import Document
 from blocksim.simulation.observables import DISPLACEMENT, END_SPEED, FIRST_MOVED, FIRST_MOVER, MOVES_ON, OUTCOME, TURN
-from blocksim.study.manifest import SweepResult
-from blocksim.study.plan import estimate
-from blocksim.study.rows import FINISHED, heads_of
-from blocksim.study.sweep import SweepOptions, kernels_for, merge, run_sweep
+from blocksim.study import manifest, plan, rows, sweep
 from blocksim.view.sweeps.data import short_names
 from blocksim.world.free_memory import readable
 
@@ -34,7 +30,7 @@ def sweep_command(
     *,
     scenario: Annotated[Path | None, Option("Scenario file (TOML).", metavar="SCENARIO", is_argument=True)] = None,
     settings: command_line.Settings = None,
-    options: SweepOptions,
+    options: sweep.SweepOptions,
     merged: Annotated[
         Path | None,
         Option("Run nothing; make sweep.csv from the shards in a folder.", flags=("--merge",), metavar="DIR"),
@@ -53,7 +49,7 @@ def sweep_command(
         if scenario is not None:
             message = "--merge takes the plan from the folder; leave the scenario out"
             raise typer.BadParameter(message, param_hint="--merge")
-        return _table_report(merge(merged, allow_missing=allow_missing))
+        return _table_report(sweep.merge(merged, allow_missing=allow_missing))
     if scenario is None:
         raise typer.BadParameter("a scenario file is needed, or --merge DIR", param_hint="SCENARIO")
     document = options.document(Document.read(scenario).with_settings(settings or []))
@@ -61,7 +57,7 @@ def sweep_command(
     if not screen.silent:
         prepare.warn_of_values(base)
     if dry_run:
-        found = estimate(document, keep_cases=options.keep_cases)
+        found = plan.estimate(document, keep_cases=options.keep_cases)
         cores = options.jobs or os.cpu_count() or 1
         on = f"{cores} core{'' if cores == 1 else 's'}"
         until_rest = "; less if they stop at rest" if found.stop_at_rest else ""
@@ -78,15 +74,15 @@ def sweep_command(
         return command_line.Report(
             lines, {**asdict(found), "jobs": cores}, always=() if screen.as_json else found.remarks
         )
-    for kernels in kernels_for(document):
+    for kernels in sweep.kernels_for(document):
         prepare.announce_compilation(kernels, quiet=screen.silent)
-    heads = () if base.sweep is None else heads_of(base.sweep)
-    with exit_on_stop(), case_progress(heads, quiet=screen.silent) as on_row:
-        result = run_sweep(document, replace(options, on_row=on_row))
+    heads = () if base.sweep is None else rows.heads_of(base.sweep)
+    with progress.exit_on_stop(), progress.case_progress(heads, quiet=screen.silent) as on_row:
+        result = sweep.run_sweep(document, replace(options, on_row=on_row))
     return _table_report(result)
 
 
-def _table_report(result: SweepResult) -> command_line.Report:
+def _table_report(result: manifest.SweepResult) -> command_line.Report:
     """Return the columns that vary as far as they fit on the screen, outcomes, failures and what is left to do."""
     table = result.table
     short = dict(zip(result.keys, short_names(result.keys), strict=True))
@@ -95,13 +91,13 @@ def _table_report(result: SweepResult) -> command_line.Report:
     ]
     columns += [name for name in SHOWN_LAST if name in table]
     names = [name for name in columns if name in short or name == "inside" or _varies(table[name])]
-    heads, rows, fitting = _texts(result, names, short)
+    heads, entries, fitting = _texts(result, names, short)
     if fitting < sum(name not in SHOWN_LAST for name in names):  # the first blocks of many may all stay where they are
         # columns of single blocks behind others, and last what a note below the table tells
         names.sort(key=lambda name: (name in (FIRST_MOVER, FIRST_MOVED), name.endswith(POSITION)))
-        heads, rows, fitting = _texts(result, names, short)
+        heads, entries, fitting = _texts(result, names, short)
     counts = {
-        "row": len(table) - len(rows),
+        "row": len(table) - len(entries),
         "column": len(names) - fitting,
         "constant column": len(columns) - len(names),
     }
@@ -114,27 +110,30 @@ def _table_report(result: SweepResult) -> command_line.Report:
     if result.left:
         notes.append(f"{result.left} cases have not been run; rerun the command to finish")
     return command_line.Report(
-        output.table_lines(heads[:fitting], [row[:fitting] for row in rows], left=0),
+        output.table_lines(heads[:fitting], [row[:fitting] for row in entries], left=0),
         {"folder": str(result.folder), "rows": table.to_dict(orient="records")},
         [*notes, f"table: {result.folder / result.name}"],
         code=ExitCode.SWEEP_HAS_FAILURES if result.failed else ExitCode.SUCCESS,
     )
 
 
-def _texts(result: SweepResult, names: list[str], short: dict[str, str]) -> tuple[list[str], list[list[str]], int]:
+def _texts(
+    result: manifest.SweepResult, names: list[str], short: dict[str, str]
+) -> tuple[list[str], list[list[str]], int]:
     """Return heads and rows of a table of some columns, and how many of these fit on the screen, at least one."""
     heads = [short.get(name, name) for name in names]
-    rows = [[cell_text(value) for value in row] for row in result.table[names].head(MOST_ROWS).itertuples(index=False)]
+    first = result.table[names].head(MOST_ROWS).itertuples(index=False)
+    entries = [[progress.cell_text(value) for value in row] for row in first]
     width, fitting = -len(output.GAP), 0
-    for column in zip(heads, *rows, strict=True):
+    for column in zip(heads, *entries, strict=True):
         width += len(output.GAP) + max(map(len, column))
         if width > output.width_of_screen():
             break
         fitting += 1
-    return heads, rows, max(fitting, 1)
+    return heads, entries, max(fitting, 1)
 
 
-def _movement_lines(result: SweepResult) -> Iterator[str]:
+def _movement_lines(result: manifest.SweepResult) -> Iterator[str]:
     """Yield how often each outcome occurs, and the largest movement of all."""
     table = result.table
     if OUTCOME not in table or table[OUTCOME].isna().all():  # all failed
@@ -152,14 +151,14 @@ def _movement_lines(result: SweepResult) -> Iterator[str]:
         yield f"first to move: {first}{more} of {len(table)} cases"
 
 
-def _failure_lines(result: SweepResult, short: dict[str, str]) -> Iterator[str]:
+def _failure_lines(result: manifest.SweepResult, short: dict[str, str]) -> Iterator[str]:
     """Yield the first cases that failed, with their reasons."""
     if not result.failed:
         return
-    failed = result.table[result.table["status"] != FINISHED]
+    failed = result.table[result.table["status"] != rows.FINISHED]
     yield f"{result.failed} of {len(result.table)} cases did not finish; the first: {failed.iloc[0]['reason']}"
     for _, row in failed.head(MOST_FAILURES).iterrows():
-        values = ", ".join(f"{name} = {cell_text(row[key])}" for key, name in short.items())
+        values = ", ".join(f"{name} = {progress.cell_text(row[key])}" for key, name in short.items())
         yield f"  {row['status']}: {values}: {str(row['reason']).splitlines()[0]}"
     if len(failed) > MOST_FAILURES:
         yield f"  and {len(failed) - MOST_FAILURES} more; --retry-failed runs them again"

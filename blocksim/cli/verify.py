@@ -1,16 +1,19 @@
-"""blocksim verify: run the verification cases and print their table."""
+"""blocksim verify and bench: run the cases, or the measurements of speed and memory, of a list; print their table."""
 
+import json
+import math
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated
 
+from blocksim.bench import harness, registry
 from blocksim.cli import command_line, output, prepare, progress
-from blocksim.errors import ExitCode
-from blocksim.options import Option
+from blocksim.errors import ExitCode, OutputError
+from blocksim.options import Option, Replace
 from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
-from blocksim.simulation.schemes import SCHEMES
-from blocksim.verification.case import CaseOutcome, Setting, run_case
-from blocksim.verification.cases import choose_cases, exclusions
+from blocksim.simulation import files, schemes
+from blocksim.verification import case, cases as case_list
 
 COLUMNS = ("quantity", "expected", "measured", "error", "tolerance", "verdict")
 
@@ -35,27 +38,27 @@ def verify_command(
 
     Example: blocksim verify V3 V7 --law hertz-mindlin
     """
-    setting = Setting(model, law, quick, scheme)
-    wanted = choose_cases(cases or [], setting, soil=soil)
-    prepare.announce_compilation(SCHEMES[setting.scheme].kernels(setting.model), quiet=screen.silent)
-    outcomes: list[CaseOutcome] = []
+    setting = case.Setting(model, law, quick, scheme)
+    wanted = case_list.choose_cases(cases or [], setting, soil=soil)
+    prepare.announce_compilation(schemes.SCHEMES[setting.scheme].kernels(setting.model), quiet=screen.silent)
+    outcomes: list[case.CaseOutcome] = []
     try:
-        under_way = progress.one_by_one(wanted, lambda case: f"{case.id} {case.title}", quiet=screen.silent)
-        outcomes.extend(run_case(case, setting) for case in under_way)
+        under_way = progress.one_by_one(wanted, lambda one: f"{one.id} {one.title}", quiet=screen.silent)
+        outcomes.extend(case.run_case(one, setting) for one in under_way)
     except BaseException:  # minutes of measuring must not be lost; the list has what was measured
         if outcomes:
             screen.print(_report(outcomes))
         raise
     report = _report(outcomes)
-    missing = () if cases or soil else exclusions(setting.scheme)
+    missing = () if cases or soil else case_list.exclusions(setting.scheme)
     return replace(report, notes=[*report.notes, f"left out: {'; '.join(missing)}"]) if missing else report
 
 
-def _report(outcomes: list[CaseOutcome]) -> command_line.Report:
+def _report(outcomes: list[case.CaseOutcome]) -> command_line.Report:
     groups = []
     for outcome in outcomes:
-        case, texts = outcome.case, [row.texts for row in outcome.rows]
-        heading = f"{case.id} {case.title} ({case.source}): {outcome.seconds:.1f} s"
+        one, texts = outcome.case, [row.texts for row in outcome.rows]
+        heading = f"{one.id} {one.title} ({one.source}): {outcome.seconds:.1f} s"
         groups.append((heading, [(f"  {row['quantity']}", *(row[key] for key in COLUMNS[1:])) for row in texts]))
     return command_line.Report(
         output.grouped_lines(COLUMNS, groups),
@@ -65,7 +68,7 @@ def _report(outcomes: list[CaseOutcome]) -> command_line.Report:
     )
 
 
-def _notes(outcomes: list[CaseOutcome]) -> Iterator[str]:
+def _notes(outcomes: list[case.CaseOutcome]) -> Iterator[str]:
     missed = [outcome for outcome in outcomes if not outcome.inside]
     for outcome in missed:
         count = sum(not row.is_inside for row in outcome.rows)
@@ -76,3 +79,79 @@ def _notes(outcomes: list[CaseOutcome]) -> Iterator[str]:
             yield f"{outcome.case.id} shortened: {outcome.case.quick}"
     seconds = sum(outcome.seconds for outcome in outcomes)
     yield f"{len(outcomes) - len(missed)} of {len(outcomes)} cases inside, {seconds:.0f} s"
+
+
+QUANTITIES = ("quantity", "unit", "median", "smallest", "largest")
+BENCH_DIGITS = 3
+LARGE = 100.0  # from here on a number has all digits before the point, and else three significant ones
+
+
+def bench_command(
+    *,
+    names: Annotated[
+        list[str] | None,
+        Option(
+            "three-blocks, ensemble, walls, threads, nonsmooth-blocks, nonsmooth-walls, nonsmooth-threads, "
+            "soils, start-up.",
+            metavar="[NAME]...",
+            is_argument=True,
+        ),
+    ] = None,
+    quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,
+    repeats: Annotated[int, Option("Samples of each number.", metavar="N", least=1)] = harness.REPEATS,
+    out: Annotated[Path | None, Option("Write everything as JSON.", metavar="FILE")] = None,
+    overwrite: Replace = False,
+    screen: command_line.Screen,
+) -> None:
+    """Measure speed and memory, and show the table.
+
+    Times of the solver are CPU seconds of its steps, medians over repeats with the smallest and largest sample. All
+    measurements take some minutes on one core; nothing else should run.
+
+    Example: blocksim bench walls --out bench.json
+    """
+    wanted = registry.choose(names or [])
+    if out is not None:  # checked before minutes of measuring
+        if out.is_dir() or not out.absolute().parent.is_dir():
+            raise OutputError(f"{out}: cannot be written: {'it is a folder' if out.is_dir() else 'no such folder'}")
+        files.refuse_foreign(out, overwrite=overwrite)
+    machine = harness.this_machine()
+    prepare.announce_compilation("surface", quiet=screen.silent)
+    outcomes: list[harness.BenchmarkRun] = []
+    try:
+        under_way = progress.one_by_one(wanted, lambda one: f"{one.name}: {one.title}", quiet=screen.silent)
+        outcomes.extend(one.run(harness.Effort(quick, repeats)) for one in under_way)
+    finally:  # also when stopped: minutes of measuring must not be lost; the list has what was measured
+        if outcomes:
+            data = harness.report(machine, outcomes)
+            if out is not None:
+                files.write_text(out, json.dumps(data, indent=2) + "\n")
+            written = [] if out is None else [f"written: {out}"]
+            notes = [
+                *_bench_notes(outcomes),
+                *harness.machine_lines(machine),
+                f"{sum(one.seconds for one in outcomes):.0f} s",
+                *written,
+            ]
+            screen.print(command_line.Report(output.grouped_lines(QUANTITIES, _groups(outcomes), left=2), data, notes))
+
+
+def _groups(outcomes: list[harness.BenchmarkRun]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+    """Yield the name and the rows of each measurement."""
+
+    def shown(value: float) -> str:
+        return f"{value:.0f}" if LARGE <= abs(value) < math.inf else case.number(value, BENCH_DIGITS)
+
+    for one in outcomes:
+        rows = []
+        for found in one.findings.numbers:
+            spread = (min(found.samples), max(found.samples)) if len(found.samples) > 1 else (math.nan, math.nan)
+            rows.append((f"  {found.quantity}", found.unit, *map(shown, (found.median, *spread))))
+        yield f"{one.measurement.name}: {one.measurement.title}", rows
+
+
+def _bench_notes(outcomes: list[harness.BenchmarkRun]) -> Iterator[str]:
+    for outcome in outcomes:
+        yield from (f"{outcome.measurement.name}: {text}" for text in outcome.findings.notes)
+        if outcome.shortened:
+            yield f"{outcome.measurement.name} shortened: {outcome.shortened}"

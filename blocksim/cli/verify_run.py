@@ -9,10 +9,8 @@ from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import BlocksimError, ExitCode, InputMissingError, StoppedEarlyError
 from blocksim.options import Option
 from blocksim.scenario import load_stored
-from blocksim.simulation.files import SCENARIO
-from blocksim.simulation.schemes import kernels_of
-from blocksim.study import answer, manifest, run_folder, sweep, sweep_folder, verify
-from blocksim.study.run import Threads
+from blocksim.simulation import files, schemes
+from blocksim.study import answer, manifest, run, run_folder, sweep, sweep_folder, verify
 
 INDENT = "  "
 MOST_LINES = 5
@@ -34,7 +32,7 @@ def verify_run_command(
             is_argument=True,
         ),
     ],
-    threads: Threads = 1,
+    threads: run.Threads = 1,
     sample: Annotated[
         int, Option("Number of rows of a sweep or study to run again.", metavar="N", least=1)
     ] = verify.SAMPLE,
@@ -62,12 +60,12 @@ def _verified(place: Path, threads: int, sample: int, seed: int, screen: command
     try:
         study = answer.study_in(place)
         if study is not None:
-            kernels = [kernels_of(load_stored(place / study.answer.files.plan))]
+            kernels = [schemes.kernels_of(load_stored(place / study.answer.files.plan))]
         else:
             kernels = (
                 [*sweep.kernels_for(sweep_folder.read_plan(place))]
                 if manifest.is_sweep(place)
-                else [kernels_of(load_stored(run_folder.find_run(place) / SCENARIO))]
+                else [schemes.kernels_of(load_stored(run_folder.find_run(place) / files.SCENARIO))]
             )
         for one in kernels:
             prepare.announce_compilation(one, quiet=screen.silent)
@@ -117,7 +115,7 @@ def _of_sweep(verdict: verify.SweepVerdict, what: str = "rows", study: str = "")
     else:
         rows = {one.row for one in verdict.cells}
         where = "" if study else f" in {len(rows)} of the {count} that were run again"
-        runs = (line for run in verdict.runs if not run.agrees for line in _of_run(run).lines)
+        runs = (line for one in verdict.runs if not one.agrees for line in _of_run(one).lines)
         reasons = (*_cells(verdict), *_entries(verdict.entries), *runs)
         lines = [f"{verdict.folder}: differs{where}", *(INDENT + line for line in reasons)]
     return command_line.Report(lines, verdict.to_dict(), code=ExitCode(not verdict.agrees))

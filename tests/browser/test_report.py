@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from typer.testing import CliRunner
 
-from blocksim.cli.app import app
+from blocksim.cli.commands import app
 from blocksim.simulation.trajectory import Frames
 from blocksim.view.report.page import write_report
 from blocksim.view.report.subjects import StudyPage, read_stored, run_subject, study_subject

@@ -14,7 +14,7 @@ import h5py
 import pytest
 from typer.testing import CliRunner
 
-from blocksim.cli.app import app
+from blocksim.cli.commands import app
 from tests.view.report.folders import write_run
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

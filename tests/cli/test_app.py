@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from blocksim import __version__
-from blocksim.cli.app import app
-from blocksim.cli.commands import COMMANDS, GROUPS, function_of
+from blocksim.cli.commands import COMMANDS, GROUPS, app, function_of
 from tests.cli.conftest import SOFT, Command
 from tests.golden import Golden
 
@@ -41,7 +40,7 @@ def test_version(blocksim: Command) -> None:
 def test_a_run_compared_with_an_experiment_does_without_pandas_and_matplotlib(tmp_path: Path) -> None:
     scenario = Path(__file__).parents[2] / "scenarios" / "three_blocks.toml"
     code = (
-        "import sys; from typer.testing import CliRunner; from blocksim.cli.app import app;"
+        "import sys; from typer.testing import CliRunner; from blocksim.cli.commands import app;"
         "ended = CliRunner().invoke(app, ['run', *sys.argv[1:]]);"
         f"print(ended.exit_code, [name for name in {UNUSED_BY_A_RUN!r} if name in sys.modules])"
     )
@@ -52,7 +51,7 @@ def test_a_run_compared_with_an_experiment_does_without_pandas_and_matplotlib(tm
 
 def test_help_does_not_wait_for_heavy_packages() -> None:
     code = (
-        "import sys; from typer.testing import CliRunner; from blocksim.cli.app import app;"
+        "import sys; from typer.testing import CliRunner; from blocksim.cli.commands import app;"
         "assert CliRunner().invoke(app, ['--help']).exit_code == 0;"
         f"print([name for name in {HEAVY!r} if name in sys.modules])"
     )

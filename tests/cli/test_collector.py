@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from blocksim.cli.process import pause_collector
+from blocksim.cli.app import pause_collector
 
 
 @pytest.fixture(autouse=True)

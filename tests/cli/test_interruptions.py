@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from blocksim.cli.app import app
+from blocksim.cli.commands import app
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5 import read_frames
 from tests.cli.conftest import PATIENCE, SCENARIOS, SOFT, Command, Process, committed, wait_for, wait_for_frames

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.cli.process import STOPPED_EARLY
+from blocksim.cli.app import STOPPED_EARLY
 from blocksim.errors import ExitCode
 from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for, wait_for_frames
 

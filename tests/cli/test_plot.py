@@ -155,7 +155,7 @@ def test_forces_are_drawn_where_contacts_are_stored(blocksim: Command) -> None:
 SOLVER_FREE = """
 import sys
 from typer.testing import CliRunner
-from blocksim.cli.app import app
+from blocksim.cli.commands import app
 for arguments in {calls}:
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, (arguments, result.output, result.stderr)

@@ -152,7 +152,7 @@ def test_sweep_is_judged_by_the_repeats(blocksim: Command, tmp_path: Path) -> No
 def test_run_needs_no_solver(tmp_path: Path) -> None:
     write_run(tmp_path / "run")
     code = (
-        "import sys; from typer.testing import CliRunner; from blocksim.cli.app import app;"
+        "import sys; from typer.testing import CliRunner; from blocksim.cli.commands import app;"
         "result = CliRunner().invoke(app, ['report', 'run']);"
         "print(result.exit_code, sorted({'numba', 'scipy'} & set(sys.modules)))"
     )

@@ -13,7 +13,7 @@ import h5py
 import pytest
 from typer.testing import CliRunner
 
-from blocksim.cli.app import app
+from blocksim.cli.commands import app
 from blocksim.simulation.files import sha256_of
 from blocksim.study.fragility import fragility
 from blocksim.study.limit import limit, limit_curve

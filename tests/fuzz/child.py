@@ -100,7 +100,7 @@ def _left(folder: str, arguments: list[str]) -> dict[str, Any]:
 
     from typer.testing import CliRunner  # noqa: PLC0415
 
-    from blocksim.cli.app import app  # noqa: PLC0415
+    from blocksim.cli.commands import app  # noqa: PLC0415
 
     os.chdir(folder)
     _forget_memory()
