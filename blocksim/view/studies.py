@@ -12,9 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.view import run_data, style
+from blocksim.view import run_data, style, time_panels
 from blocksim.view.sweeps.data import short_names
-from blocksim.view.time_panels import limits_of
 
 PANEL, LEAST = (4.4, 3.0), (1.8, 1.0)  # inches, of the panel, and on a page whose size was asked for
 SIDES = 0.65, 0.15, 0.11, 0.42  # inches
@@ -85,7 +84,7 @@ def draw_law(law: Law, path: Path | str, title: str, paper: style.Paper = style.
                 axes.axvline(mark, color=style.FAINT_INK, linewidth=0.5, zorder=0)
             axes.spines[["right", "top"]].set_visible(False)
             axes.set_xlim(float(law.time[0]), float(law.time[-1]))
-            axes.set_ylim(*limits_of(values))
+            axes.set_ylim(*time_panels.limits_of(values))
             axes.set_ylabel(f"{label} ({law.unit})")
             style.number_axis(axes.yaxis)
         figure.align_ylabels()

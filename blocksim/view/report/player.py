@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario
-from blocksim.simulation.results import EventRecord
-from blocksim.simulation.trajectory import Frames
+from blocksim.simulation import results, trajectory
 from blocksim.view import arrows, paint, run_data, style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices
 from blocksim.view.scene import upper_sides
@@ -57,7 +56,7 @@ STEPS = 24  # of the colours of elements: each is one path of the canvas
 SAME_SHAPE = 1e-6  # of its size, by which corners of an outline that only moves may be off
 
 
-def element_bytes(frames: Frames, drawable: Indices) -> int:
+def element_bytes(frames: trajectory.Frames, drawable: Indices) -> int:
     """Return about how many bytes the elements of all systems take in one frame, judged by two of them."""
     total = 0
     for track in frames.others:
@@ -79,7 +78,7 @@ def _only_move(outlines: Floats) -> bool:
     return bool(np.abs(shapes - shapes[:1]).max(initial=0.0) <= SAME_SHAPE * size)
 
 
-def pack_systems(frames: Frames, kept: Indices) -> list[dict[str, Any]]:
+def pack_systems(frames: trajectory.Frames, kept: Indices) -> list[dict[str, Any]]:
     """Return every system with its name, colour, number of elements and corners, and places in the kept frames.
 
     `x` and `y` are those of centres (f, b), with a `shape` of one outline for each element, or for all; without it
@@ -130,7 +129,7 @@ class PackedLoads(NamedTuple):
 
 
 def pack_loads(
-    frames: Frames, scenario: Scenario, kept: Indices, happened: Sequence[EventRecord]
+    frames: trajectory.Frames, scenario: Scenario, kept: Indices, happened: Sequence[results.EventRecord]
 ) -> PackedLoads | None:
     """Return what acts from outside in some frames, with the extent that holds it; None where nothing does.
 
@@ -180,7 +179,7 @@ class PackedFrames(NamedTuple):
     notes: list[str]
 
 
-def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> PackedFrames:
+def pack_frames(frames: trajectory.Frames, most_bytes: int = MOST_BYTES) -> PackedFrames:
     """Return the drawable frames in mm and degrees: evenly chosen, first and last included, as many as fit.
 
     Raises InvalidInputError when there is none.
@@ -222,7 +221,7 @@ def pack_frames(frames: Frames, most_bytes: int = MOST_BYTES) -> PackedFrames:
     return PackedFrames(data, kept, notes)
 
 
-def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | None:
+def pack_forces(frames: trajectory.Frames, kept: Indices, tilt: float) -> dict[str, Any] | None:
     """Return the contacts of some frames: places (mm) and forces (N), each on the upper block.
 
     `ends` counts contacts up to and with each frame; `scale` is mm for a newton, and `longest` (mm) where arrows are
@@ -243,7 +242,7 @@ def pack_forces(frames: Frames, kept: Indices, tilt: float) -> dict[str, Any] | 
 
 
 def scene_data(
-    frames: Frames, scenario: Scenario, kept: Indices, happened: Sequence[EventRecord] = ()
+    frames: trajectory.Frames, scenario: Scenario, kept: Indices, happened: Sequence[results.EventRecord] = ()
 ) -> dict[str, Any]:
     """Return everything but the frames that the player needs, as plain values for JSON.
 

@@ -18,10 +18,8 @@ import numpy as np
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, document, input_files, load_stored
-from blocksim.simulation import files, observables, results as result
-from blocksim.simulation.instruments import ProbeSeries
+from blocksim.simulation import files, instruments, observables, results as result, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
-from blocksim.simulation.trajectory import Columns, Frames, read_table, rows_of
 from blocksim.view import kinds, run_data, style, time_panels
 from blocksim.view.history import draw_history_page
 from blocksim.view.report.player import MOST_BYTES, pack_forces, pack_frames, pack_loads, scene_data
@@ -84,11 +82,11 @@ class PartialRun:
     scenario: Scenario | None
     scenario_text: str | None
     summary: result.Summary | None
-    frames: Frames | None
-    final: Columns | None
+    frames: trajectory.Frames | None
+    final: trajectory.Columns | None
     problems: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
-    probes: Mapping[str, ProbeSeries] = field(default_factory=dict)
+    probes: Mapping[str, instruments.ProbeSeries] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -121,7 +119,7 @@ def read_stored(folder: Path) -> PartialRun:
     scenario = attempt(lambda: load_stored(folder / files.SCENARIO))
     summary = attempt(lambda: result.read_summary(folder / files.SUMMARY))
     frames = None if scenario is None else attempt(lambda: read_frames(folder / files.FRAMES, scenario))
-    final = attempt(lambda: read_table(folder / files.FINAL))
+    final = attempt(lambda: trajectory.read_table(folder / files.FINAL))
     if scenario is None and summary is None and final is None:
         raise InvalidInputError("\n".join([f"{folder}: nothing of this run can be read", *problems]))
     probes = None
@@ -159,7 +157,9 @@ def embedded(figure: "style.Figure") -> str:
     return f"data:image/svg+xml;base64,{b64encode(short.encode()).decode()}"
 
 
-def history_of(frames: Frames, support: run_data.Support, measured: Repeats | None) -> tuple[str, list[dict[str, Any]]]:
+def history_of(
+    frames: trajectory.Frames, support: run_data.Support, measured: Repeats | None
+) -> tuple[str, list[dict[str, Any]]]:
     """Return the histories of a run, and of each panel its name, place and the ends of its axes."""
     with draw_history_page(frames, None, measured, support) as (figure, panels):
         places = [
@@ -260,7 +260,7 @@ def run_subject(
         "values": None if run.scenario is None else run.scenario.model_dump(by_alias=True, exclude={"sweep"}),
         "description": None if run.scenario is None else run.scenario.description,
         "notes": notes,
-        "final": [] if run.final is None else rows_of(run.final),
+        "final": [] if run.final is None else trajectory.rows_of(run.final),
         "comparison": comparison,
         "ledger": _ledger(run),
         "provenance": _provenance(run),
