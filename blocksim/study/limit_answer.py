@@ -340,7 +340,7 @@ class LimitAnswer(Answer, frozen=True):
             raise InvalidInputError(f"{self.folder}: {why}; nothing to draw")
         mechanism.draw_mechanisms(brackets, path, title, paper)
 
-    def _picture_of(self, side: Side) -> mechanism.Side:
+    def _picture_of(self, side: Side) -> mechanism.BracketRun:
         """Return a side whose run was kept, as it is drawn."""
         run = read_run(self.folder / CASES / Path(str(side.case)).name)
         first = None if side.first_mover is None else str(side.first_mover)
@@ -349,7 +349,7 @@ class LimitAnswer(Answer, frozen=True):
         if first is not None:
             came = f"{came}; first to move: block {first} at {side.first_moved_s or 0.0:.3g} s"
         support, is_mechanism = run_data.support_of(run.scenario, run.events), side.verdict is not Stability.STANDS
-        picture = mechanism.Side(run.frames, support, first, head, is_mechanism=is_mechanism)
+        picture = mechanism.BracketRun(run.frames, support, first, head, is_mechanism=is_mechanism)
         return replace(picture, caption=f"{head}\n{came} (drawn at {float(run.frames.time[picture.frame]):.3g} s)")
 
 
@@ -443,7 +443,7 @@ class CurveAnswer(Answer, frozen=True):
     def draw(self, path: Path, title: str, paper: style.Paper) -> None:
         """Draw limits over the other key, with a table of published or measured ones beside them."""
         points = [
-            (point.over, [studies.Bracket(one.low, one.high, one.below.value, one.above.value)
+            (point.over, [studies.LimitRange(one.low, one.high, one.below.value, one.above.value)
                           for one in point.search.changes])
             for point in self.points
         ]  # fmt: skip
@@ -464,7 +464,7 @@ def place_of(number: float, unit: str) -> str:
     return re.sub(r"[^A-Za-z0-9.+-]+", "-", with_unit(number, unit, 6))
 
 
-def read_limits(path: Path, over_unit: str, unit: str) -> tuple[studies.Series, ...]:
+def read_limits(path: Path, over_unit: str, unit: str) -> tuple[studies.OtherLimits, ...]:
     """Return the series of a table in the order of their first rows: value of the other key, limit, and name.
 
     Its columns are `over`, `limit` and `series`, the first two with the units of the search in brackets where there
@@ -487,4 +487,4 @@ def read_limits(path: Path, over_unit: str, unit: str) -> tuple[studies.Series, 
         problems.append(Problem(str(path), "the table has no rows"))
     if problems:
         raise_problems(problems)
-    return tuple(studies.Series(name, tuple(points)) for name, points in series.items())
+    return tuple(studies.OtherLimits(name, tuple(points)) for name, points in series.items())

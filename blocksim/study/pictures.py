@@ -24,7 +24,7 @@ from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
 from blocksim.view import animation, history, run_data, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
-from blocksim.view.paint import COLOURS, paint_named
+from blocksim.view.paint import COLOURS, paint_of
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 
 if TYPE_CHECKING:
@@ -346,7 +346,7 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
     stored = run_folder.read_run(run)
     scenario = stored.scenario
     table = options.table or (scenario.experiment.table if scenario.experiment is not None else None)
-    measured = None if table is None or draw is None else load_table(table)
+    measured = None if table is None or draw is None else load_table(table).summaries()
     picture = options.picture(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
     if draw is None:
         probes = read_probes(stored.folder / files.FRAMES, scenario)
@@ -365,7 +365,7 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
         measured=measured,
         support=run_data.support_of(scenario, stored.events),
         forces=options.forces,
-        paint=paint_named(options.colour, stored.frames, scenario),
+        paint=paint_of(options.colour, stored.frames, scenario),
         paper=options.paper,
         **chosen,
     )
@@ -419,7 +419,7 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
     path = Path(options.out or f"{scenario.name}.gif")
     refuse_foreign(path, overwrite=options.overwrite)
     older = OLDER if path.exists() else ""
-    paint = paint_named(options.colour, stored.frames, scenario)
+    paint = paint_of(options.colour, stored.frames, scenario)
     look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)
     support, pace = run_data.support_of(scenario, stored.events), animation.Pace(options.speed, options.fps)
     count, beyond = animation.draw_animation(stored.frames, path, pace, look, support, options.on_picture)

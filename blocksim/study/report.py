@@ -65,7 +65,7 @@ def report_on(
         else:
             is_run = place.is_dir() and any((place / name).is_file() for name in files.OURS)  # even if files lack
             folder = place if is_run else run_folder.find_run(place)
-            run = parts.read_stored(folder)
+            run = parts.read_folder(folder)
             subjects, damage = [parts.run_subject(key, run, *_compared(run, experiment))], run.damage
             remark = run_folder.choice(place, folder)
             if remark:
@@ -94,8 +94,8 @@ def _compared(run: parts.PartialRun, experiment: Path | None) -> tuple[dict[str,
 
 def _shown(found: Comparison | Judgement) -> dict[str, Any]:
     """Return a comparison as a report has it, without paths of the machine."""
-    messages = [parts.shared_text(text) for text in found.messages]
-    return {**found.to_dict(), "experiment": parts.shared_path(found.source), "messages": messages}
+    messages = [parts.local_text(text) for text in found.messages]
+    return {**found.to_dict(), "experiment": parts.local_path(found.source), "messages": messages}
 
 
 def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[list[parts.Subject], tuple[str, ...]]:
@@ -133,7 +133,7 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
         problems += [] if is_whole else ["no picture of the sweep: its table is damaged"]
     folders = {case: sweep_folder.case_folder(table.folder, case) for case in table.column("case")}
     cases = {case: one for case, one in folders.items() if one is not None and (one / files.FRAMES).is_file()}
-    found = [(case, parts.read_stored(folder)) for case, folder in list(cases.items())[:most]]
+    found = [(case, parts.read_folder(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
     subject = parts.sweep_subject(
         key, table, scenario, keys, problems, list(cases)[most:], judged=judged, pictures=pictures

@@ -222,7 +222,7 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
     runs = [_finished(scenarios / f"{name}.toml", settings or {}) for name in COLLAPSES]
     bounce, slide = (_finished(scenarios / f"{name}.toml", {}) for name in ("bounce", "slide"))
     experiments, first = scenarios / "experiments", runs[0]
-    centres = load_table(experiments / "three_blocks.csv")
+    centres = load_table(experiments / "three_blocks.csv").summaries()
     edges = load_table(experiments / "three_blocks_edges.csv")
     wide = edges.values("3", "right") - edges.values("3", "left")
     height, speed = bounce_law(bounce), slide_law(slide)

@@ -1,6 +1,5 @@
 """Pictures, animations, reports. Importing this room is cheap: matplotlib is loaded when the first picture is drawn."""
 
-from blocksim.view.final import MeasuredTable
 from blocksim.view.strip import draw_strip
 
-__all__ = ["MeasuredTable", "draw_strip"]
+__all__ = ["draw_strip"]

@@ -269,17 +269,14 @@ class Animation:
         self.seen = run_data.blocks_in_view(frames, self.drawable, support)
         self.beyond = beyond_view(frames.names, self.seen)
         extent = run_data.extent_of(frames, self.drawable, support, self.seen)
-        self.acts, self.length = arrows.actions_on(frames, self.drawable, support), arrows.length_in(extent)
-        self.page = page = scene.page_for(
-            arrows.with_room(extent, self.acts, self.length),
-            across,
-            HIGHEST * (across - 2.0 * side),
-            (side, head, foot + paint.height),
-        )
+        self.acts = arrows.actions_on(frames, self.drawable, support)
+        extent, self.length = arrows.with_room(extent, self.acts)
+        margins = side, head, foot + paint.height
+        self.page = page = scene.page_for(extent, across, HIGHEST * (across - 2.0 * side), margins)
         # whole pairs of pixels, as MP4 wants them; half a pixel spare
         pairs = (round(0.5 * one * DOTS_PER_INCH) for one in (page.width, page.height))
         width, height = ((2 * pair + 0.5) / DOTS_PER_INCH for pair in pairs)
-        with style.styled_figure(width, height) as figure, style.silence_missing_glyphs():
+        with style.open_figure(width, height) as figure, style.silence_missing_glyphs():
             figure.set_dpi(DOTS_PER_INCH)
             self.canvas = page.canvas(figure)
             scene.finish_panel(self.canvas, labelled=True)
@@ -295,7 +292,7 @@ class Animation:
             self.canvas.axes.text(*place, text, ha="right", va="bottom", color=style.FAINT_INK)
             self.is_still = support.motion is None and not np.isfinite(support.gone).any()
             if self.is_still:
-                scene.draw_standing(self.canvas, self.scene, int(self.drawable[0]))
+                scene.draw_surroundings(self.canvas, self.scene, int(self.drawable[0]))
             paper: Any = FigureCanvasAgg
             self.paper = paper(figure)
             self.paper.draw()
@@ -303,19 +300,16 @@ class Animation:
 
     def picture(self, frame: int) -> Pixels:
         """Return the picture of one frame: the fixed parts, and what has moved."""
-        from matplotlib.collections import LineCollection
-
         canvas, frames, axes = self.canvas, self.frames, self.canvas.axes
         there, index = set(axes.get_children()), int(np.searchsorted(self.drawable, frame))
         with style.in_style(), style.silence_missing_glyphs():
             if not self.is_still:
-                scene.draw_standing(canvas, self.scene, frame)
+                scene.draw_surroundings(canvas, self.scene, frame)
             scene.draw_blocks(canvas, self.scene, frame)
             if self.has_trails:  # the paths of all free centres
                 past, free = self.drawable[: index + 1], ~run_data.is_fixed(frames, self.support)
                 ways = run_data.MILLIMETRES * np.stack([frames.x[past], frames.y[past]], axis=-1)[:, free]
-                lines = LineCollection(list(ways.swapaxes(0, 1)), colors=style.INK, **TRAIL, transform=canvas.scene)
-                axes.add_collection(lines)
+                style.add_lines(axes, ways.swapaxes(0, 1), colors=style.INK, **TRAIL, transform=canvas.scene)
             arrows.draw_actions(canvas, self.acts, index, self.length)
             arrows.draw_marks(canvas, self.acts.marks[index], TIME_ROOM)
             if self.forces is not None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,6 @@ from blocksim.view import style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices, Support, rotate_points
 from blocksim.view.scene import Canvas
 from blocksim.world.systems.blocks import are_removed
-
-if TYPE_CHECKING:
-    from matplotlib.collections import Collection
-
 
 USUAL = 0.9  # share of all recorded forces that are no larger than the one the scale is made for
 USUAL_LENGTH = 0.6  # of the mean side of the blocks: length of the arrow of that force
@@ -103,17 +99,14 @@ def draw_forces(canvas: Canvas, frames: Frames, frame: int, scale: ForceScale) -
     if size < 1.0:  # make everything above the ground paler
         place = (extent.left, extent.lowest), extent.width, extent.top - extent.lowest
         canvas.axes.add_artist(Rectangle(*place, facecolor="#FFFFFF", alpha=VEIL_ALPHA, linewidth=0.0, zorder=VEIL))
-    for part in arrow_parts(found, canvas, size):
-        canvas.axes.add_collection(part)
+    draw_arrows(canvas, found, size)
 
 
-def arrow_parts(found: Floats, canvas: Canvas, size: float, colour: str = style.INK) -> "list[Collection]":
-    """Return shafts and heads of arrows, with a light line around them that keeps them apart from dark blocks.
+def draw_arrows(canvas: Canvas, found: Floats, size: float, colour: str = style.INK) -> None:
+    """Draw shafts and heads of arrows, with a light line around them that keeps them apart from dark blocks.
 
     `size` is that of heads and lines over their usual one.
     """
-    from matplotlib.collections import LineCollection, PolyCollection
-
     ways = found[:, 1] - found[:, 0]
     lengths = np.hypot(*ways.T)
     found, ways, lengths = (one[lengths * canvas.points_per_mm >= LEAST] for one in (found, ways, lengths))
@@ -121,17 +114,14 @@ def arrow_parts(found: Floats, canvas: Canvas, size: float, colour: str = style.
     head = np.minimum(size * HEAD[0] / canvas.points_per_mm, lengths)
     necks = found[:, 1] - head[:, None] * along
     across = np.stack([-along[:, 1], along[:, 0]], axis=-1) * (head * HEAD[1] / HEAD[0])[:, None]
-    heads = list(np.stack([found[:, 1], necks + across, necks - across], axis=1))
-    shafts = list(np.stack([found[:, 0], necks], axis=1))
-    light: dict[str, Any] = {"zorder": BELOW, "transform": canvas.scene}
-    dark = {**light, "zorder": FORCES}
-    edge = size * (HALO - WIDTH)
-    return [
-        LineCollection(shafts, colors="#FFFFFF", linewidths=size * HALO, **light),
-        PolyCollection(heads, facecolors="#FFFFFF", edgecolors="#FFFFFF", linewidths=edge, **light),
-        LineCollection(shafts, colors=colour, linewidths=size * WIDTH, **dark),
-        PolyCollection(heads, facecolors=colour, linewidths=0.0, **dark),
-    ]
+    heads, shafts = (
+        np.stack([found[:, 1], necks + across, necks - across], axis=1),
+        np.stack([found[:, 0], necks], axis=1),
+    )
+    for fill, width, edge, zorder in (("#FFFFFF", HALO, HALO - WIDTH, BELOW), (colour, WIDTH, 0.0, FORCES)):
+        at: dict[str, Any] = {"zorder": zorder, "transform": canvas.scene}
+        style.add_lines(canvas.axes, shafts, colors=fill, linewidths=size * width, **at)
+        style.add_polygons(canvas.axes, heads, facecolors=fill, edgecolors=fill, linewidths=size * edge, **at)
 
 
 UNIFORM, DEEP = 5, 9  # arrows along a face under uniform pressure, and along one under water
@@ -236,25 +226,17 @@ def in_words(value: float, unit: str) -> str:
     return f"{value / factor:.3g} {prefix}{unit}"
 
 
-def length_in(extent: Extent) -> float:
-    """Return the length (mm) of the longest arrow in a panel."""
-    return LENGTH * max(extent.width, extent.height)
-
-
-def with_room(extent: Extent, found: Actions, length: float) -> Extent:
-    """Return an extent that also holds all arrows, but for what is below it."""
+def with_room(extent: Extent, found: Actions) -> tuple[Extent, float]:
+    """Return an extent that also holds all arrows, but for what is below it, and the length (mm) of the longest."""
+    length = LENGTH * max(extent.width, extent.height)
     lines = [rotate_points(one.lines(length), extent.tilt).reshape(-1, 2) for one in found.arrows if one.way.any()]
     if not lines:
-        return extent
+        return extent, length
     points = np.concatenate(lines)
     margin = MARGIN * max(extent.width, extent.height)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    return replace(
-        extent,
-        left=min(extent.left, float(low[0])),
-        right=max(extent.right, float(high[0])),
-        top=max(extent.top, float(high[1])),
-    )
+    left, right = min(extent.left, float(low[0])), max(extent.right, float(high[0]))
+    return replace(extent, left=left, right=right, top=max(extent.top, float(high[1]))), length
 
 
 class _Poses:
@@ -267,7 +249,7 @@ class _Poses:
         self.sides = np.stack([frames.size_x, frames.size_y], axis=-1)  # (b, 2)
         self.is_there = 1.0 - are_removed(frames.vx[chosen])  # (f, b) 1 or 0
 
-    def turned(self, body: int, vectors: Floats) -> Floats:
+    def to_scene(self, body: int, vectors: Floats) -> Floats:
         """Return vectors (k, 2) of a body's own axes in those of the scene, (f, k, 2)."""
         cosine, sine = np.cos(self.angle[:, body])[:, None], np.sin(self.angle[:, body])[:, None]
         x, y = vectors[:, 0], vectors[:, 1]
@@ -289,20 +271,20 @@ def _loads_and_speeds(poses: _Poses, support: Support) -> Iterator[Arrows]:
         load, factor = one.load, one.values(poses.time)[:, None]
         if isinstance(load, Force):
             way = np.array([[np.cos(load.direction), np.sin(load.direction)]])
-            ways = poses.turned(one.body, way) if load.axes == "body" else way[None]
-            arms = poses.turned(one.body, np.array([load.point]))
+            ways = poses.to_scene(one.body, way) if load.axes == "body" else way[None]
+            arms = poses.to_scene(one.body, np.array([load.point]))
             yield poses.arrows(FORCE, one.body, arms, (load.magnitude * factor)[..., None] * ways)
         elif isinstance(load, Pressure):
             is_water = load.water_level is not None
             normal, half = np.array(NORMALS[load.face]), 0.5 * poses.sides[one.body]
             along = np.linspace(0.0, 1.0, DEEP) if is_water else (np.arange(UNIFORM) + 0.5) / UNIFORM
-            arms = poses.turned(one.body, half * (normal + np.outer(2.0 * along - 1.0, np.abs(normal[::-1]))))
+            arms = poses.to_scene(one.body, half * (normal + np.outer(2.0 * along - 1.0, np.abs(normal[::-1]))))
             up = np.array([np.sin(support.tilt), np.cos(support.tilt)])
             heights = (poses.places[:, one.body, None] + arms) @ up
             size = np.broadcast_to(factor * (load.magnitude or 0.0), heights.shape)
             if load.water_level is not None:
                 size = load.unit_weight * np.maximum(load.water_level * factor - heights, 0.0)
-            inwards = poses.turned(one.body, -normal[None])
+            inwards = poses.to_scene(one.body, -normal[None])
             yield poses.arrows(PRESSURE, one.body, arms, size[..., None] * inwards)
     driven = np.flatnonzero(support.driven)
     if not len(driven):
@@ -345,10 +327,7 @@ MARK_GAP = 8.0  # points between two marks
 def draw_actions(canvas: Canvas, found: Actions, index: int, length: float) -> None:
     """Draw the arrows of the frame with this index among the chosen ones; `length` is of the longest (mm)."""
     for one in found.arrows:
-        lines = one.lines(length)[index]
-        seen = np.hypot(*(lines[:, 1] - lines[:, 0]).T) * canvas.points_per_mm >= LEAST
-        for part in arrow_parts(lines[seen], canvas, 1.0, style.INK if one.kind == SPEED else COLOUR):
-            canvas.axes.add_collection(part)
+        draw_arrows(canvas, one.lines(length)[index], 1.0, style.INK if one.kind == SPEED else COLOUR)
     turns = found.turns
     for number in range(0 if turns is None else len(turns.radius)):
         if turns is not None and abs(turns.sweep[index, number]) >= LEAST_SWEEP:
@@ -357,8 +336,6 @@ def draw_actions(canvas: Canvas, found: Actions, index: int, length: float) -> N
 
 def _draw_turn(canvas: Canvas, centre: Floats, radius: float, sweep: float) -> None:
     """Draw a round arrow (mm, rad), which is open at the right."""
-    from matplotlib.collections import LineCollection, PolyCollection
-
     angle = (0.25 * np.pi if sweep > 0.0 else -0.25 * np.pi) + np.linspace(0.0, sweep, ARC_POINTS)
     points = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     way = (points[-1] - points[-2]) / np.hypot(*(points[-1] - points[-2]))
@@ -368,8 +345,8 @@ def _draw_turn(canvas: Canvas, centre: Floats, radius: float, sweep: float) -> N
     outline = points[-1] + np.stack([head * way, across - head * way, -across - head * way])
     at: dict[str, Any] = {"transform": canvas.scene, "zorder": FORCES}
     for colour, width in (("#FFFFFF", 2.5 * WIDTH), (COLOUR, WIDTH)):
-        canvas.axes.add_collection(LineCollection([points], colors=colour, linewidths=width, **at))
-    canvas.axes.add_collection(PolyCollection([outline], facecolors=COLOUR, linewidths=0.0, **at))
+        style.add_lines(canvas.axes, [points], colors=colour, linewidths=width, **at)
+    style.add_polygons(canvas.axes, [outline], facecolors=COLOUR, linewidths=0.0, **at)
 
 
 def draw_marks(canvas: Canvas, marks: tuple[Mark, ...], offset: float = 0.0, *, up: float = 4.0) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +16,9 @@ NARROWEST = 0.35  # width over height
 RANGE_GAP = 0.06  # part of the width that two measured ranges in one row keep apart
 
 
-class MeasuredTable(Protocol):
-    """The part of a measured table that pictures need."""
-
-    def summaries(self) -> Sequence[Any]:
-        """Return what has block, quantity, mean, minimum and maximum (mm or degrees), one a block and quantity."""
-        ...
-
-
-def measured_ranges(measured: MeasuredTable, names: Sequence[str], width: float) -> list[scene.MeasuredRange]:
+def ranges_of(measured: run_data.Repeats, names: Sequence[str], width: float) -> list[scene.MeasuredRange]:
     """Return the measured centres (mm) of the blocks, in rows without overlap; `width` (mm) is shown."""
-    centres = [one for one in measured.summaries() if one.quantity == "x" and one.block in names]
+    centres = [one for one in measured if one.quantity == "x" and one.block in names]
     row_ends: list[float] = []
     ranges = []
     for one in sorted(centres, key=lambda one: one.minimum):
@@ -114,7 +106,7 @@ def draw_final(
     frames: Frames,
     path: Path | str,
     title: str | None = None,
-    measured: MeasuredTable | None = None,
+    measured: run_data.Repeats | None = None,
     support: run_data.Support | None = None,
     *,
     forces: bool = False,
@@ -137,11 +129,10 @@ def draw_final(
     scale = arrows.force_scale(frames) if forces else None
     acts = arrows.actions_on(frames, chosen, support)
     extent = run_data.extent_of(frames, chosen, support)
-    length = arrows.length_in(extent)
-    extent = arrows.with_room(extent, acts, length)
+    extent, length = arrows.with_room(extent, acts)
     ranges = []
     if measured is not None and frame == drawable[-1]:  # measurements are of the final state
-        ranges = measured_ranges(measured, frames.names, extent.width)
+        ranges = ranges_of(measured, frames.names, extent.width)
     extent, rows = widen(extent, ranges), 1 + max((one.row for one in ranges), default=-1)
     width, tallest = paper.width(WIDTH, LEAST_WIDTH), TALLEST
     margins = SIDE, HEAD + MARKS * any(acts.marks), AXIS
@@ -162,13 +153,13 @@ def draw_final(
     else:  # for the type checker: the last round breaks
         raise AssertionError
     height = paper.height(height)
-    with style.styled_figure(width, height, paper.dots) as figure:
+    with style.open_figure(width, height, paper.dots) as figure:
         canvas = page.canvas(figure, bottom=height - margins[1] - page.panel_height)
         scene.draw_scene(canvas, scene.Scene(frames, support, paint), frame)
         scene.finish_panel(canvas, labelled=True, rows=rows)
         if labels.row_count:
             scene.draw_centres(canvas, frames, frame)
-            scene.draw_measured(canvas, ranges, scene.ROW_HEIGHT)
+            scene.draw_repeats(canvas, ranges, scene.ROW_HEIGHT)
             _draw_labels(style.add_axes(figure, SIDE, height - page.height - room, page.panel_width, room), labels)
         arrows.draw_actions(canvas, acts, 0, length)
         arrows.draw_marks(canvas, acts.marks[0])

@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
 from blocksim.simulation.trajectory import Frames, force_on_supports
-from blocksim.view import arrows, final, run_data, style, time_panels
+from blocksim.view import arrows, run_data, style, time_panels
 from blocksim.view.paint import Paint, by_block
 from blocksim.world.systems.blocks import BLOCKS
 from blocksim.world.systems.system import Channel
@@ -133,7 +133,7 @@ def draw_history(
     frames: Frames,
     path: Path | str,
     title: str | None = None,
-    measured: final.MeasuredTable | None = None,
+    measured: run_data.Repeats | None = None,
     support: run_data.Support | None = None,
     **asked: Any,
 ) -> None:
@@ -151,7 +151,7 @@ def draw_history(
 def draw_history_page(
     frames: Frames,
     title: str | None = None,
-    measured: final.MeasuredTable | None = None,
+    measured: run_data.Repeats | None = None,
     support: run_data.Support | None = None,
     *,
     forces: bool = False,
@@ -271,19 +271,17 @@ def _panel_height(names: Sequence[str], blocks: int) -> float:
 
 def _draw_others(axes: "style.Axes", time: run_data.Floats, values: run_data.Floats) -> None:
     """Draw the blocks that have no line of their own in grey, (n, k)."""
-    from matplotlib.collections import LineCollection
-
     lines = [np.stack([time, one], axis=-1) for one in values.T]
     faint = min(0.35, max(0.12, 30.0 / max(len(lines), 1)))
     look: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": 0.4, "alpha": faint}
-    axes.add_collection(LineCollection(lines, **look, rasterized=len(lines) > MOST_PATHS))
+    style.add_lines(axes, lines, **look, rasterized=len(lines) > MOST_PATHS)
 
 
 def _draw_measured(
-    axes: "style.Axes", seen: FramesInView, motion: Motion, measured: final.MeasuredTable, names: Sequence[str]
+    axes: "style.Axes", seen: FramesInView, motion: Motion, measured: run_data.Repeats, names: Sequence[str]
 ) -> None:
     """Draw mean and range of the repeats at the end of the lines of blocks."""
-    rows = [one for one in measured.summaries() if one.quantity == motion.quantity and one.block in names]
+    rows = [one for one in measured if one.quantity == motion.quantity and one.block in names]
     x = float(seen.frames.time[-1]) * 1.02
     line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "linewidth": 1.2, "zorder": 4.0}
     known = [motion.values.ravel()]

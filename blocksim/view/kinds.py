@@ -24,12 +24,12 @@ MOST_SLIPS = 2
 
 
 @dataclass(frozen=True)
-class Kind:
+class SweepPicture:
     """A kind of picture of a sweep: which sweeps it cannot show or suits best, and its drawing."""
 
     refusal: Callable[[data.SweepData], str]  # why it cannot show a sweep; empty where it can
     suits: Callable[[data.SweepData], bool]
-    drawn: Callable[[data.SweepData, style.Paper], AbstractContextManager["style.Figure"]]
+    open: Callable[[data.SweepData, style.Paper], AbstractContextManager["style.Figure"]]
 
     def draw(self, sweep: data.SweepData, path: Path, paper: style.Paper = style.OWN) -> None:
         """Draw a sweep and write PNG, SVG or PDF; the same input gives the same bytes.
@@ -37,15 +37,15 @@ class Kind:
         Raises InvalidInputError for an unknown picture format or too small a page, OutputError.
         """
         path = style.picture_path(path)
-        with self.drawn(sweep, paper) as figure:
+        with self.open(sweep, paper) as figure:
             style.save_figure(figure, path)
 
 
 SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
-    "lines": Kind(lines.refusal, lines.suits, lines.draw_lines),
-    "map": Kind(outcome_map.refusal, outcome_map.suits, outcome_map.draw_map),
-    "matrix": Kind(lambda _: "", lambda sweep: len(sweep.inputs) > 1, scatter.draw_matrix),
-    "histogram": Kind(lambda _: "", lambda _: True, scatter.draw_histogram),
+    "lines": SweepPicture(lines.refusal, lines.suits, lines.draw_lines),
+    "map": SweepPicture(outcome_map.refusal, outcome_map.suits, outcome_map.draw_map),
+    "matrix": SweepPicture(lambda _: "", lambda sweep: len(sweep.inputs) > 1, scatter.draw_matrix),
+    "histogram": SweepPicture(lambda _: "", lambda _: True, scatter.draw_histogram),
 }
 
 
@@ -58,6 +58,6 @@ def run_kind(name: str) -> Callable[..., None]:
     return RUN_KINDS[name]
 
 
-def kind_for(sweep: data.SweepData) -> Kind:
+def kind_for(sweep: data.SweepData) -> SweepPicture:
     """Return the first kind that suits a sweep."""
     return next(kind for kind in SWEEP_KINDS.values() if not kind.refusal(sweep) and kind.suits(sweep))

@@ -17,7 +17,7 @@ from blocksim.view.paint import by_displacement, displacements, draw_key
 Pair = tuple[int, int]  # bodies a and b
 
 
-class Joint(NamedTuple):
+class JointMotion(NamedTuple):
     """A joint in a frame: its points (m, scene, (k, 2)), whether it slides, and the point about which it rocks."""
 
     points: run_data.Floats
@@ -33,7 +33,7 @@ class _Followed(NamedTuple):
     slip: run_data.Floats  # (k,), since the beginning
 
 
-def joints(frames: Frames, frame: int, support: run_data.Support) -> list[Joint]:
+def joints(frames: Frames, frame: int, support: run_data.Support) -> list[JointMotion]:
     """Return the joints that slide or rock in a frame; none where no contact was recorded."""
     now = _by_pair(arrows.contacts_of(frames).at(frame))
     found = [
@@ -71,7 +71,7 @@ def _by_pair(rows: Rows) -> dict[Pair, Rows]:
     return {pair: rows[chosen] for pair, chosen in pairs.items() if (rows["normal_force"][chosen] > 0.0).any()}
 
 
-def _joint(frames: Frames, times: tuple[int, int], support: run_data.Support, then: Rows, now: Rows) -> Joint:
+def _joint(frames: Frames, times: tuple[int, int], support: run_data.Support, then: Rows, now: Rows) -> JointMotion:
     """Judge a joint by its points at the beginning and in the frame that is drawn."""
     pair = int(then["body_a"][0]), int(then["body_b"][0])
     least = MOVED_SHARE * min(float(run_data.shortest_sides(frames)[body]) for body in pair if body != SUPPORT)
@@ -85,7 +85,7 @@ def _joint(frames: Frames, times: tuple[int, int], support: run_data.Support, th
     rocks = abs(turn_a - turn_b) > MOVED_SHARE and bool(is_closed.any())
     touching = late if len(now) else early
     hinges = touching.points[[int(np.argmin(touching.opening))]] if rocks else touching.points[:0]
-    return Joint(both.points, bool((both.slip[is_closed] > least).any()), hinges)
+    return JointMotion(both.points, bool((both.slip[is_closed] > least).any()), hinges)
 
 
 def _followed(frames: Frames, times: tuple[int, int], support: run_data.Support, rows: Rows) -> _Followed:
@@ -133,7 +133,7 @@ ENTRIES, ENTRIES_WIDTH = 3, 3.8  # of the legend; inches that they need side by 
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class BracketRun:
     """One side of a bracket: a run, its support, the block that moved first if any, and what is said above it."""
 
     frames: Frames
@@ -159,14 +159,15 @@ class Side:
 
 
 def draw_mechanisms(
-    brackets: Sequence[tuple[Side, Side]], path: Path | str, title: str | None = None, paper: style.Paper = style.OWN
+    brackets: Sequence[tuple[BracketRun, BracketRun]],
+    path: Path | str,
+    title: str | None = None,
+    paper: style.Paper = style.OWN,
 ) -> None:
     """Draw both sides of every bracket, a row each, and write PNG, SVG or PDF; the same input gives the same bytes.
 
     Raises InvalidInputError for an unknown picture format, too small a page and runs without contacts, OutputError.
     """
-    from matplotlib import lines, patches
-
     path = style.picture_path(path)
     width = paper.width(WIDTH, LEAST_WIDTH)
     across = 0.5 * (width - GAP)
@@ -184,11 +185,11 @@ def draw_mechanisms(
     height = paper.height(HEAD + sum(page.height for page in pages) + foot)
     look = {"edgecolor": FIRST["color"], "linewidth": FIRST["linewidth"]}
     handles = [
-        patches.Patch(facecolor="none", label="first block to move", **look),
-        lines.Line2D([], [], label="sliding joint", **SLIDING),
-        lines.Line2D([], [], linestyle="none", label="hinge", **HINGE),
+        style.legend_entry("first block to move", facecolor="none", **look),
+        style.legend_entry("sliding joint", **SLIDING),
+        style.legend_entry("hinge", linestyle="none", **HINGE),
     ]
-    with style.styled_figure(width, height, paper.dots) as figure:
+    with style.open_figure(width, height, paper.dots) as figure:
         top = height - HEAD
         for pair, page in zip(brackets, pages, strict=True):
             for column, side in enumerate(pair):
@@ -201,17 +202,17 @@ def draw_mechanisms(
         style.save_figure(figure, path)
 
 
-def _extent(pair: tuple[Side, Side]) -> run_data.Extent:
+def _extent(pair: tuple[BracketRun, BracketRun]) -> run_data.Extent:
     """Return what both panels of a row show: on one scale, all blocks of either."""
     found = [run_data.extent_of(side.frames, np.array([side.frame]), side.support) for side in pair]
-    one, other = (
-        arrows.with_room(extent, side.acts, arrows.length_in(extent)) for extent, side in zip(found, pair, strict=True)
-    )
+    one, other = (arrows.with_room(extent, side.acts)[0] for extent, side in zip(found, pair, strict=True))
     least = {name: min(getattr(one, name), getattr(other, name)) for name in ("left", "bottom", "base")}
     return replace(one, right=max(one.right, other.right), top=max(one.top, other.top), **least)
 
 
-def _draw_side(figure: "style.Figure", side: Side, page: scene.Page, corner: tuple[float, float], most: float) -> None:
+def _draw_side(
+    figure: "style.Figure", side: BracketRun, page: scene.Page, corner: tuple[float, float], most: float
+) -> None:
     """Draw a panel with its upper left corner at a place in inches; ground is tilted as it is on that side."""
     left, top = corner
     page = replace(page, extent=replace(page.extent, tilt=side.support.tilt))
@@ -219,7 +220,8 @@ def _draw_side(figure: "style.Figure", side: Side, page: scene.Page, corner: tup
     paint = by_displacement(side.frames, side.support, most)
     shown = scene.Scene(side.frames, side.support, paint, with_tops=False)  # tops read as joints
     scene.draw_scene(canvas, shown, side.frame)
-    arrows.draw_actions(canvas, side.acts, 0, arrows.length_in(page.extent))
+    longest = arrows.LENGTH * max(page.extent.width, page.extent.height)
+    arrows.draw_actions(canvas, side.acts, 0, longest)
     if side.first in side.frames.names:
         outline = scene.corners(side.frames, side.frame)[side.frames.names.index(side.first)]
         canvas.axes.plot(*np.concatenate([outline, outline[:2]]).T, transform=canvas.scene, **FIRST)

@@ -82,10 +82,10 @@ def by_speed(frames: Frames) -> Paint:
     known = speeds[run_data.drawable_frames(frames)]
     factor, unit = (1.0, "m/s") if (float(known.max()) or 1.0) >= 1.0 else (1e3, "mm/s")
     moving = known[known > 0.0] if known.any() else np.ones(1)
-    return _scaled(factor * speeds, capped_scale(f"speed ({unit})", factor * moving, SPEED_COLOURS))
+    return _scaled(factor * speeds, scale_from_zero(f"speed ({unit})", factor * moving, SPEED_COLOURS))
 
 
-def capped_scale(label: str, values: run_data.Floats, colours: str = ELEMENT_COLOURS) -> Scale:
+def scale_from_zero(label: str, values: run_data.Floats, colours: str = ELEMENT_COLOURS) -> Scale:
     """Return a scale from 0 to the largest value; where a few are far beyond all others, these lie beyond its end."""
     usual, largest = (float(np.quantile(values, share)) for share in (RARE, 1.0))
     is_cut = largest > PEAK * usual > 0.0
@@ -98,7 +98,7 @@ def shade_elements(paint: Paint, frames: Frames, name: str) -> Paint:
     found = [next((one for one in track.system.shades if one.name == name), None) for track in frames.others]
     values = [None if shade is None else shade.of(track) for shade, track in zip(found, frames.others, strict=True)]
     known = np.concatenate([one[run_data.drawable_frames(frames)].ravel() for one in values if one is not None])
-    scale = capped_scale(next(shade.label for shade in found if shade is not None), known)
+    scale = scale_from_zero(next(shade.label for shade in found if shade is not None), known)
     fills = tuple(None if one is None else _scaled(one, scale).fills for one in values)
     return replace(paint, entries=(), scale=scale, elements=fills)
 
@@ -142,7 +142,7 @@ SHADES = ("displacement", "speed", "plastic", "pressure")
 COLOURS = tuple(dict.fromkeys((*PAINTS, *SHADES)))
 
 
-def paint_named(name: str, frames: Frames, scenario: Scenario) -> Paint:
+def paint_of(name: str, frames: Frames, scenario: Scenario) -> Paint:
     """Return the colours of a run by their meaning. Raises InvalidInputError for a meaning that this run does not have.
 
     Elements of other systems have their first shade, unless the meaning is one of theirs: then blocks keep their own
@@ -172,7 +172,7 @@ def _scaled(values: run_data.Floats, scale: Scale) -> Paint:
 
 def draw_key(figure: "style.Figure", paint: Paint, left: float, bottom: float) -> None:
     """Draw what explains the colours, its lower left corner at a place given in inches."""
-    from matplotlib import cm, colors, patches, ticker
+    from matplotlib import cm, colors, ticker
 
     across = float(figure.get_figwidth())
     if paint.scale is not None:
@@ -186,8 +186,6 @@ def draw_key(figure: "style.Figure", paint: Paint, left: float, bottom: float) -
         bar.update_ticks()
         style.write_text(figure, left + width + 0.15, bottom + 0.39, scale.label, va="center")
     elif paint.entries:
-        handles = [
-            patches.Patch(facecolor=fill, edgecolor=style.INK, linewidth=0.5, label=name)
-            for name, fill in paint.entries
-        ]
+        edge = {"edgecolor": style.INK, "linewidth": 0.5}
+        handles = [style.legend_entry(name, facecolor=fill, **edge) for name, fill in paint.entries]
         style.write_legend(figure, handles, left, bottom, ncols=max(1, min(len(handles), int(across / 1.6))))

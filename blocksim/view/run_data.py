@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from blocksim.world.systems.blocks import boxes_around, least_widths, local_corn
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
+Repeats = Sequence[Any]
+"""What was measured: block, quantity, mean, minimum and maximum (mm or degrees) of each, such as `Statistics`."""
 PRINTED_DIGITS = 3  # of a time in s
 PRINTED = 0.000501  # s; half of the last digit of a printed time, and round-off
 LEAST_ANGLE = 0.05  # degrees; motion closer to x is along x
@@ -68,7 +70,7 @@ def drawable_frames(frames: Frames) -> Indices:
     return indices
 
 
-def path_travelled(frames: Frames, chosen: Indices, carried: Floats | None = None) -> Floats:
+def path_lengths(frames: Frames, chosen: Indices, carried: Floats | None = None) -> Floats:
     """Return the path (m) up to each chosen frame, summed over the blocks; (len(chosen),), never falling.
 
     A turn counts as the way of a corner: the angle times half the diagonal. `carried` is how far the support has moved
@@ -92,9 +94,9 @@ def moments_by_motion(frames: Frames, chosen: Indices, count: int, carried: Floa
     """Return at most `count` of the chosen frames, even in the path travelled, first and last included.
 
     Even spacing in time would show the release and the rest several times and the impacts hardly. Where
-    nothing moves, the first and the last frame are left. `carried` as for `path_travelled`.
+    nothing moves, the first and the last frame are left. `carried` as for `path_lengths`.
     """
-    path = path_travelled(frames, chosen, carried)
+    path = path_lengths(frames, chosen, carried)
     wanted = np.linspace(0.0, path[-1], count)[1:-1]
     between = np.searchsorted(path, wanted) if path[-1] > 0.0 else np.array([], dtype=np.intp)
     last = len(chosen) - 1

@@ -166,7 +166,7 @@ MOST_ALIGNED = -0.8  # cosine between two walls that turn back so sharply that a
 
 def draw_support(canvas: Canvas, support: run_data.Support, offset: run_data.Floats) -> None:
     """Draw the part of ground and walls that can be seen, displaced by `offset` (mm) along x and y."""
-    from matplotlib import collections, patches, path, transforms
+    from matplotlib import patches, path, transforms
 
     low, high = canvas.box()
     ground, *faces = _faces(support, canvas)
@@ -180,7 +180,7 @@ def draw_support(canvas: Canvas, support: run_data.Support, offset: run_data.Flo
         canvas.axes.add_artist(patch)
     lines = np.concatenate([run_data.parts_within(line + offset, low, high) for line in (ground, *faces)])
     look: dict[str, Any] = {"colors": style.INK, "linewidths": style.LINE_WIDTH}
-    canvas.axes.add_collection(collections.LineCollection(list(lines), **look, transform=canvas.scene))
+    style.add_lines(canvas.axes, lines, **look, transform=canvas.scene)
 
 
 def draw_start(canvas: Canvas, support: run_data.Support, offset: run_data.Floats, outlines: run_data.Floats) -> None:
@@ -188,8 +188,6 @@ def draw_start(canvas: Canvas, support: run_data.Support, offset: run_data.Float
 
     Pieces that have moved along themselves, such as level ground on a shaking table, look the same and are left out.
     """
-    from matplotlib.collections import LineCollection
-
     least = LEAST_SHIFT / canvas.points_per_mm
     if float(np.hypot(*offset)) < least:
         return
@@ -198,8 +196,7 @@ def draw_start(canvas: Canvas, support: run_data.Support, offset: run_data.Float
     ways = parts[:, 1] - parts[:, 0]
     apart = np.abs(ways[:, 0] * offset[1] - ways[:, 1] * offset[0]) > least * np.hypot(*ways.T)
     closed = [np.concatenate([outline, outline[:1]]) - offset for outline in outlines]
-    lines = [*parts[apart], *closed]
-    canvas.axes.add_collection(LineCollection(lines, **START_LINE, zorder=START, transform=canvas.scene))
+    style.add_lines(canvas.axes, [*parts[apart], *closed], **START_LINE, zorder=START, transform=canvas.scene)
 
 
 def draw_shift(canvas: Canvas, support: run_data.Support, offset: run_data.Floats, x: float) -> None:
@@ -306,11 +303,11 @@ class Scene:
 
 def draw_scene(canvas: Canvas, scene: Scene, frame: int) -> None:
     """Draw the support and the blocks of one frame."""
-    draw_standing(canvas, scene, frame)
+    draw_surroundings(canvas, scene, frame)
     draw_blocks(canvas, scene, frame)
 
 
-def draw_standing(canvas: Canvas, scene: Scene, frame: int) -> None:
+def draw_surroundings(canvas: Canvas, scene: Scene, frame: int) -> None:
     """Draw ground and walls at the time of one frame, and where they were at the start."""
     frames, fixed = scene.frames, run_data.is_fixed(scene.frames, scene.support)
     offset = run_data.MILLIMETRES * scene.support.offset(frames.time[frame : frame + 1])[0]
@@ -326,8 +323,6 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
 
     Other systems lie below the blocks, each in one colour, or each element and its edge in that of the paint.
     """
-    from matplotlib.collections import LineCollection, PolyCollection
-
     frames, paint = scene.frames, scene.paint
     for number, track in enumerate(frames.others if scene.with_others else ()):
         fills = paint.elements[number] if number < len(paint.elements) else None
@@ -338,7 +333,7 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
             thin = CLOSED * size
         colours: dict[str, Any] = {"facecolors": style.block_colour(number + 1), "edgecolors": style.INK}
         colours = colours if fills is None else {"facecolors": fills(frame), "edgecolors": "face"}
-        canvas.axes.add_collection(PolyCollection(list(shapes), **colours, linewidths=thin, transform=canvas.scene))
+        style.add_polygons(canvas.axes, shapes, **colours, linewidths=thin, transform=canvas.scene)
     there, fixed = ~are_removed(frames.vx[frame]), run_data.is_fixed(frames, scene.support)
     held, free = fixed & there, ~fixed & there
     own = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, paint.fills(frame), strict=True)]
@@ -349,11 +344,11 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
     hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
     for kind, lines in ((held, hatch), (free, None)):
         shown = [own[block] for block in np.flatnonzero(kind)]
-        canvas.axes.add_collection(PolyCollection(list(outlines[kind]), facecolors=shown, hatch=lines, **edge))
+        style.add_polygons(canvas.axes, outlines[kind], facecolors=shown, hatch=lines, **edge)
     if scene.with_tops:
         tops = placed_points(upper_sides(frames), frames.x[frame], frames.y[frame], frames.angle[frame])
         line: dict[str, Any] = {"colors": style.INK, "linewidths": 2.0 * thin, "transform": canvas.scene}
-        canvas.axes.add_collection(LineCollection(list(run_data.MILLIMETRES * tops[free]), **line))
+        style.add_lines(canvas.axes, run_data.MILLIMETRES * tops[free], **line)
     for kind in (held, free):
         _draw_names(canvas, frames, frame, kind, own)
 
@@ -365,7 +360,7 @@ def draw_centres(canvas: Canvas, frames: Frames, frame: int) -> None:
         canvas.axes.plot([x, x], ends, color=style.INK, linewidth=1.2, transform=canvas.scene)
 
 
-def draw_measured(canvas: Canvas, measured: list[MeasuredRange], row_height: float) -> None:
+def draw_repeats(canvas: Canvas, measured: list[MeasuredRange], row_height: float) -> None:
     """Draw measured mean and range of each block in rows of `row_height` (points) below the ground."""
     line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "linewidth": 1.2, "transform": canvas.scene}
     point = 1.0 / canvas.points_per_mm

@@ -35,7 +35,7 @@ class Lines:
 
 
 @dataclass(frozen=True)
-class Layout:
+class PanelGrid:
     """How the panels are arranged, in inches; `points_per_mm` is the scale of all of them."""
 
     columns: int
@@ -65,7 +65,7 @@ def arrangement(extent: run_data.Extent, readable: float = 0.0) -> tuple[int, in
     return (2, 8) if aspect <= WIDEST_IN_PAIRS else (1, 6)
 
 
-def plan(paper: style.Paper, extent: run_data.Extent, columns: int, panels: int, lines: Lines) -> Layout:
+def plan(paper: style.Paper, extent: run_data.Extent, columns: int, panels: int, lines: Lines) -> PanelGrid:
     """Fit the panels into a page. Where its size was asked for, as many columns as make them largest.
 
     Raises InvalidInputError for a page that is too small.
@@ -97,7 +97,7 @@ def plan(paper: style.Paper, extent: run_data.Extent, columns: int, panels: int,
     total = others(rows) + rows * height
     step = height + head + ticks + (paper.height(total) - total) / rows
     size = width, paper.height(total)
-    return Layout(columns, rows, (across, height), scale * style.POINTS_PER_INCH, size, extent, step, foot)
+    return PanelGrid(columns, rows, (across, height), scale * style.POINTS_PER_INCH, size, extent, step, foot)
 
 
 def _panel_width(columns: int, width: float) -> float:
@@ -110,7 +110,7 @@ def draw_strip(
     path: Path | str,
     times: Sequence[float] | None = None,
     title: str | None = None,
-    measured: final.MeasuredTable | None = None,
+    measured: run_data.Repeats | None = None,
     support: run_data.Support | None = None,
     *,
     forces: bool = False,
@@ -131,9 +131,8 @@ def draw_strip(
     drawable = run_data.drawable_frames(frames)
     scale = arrows.force_scale(frames) if forces else None
     extent = run_data.extent_of(frames, drawable, support)
-    length = arrows.length_in(extent)
-    extent = arrows.with_room(extent, arrows.actions_on(frames, drawable, support), length)
-    ranges = [] if measured is None else final.measured_ranges(measured, frames.names, extent.width)
+    extent, length = arrows.with_room(extent, arrows.actions_on(frames, drawable, support))
+    ranges = [] if measured is None else final.ranges_of(measured, frames.names, extent.width)
     extent = final.widen(extent, ranges)
     columns, usual = arrangement(extent, scene.readable_scale(frames))
     if times is None:
@@ -149,13 +148,13 @@ def draw_strip(
     notes = style.break_lines(" ".join(filter(None, texts)), paper.width(WIDTH, LEAST_WIDTH) - 2.0 * SIDE)
     captions = 1 + (support.motion is not None) + any(acts.marks)
     layout = plan(paper, extent, columns, len(chosen), Lines(captions, len(notes), rows, paint.height))
-    with style.styled_figure(*layout.size, paper.dots) as figure:
+    with style.open_figure(*layout.size, paper.dots) as figure:
         for index, frame in enumerate(chosen.tolist()):
             canvas = scene.Canvas(style.add_axes(figure, *layout.place(index)), layout.extent, layout.points_per_mm)
             scene.draw_scene(canvas, scene.Scene(frames, support, paint), frame)
             if index == len(chosen) - 1 and ranges:
                 scene.draw_centres(canvas, frames, frame)
-                scene.draw_measured(canvas, ranges, scene.ROW_HEIGHT)
+                scene.draw_repeats(canvas, ranges, scene.ROW_HEIGHT)
             scene.finish_panel(canvas, labelled=index + layout.columns >= len(chosen), rows=rows)
             arrows.draw_actions(canvas, acts, index, length)
             arrows.draw_marks(canvas, acts.marks[index], up=2.0)
@@ -207,7 +206,7 @@ def draw_profile(
     frames: Frames,
     path: Path | str,
     title: str | None = None,
-    measured: final.MeasuredTable | None = None,  # noqa: ARG001 - of blocks
+    measured: run_data.Repeats | None = None,  # noqa: ARG001 - of blocks
     support: run_data.Support | None = None,
     *,
     forces: bool = False,  # noqa: ARG001 - of blocks
@@ -239,7 +238,7 @@ def draw_profile(
     side, head, foot = PROFILE_MARGINS
     extent, width = run_data.extent_of(frames, drawable, support), paper.width(PROFILE_WIDTH, PROFILE_LEAST)
     page = scene.page_for(extent, width, PROFILE_TALLEST, (side, head, foot + key.height))
-    with style.styled_figure(page.width, paper.height(page.height), paper.dots) as figure:
+    with style.open_figure(page.width, paper.height(page.height), paper.dots) as figure:
         canvas = page.canvas(figure)
         scene.draw_scene(canvas, scene.Scene(frames, support, key, with_others=False), int(chosen[-1]))
         for shade, of_frame in zip(shades, lines, strict=True):

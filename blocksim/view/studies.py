@@ -102,7 +102,7 @@ MARKS = "DsX^"
 MOST_MARKS = 12  # series with more points are lines
 
 
-class Bracket(NamedTuple):
+class LimitRange(NamedTuple):
     """A limit at one value: between which values it lies, and what the structure does below and above."""
 
     low: float
@@ -116,7 +116,7 @@ class Bracket(NamedTuple):
         return 0.5 * (self.low + self.high)
 
 
-class Series(NamedTuple):
+class OtherLimits(NamedTuple):
     """What others found: a name, and limits as pairs of the other key's value and the limit."""
 
     name: str
@@ -129,9 +129,9 @@ class LimitCurve:
 
     across: str
     up: str
-    points: Sequence[tuple[float, Sequence[Bracket]]]
+    points: Sequence[tuple[float, Sequence[LimitRange]]]
     notes: tuple[str, ...] = ()
-    beside: tuple[Series, ...] = ()
+    beside: tuple[OtherLimits, ...] = ()
 
 
 def join_brackets(curve: LimitCurve) -> list[tuple[tuple[float, float], tuple[float, float]]]:
@@ -273,8 +273,6 @@ def draw_tornado(
     Raises InvalidInputError for an unknown picture format or a page that is too small, and OutputError when the file
     cannot be written.
     """
-    from matplotlib.patches import Patch
-
     path = style.picture_path(path)
     varying = [panel for panel in panels if np.any(panel.values)] or list(panels)
     panels = []
@@ -292,7 +290,7 @@ def draw_tornado(
     own, least = (width - left - right, bar * rows), (NARROWEST, LEAST_BAR * rows)
     sides, gaps = (left, right, 0.08 + style.LINE * most, BAR_FOOT), (0.0, BAR_GAP + style.LINE * (most - 1))
     pairs = zip((MAIN_COLOUR, FIRST_COLOUR), labels, strict=True)
-    handles = [Patch(color=colour, label=label) for colour, label in pairs if label]
+    handles = [style.legend_entry(label, facecolor=colour, edgecolor=colour) for colour, label in pairs if label]
     counts = [1] * len(panels)
     with style.open_panels(paper, counts, own, least, sides, gaps, title=title, handles=handles) as (figure, drawn):
         up = float(figure.get_figheight())
@@ -407,18 +405,16 @@ def _open_levels(
     panels: int, blocks: Sequence[str], shown: Sequence[int], title: str | None, paper: style.Paper
 ) -> Iterator[tuple["style.Figure", list["style.Axes"]]]:
     """Give panels side by side, and a legend that names the lines of some blocks."""
-    from matplotlib.lines import Line2D
-
     room, width = (
         LEGEND_NAME * style.POINTS_PER_INCH,
         LEVEL_SIDES[0] + LEVEL_SIDES[1] + panels * LEVEL_PANEL[0] + (panels - 1) * LEVEL_GAP,
     )
     names = [style.cut_to(blocks[block], room, style.FONT_SIZE) for block in shown]
     handles = [
-        Line2D([], [], **_line_look(shown, block), label=f"x of block {name}")
+        style.legend_entry(f"x of block {name}", **_line_look(shown, block))
         for block, name in zip(shown, names, strict=True)
     ]
-    handles.append(Line2D([], [], **LARGEST, label="largest, with turns"))
+    handles.append(style.legend_entry("largest, with turns", **LARGEST))
     more: dict[str, Any] = {"handles": handles, "columns": max(1, int(paper.width(width) / LEGEND_ENTRY))}
     with style.open_panels(
         paper, [panels], LEVEL_PANEL, LEVEL_LEAST, LEVEL_SIDES, (LEVEL_GAP, 0.0), title=title, **more

@@ -4,7 +4,7 @@ import functools
 import re
 import warnings
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import KW_ONLY, dataclass
 from io import BytesIO
@@ -100,7 +100,7 @@ def picture_path(path: Path | str) -> Path:
 
 
 @contextmanager
-def styled_figure(width: float, height: float, dots: float | None = None) -> Iterator["Figure"]:
+def open_figure(width: float, height: float, dots: float | None = None) -> Iterator["Figure"]:
     """Give an empty figure of `width` x `height` inches, in this style; needs no display. `dots` are those an inch."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -342,6 +342,27 @@ def write_legend(figure: "Figure", handles: "Sequence[artist.Artist]", left: flo
     figure.legend(handles=handles, **own | place | look)
 
 
+def add_lines(axes: "Axes", lines: Iterable[Any], **look: Any) -> None:
+    """Draw lines, each points (k, 2), as one artist."""
+    from matplotlib.collections import LineCollection
+
+    axes.add_collection(LineCollection(list(lines), **look))
+
+
+def add_polygons(axes: "Axes", outlines: Iterable[Any], **look: Any) -> None:
+    """Draw polygons, each corners (k, 2), as one artist."""
+    from matplotlib.collections import PolyCollection
+
+    axes.add_collection(PolyCollection(list(outlines), **look))
+
+
+def legend_entry(label: str, **look: Any) -> "artist.Artist":
+    """Return an entry of a legend: a patch where it has a `facecolor`, else a line or mark."""
+    from matplotlib import lines, patches
+
+    return patches.Patch(label=label, **look) if "facecolor" in look else lines.Line2D([], [], label=label, **look)
+
+
 Sides = tuple[float, float, float, float]
 """Inches at left, right, top and bottom of all panels, for numbers, names of axes and headings."""
 
@@ -381,7 +402,7 @@ def open_panels(
     head, others = head + TITLE_LINE * len(heading), others + TITLE_LINE * len(heading)
     row = paper.panel(panel[1], rows, others, least[1])
     column, height = (width - beside) / across, paper.height(others + rows * row)
-    with styled_figure(width, height, paper.dots) as figure:
+    with open_figure(width, height, paper.dots) as figure:
         panels = [
             [
                 add_axes(figure, left + k * (column + gaps[0]), height - head - row - n * (row + gaps[1]), column, row)

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from blocksim.cli.commands import app
 from blocksim.simulation.trajectory import Frames
 from blocksim.view.report.page import write_report
-from blocksim.view.report.subjects import StudyPage, read_stored, run_subject, study_subject
+from blocksim.view.report.subjects import StudyPage, read_folder, run_subject, study_subject
 from tests.browser.conftest import PLAYER, Open, Opened
 from tests.view.made_up import polygons
 from tests.view.report.folders import write_experiment, write_run, write_sweep
@@ -77,7 +77,7 @@ def middle_of(picture: NDArray[np.int64], colour: tuple[int, ...]) -> NDArray[np
 def test_polygons_have_their_corners_and_are_found_under_the_pointer(tmp_path: Path, open_page: Open) -> None:
     frames = write_run(tmp_path / "run", count=3)
     wedge = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
-    stored = replace(read_stored(tmp_path / "run"), frames=polygons(frames, wedge))
+    stored = replace(read_folder(tmp_path / "run"), frames=polygons(frames, wedge))
     write_report([run_subject("part-1", stored)], tmp_path / "report.html", title="wedges", version="0")
     one = open_page(tmp_path / "report.html")
     one.page.evaluate(f"{PLAYER}.toggle('names')")
@@ -109,7 +109,7 @@ def test_blocks_are_where_the_run_says_to_a_pixel(three: tuple[Path, Frames], op
 
 def test_blocks_that_an_event_removed_are_neither_drawn_nor_found(tmp_path: Path, open_page: Open) -> None:
     write_run(tmp_path / "run", count=21)
-    stored = read_stored(tmp_path / "run")
+    stored = read_folder(tmp_path / "run")
     assert stored.frames is not None
     vx = stored.frames.vx.copy()
     vx[10:, 2] = np.nan
@@ -394,7 +394,7 @@ def test_case_without_frames_says_how_to_get_them(swept: Path, open_page: Open) 
 
 def test_hostile_names_stay_text(tmp_path: Path, open_page: Open) -> None:
     write_run(tmp_path / "run", count=5)
-    stored = read_stored(tmp_path / "run")
+    stored = read_folder(tmp_path / "run")
     assert stored.frames is not None
     assert stored.final is not None
     for number, name in enumerate(HOSTILE):
@@ -434,7 +434,7 @@ def test_page_fits_phones_and_has_dark_colours(
 
 def test_tables_and_pictures_wider_than_a_phone_say_that_they_scroll(tmp_path: Path, open_page: Open) -> None:
     write_run(tmp_path / "run", count=5)
-    stored = read_stored(tmp_path / "run")
+    stored = read_folder(tmp_path / "run")
     study = StudyPage("study", "", [], "Title", ("head",), [("cell",)], picture=sheet_png())
     subjects = [study_subject("part-2", study, "study"), run_subject("part-1", stored)]
     write_report(subjects, tmp_path / "report.html", title="wide", version="0")

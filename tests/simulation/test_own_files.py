@@ -11,7 +11,7 @@ import pytest
 from blocksim.errors import OutputError, OutputExistsError
 from blocksim.simulation.files import refuse_foreign
 from blocksim.view.animation import write_gif, write_mp4
-from blocksim.view.style import save_figure, styled_figure
+from blocksim.view.style import open_figure, save_figure
 
 PNG = b"\x89PNG\r\n\x1a\n"
 REPORT = b'<meta name="generator" content="blocksim report">'
@@ -32,7 +32,7 @@ OTHERS = {
 
 
 def draw(path: Path) -> None:
-    with styled_figure(2.0, 1.0) as figure:
+    with open_figure(2.0, 1.0) as figure:
         figure.text(0.5, 0.5, "blocksim")
         save_figure(figure, path)
 

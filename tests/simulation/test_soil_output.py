@@ -12,7 +12,7 @@ from blocksim.simulation import Result
 from blocksim.simulation.stores.exports import write_vtkhdf
 from blocksim.study.run import open_run
 from blocksim.view.kinds import run_kind
-from blocksim.view.paint import paint_named
+from blocksim.view.paint import paint_of
 from blocksim.view.report.player import pack_frames
 from tests.soils import DEPTH, LEFT, column, scene
 from tests.view.made_up import toppling
@@ -67,14 +67,14 @@ def test_the_end_of_soils_is_a_table_of_the_folder_and_of_the_result(run: Result
 
 @pytest.mark.parametrize("kind", ["strip", "final", "profile"])
 def test_pictures_show_soil(run: Result, kind: str, tmp_path: Path) -> None:
-    paint = paint_named("pressure", run.frames, SCENE)
+    paint = paint_of("pressure", run.frames, SCENE)
     run_kind(kind)(run.frames, tmp_path / "one.svg", title="title", paint=paint)
     text = (tmp_path / "one.svg").read_text()
     assert text.count("<path") > (100 if kind != "profile" else 8)
 
 
 def test_soil_has_the_colour_asked_for_and_blocks_keep_theirs(run: Result) -> None:
-    usual, speed = (paint_named(name, run.frames, SCENE) for name in ("block", "speed"))
+    usual, speed = (paint_of(name, run.frames, SCENE) for name in ("block", "speed"))
     assert usual.scale is not None
     assert usual.scale.label == "displacement (mm)"
     assert (usual.fills(0), any(usual.elements)) == (speed.fills(0), True)
@@ -82,7 +82,7 @@ def test_soil_has_the_colour_asked_for_and_blocks_keep_theirs(run: Result) -> No
     assert len(set(first)) == 1
     assert len(set(last)) > 10
     with pytest.raises(InvalidInputError, match="unknown colour 'plastic' in this run"):
-        paint_named("plastic", toppling(2), SCENE)
+        paint_of("plastic", toppling(2), SCENE)
 
 
 def test_a_run_without_soil_has_no_profile(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from blocksim.view import style
 from blocksim.view.animation import Animation, Look
 from blocksim.view.report import player
 from blocksim.view.report.player import element_bytes, pack_frames
-from blocksim.view.report.subjects import read_stored, run_subject
+from blocksim.view.report.subjects import read_folder, run_subject
 from blocksim.view.run_data import Support, drawable_frames, extent_of
 from blocksim.view.strip import draw_strip
 from blocksim.world.describe import describe
@@ -255,7 +255,7 @@ def test_the_player_gets_every_element(tmp_path: Path) -> None:
         np.testing.assert_allclose(numbers(packed[axis]).reshape(-1, 3), 1e3 * masses[axis], rtol=1e-6)
     assert np.abs(np.hypot(*numbers(packed["shape"]).reshape(8, 2).T) - 1e3 * RADIUS).max() < 1e-6
     assert element_bytes(frames, drawable_frames(frames)) == 2 * 2 * 3
-    told = dict(run_subject("r1", read_stored(tmp_path / "toy")).page["summary"])
+    told = dict(run_subject("r1", read_folder(tmp_path / "toy")).page["summary"])
     assert (told["blocks"], told["masses"]) == ("1", "3")
 
 

@@ -12,7 +12,7 @@ from blocksim.study.limit import limit_curve
 from blocksim.study.limit_answer import CurveAnswer
 from blocksim.study.pictures import plot
 from blocksim.study.report import report
-from blocksim.view.studies import Bracket, LimitCurve, Series, join_brackets
+from blocksim.view.studies import LimitCurve, LimitRange, OtherLimits, join_brackets
 from tests.study.test_limit import TILT, block_on_a_slope
 
 SIZE = (0.05, 0.1)  # m: topples at atan 0.5
@@ -64,7 +64,7 @@ def test_a_table_of_others_is_drawn_beside_it(
     table = tmp_path / "published.csv"
     table.write_text('# from a book\nover,limit [deg],series\n0.3,16.7,"a, b"\n0.5,26.6,c\n0.4,21.8,"a, b"\n')
     plot(found, experiment=table)
-    assert drawn[0].beside == (Series("a, b", ((0.3, 16.7), (0.4, 21.8))), Series("c", ((0.5, 26.6),)))
+    assert drawn[0].beside == (OtherLimits("a, b", ((0.3, 16.7), (0.4, 21.8))), OtherLimits("c", ((0.5, 26.6),)))
 
 
 @pytest.mark.parametrize(
@@ -109,6 +109,6 @@ def test_what_is_no_list_of_numbers_is_refused_before_anything_is_written(
 
 
 def test_only_neighbours_with_the_same_changes_are_joined() -> None:
-    one, two = Bracket(1.0, 3.0, "stands", "falls"), Bracket(4.0, 6.0, "falls", "stands")
+    one, two = LimitRange(1.0, 3.0, "stands", "falls"), LimitRange(4.0, 6.0, "falls", "stands")
     points = [(0.0, [one]), (1.0, [one]), (2.0, [one, two]), (3.0, []), (4.0, [two])]
     assert join_brackets(LimitCurve("", "", points)) == [((0.0, 2.0), (1.0, 2.0))]

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     Drawing = Callable[[Path, Paper], None]
 
-TABLE = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")
+TABLE = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv").summaries()
 RUN: dict[str, Any] = {"title": "a run", "measured": TABLE}
 KEYS = ("contact.restitution", "friction.block_block.static", "friction.block_ground.static")
 PIECES = MotionPieces(np.array([0.0, 0.3, 1.0]), np.array([[0.0, 0.0, 0.1, 0.0], [0.009, 0.0, 0.0, 0.0]]), 0.0)

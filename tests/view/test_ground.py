@@ -18,7 +18,7 @@ from blocksim.view.scene import (
     draw_support,
     wall_outlines,
 )
-from blocksim.view.style import styled_figure
+from blocksim.view.style import open_figure
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ STEP = Support(profile=((20.0e-3, 0.0), (20.0e-3, -40.0e-3)))
 
 def canvas(base: float = -40.0, tilt: float = 0.0) -> Canvas:
     """Return a canvas that shows 200 x 150 mm."""
-    with styled_figure(4.0, 3.0) as figure:
+    with open_figure(4.0, 3.0) as figure:
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_xlim(-100.0, 100.0)
     axes.set_ylim(-50.0, 100.0)

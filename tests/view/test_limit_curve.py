@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from blocksim.view.studies import Bracket, LimitCurve, Series, draw_limit_curve
+from blocksim.view.studies import LimitCurve, LimitRange, OtherLimits, draw_limit_curve
 from tests.view.made_up import overlapping
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ def test_long_series_of_others_are_lines_and_short_ones_marks_with_their_names(
     curve = LimitCurve(
         "friction",
         "thickness (m)",
-        [(0.3, [Bracket(1.6, 1.8, "falls", "stands")])],
+        [(0.3, [LimitRange(1.6, 1.8, "falls", "stands")])],
         ("Stands means: outcome == stands.",),
-        (Series("curve of a book", many), Series("values of a paper", few)),
+        (OtherLimits("curve of a book", many), OtherLimits("values of a paper", few)),
     )
     draw_limit_curve(curve, tmp_path / "limits.png", "An arch")
     (figure,) = caught

@@ -142,11 +142,11 @@ def test_arrows_are_inside_the_picture_and_nothing_changes_without_loads() -> No
     loaded = support([PUSH, STRONGER])
     extent = extent_of(frames, chosen, loaded)
     found = actions_on(frames, chosen, loaded)
-    room = with_room(extent, found, 300.0)
-    for lines in (one.lines(300.0).reshape(-1, 2) for one in found.arrows):
+    room, length = with_room(extent, found)
+    for lines in (one.lines(length).reshape(-1, 2) for one in found.arrows):
         assert ([room.left, room.bottom] < lines.min(axis=0)).all()
         assert (lines.max(axis=0) < [room.right, room.top]).all()
     nothing = actions_on(frames, chosen, Support())
     assert (nothing.arrows, nothing.turns, any(nothing.marks)) == ((), None, False)
-    assert with_room(extent, nothing, 300.0) == extent
+    assert with_room(extent, nothing)[0] == extent
     assert nothing.explanation == ""

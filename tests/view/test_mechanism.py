@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.study.run import run
-from blocksim.view.mechanism import SLIDES, Side, draw_mechanisms, joints
+from blocksim.view.mechanism import SLIDES, BracketRun, draw_mechanisms, joints
 from blocksim.view.run_data import support_of
 from blocksim.view.scene import corners
 from blocksim.view.style import BLOCK_COLOURS, INK, MEASURED_COLOUR, Paper
@@ -20,34 +20,34 @@ from tests.study.test_limit import SLENDER, SQUAT, block_on_a_slope
 from tests.view.made_up import boxes_of
 
 
-def side(size: tuple[float, float], tilt: str, *, contacts: bool = True, **tables: Any) -> Side:
+def side(size: tuple[float, float], tilt: str, *, contacts: bool = True, **tables: Any) -> BracketRun:
     data: dict[str, Any] = block_on_a_slope(size) | {"ground": {"tilt": tilt}} | tables
     scenario = load_scenario(data | {"output": {"every": 0.02, "contacts": contacts}})
     result = run(scenario)
     assert result.summary.movement is not None
     moved = result.summary.movement.first_mover
-    return Side(result.frames, support_of(scenario), moved, f"at {tilt}", is_mechanism=moved is not None)
+    return BracketRun(result.frames, support_of(scenario), moved, f"at {tilt}", is_mechanism=moved is not None)
 
 
 @pytest.fixture(scope="module")
-def sliding() -> Side:
+def sliding() -> BracketRun:
     """Give a squat block that slides."""
     return side(SQUAT, "25 deg")
 
 
 @pytest.fixture(scope="module")
-def toppling() -> Side:
+def toppling() -> BracketRun:
     """Give a slender block that topples downhill, to -x."""
     return side(SLENDER, "15 deg")
 
 
-def test_a_sliding_block_has_a_joint_that_slides_and_does_not_rock(sliding: Side) -> None:
+def test_a_sliding_block_has_a_joint_that_slides_and_does_not_rock(sliding: BracketRun) -> None:
     (joint,) = joints(sliding.frames, sliding.frame, sliding.support)
     assert joint.slides
     assert not len(joint.hinges)
 
 
-def test_a_toppling_block_rocks_about_its_lower_edge(toppling: Side) -> None:
+def test_a_toppling_block_rocks_about_its_lower_edge(toppling: BracketRun) -> None:
     (joint,) = joints(toppling.frames, toppling.frame, toppling.support)
     assert not joint.slides
     assert joint.hinges == pytest.approx(np.array([[-0.5 * SLENDER[0], 0.0]]), abs=1e-4)
@@ -68,7 +68,7 @@ def test_an_arch_placed_without_force_has_its_four_hinges() -> None:
     }
     scenario = load_scenario("scenarios/tilting_arch.toml", changes)
     frames = run(scenario).frames
-    fallen = Side(frames, support_of(scenario), "2", "", is_mechanism=True)
+    fallen = BracketRun(frames, support_of(scenario), "2", "", is_mechanism=True)
     found = joints(frames, fallen.frame, fallen.support)
     assert not any(joint.slides for joint in found)
     hinges = sorted(np.concatenate([joint.hinges for joint in found]).tolist())
@@ -81,14 +81,14 @@ def test_an_arch_placed_without_force_has_its_four_hinges() -> None:
     assert np.hypot(*(then[nearest] - centre).T) == pytest.approx([outer, inner, outer, inner], abs=0.01)
 
 
-def test_a_mechanism_is_drawn_when_it_is_first_seen_and_not_as_a_heap(toppling: Side) -> None:
+def test_a_mechanism_is_drawn_when_it_is_first_seen_and_not_as_a_heap(toppling: BracketRun) -> None:
     way = np.hypot(toppling.frames.x - toppling.frames.x[0], toppling.frames.y - toppling.frames.y[0])[:, 0]
     assert way[toppling.frame - 1] <= 0.3 * SLENDER[0] < way[toppling.frame]
     assert toppling.frame < len(way) - 1
 
 
 def test_the_picture_is_the_same_every_time_and_says_what_each_side_is(
-    toppling: Side, sliding: Side, tmp_path: Path
+    toppling: BracketRun, sliding: BracketRun, tmp_path: Path
 ) -> None:
     for name in ("one", "two"):
         draw_mechanisms([(sliding, toppling), (toppling, sliding)], tmp_path / f"{name}.svg", "Both")
@@ -101,7 +101,7 @@ def test_the_picture_is_the_same_every_time_and_says_what_each_side_is(
 
 
 def test_no_line_but_a_sliding_joint_reads_as_one_and_the_legend_has_its_colour(
-    sliding: Side, toppling: Side, caught: list[Figure]
+    sliding: BracketRun, toppling: BracketRun, caught: list[Figure]
 ) -> None:
     draw_mechanisms([(toppling, sliding)], "marks.png")
     (figure,) = caught
@@ -120,7 +120,7 @@ def test_no_line_but_a_sliding_joint_reads_as_one_and_the_legend_has_its_colour(
     assert SLIDES not in {*BLOCK_COLOURS, MEASURED_COLOUR, INK}
 
 
-def test_loads_are_drawn_on_the_side_that_has_them_and_told(sliding: Side, caught: list[Figure]) -> None:
+def test_loads_are_drawn_on_the_side_that_has_them_and_told(sliding: BracketRun, caught: list[Figure]) -> None:
     pushed = side(SQUAT, "5 deg", loads=[{"kind": "force", "body": "1", "magnitude": "1 N"}])
     draw_mechanisms([(pushed, sliding)], "loads.png")
     draw_mechanisms([(sliding, sliding)], "none.png")

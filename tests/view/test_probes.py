@@ -9,7 +9,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.simulation import simulate_into
 from blocksim.simulation.instruments import COLUMNS, ENERGY, ProbeSeries, series_of
 from blocksim.view.report.page import page_text
-from blocksim.view.report.subjects import read_stored, run_subject
+from blocksim.view.report.subjects import read_folder, run_subject
 from blocksim.view.time_panels import draw_probes, panels_of
 from tests.simulation.test_probes import scene
 
@@ -80,7 +80,7 @@ def test_what_cannot_be_drawn_is_told(
 def test_a_report_shows_the_probes_of_a_run(tmp_path: Path) -> None:
     probes = [{"kind": "force", "on": "supports", "name": "base"}]
     simulate_into(scene("nonsmooth", probes, 0.02), tmp_path / "run")
-    stored = read_stored(tmp_path / "run")
+    stored = read_folder(tmp_path / "run")
     text = page_text([run_subject("a", stored)], title="", version="0")
     assert "base: force, 3 samples to 0.02 s, in probe-base.csv" in text
     assert 'src="data:image/png;base64,iVBOR' in text

@@ -31,14 +31,9 @@ FAR_OFF, MOST_FAR_OFF = 32, 0.01  # a pixel is far off from here on; share of pi
 FRAMES = pressed(toppling(3))
 
 
-class Repeats:
-    """Measured centres of two blocks."""
-
-    def summaries(self) -> list[SimpleNamespace]:
-        """Return mean and range (mm)."""
-        rows = [("x", "2", 98.0, 104.0, 110.0), ("x", "3", 139.0, 141.5, 145.0), ("rotation", "2", -90.0, -90.0, -90.0)]
-        names = ("quantity", "block", "minimum", "mean", "maximum")
-        return [SimpleNamespace(**dict(zip(names, row, strict=True))) for row in rows]
+ROWS = [("x", "2", 98.0, 104.0, 110.0), ("x", "3", 139.0, 141.5, 145.0), ("rotation", "2", -90.0, -90.0, -90.0)]
+NAMES = "quantity", "block", "minimum", "mean", "maximum"
+REPEATS = [SimpleNamespace(**dict(zip(NAMES, row, strict=True))) for row in ROWS]  # in mm and degrees
 
 
 def tornado(path: Path) -> None:
@@ -50,8 +45,8 @@ def tornado(path: Path) -> None:
 
 
 PICTURES: dict[str, Callable[[Path], None]] = {
-    "strip": lambda path: draw_strip(FRAMES, path, [0.0, 0.4, 0.6], "made up", measured=Repeats(), forces=True),
-    "final": lambda path: draw_final(FRAMES, path, title="made up", measured=Repeats()),
+    "strip": lambda path: draw_strip(FRAMES, path, [0.0, 0.4, 0.6], "made up", measured=REPEATS, forces=True),
+    "final": lambda path: draw_final(FRAMES, path, title="made up", measured=REPEATS),
     "history": lambda path: draw_history(FRAMES, path, title="made up", support=Support(weight=12.0)),
     "map": lambda path: SWEEP_KINDS["map"].draw(made_up(grid(3), failed=5), path),
     "tornado": tornado,

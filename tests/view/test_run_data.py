@@ -10,7 +10,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_to_toml
 from blocksim.simulation.results import EventRecord
 from blocksim.simulation.trajectory import Frames
-from blocksim.view.run_data import Support, drawable_frames, moments_at, moments_by_motion, path_travelled, support_of
+from blocksim.view.run_data import Support, drawable_frames, moments_at, moments_by_motion, path_lengths, support_of
 from tests.view.made_up import blocks_at
 
 SCENE: dict[str, object] = {
@@ -40,15 +40,15 @@ def test_panels_are_even_in_the_way_and_not_in_time() -> None:
 
 def test_turning_on_the_spot_counts_as_motion_and_going_back_does_not_cancel() -> None:
     turning, returning = moving([0.0] * 5, [0.0, 0.0, 0.5, 1.0, 1.0]), moving([0.0, 1.0, 0.0])
-    path = path_travelled(turning, drawable_frames(turning))
+    path = path_lengths(turning, drawable_frames(turning))
     assert list(path) == pytest.approx([0.0, 0.0, np.sqrt(0.125), np.sqrt(0.5), np.sqrt(0.5)])
-    assert path_travelled(returning, drawable_frames(returning))[-1] == 2.0
+    assert path_lengths(returning, drawable_frames(returning))[-1] == 2.0
 
 
 def test_riding_on_a_moving_support_is_no_way() -> None:
     frames = moving([0.0, 1.0, 0.0, 0.5])
     carried = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
-    assert list(path_travelled(frames, drawable_frames(frames), carried)) == [0.0, 0.0, 0.0, 0.5]
+    assert list(path_lengths(frames, drawable_frames(frames), carried)) == [0.0, 0.0, 0.0, 0.5]
     assert list(moments_by_motion(frames, drawable_frames(frames), 3, carried)) == [0, 3]
 
 

@@ -15,7 +15,7 @@ from blocksim.simulation.trajectory import Frames
 from blocksim.view.paint import by_block
 from blocksim.view.run_data import Support, extent_of
 from blocksim.view.scene import Canvas, Scene, corners, draw_scene, readable_scale, upper_sides
-from blocksim.view.style import GROUND_COLOUR, block_colour, styled_figure
+from blocksim.view.style import GROUND_COLOUR, block_colour, open_figure
 from tests.view.made_up import blocks_at, polygons
 
 FRAMES = blocks_at([0.1, 0.2], [0.025, 0.016], [0.0, -np.pi / 2])
@@ -78,7 +78,7 @@ def drawn(frames: Frames, support: Support, points_per_mm: float = 1.0) -> Canva
     """Draw the last frame."""
     frame = len(frames.time) - 1
     extent = extent_of(frames, np.arange(frame + 1), support)
-    with styled_figure(1.0, 1.0) as figure:
+    with open_figure(1.0, 1.0) as figure:
         canvas = Canvas(figure.add_axes((0.0, 0.0, 1.0, 1.0)), extent, points_per_mm)
         draw_scene(canvas, Scene(frames, support, by_block(frames)), frame)
     return canvas

@@ -8,24 +8,19 @@ from types import SimpleNamespace
 import pytest
 
 from blocksim.view import final, strip
-from blocksim.view.final import measured_ranges, widen
+from blocksim.view.final import ranges_of, widen
 from blocksim.view.run_data import Extent
 from blocksim.view.strip import Lines, arrangement, plan
 from blocksim.view.style import OWN
 
 
-class Table:
-    """Measured centres (mm) of blocks: smallest, mean and largest."""
-
-    def __init__(self, **ranges: tuple[float, float, float]) -> None:
-        self.ranges = ranges
-
-    def summaries(self) -> list[SimpleNamespace]:
-        rows = [
-            SimpleNamespace(block=block[1:], quantity="x", mean=mean, minimum=minimum, maximum=maximum)
-            for block, (minimum, mean, maximum) in self.ranges.items()
-        ]
-        return [*rows, SimpleNamespace(block="1", quantity="rotation", mean=0.0)]
+def table(**ranges: tuple[float, float, float]) -> list[SimpleNamespace]:
+    """Return measured centres (mm) of blocks: smallest, mean and largest."""
+    rows = [
+        SimpleNamespace(block=block[1:], quantity="x", mean=mean, minimum=minimum, maximum=maximum)
+        for block, (minimum, mean, maximum) in ranges.items()
+    ]
+    return [*rows, SimpleNamespace(block="1", quantity="rotation", mean=0.0)]
 
 
 @pytest.mark.parametrize(
@@ -66,13 +61,13 @@ def test_tilted_panels_have_room_for_the_numbers_along_the_ground() -> None:
 
 
 def test_overlapping_measured_ranges_get_rows_of_their_own() -> None:
-    table = Table(b3=(100.0, 110.0, 120.0), b1=(0.0, 5.0, 10.0), b2=(8.0, 20.0, 30.0), b9=(0.0, 1.0, 2.0))
-    ranges = measured_ranges(table, ("1", "2", "3"), width=150.0)
+    measured = table(b3=(100.0, 110.0, 120.0), b1=(0.0, 5.0, 10.0), b2=(8.0, 20.0, 30.0), b9=(0.0, 1.0, 2.0))
+    ranges = ranges_of(measured, ("1", "2", "3"), width=150.0)
     assert {item.block: item.row for item in ranges} == {"1": 0, "2": 1, "3": 0}
 
 
 def test_a_scene_is_widened_to_hold_what_was_measured_and_a_tower_s_caption() -> None:
-    wide = widen(Extent(0.0, 100.0, 0.0, 100.0), measured_ranges(Table(b1=(-50.0, 5.0, 400.0)), ("1",), width=100.0))
+    wide = widen(Extent(0.0, 100.0, 0.0, 100.0), ranges_of(table(b1=(-50.0, 5.0, 400.0)), ("1",), width=100.0))
     assert wide.left < -50.0
     assert wide.right > 400.0
     tower = widen(Extent(0.0, 30.0, 0.0, 1000.0), [])

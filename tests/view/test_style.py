@@ -15,9 +15,9 @@ from blocksim.view.style import (
     break_lines,
     cut_to,
     fitting_font,
+    open_figure,
     save_figure,
     shorten,
-    styled_figure,
     text_colour,
     width_of,
 )
@@ -75,7 +75,7 @@ def test_full_disk_leaves_the_older_picture(tmp_path: Path, monkeypatch: pytest.
     (tmp_path / "a.png").write_text("older")
     monkeypatch.setattr("os.fsync", fail)
     with (
-        styled_figure(1.0, 1.0) as figure,
+        open_figure(1.0, 1.0) as figure,
         pytest.raises(OutputError, match=r"a\.png: cannot be written: No space"),
     ):
         save_figure(figure, tmp_path / "a.png")

@@ -47,7 +47,7 @@ def _exact(**columns: Floats) -> dict[str, Any]:
     return {name: pack(values, exact=True)[0] for name, values in columns.items()}
 
 
-def listed(values: Floats) -> list[float]:
+def to_numbers(values: Floats) -> list[float]:
     """Return a few values as plain numbers of seven digits."""
     return [float(f"{value:.7g}") for value in values]
 
@@ -93,7 +93,7 @@ def pack_systems(frames: trajectory.Frames, kept: Indices) -> list[dict[str, Any
         shades = []
         for shade in track.system.shades:
             values = shade.of(track.some(kept))
-            high = paint.capped_scale(shade.label, values).high
+            high = paint.scale_from_zero(shade.label, values).high
             shades.append({"label": shade.label, "high": high, "values": pack(values)[0]})
         look = {"name": track.system.name, "colour": style.block_colour(number)}
         systems.append({**look, **_places(track, kept), "shades": shades, "palette": palette if shades else []})
@@ -137,7 +137,7 @@ def pack_loads(
     """
     support = run_data.support_of(scenario, happened)
     acts, extent = arrows.actions_on(frames, kept, support), run_data.extent_of(frames, kept, support)
-    length = arrows.length_in(extent)
+    room, length = arrows.with_room(extent, acts)
     marks = [[[mark.text, *mark.way] for mark in row] for row in acts.marks]
     for row, moved in zip(marks, support.displacement(frames.time[kept]) if support.motion else (), strict=False):
         text = f"support {MILLIMETRES * moved:+.2f} mm".replace("-", "−")
@@ -155,11 +155,11 @@ def pack_loads(
             colour = "ink" if one.kind == arrows.SPEED else "load"
             shown.append({"colour": colour, "count": lines.shape[1], **_exact(x0=x0, y0=y0, x1=x1, y1=y1)})
     turns = acts.turns and {
-        "radius": listed(acts.turns.radius),
+        "radius": to_numbers(acts.turns.radius),
         **_exact(x=acts.turns.at[..., 0], y=acts.turns.at[..., 1], sweep=acts.turns.sweep),
     }
-    extent = arrows.with_room(extent, acts, length)
-    return PackedLoads({"arrows": shown, "turns": turns, "marks": marks}, extent, notes)
+    data = {"arrows": shown, "turns": turns, "marks": marks}
+    return PackedLoads(data, room if acts.arrows else extent, notes)
 
 
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
@@ -197,18 +197,18 @@ def pack_frames(frames: trajectory.Frames, most_bytes: int = MOST_BYTES) -> Pack
         kinds, first, which = np.unique(frames.outlines, axis=0, return_index=True, return_inverse=True)
         uppers, widths = MILLIMETRES * upper_sides(frames)[first], MILLIMETRES * run_data.shortest_sides(frames)[first]
         outlines = {
-            "corners": [[listed(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
-            "upper": [[listed(end) for end in upper] for upper in uppers],
-            "width": listed(widths),
+            "corners": [[to_numbers(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
+            "upper": [[to_numbers(end) for end in upper] for upper in uppers],
+            "width": to_numbers(widths),
             "which": which.ravel().tolist(),
         }
     data = {
         "time": pack(frames.time[kept], exact=True)[0],
         "names": list(frames.names),
-        "size_x": listed(MILLIMETRES * frames.size_x),
-        "size_y": listed(MILLIMETRES * frames.size_y),
+        "size_x": to_numbers(MILLIMETRES * frames.size_x),
+        "size_y": to_numbers(MILLIMETRES * frames.size_y),
         "outlines": outlines,
-        "start_angle": listed(np.degrees(frames.start_angle)),
+        "start_angle": to_numbers(np.degrees(frames.start_angle)),
         "channels": {name: part for name, (part, _) in packed.items()},
         "systems": pack_systems(frames, kept),
     }

@@ -30,16 +30,16 @@ ROOT = r"(?:/|[A-Za-z]:[\\/])"
 ABSOLUTE = re.compile(rf"'(?P<quoted>{ROOT}[^']+)'|(?<![^\s=,(\"])(?P<bare>{ROOT}[^\s'\",:;()]+)")
 
 
-def shared_path(path: str) -> str:
+def local_path(path: str) -> str:
     """Return an absolute path as seen from the current folder, or its last name where it lies elsewhere."""
     below = input_files.relative_path(path)
     is_elsewhere = below == path and re.match(ROOT, path) is not None
     return re.split(r"[\\/]", path.rstrip("\\/"))[-1] if is_elsewhere else below
 
 
-def shared_text(text: str) -> str:
-    """Return a text with all absolute paths in it as `shared_path` has them; those with spaces need quotes."""
-    return ABSOLUTE.sub(lambda found: f"'{shared_path(q)}'" if (q := found["quoted"]) else shared_path(found[0]), text)
+def local_text(text: str) -> str:
+    """Return a text with all absolute paths in it as `local_path` has them; those with spaces need quotes."""
+    return ABSOLUTE.sub(lambda found: f"'{local_path(q)}'" if (q := found["quoted"]) else local_path(found[0]), text)
 
 
 Part = TypeVar("Part")
@@ -101,7 +101,7 @@ class PartialRun:
         return "unfinished" if self.summary is None else self.summary.status
 
 
-def read_stored(folder: Path) -> PartialRun:
+def read_folder(folder: Path) -> PartialRun:
     """Return what a run's folder holds. Raises InvalidInputError where nothing of it can be read."""
     problems: list[str] = []
     damage: list[str] = []
@@ -136,18 +136,7 @@ COORDINATES = re.compile(r'(?<= (?:d|x|y)=")[^"]*')
 DIGITS = re.compile(r"(\.\d\d)\d+")
 
 
-@dataclass(frozen=True)
-class Repeats:
-    """The measured ranges of a comparison, as pictures want them: rows of `Comparison.to_dict`."""
-
-    rows: Sequence[Mapping[str, Any]]
-
-    def summaries(self) -> list[Any]:
-        """Return the rows that have repeats."""
-        return [SimpleNamespace(**row) for row in self.rows if row["mean"] is not None]
-
-
-def embedded(figure: "style.Figure") -> str:
+def svg_address(figure: "style.Figure") -> str:
     """Return a figure as the address of an SVG within the page: letters as text, coordinates to 0.01 points."""
     from matplotlib import rc_context
 
@@ -158,7 +147,7 @@ def embedded(figure: "style.Figure") -> str:
 
 
 def history_of(
-    frames: trajectory.Frames, support: run_data.Support, measured: Repeats | None
+    frames: trajectory.Frames, support: run_data.Support, measured: run_data.Repeats | None
 ) -> tuple[str, list[dict[str, Any]]]:
     """Return the histories of a run, and of each panel its name, place and the ends of its axes."""
     with draw_history_page(frames, None, measured, support) as (figure, panels):
@@ -166,7 +155,7 @@ def history_of(
             {"name": name, "place": _place(axes), "time": axes.get_xlim(), "values": axes.get_ylim()}
             for name, axes in panels.items()
         ]
-        return embedded(figure), places
+        return svg_address(figure), places
 
 
 def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
@@ -185,12 +174,12 @@ def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
         found = outcome_map.map_of(sweep, (x, y))
         with outcome_map.draw_map(sweep, style.OWN, found, by_manner=any(sweep.manners)) as figure:
             label = f"map of {names[y.key]} over {names[x.key]}"
-            maps.append({"label": label, "source": embedded(figure), "data": _cases(found)})
+            maps.append({"label": label, "source": svg_address(figure), "data": _cases(found)})
     others = []
     for name, kind in kinds.SWEEP_KINDS.items():
         if name != "map" and not kind.refusal(sweep) and kind.suits(sweep):
-            with kind.drawn(sweep, style.OWN) as figure:
-                others.append({"label": name, "source": embedded(figure), "data": None})
+            with kind.open(sweep, style.OWN) as figure:
+                others.append({"label": name, "source": svg_address(figure), "data": None})
     return maps + others
 
 
@@ -251,11 +240,11 @@ def run_subject(
     ]
     page = {
         "parent": parent,
-        "place": shared_path(str(run.folder)),
+        "place": local_path(str(run.folder)),
         "status": run.status,
-        "reason": NO_SUMMARY if run.summary is None else shared_text(run.summary.reason),
+        "reason": NO_SUMMARY if run.summary is None else local_text(run.summary.reason),
         "summary": _summary(run),
-        "problems": [shared_text(text) for text in (*run.problems, *problems, *remarks)],
+        "problems": [local_text(text) for text in (*run.problems, *problems, *remarks)],
         "scenario": run.scenario_text,
         "values": None if run.scenario is None else run.scenario.model_dump(by_alias=True, exclude={"sweep"}),
         "description": None if run.scenario is None else run.scenario.description,
@@ -304,8 +293,9 @@ def _player_data(
     data |= {"scene": scene, "forces": forces, "loads": loads.data if loads else None, "measured": measured}
     history = None
     if data["names"]:
-        repeats = None if comparison is None else Repeats(rows)
-        history, data["histories"] = history_of(frames, run_data.support_of(scenario, happened), repeats)
+        repeats = [SimpleNamespace(**row) for row in rows if row["mean"] is not None]
+        support = run_data.support_of(scenario, happened)
+        history, data["histories"] = history_of(frames, support, repeats if comparison else None)
     return data, notes, [], history
 
 
@@ -324,7 +314,7 @@ def _summary(run: PartialRun) -> list[tuple[str, str]]:
         ("steps", f"{summary.steps} of {summary.time_step_s:.3g} s"),
         ("solver time", f"{summary.solver_seconds:.2f} s on {summary.threads} thread{'s' * (summary.threads > 1)}"),
         ("relative energy error", "0" if error == 0.0 else f"{error:.1e}" if math.isfinite(error) else "unknown"),
-        *(("warning", shared_text(warning)) for warning in summary.warnings),
+        *(("warning", local_text(warning)) for warning in summary.warnings),
     ]
 
 
@@ -345,7 +335,7 @@ def _provenance(run: PartialRun) -> list[tuple[str, str]]:
         return []
     summary = run.summary
     hashes = [("run", summary.run), ("scenario", summary.scenario_hash), ("final state", summary.final_state_sha256)]
-    environment = [(name, shared_text(text)) for name, text in summary.environment.items()]  # the command names folders
+    environment = [(name, local_text(text)) for name, text in summary.environment.items()]  # the command names folders
     return [("ended at", summary.ended_at), *hashes, *environment, *summary.sha256.items()]
 
 
@@ -363,14 +353,14 @@ class CaseTable:
     rows: tuple[tuple[str, ...], ...]
 
     @property
-    def varied(self) -> tuple[str, ...]:
+    def keys(self) -> tuple[str, ...]:
         """Columns of the keys that vary, as `SweepResult.keys` has them."""
         return self.columns[self.columns.index(CASE) + 1 : self.columns.index(STATUS)]
 
     @property
     def results(self) -> tuple[str, ...]:
         """Columns of what is known of a whole case: status, movement and whatever else is not of a block."""
-        known = {CASE, *self.varied}
+        known = {CASE, *self.keys}
         return tuple(name for name in self.columns if name not in known and not name.endswith(OF_BLOCKS))
 
     @property
@@ -416,16 +406,16 @@ def sweep_subject(
         if row["quantity"] in COLUMN_OF and row["limits"]
     }
     page = {
-        "place": shared_path(str(table.folder)),
+        "place": local_path(str(table.folder)),
         "description": None if scenario is None else scenario.description,
         "summary": [
             ("cases", str(len(table.rows))),
             ("finished", f"{table.column(STATUS).count('finished')} of {len(table.rows)}"),
             *([("inside all measured ranges", f"{inside.count('True')} of {len(inside)}")] if inside else []),
-            ("varied", ", ".join(table.varied) or "nothing"),
+            ("varied", ", ".join(table.keys) or "nothing"),
             ("runs in this page", str(len(members))),
         ],
-        "problems": [shared_text(text) for text in problems],
+        "problems": [local_text(text) for text in problems],
         "hidden_blocks": len(table.blocks) - len(shown),
         "has_members": bool(members),
         "judged": judged,
@@ -434,7 +424,7 @@ def sweep_subject(
     data = {
         "kind": "sweep",
         "name": name,
-        "place": shared_path(str(table.folder)),
+        "place": local_path(str(table.folder)),
         "columns": _columns(table, shown),
         "left_out": list(left_out),
         "measured": limits,
@@ -447,8 +437,8 @@ def sweep_subject(
 def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
     """Return names, roles and values; a column whose values are all numbers has numbers, an empty cell is null."""
     ends = [f"{block}{suffix}" for block in blocks for suffix in (".x_mm", ".rotation_deg")]
-    roles = {"varied": table.varied, "case": (CASE,), "outcome": table.results, "block": ends}
-    order = [CASE, *table.varied, *table.results, *ends]
+    roles = {"varied": table.keys, "case": (CASE,), "outcome": table.results, "block": ends}
+    order = [CASE, *table.keys, *table.results, *ends]
     role = {name: kind for kind, names in roles.items() for name in names}
     labels = {one.name: {"label": one.label} for one in observables.OBSERVABLES.values() if one.title}
     return [
@@ -489,8 +479,8 @@ class StudyPage:
 def study_subject(key: str, study: StudyPage, place: str) -> Subject:
     """Return a study for a report."""
     picture = None if study.picture is None else f"data:image/png;base64,{b64encode(study.picture).decode()}"
-    page = asdict(study) | {"picture": picture, "problems": [shared_text(text) for text in study.problems]}
-    where = shared_path(place)
+    page = asdict(study) | {"picture": picture, "problems": [local_text(text) for text in study.problems]}
+    where = local_path(place)
     return Subject(
         key, "study", study.name, page | {"place": where}, {"kind": "study", "name": study.name, "place": where}
     )

@@ -77,10 +77,10 @@ class SweepData:
     manners: tuple[str, ...] = ()  # (n,) how each case ended, such as `fell`; none where nobody judged it
 
     @property
-    def moving(self) -> list[int]:
+    def movers(self) -> list[int]:
         """The numbers of the blocks that are worth drawing."""
         low, high = np.percentile(self.x_mm[self.finished], [RARE, 100.0 - RARE], axis=0)
-        return most_moving(high - low)
+        return choose_movers(high - low)
 
     @property
     def outcomes(self) -> list[tuple[int, ...] | None]:
@@ -123,12 +123,12 @@ class ValueAxis:
     factor: float
     is_log: bool
 
-    def shown(self, values: Floats) -> Floats:
+    def scale(self, values: Floats) -> Floats:
         """Return the numbers on the axis."""
         return (values - self.middle) * self.factor
 
 
-def most_moving(spread: Floats) -> list[int]:
+def choose_movers(spread: Floats) -> list[int]:
     """Return the blocks to draw by how much their final x varies (mm, (b,))."""
     candidates = [int(block) for block in np.argsort(-spread, kind="stable")]
     moving = [block for block in candidates if spread[block] >= STAYS_MM]

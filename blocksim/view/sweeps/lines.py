@@ -132,7 +132,7 @@ def draw_series(
                         axes.axhline(end, color=style.MEASURED_COLOUR, linewidth=style.LINE_WIDTH, zorder=1)
                 axes.set_xscale("log" if axis.is_log else "linear")
                 look = {"color": style.block_colour(block), "markeredgecolor": style.INK} | DOTS
-                axes.plot(axis.shown(one.values), one.x_mm[:, block], linestyle="-" if joined else "", **look)
+                axes.plot(axis.scale(one.values), one.x_mm[:, block], linestyle="-" if joined else "", **look)
                 axes.spines[["right", "top"]].set_visible(False)
                 style.number_axis(axes.xaxis, is_log=axis.is_log)
                 style.number_axis(axes.yaxis)
@@ -148,7 +148,7 @@ def draw_series(
 
 def moving_blocks(series: Sequence[Series]) -> list[int]:
     """Return the blocks to draw, in their order: those whose final x varies most; all are candidates if none does."""
-    return data.most_moving(np.max([np.ptp(one.x_mm, axis=0) for one in series], axis=0))
+    return data.choose_movers(np.max([np.ptp(one.x_mm, axis=0) for one in series], axis=0))
 
 
 def is_smooth(values: run_data.Floats) -> bool:

@@ -91,8 +91,6 @@ def draw_panel(
     axes: "style.Axes", plane: Plane, numbers: run_data.Floats, look: dict[str, Any], agrees: run_data.Flags | None
 ) -> None:
     """Colour the cases by their numbers (NaN: none), with the map and norm of `look`; outline those that agree."""
-    from matplotlib.collections import LineCollection
-
     axes.set_xscale("log" if plane.axes[0].is_log else "linear")
     axes.set_yscale("log" if plane.axes[1].is_log else "linear")
     if plane.is_grid:
@@ -102,7 +100,7 @@ def draw_panel(
         if agrees is not None:
             lines = outline_of(on_grid(plane, agrees.astype(np.float64))[2] == 1.0, *edges)
             for outline in (HALO, OUTLINE):
-                axes.add_collection(LineCollection(lines, **outline, capstyle="projecting"))
+                style.add_lines(axes, lines, **outline, capstyle="projecting")
         return
     known = np.isfinite(numbers)
     is_outlined = known & (False if agrees is None else agrees)
@@ -167,7 +165,7 @@ class OutcomeMap:
 
     def plane(self, cases: run_data.Flags) -> Plane:
         """Return the inputs of some cases."""
-        x, y = (axis.shown(one.values[cases]) for axis, one in zip(self.axes, (self.x, self.y), strict=True))
+        x, y = (axis.scale(one.values[cases]) for axis, one in zip(self.axes, (self.x, self.y), strict=True))
         return Plane(x, y, self.axes, self.sweep.mode == "grid")
 
 
@@ -201,7 +199,7 @@ def map_of(sweep: data.SweepData, axes: tuple[data.Input, ...] | None = None) ->
         values = np.unique(others[0].values)
         columns = [(f"{name} = {others[0].label(value)}", others[0].values == value) for value in values]
     shown = tuple(data.value_axis(one.values, one.key, one.unit, is_even=one.is_even, typed=one.typed) for one in axes)
-    return OutcomeMap(sweep, x, y, tuple(columns), sweep.moving[-MOST_BLOCKS:], (shown[0], shown[1]))
+    return OutcomeMap(sweep, x, y, tuple(columns), sweep.movers[-MOST_BLOCKS:], (shown[0], shown[1]))
 
 
 @contextmanager
@@ -213,7 +211,7 @@ def draw_map(
     `found` are its contents, by default over the two inputs with the most values; it gets the panels. `by_manner` shows
     in the last row how cases ended in place of their final rotations. Raises InvalidInputError for too small a page.
     """
-    from matplotlib import colors, lines, patches
+    from matplotlib import colors
 
     found = found or map_of(sweep)
     count = len(found.columns)
@@ -222,10 +220,8 @@ def draw_map(
     for number, (label, colour) in enumerate(zip(classes.labels, classes.colours, strict=True)):
         if not (classes.numbers == number).any():
             continue
-        if label.startswith("failed"):
-            handles.append(lines.Line2D([], [], linestyle="", marker="x", markersize=4.0, color=style.INK, label=label))
-        else:
-            handles.append(patches.Patch(facecolor=colour, label=label))
+        cross = {"linestyle": "", "marker": "x", "markersize": 4.0, "color": style.INK}
+        handles.append(style.legend_entry(label, **cross if label.startswith("failed") else {"facecolor": colour}))
     beside = LEFT + RIGHT + (count - 1) * COLUMN_GAP
     own = style.COLUMN_WIDTH - beside if count == 1 else min(WIDEST, (style.PAGE_WIDTH - beside) / count)
     width = paper.width(beside + count * own, beside + count * LEAST)

@@ -48,7 +48,7 @@ def variables_of(sweep: SweepData) -> list[Variable]:
     """Return the first inputs and the blocks that move, in this order."""
     names = short_names([one.key for one in sweep.inputs])
     variables = [_of_input(one, name) for one, name in zip(sweep.inputs, names, strict=True)][:MOST_INPUTS]
-    for block in sweep.moving[-MOST_BLOCKS:]:
+    for block in sweep.movers[-MOST_BLOCKS:]:
         x, name = sweep.x_mm[:, block], sweep.blocks[block]
         repeats = sweep.measured.x_mm.get(name)
         ends = np.nanpercentile(x, [RARE, 100.0 - RARE])
@@ -104,7 +104,7 @@ def _of_input(one: Input, name: str) -> Variable:
         levels = tuple(style.cut_to(level, room, SMALL_FONT) for level in one.levels)
         return Variable(_in_lines(name), one.values + spread, (-0.5, len(levels) - 0.5), levels=levels)
     axis = value_axis(one.values, name, one.unit, is_even=one.is_even, typed=one.typed)
-    values = axis.shown(one.values)
+    values = axis.scale(one.values)
     return Variable(_in_lines(axis.label), values, _around(values, axis), is_log=axis.is_log)
 
 
@@ -193,23 +193,21 @@ def _number(side: "style.Axis", one: Variable) -> None:
 
 def _entries(sweep: SweepData) -> list[Any]:
     """Return the entries of the legend."""
-    from matplotlib.lines import Line2D
-
     dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markeredgewidth": 0.0}
     entries = []
     if sweep.inside is None:
-        entries.append(Line2D([], [], **dot, color=INSIDE["color"], markersize=3.0, label="finished"))
+        entries.append(style.legend_entry("finished", **dot, color=INSIDE["color"], markersize=3.0))
     else:
         share = percent(float(sweep.inside.mean()))
         label = f"in all measured ranges ({share} of {len(sweep.finished)})"
-        entries.append(Line2D([], [], **dot, color=INSIDE["color"], markersize=3.5, label=label))
-        entries.append(Line2D([], [], **dot, color=OUTSIDE["color"], markersize=2.5, label="others"))
+        entries.append(style.legend_entry(label, **dot, color=INSIDE["color"], markersize=3.5))
+        entries.append(style.legend_entry("others", **dot, color=OUTSIDE["color"], markersize=2.5))
     if not sweep.finished.all():
         failed = f"failed ({percent(1.0 - float(sweep.finished.mean()))})"
-        entries.append(Line2D([], [], linestyle="", marker="x", color=style.INK, markersize=3.5, label=failed))
+        entries.append(style.legend_entry(failed, linestyle="", marker="x", color=style.INK, markersize=3.5))
     if sweep.measured.x_mm:
         look: dict[str, Any] = {"linestyle": "-", "marker": "D", "markersize": 3.0, "linewidth": 0.8}
-        entries.append(Line2D([], [], **look, color=style.MEASURED_COLOUR, label="repeats"))
+        entries.append(style.legend_entry("repeats", **look, color=style.MEASURED_COLOUR))
     return entries
 
 
@@ -230,7 +228,7 @@ _INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 @contextmanager
 def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[style.Figure]":
     """Give a panel for each block that moves."""
-    blocks = sweep.moving[-MOST_HISTOGRAMS:]
+    blocks = sweep.movers[-MOST_HISTOGRAMS:]
     own = style.COLUMN_WIDTH - sum(SIDES[:2]), PANEL_HEIGHT
     more: dict[str, Any] = {"title": sweep.title, "handles": _entries_histogram(sweep), "columns": 2}
     with style.open_panels(paper, [1] * len(blocks), own, LEAST_PANEL, SIDES, (0.0, ROW_GAP), **more) as opened:
@@ -282,15 +280,15 @@ def _draw_block(axes: "style.Axes", sweep: SweepData, block: int, room: float) -
 
 def _entries_histogram(sweep: SweepData) -> list[Any]:
     """Return the entries of the legend."""
-    from matplotlib import lines, patches
-
-    entries: list[Any] = [patches.Patch(color=ALL_COLOUR, label=f"all {len(sweep.finished)} cases")]
+    entries: list[Any] = [
+        style.legend_entry(f"all {len(sweep.finished)} cases", facecolor=ALL_COLOUR, edgecolor=ALL_COLOUR)
+    ]
     if sweep.inside is not None:
         share = percent(float(sweep.inside.mean()))
-        entries.append(patches.Patch(color=INSIDE_COLOUR, label=f"all inside ({share})"))
+        entries.append(style.legend_entry(f"all inside ({share})", facecolor=INSIDE_COLOUR, edgecolor=INSIDE_COLOUR))
     if sweep.measured.x_mm:
         count = max(len(repeats) for repeats in sweep.measured.x_mm.values())
-        entries.append(lines.Line2D([], [], **_REPEATS, label=f"{count} repeats and their range"))
+        entries.append(style.legend_entry(f"{count} repeats and their range", **_REPEATS))
     if sweep.measured.prediction_mm:
-        entries.append(lines.Line2D([], [], **_INTERVAL, label="next test (95 %)"))
+        entries.append(style.legend_entry("next test (95 %)", **_INTERVAL))
     return entries

@@ -13,7 +13,7 @@ import pytest
 from blocksim.simulation.balance import EnergyLedger
 from blocksim.simulation.observables import Movement, Response
 from blocksim.view.report.page import labels, page_text
-from blocksim.view.report.subjects import CaseTable, Subject, read_stored, run_subject, sweep_subject
+from blocksim.view.report.subjects import CaseTable, Subject, read_folder, run_subject, sweep_subject
 from tests.view.report.folders import write_run
 
 HOSTILE = ("<script>alert(1)</script>", "</script><img src=x>", "<!--<script>", "\u202egnp", "{{ 7*7 }}", "x" * 3000)
@@ -22,7 +22,7 @@ HOSTILE = ("<script>alert(1)</script>", "</script><img src=x>", "<!--<script>", 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_names_stay_text(tmp_path: Path, name: str) -> None:
     write_run(tmp_path / "run", count=2)
-    stored = read_stored(tmp_path / "run")
+    stored = read_folder(tmp_path / "run")
     assert stored.frames is not None
     frames = replace(stored.frames, names=(name, "2", "3"))
     run = replace(stored, frames=frames, scenario_text=name, problems=(name,))
@@ -39,7 +39,7 @@ def test_hostile_names_stay_text(tmp_path: Path, name: str) -> None:
 
 def test_page_runs_nothing_but_its_own_script_and_style(tmp_path: Path) -> None:
     write_run(tmp_path / "run", count=2)
-    text = page_text([run_subject("a", read_stored(tmp_path / "run"))], title="", version="0")
+    text = page_text([run_subject("a", read_folder(tmp_path / "run"))], title="", version="0")
     (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
     allowed = dict(part.split(" ", 1) for part in unescape(policy).split("; "))
     own = {
@@ -56,7 +56,7 @@ def test_page_runs_nothing_but_its_own_script_and_style(tmp_path: Path) -> None:
 def subject(folder: Path, key: str, name: str = "three_blocks", **settings: object) -> Subject:
     overrides = {text.replace("__", "."): value for text, value in settings.items()}
     write_run(folder / key, name, count=2, overrides=overrides)
-    return run_subject(key, read_stored(folder / key))
+    return run_subject(key, read_folder(folder / key))
 
 
 def test_runs_of_one_name_are_labelled_with_the_keys_that_differ(tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_runs_of_one_name_are_labelled_with_the_keys_that_differ(tmp_path: Path)
 
 def test_report_names_the_outcome_and_the_block_that_moved_first(tmp_path: Path) -> None:
     write_run(tmp_path / "run", count=2)
-    stored = read_stored(tmp_path / "run")
+    stored = read_folder(tmp_path / "run")
     assert stored.summary is not None
     known = {
         "outcome": Response.FELL,
@@ -95,7 +95,7 @@ def test_report_names_the_outcome_and_the_block_that_moved_first(tmp_path: Path)
 
 def test_ledger_has_all_entries_that_are_not_zero_and_no_empty_cell(tmp_path: Path) -> None:
     write_run(tmp_path / "run", count=3)
-    stored = read_stored(tmp_path / "run")
+    stored = read_folder(tmp_path / "run")
     assert stored.summary is not None
     entries = {"kinetic": 0.1, "potential": 4.9, "events": -0.25, "start": 5.0, "in_play": 1.0}
     further = {"sand_kinetic": 0.125, "friction": -1e-16}  # the second is round-off

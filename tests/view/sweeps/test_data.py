@@ -27,7 +27,7 @@ def test_classes_of_many_blocks_are_counted() -> None:
 
 
 def test_blocks_that_stay_are_not_worth_drawing() -> None:
-    assert made_up((Input("gravity", "", np.arange(4.0)),)).moving == [1]
+    assert made_up((Input("gravity", "", np.arange(4.0)),)).movers == [1]
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_axis_shows_values_so_that_they_can_be_read(
 ) -> None:
     axis = value_axis(np.array(values), "key", unit)
     assert (axis.label, axis.is_log) == (label, is_log)
-    assert axis.shown(np.array(values)).tolist() == pytest.approx(shown, abs=1e-6)
+    assert axis.scale(np.array(values)).tolist() == pytest.approx(shown, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -83,4 +83,4 @@ def test_axis_shows_values_so_that_they_can_be_read(
 def test_axis_keeps_the_typed_unit(values: list[float], typed: InputUnit, label: str, shown: list[float]) -> None:
     axis = value_axis(np.array(values), "key", "m", typed=typed)
     assert axis.label == label
-    assert axis.shown(np.array(values)).tolist() == pytest.approx(shown)
+    assert axis.scale(np.array(values)).tolist() == pytest.approx(shown)
