@@ -1,5 +1,6 @@
 """Overlap of placed blocks with one another, the ground and walls, exactly (separating axes)."""
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from operator import attrgetter
@@ -145,10 +146,12 @@ def overlapping_pairs(
 
     With segments those of bodies and of the segments that they lie across, and nothing else.
     """
+    if segments is not None and not segments:
+        return
     outlines = Outlines.of(bodies)
     if segments is not None:
         outlines = outlines.and_pieces(Outlines.along(segments))
-    for one, other in near_pairs(outlines) if segments is None or segments else ():
+    for one, other in near_pairs(outlines):
         first, second = np.minimum(one, other), np.maximum(one, other)
         if segments is not None:
             wanted = (first < len(bodies)) & (second >= len(bodies))
@@ -170,7 +173,7 @@ def near_pairs(outlines: Outlines) -> Iterator[Pairs]:
     middles = np.stack([outlines.x, outlines.y], axis=1)
     low, high = middles - extents, middles + extents
     if len(middles) <= FEW:
-        one, other = np.triu_indices(len(middles), 1)
+        one, other = _all_pairs(len(middles))
         near = _meet(low, high, one, other)
         yield one[near], other[near]
         return
@@ -181,6 +184,13 @@ def near_pairs(outlines: Outlines) -> Iterator[Pairs]:
         cell[cell == 0.0] = 1.0
         for one, other in _in_cells(low[members], high[members], level[members] < size, cell):
             yield members[one], members[other]
+
+
+@functools.cache
+def _all_pairs(count: int) -> Pairs:
+    """Return the indices of all pairs among so many; kept, as numpy takes longer for them than for all the rest."""
+    one, other = np.triu_indices(count, 1)
+    return one, other
 
 
 def _in_cells(low: Floats, high: Floats, is_small: NDArray[np.bool_], cell: Floats) -> Iterator[Pairs]:
