@@ -96,7 +96,7 @@ def smallest_width(bodies: Iterable[PlacedBody]) -> float:
     return min((body.least_width for body in bodies), default=math.inf)
 
 
-def length_beside(of_blocks: float) -> float:
+def reference_length(of_blocks: float) -> float:
     """Return a length (m) that blocks give, where there are none LENGTH_WITHOUT_BLOCKS.
 
     What goes by it moves nothing then, as soil has lengths of its own: lists of pairs that stay empty, how thick ground
@@ -256,19 +256,12 @@ def profile_segments(scenario: Scenario) -> tuple[PlacedSegment, ...]:
     line.append((x_last + ENDLESS, y_last))
     joints = list(zip(line, line[1:], line[2:], strict=False))
     turns = [0.0, *(_turn(*joint) for joint in joints), 0.0]
-    sharp = [*(_is_sharp(*joint) for joint in joints), False]
+    sharps = [*(_is_sharp(*joint) for joint in joints), False]
     return tuple(
         PlacedSegment(
-            *one,
-            *other,
-            material=None,
-            extends_start=before > 0.0,
-            extends_end=after > 0.0,
-            touches_start=False,
-            touches_end=after < 0.0,
-            sharp_end=is_sharp,
+            *one, *other, None, before > 0.0, after > 0.0, touches_start=False, touches_end=after < 0.0, sharp_end=sharp
         )
-        for (one, other), (before, after), is_sharp in zip(pairwise(line), pairwise(turns), sharp, strict=True)
+        for (one, other), (before, after), sharp in zip(pairwise(line), pairwise(turns), sharps, strict=True)
     )
 
 

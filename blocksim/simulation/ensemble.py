@@ -19,7 +19,7 @@ from blocksim.simulation import balance, instruments, loop, observables, rest_st
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
 from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measure_row, scheme_of, system_totals
 from blocksim.world.build import Refusal, SceneStack, member, stack_of_one
-from blocksim.world.systems.blocks import blocks_placed, motion_of, outlines_of
+from blocksim.world.systems.blocks import block_system, motion_of, outlines_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +44,7 @@ class MemberEnd:
     @cached_property
     def frames(self) -> trajectory.Frames:
         """One: the last."""
-        return instruments.frames_from_rows((blocks_placed(self.placed),), self.time_step, self.rows)
+        return instruments.frames_from_rows((block_system(self.placed),), self.time_step, self.rows)
 
     @property
     def final(self) -> "pd.DataFrame":

@@ -20,7 +20,7 @@ from blocksim.scenario import PlacedBody, Scenario, events, place_segments
 from blocksim.scenario.models.timeline import STEP, ForceProbe, JointProbe, PointProbe
 from blocksim.simulation import balance, observables, trajectory
 from blocksim.world.systems import systems_of
-from blocksim.world.systems.blocks import BLOCKS, blocks_placed
+from blocksim.world.systems.blocks import BLOCKS, block_system
 from blocksim.world.systems.system import BodyContacts, Floats, System, SystemInScene, Track
 
 if TYPE_CHECKING:
@@ -408,7 +408,7 @@ class Recorder:
         `probes` are sampled at steps of their own. What has moved is seen from the `support`.
         """
         self.placed = tuple(placed)
-        self.systems = (blocks_placed(placed), *others)
+        self.systems = (block_system(placed), *others)
         self.time_step = step
         self.sink: FrameFile | None = None  # where frames go but the last, from when on it is there
         self.steps_per_frame = max(every / step, 1.0)

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from blocksim.kernels.common import arrays
 from blocksim.kernels.explicit.models.particles import PER_PARTICLE
 from blocksim.kernels.explicit.outlines import WIDEST_CONE
-from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments
-from blocksim.scenario.placement import length_beside, smallest_width
+from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments, placement
 from blocksim.world.excitation import Drives, LoadArrays, drive_records, load_arrays
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
 
@@ -245,7 +244,8 @@ def _slab_records(
     slabs = arrays.zeros(len(segments), arrays.BODY)
     if not segments:
         return slabs
-    thickness = max(SLAB_SHARE * length_beside(smallest_width(placed)), 2.0 * (scenario.contact.max_overlap or 0.0))
+    smallest = placement.reference_length(placement.smallest_width(placed))
+    thickness = max(SLAB_SHARE * smallest, 2.0 * (scenario.contact.max_overlap or 0.0))
     for record, segment in zip(slabs, segments, strict=True):
         along = ((segment.x1 - segment.x0) / segment.length, (segment.y1 - segment.y0) / segment.length)
         begin = -thickness if segment.extends_start else 0.0
@@ -324,7 +324,7 @@ def _fill_blocks(records: NDArray[np.record], layouts: Sequence[Layout]) -> None
     )
 
 
-def moved_records(bodies: arrays.Records, layouts: Sequence[Layout]) -> arrays.Records:
+def motion_records(bodies: arrays.Records, layouts: Sequence[Layout]) -> arrays.Records:
     """Return where all bodies of scenes (m, n + 1) start that move with the supports, then all that are driven, (m, f).
 
     In every scene there are equally many.

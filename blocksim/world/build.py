@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common import arrays
 from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
-from blocksim.kernels.explicit import broad_phase, laws
-from blocksim.kernels.explicit.models import MODEL_CODES
+from blocksim.kernels.explicit import broad_phase, laws, models
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import PlacedBody, Scenario, motion
-from blocksim.world.bodies import Layout, body_records, layout_of, moved_records, place_particles, slots_of_a_pair
-from blocksim.world.interactions import interaction_tables
-from blocksim.world.memory import Size, refuse_if_too_large, scene_size
+from blocksim.world import interactions, memory
+from blocksim.world.bodies import Layout, body_records, layout_of, motion_records, place_particles, slots_of_a_pair
 from blocksim.world.step import MOST_STEPS, Bounds, Stride, bounds_of, choose_stride
 from blocksim.world.systems import acts_of
 from blocksim.world.systems.system import SystemInScene
@@ -70,7 +68,7 @@ class Construction:
     """Parts of building scenes that depend on the scheme."""
 
     choose: Callable[[Layout, Bounds], Stride]  # raises BlocksimError
-    size: Callable[[Parts], Size]  # of one of these scenes
+    size: Callable[[Parts], memory.Size]  # of one of these scenes
     assemble: Callable[[Parts, Sequence[Stride]], Any]
 
 
@@ -145,7 +143,7 @@ def _stacks(numbers: list[int], parts: Parts, strides: list[Stride], constructio
         places = range(first, min(first + count, len(numbers)))
         names = [numbers[k] for k in places]
         try:
-            refuse_if_too_large(size)
+            memory.refuse_if_too_large(size)
         except BlocksimError as error:
             yield from (Refusal(number, error) for number in names)
         else:
@@ -264,9 +262,9 @@ def build_world(scenario: Scenario) -> arrays.World:
     return world
 
 
-def _size(parts: Parts) -> Size:
+def _size(parts: Parts) -> memory.Size:
     bodies = parts.bodies.shape[1]
-    return scene_size(bodies, first_capacity(bodies), parts.slots, has_particles=parts.particles is not None)
+    return memory.scene_size(bodies, first_capacity(bodies), parts.slots, has_particles=parts.particles is not None)
 
 
 def _assemble(parts: Parts, strides: Sequence[Stride]) -> arrays.World:
@@ -311,11 +309,11 @@ def assemble_world(
         links=numbers((members, blocks), np.uint32),
         large=numbers(large.shape, np.uint32),
         neighbours=numbers((members, blocks), np.uint32),
-        interactions=interaction_tables([layout.interactions for layout in layouts]),
+        interactions=interactions.interaction_tables([layout.interactions for layout in layouts]),
         ledger=arrays.zeros((members, count // arrays.GROUP + 1), arrays.LEDGER),
         action=arrays.zeros((members, 1), arrays.ACTION),
         matrices=numbers((members, 8, 3, 3), np.float64),
-        moved=moved_records(bodies, layouts),
+        moved=motion_records(bodies, layouts),
         motion=join_records([layout.drives.pieces for layout in layouts]),
         controls=controls,
         clock=arrays.zeros((members, 1), arrays.CLOCK),
@@ -369,7 +367,8 @@ def with_more_room(world: arrays.World) -> arrays.World:
     """Return the same world with more room for candidate pairs. Raises SceneTooLargeError."""
     used = world.pairs.size
     capacity, slots = math.ceil(GROWTH * used), world.candidates.shape[1]
-    refuse_if_too_large(scene_size(world.bodies.size, capacity, slots, has_particles=world.particles is not None))
+    has_particles = world.particles is not None
+    memory.refuse_if_too_large(memory.scene_size(world.bodies.size, capacity, slots, has_particles=has_particles))
     lists = empty_lists(capacity, slots, world.before)
     for name in ("pairs", "contacts", "candidates", "operators"):
         lists[name][:used] = getattr(world, name)
@@ -403,7 +402,7 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
             "motion_y": motion_y,
             "max_overlap": 0.0 if contact.max_overlap is None else contact.max_overlap,
             "rest_speed": time.rest_speed,
-            "model": MODEL_CODES[contact.model],
+            "model": models.MODEL_CODES[contact.model],
             "law": laws.LAW_CODES[contact.law],
             "sph_kernel": kernel,
             "particle_size": contact.particle_spacing,

@@ -6,13 +6,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, placement
-from blocksim.scenario.motion import motion_peaks, motion_pieces
-from blocksim.world import build, interactions, memory, nonsmooth, rigid_step
+from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, motion, placement
+from blocksim.world import build, interactions, memory, nonsmooth, rigid_step, systems
 from blocksim.world.bodies import Layout, division, layout_of
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
 from blocksim.world.step import Bounds, Speeds, bounds_of, speeds_of, step_of_contacts
-from blocksim.world.systems import largest_step, others_of, warnings_of
 
 # measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
@@ -102,7 +100,7 @@ class Description:
 
 def describe(scenario: Scenario) -> Description:
     """Build the scene and describe it. Raises what building it raises."""
-    layout, others = layout_of(scenario), others_of(scenario)
+    layout, others = layout_of(scenario), systems.others_of(scenario)
     count, has_rigid = len(layout.placed), scenario.time.has_rigid_contacts
     if has_rigid:
         scene = nonsmooth.build_nonsmooth(scenario)
@@ -127,19 +125,19 @@ def describe(scenario: Scenario) -> Description:
     contacts = memory.recorded_contacts(count, touching) if scenario.output.contacts else 0
     more = sum(one.count * one.system.cost.memory for one in others)
     of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
-    limits, of_others = None, largest_step(scenario)
+    limits, of_others = None, systems.largest_step(scenario)
     if scenario.time.has_springs and of_others < math.inf:
         of_blocks = step_of_contacts(layout, bounds, speeds)
         limits = StepLimits(of_blocks, of_others, scenario.contact.stiffness_scale * (of_blocks / of_others) ** 2)
-    motion = None
+    support = None
     if scenario.motion is not None:
-        peaks = motion_peaks(motion_pieces(scenario), scenario.time.end)
+        peaks = motion.motion_peaks(motion.motion_pieces(scenario), scenario.time.end)
         values = (peaks.acceleration.value, peaks.displacement.value, peaks.velocity.value)
-        motion = MotionDescription(*values, abs(peaks.final_velocity))
+        support = MotionDescription(*values, abs(peaks.final_velocity))
     return Description(
         bodies=layout.placed,
         pairs=tuple(_pairs(layout, world)),
-        motion=motion,
+        motion=support,
         step=step,
         steps=steps,
         frames=frames,
@@ -152,7 +150,7 @@ def describe(scenario: Scenario) -> Description:
         rigid=_rigid(layout, bounds, speeds, step) if has_rigid else None,
         systems={one.system.name: one.count for one in others},
         limits=limits,
-        warnings=tuple(warnings_of(scenario)),
+        warnings=tuple(systems.warnings_of(scenario)),
     )
 
 

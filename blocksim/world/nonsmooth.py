@@ -8,8 +8,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import CACHE_LINE, Records, World, zeros
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth import arrays
-from blocksim.kernels.nonsmooth.groups import LONELY
+from blocksim.kernels.nonsmooth import arrays, groups
 from blocksim.scenario import PlacedBody, Scenario, place_bodies, placement
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.world import build, memory, rigid_step, sag, step
@@ -159,18 +158,18 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
     """Return worlds (one, or a stack) with empty constraints, as many as there is room for pairs."""
     *members, bodies = world.bodies.shape
     # full groups, and those in every colour that are not
-    groups = min(capacity, capacity // WIDTH + LONELY * arrays.COLOURS)
+    count = min(capacity, capacity // WIDTH + groups.LONELY * arrays.COLOURS)
     follows = bool(stepping["is_guarded"].any())
     contacts = arrays.Contacts(
         states=zeros((*members, bodies), arrays.STATE),
         before=zeros((*members, bodies), arrays.BEFORE),
         constraints=zeros((*members, capacity), arrays.CONSTRAINT),
-        groups=zeros((*members, groups), arrays.GROUP),
+        groups=zeros((*members, count), arrays.GROUP),
         ends=build.numbers((*members, arrays.COLOURS + 1), np.int64),
         materials=world.interactions.reshape(*members, -1).view(np.recarray),
-        tallies=zeros((*members, groups // arrays.PART + 1), arrays.TALLY),
+        tallies=zeros((*members, count // arrays.PART + 1), arrays.TALLY),
         impacts=zeros((*members, bodies), arrays.IMPACT) if follows else None,
-        asides=zeros((*members, groups), arrays.ASIDE) if follows else None,
+        asides=zeros((*members, count), arrays.ASIDE) if follows else None,
         residuals=build.numbers((*members, 2, LINE_WORDS * threads), np.float64),
         stepping=stepping,
     )

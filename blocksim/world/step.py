@@ -47,10 +47,9 @@ from blocksim.kernels.common.arrays import OUTLINE
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
 from blocksim.scenario import Scenario, motion, placement
 from blocksim.scenario.models.timeline import Explicit
+from blocksim.world import excitation, systems
 from blocksim.world.bodies import Layout, Shapes
-from blocksim.world.excitation import drive_bounds, steepest_tilt
 from blocksim.world.interactions import Interactions
-from blocksim.world.systems import largest_step
 
 STABILITY_LIMIT = 2.0
 MOST_STEPS = 2**53  # beyond that a step number is no exact float
@@ -180,8 +179,8 @@ class Speeds(NamedTuple):
 
 def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
     """Return the bounds of the speeds of a scene."""
-    scenario, tilt = layout.scenario, steepest_tilt(layout.scenario)
-    driven, rise = drive_bounds(scenario)
+    scenario, tilt = layout.scenario, excitation.steepest_tilt(layout.scenario)
+    driven, rise = excitation.drive_bounds(scenario)
     given = max(bounds.speed, driven)
     for one in [event.velocity for event in scenario.events if event.velocity is not None]:
         size = max((math.hypot(block.size_x, block.size_y) for block in scenario.blocks.values()), default=0.0)
@@ -290,7 +289,7 @@ def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str
 def expected_load(layout: Layout, bounds: Bounds, speeds: Speeds) -> ContactLoad:
     """Return the speed that the fastest point may reach by falling, or by sliding all the time, and the weight."""
     scenario, push = layout.scenario, layout.applied.push
-    along = scenario.gravity * math.sin(steepest_tilt(scenario)) + push
+    along = scenario.gravity * math.sin(excitation.steepest_tilt(scenario)) + push
     speed = speeds.given + speeds.fall + along * scenario.time.end
     return ContactLoad(speed, (scenario.gravity + push) * bounds.mass)
 
@@ -324,7 +323,7 @@ def choose_stride(layout: Layout, bounds: Bounds) -> Stride:
         speed = speeds.greatest + speeds.support
         share = TRAVEL_SHARE_OF_PARTICLES if has_particles else TRAVEL_SHARE
         of_travel = share * bounds.smallest / speed if speed > 0.0 else math.inf
-        limit = min(step_of_contacts(layout, bounds, speeds), of_travel, largest_step(scenario))
+        limit = min(step_of_contacts(layout, bounds, speeds), of_travel, systems.largest_step(scenario))
     limit = min(limit, time.end)
     step = limit if time.step == "auto" else time.step
     refuse_uncountable(time.end, step)
@@ -333,7 +332,7 @@ def choose_stride(layout: Layout, bounds: Bounds) -> Stride:
         raise StepError(f'{message}; use step = "auto", or force_step = true to override', limit)
     approach = 0.0
     if not has_particles:
-        default = placement.length_beside(bounds.smallest) * SKIN_SHARE
+        default = placement.reference_length(bounds.smallest) * SKIN_SHARE
         way = APPROACH_STEPS * step * speeds.greatest
         approach = min(max(way, LEAST_APPROACH * default), MOST_APPROACH * default)
     return Stride(step, choose_skin(layout, bounds, speeds, step), approach)
@@ -357,7 +356,7 @@ def choose_skin(layout: Layout, bounds: Bounds, speeds: Speeds, step: float) -> 
     skin = contact.skin
     if skin is None:
         share = SKIN_SHARE_OF_PARTICLES if contact.model != "surface" and has_springs else SKIN_SHARE
-        return placement.length_beside(bounds.smallest) * share
+        return placement.reference_length(bounds.smallest) * share
     speed = speeds.greatest + speeds.support
     nearer = 2.0 * speed * step  # a list holds for one step at least, even where it is updated at every one
     least = (RESERVE if has_springs else 1.0) * nearer

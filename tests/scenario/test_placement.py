@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
 from blocksim.scenario.overrides import freeze
-from blocksim.scenario.placement import LENGTH_WITHOUT_BLOCKS, PlacedBody, length_beside, smallest_width
+from blocksim.scenario.placement import LENGTH_WITHOUT_BLOCKS, PlacedBody, reference_length, smallest_width
 from tests.scenario.conftest import MATERIAL, data_of
 
 BRICK = {"width": "32 mm", "height": "25 mm", "length": "50 mm", "material": "aluminium"}
@@ -119,8 +119,8 @@ def test_structures_line_up_the_bounding_boxes_of_outlines() -> None:
 
 
 def test_lengths_where_there_are_no_blocks_are_finite_and_those_of_blocks_as_they_are() -> None:
-    assert length_beside(smallest_width([])) == length_beside(-math.inf) == LENGTH_WITHOUT_BLOCKS
-    assert length_beside(0.025) == 0.025
+    assert reference_length(smallest_width([])) == reference_length(-math.inf) == LENGTH_WITHOUT_BLOCKS
+    assert reference_length(0.025) == 0.025
 
 
 @given(st.floats(1e-3, 1.0), st.floats(1e-3, 1.0), st.floats(1e-3, 1.0), st.floats(500.0, 8000.0))

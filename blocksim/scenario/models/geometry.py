@@ -20,6 +20,7 @@ SIDES: tuple[Side, ...] = ("width", "height", "length")
 RECTANGLE_KEYS = (*SIDES, "upright", "along")
 OUTLINE_KEYS = {"outline": ("outline", "depth"), "sides": ("sides", "radius", "depth")}
 """What a block needs that is no rectangle, by the key that tells so."""
+COUNTS = {"minItems": geometry.FEWEST, "maxItems": geometry.MOST}  # of the corners of an outline
 ABSENT = object()  # in place of a value that is missing
 Point = tuple[q.Length, q.Length]
 
@@ -84,7 +85,7 @@ class Block(Table):
         "corners [x, y] of a convex block, in either sense, in place of width, height and length; "
         "x and y of a body are those of its centroid",
         None,
-        json_schema_extra={"minItems": geometry.FEWEST, "maxItems": geometry.MOST},
+        json_schema_extra=COUNTS,
     )
     sides: Annotated[int, Whole(geometry.FEWEST, geometry.MOST)] | None = setting(
         "number of sides of a regular block, the lowest level, in place of an outline", None

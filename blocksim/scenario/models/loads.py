@@ -123,7 +123,7 @@ HISTORIES: dict[str, type[base.Table]] = base.by_kind(AnyHistory)
 """Class by kind, as written in a scenario."""
 
 
-Axes = Literal["world", "body"]
+Axes = Annotated[Literal["world", "body"], base.OneOf(("world", "body"))]
 Face = Literal["left", "right", "top", "bottom"]
 FACES: tuple[Face, ...] = get_args(Face)
 WATER = 9810.0  # N/m³; unit weight of water
@@ -149,9 +149,7 @@ class Force(VaryingLoad):
     body: str = BODY
     magnitude: q.Force = setting("size of the force; negative against its direction")
     direction: q.Angle = setting("direction, counter-clockwise from +x of the axes", 0.0)
-    axes: Annotated[Axes, base.OneOf(get_args(Axes))] = setting(
-        "axes of the direction: world, or body, with which it turns", "world"
-    )
+    axes: Axes = setting("axes of the direction: world, or body, with which it turns", "world")
     point: geometry.Point = setting("[x, y] of its point in the body, from the centre", (0.0, 0.0))
 
 

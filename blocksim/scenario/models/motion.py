@@ -286,7 +286,7 @@ class Pulse(Table):
             raise q.invalid(message, "cycles")
 
 
-Course = Literal["constant", "smooth"]
+Course = Annotated[Literal["constant", "smooth"], OneOf(("constant", "smooth"))]
 MOST_BODY_TABLES = 16
 """Different tables of motion of bodies, which are copied into the folder of a run."""
 
@@ -299,9 +299,7 @@ class Ramp(Table):
     direction: q.Angle = setting("direction of the motion, counter-clockwise from +x", 0.0)
     duration: q.PositiveTime | None = setting("time from start to end; give this or speed", None)
     speed: q.PositiveSpeed | None = setting("greatest speed; give this or duration", None)
-    course: Annotated[Course, OneOf(get_args(Course))] = setting(
-        "constant (at once at full speed) or smooth (starts and ends without a jerk)", "constant"
-    )
+    course: Course = setting("constant (at once at full speed) or smooth (starts and ends without a jerk)", "constant")
     start: q.NonNegativeTime = setting("start of the motion; the body rests before", 0.0)
 
     def _check(self) -> None:
@@ -318,9 +316,7 @@ class Rotation(Table):
     )
     duration: q.PositiveTime | None = setting("time from start to end; give this or spin", None)
     spin: q.PositiveSpin | None = setting("greatest angular velocity; give this or duration", None)
-    course: Annotated[Course, OneOf(get_args(Course))] = setting(
-        "constant (at once at full spin) or smooth (starts and ends without a jerk)", "constant"
-    )
+    course: Course = setting("constant (at once at full spin) or smooth (starts and ends without a jerk)", "constant")
     start: q.NonNegativeTime = setting("start of the motion; the body rests before", 0.0)
 
     def _check(self) -> None:

@@ -131,16 +131,13 @@ class PolygonStructure(Structure):
     def divide(self) -> Sequence[Cell]:
         """Return all blocks, wherever they are; raises UnfitError where keys do not make blocks."""
 
-    def shift(self, cells: Sequence[Cell]) -> geometry.Corner:
-        """Return how far all blocks move (m) from where `divide` has them."""
-        low, _ = geometry.box_of([corner for cell in cells for corner in cell.corners])
-        return self.left - low[0], self.bottom - low[1]
-
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
         """All blocks where they start; raises UnfitError."""
         cells = self.divide()
-        dx, dy = self.shift(cells)
+        (x, y), _ = geometry.box_of([corner for cell in cells for corner in cell.corners])
+        is_in_place = getattr(self, "in_place", False)  # as of drawings that keep their coordinates
+        dx, dy = (0.0, 0.0) if is_in_place else (self.left - x, self.bottom - y)
         cells = tuple(cell._replace(corners=[(x + dx, y + dy) for x, y in cell.corners]) for cell in cells)
         for number, cell in enumerate(cells, start=1):
             for _, message in geometry.faults(cell.corners):

@@ -9,7 +9,7 @@ from pydantic import ConfigDict
 
 from blocksim.scenario import geometry, units as q
 from blocksim.scenario.models.base import Whole, require_one, setting
-from blocksim.scenario.models.geometry import Point
+from blocksim.scenario.models.geometry import COUNTS, Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure, Seed, UnfitError, draws
 
 MOST_VOUSSOIRS = 1000
@@ -57,19 +57,15 @@ class Arch(PolygonStructure):
             raise UnfitError("count", f"a voussoir of {math.degrees(self.embrace / self.count):.4g} deg is not convex")
         inner, outer = self.mean_radius - 0.5 * self.thickness, self.mean_radius + 0.5 * self.thickness
         joints = [0.5 * math.pi + self.embrace * (0.5 - number / self.count) for number in range(self.count + 1)]
-        ends = [(_at(inner, angle), _at(outer, angle)) for angle in joints]
+        ways = [(math.cos(angle), math.sin(angle)) for angle in joints]
+        ends = [((inner * c, inner * s), (outer * c, outer * s)) for c, s in ways]
         cells = [Cell([one[0], other[0], other[1], one[1]]) for one, other in pairwise(ends)]
         inner, outer = (self.mean_radius + 0.5 * sign * ABUTMENT * self.thickness for sign in (-1.0, 1.0))
-        for angle, way in ((joints[0], 1.0), (joints[-1], -1.0)) if self.abutments else ():  # behind it, to this side
-            back = way * self.thickness
-            dx, dy = -back * math.sin(angle), back * math.cos(angle)
-            (x0, y0), (x1, y1) = _at(inner, angle), _at(outer, angle)
+        for (c, s), side in ((ways[0], 1.0), (ways[-1], -1.0)) if self.abutments else ():  # behind it, to this side
+            dx, dy = -side * self.thickness * s, side * self.thickness * c
+            x0, y0, x1, y1 = inner * c, inner * s, outer * c, outer * s
             cells.append(Cell([(x0, y0), (x1, y1), (x1 + dx, y1 + dy), (x0 + dx, y0 + dy)], fixed=True))
         return cells
-
-
-def _at(radius: float, angle: float) -> geometry.Corner:
-    return radius * math.cos(angle), radius * math.sin(angle)
 
 
 MOST_DRUMS = 1000
@@ -119,9 +115,7 @@ class Voronoi(PolygonStructure):
     width: q.PositiveLength | None = setting("width of a wall; give this and height, or region", None)
     tall: q.PositiveLength | None = setting("height of a wall", None, alias="height")
     region: tuple[Point, ...] | None = setting(
-        "corners [x, y] of a convex region, such as a slope",
-        None,
-        json_schema_extra={"minItems": geometry.FEWEST, "maxItems": geometry.MOST},
+        "corners [x, y] of a convex region, such as a slope", None, json_schema_extra=COUNTS
     )
     seed: Seed = setting("seed of the random points", 1)
     relax: Annotated[int, Whole(0, 20)] = setting(

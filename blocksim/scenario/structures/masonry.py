@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -46,7 +46,7 @@ class Staircase(Structure):
         return _pile(self, block, self.count, block.size_x - self.overlap)
 
 
-Bond = Literal["running", "stack"]
+Bond = Annotated[Literal["running", "stack"], base.OneOf(("running", "stack"))]
 
 
 def _hole(value: object) -> object:
@@ -68,9 +68,7 @@ class BlockWall(Courses):
 
     kind: Literal["wall"] = setting("kind of structure")
     columns: Count = setting("number of blocks in a course")
-    bond: Annotated[Bond, base.OneOf(get_args(Bond))] = setting(
-        "running: every second course is shifted by half a block; stack: none is", "running"
-    )
+    bond: Bond = setting("running: every second course is shifted by half a block; stack: none is", "running")
     gap: q.NonNegativeLength = setting("gap between neighbours in a course", 0.0)
     holes: tuple[Hole, ...] = setting("blocks to leave out, [row, column] from 1, the lowest and leftmost first", ())
     missing: q.Share = setting("share of the other blocks to leave out at random", 0.0)

@@ -1,7 +1,4 @@
-"""Outlines of blocks in drawings: polygons of a GeoJSON file and closed polylines of a DXF file.
-
-Blocks by their corners where they are: written out, or taken from a drawing.
-"""
+"""Blocks by their corners where they are: written out, or from polygons in GeoJSON or closed polylines in DXF."""
 
 import json
 import math
@@ -15,7 +12,7 @@ from blocksim.errors import BlocksimError
 from blocksim.extras import load_module
 from blocksim.scenario import geometry, input_files, units as q
 from blocksim.scenario.models.base import Identifier, Table, setting, table_path
-from blocksim.scenario.models.geometry import Point
+from blocksim.scenario.models.geometry import COUNTS, Point
 from blocksim.scenario.structures.base import Cell, PolygonStructure
 
 MOST_BYTES = 20 * input_files.MEGABYTE
@@ -165,10 +162,7 @@ MOST_SHRINK = 0.01  # of the least width of a block
 class DrawnBlock(Table):
     """One block of a drawing."""
 
-    outline: tuple[Point, ...] = setting(
-        "corners [x, y] of a convex block, in either sense",
-        json_schema_extra={"minItems": geometry.FEWEST, "maxItems": geometry.MOST},
-    )
+    outline: tuple[Point, ...] = setting("corners [x, y] of a convex block, in either sense", json_schema_extra=COUNTS)
     block: str | None = setting("the name of its block (default: that of the structure)", None)
     fixed: bool = setting("true for a body that never moves", default=False)
     name: Identifier | None = setting("name in tables (default: its number, from 1)", None)
@@ -239,7 +233,3 @@ class Polygons(PolygonStructure):
             outlines = [geometry.shrink_outline(one, self.shrink) for one in outlines]
         named = zip(outlines, self.cells_given, strict=True)
         return [Cell(outline, one.fixed, one.block, one.name) for outline, one in named]
-
-    def shift(self, cells: Sequence[Cell]) -> geometry.Corner:
-        """Return how far all blocks move (m)."""
-        return (0.0, 0.0) if self.in_place else super().shift(cells)

@@ -293,7 +293,7 @@ def read_frames(path: Path, scenario: Scenario) -> trajectory.Frames:
 
     Raises InputMissingError, or InvalidInputError when the file is not one of ours, damaged or still empty.
     """
-    systems = (blocks.blocks_placed(place_bodies(scenario)), *others_of(scenario))
+    systems = (blocks.block_system(place_bodies(scenario)), *others_of(scenario))
     time_step, rows = read_rows(path, systems)
     return instruments.frames_from_rows(systems, time_step, rows)
 

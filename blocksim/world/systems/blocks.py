@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import PlacedBody, Scenario, place_bodies, placement
-from blocksim.scenario.motion import displacement_and_velocity, motion_direction, motion_pieces
+from blocksim.scenario import PlacedBody, Scenario, motion, place_bodies, placement
 from blocksim.world.systems import system
 
 MILLI, DEGREES = 1e3, float(np.degrees(1.0))
@@ -138,13 +137,13 @@ BLOCKS = system.System(
         system.Channel("spin", "rad/s", "angular velocity", "spin_deg_s", DEGREES),
         system.Channel("kinetic_energy", "J", "kinetic energy", "kinetic_energy_J", formula=kinetic_energy),
     ),
-    elements=lambda scenario: blocks_placed(place_bodies(scenario)).elements,
+    elements=lambda scenario: block_system(place_bodies(scenario)).elements,
     state=lambda world, count: motion_of(world.bodies[:count]),
     outlines=corners,
 )
 
 
-def blocks_placed(placed: Sequence[PlacedBody]) -> system.SystemInScene:
+def block_system(placed: Sequence[PlacedBody]) -> system.SystemInScene:
     """Return the blocks of a scene that were placed so."""
     constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
     start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
@@ -182,8 +181,8 @@ def supports_track(scenario: Scenario, blocks: system.Track, times: system.Float
     quads, walls = support_quads(scenario, blocks), len(placement.wall_segments(scenario))
     names = (*["ground"] * (len(quads) - walls), *(f"wall {k}" for k in range(1, walls + 1)))
     elements = system.Elements(names, quads.reshape(-1, 8).T, np.zeros((len(SUPPORT_QUANTITIES), len(quads))))
-    motion = np.concatenate(support_motion(scenario, times), axis=1)
-    values = np.repeat(motion[:, :, None], len(names), axis=2)
+    course = np.concatenate(support_motion(scenario, times), axis=1)
+    values = np.repeat(course[:, :, None], len(names), axis=2)
     return system.Track(system.SystemInScene(SUPPORTS, elements), values)
 
 
@@ -194,8 +193,8 @@ def support_quads(scenario: Scenario, blocks: system.Track) -> system.Floats:
     have been, or beyond the ends of walls without any; a wall has a thickness behind its face.
     """
     walls = placement.wall_segments(scenario)
-    thick = THICKNESS * placement.length_beside(np.minimum(blocks["size_x"], blocks["size_y"]).min(initial=np.inf))
-    beyond = BEYOND * placement.length_beside(np.hypot(blocks["size_x"], blocks["size_y"]).max(initial=-np.inf))
+    thick = THICKNESS * placement.reference_length(np.minimum(blocks["size_x"], blocks["size_y"]).min(initial=np.inf))
+    beyond = BEYOND * placement.reference_length(np.hypot(blocks["size_x"], blocks["size_y"]).max(initial=-np.inf))
     profile = np.array(scenario.ground.profile or ()).reshape(-1, 2)
     places = blocks["x"][np.isfinite(blocks["x"])]
     if not places.size:
@@ -216,6 +215,6 @@ def support_motion(scenario: Scenario, times: system.Floats) -> tuple[system.Flo
     """Return displacement (m) and velocity (m/s) of ground and walls along x and y at these times (s), (n, 2) each."""
     if scenario.motion is None:
         return np.zeros((len(times), 2)), np.zeros((len(times), 2))
-    along = motion_direction(scenario)
-    displacement, velocity = displacement_and_velocity(motion_pieces(scenario), times)
+    along = motion.motion_direction(scenario)
+    displacement, velocity = motion.displacement_and_velocity(motion.motion_pieces(scenario), times)
     return np.multiply.outer(displacement, along), np.multiply.outer(velocity, along)

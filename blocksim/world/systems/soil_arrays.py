@@ -9,9 +9,8 @@ from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.systems import Stages
 from blocksim.kernels.soil import arrays, contact, energy, step
 from blocksim.kernels.sph.functions import WENDLAND_SUPPORT
-from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments
+from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments, start
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.start import soil_tables
 from blocksim.world import build, interactions
 from blocksim.world.systems import soils
 
@@ -27,13 +26,13 @@ FEW_TOUCHES = 128
 
 def build_soils(scenario: Scenario) -> arrays.Soils:
     """Return the arrays of the soils of a scenario at time zero."""
-    tables, places = soil_tables(scenario), soils.places_of(scenario)
-    start = soils.elements_of(scenario).start
-    n = start.shape[1]
+    tables, places = start.soil_tables(scenario), soils.places_of(scenario)
+    initial = soils.elements_of(scenario).start
+    n = initial.shape[1]
     points, states = zeros(n, arrays.POINT), zeros(n, arrays.STATE)
     for number, quantity in enumerate(soils.QUANTITIES):
         holder = points if number < 4 else states
-        holder[quantity.name] = start[number]
+        holder[quantity.name] = initial[number]
     states["number"] = np.arange(n)
     states["kind"] = np.repeat(np.arange(len(tables)), [len(one) for one in places])
     groups = math.ceil(n / arrays.GROUP)

@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, resolve_pair
+from blocksim.scenario import GROUND, Scenario, geometry, overrides, place_bodies, resolve_pair, start
 from blocksim.scenario.models import contact, timeline
 from blocksim.scenario.models.geometry import Material
 from blocksim.scenario.models.soil import SoilTable
-from blocksim.scenario.start import soil_tables
 from blocksim.world.systems import blocks, system
 
 MILLI, KILO = 1e3, 1e-3
@@ -122,7 +121,7 @@ def geostatic_stress(scenario: Scenario, table: SoilTable, places: system.Floats
         return stress
     weight = np.zeros(len(places))
     gravity = scenario.gravity * math.cos(scenario.ground.tilt)
-    for other in soil_tables(scenario):
+    for other in start.soil_tables(scenario):
         density = scenario.materials[other.material].density
         weight += density * gravity * geometry.height_above(other.corners, places)
     at_rest = earth_pressure_at_rest(scenario.materials[table.material])
@@ -133,7 +132,7 @@ def geostatic_stress(scenario: Scenario, table: SoilTable, places: system.Floats
 
 def weak_thrusts(scenario: Scenario) -> Iterator[str]:
     """Yield a warning for each soil beside blocks that may yield, whose thrust on them is known to be too small."""
-    for soil in soil_tables(scenario):
+    for soil in start.soil_tables(scenario):
         rows = geometry.count_across(soil.corners, soil.spacing)[1]
         per_row, less = LACK[soil.gradient]
         share = per_row / rows - less
@@ -304,22 +303,22 @@ SHADES = (
 
 def places_of(scenario: Scenario) -> list[system.Floats]:
     """Return the places (m, (n, 2)) of the particles of each soil."""
-    return [geometry.fill_lattice(table.corners, table.spacing) for table in soil_tables(scenario)]
+    return [geometry.fill_lattice(table.corners, table.spacing) for table in start.soil_tables(scenario)]
 
 
 def elements_of(scenario: Scenario) -> system.Elements:
     """Return the particles of all soils of a scenario."""
-    tables, places = soil_tables(scenario), places_of(scenario)
+    tables, places = start.soil_tables(scenario), places_of(scenario)
     soils = [*zip(tables, places, strict=True)]
     names = tuple(f"{table.name}.{number}" for table, one in soils for number in range(1, len(one) + 1))
     depth = depth_of_scene(scenario)
     each = [scenario.materials[table.material].density * table.spacing**2 * depth for table in tables]
     masses = np.repeat(each, [len(one) for one in places])
     constants = np.stack([masses, np.full(len(names), tables[0].spacing)])
-    start = np.zeros((len(QUANTITIES), len(names)))
-    start[:2] = np.concatenate(places).T
-    start[4:8] = np.concatenate([geostatic_stress(scenario, *one) for one in soils], axis=1)
-    return system.Elements(names, constants, start)
+    initial = np.zeros((len(QUANTITIES), len(names)))
+    initial[:2] = np.concatenate(places).T
+    initial[4:8] = np.concatenate([geostatic_stress(scenario, *one) for one in soils], axis=1)
+    return system.Elements(names, constants, initial)
 
 
 def _state(soils: Any, count: int) -> system.Floats:
@@ -332,7 +331,7 @@ def _state(soils: Any, count: int) -> system.Floats:
 
 
 def _largest_step(scenario: Scenario) -> float:
-    tables = soil_tables(scenario)
+    tables = start.soil_tables(scenario)
     usual = float(timeline.Explicit.model_fields["safety"].default)
     finer = min(1.0, float(getattr(scenario.time, "safety", usual)) / usual)  # a finer step is finer for all
     courant = COURANT * finer
@@ -370,8 +369,8 @@ SOILS = system.System(
     largest_step=_largest_step,
     stages=lambda: soil_kernels().STAGES,
     cost=COST,
-    dearer=lambda scenario: max(GRADIENT_COST[table.gradient] for table in soil_tables(scenario)),
-    parts=lambda scenario: tuple(table.name for table in soil_tables(scenario)),
+    dearer=lambda scenario: max(GRADIENT_COST[table.gradient] for table in start.soil_tables(scenario)),
+    parts=lambda scenario: tuple(table.name for table in start.soil_tables(scenario)),
     touching=body_contacts,
     shades=SHADES,
     ending=final_table,
