@@ -71,11 +71,11 @@ def limit_command(
             screen.note(f"{answer.with_unit(value, plan.unit)}: {verdict.value} ({row['reason']})")
 
         def tell_search(plan: limit_plan.LimitPlan) -> None:
-            scale, step = (plan.apart.get(key) for key in (limit.STIFFNESS, limit.STEP))
+            scale, step = (plan.apart.get(key) for key in (limit.STIFFNESS, limit_answer.STEP))
             if scale is not None:
                 changed = f"springs shift this limit, or may: once more with {limit.STIFFNESS} = {scale:g}"
             else:
-                changed = f"both sides once more with half the time step, {limit.STEP} = {step:.3g} s"
+                changed = f"both sides once more with half the time step, {limit_answer.STEP} = {step:.3g} s"
             screen.note(changed)
 
         out, stiffer = options.out, options.stiffer

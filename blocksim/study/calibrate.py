@@ -23,7 +23,6 @@ from blocksim.study.executors.ensemble import run_members
 
 TABLES: tuple[KeyPath, ...] = (("experiment", "table"), ("motion", "table"), ("sweep", "table"))
 NOTE = "calibrated, see [provenance]"
-GAP = "  "
 _COMMENT = re.compile(r"""([^#"']*?)(\s*)(?:#\s*(.*?)\s*)?""")
 """What stands behind a value: the end of its list or table, blanks, and a comment."""
 
@@ -101,7 +100,7 @@ def _edited(text: str, path: KeyPath, data: Mapping[str, object], note: str) -> 
     if note and comment is not None:
         told = note if known == path else f"{path[-1]} {note}"
         before = f"; before: {comment[3]}" if comment[3] else ""
-        gap = " " * max(len(GAP), span.length + len(comment[2]) - len(value))  # the comment stays in its column
+        gap = " " * max(2, span.length + len(comment[2]) - len(value))  # the comment stays in its column
         rest = f"{comment[1]}{gap}# {told}{before}"
     lines[span.line - 1] = line[: span.column] + value + rest
     return "\n".join(lines)
@@ -116,9 +115,6 @@ def toml_value(value: object) -> str:
     return tomli_w.dumps({"v": value}).removeprefix("v = ").rstrip("\n")
 
 
-WRITTEN = "scenario.toml"
-JOURNAL = ".trials.jsonl"
-NEEDED = ("optuna", "scipy.stats.qmc")  # before anything is written
 TAKEN = "{}: already exists; --overwrite replaces it, --out FILE writes elsewhere"
 
 
@@ -201,11 +197,25 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
     options.on_start(schemes.kernels_of(plan.base))
     resume, overwrite = options.resume, options.overwrite
     name = hashlib.sha256(str(plan.fingerprint()).encode()).hexdigest()[:12]
-    path = Path(options.out or files.RESULTS / plan.base.name / f"calibrate-{name}" / WRITTEN)
-    journal = path.parent / (path.stem + JOURNAL)
-    for package in NEEDED:
+    path = Path(options.out or files.RESULTS / plan.base.name / f"calibrate-{name}" / "scenario.toml")
+    journal = path.parent / f"{path.stem}.trials.jsonl"
+    for package in ("optuna", "scipy.stats.qmc"):  # before anything is written
         load_module(package, calibrate_plan.PURPOSE)
-    _make_room(path, journal, resume=resume, overwrite=overwrite)
+    if path.is_dir():
+        raise OutputExistsError(f"{path}: this is a folder; a file name is needed")
+    has_trials = journal.exists() and journal.stat().st_size > 0
+    if path.exists() and not overwrite and not (resume and has_trials):
+        raise OutputExistsError(TAKEN.format(path))
+    if has_trials and not (resume or overwrite):
+        how = "--resume continues them, --overwrite starts again"
+        raise OutputExistsError(f"{journal}: has trials of a calibration; {how}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if overwrite and not resume and journal.exists():
+            calibrate_plan.refuse_other_file(journal)
+            journal.unlink()
+    except OSError as error:
+        raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
     kept = path if path.exists() and not overwrite else None
     best, ties = _searched(plan, journal, options, kept)
     count = 1 if plan.scatter is None else options.fresh_members
@@ -223,26 +233,6 @@ def calibrate(scenario: Source, options: calibrate_plan.CalibrateOptions) -> Fit
     elif kept.read_bytes() != text.encode():
         raise OutputExistsError(TAKEN.format(kept))
     return fit
-
-
-def _make_room(path: Path, journal: Path, *, resume: bool, overwrite: bool) -> None:
-    """Make the folder, and room in it. Raises OutputExistsError for files that must not go."""
-    if path.is_dir():
-        raise OutputExistsError(f"{path}: this is a folder; a file name is needed")
-    has_trials = journal.exists() and journal.stat().st_size > 0
-    if path.exists() and not overwrite and not (resume and has_trials):
-        raise OutputExistsError(TAKEN.format(path))
-    if has_trials and not (resume or overwrite):
-        raise OutputExistsError(
-            f"{journal}: has trials of a calibration; --resume continues them, --overwrite starts again"
-        )
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if overwrite and not resume and journal.exists():
-            calibrate_plan.refuse_other_file(journal)
-            journal.unlink()
-    except OSError as error:
-        raise OutputExistsError(f"{path.parent}: cannot be created: {error.strerror}") from error
 
 
 def _searched(

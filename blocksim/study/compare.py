@@ -10,10 +10,8 @@ from blocksim.analysis.metrics import Judgement, Settings, judge
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option
 from blocksim.scenario import load_scenario, load_stored
-from blocksim.simulation import Result, files
-from blocksim.simulation.results import read_final, read_summary
+from blocksim.simulation import Result, files, results
 from blocksim.study import manifest, rows, run_folder, sweep_folder
-from blocksim.study.manifest import SweepResult
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +25,9 @@ ExperimentTablePath = Annotated[
 
 
 @overload
-def compare(run: SweepResult, experiment: Path | str | None = None, settings: Settings | None = None) -> Judgement: ...
+def compare(
+    run: manifest.SweepResult, experiment: Path | str | None = None, settings: Settings | None = None
+) -> Judgement: ...
 
 
 @overload
@@ -41,7 +41,7 @@ def compare(
 
 
 def compare(
-    run: "SweepResult | Result | pd.DataFrame | Path | str",
+    run: "manifest.SweepResult | Result | pd.DataFrame | Path | str",
     experiment: Path | str | None = None,
     settings: Settings | None = None,
 ) -> Comparison | Judgement:
@@ -49,20 +49,20 @@ def compare(
 
     A run is what `compare_run` takes; `settings` are for sweeps. Raises what `compare_run` and `compare_sweep` raise.
     """
-    if isinstance(run, SweepResult) or (isinstance(run, Path | str) and manifest.is_sweep(run)):
+    if isinstance(run, manifest.SweepResult) or (isinstance(run, Path | str) and manifest.is_sweep(run)):
         return compare_sweep(run, experiment, settings)
     return compare_run(run, experiment)
 
 
 def compare_sweep(
-    sweep: SweepResult | Path | str, experiment: Path | str | None = None, settings: Settings | None = None
+    sweep: manifest.SweepResult | Path | str, experiment: Path | str | None = None, settings: Settings | None = None
 ) -> Judgement:
     """Judge the cases of a sweep by its table and an experiment's; by default that of the scenario.
 
     Raises InputMissingError without any experiment, InvalidInputError for tables that cannot be used or do not go with
     each other, UnavailableError without scipy.
     """
-    result = sweep if isinstance(sweep, SweepResult) else manifest.read_sweep(Path(sweep))
+    result = sweep if isinstance(sweep, manifest.SweepResult) else manifest.read_sweep(Path(sweep))
     plan = result.folder / sweep_folder.PLAN
     scenario = load_stored(plan) if plan.exists() else None
     table = experiment or (scenario.experiment.table if scenario is not None and scenario.experiment else None)
@@ -93,8 +93,9 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
         name, summary, final, named = "", None, run, None
     else:
         folder = run_folder.find_run(run)
-        name, summary, was = str(folder), read_summary(folder / files.SUMMARY), load_stored(folder / files.SCENARIO)
-        final = read_final(folder, was) if summary.status == rows.FINISHED else {}
+        name, summary = str(folder), results.read_summary(folder / files.SUMMARY)
+        was = load_stored(folder / files.SCENARIO)
+        final = results.read_final(folder, was) if summary.status == rows.FINISHED else {}
         # a scenario file may name another table by now than it did when it was run
         now = (load_scenario(run) if Path(run).is_file() else was).experiment
         named = now.table if now else None

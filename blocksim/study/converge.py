@@ -41,8 +41,8 @@ DIGITS = 6  # of a level's value, so that the value that is reported gives the s
 ROUND_OFF_MM = 1e-6  # a smaller change says nothing about the order
 SHRINKING = 0.75  # a change is at most this part of the one before it where changes shrink
 MILLI = 1e3
+AXES = ("x_mm", "y_mm", "rotation_deg")
 ANOTHER_FACE_DEG = 45.0  # turned by more, a block ends on another of its sides
-COORDINATES = ("x_mm", "y_mm", "rotation_deg")
 NO_COORDINATES = np.zeros(0)
 Floats = NDArray[np.float64]
 
@@ -177,7 +177,7 @@ class Coordinates:
         """Return final x, y (mm) and rotation (degrees) of every block, None where the run did not finish."""
         if row["status"] != FINISHED:
             return None
-        table = np.array([[row[f"{block}.{name}"] for block in self.blocks] for name in COORDINATES], dtype=float)
+        table = np.array([[row[f"{block}.{name}"] for block in self.blocks] for name in AXES], dtype=float)
         return table[0], table[1], table[2]
 
     def point(self, row: Row) -> Floats:
@@ -258,7 +258,6 @@ def verdict_of(levels: Sequence[Level], tolerance_mm: float) -> ConvergenceVerdi
     return ConvergenceVerdict.NOT_YET if shrinks else ConvergenceVerdict.SCATTERED
 
 
-FOLDER = "converge"
 SOIL_SPACING = "soils.spacing"
 TOLERANCE_MM = 0.1
 LEVELS = 4  # refinements of the scenario's own value
@@ -317,7 +316,7 @@ def converge(scenario: Source, options: ConvergeOptions) -> Convergence:
     schemes.build_scene(scenario)
     refinements = refinements_of(scenario, studies)
     schemes.compile_kernels(schemes.kernels_of(scenario))
-    folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / FOLDER
+    folder = Path(options.out) if options.out is not None else files.RESULTS / scenario.name / "converge"
     runs = LevelRuns(scenario, folder, options.jobs or os.cpu_count() or 1, options.on_run)
     found = runs.refine(refinements, tolerance_mm, levels)
     notes, recommended = runs.notes(studies), None  # notes are about the levels

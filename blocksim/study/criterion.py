@@ -16,15 +16,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import units as q
-from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario import spelling, units as q
 from blocksim.simulation import observables, results
 from blocksim.study.rows import FINISHED
 
 STANDS = "--stands"
 DEFAULT = "outcome = stands | rocked back"
 FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|==?|<|>)\s*(.*?)\s*")
-MOVED = "moved"
 UNITS = {  # of observables: kind, units in one of SI
     "mm": (q.LENGTH, 1e3),
     "deg": (q.ANGLE, math.degrees(1.0)),
@@ -96,12 +94,13 @@ def _condition(text: str) -> tuple[Callable[[Mapping[str, object]], bool], list[
     word, sign, value = match[1], match[2].replace("==", "="), match[3]
     known = {one.word: one for one in observables.OBSERVABLES.values() if one.word}
     if word not in known:
-        raise ValueError(f"unknown quantity '{word}', {did_you_mean_or_list(word, known)}")
+        raise ValueError(f"unknown quantity '{word}', {spelling.did_you_mean_or_list(word, known)}")
     name = known[word].name
     if choices := set(known[word].choices):
         named = {part.strip() for part in value.split("|")}
         if unknown := sorted(named - choices):
-            raise ValueError(f"unknown {word} '{unknown[0]}', {did_you_mean_or_list(unknown[0], sorted(choices))}")
+            hint = spelling.did_you_mean_or_list(unknown[0], sorted(choices))
+            raise ValueError(f"unknown {word} '{unknown[0]}', {hint}")
         if sign not in ("=", "!="):
             raise ValueError(f"an {word} is compared with = or !=")
         allowed = named if sign == "=" else choices - named
@@ -114,4 +113,4 @@ def _condition(text: str) -> tuple[Callable[[Mapping[str, object]], bool], list[
     if dimension != kind.dimension:
         raise ValueError(f'{kind.name} is needed, such as "{kind.example}"')
     limit = number * units
-    return lambda row: compare(float(str(row[name])), limit), [number] if word == MOVED else []
+    return lambda row: compare(float(str(row[name])), limit), [number] if word == "moved" else []

@@ -15,7 +15,7 @@ dissertation, Stanford 2003): member i has record i modulo their number. Curves 
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
@@ -49,7 +49,6 @@ NO_SCATTER = (
     "no scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO, KEY=a,b,c), --stripes KEY=a,b,c, or a [sweep] table with "
     "distributions"
 )
-OnRow = Callable[[int, int, rows.Row], None]
 MEMBERS_TABLE = "members.csv"
 DIGITS = 3
 DOUBTFUL = 0.05  # probability of a larger deviance below which counts and curve do not agree
@@ -128,7 +127,7 @@ class FragilityOptions(executors.Execution):
         Path | str | None, Option("Folder to write (default: results/NAME/fragility-HASH).", metavar="DIR")
     ] = None
     overwrite: Overwrite = False
-    on_row: OnRow = silent
+    on_row: sweep.OnRow = silent
 
 
 @dataclass(frozen=True)

@@ -61,11 +61,9 @@ MOST_LEVELS = 4  # stiffnesses
 MOST_PICTURED = 3  # brackets whose sides are kept
 SHARPER = 0.8  # of the tolerance: what is extrapolated from two brackets is wider than the narrower one
 HALF = 0.5
-STEP = "time.step"
 NO_STIFFER = "with springs {ratio:g} times as stiff there is no such limit in the range"
 NO_FINER = "with half the time step there is no such limit in the range"
 STILL_FAR = "limits of the last two stiffnesses are too far apart to be extrapolated well; give stiffer springs"
-BOTH = {Stability.STANDS, Stability.FALLS}
 STANDS = observables.Response.STANDS.value
 OnOther = Callable[[LimitPlan], None]
 OnLimit = Callable[[float, limit_answer.LimitAnswer], None]
@@ -76,12 +74,9 @@ FAR = 0.08  # of a limit: two of them that are no farther apart are extrapolated
 HERTZ_POWER = 2.0 / 3.0
 AIM = 0.07  # of the way to the next limit, by which that may be elsewhere
 TILT = "ground.tilt"
-ROTATION = ".rotation_deg"
 COEFFICIENTS = ("friction.", ".friction")
-HORIZONTAL = "loads."
 STIFFNESS = "contact.stiffness_scale"
 OF_STIFFNESS = ("stiffness", "young_modulus", "poisson_ratio", "contact_radius", "time.")
-NO_SPRINGS = f"rigid contacts have no stiffness: --stiffer is for springs (time.scheme {timeline.SPRINGS})"
 
 
 @takes(limit_plan.LimitOptions)
@@ -219,7 +214,8 @@ def refuse_without_springs(*plans: LimitPlan) -> None:
     if any(can_be_stiffer(plan) for plan in plans):
         return
     if not any(plan.scenario.time.has_springs for plan in plans):
-        raise InvalidInputError(NO_SPRINGS)
+        scheme = f"time.scheme {timeline.SPRINGS}"
+        raise InvalidInputError(f"rigid contacts have no stiffness: --stiffer is for springs ({scheme})")
     springs = limit_plan.NAMES[timeline.SPRINGS]
     raise InvalidInputError(f"--stiffer: {springs} are not made stiffer for a limit of {plans[0].key}, or beside soil")
 
@@ -234,7 +230,7 @@ class StandingSide:
         self.scenario, row = plan.scenario_at(self.value), rows[self.value]
         self.give: limit_answer.Give | None = None  # how far springs have given way, where what stands there says so
         if plan.scenario.time.has_springs and row.get("outcome") == STANDS:  # what rocked back has turned too
-            turn = max(abs(float(str(row[name]))) for name in row if name.endswith(ROTATION))
+            turn = max(abs(float(str(row[name]))) for name in row if name.endswith(".rotation_deg"))
             # of the load k that topples a block by k g along the ground, atan k = a, a turn d takes away 2 d/sin(2 a) k
             slope = (float(self.scenario.ground.tilt) or math.inf) if plan.key == TILT else 0.5
             self.give = limit_answer.Give(self.value, turn, math.radians(turn) / slope)
@@ -264,7 +260,7 @@ class StandingSide:
         plan, scenario = self.plan, self.scenario
         rest = rest_acceleration(scenario, plan.criterion.least_moved)
         if rest:  # over gravity it is a share of a tilt (rad), of a coefficient; of one for other keys
-            is_coefficient = any(part in plan.key for part in COEFFICIENTS) or plan.key.startswith(HORIZONTAL)
+            is_coefficient = any(part in plan.key for part in COEFFICIENTS) or plan.key.startswith("loads.")
             load = 1.0
             if plan.key == TILT:
                 load = min(abs(float(scenario.ground.tilt)), 1.0) or 1.0
@@ -363,7 +359,7 @@ class _Search:
         below = limit_answer.Side.of(change.low, change.below, rows[change.low])
         above = limit_answer.Side.of(change.high, change.above, rows[change.high])
         given = limit_answer.Bracket(low=change.low, high=change.high, below=below, above=above)
-        if not BOTH | {Stability.UNDECIDED} >= {change.below, change.above} > {Stability.FALLS}:
+        if not limit_answer.LIMIT | {Stability.UNDECIDED} >= {change.below, change.above} > {Stability.FALLS}:
             return given
         side = StandingSide(plan, change, rows)
         least, levels, half = max(SHIFT, plan.tolerance), None, None
@@ -372,7 +368,7 @@ class _Search:
         elif is_corrected and not plan.scenario.time.has_springs and not plan.key.startswith("time."):
             half = self._half(change)
         margin = side.margin(levels, least, as_given=not is_corrected)
-        give = side.give if {change.below, change.above} == BOTH else None
+        give = side.give if {change.below, change.above} == limit_answer.LIMIT else None
         fields: dict[str, Any] = {"undecided": margin, "give": give}
         low, high = given.low, given.high
         if levels is not None:
@@ -415,14 +411,14 @@ class _Search:
         rows = self._searched(plan, choose)
         known.setdefault(place, {}).update(rows)
         changes = limit_plan.changes_in(_fallen(self.plan.verdicts(rows)))
-        return changes[0] if len(changes) == 1 and {changes[0].below, changes[0].above} == BOTH else None
+        return changes[0] if len(changes) == 1 and {changes[0].below, changes[0].above} == limit_answer.LIMIT else None
 
     def _half(self, change: Change[Stability]) -> limit_answer.HalfStep:
         """Search a limit with half the time step."""
         ends = (change.low, change.high)
         steps = (schemes.build(self.plan.scenario_at(value)).scene.world.controls[0].step for value in ends)
         step = HALF * float(min(steps))
-        found = self._again(replace(self.plan, apart={STEP: step}), change, self.step_rows, step)
+        found = self._again(replace(self.plan, apart={limit_answer.STEP: step}), change, self.step_rows, step)
         if found is None:
             return limit_answer.HalfStep(step=step, low=change.low, high=change.high, problem=NO_FINER)
         return limit_answer.HalfStep(step=step, low=found.low, high=found.high)
@@ -448,7 +444,7 @@ class _Search:
             near = replace(change, low=self.plan.span.clip(low), high=self.plan.span.clip(high))
             apart: dict[str, object] = {STIFFNESS: scale}
             if scenario.time.step != "auto":
-                apart[STEP] = scenario.time.step * (first / scale) ** 0.5
+                apart[limit_answer.STEP] = scenario.time.step * (first / scale) ** 0.5
             plan = replace(self.plan, tolerance=SHARPER * self.plan.tolerance, apart=apart)
             may_stay = not (is_foretold or self.stiffer)
             found = self._again(plan, near, self.stiff_rows, scale, may_stay=may_stay)

@@ -21,8 +21,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
-from blocksim.simulation import files as atomic, observables
-from blocksim.simulation.files import brief_lock, takes_lock
+from blocksim.simulation import files, observables
 from blocksim.study import plan, rows
 from blocksim.study.executors import Batch
 
@@ -39,7 +38,6 @@ NEWLINE = b"\n"
 NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 LONGEST = 1 << 30  # bytes of a line that are read at once; a row of a million blocks has 200 million
 MISSING, ENDED_WELL, ENDED_BADLY = range(3)
-TIMING_COLUMNS = ("case", "executor", "seconds", "host")
 
 
 @dataclass(frozen=True)
@@ -123,12 +121,12 @@ class Manifest:
     def __init__(self, path: Path, what: str = "sweep") -> None:
         """Open the file and keep others out. Raises OutputExistsError where another process has it, and OutputError."""
         self.path = path
-        with brief_lock(path.parent):  # who empties the folder sees the file locked, or not at all
+        with files.brief_lock(path.parent):  # who empties the folder sees the file locked, or not at all
             try:
-                self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, atomic.PERMISSIONS)
+                self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | NO_LINK, files.PERMISSIONS)
             except OSError as error:
                 raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
-            is_free = takes_lock(self._file)
+            is_free = files.takes_lock(self._file)
         if not is_free:
             os.close(self._file)
             message = f"{path.parent}: this {what} is already running; wait for it, or write elsewhere with --out DIR"
@@ -211,8 +209,8 @@ class CaseIndex:
 
     def entries(self, cases: plan.Cases, shard: Shard = WHOLE) -> Iterator[tuple[int, plan.Settings, Entry]]:
         """Yield number, values and entry of every case that has a row; not where the file has changed since."""
-        with ExitStack() as files:
-            opened = [files.enter_context(open_regular(path)) for path in self.paths]
+        with ExitStack() as stack:
+            opened = [stack.enter_context(open_regular(path)) for path in self.paths]
             for number in range(len(cases))[shard.slice]:
                 settings = cases.design[number]
                 if self.holds(number, settings):
@@ -234,7 +232,7 @@ def note_timings(path: Path, executor: str, batch: Batch) -> None:
                 file.seek(size - 1)
                 text.write("" if file.read() == NEWLINE else "\n")
             writer = csv.writer(text, lineterminator="\n")
-            writer.writerows([] if size else [TIMING_COLUMNS])
+            writer.writerows([] if size else [("case", "executor", "seconds", "host")])
             share = f"{batch.seconds / max(len(batch.tasks), 1):.6f}"
             writer.writerows((task.name, executor, share, rows.as_cell(batch.host)) for task in batch.tasks)
             file.write(text.getvalue().encode())

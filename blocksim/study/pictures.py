@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from blocksim.analysis.compare import limits, prediction_half_width
 from blocksim.analysis.evidence import Members
@@ -18,7 +17,6 @@ from blocksim.scenario import Scenario, input_files, load_scenario, load_stored,
 from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.silence import silent
 from blocksim.simulation import files
-from blocksim.simulation.files import refuse_foreign
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
@@ -33,7 +31,6 @@ if TYPE_CHECKING:
     from blocksim.study.converge import Convergence
 
 
-Floats = NDArray[np.float64]
 LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
 
 
@@ -325,7 +322,7 @@ class PlotOptions(style.PageOptions):
         Raises InvalidInputError for an unknown format, OutputExistsError, OutputError where it may not go there.
         """
         path = style.picture_path(self.out or default)
-        refuse_foreign(path, overwrite=self.overwrite)
+        files.refuse_foreign(path, overwrite=self.overwrite)
         return path
 
     @property
@@ -417,7 +414,7 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
     stored = run_folder.read_run(place)
     scenario = stored.scenario
     path = Path(options.out or f"{scenario.name}.gif")
-    refuse_foreign(path, overwrite=options.overwrite)
+    files.refuse_foreign(path, overwrite=options.overwrite)
     older = OLDER if path.exists() else ""
     paint = paint_of(options.colour, stored.frames, scenario)
     look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)

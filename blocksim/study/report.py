@@ -11,10 +11,7 @@ from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import input_files, load_stored
 from blocksim.simulation import files
-from blocksim.simulation.files import refuse_foreign
-from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
-from blocksim.study.pictures import read_sweep_data
-from blocksim.study.rows import FINISHED, TABLE
+from blocksim.study import answer, compare, manifest, pictures, rows, run_folder, sweep_folder
 from blocksim.view.report import page, player, subjects as parts
 
 MEMBERS = 50  # of a sweep in one page
@@ -32,7 +29,7 @@ def report(
     Raises as `plot` does, and InvalidInputError, after writing, for what is damaged in them.
     """
     path = Path(out)
-    refuse_foreign(path, overwrite=overwrite)
+    files.refuse_foreign(path, overwrite=overwrite)
     table = None if experiment is None else Path(experiment)
     _, problems = report_on([run_folder.folder_of(place) for place in places], path, table)
     if problems:
@@ -83,7 +80,7 @@ def _compared(run: parts.PartialRun, experiment: Path | None) -> tuple[dict[str,
         table = experiment or named
         if table is None or run.final is None:
             return None, ()
-        if run.status != FINISHED:
+        if run.status != rows.FINISHED:
             return None, ("only a finished run is compared with the measurement",)
         return _shown(compare_final(run.final, load_table(table))), ()
     except BlocksimError as error:
@@ -103,13 +100,13 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
 
     Rows that are cut off are left out. Raises InvalidInputError for what is no table of a sweep.
     """
-    path = place / TABLE
-    columns, *rows = list(filter(None, manifest.lines_in(path, MOST_TABLE_BYTES))) or [[]]
+    path = place / rows.TABLE
+    columns, *lines = list(filter(None, manifest.lines_in(path, MOST_TABLE_BYTES))) or [[]]
     if not set(columns) >= manifest.NEEDED:
         raise InvalidInputError(f"{path}: {manifest.NO_TABLE}: {manifest.NO_COLUMNS}")
-    table = parts.CaseTable(place, tuple(columns), tuple(tuple(row) for row in rows if len(row) == len(columns)))
+    table = parts.CaseTable(place, tuple(columns), tuple(tuple(row) for row in lines if len(row) == len(columns)))
     problems: list[str] = []
-    scenario, judged, pictures = None, None, []
+    scenario, judged, drawings = None, None, []
     try:
         scenario = load_stored(place / sweep_folder.PLAN)
     except InputMissingError:
@@ -124,19 +121,19 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
             raise
         problems.append(str(error))
     try:
-        sweep = read_sweep_data(place, experiment)
+        sweep = pictures.read_sweep_data(place, experiment)
     except BlocksimError as error:
         problems.append(f"no picture of the sweep: {error}")
     else:
         is_whole = len(sweep.finished) == len(table.rows)
-        pictures = parts.pictures_of(sweep) if is_whole else []
+        drawings = parts.pictures_of(sweep) if is_whole else []
         problems += [] if is_whole else ["no picture of the sweep: its table is damaged"]
     folders = {case: sweep_folder.case_folder(table.folder, case) for case in table.column("case")}
     cases = {case: one for case, one in folders.items() if one is not None and (one / files.FRAMES).is_file()}
     found = [(case, parts.read_folder(folder)) for case, folder in list(cases.items())[:most]]
     keys = {case: f"{key}-member-{number}" for number, (case, _) in enumerate(found, start=1)}
     subject = parts.sweep_subject(
-        key, table, scenario, keys, problems, list(cases)[most:], judged=judged, pictures=pictures
+        key, table, scenario, keys, problems, list(cases)[most:], judged=judged, pictures=drawings
     )
     shown = [
         parts.run_subject(

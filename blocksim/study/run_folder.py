@@ -10,9 +10,8 @@ from typing import NamedTuple, Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored, spelling
-from blocksim.simulation import files, results
+from blocksim.simulation import files, results, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames
-from blocksim.simulation.trajectory import Frames
 from blocksim.study.rows import FINISHED, TABLE
 
 MOST_FOLDERS = 5  # named in a message
@@ -94,7 +93,7 @@ class StoredRun(NamedTuple):
 
     folder: Path
     scenario: Scenario
-    frames: Frames
+    frames: trajectory.Frames
     events: tuple[results.EventRecord, ...]  # that have happened; none where run.json is missing or damaged
     remark: str  # for whoever examines the frames; empty for a finished run that was meant for certain
 

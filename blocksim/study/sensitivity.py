@@ -17,9 +17,8 @@ from blocksim.scenario import Source, Sweep, document_of
 from blocksim.scenario.models.study import Normal, Variation
 from blocksim.silence import silent
 from blocksim.simulation import schemes, trajectory
-from blocksim.study import plan as plans
+from blocksim.study import plan as plans, rows
 from blocksim.study.executors.ensemble import run_members
-from blocksim.study.rows import quarter_turns, ranges_of, values_at
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,15 +144,15 @@ class ModelOutput(NamedTuple):
 def outputs_of(finals: Sequence[trajectory.Columns], table: ExperimentTable | None) -> list[ModelOutput]:
     """Return every measured quantity (without a table: x of the first blocks), and indicators of the outcome."""
     blocks = finals[0]["block"]
-    outcomes = [quarter_turns(final["rotation_deg"]) for final in finals]
+    outcomes = [rows.quarter_turns(final["rotation_deg"]) for final in finals]
     inside: dict[str, list[bool]] = {}
     means: dict[str, float] = {}
     if table is None:
         places = np.array([final["x_mm"] for final in finals])
         found = [ModelOutput(f"x of block {name}", "mm", places[:, k]) for k, name in enumerate(blocks[:MOST_BLOCKS])]
     else:
-        ranges, summaries = ranges_of(table), table.summaries()
-        values = [values_at(final, ranges) for final in finals]
+        ranges, summaries = rows.ranges_of(table), table.summaries()
+        values = [rows.values_at(final, ranges) for final in finals]
         found = [
             ModelOutput(f"{row.quantity} of block {row.block}", QUANTITIES[row.quantity].unit, column)
             for row, column in zip(summaries, np.array(values).T, strict=True)
@@ -162,7 +161,7 @@ def outputs_of(finals: Sequence[trajectory.Columns], table: ExperimentTable | No
         are_in = [all(one.holds(value) for one, value in zip(ranges, row, strict=True)) for row in values]
         inside = {"inside all measured ranges": are_in}
     if set(blocks) <= set(means):
-        name, wanted = "measured outcome", quarter_turns([means[block] for block in blocks])
+        name, wanted = "measured outcome", rows.quarter_turns([means[block] for block in blocks])
     else:
         name, wanted = "most frequent outcome", Counter(outcomes).most_common(1)[0][0]
     turned = f"({sum(angle != 0 for angle in wanted)} of {len(wanted)} blocks turned)"
@@ -307,16 +306,16 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
     for member in run_members(document, settings_at(points, plan.vary)):
         members.append(member)
         options.on_member(len(members), len(points))
-    rows = len(plan.vary) + method.more_rows
+    size = len(plan.vary) + method.more_rows
     has_final = np.array([member.final is not None for member in members])
-    whole = np.asarray(np.all(has_final.reshape(-1, rows), axis=1))
+    whole = np.asarray(np.all(has_final.reshape(-1, size), axis=1))
     problems = [member.problem for member in members if member.final is None]
     if whole.sum() < max(LEAST_BLOCKS, LEAST_SHARE * len(whole)):
         raise TooManyFailuresError(
             f"{len(problems)} of {len(members)} runs failed, in {np.sum(~whole)} of {len(whole)} {method.sample_word}; "
             f"no indices can be computed. The first: {problems[0]}"
         )
-    kept = np.repeat(whole, rows)
+    kept = np.repeat(whole, size)
     finals = [member.final for member, is_kept in zip(members, kept, strict=True) if is_kept and member.final]
     return Sensitivity(
         method=method,

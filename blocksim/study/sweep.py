@@ -22,7 +22,6 @@ from blocksim.silence import silent
 from blocksim.simulation import files, interruption, provenance, schemes
 from blocksim.study import executors, manifest, plan as plans, rows, sweep_folder
 
-TIMINGS = "timings.csv"
 MOST_INVALID = 500  # kept in memory before they are written
 SOONEST = 2.0  # s between two tables while the sweep runs
 SHARE = 0.02  # of the time, at most, goes into tables that are soon replaced
@@ -171,7 +170,7 @@ class SweepRun:
         state = self.done.state[self.shard.slice]
         if retry_failed:
             state[state == manifest.ENDED_BADLY] = manifest.MISSING
-        timings = self.folder / self.shard.file(TIMINGS)
+        timings = self.folder / self.shard.file("timings.csv")
         try:
             with interruption.stop_requests() as is_stopped:
                 setting = replace(setting, is_stopped=is_stopped)

@@ -17,7 +17,6 @@ from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError,
 from blocksim.scenario import Document, Scenario, input_files, overrides, spelling
 from blocksim.scenario.models.motion import content_of
 from blocksim.simulation import files, provenance
-from blocksim.simulation.files import is_resolved
 from blocksim.study.plan import with_tables
 
 MOST_SHOWN, LONGEST_NAME = 5, 40  # columns in a message, and characters of each
@@ -135,10 +134,11 @@ def _make_free(folder: Path, head: bytes, tables: Mapping[str, bytes], kind: Fol
     present = [path for path in sorted(folder.iterdir()) if not files.is_leftover(path.name, (kind.plan,))]
     if not present:
         return
-    if not is_resolved(folder / kind.plan) or input_files.read_head(folder / kind.plan, len(kind.head)) != kind.head:
+    plan = folder / kind.plan
+    start = input_files.read_head(plan, len(head)) if files.is_resolved(plan) else b""
+    if not start.startswith(kind.head):
         raise OutputExistsError(f"{folder}: holds files that are not {kind.what}; choose another folder with --out")
-    is_same = input_files.read_head(folder / kind.plan, len(head)) == head
-    if not (overwrite or is_same):
+    if not (overwrite or start == head):
         which = kind.what.replace("a ", "another ", 1)
         raise OutputExistsError(f"{folder}: contains {which}; --overwrite replaces it, --out DIR writes elsewhere")
     for path in present if overwrite else ():

@@ -25,24 +25,12 @@ from blocksim.analysis.bits import Differences, differences
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import input_files, scenario_hash
 from blocksim.silence import silent
-from blocksim.simulation import (
-    Watcher,
-    checkpoint,
-    files,
-    instruments,
-    observables,
-    provenance,
-    read_result,
-    results,
-    simulate,
-)
+from blocksim.simulation import Watcher, checkpoint, files, instruments, observables, provenance, results, simulate
 from blocksim.simulation.trajectory import csv_text
 from blocksim.study import answer, manifest, plan, run_folder, sweep, sweep_folder
-from blocksim.study.executors.ensemble import rows_of
+from blocksim.study.executors.ensemble import INTERRUPTED, rows_of
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, invalid_row
 
-INTERRUPTED = "interrupted"
-SCENARIO = "scenario"  # its hash, beside the entries of `environment`
 CODE = "code"
 DECIDES = ("blocksim", provenance.ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
 ALWAYS = ("name", "steps", "time_step_s", "simulated_time_s", "energy_J")
@@ -177,7 +165,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     summary = results.read_summary(folder / files.SUMMARY)
     changed = results.changed_files(folder, summary)
     try:
-        stored = read_result(folder)
+        stored = results.read_result(folder)
     except InvalidInputError as error:  # what cannot be read because it was changed is reported as such
         if not changed:
             raise
@@ -192,7 +180,7 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
         raise StoppedEarlyError(f"{folder}: stopped before the new run was complete")
     origins, now = origin_differences(summary.environment), scenario_hash(stored.scenario)
     if now != summary.scenario_hash:
-        origins = (OriginDifference(SCENARIO, summary.scenario_hash, now), *origins)
+        origins = (OriginDifference("scenario", summary.scenario_hash, now), *origins)
     return RunVerdict(
         folder,
         changed,

@@ -23,6 +23,7 @@ from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation.files import write_text
 from blocksim.simulation.results import Result
 from blocksim.simulation.run import simulate
+from blocksim.study.answer import number_text
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.reference import markdown
 from blocksim.view import run_data, studies, style
@@ -151,8 +152,8 @@ def edges_table(edges: ExperimentTable, runs: Sequence[Result]) -> str:
     for quantity in ("left", "right"):
         for block in edges.blocks:
             places = [run.columns[f"{quantity}_mm"][list(run.columns["block"]).index(block)] for run in runs]
-            row = (f"{quantity}, block {block}", *_repeats(edges, block, quantity), *map(_hundredths, places))
-            rows.append(row)
+            texts = (*_repeats(edges, block, quantity), *(number_text(place, 2) for place in places))
+            rows.append((f"{quantity}, block {block}", *texts))
     return _table(("mm", *map(str, edges.replicates), "mean", *(f"`{run.name}`" for run in runs)), rows)
 
 
@@ -169,7 +170,7 @@ def centres_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
             if row is None or not isfinite(row.simulated):
                 yield "–"
             else:
-                yield f"{_hundredths(row.simulated)} {SIGNS[row.verdict]}"
+                yield f"{number_text(row.simulated, 2)} {SIGNS[row.verdict]}"
 
     places = [
         (f"block {block}", *_repeats(centres, block, "x"), PAPER_X.get(block, ""), *verdicts(block, "x"))
@@ -196,12 +197,6 @@ def _repeats(table: ExperimentTable, block: str, quantity: str) -> list[str]:
     """Return the repeats of one quantity, and their mean."""
     values = [one.value for one in table.measurements if (one.block, one.quantity) == (block, quantity)]
     return [f"{value:.2f}" for value in (*values, sum(values) / len(values))]
-
-
-def _hundredths(value: float) -> str:
-    """Return a number; a zero has no sign."""
-    text = f"{value:.2f}"
-    return text[1:] if text.startswith("-") and not text.strip("-0.") else text
 
 
 PANELS = 11  # of Figure 4

@@ -371,7 +371,7 @@ def test_who_begins_a_sweep_waits_while_another_one_makes_room_for_it(
         looked.release()
         return may_go_on.wait(10.0) and is_resolved(plan)
 
-    monkeypatch.setattr("blocksim.study.sweep_folder.is_resolved", slow)
+    monkeypatch.setattr("blocksim.simulation.files.is_resolved", slow)
     with ThreadPoolExecutor(3) as pool:
         waiting = [pool.submit(prepare, tmp_path / "out", base, "0123", overwrite=True) for _ in range(3)]
         assert looked.acquire(timeout=10.0)

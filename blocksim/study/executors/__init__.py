@@ -13,8 +13,7 @@ from typing import Annotated, Any, NamedTuple
 
 from blocksim.errors import InvalidInputError
 from blocksim.options import Option
-from blocksim.scenario import Scenario
-from blocksim.scenario.spelling import did_you_mean_or_list
+from blocksim.scenario import Scenario, spelling
 from blocksim.silence import silent
 from blocksim.study.rows import Row
 
@@ -102,7 +101,7 @@ def load_executor(name: str) -> Any:
     It may have `check`, which raises UnavailableError where it cannot run, before anything is written.
     """
     if name not in EXECUTORS:
-        raise InvalidInputError(f"unknown executor '{name}', {did_you_mean_or_list(name, EXECUTORS)}")
+        raise InvalidInputError(f"unknown executor '{name}', {spelling.did_you_mean_or_list(name, EXECUTORS)}")
     return import_module(EXECUTORS[name])
 
 
