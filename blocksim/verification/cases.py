@@ -128,10 +128,6 @@ CASES = (
 )
 
 
-class UnknownCaseError(InvalidInputError):
-    """A case that is not in the table."""
-
-
 class SettingError(BlocksimError):
     """Incompatible options."""
 
@@ -141,7 +137,7 @@ class SettingError(BlocksimError):
 def choose_cases(ids: Sequence[str], setting: Setting, *, soil: bool = False) -> tuple[Case, ...]:
     """Return the cases of some ids (upper or lower case), in the order of the table; without ids all of the scheme.
 
-    Raises UnknownCaseError, and SettingError for a model, law or case that the scheme does not have.
+    Raises InvalidInputError for an unknown id, and SettingError for a model, law or case that the scheme does not have.
     """
     usual, scheme = Setting(quick=setting.quick), setting.scheme
     if not setting.has_springs and (setting.model, setting.law) != (usual.model, usual.law):
@@ -154,7 +150,7 @@ def choose_cases(ids: Sequence[str], setting: Setting, *, soil: bool = False) ->
     if unknown:
         known = f"{CASES[0].id} to {CASES[-1].id}"
         wrong = f"case of soil; choose {', '.join(case.id for case in table)}" if soil else f"case; choose {known}"
-        raise UnknownCaseError(f"{', '.join(unknown)}: no such {wrong}")
+        raise InvalidInputError(f"{', '.join(unknown)}: no such {wrong}")
     foreign = [reason for reason in exclusions(scheme) if reason.split()[0] in wanted]
     if foreign:
         raise SettingError(f"not for --scheme {scheme}: {'; '.join(foreign)}")

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from blocksim.errors import InvalidInputError
 from blocksim.verification.case import Case, Setting, run_case
-from blocksim.verification.cases import UnknownCaseError, choose_cases
+from blocksim.verification.cases import choose_cases
 from blocksim.verification.reference import SOIL, STORE, read_store, rows_of
 from blocksim.verification.soil import SOIL_CASES
 
@@ -44,5 +45,5 @@ def test_cases_are_as_the_table_has_them(case: Case) -> None:
 
 
 def test_an_unknown_case_is_told_with_those_there_are() -> None:
-    with pytest.raises(UnknownCaseError, match="S12: no such case of soil; choose S1, S2"):
+    with pytest.raises(InvalidInputError, match="S12: no such case of soil; choose S1, S2"):
         choose_cases(["S12"], Setting(), soil=True)

@@ -94,9 +94,9 @@ class StoppedError(Exception):
 class LastingPool:
     """A pool for several rounds of tasks: starting its processes takes longer than most rounds."""
 
-    def __init__(self) -> None:
-        """Start nothing yet."""
-        self._ended = ExitStack()
+    def __init__(self, ended: ExitStack) -> None:
+        """Start nothing yet; what is started ends with a stack."""
+        self._ended = ended
         self._pool: ProcessPoolExecutor | None = None
 
     @contextmanager
@@ -110,14 +110,6 @@ class LastingPool:
             self._pool = None
             self._ended.__exit__(type(error), error, error.__traceback__)
             raise
-
-    def __enter__(self) -> Run:
-        """Give what runs the tasks of each round."""
-        return self.run
-
-    def __exit__(self, *error: object) -> None:
-        """End the processes."""
-        self._ended.__exit__(*error)  # type: ignore[arg-type]
 
     def run(self, tasks: Iterator[Task], setting: RunSetting) -> Generator[Batch, None, None]:
         """Run batches on `setting.jobs` processes, each on one thread; a pool that dies is replaced by a new one."""
@@ -146,12 +138,16 @@ class LastingPool:
                 yield Batch(tuple(later), tuple(rows[task.name] or DEAD for task in later), 0.0, "")
 
 
-for_rounds = LastingPool
+@contextmanager
+def for_rounds() -> Iterator[Run]:
+    """Give what runs the tasks of each round, and end the processes."""
+    with ExitStack() as ended:
+        yield LastingPool(ended).run
 
 
 def run_tasks(tasks: Iterator[Task], setting: RunSetting) -> Generator[Batch, None, None]:
     """Run the tasks of one round."""
-    with LastingPool() as run:
+    with for_rounds() as run:
         yield from run(tasks, setting)
 
 
