@@ -139,14 +139,15 @@ def scatter_texts(scatter: Sweep | None) -> dict[str, str]:
     """Return every key with its distribution in words, in SI, for a message or for provenance."""
     words = {}
     for key, values in scatter.vary.items() if scatter else ():
-        table = {"levels": " or ".join(map(str, values))} if isinstance(values, tuple) else values.as_table()
-        if "mean" in table:
-            bounds = f" in {table['from']}-{table['to']}" if {"from", "to"} <= set(table) else ""
-            words[key] = f"{table['mean']} +- {table['sd']}{bounds}"
-        elif "from" in table:
+        if isinstance(values, tuple):
+            words[key] = " or ".join(map(str, values))
+            continue
+        table = values.as_table()
+        if isinstance(values, Uniform):
             words[key] = f"{table['from']} to {table['to']}" + (", log" if "scale" in table else "")
         else:
-            words[key] = str(table["levels"])
+            bounds = f" in {table['from']}-{table['to']}" if {"from", "to"} <= set(table) else ""
+            words[key] = f"{table['mean']} +- {table['sd']}{bounds}"
     return words
 
 

@@ -255,6 +255,15 @@ class SweepCase:
     problem: str = ""
     name: str = ""  # hash of its run
 
+    @classmethod
+    def of(cls, document: Document, values: Settings) -> "SweepCase":
+        """Build the scenario of a document with these values."""
+        try:
+            scenario = document.with_values(values).build()
+        except BlocksimError as error:  # mistakes that only show in the combination
+            return cls(values, None, problem=str(error).splitlines()[0])
+        return cls(values, scenario, name=run_hash(scenario))
+
 
 @dataclass(frozen=True)
 class Cases:
@@ -269,12 +278,7 @@ class Cases:
         return len(self.design)
 
     def __getitem__(self, number: int) -> SweepCase:
-        values = self.design[number]
-        try:
-            scenario = self.document.with_values(values).build()
-        except BlocksimError as error:  # mistakes that only show in the combination
-            return SweepCase(values, None, problem=str(error).splitlines()[0])
-        return SweepCase(values, scenario, name=run_hash(scenario))
+        return SweepCase.of(self.document, self.design[number])
 
 
 def plan_of(base: Scenario) -> Sweep:

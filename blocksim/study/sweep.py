@@ -299,12 +299,11 @@ class Runs:
 
         def tasks() -> Iterator[executors.Task]:
             for number, key in enumerate(missing.values(), start=len(self.known)):
-                try:
-                    scenario = self.document.with_values(wanted[key]).build()
-                except errors.BlocksimError as error:
-                    keep(wanted[key], "", rows.invalid_row(str(error).splitlines()[0]))
-                    continue
-                yield executors.Task(number, provenance.run_hash(scenario), wanted[key], scenario)
+                case = plans.SweepCase.of(self.document, wanted[key])
+                if case.scenario is None:
+                    keep(wanted[key], "", rows.invalid_row(case.problem))
+                else:
+                    yield executors.Task(number, case.name, wanted[key], case.scenario)
 
         try:
             with interruption.stop_requests() as is_stopped:

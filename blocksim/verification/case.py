@@ -47,7 +47,7 @@ class Row:
     @property
     def is_inside(self) -> bool:
         """Return True if it is inside the tolerance; a number that is not finite is outside."""
-        return abs(self.error) <= self.tolerance
+        return bool(abs(self.error) <= self.tolerance)
 
     @property
     def texts(self) -> dict[str, str]:

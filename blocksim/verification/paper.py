@@ -217,7 +217,7 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
     runs = [_finished(scenarios / f"{name}.toml", settings or {}) for name in COLLAPSES]
     bounce, slide = (_finished(scenarios / f"{name}.toml", {}) for name in ("bounce", "slide"))
     experiments, first = scenarios / "experiments", runs[0]
-    centres = load_table(experiments / "three_blocks.csv").summaries()
+    centres = load_table(experiments / "three_blocks.csv")
     edges = load_table(experiments / "three_blocks_edges.csv")
     wide = edges.values("3", "right") - edges.values("3", "left")
     height, speed = bounce_law(bounce), slide_law(slide)
@@ -228,9 +228,11 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
     names = ("figure3.png", "figure4.png", "equation10.png", "equation13.png", "README.md")
     final, strip, equation10, equation13, index = written = [folder / name for name in names]
     support = run_data.support_of(first.scenario)
-    draw_final(first.frames, final, f"Figure 3: {first.name}", centres, support, paper=PAPER)
+    draw_final(first.frames, final, f"Figure 3: {first.name}", centres.summaries(), support, paper=PAPER)
     title = f"Figure 4: {first.name}"
-    draw_strip(first.frames, strip, title=title, measured=centres, support=support, count=PANELS, paper=PAPER)
+    draw_strip(
+        first.frames, strip, title=title, measured=centres.summaries(), support=support, count=PANELS, paper=PAPER
+    )
     studies.draw_law(height, equation10, "Equation 10: height over a bounce", PAPER)
     studies.draw_law(speed, equation13, "Equation 13: speed of a sliding block", PAPER)
     parts = [
