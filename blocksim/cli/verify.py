@@ -11,6 +11,7 @@ from blocksim.bench import harness, registry
 from blocksim.cli import command_line, output, prepare, progress
 from blocksim.errors import ExitCode, OutputError
 from blocksim.options import Option, Replace
+from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.scenario.models.timeline import IMPULSES, SPRINGS
 from blocksim.simulation import files, schemes
 from blocksim.verification import case, cases as case_list
@@ -25,7 +26,7 @@ def verify_command(
         Option("V1 to V25 (default: all).", metavar="[CASE]...", complete="cases", is_argument=True),
     ] = None,
     model: Annotated[str, Option("Contact model.", choices=("surface", "particles", "kernel"))] = "surface",
-    law: Annotated[str, Option("Force law.", choices=("linear", "hertz-mindlin"))] = "linear",
+    law: Annotated[str, Option("Force law.", choices=tuple(LAWS))] = LINEAR.name,
     scheme: Annotated[str, Option("Stepping: springs or impulses.", choices=(SPRINGS, IMPULSES))] = SPRINGS,
     soil: Annotated[bool, Option("The cases of soil, S1 to S11.")] = False,
     quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,

@@ -7,7 +7,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from blocksim.scenario import events, geometry, overlap, overrides, placement, resolution
+from blocksim.scenario import events, geometry, laws, overlap, overrides, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
@@ -251,10 +251,11 @@ def _unfit_tables(scenario: Scenario) -> Iterator[Mistake]:
     if len(tables := {one.digest for one in resolution.tables_of_bodies(scenario).values()}) > MOST_BODY_TABLES:
         message = f"{len(tables)} different tables of motion of bodies are too many; at most {MOST_BODY_TABLES}"
         yield Mistake(("bodies",), f"{message} are allowed")
-    if scenario.contact.law != "linear":
+    if not laws.LAWS[law := scenario.contact.law].is_linear:
         for one, partners in scenario.pairs.items():
             for other in (name for name, pair in partners.items() if pair.normal_stiffness is not None):
-                yield Mistake(("pairs", one, other, "normal_stiffness"), NO_FIXED_STIFFNESS, relation=True)
+                path = ("pairs", one, other, "normal_stiffness")
+                yield Mistake(path, NO_FIXED_STIFFNESS.format(law), relation=True)
     for name in [name for name, block in scenario.blocks.items() if block.size_x > 0.0]:
         (body,) = placement.place_blocks(scenario, name, [(name, base.Pose(0.0, 0.0))], fixed=False)
         if why := _why_impossible(body):

@@ -17,10 +17,10 @@ only a bound is known, if everything rests on one corner of the softest contact;
 impacts of a rocking block leave depends on the springs too, and a pulse that begins at its peak while springs carry
 none of it makes it slip too far, with the root of 1/stiffness (simulation/run.py).
 
-**Stiff contacts.** All that is linear in 1/k where it is small, and so is what it takes away from a limit:
-L(k) = L - a/k. Of two stiffnesses, one r times the other, L = (r L(r k) - L(k))/(r - 1). With the law of Hertz a
-contact gives way as k^(-2/3), so that r is 10^(2/3) for a ratio of 10. What is left out is of second order: for
-L(k) = L (1 - s - c s^2) it is c s^2/r of L, and c is about one for a block that topples about its toe. That much is
+**Stiff contacts.** All that is linear in 1/k where it is small, and so is what it takes away from a limit: L(k) = L -
+a/k. Of two stiffnesses, one r times the other, L = (r L(r k) - L(k))/(r - 1). With a force k d^n a contact gives way as
+k^(-1/n), so that r is 10^(1/n) for a ratio of 10: with the law of Hertz 10^(2/3). What is left out is of second order:
+for L(k) = L (1 - s - c s^2) it is c s^2/r of L, and c is about one for a block that topples about its toe. That much is
 added to both sides of the bracket. Where gravity comes at once, a scene falls on its springs by F/k, and with the
 velocity that it has then, which goes as 1/k^(1/2), it rocks. Without a start at rest the answer is therefore a bracket
 that holds the extrapolations of both powers.
@@ -45,6 +45,7 @@ from typing import Any
 from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.options import takes
 from blocksim.scenario import Document, Scenario, Source, document_of, motion, place_bodies, placement
+from blocksim.scenario.laws import LAWS
 from blocksim.scenario.models import motion as motions, timeline
 from blocksim.silence import silent
 from blocksim.simulation import observables, provenance, schemes
@@ -71,7 +72,6 @@ Rows = Mapping[Number, Row]
 RATIO = 10.0  # of stiffness between a search and the next one
 BEYOND = 10.0 / 9.0  # of the way to stiff contacts over that to springs ten times as stiff
 FAR = 0.08  # of a limit: two of them that are no farther apart are extrapolated
-HERTZ_POWER = 2.0 / 3.0
 AIM = 0.07  # of the way to the next limit, by which that may be elsewhere
 TILT = "ground.tilt"
 COEFFICIENTS = ("friction.", ".friction")
@@ -200,7 +200,7 @@ def extrapolate_limit(softer: float, stiffer: float, ratio: float) -> float:
 
 def ratio_of(scenario: Scenario) -> float:
     """Return by how much less springs of RATIO times the stiffness give way."""
-    return float(RATIO**HERTZ_POWER) if scenario.contact.law == "hertz-mindlin" else RATIO
+    return LAWS[scenario.contact.law].compression(1.0, RATIO)
 
 
 def can_be_stiffer(plan: LimitPlan) -> bool:
@@ -294,8 +294,7 @@ def largest_static_compression(scenario: Scenario) -> float:
     stiffness = min(
         one.normal_stiffness * min(1.0, one.shear_ratio) for row in table for one in row if one.normal_stiffness > 0.0
     )
-    power = HERTZ_POWER if scenario.contact.law == "hertz-mindlin" else 1.0
-    return float((weight / stiffness) ** power)
+    return LAWS[scenario.contact.law].compression(stiffness, weight)
 
 
 def rest_acceleration(scenario: Scenario, least_moved: float | None) -> float:

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from blocksim.kernels.common.arrays import World
+from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.scenario.models.timeline import SCHEMES, SPRINGS
 from blocksim.verification.scene import Scene, Simulation
 
@@ -80,7 +81,7 @@ class Setting:
     """Settings of a case."""
 
     model: str = "surface"
-    law: str = "linear"
+    law: str = LINEAR.name
     quick: bool = False  # the case's shortened size, where it has one
     scheme: str = SPRINGS
     rigid_step: float | None = None  # s, of the non-smooth scheme, without substeps; None for what users get
@@ -97,7 +98,7 @@ class Setting:
     @property
     def hertzian(self) -> bool:
         """Return True if the stiffness of a contact changes with its overlap."""
-        return self.law == "hertz-mindlin"
+        return not LAWS[self.law].is_linear
 
     def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:
         """Return a scene with this model, law and stepping; `values` are more fields of Scene."""

@@ -98,17 +98,9 @@ def ladder_friction(slope: float, slenderness: float) -> float:
     return 0.5 * (1.0 / tan(slope) - slenderness)
 
 
-def static_overlap(mass: float, face_stiffness: float, gravity: float = GRAVITY) -> float:
-    """Return the overlap (m) of a block resting on a linear face contact of `face_stiffness` (N/m): m g/K."""
-    return mass * gravity / face_stiffness
-
-
-def hertz_static_overlap(mass: float, modulus: float, radius: float, gravity: float = GRAVITY) -> float:
-    """Return the overlap (m) of a block resting on two Hertzian corners, E* `modulus` (Pa), R* `radius` (m).
-
-    Each corner carries m g/2 = (4/3) E* sqrt(R*) delta^(3/2).
-    """
-    return float((3.0 * mass * gravity / (8.0 * modulus * sqrt(radius))) ** (2.0 / 3.0))
+def static_overlap(mass: float, face_stiffness: float, exponent: float = 1.0) -> float:
+    """Return the overlap (m) of a block resting on a face whose force is K d^n, K = `face_stiffness`: (m g/K)^(1/n)."""
+    return float((mass * GRAVITY / face_stiffness) ** (1.0 / exponent))
 
 
 def harmonic_offsets(count: int, width: float) -> tuple[float, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import World
+from blocksim.scenario.laws import LAWS
 from blocksim.verification import case, closed_forms as forms, statics
 from blocksim.verification.scene import HEIGHT, Simulation, Throw, Thrower
 
@@ -153,7 +154,7 @@ def rms(values: NDArray[np.float64]) -> float:
 def oscillation(setting: case.Setting, refinement: int) -> NDArray[np.float64]:
     """Return heights (m) at fixed times of an undamped block that starts half of its overlap too high: no lift-off."""
     overlap = statics.weight_overlap(setting)
-    frequency = sqrt((1.5 if setting.hertzian else 1.0) * forms.GRAVITY / overlap)  # slope of d^1.5: 1.5 force/overlap
+    frequency = sqrt(LAWS[setting.law].exponent * forms.GRAVITY / overlap)  # slope of d^n: n force/overlap
     step = COARSEST / frequency / refinement
 
     def press(world: World) -> None:

@@ -207,7 +207,7 @@ def seats(setting: Setting) -> Iterator[Row]:
         rebounds = [vy - asked for asked, (vy, _) in landings]
         yield Row(f"{name}, e off by", "", 0.0, farthest(0.0, rebounds), 0.01)
         yield Row(f"{name}, spin", "rad/s", 0.0, farthest(0.0, [spin for _, (_, spin) in landings]), 0.05)
-    if setting.law == "linear":
+    if not setting.hertzian:
         vy, spin = land(setting, LOOSE, 1.0, fixed=False)
         yield Row("two loose blocks, elastic, speed", "m/s", 0.5, vy, 0.01)
         yield Row("two loose blocks, elastic, spin", "rad/s", 0.0, spin, 0.05)

@@ -6,6 +6,7 @@ from math import degrees, radians
 
 import numpy as np
 
+from blocksim.scenario.laws import LAWS
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Row, Setting, count, farthest, relative
 from blocksim.verification.scene import HEIGHT, WIDTH, PaperBlock, Simulation
@@ -31,10 +32,9 @@ def static_overlap(setting: Setting) -> Iterator[Row]:
 
 def weight_overlap(setting: Setting) -> float:
     """Return the overlap (m) of the paper's block that rests on its face."""
-    block = PaperBlock()
-    if setting.hertzian:
-        return forms.hertz_static_overlap(block.mass, block.modulus, CONTACT_RADIUS)
-    return forms.static_overlap(block.mass, 2.0 * block.point_stiffness)
+    block, law = PaperBlock(), LAWS[setting.law]
+    stiffness = block.modulus * law.size(block.depth, CONTACT_RADIUS)
+    return forms.static_overlap(block.mass, 2.0 * stiffness, law.exponent)
 
 
 def overhanging_stacks(setting: Setting) -> Iterator[Row]:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common import arrays
 from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
-from blocksim.kernels.explicit import broad_phase, laws, models
+from blocksim.kernels.explicit import broad_phase, models
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
-from blocksim.scenario import PlacedBody, Scenario, motion
+from blocksim.scenario import PlacedBody, Scenario, laws, motion
 from blocksim.world import interactions, memory
 from blocksim.world.bodies import Layout, body_records, layout_of, motion_records, place_particles, slots_of_a_pair
 from blocksim.world.step import MOST_STEPS, Bounds, Stride, bounds_of, choose_stride
@@ -403,7 +403,7 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
             "max_overlap": 0.0 if contact.max_overlap is None else contact.max_overlap,
             "rest_speed": time.rest_speed,
             "model": models.MODEL_CODES[contact.model],
-            "law": laws.LAW_CODES[contact.law],
+            "exponent": laws.LAWS[contact.law].exponent,
             "sph_kernel": kernel,
             "particle_size": contact.particle_spacing,
             "smoothing_length": smoothing_length,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from blocksim.kernels.common.arrays import World
 from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, motion, placement
+from blocksim.scenario.laws import LAWS
 from blocksim.world import build, interactions, memory, nonsmooth, rigid_step, systems
 from blocksim.world.bodies import Layout, division, layout_of
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
@@ -22,7 +23,6 @@ OUTLINES_COST = 1.5  # times as much, where blocks with outlines are on springs:
 SECONDS_WITH_PARTICLES = {"kernel": (1.5e-6, 10e-9, 5.0), "particles": (0.7e-6, 6e-9, 2.0)}
 SECONDS_IN_A_SUBSTEP = 400e-9  # a block, where contacts are rigid
 RIGID_RULES = ("friction", "restitution")  # what decides where contacts are rigid
-STIFFNESS_UNITS = {"linear": "N/m", "hertz-mindlin": "N/m^1.5"}
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class PairDescription:
     normal_damping_ratio: float | None  # None: contacts are rigid, they have no dashpots and no springs in shear
     shear_damping_ratio: float | None
     normal_stiffness: float  # of one contact point, in `stiffness_unit`; of rigid ones see world/sag.py
-    stiffness_unit: str  # N/m, with the law of Hertz N/m^1.5
+    stiffness_unit: str  # N/m^n, n the exponent of the law
     shear_stiffness_ratio: float | None  # shear stiffness over (tangent) normal stiffness
     rules: Mapping[str, str]  # quantity and the key that set it, as in ResolvedPair
 
@@ -216,7 +216,7 @@ def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
                     normal_damping_ratio=None if has_rigid else float(row.normal_damping),
                     shear_damping_ratio=None if has_rigid else float(row.shear_damping),
                     normal_stiffness=normal_stiffness,
-                    stiffness_unit=STIFFNESS_UNITS[scenario.contact.law],
+                    stiffness_unit=LAWS[scenario.contact.law].unit,
                     shear_stiffness_ratio=None if has_rigid else float(row.shear_ratio),
                     rules=rules,
                 )

@@ -5,12 +5,7 @@ not the overlap, returns to zero. For a linear spring the closed form is that of
 "Coefficient of restitution and linear-dashpot model revisited", Granular Matter 9 (2007) 465-469. The textbook formula
 without clipping gives 0.40 where 0.30 is wanted.
 
-Hertz's law with a dashpot 2 z sqrt(m k_t), k_t = 3/2 K x^(1/2) its slope, follows from the linear case exactly. With
-m = K = 1 and p = dx/dt, p dp/dx = -x^(3/2) - 2 z (3/2)^(1/2) x^(1/4) p. With w = x^(5/4), dw = 5/4 x^(1/4) dx, this is
-p dp/dw = -4/5 w - 2 z' (4/5)^(1/2) p, z' = z (6/5)^(1/2): the phase plane of a linear oscillator of damping ratio z'.
-The force is zero where w = -2 z (3/2)^(1/2) p in both. So e(z) of Hertz is the linear e(z'), at any speed. (The map is
-that of D. Antypov and J. A. Elliott, "On an analytical solution for the damped Hertzian spring", EPL 94 (2011) 50004,
-for contacts that end at zero overlap.)
+The damping ratio of other laws is that of the linear one times `Law.damping_share`.
 """
 
 import functools
@@ -22,10 +17,10 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import INTERACTION, Records, zeros
 from blocksim.scenario import GROUND, PlacedBody, Scenario, resolution, resolve_pair
+from blocksim.scenario.laws import LAWS, LINEAR
 
 # e = 0 would need infinite damping; this rebound counts as none (the promise is at most 1 % of the impact speed)
 SMALLEST_RESTITUTION = 0.009
-HERTZ_SHARE = math.sqrt(5.0 / 6.0)  # damping ratio of Hertz over that of the linear law, for the same restitution
 BISECTIONS = 200  # at most; neighbouring numbers are reached after some sixty
 MOST_KNOWN = 10_000  # ratios that are kept: a sweep may have a restitution of its own in every case
 NEARLY_CRITICAL = 1e-9
@@ -43,10 +38,10 @@ def restitution_of(damping_ratio: float) -> float:
 
 
 @functools.lru_cache(MOST_KNOWN)
-def damping_ratio(restitution: float, law: str = "linear") -> float:
+def damping_ratio(restitution: float, law: str = LINEAR.name) -> float:
     """Return the damping ratio (-) for a coefficient of restitution in [0, 1]; the inverse of `restitution_of`.
 
-    For Hertz-Mindlin it refers to the slope of the force at each overlap. Raises ValueError outside [0, 1].
+    Where the law is not linear it refers to the slope of the force at each overlap. Raises ValueError outside [0, 1].
     """
     if not 0.0 <= restitution <= 1.0:
         message = f"a coefficient of restitution lies between 0 and 1, not {restitution}"
@@ -60,7 +55,7 @@ def damping_ratio(restitution: float, law: str = "linear") -> float:
         if not low < middle < high:
             break
         low, high = (middle, high) if restitution_of(middle) > target else (low, middle)
-    return 0.5 * (low + high) * (HERTZ_SHARE if law == "hertz-mindlin" else 1.0)
+    return 0.5 * (low + high) * LAWS[law].damping_share
 
 
 class ContactClass(NamedTuple):
@@ -116,21 +111,19 @@ def pair_of(scenario: Scenario, a: ContactClass, b: ContactClass) -> resolution.
 def interaction(scenario: Scenario, a: ContactClass, b: ContactClass) -> Interaction:
     """Return the parameters of one pair of classes, at least one of them blocks; those of a corner contact.
 
-    Compliance 1/E* = sum (1 - nu^2)/E (1/Pa): K. L. Johnson, Contact Mechanics (1985), eq. 4.24. Stiffness, linear:
-    scale E* L (N/m), L the shorter depth, or what the scenario gives instead of E* L. Hertz-Mindlin: scale
-    4/3 E* R*^(1/2) (N/m^1.5), R* the scenario's `contact_radius`. Shear over normal stiffness (-): as given, else
-    Mindlin's 4 G*/E*, 1/G* = 2 sum (2 - nu)(1 + nu)/E; for two equal materials this is 2 (1 - nu)/(2 - nu). R. D.
+    Compliance 1/E* = sum (1 - nu^2)/E (1/Pa): K. L. Johnson, Contact Mechanics (1985), eq. 4.24. Stiffness: the scale
+    times that of the law, or times what the scenario gives instead (linear). Shear over normal stiffness (-): as given,
+    else Mindlin's 4 G*/E*, 1/G* = 2 sum (2 - nu)(1 + nu)/E; for two equal materials this is 2 (1 - nu)/(2 - nu). R. D.
     Mindlin, J. Appl. Mech. 16 (1949) 259-268.
     """
     contact, pair = scenario.contact, pair_of(scenario, a, b)
     both = [scenario.materials[str(name)] for name in (a.material or b.material, b.material or a.material)]
     compliance = sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in both)
-    if contact.law == "hertz-mindlin":
-        stiffness = contact.stiffness_scale * 4.0 / 3.0 * math.sqrt(contact.contact_radius) / compliance
-    elif pair.normal_stiffness is not None:
+    if pair.normal_stiffness is not None:
         stiffness = contact.stiffness_scale * pair.normal_stiffness
     else:
-        stiffness = contact.stiffness_scale * min(a.depth, b.depth) / compliance
+        size = LAWS[contact.law].size(min(a.depth, b.depth), contact.contact_radius)
+        stiffness = contact.stiffness_scale * size / compliance
     shear_ratio = pair.shear_stiffness_ratio
     if shear_ratio is None:
         shear = sum(2.0 * (2.0 - m.poisson_ratio) * (1.0 + m.poisson_ratio) / m.young_modulus for m in both)

@@ -19,9 +19,9 @@ that well beyond critical damping the step shrinks with 1/z, z being the damping
 
 With safety = 0.05 impacts are resolved with w dt <= 0.1, some thirty steps, and z w dt <= 0.2.
 
-Hertz. The slope of the force grows with the overlap; the deepest one expected decides. An impact at speed v of a mass m
-goes to d = (5 m v^2/(4 K))^(2/5) (from m v^2/2 = 2/5 K d^(5/2)), a weight W to (W/K)^(2/3). As the step goes with
-v^(-1/5), a speed that is wrong by a factor of ten changes it by 1.6 only.
+Laws that are not linear. The slope of the force grows with the overlap; the deepest one expected decides
+(scenario/laws.py). As the step of Hertz goes with v^(-1/5), a speed that is wrong by a factor of ten changes it by 1.6
+only.
 
 Speed. Contacts are found by the corners that lie in another block at the end of a step, so that in one step no block
 may come far into another: at the greatest speed expected it moves by at most a twentieth of the smallest side, and by a
@@ -46,6 +46,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import OUTLINE
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
 from blocksim.scenario import Scenario, motion, placement
+from blocksim.scenario.laws import LAWS, Law
 from blocksim.scenario.models.timeline import Explicit
 from blocksim.world import excitation, systems
 from blocksim.world.bodies import Layout, Shapes
@@ -215,18 +216,6 @@ class ContactLoad(NamedTuple):
     weight: float  # N, of all free bodies
 
 
-def max_tangent_stiffness(law: str, stiffness: float, inverse_mass: float, load: ContactLoad) -> float:
-    """Return the greatest slope (N/m) of the normal force that a contact of two bodies is expected to reach.
-
-    `stiffness` as in the interaction table; `inverse_mass` (1/kg) of both bodies together.
-    """
-    if law == "linear" or inverse_mass == 0.0:
-        return stiffness
-    impact = (1.25 * load.speed**2 / (inverse_mass * stiffness)) ** 0.4
-    static = (load.weight / stiffness) ** (2.0 / 3.0)
-    return 1.5 * stiffness * math.sqrt(max(impact, static))
-
-
 def frequency_squared(body: BlockKind, normal: float, shear: float) -> float:
     """Return w2 (1/s2), the stiffest mode of a body that stands with one of its faces on a rigid plane."""
     greatest = 2.0 * normal * body.inverse_mass
@@ -255,13 +244,13 @@ def stable_step(pairs: Iterable[tuple[BlockKind, BlockKind | None, ContactStiffn
     return step
 
 
-def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str, load: ContactLoad) -> float:
+def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: Law, load: ContactLoad) -> float:
     """Return the largest safe step (s) of blocks within these bounds with these contact parameters."""
     kinds = bounds.standing
 
     def stiffness(i: int, j: int, inverse_mass: float) -> ContactStiffness:
         row = table[i][j]
-        normal = max_tangent_stiffness(law, row.normal_stiffness, inverse_mass, load)
+        normal = law.greatest_slope(row.normal_stiffness, inverse_mass, *load)
         return ContactStiffness(normal, normal * row.shear_ratio, max(row.normal_damping, row.shear_damping))
 
     def stiffest(number: int, springs: ContactStiffness) -> BlockKind:
@@ -274,7 +263,7 @@ def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: str
         for kind in kinds
         for ground in {0, *bounds.grounds}
     ]
-    if law == "linear":  # stiffness goes with the classes only: of hundreds of kinds in a class the stiffest decides
+    if law.is_linear:  # stiffness goes with the classes only: of hundreds of kinds in a class the stiffest decides
         classes = combinations_with_replacement({kind.contact_class for kind in kinds}, 2)
         springs = [(i, j, stiffness(i, j, 0.0)) for i, j in classes]
         paired = [(stiffest(i, one), stiffest(j, one), one) for i, j, one in springs]
@@ -296,7 +285,7 @@ def expected_load(layout: Layout, bounds: Bounds, speeds: Speeds) -> ContactLoad
 
 def step_of_contacts(layout: Layout, bounds: Bounds, speeds: Speeds) -> float:
     """Return the largest safe step (s) of the contacts of a scenario's blocks. Raises ValueError without springs."""
-    load, law = expected_load(layout, bounds, speeds), layout.scenario.contact.law
+    load, law = expected_load(layout, bounds, speeds), LAWS[layout.scenario.contact.law]
     return admissible_step(bounds, layout.interactions, safety_of(layout.scenario), law, load)
 
 

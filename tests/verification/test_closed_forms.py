@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from blocksim.scenario.laws import LAWS
 from blocksim.verification import closed_forms as forms
 
 G = 9.81
@@ -118,9 +119,8 @@ def test_resting_overlaps_balance_the_weight() -> None:
     def surplus(overlap: float) -> float:
         return 8.0 / 3.0 * modulus * sqrt(radius) * float(overlap**1.5) - MASS * G
 
-    assert forms.hertz_static_overlap(MASS, modulus, radius) == pytest.approx(
-        brentq(surplus, 0.0, 1e-4, xtol=1e-18), rel=1e-9
-    )
+    stiffness = 2.0 * modulus * LAWS["hertz-mindlin"].size(0.05, radius)
+    assert forms.static_overlap(MASS, stiffness, 1.5) == pytest.approx(brentq(surplus, 0.0, 1e-4, xtol=1e-18), rel=1e-9)
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])

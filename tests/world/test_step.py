@@ -10,6 +10,7 @@ import pytest
 
 from blocksim.kernels.common.arrays import AT_REST, REACHED
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, tangent_stiffness
+from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.bodies import layout_of
 from blocksim.world.build import build_world
@@ -19,7 +20,6 @@ from blocksim.world.step import (
     StepError,
     bounds_of,
     expected_load,
-    max_tangent_stiffness,
     speeds_of,
 )
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.common.arrays import World
 
-G = 9.81
+G, HERTZ = 9.81, LAWS["hertz-mindlin"]
 RADIUS = hypot(WIDTH, HEIGHT) / 2
 FALLING = {"y": 0.2, "angle": 0.4}
 
@@ -81,7 +81,7 @@ def test_no_contact_becomes_stiffer_than_the_step_expects(body: Mapping[str, obj
     world, block = scene.world, scene.bodies[0]
     stiffness = float(world.interactions[1, 0].normal_stiffness)
     load = load_of(body, contact={"law": "hertz-mindlin"})
-    expected = max_tangent_stiffness("hertz-mindlin", stiffness, float(block.inverse_mass), load)
+    expected = HERTZ.greatest_slope(stiffness, float(block.inverse_mass), *load)
     deepest = 0.0
     while scene.time < 0.25:
         scene.to_step(scene.steps + 5)
@@ -94,15 +94,15 @@ def test_no_contact_becomes_stiffer_than_the_step_expects(body: Mapping[str, obj
 def test_contact_under_the_weight_of_everything_is_not_stiffer_than_expected() -> None:
     load = ContactLoad(0.0, 100.0)
     stiffness = 1e9
-    slope = max_tangent_stiffness("hertz-mindlin", stiffness, 10.0, load)
+    slope = HERTZ.greatest_slope(stiffness, 10.0, *load)
     depth = (slope / (1.5 * stiffness)) ** 2
     assert stiffness * depth**1.5 == pytest.approx(100.0)
 
 
 def test_linear_contacts_and_fixed_pairs_do_not_stiffen() -> None:
     load = ContactLoad(10.0, 1e3)
-    assert max_tangent_stiffness("linear", 7.0, 10.0, load) == 7.0
-    assert max_tangent_stiffness("hertz-mindlin", 7.0, 0.0, load) == 7.0
+    assert LINEAR.greatest_slope(7.0, 10.0, *load) == 7.0
+    assert HERTZ.greatest_slope(7.0, 0.0, *load) == 7.0
 
 
 @pytest.mark.parametrize("change", [{"velocity": [0.0, -20.0]}, {"y": 5.0}, {"spin": 500.0}])

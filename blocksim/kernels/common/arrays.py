@@ -160,7 +160,7 @@ PARTICLE_CONTACT = record_type(
     indices="slot face",
 )
 INTERACTION = record_type(
-    "normal_stiffness "  # of one corner contact: N/m for the linear law, N/m^1.5 for Hertz-Mindlin
+    "normal_stiffness "  # of one corner contact: N/m^n, n the exponent of the law
     "shear_ratio "  # -: shear stiffness over the slope of the normal force
     "normal_damping shear_damping "  # damping ratios
     "static_friction kinetic_friction transition_speed "  # -, -, m/s
@@ -193,8 +193,9 @@ CONTROLS = record_type(
     "max_overlap "  # m, zero: a share of the smallest side of each pair
     "push loads_end "  # m/s2: no load gives any point more; s: from then on none changes with time
     "cell_width cell_radius "  # m: of the grid of the broad phase; half diagonal of the largest body in it
-    "particle_size smoothing_length support",  # m: diameter; of the SPH kernel; radius beyond which it is zero
-    "model law sph_kernel "  # codes
+    "particle_size smoothing_length support "  # m: diameter; of the SPH kernel; radius beyond which it is zero
+    "exponent",  # -: of the overlap in the normal force
+    "model sph_kernel "  # codes
     "check_every rest_checks "  # steps between checks; checks in a row that must find rest (0: never)
     "driven",  # bodies with a motion of their own
 )

@@ -55,7 +55,7 @@ def ends_that_last(world: World, p: int, table: Records) -> int:
     """As lasting_points, for two ends of an interval in a scene with polygons."""
     pair = world.pairs[p]
     is_settled = pair.active == 2 and pair.bearing == bearing.ENDS and pair.is_sliver == 0
-    if laws.has_constant_stiffness(world.controls[0].law) or not is_settled:
+    if world.controls[0].exponent == laws.LINEAR or not is_settled:
         return SEARCH
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
@@ -104,12 +104,12 @@ def are_both_ends(world: World, p: int, a: Record, b: Record, table: Records) ->
 
 
 @kernel
-def push_spring(point: Record, contact: Record, law: int, stiffness: float) -> None:
+def push_spring(point: Record, contact: Record, exponent: float, stiffness: float) -> None:
     """Set the normal spring force of a point and what its dashpot needs."""
     point.before = contact.normal_force
     point.rate = point.closing_rate
-    point.stiffness = laws.tangent_stiffness(law, stiffness * point.share, point.depth)
-    point.force = laws.elastic_force(law, stiffness * point.share, point.depth)
+    point.stiffness = laws.tangent_stiffness(exponent, stiffness * point.share, point.depth)
+    point.force = laws.elastic_force(exponent, stiffness * point.share, point.depth)
     point.spring_force = point.force
 
 
@@ -247,14 +247,14 @@ def resolve_points(world: World, p: int, count: int, step: float, tally: Record)
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
-    law = world.controls[0].law
+    exponent = world.controls[0].exponent
     continuing = 0
     loses_face = False
     for i in range(count):
         point = world.points[i]
         kinematics.resolve_point(point, a, b, step)
-        if not laws.has_constant_stiffness(law):
-            kinematics.weigh_onset(point, law)
+        if exponent != laws.LINEAR:
+            kinematics.weigh_onset(point, exponent)
         if i < pair.active:
             contact = world.contacts[p, i]
             continuing += 1 if contact.slot == point.slot and contact.face == point.face else 0
@@ -275,11 +275,11 @@ def foresee_slip(pair: Record, point: Record, values: Record) -> None:
 @rare_kernel
 def normal_pass(world: World, p: int, count: int, values: Record, step: float) -> None:
     """Springs and dashpots along the normals."""
-    law = world.controls[0].law
+    exponent = world.controls[0].exponent
     pair = world.pairs[p]
     stiffness = pair.stiffness if world.controls[0].model == SURFACE else values.normal_stiffness
     for i in range(count):
-        push_spring(world.points[i], world.contacts[p, i], law, stiffness)
+        push_spring(world.points[i], world.contacts[p, i], exponent, stiffness)
     if count > 1:
         pair.slides = 0
     elif world.points[0].drawn < 1.0:
@@ -294,14 +294,14 @@ def draw_springs(world: World, p: int, count: int, values: Record, before: float
 
     Beyond two points only zero or not zero counts. `before` is the stiffness of corners in the step before.
     """
-    law = world.controls[0].law
+    exponent = world.controls[0].exponent
     sticking = 0
     for i in range(count):
         point = world.points[i]
         contact = world.contacts[p, i]
         of_spring = history.stiffness_before(contact, before, values, world.particles)
-        old_stiffness = history.shear_stiffness_before(contact, of_spring, values, law)
-        tally.dashpot += clip_tension(point, history.normal_loss(contact, of_spring, law))
+        old_stiffness = history.shear_stiffness_before(contact, of_spring, values, exponent)
+        tally.dashpot += clip_tension(point, history.normal_loss(contact, of_spring, exponent))
         stiffness = values.shear_ratio * point.stiffness
         slip = point.slipping
         spring, point.limit, slides, friction_work = friction.draw_spring(
@@ -347,11 +347,11 @@ def force_pass(world: World, p: int, count: int, action: Record) -> None:
     stiffness does; see bearing.py.
     """
     pair = world.pairs[p]
-    law = world.controls[0].law
+    exponent = world.controls[0].exponent
     for i in range(count):
         point = world.points[i]
-        along = point.force + laws.stored_energy(law, pair.slide, point.depth)
-        couple = laws.stored_energy(law, pair.turn, point.depth)
+        along = point.force + laws.stored_energy(exponent, pair.slide, point.depth)
+        couple = laws.stored_energy(exponent, pair.turn, point.depth)
         action.fx += point.nx * point.normal_force + point.ny * along
         action.fy += point.ny * point.normal_force - point.nx * along
         action.torque_a += point.normal_arm_a * point.normal_force - point.shear_arm_a * along - couple
@@ -398,7 +398,7 @@ def pair_forces(world: World, p: int, step: float) -> None:
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
-    if has_new_neighbours(a, b, model) or not laws.has_constant_stiffness(world.controls[0].law):
+    if has_new_neighbours(a, b, model) or world.controls[0].exponent != laws.LINEAR:
         damping.renew_dashpots(pair)
     resolve_points(world, p, count, step, action)
     if model == SURFACE:

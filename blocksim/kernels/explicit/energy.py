@@ -24,7 +24,7 @@ def contact_summary(world: arrays.World) -> tuple[float, float, int, float]:
     shear = 0.0
     count = 0
     largest = 0.0
-    law = world.controls[0].law
+    exponent = world.controls[0].exponent
     for p in range(world.clock[0].pair_count):
         pair = world.pairs[p]
         if pair.active > 0:
@@ -32,8 +32,8 @@ def contact_summary(world: arrays.World) -> tuple[float, float, int, float]:
             for k in range(pair.active):
                 contact = world.contacts[p, k]
                 of_spring = history.stiffness_before(contact, pair.stiffness, values, world.particles)
-                stiffness = history.shear_stiffness_before(contact, of_spring, values, law)
-                normal += laws.stored_energy(law, of_spring, contact.depth)
+                stiffness = history.shear_stiffness_before(contact, of_spring, values, exponent)
+                normal += laws.stored_energy(exponent, of_spring, contact.depth)
                 shear += 0.5 * stiffness * contact.spring * contact.spring
                 count += 1
                 largest = max(largest, contact.depth)

@@ -22,15 +22,15 @@ def stiffness_before(contact: Record, of_corners: float, values: Record, particl
 
 
 @kernel
-def shear_stiffness_before(contact: Record, stiffness: float, values: Record, law: int) -> float:
+def shear_stiffness_before(contact: Record, stiffness: float, values: Record, exponent: float) -> float:
     """Return the stiffness (N/m) that the shear spring of a contact had; `stiffness` as above."""
-    return values.shear_ratio * laws.tangent_stiffness(law, stiffness, contact.depth)
+    return values.shear_ratio * laws.tangent_stiffness(exponent, stiffness, contact.depth)
 
 
 @kernel
-def normal_loss(contact: Record, stiffness: float, law: int) -> float:
+def normal_loss(contact: Record, stiffness: float, exponent: float) -> float:
     """Return the part (N) of the normal force that was dashpot, less what clipping took; `stiffness` as above."""
-    return contact.normal_force - laws.elastic_force(law, stiffness, contact.depth)
+    return contact.normal_force - laws.elastic_force(exponent, stiffness, contact.depth)
 
 
 @kernel
@@ -111,13 +111,13 @@ def release(world: World, p: int, old: Record, step: float, tally: Record) -> No
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
-    law = world.controls[0].law
+    exponent = world.controls[0].exponent
     point = world.points[world.points.size - 1]
     place_ended(world, p, old, point)
     kinematics.resolve_point(point, a, b, step)
     of_spring = stiffness_before(old, pair.stiffness, values, world.particles)
-    stiffness = shear_stiffness_before(old, of_spring, values, law)
-    lost = normal_loss(old, of_spring, law) * point.closing
+    stiffness = shear_stiffness_before(old, of_spring, values, exponent)
+    lost = normal_loss(old, of_spring, exponent) * point.closing
     tally.dashpot += 0.5 * (lost + shear_loss(old, stiffness) * point.slipping)
     tally.broken += 0.5 * stiffness * old.spring * (old.spring + point.slipping)
 
@@ -136,7 +136,7 @@ def change_contacts(world: World, p: int, count: int, step: float, tally: Record
         if contact.depth == 0.0 and world.controls[0].model == SURFACE:
             take_over(world, p, i, before)
         if contact.depth == 0.0:  # it is new
-            kinematics.weigh_first_step(world.points[i], world.controls[0].law)
+            kinematics.weigh_first_step(world.points[i], world.controls[0].exponent)
     for j in range(before):
         if world.before[j].slot != TAKEN:
             release(world, p, world.before[j], step, tally)

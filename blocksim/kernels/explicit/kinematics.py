@@ -46,7 +46,7 @@ def has_just_begun(point: arrays.Record) -> bool:
 
 
 @jit.rare_kernel
-def weigh_first_step(point: arrays.Record, law: int) -> None:
+def weigh_first_step(point: arrays.Record, exponent: float) -> None:
     """Set the dashpot weight and the drawn share of the shear spring of a point that was not in contact before.
 
     The kick at time t covers [t - dt/2, t + dt/2]. A contact with overlap d = s v dt began at t - s dt, so a dashpot of
@@ -56,19 +56,19 @@ def weigh_first_step(point: arrays.Record, law: int) -> None:
     """
     if has_just_begun(point):
         share = min(point.depth / point.closing, 1.0)
-        point.weight = dashpot_weight(law, 0.0, share + 0.5, share)
+        point.weight = dashpot_weight(exponent, 0.0, share + 0.5, share)
         point.drawn = share
 
 
 @jit.rare_kernel
-def weigh_onset(point: arrays.Record, law: int) -> None:
+def weigh_onset(point: arrays.Record, exponent: float) -> None:
     """Set the dashpot weight of a point whose contact began some steps ago, where the coefficient still rises fast.
 
     Hertz: it goes with the fourth root of time, and one value for each step would leave an error of order dt^(5/4).
     """
     if 0.0 < point.depth < ONSET_STEPS * point.closing:
         at = point.depth / point.closing
-        point.weight = dashpot_weight(law, max(at - 0.5, 0.0), at + 0.5, at)
+        point.weight = dashpot_weight(exponent, max(at - 0.5, 0.0), at + 0.5, at)
 
 
 @jit.rare_kernel

@@ -1,68 +1,48 @@
-"""Contact laws, by an integer code: force, its slope, stored energy and weight of the dashpot at an overlap d.
+"""Contact laws, by the exponent n of the overlap d in the normal force K d^n (N); see blocksim/scenario/laws.py.
 
-A code keeps numba's disk cache valid, which jitted functions passed as arguments do not.
-
-LINEAR: a force proportional to the overlap (Eqs 8 and 9 of Huyen & Cuong 2020), stiffness K in N/m.
-
-HERTZ_MINDLIN: Hertz's normal force between spheres, proportional to the overlap to the power 3/2, K = 4/3 E* sqrt(R*)
-in N/m^1.5. H. Hertz, J. reine angew. Math. 92 (1881) 156-171; K. L. Johnson, Contact Mechanics (1985), ch. 4. A corner
-of a block has no radius of its own, so R* is an input (`contact_radius`). The shear stiffness 8 G* sqrt(R* d) of R. D.
-Mindlin, J. Appl. Mech. 16 (1949) 259-268, is the slope of the normal force, 2 E* sqrt(R* d), times 4 G*/E*: the same
-ratio as for the linear law. What happens to the shear spring while the overlap changes is written in
-kernels/explicit/contact.py.
+What happens to the shear spring while the overlap changes is written in kernels/explicit/friction.py.
 """
 
 import math
 
 from blocksim.kernels.common.jit import kernel
 
-LINEAR, HERTZ_MINDLIN = range(2)
-LAW_CODES = {"linear": LINEAR, "hertz-mindlin": HERTZ_MINDLIN}
+LINEAR, HERTZ_MINDLIN = 1.0, 1.5
 
 
 @kernel
-def elastic_force(law: int, stiffness: float, depth: float) -> float:
-    """Return the normal spring force (N) at an overlap (m): K d, or K d^(3/2)."""
-    if law == HERTZ_MINDLIN:
-        return stiffness * depth * math.sqrt(depth)
-    return stiffness * depth
+def growth(exponent: float, depth: float) -> float:
+    """Return d^(n-1) (m^(n-1)), which takes no power for two of the exponents."""
+    if exponent == LINEAR:
+        return 1.0
+    return math.sqrt(depth) if exponent == HERTZ_MINDLIN else depth ** (exponent - 1.0)
 
 
 @kernel
-def tangent_stiffness(law: int, stiffness: float, depth: float) -> float:
-    """Return the slope of the normal spring force (N/m) at an overlap (m): K, or 3/2 K d^(1/2)."""
-    if law == HERTZ_MINDLIN:
-        return 1.5 * stiffness * math.sqrt(depth)
-    return stiffness
+def elastic_force(exponent: float, stiffness: float, depth: float) -> float:
+    """Return the normal spring force (N) at an overlap (m): K d^n."""
+    return stiffness * depth * growth(exponent, depth)
 
 
 @kernel
-def stored_energy(law: int, stiffness: float, depth: float) -> float:
-    """Return the energy (J) stored in the normal spring at an overlap (m): K d^2 / 2, or 2/5 K d^(5/2)."""
-    if law == HERTZ_MINDLIN:
-        return 0.4 * stiffness * depth * depth * math.sqrt(depth)
-    return 0.5 * stiffness * depth * depth
+def tangent_stiffness(exponent: float, stiffness: float, depth: float) -> float:
+    """Return the slope of the normal spring force (N/m) at an overlap (m): n K d^(n-1)."""
+    return exponent * stiffness * growth(exponent, depth)
 
 
 @kernel
-def dashpot_weight(law: int, begin: float, end: float, at: float) -> float:
+def stored_energy(exponent: float, stiffness: float, depth: float) -> float:
+    """Return the energy (J) stored in the normal spring at an overlap (m): K d^(n+1)/(n+1)."""
+    return stiffness * depth * depth * growth(exponent, depth) / (exponent + 1.0)
+
+
+@kernel
+def dashpot_weight(exponent: float, begin: float, end: float, at: float) -> float:
     """Return the mean of the dashpot coefficient over [begin, end] over its value `at` a moment, times the length.
 
-    Times in steps since the contact began. The coefficient is constant, or goes with the root of the slope of the
-    force, d^(1/4), and while a contact closes d grows in proportion to time: (end^(5/4) - begin^(5/4))/(5/4 at^(1/4)).
+    Times in steps since the contact began. The coefficient goes with the root of the slope of the force, d^((n-1)/2),
+    and while a contact closes d grows in proportion to time, so that its integral is t^((n+1)/2)/((n+1)/2).
     """
-    if law == HERTZ_MINDLIN:
-        return 0.8 * (fourth_root(end) * end - fourth_root(begin) * begin) / fourth_root(at)
-    return end - begin
-
-
-@kernel
-def fourth_root(x: float) -> float:
-    """Return x^(1/4) for x >= 0."""
-    return math.sqrt(math.sqrt(x))
-
-
-@kernel
-def has_constant_stiffness(law: int) -> bool:
-    """Return True if the slope of the normal force is the same at every overlap."""
-    return law == LINEAR
+    first = begin * math.sqrt(growth(exponent, begin))
+    last = end * math.sqrt(growth(exponent, end))
+    return (last - first) / (0.5 * (exponent + 1.0) * math.sqrt(growth(exponent, at)))

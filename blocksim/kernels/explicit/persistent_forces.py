@@ -472,7 +472,7 @@ def apart_or_changed(world: World, p: int, a: Record, b: Record, table: Records)
 def has_changed(world: World, p: int, a: Record, b: Record, table: Records) -> bool:
     """As is_unsettled, for two bodies that touch in a scene with polygons."""
     pair = world.pairs[p]
-    if pair.is_sliver != 0 or not laws.has_constant_stiffness(world.controls[0].law):
+    if pair.is_sliver != 0 or world.controls[0].exponent != laws.LINEAR:
         return True
     if pair.duplicates != 0 and persistent_outlines.has_crossed(world, p, a, b, table):
         return True
@@ -496,4 +496,4 @@ def is_unsettled(world: World, p: int, a: Record, b: Record, dx: float, dy: floa
         return True
     if pair.active > 0 and has_new_neighbours(a, b, SURFACE):
         damping.renew_dashpots(pair)
-    return pair.active > 0 and (b.faces != ALL or not laws.has_constant_stiffness(world.controls[0].law))
+    return pair.active > 0 and (b.faces != ALL or world.controls[0].exponent != laws.LINEAR)

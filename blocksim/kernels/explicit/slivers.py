@@ -376,10 +376,10 @@ def place_sliver(world: World, p: int, nearest: Axis, table: Records) -> None:
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
-    law = world.controls[0].law
+    exponent = world.controls[0].exponent
     stiffness = world.interactions[a.contact_class, b.contact_class].normal_stiffness
-    whole = stored_energy(law, 1.0, 1.0)  # 1/2 of the linear law, 2/5 of Hertz's
-    energy = mean_energy(nearest, 1.0 / whole, a, b, table)
+    whole = stored_energy(exponent, 1.0, 1.0)
+    energy = mean_energy(nearest, exponent + 1.0, a, b, table)
     potential = mapped(energy, whole * stiffness * energy.value, whole * stiffness)
     point = world.points[0]
     place_nearest(point, nearest, a, b, table)
@@ -390,9 +390,9 @@ def place_sliver(world: World, p: int, nearest: Axis, table: Records) -> None:
     couple = (arm_x * point.ny - arm_y * point.nx) * force - (arm_x * point.nx + arm_y * point.ny) * along
     couple += potential.turn
     point.depth = potential.value / (whole * force)
-    point.stiffness = potential.value / stored_energy(law, 1.0, point.depth)
-    point.before = along / stored_energy(law, 1.0, point.depth)
-    point.rate = couple / stored_energy(law, 1.0, point.depth)
+    point.stiffness = potential.value / stored_energy(exponent, 1.0, point.depth)
+    point.before = along / stored_energy(exponent, 1.0, point.depth)
+    point.rate = couple / stored_energy(exponent, 1.0, point.depth)
 
 
 @kernel
@@ -443,11 +443,11 @@ def has_both_ends(
 
     `limit` (m) is that of the overlap.
     """
-    law = world.controls[0].law
+    exponent = world.controls[0].exponent
     sharp = Jet(0.0, 0.0, 0.0, 0.0)
     other = across_from(nearest, across, sharp, sharp, a, b, table).other.value
-    whole = stored_energy(law, 1.0, nearest.depth) + stored_energy(law, 1.0, max(other, 0.0))
+    whole = stored_energy(exponent, 1.0, nearest.depth) + stored_energy(exponent, 1.0, max(other, 0.0))
     found = 0.0
     for i in range(count):
-        found += stored_energy(law, 1.0, world.points[i].depth)
-    return abs(found - whole) <= ALIKE * whole + stored_energy(law, 1.0, NEGLIGIBLE * limit)
+        found += stored_energy(exponent, 1.0, world.points[i].depth)
+    return abs(found - whole) <= ALIKE * whole + stored_energy(exponent, 1.0, NEGLIGIBLE * limit)

@@ -9,10 +9,10 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from blocksim.scenario import units as q
+from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.scenario.models.base import OneOf, Table, setting
 
 Model = Literal["surface", "particles", "kernel"]
-Law = Literal["linear", "hertz-mindlin"]
 Kernel = Literal["wendland-c2", "cubic-spline", "quintic-spline"]
 
 SUPPORT: dict[Kernel, float] = {"wendland-c2": 2.0, "cubic-spline": 2.0, "quintic-spline": 3.0}
@@ -20,7 +20,7 @@ SUPPORT: dict[Kernel, float] = {"wendland-c2": 2.0, "cubic-spline": 2.0, "quinti
 SPACINGS_PER_LENGTH = 1.3  # smoothing length by default, in particle spacings
 LEAST_SPACINGS = 0.8
 """Least smoothing length, in particle spacings; below it a particle may have no neighbour on a flat side."""
-NO_FIXED_STIFFNESS = 'law "hertz-mindlin" takes it from the materials and contact_radius; use stiffness_scale'
+NO_FIXED_STIFFNESS = 'law "{}" takes it from the materials and contact_radius; use stiffness_scale'
 
 
 GROUND = "ground"
@@ -117,8 +117,8 @@ class Contact(Table):
     model: Annotated[Model, OneOf(get_args(Model))] = setting(
         "how contacts are found: surface, particles or kernel", "surface"
     )
-    law: Annotated[Law, OneOf(get_args(Law))] = setting(
-        "how the force grows with the overlap: linear or hertz-mindlin", "linear"
+    law: Annotated[str, OneOf(tuple(LAWS))] = setting(
+        f"how the force grows with the overlap: {' or '.join(LAWS)}", LINEAR.name
     )
     restitution: Restitution = setting("rebound speed over impact speed", Restitution())
     stiffness_scale: q.PositiveNumber = setting("factor on the stiffness of every contact", 1.0)
@@ -162,8 +162,8 @@ class Contact(Table):
         return SUPPORT[self.kernel] * self.resolved_smoothing_length
 
     def _check(self) -> None:
-        if self.law == "hertz-mindlin" and self.normal_stiffness is not None:
-            raise q.invalid(NO_FIXED_STIFFNESS, "normal_stiffness")
+        if not LAWS[self.law].is_linear and self.normal_stiffness is not None:
+            raise q.invalid(NO_FIXED_STIFFNESS.format(self.law), "normal_stiffness")
         least = LEAST_SPACINGS * self.particle_spacing
         if self.model == "kernel" and self.smoothing_length is not None and self.smoothing_length < least:
             message = (

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from blocksim.kernels.common import arrays, systems
 from blocksim.kernels.explicit import depth, step
 from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
-from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
 from blocksim.kernels.explicit.models import KERNEL, SURFACE as SURFACE_MODEL
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.scenario.overlap import penetration
@@ -19,7 +18,6 @@ from blocksim.simulation.trajectory import CONTACT_ROW, SUPPORT, UNITS, Rows
 from blocksim.world import build
 
 WORK_SPACE = ("points", "matrices", "before", "action")
-ENERGIES = {LINEAR: (0.5, 2.0), HERTZ_MINDLIN: (0.4, 2.5)}  # stored per stiffness: factor, power of the overlap
 Indices = NDArray[np.intp]
 SIDES_X, SIDES_Y = (-1.0, 1.0, 1.0, -1.0), (-1.0, -1.0, 1.0, 1.0)  # of the corners, counter-clockwise from lower left
 
@@ -40,8 +38,8 @@ def explicit_contacts(world: arrays.World, blocks: int) -> Rows:
     if "nx" not in (contacts.dtype.names or ()):
         # what a stiffness does that changes by slip and tilt: a force along the tangent, and a couple, that of a normal
         # force that acts a little beside its corner; without a normal force there is no such place
-        factor, power = ENERGIES[int(world.controls[0].law)]
-        energy = factor * rows["overlap"] ** power
+        power = float(world.controls[0].exponent) + 1.0
+        energy = rows["overlap"] ** power / power  # stored per stiffness
         rows["shear_force"] -= pairs["slide"][pair] * energy
         normal = rows["normal_force"]
         way = np.divide(pairs["turn"][pair] * energy, normal, out=np.zeros_like(normal), where=normal > 0.0)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 import pytest
 
-from blocksim.kernels.explicit.laws import LAW_CODES
 from blocksim.kernels.explicit.models import MODEL_CODES
+from blocksim.scenario.laws import LAWS
 from blocksim.scenario.models.contact import Contact
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ STEPS = 600
 # near corners the stiffness of the kernel model's contacts follows the pose, which does no work and creates or destroys
 # some energy; the other two have potentials
 CONSERVATIVE = ("surface", "particles")
-BOTH = pytest.mark.parametrize("law", LAW_CODES)
+BOTH = pytest.mark.parametrize("law", LAWS)
 ALL_MODELS = pytest.mark.parametrize("model", MODEL_CODES)
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.explicit.laws import LAW_CODES
 from blocksim.kernels.explicit.models.outlines import near_slots
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
+from blocksim.scenario.laws import LAWS
 from blocksim.verification.scene import Scene
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def landed(outline: Outline, angle: float, **values: object) -> tuple[Simulation
     return run, float(run.bodies[0].vy + run.bodies[0].spin * arm)
 
 
-@pytest.mark.parametrize("law", LAW_CODES)
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("corners", [3, 6, 16])
 def test_polygon_leaves_with_its_restitution_flat_and_on_a_corner(corners: int, law: str) -> None:
     flat = -0.5 * pi - pi / corners
@@ -148,7 +148,7 @@ def bouncing(shape: dict[str, object], law: str, nudge: float = 0.0) -> Simulati
     return Scene([{**pose, **shape} for pose in poses], restitution=0.6, friction=0.3, contact=contact).start()
 
 
-@pytest.mark.parametrize("law", LAW_CODES)
+@pytest.mark.parametrize("law", LAWS)
 def test_rectangles_given_as_outlines_bounce_and_tumble_as_rectangles_do(law: str) -> None:
     """To no more than what a shift by 1e-16 m grows to, or 1e-9 of a width: impacts multiply round-off."""
     plain: dict[str, object] = {"width": SIDES[0], "height": SIDES[1]}
