@@ -275,7 +275,7 @@ def _scenario_keys(ctx: Any, incomplete: str) -> list[str]:
 
 COMPLETIONS = {
     "kinds": completion_of(_kinds),
-    "colours": completion_of(lambda: import_module("blocksim.view.paint").COLOURS),
+    "colours": completion_of(lambda: import_module("blocksim.view.paints").COLOURS),
     "cases": completion_of(_cases),
     "templates": completion_of(lambda: import_module("blocksim.cli.new").templates()),
     "scenario_keys": _scenario_keys,

@@ -8,7 +8,7 @@ from importlib import import_module
 from io import BytesIO
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError, OutputError, UnavailableError
 from blocksim.simulation.files import NAME, atomic_path, write_bytes
 from blocksim.simulation.trajectory import Frames
-from blocksim.view import arrows, run_data, scene, style
-from blocksim.view.paint import Paint, by_block, draw_key
+from blocksim.view import arrows, paints, run_data, scene, style
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -175,7 +174,7 @@ class Look:
     trails: bool | None = None
     title: str = ""
     forces: bool = False
-    paint: Paint | None = None
+    paint: paints.Paint | None = None
 
 
 def draw_animation(
@@ -209,11 +208,10 @@ def draw_animation(
 
 def writer_of(path: Path) -> Writer:
     """Return what writes a file of this name; raises InvalidInputError for a format that is not written."""
-    try:
-        return WRITERS[path.suffix.lower()]
-    except KeyError:
-        unknown = f"{path}: '{path.suffix}' unsupported format; use {' or '.join(WRITERS)}"
-        raise InvalidInputError(unknown) from None
+    write = WRITERS.get(path.suffix.lower())
+    if write is None:
+        raise InvalidInputError(f"{path}: '{path.suffix}' unsupported format; use {' or '.join(WRITERS)}")
+    return write
 
 
 def frame_times(frames: Frames, drawable: run_data.Indices, pace: Pace) -> tuple[run_data.Indices, run_data.Floats]:
@@ -256,13 +254,11 @@ class Animation:
 
         Raises InvalidInputError for forces that were not stored.
         """
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-
         self.frames, self.support = frames, support
         self.forces = arrows.force_scale(frames) if look.forces else None
         self.drawable = run_data.drawable_frames(frames)
         self.has_trails = len(frames.names) <= FEW_BLOCKS if look.trails is None else look.trails
-        paint = look.paint or by_block(frames)
+        paint = look.paint or paints.by_block(frames)
         self.scene = scene.Scene(frames, support, paint)
         across = look.width / DOTS_PER_INCH
         side, head, foot = MARGINS
@@ -281,7 +277,7 @@ class Animation:
             self.canvas = page.canvas(figure)
             scene.finish_panel(self.canvas, labelled=True)
             style.write_heading(figure, look.title, side)
-            draw_key(figure, paint, side, KEY_FOOT)
+            paints.draw_key(figure, paint, side, KEY_FOOT)
             scales = [self.beyond, "" if self.forces is None else f"forces: {self.forces.example}"]
             scales.append(f"loads: {self.acts.sizes}" if self.acts.sizes else "")
             # at the right, beside the time, where there is room
@@ -293,8 +289,7 @@ class Animation:
             self.is_still = support.motion is None and not np.isfinite(support.gone).any()
             if self.is_still:
                 scene.draw_surroundings(self.canvas, self.scene, int(self.drawable[0]))
-            paper: Any = FigureCanvasAgg
-            self.paper = paper(figure)
+            self.paper = cast("Any", figure.canvas)
             self.paper.draw()
             self.still = self.paper.copy_from_bbox(figure.bbox)
 

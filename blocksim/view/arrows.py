@@ -92,13 +92,13 @@ def arrows(rows: Rows, scale: ForceScale, tilt: float) -> Floats:
 
 def draw_forces(canvas: Canvas, frames: Frames, frame: int, scale: ForceScale) -> None:
     """Draw the forces of all contacts of one frame."""
-    from matplotlib.patches import Rectangle
-
     found, extent = arrows(contacts_of(frames).at(frame), scale, canvas.extent.tilt), canvas.extent
     size = min(1.0, scale.longest * canvas.points_per_mm / WHOLE)
     if size < 1.0:  # make everything above the ground paler
-        place = (extent.left, extent.lowest), extent.width, extent.top - extent.lowest
-        canvas.axes.add_artist(Rectangle(*place, facecolor="#FFFFFF", alpha=VEIL_ALPHA, linewidth=0.0, zorder=VEIL))
+        left, right, low, top = extent.left, extent.right, extent.lowest, extent.top
+        corners = [(left, low), (right, low), (right, top), (left, top)]
+        look: dict[str, Any] = {"facecolors": "#FFFFFF", "alpha": VEIL_ALPHA, "linewidths": 0.0, "zorder": VEIL}
+        style.add_polygons(canvas.axes, [corners], **look)
     draw_arrows(canvas, found, size)
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.simulation.trajectory import Frames
-from blocksim.view import arrows, run_data, scene, style
-from blocksim.view.paint import Paint, by_block, draw_key
+from blocksim.view import arrows, paints, run_data, scene, style
 
 NARROWEST = 0.35  # width over height
 RANGE_GAP = 0.06  # part of the width that two measured ranges in one row keep apart
@@ -111,7 +110,7 @@ def draw_final(
     *,
     forces: bool = False,
     times: Sequence[float] | None = None,
-    paint: Paint | None = None,
+    paint: paints.Paint | None = None,
     paper: style.Paper = style.OWN,
 ) -> None:
     """Draw the last frame, or the one nearest to the last of `times` (s).
@@ -122,7 +121,7 @@ def draw_final(
     that is too small or nothing to draw, and OutputError when the file cannot be written.
     """
     path = style.picture_path(path)
-    support, paint = support or run_data.Support(), paint or by_block(frames)
+    support, paint = support or run_data.Support(), paint or paints.by_block(frames)
     drawable = run_data.drawable_frames(frames)
     chosen = drawable[-1:] if times is None else run_data.moments_at(frames, drawable, times)[-1:]
     frame = int(chosen[0])
@@ -165,7 +164,7 @@ def draw_final(
         arrows.draw_marks(canvas, acts.marks[0])
         if scale is not None:
             arrows.draw_forces(canvas, frames, frame, scale)
-        draw_key(figure, paint, SIDE, foot - paint.height)
+        paints.draw_key(figure, paint, SIDE, foot - paint.height)
         caption = f"{float(frames.time[frame]):.3f} s" + (", final" if frame == len(frames.time) - 1 else "")
         beside = SIDE + (style.width_of(caption, style.FONT_SIZE) + SPACE[0]) / style.POINTS_PER_INCH
         style.write_text(figure, width - SIDE, height - style.EDGE, caption, ha="right", va="top")

@@ -11,8 +11,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
 from blocksim.simulation.trajectory import Frames, force_on_supports
-from blocksim.view import arrows, run_data, style, time_panels
-from blocksim.view.paint import Paint, by_block
+from blocksim.view import arrows, paints, run_data, style, time_panels
 from blocksim.world.systems.blocks import BLOCKS
 from blocksim.world.systems.system import Channel
 
@@ -95,7 +94,7 @@ class FramesInView:
     def velocity(self, axis: int) -> run_data.Floats:
         """Return velocities (mm/s) along x (0) or y (1)."""
         velocities = (self.frames.vx, self.frames.vy)[axis][self.chosen]
-        carried = np.multiply.outer(self.support.velocity(self.time), self.support.direction)
+        carried = np.multiply.outer(self.support.displacement(self.time, 1), self.support.direction)
         return np.asarray(run_data.MILLIMETRES * (velocities - carried[:, axis, None] * bool(self.from_ground)))
 
 
@@ -156,7 +155,7 @@ def draw_history_page(
     *,
     forces: bool = False,
     choice: Choice | None = None,
-    paint: Paint | None = None,
+    paint: paints.Paint | None = None,
     paper: style.Paper = style.OWN,
 ) -> "Iterator[tuple[style.Figure, dict[str, style.Axes]]]":
     """Give x, y, rotation, energies and contacts over time, or the panels of `choice`, by the name of each.
@@ -167,7 +166,7 @@ def draw_history_page(
     InvalidInputError for unknown panels or blocks, forces that were not stored, a page that is too small or nothing to
     draw.
     """
-    choice, support, paint = choice or Choice(), support or run_data.Support(), paint or by_block(frames)
+    choice, support, paint = choice or Choice(), support or run_data.Support(), paint or paints.by_block(frames)
     if paint.scale is not None and not any(paint.elements):  # a block does not keep its colour throughout the run
         raise InvalidInputError("a history is coloured by block or material; speed and rotation are separate panels")
     if not frames.names:

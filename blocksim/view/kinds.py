@@ -28,7 +28,7 @@ class SweepPicture:
     """A kind of picture of a sweep: which sweeps it cannot show or suits best, and its drawing."""
 
     refusal: Callable[[data.SweepData], str]  # why it cannot show a sweep; empty where it can
-    suits: Callable[[data.SweepData], bool]
+    suits: Callable[[data.SweepData], bool]  # of those that it can show
     open: Callable[[data.SweepData, style.Paper], AbstractContextManager["style.Figure"]]
 
     def draw(self, sweep: data.SweepData, path: Path, paper: style.Paper = style.OWN) -> None:
@@ -60,4 +60,4 @@ def run_kind(name: str) -> Callable[..., None]:
 
 def kind_for(sweep: data.SweepData) -> SweepPicture:
     """Return the first kind that suits a sweep."""
-    return next(kind for kind in SWEEP_KINDS.values() if not kind.refusal(sweep) and kind.suits(sweep))
+    return next(kind for kind in SWEEP_KINDS.values() if kind.suits(sweep))

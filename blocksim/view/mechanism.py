@@ -11,8 +11,7 @@ import numpy as np
 
 from blocksim.simulation.observables import MOVED_SHARE
 from blocksim.simulation.trajectory import SUPPORT, Frames, Rows
-from blocksim.view import arrows, run_data, scene, style
-from blocksim.view.paint import by_displacement, displacements, draw_key
+from blocksim.view import arrows, paints, run_data, scene, style
 
 Pair = tuple[int, int]  # bodies a and b
 
@@ -49,7 +48,7 @@ def _at_the_start(frames: Frames, frame: int, support: run_data.Support) -> dict
     pressed = next((found for found in range(frame + 1) if len(contacts.at(found))), None)
     if pressed is None:
         return {}
-    share = displacements(frames, support)[: frame + 1] / run_data.shortest_sides(frames)
+    share = paints.displacements(frames, support)[: frame + 1] / run_data.shortest_sides(frames)
     moved = np.column_stack([share > MOVED_SHARE, np.zeros(frame + 1, dtype=bool)])  # the last is the support, SUPPORT
     has_moved = np.maximum.accumulate(moved, axis=0)
     found: dict[Pair, tuple[int, Rows]] = {}
@@ -154,7 +153,7 @@ class BracketRun:
         if not self.is_mechanism:
             return int(drawable[-1])
         shortest = run_data.shortest_sides(self.frames)
-        seen = (displacements(self.frames, self.support)[drawable] > VISIBLE * shortest).any(axis=1)
+        seen = (paints.displacements(self.frames, self.support)[drawable] > VISIBLE * shortest).any(axis=1)
         return int(drawable[int(np.argmax(seen))] if seen.any() else drawable[-1])
 
 
@@ -172,8 +171,8 @@ def draw_mechanisms(
     width = paper.width(WIDTH, LEAST_WIDTH)
     across = 0.5 * (width - GAP)
     sides = [side for pair in brackets for side in pair]
-    most = max(float(displacements(side.frames, side.support)[side.frame].max()) for side in sides)
-    paint = by_displacement(sides[0].frames, sides[0].support, most)
+    most = max(float(paints.displacements(side.frames, side.support)[side.frame].max()) for side in sides)
+    paint = paints.by_displacement(sides[0].frames, sides[0].support, most)
     texts = [ARROWS_OF_LOADS] if any(side.acts.sizes for side in sides) else []
     texts += [ARROWS_OF_SPEED] if any(side.acts.largest.get(arrows.SPEED, 0.0) > 0.0 for side in sides) else []
     notes = style.break_lines(" ".join(texts), width - 2.0 * SIDE) if texts else []
@@ -195,7 +194,7 @@ def draw_mechanisms(
             for column, side in enumerate(pair):
                 _draw_side(figure, side, page, (column * (across + GAP) + SIDE, top), most)
             top -= page.height
-        draw_key(figure, paint, SIDE, style.EDGE + legend)
+        paints.draw_key(figure, paint, SIDE, style.EDGE + legend)
         style.write_legend(figure, handles, SIDE, style.EDGE + style.LINE * len(notes), ncols=columns, handlelength=1.6)
         style.write_text(figure, SIDE, style.EDGE, "\n".join(notes), color=style.FAINT_INK, va="bottom")
         style.write_heading(figure, title, SIDE)
@@ -217,7 +216,7 @@ def _draw_side(
     left, top = corner
     page = replace(page, extent=replace(page.extent, tilt=side.support.tilt))
     canvas = page.canvas(figure, left, top - HEAD - page.panel_height)
-    paint = by_displacement(side.frames, side.support, most)
+    paint = paints.by_displacement(side.frames, side.support, most)
     shown = scene.Scene(side.frames, side.support, paint, with_tops=False)  # tops read as joints
     scene.draw_scene(canvas, shown, side.frame)
     longest = arrows.LENGTH * max(page.extent.width, page.extent.height)

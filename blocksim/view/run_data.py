@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario import PlacedSegment, Scenario, place_bodies, placement
-from blocksim.scenario.events import wall_names
+from blocksim.scenario import PlacedSegment, Scenario, events, place_bodies, placement
 from blocksim.scenario.models.loads import AnyLoad, OnBody, Stretch, stretches_of
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.simulation.results import EventRecord
@@ -154,13 +153,9 @@ class Support:
         walls = (wall for wall, gone in zip(self.walls, self.gone, strict=True) if time < gone)
         return replace(self, walls=tuple(walls), gone=())
 
-    def displacement(self, times: Floats) -> Floats:
-        """Return the displacement (m) along `direction` at these times (s)."""
-        return np.zeros_like(times) if self.motion is None else displacement_and_velocity(self.motion, times)[0]
-
-    def velocity(self, times: Floats) -> Floats:
-        """Return the velocity (m/s) along `direction` at these times (s)."""
-        return np.zeros_like(times) if self.motion is None else displacement_and_velocity(self.motion, times)[1]
+    def displacement(self, times: Floats, order: int = 0) -> Floats:
+        """Return the displacement (m) along `direction` at these times (s), of `order` 1 its velocity (m/s)."""
+        return np.zeros_like(times) if self.motion is None else displacement_and_velocity(self.motion, times)[order]
 
     def offset(self, times: Floats) -> Floats:
         """Return the displacement (m) along x and y at these times (s), (n, 2)."""
@@ -199,14 +194,14 @@ def support_of(scenario: Scenario, happened: Sequence[EventRecord] = ()) -> Supp
     times = [np.inf if event.at is None else event.at for event in scenario.events]
     for one in happened:
         times[one.event] = one.time_s
-    events = list(zip(scenario.events, times, strict=True))
+    timeline = list(zip(scenario.events, times, strict=True))
     numbers = {body.name: number for number, body in enumerate(placed)}
     loads = tuple(
         ActingLoad(
             load,
             numbers[load.body] if isinstance(load, OnBody) else -1,
             stretches_of(load, scenario.ground.tilt),
-            min((at for event, at in events if load.name in event.unload), default=math.inf),
+            min((at for event, at in timeline if load.name in event.unload), default=math.inf),
         )
         for load in scenario.loads
     )
@@ -216,7 +211,8 @@ def support_of(scenario: Scenario, happened: Sequence[EventRecord] = ()) -> Supp
         fixed=tuple(body.fixed and not body.freed for body in placed),
         driven=tuple(body.driven for body in placed) if any(body.driven for body in placed) else (),
         gone=tuple(
-            min((at for event, at in events if name in event.remove), default=np.inf) for name in wall_names(scenario)
+            min((at for event, at in timeline if name in event.remove), default=np.inf)
+            for name in events.wall_names(scenario)
         ),
         tilt=scenario.ground.tilt,
         direction=motion_direction(scenario),

@@ -3,19 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from blocksim.scenario import PlacedSegment, placement
 from blocksim.simulation.trajectory import Frames
-from blocksim.view import run_data, style
-from blocksim.view.paint import Paint
+from blocksim.view import paints, run_data, style
 from blocksim.world.systems.blocks import are_removed, local_corners, placed_points
-
-if TYPE_CHECKING:
-    from matplotlib.transforms import Transform
-
 
 GROUND_THICKNESS = 5.0  # points, below the lowest ground
 RULER_EDGE = 10.0  # points; no number is nearer to the edge of a panel
@@ -35,7 +30,7 @@ class Canvas:
     points_per_mm: float
 
     @cached_property
-    def scene(self) -> "Transform":
+    def scene(self) -> Any:
         """From the scene's millimetres to the paper."""
         from matplotlib.transforms import Affine2D
 
@@ -122,10 +117,10 @@ def finish_panel(canvas: Canvas, *, labelled: bool, is_numbered: bool = True, ro
     """Fix the scale of a panel and leave only its x axis; on tilted ground a ruler below `rows` of measured ranges."""
     from matplotlib.ticker import MaxNLocator
 
-    axes, extent = canvas.axes, canvas.extent
+    axes, extent, points = canvas.axes, canvas.extent, canvas.points_per_mm
     width, height = style.size_of(axes)
     axes.set_xlim(extent.left, extent.right)
-    axes.set_ylim(extent.top - height * style.POINTS_PER_INCH / canvas.points_per_mm, extent.top)
+    axes.set_ylim(extent.top - height * style.POINTS_PER_INCH / points, extent.top)
     axes.spines[["left", "right", "top"]].set_visible(False)
     axes.yaxis.set_visible(False)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=max(2, int(width / TICK_ROOM)), steps=[1, 2, 5, 10]))
@@ -134,26 +129,19 @@ def finish_panel(canvas: Canvas, *, labelled: bool, is_numbered: bool = True, ro
     axes.spines["bottom"].set_visible(not extent.tilt)
     if labelled:
         axes.set_xlabel("x (mm)", labelpad=1.0)
-    if is_numbered and extent.tilt:
-        draw_ruler(canvas, depth_of(rows))
-
-
-def draw_ruler(canvas: Canvas, depth: float) -> None:
-    """Draw numbers of x (mm) along tilted ground, `depth` (points) below its lowest part."""
-    from matplotlib.ticker import MaxNLocator
-
-    y = canvas.extent.base - depth / canvas.points_per_mm
-    low, high = canvas.extent.span(y)
-    edge, tick = RULER_EDGE / canvas.points_per_mm, TICK_LENGTH / canvas.points_per_mm
-    room = (high - low) * canvas.points_per_mm
-    locator = MaxNLocator(nbins=max(2, int(room / TICK_SPACING)), steps=[1, 2, 5, 10])
+    if not is_numbered or not extent.tilt:
+        return
+    y = extent.base - depth_of(rows) / points
+    low, high = extent.span(y)
+    edge, tick = RULER_EDGE / points, TICK_LENGTH / points
+    locator = MaxNLocator(nbins=max(2, int((high - low) * points / TICK_SPACING)), steps=[1, 2, 5, 10])
     line: dict[str, Any] = {"color": style.FAINT_INK, "linewidth": style.LINE_WIDTH, "transform": canvas.scene}
-    canvas.axes.plot([low, high], [y, y], **line)
+    axes.plot([low, high], [y, y], **line)
     ticks = [float(x) for x in locator.tick_values(low, high) if low + edge <= x <= high - edge]
     for x in ticks:
-        canvas.axes.plot([x, x], [y - tick, y], **line)
+        axes.plot([x, x], [y - tick, y], **line)
         text = f"{x:g}{' mm' if x == ticks[-1] else ''}".replace("-", "−")
-        canvas.axes.text(x, y - 1.6 * tick, text, ha="center", va="top", **canvas.along)
+        axes.text(x, y - 1.6 * tick, text, ha="center", va="top", **canvas.along)
 
 
 WALL_THICKNESS = 4.0  # points; less than the ground, which covers the feet of walls
@@ -296,7 +284,7 @@ class Scene:
 
     frames: Frames
     support: run_data.Support
-    paint: Paint
+    paint: paints.Paint
     with_tops: bool = True
     with_others: bool = True
 

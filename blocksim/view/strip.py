@@ -8,8 +8,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.trajectory import Frames
-from blocksim.view import arrows, final, run_data, scene, style
-from blocksim.view.paint import Paint, by_block, draw_key
+from blocksim.view import arrows, final, paints, run_data, scene, style
 
 WIDTH = 10.0  # inches, of the whole strip
 SIDE, GAP = 0.25, 0.25  # inches, at the left and right end and between columns
@@ -115,7 +114,7 @@ def draw_strip(
     *,
     forces: bool = False,
     count: int | None = None,
-    paint: Paint | None = None,
+    paint: paints.Paint | None = None,
     paper: style.Paper = style.OWN,
 ) -> None:
     """Draw the run as 6 to 8 panels from release to the final state and write them as PNG, SVG or PDF.
@@ -127,7 +126,7 @@ def draw_strip(
     page that is too small or nothing to draw, and OutputError when the file cannot be written.
     """
     path = style.picture_path(path)
-    support, paint = support or run_data.Support(), paint or by_block(frames)
+    support, paint = support or run_data.Support(), paint or paints.by_block(frames)
     drawable = run_data.drawable_frames(frames)
     scale = arrows.force_scale(frames) if forces else None
     extent = run_data.extent_of(frames, drawable, support)
@@ -164,7 +163,7 @@ def draw_strip(
                 arrows.draw_forces(canvas, frames, frame, scale)
         style.write_heading(figure, title, SIDE)
         style.write_text(figure, SIDE, 0.05, "\n".join(notes), color=style.FAINT_INK, va="bottom")
-        draw_key(figure, paint, SIDE, 0.05 + len(notes) * style.LINE)
+        paints.draw_key(figure, paint, SIDE, 0.05 + len(notes) * style.LINE)
         style.save_figure(figure, path)
 
 
@@ -211,7 +210,7 @@ def draw_profile(
     *,
     forces: bool = False,  # noqa: ARG001 - of blocks
     times: Sequence[float] | None = None,
-    paint: Paint | None = None,  # noqa: ARG001 - lines are coloured by time
+    paint: paints.Paint | None = None,  # noqa: ARG001 - lines are coloured by time
     paper: style.Paper = style.OWN,
 ) -> None:
     """Draw the surface of soil at these times (s), by default at six that are even in motion.
@@ -234,7 +233,7 @@ def draw_profile(
     steps = np.linspace(0.0, 0.85, len(chosen))  # dark to light
     shades = [colors.to_hex(colour) for colour in colormaps[COLOURS](steps)]
     named = tuple((f"{float(frames.time[frame]):.3f} s", shade) for frame, shade in zip(chosen, shades, strict=True))
-    key = Paint(lambda _: [PALE] * len(frames.names), named)
+    key = paints.Paint(lambda _: [PALE] * len(frames.names), named)
     side, head, foot = PROFILE_MARGINS
     extent, width = run_data.extent_of(frames, drawable, support), paper.width(PROFILE_WIDTH, PROFILE_LEAST)
     page = scene.page_for(extent, width, PROFILE_TALLEST, (side, head, foot + key.height))
@@ -245,6 +244,6 @@ def draw_profile(
             for line in of_frame:
                 canvas.axes.plot(*(run_data.MILLIMETRES * line).T, color=shade, linewidth=THICK, transform=canvas.scene)
         scene.finish_panel(canvas, labelled=True)
-        draw_key(figure, key, side, 0.06)
+        paints.draw_key(figure, key, side, 0.06)
         style.write_heading(figure, title and f"{title}: surface", side)
         style.save_figure(figure, path)

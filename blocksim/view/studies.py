@@ -151,6 +151,7 @@ def draw_limit_curve(
     Brackets of a kind have one colour. Of what others found, long series are lines and short ones marks, which no line
     between few points would do justice.
     """
+    brackets = [(x, one) for x, found in curve.points for one in found]
     with open_study_figure(path, title, curve.notes, paper) as axes:
         for start, end in join_brackets(curve):
             axes.plot(*zip(start, end, strict=True), color=LINE_COLOUR, linewidth=1.0, zorder=2)
@@ -160,7 +161,6 @@ def draw_limit_curve(
                 look |= {"linestyle": "none", "marker": MARKS[number % len(MARKS)], "markersize": 6.0, "zorder": 3.0}
                 look |= {"markerfacecolor": "none"}
             axes.plot(*zip(*series.points, strict=True), label=series.name, **look)
-        brackets = [(x, one) for x, found in curve.points for one in found]
         for number, kind in enumerate(dict.fromkeys((one.below, one.above) for _, one in brackets)):
             own = [(x, one.middle, 0.5 * (one.high - one.low)) for x, one in brackets if one[2:] == kind]
             x, middles, reach = zip(*own, strict=True)
@@ -224,8 +224,8 @@ def draw_fragility(
     found: Fragility, path: Path | str, title: str | None = None, paper: style.Paper = style.OWN
 ) -> None:
     """Draw the picture and write it; raises as `open_study_figure`."""
+    band = found.band
     with open_study_figure(path, title, found.notes, paper) as axes:
-        band = found.band
         if band is not None:
             axes.fill_between(band.x, band.low, band.high, color=CURVE_COLOUR, alpha=0.18, linewidth=0.0)
             axes.plot(band.x, band.probability, color=CURVE_COLOUR, linewidth=1.4, label="lognormal curve, 95 % band")
@@ -405,10 +405,8 @@ def _open_levels(
     panels: int, blocks: Sequence[str], shown: Sequence[int], title: str | None, paper: style.Paper
 ) -> Iterator[tuple["style.Figure", list["style.Axes"]]]:
     """Give panels side by side, and a legend that names the lines of some blocks."""
-    room, width = (
-        LEGEND_NAME * style.POINTS_PER_INCH,
-        LEVEL_SIDES[0] + LEVEL_SIDES[1] + panels * LEVEL_PANEL[0] + (panels - 1) * LEVEL_GAP,
-    )
+    room = LEGEND_NAME * style.POINTS_PER_INCH
+    width = LEVEL_SIDES[0] + LEVEL_SIDES[1] + panels * LEVEL_PANEL[0] + (panels - 1) * LEVEL_GAP
     names = [style.cut_to(blocks[block], room, style.FONT_SIZE) for block in shown]
     handles = [
         style.legend_entry(f"x of block {name}", **_line_look(shown, block))
@@ -454,8 +452,6 @@ def _line_look(shown: Sequence[int], block: int) -> dict[str, Any]:
 
 
 def _draw_level(axes: "style.Axes", panel: LevelPanel, shown: Sequence[int], width: float) -> None:
-    from matplotlib.ticker import FuncFormatter, NullLocator
-
     low, _ = axes.get_ylim()
     coarser = panel.values[:-1]  # the finest level is what the others are measured from
     axes.set_xscale("log")
@@ -475,8 +471,8 @@ def _draw_level(axes: "style.Axes", panel: LevelPanel, shown: Sequence[int], wid
     apart = -(-len(panel.values) // int(width / NUMBER_ROOM))
     start = int(np.argmin(np.abs(panel.values - panel.own))) % apart
     axes.set_xticks(panel.values[start::apart], [f"{value:.3g}" for value in panel.values[start::apart]])
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.minorticks_off()
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.spines[["right", "top"]].set_visible(False)
     room = width * style.POINTS_PER_INCH
     label = f"{panel.key}, finer to the right"

@@ -429,11 +429,10 @@ def name_axes(figure: "Figure", panels: list[list["Axes"]], x: str, y: str, dept
 
 def write_heading(figure: "Figure", title: str | None, left: float, right: float | None = None) -> None:
     """Write a title in one line at the top, cut where it would come nearer to the sides than `left` and `right`."""
-    if title:
-        across, up = (float(size) for size in figure.get_size_inches())
-        room = across - left - (left if right is None else right)
-        shown = cut_to(title, room * POINTS_PER_INCH, TITLE_SIZE)
-        write_text(figure, left, up - EDGE, shown, va="top", fontsize=TITLE_SIZE)
+    across, up = (float(size) for size in figure.get_size_inches())
+    room = across - left - (left if right is None else right)
+    shown = cut_to(title or "", room * POINTS_PER_INCH, TITLE_SIZE)
+    write_text(figure, left, up - EDGE, shown, va="top", fontsize=TITLE_SIZE)
 
 
 def limits_around(values: Any, share: float, least: float) -> tuple[float, float]:

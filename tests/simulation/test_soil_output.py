@@ -12,7 +12,7 @@ from blocksim.simulation import Result
 from blocksim.simulation.stores.exports import write_vtkhdf
 from blocksim.study.run import open_run
 from blocksim.view.kinds import run_kind
-from blocksim.view.paint import paint_of
+from blocksim.view.paints import paint_of
 from blocksim.view.report.player import pack_frames
 from tests.soils import DEPTH, LEFT, column, scene
 from tests.view.made_up import toppling

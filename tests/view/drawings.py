@@ -16,7 +16,7 @@ from blocksim.view import style
 from blocksim.view.final import draw_final
 from blocksim.view.history import Choice, draw_history
 from blocksim.view.kinds import SWEEP_KINDS
-from blocksim.view.paint import by_speed, by_turn
+from blocksim.view.paints import by_speed, by_turn
 from blocksim.view.run_data import ActingLoad, Support
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, LevelPanel, draw_levels, draw_tornado

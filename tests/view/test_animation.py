@@ -14,7 +14,7 @@ from blocksim.scenario import load_scenario
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.trajectory import Frames
 from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, draw_animation, frame_times, ticks
-from blocksim.view.paint import PAINTS
+from blocksim.view.paints import PAINTS
 from blocksim.view.run_data import Support
 from blocksim.view.style import BLOCK_COLOURS
 from tests.golden import Golden

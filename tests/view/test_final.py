@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from blocksim.simulation.trajectory import final_columns
 from blocksim.view.final import draw_final
 from blocksim.view.history import Choice, draw_history
-from blocksim.view.paint import by_turn
+from blocksim.view.paints import by_turn
 from tests.view.drawings import TABLE
 from tests.view.made_up import boxes_of, stacked, toppling
 from tests.view.test_loads import support

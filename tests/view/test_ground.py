@@ -12,10 +12,10 @@ from blocksim.view.scene import (
     GROUND_THICKNESS,
     WALL_THICKNESS,
     Canvas,
-    draw_ruler,
     draw_shift,
     draw_start,
     draw_support,
+    finish_panel,
     wall_outlines,
 )
 from blocksim.view.style import open_figure
@@ -160,11 +160,11 @@ def test_tilted_ground_is_turned_in_the_picture_and_numbered_along_itself(tilt: 
     assert drawn.axes.patches[0].get_transform().transform([70.0, 0.0]) == pytest.approx(
         drawn.axes.transData.transform(rotate_points(np.array([70.0, 0.0]), tilt))
     )
-    draw_ruler(drawn, depth=10.0)
+    finish_panel(drawn, labelled=False)
     numbers = [(text.get_text(), text.get_position()[0]) for text in drawn.axes.texts]
     assert len(numbers) > 5
     assert all(float(shown.removesuffix(" mm").replace("−", "-")) == x for shown, x in numbers)
     assert [shown.endswith(" mm") for shown, _ in numbers] == [False] * (len(numbers) - 1) + [True]
     turns = np.array([text.get_rotation() for text in drawn.axes.texts])
     assert turns == pytest.approx(np.degrees(tilt) % 360.0)
-    assert all(text.get_position()[1] < -10.0 / SCALE for text in drawn.axes.texts)
+    assert all(text.get_position()[1] < -GROUND_THICKNESS / SCALE for text in drawn.axes.texts)

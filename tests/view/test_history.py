@@ -11,7 +11,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.simulation.trajectory import force_on_supports
 from blocksim.view import style
 from blocksim.view.history import ENERGY_LOOKS, Choice, draw_history, line_looks
-from blocksim.view.paint import by_speed
+from blocksim.view.paints import by_speed
 from blocksim.view.run_data import Support
 from blocksim.view.time_panels import LEAST_SPAN, energy_groups, unit_for
 from tests.golden import Golden

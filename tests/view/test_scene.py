@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from blocksim.scenario.geometry import holds, least_width, regular
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.trajectory import Frames
-from blocksim.view.paint import by_block
+from blocksim.view.paints import by_block
 from blocksim.view.run_data import Support, extent_of
 from blocksim.view.scene import Canvas, Scene, corners, draw_scene, readable_scale, upper_sides
 from blocksim.view.style import GROUND_COLOUR, block_colour, open_figure

@@ -7,15 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from hashlib import sha256
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from blocksim.scenario.overrides import KeyPath, format_key
 from blocksim.simulation.files import write_bytes
 from blocksim.view.report.subjects import Subject
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
-
 
 SCRIPTS = ("decode", "frames", "view", "drawing", "loads", "player", "pictures", "table", "main")  # in this order
 PARTS = resources.files("blocksim.view.report") / "parts"
@@ -47,11 +43,12 @@ def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
     own = (f"{kind}-src 'sha256-{b64encode(found).decode()}'" for kind, found in hashes.items())  # CSP level 2
     policy = "; ".join((*nothing, *own, "img-src data:"))
     told = {"title": title, "version": version, "subjects": subjects, "listed": listed, "labels": labels(listed)}
-    return _environment().get_template("page.html").render(**told, policy=policy, style=style, script=script)
+    page = _environment().get_template("page.html")
+    return str(page.render(**told, policy=policy, style=style, script=script))
 
 
 @functools.cache
-def _environment() -> "Environment":
+def _environment() -> Any:
     from jinja2 import DictLoader, Environment, StrictUndefined
     from markupsafe import Markup
 

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import Scenario
 from blocksim.simulation import results, trajectory
-from blocksim.view import arrows, paint, run_data, style
+from blocksim.view import arrows, paints, run_data, scene, style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices
-from blocksim.view.scene import upper_sides
 from blocksim.world.systems.blocks import are_removed, distinct
 from blocksim.world.systems.system import Track
 
@@ -87,13 +86,13 @@ def pack_systems(frames: trajectory.Frames, kept: Indices) -> list[dict[str, Any
     """
     from matplotlib import colormaps, colors
 
-    palette = [colors.to_hex(colour) for colour in colormaps[paint.ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
+    palette = [colors.to_hex(colour) for colour in colormaps[paints.ELEMENT_COLOURS](np.linspace(0.0, 1.0, STEPS))]
     systems = []
     for number, track in enumerate(frames.others, start=1):
         shades = []
         for shade in track.system.shades:
             values = shade.of(track.some(kept))
-            high = paint.scale_from_zero(shade.label, values).high
+            high = paints.scale_from_zero(shade.label, values).high
             shades.append({"label": shade.label, "high": high, "values": pack(values)[0]})
         look = {"name": track.system.name, "colour": style.block_colour(number)}
         systems.append({**look, **_places(track, kept), "shades": shades, "palette": palette if shades else []})
@@ -120,18 +119,10 @@ def _places(track: Track, kept: Indices) -> dict[str, Any]:
 MOST_ARROWS = 200_000  # in all frames of a run
 
 
-class PackedLoads(NamedTuple):
-    """What acts from outside, for the page: plain values for JSON, the extent that holds it too, notes."""
-
-    data: dict[str, Any]
-    extent: Extent
-    notes: list[str]
-
-
 def pack_loads(
     frames: trajectory.Frames, scenario: Scenario, kept: Indices, happened: Sequence[results.EventRecord]
-) -> PackedLoads | None:
-    """Return what acts from outside in some frames, with the extent that holds it; None where nothing does.
+) -> tuple[dict[str, Any], Extent, list[str]] | None:
+    """Return what acts from outside in some frames, the extent that holds it, and notes; None where nothing does.
 
     The support's displacement is told beside loads on all blocks, as level ground looks the same wherever it is.
     """
@@ -158,8 +149,7 @@ def pack_loads(
         "radius": to_numbers(acts.turns.radius),
         **_exact(x=acts.turns.at[..., 0], y=acts.turns.at[..., 1], sweep=acts.turns.sweep),
     }
-    data = {"arrows": shown, "turns": turns, "marks": marks}
-    return PackedLoads(data, room if acts.arrows else extent, notes)
+    return {"arrows": shown, "turns": turns, "marks": marks}, room if acts.arrows else extent, notes
 
 
 MOST_BYTES = 12_000_000  # of the frames of one run, before they become text, which takes a third more
@@ -195,11 +185,11 @@ def pack_frames(frames: trajectory.Frames, most_bytes: int = MOST_BYTES) -> Pack
     outlines = None
     if frames.outlines is not None:  # of every shape, and which of them each block has
         kinds, first, which = np.unique(frames.outlines, axis=0, return_index=True, return_inverse=True)
-        uppers, widths = MILLIMETRES * upper_sides(frames)[first], MILLIMETRES * run_data.shortest_sides(frames)[first]
+        uppers = MILLIMETRES * scene.upper_sides(frames)[first]
         outlines = {
             "corners": [[to_numbers(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
             "upper": [[to_numbers(end) for end in upper] for upper in uppers],
-            "width": to_numbers(widths),
+            "width": to_numbers(MILLIMETRES * run_data.shortest_sides(frames)[first]),
             "which": which.ravel().tolist(),
         }
     data = {

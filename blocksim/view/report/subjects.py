@@ -177,7 +177,7 @@ def pictures_of(sweep: SweepData) -> list[dict[str, Any]]:
             maps.append({"label": label, "source": svg_address(figure), "data": _cases(found)})
     others = []
     for name, kind in kinds.SWEEP_KINDS.items():
-        if name != "map" and not kind.refusal(sweep) and kind.suits(sweep):
+        if name != "map" and kind.suits(sweep):
             with kind.open(sweep, style.OWN) as figure:
                 others.append({"label": name, "source": svg_address(figure), "data": None})
     return maps + others
@@ -279,10 +279,11 @@ def _player_data(
         return None, [], [str(error)], None
     happened = () if run.summary is None else run.summary.events
     scene = scene_data(frames, scenario, kept, happened)
-    forces, loads = pack_forces(frames, kept, scene["tilt"]), pack_loads(frames, scenario, kept, happened)
-    if loads is not None:
-        scene["extent"] = [loads.extent.left, loads.extent.right, loads.extent.bottom, loads.extent.top]
-    notes = [*notes, NO_FORCES if forces is None else forces["told"], *(loads.notes if loads else ())]
+    forces, found = pack_forces(frames, kept, scene["tilt"]), pack_loads(frames, scenario, kept, happened)
+    notes, loads = [*notes, NO_FORCES if forces is None else forces["told"]], None
+    if found is not None:
+        loads, extent, more = found
+        scene["extent"], notes = [extent.left, extent.right, extent.bottom, extent.top], notes + more
     rows = [] if comparison is None else comparison["rows"]
     numbers = {name: number for number, name in enumerate(data["names"])}
     measured = [  # mean and range of the repeats (mm or degrees) by the number of the block
@@ -290,7 +291,7 @@ def _player_data(
         for row in rows
         if row["block"] in numbers and row["quantity"] in DRAWN and row["mean"] is not None
     ]
-    data |= {"scene": scene, "forces": forces, "loads": loads.data if loads else None, "measured": measured}
+    data |= {"scene": scene, "forces": forces, "loads": loads, "measured": measured}
     history = None
     if data["names"]:
         repeats = [SimpleNamespace(**row) for row in rows if row["mean"] is not None]

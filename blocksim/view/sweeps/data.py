@@ -129,7 +129,7 @@ class ValueAxis:
 
 
 def choose_movers(spread: Floats) -> list[int]:
-    """Return the blocks to draw by how much their final x varies (mm, (b,))."""
+    """Return the blocks to draw, in order: those whose final x varies most (mm, (b,)); any where none does."""
     candidates = [int(block) for block in np.argsort(-spread, kind="stable")]
     moving = [block for block in candidates if spread[block] >= STAYS_MM]
     return sorted((moving or candidates)[:MOST_ROWS])
@@ -141,18 +141,17 @@ def value_axis(
     """Return the axis for values of a key: over decades (not if spaced evenly), around their middle, or plain."""
     low, high = float(values.min()), float(values.max())
     factor, shown = scale_of(max(abs(low), abs(high)), unit, typed)
-    if low > 0.0 and high >= DECADES * low and not is_even:
-        factor, shown = (1.0, unit) if typed is None else (factor, shown)
-        return ValueAxis(f"{key}{_bracketed(shown)}", 0.0, factor, is_log=True)
-    middle = float(np.median(np.unique(values)))
-    if 0.0 < high - low < NARROW * abs(middle):
-        half = max(high - middle, middle - low)
+    name, middle, is_log = key, 0.0, low > 0.0 and high >= DECADES * low and not is_even
+    centre = float(np.median(np.unique(values)))
+    if is_log and typed is None:
+        factor, shown = 1.0, unit
+    if not is_log and 0.0 < high - low < NARROW * abs(centre):
+        middle, half = centre, max(high - centre, centre - low)
         other, around = scale_of(abs(middle), unit, typed)
         is_readable = typed is not None and half / typed.worth >= LEAST_READABLE
         factor, shown = scale_of(half, unit, typed if is_readable else None)
         name = f"{key} − {middle * other:.9g} {around}".rstrip()
-        return ValueAxis(f"{name}{_bracketed(shown)}", middle, factor, is_log=False)
-    return ValueAxis(f"{key}{_bracketed(shown)}", 0.0, factor, is_log=False)
+    return ValueAxis(f"{name} ({shown})" if shown else name, middle, factor, is_log)
 
 
 def scale_of(size: float, unit: str, typed: InputUnit | None = None) -> tuple[float, str]:
@@ -168,7 +167,3 @@ def scale_of(size: float, unit: str, typed: InputUnit | None = None) -> tuple[fl
     if power in {-3, 0, 3}:
         return 1.0, unit
     return 10.0**-power, f"10^{power} {unit}".strip()
-
-
-def _bracketed(unit: str) -> str:
-    return f" ({unit})" if unit else ""

@@ -95,7 +95,7 @@ def draw_series(
     `measured` gives smallest and largest measured x (mm) of some blocks. Raises InvalidInputError for too small a page.
     """
     shown, measured = list(series)[: data.MOST_COLUMNS], measured or {}
-    rows = moving_blocks(shown)
+    rows = data.choose_movers(np.max([np.ptp(one.x_mm, axis=0) for one in shown], axis=0))
     axis = data.value_axis(np.concatenate([one.values for one in shown]), *key, typed=typed)
     count = len(shown)
     beside = LEFT + RIGHT + (count - 1) * COLUMN_GAP
@@ -144,11 +144,6 @@ def draw_series(
             axes.text(0.0, up, "\n".join(heading), transform=axes.transAxes, va="bottom", weight="bold")
         style.name_axes(figure, panels, axis.label, "", LABEL_DEPTH)
         yield figure
-
-
-def moving_blocks(series: Sequence[Series]) -> list[int]:
-    """Return the blocks to draw, in their order: those whose final x varies most; all are candidates if none does."""
-    return data.choose_movers(np.max([np.ptp(one.x_mm, axis=0) for one in series], axis=0))
 
 
 def is_smooth(values: run_data.Floats) -> bool:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from blocksim.view.sweeps.data import MOST_ROWS, Input, SweepData
-from blocksim.view.sweeps.lines import is_smooth, moving_blocks, series_of
+from blocksim.view.sweeps.data import MOST_ROWS, Input, SweepData, choose_movers
+from blocksim.view.sweeps.lines import is_smooth, series_of
 from tests.view.drawings import series
 from tests.view.sweeps.made_up import made_up
 
@@ -42,6 +42,5 @@ def test_only_smooth_series_are_joined() -> None:
 
 
 def test_blocks_that_stay_are_left_out_and_many_are_cut() -> None:
-    assert moving_blocks([series(3)]) == [1, 2]
-    assert moving_blocks([series(60)]) == list(range(60 - MOST_ROWS, 60))
-    assert moving_blocks([series(1)]) == [0]
+    chosen = {count: choose_movers(np.ptp(series(count).x_mm, axis=0)) for count in (1, 3, 60)}
+    assert chosen == {1: [0], 3: [1, 2], 60: list(range(60 - MOST_ROWS, 60))}

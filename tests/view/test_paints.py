@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from blocksim.scenario import load_scenario
-from blocksim.view import paint, style
-from blocksim.view.paint import PAINTS, by_block, by_material, by_speed, by_turn
+from blocksim.view import paints, style
+from blocksim.view.paints import PAINTS, by_block, by_material, by_speed, by_turn
 from blocksim.view.sweeps.outcome_map import CLASS_COLOURS
 from tests.view.made_up import toppling
 
-SCENARIOS = Path(paint.__file__).parents[2] / "scenarios"
+SCENARIOS = Path(paints.__file__).parents[2] / "scenarios"
 
 
 def test_a_block_keeps_its_colour_and_others_take_turns() -> None:
