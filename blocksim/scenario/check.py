@@ -170,10 +170,8 @@ def implausible_values(scenario: Scenario) -> list[str]:
 
 def _friction_angles(scenario: Scenario) -> Iterator[str]:
     """Find frictions that look like angles, the largest bare value of each that the sweep varies too."""
-    frictions: list[tuple[str, float]] = [
-        ("friction.block_block", scenario.friction.block_block.static),
-        ("friction.block_ground", scenario.friction.block_ground.static),
-    ]
+    sides = contact.Friction.model_fields
+    frictions = [(f"friction.{side}", float(getattr(scenario.friction, side).static)) for side in sides]
     for left, others in scenario.pairs.items():
         for right, pair in others.items():
             if pair.friction is not None:

@@ -6,14 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from blocksim.scenario import overrides, spelling
 from blocksim.scenario.geometry import Corner, dot, edges_of
 from blocksim.scenario.mistakes import Mistake, repetitions, unknown
 from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.timeline import Event, ForceProbe, JointProbe, PointProbe
-from blocksim.scenario.overrides import KeyPath
 from blocksim.scenario.placement import TOLERANCE, PlacedBody
-from blocksim.scenario.spelling import did_you_mean_or_list
 from blocksim.scenario.units import toml
 
 MAX_EVENTS = 1000
@@ -80,7 +79,7 @@ def _wrong_moments_and_names(scenario: Scenario, known: Sequence[str]) -> Iterat
             if name in walls and not is_removed:
                 yield Mistake(place, f"{toml(name)} is a wall, which can only be removed")
             elif name not in set(allowed):
-                hint = f", {did_you_mean_or_list(name, allowed)}" if len(allowed) <= MANY else ""
+                hint = f", {spelling.did_you_mean_or_list(name, allowed)}" if len(allowed) <= MANY else ""
                 yield Mistake(place, f"there is no {'body or wall' if is_removed else 'body'} {toml(name)}{hint}")
 
 
@@ -92,7 +91,7 @@ def _wrong_unloads(scenario: Scenario) -> Iterator[Mistake]:
         for place, name in enumerate(scenario.events[number].unload):
             path = ("events", number, "unload", place)
             if name not in loads:
-                yield Mistake(path, f"there is no load {toml(name)}, {did_you_mean_or_list(name, loads)}")
+                yield Mistake(path, f"there is no load {toml(name)}, {spelling.did_you_mean_or_list(name, loads)}")
             elif isinstance(loads[name], Gravity):
                 yield Mistake(path, f"{toml(name)} is gravity, which does not end; a table of tilts turns it back")
             elif name in ends:
@@ -100,7 +99,7 @@ def _wrong_unloads(scenario: Scenario) -> Iterator[Mistake]:
             ends.setdefault(name, number)
 
 
-def _names(event: Event, path: KeyPath) -> Iterator[tuple[KeyPath, str]]:
+def _names(event: Event, path: overrides.KeyPath) -> Iterator[tuple[overrides.KeyPath, str]]:
     """Yield all names in an event with their places."""
     for group in GROUPS:
         yield from (((*path, group, place), name) for place, name in enumerate(getattr(event, group)))
@@ -176,8 +175,7 @@ def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[M
                     yield from unknown((*path, "bodies", place), "body", bodies, name)
                 if bodies.keys() >= {*probe.bodies} and joint_between(*(bodies[name] for name in probe.bodies)) is None:
                     faces = f"faces that lie opposite each other at the start, parallel within {LEAST_ANGLE:g} deg"
-                    message = f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no {faces}"
-                    yield Mistake((*path, "bodies"), message)
+                    yield Mistake((*path, "bodies"), f"bodies {probe.bodies[0]} and {probe.bodies[1]} have no {faces}")
 
 
 class Joint(NamedTuple):

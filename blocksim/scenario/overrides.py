@@ -16,17 +16,8 @@ from blocksim.scenario.units import Kind, Quantity, toml
 
 KeyPath = tuple[str | int, ...]  # path in a scenario, such as ("structures", 0, "overlap")
 
-NAMED: dict[str | int, int] = {
-    "materials": 2,
-    "blocks": 2,
-    "structures": 2,
-    "bodies": 2,
-    "walls": 2,
-    "events": 2,
-    "loads": 2,
-    "pairs": 3,
-    "probes": 2,
-}
+_LISTS = ("materials", "blocks", "structures", "bodies", "walls", "events", "loads", "probes")
+NAMED: dict[str | int, int] = {**dict.fromkeys(_LISTS, 2), "pairs": 3}
 """Tables of named or numbered entries: how many parts of a path lead to one entry."""
 
 TAGS = ("kind", "scheme")  # keys whose word selects one of several tables

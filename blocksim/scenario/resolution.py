@@ -11,11 +11,10 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
+from blocksim.scenario import overrides as keys, units
 from blocksim.scenario.models import base, geometry, motion, study, timeline
 from blocksim.scenario.models.contact import GROUND, Friction, PairFriction
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.overrides import format_key, si_unit
-from blocksim.scenario.units import ANGLE
 
 DEFAULT = "default"
 MATERIALS = "materials"
@@ -50,7 +49,7 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
         partners.append((one, scenario.ground.material))
     ways = dict.fromkeys(way for names in partners for way in (names, names[::-1]))
     found = ((way, scenario.pairs.get(way[0], {}).get(way[1])) for way in ways)
-    overrides = [(format_key(("pairs", *way)), pair) for way, pair in found if pair is not None]
+    overrides = [(keys.format_key(("pairs", *way)), pair) for way, pair in found if pair is not None]
     side = "block_ground" if ground else "block_block"
     contact = scenario.contact
     general: dict[str, tuple[object, str]] = {}
@@ -151,7 +150,7 @@ def _plain(table: object) -> Any:
     entries: dict[str, Any] = {}
     for name, info in type(table).model_fields.items():
         value = getattr(table, name)
-        if si_unit(info) != ANGLE.unit or value is None:
+        if keys.si_unit(info) != units.ANGLE.unit or value is None:
             value = _plain(value)
         elif isinstance(value, tuple):
             value = [f"{one!r} rad" for one in value]  # an angle must carry a unit: a bare one would be refused

@@ -296,8 +296,7 @@ def _unfit_lengths(scenario: Scenario, smallest: float, farthest: float) -> Iter
     side = f"the smallest side of a block, {_mm(smallest)}"
     if contact.model != "surface":
         if spacing > 0.5 * smallest:
-            message = f"{_mm(spacing)} is more than half of {side}"
-            yield Mistake(("contact", "particle_spacing"), message, relation=True)
+            yield Mistake(("contact", "particle_spacing"), f"{_mm(spacing)} is more than half of {side}", relation=True)
         elif contact.model == "kernel" and contact.support_radius >= smallest:
             key = "particle_spacing" if contact.smoothing_length is None else "smoothing_length"
             length = _mm(contact.resolved_smoothing_length)
@@ -356,8 +355,7 @@ def _overlaps(
         is_drawn = origin[0] == "structures" and scenario.structures[int(origin[1])].kind == "polygons"
         is_small = sunk <= ROUNDING * placement.smallest_width((one, other))
         cure = f'; shrink = "{_mm(sunk)}" of its structure parts them' if is_drawn and is_small else ""
-        message = f"bodies {one.name} and {other.name} overlap by {_mm(sunk)}; they may only touch{cure}"
-        yield Mistake(origin, message)
+        yield Mistake(origin, f"bodies {one.name} and {other.name} overlap by {_mm(sunk)}; they may only touch{cure}")
 
 
 def _mm(length: float) -> str:

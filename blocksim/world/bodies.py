@@ -235,10 +235,7 @@ def layout_of(scenario: Scenario) -> Layout:
 
 
 def _slab_records(
-    scenario: Scenario,
-    placed: Sequence[PlacedBody],
-    segments: Sequence[PlacedSegment],
-    classes: Sequence[ContactClass],
+    scenario: Scenario, placed: Sequence[PlacedBody], segments: Sequence[PlacedSegment], classes: Sequence[ContactClass]
 ) -> arrays.Records:
     """Return every piece of ground as a slab below its line, longer where it must leave no crack."""
     slabs = arrays.zeros(len(segments), arrays.BODY)

@@ -11,7 +11,7 @@ from blocksim.scenario.laws import LAWS
 from blocksim.world import build, interactions, memory, nonsmooth, rigid_step, systems
 from blocksim.world.bodies import Layout, division, layout_of
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
-from blocksim.world.step import Bounds, Speeds, bounds_of, speeds_of, step_of_contacts
+from blocksim.world.step import bounds_of, speeds_of, step_of_contacts
 
 # measured on one core: a step costs about this for every body with its contacts
 SECONDS_PER_BODY_AND_STEP = 75e-9
@@ -129,6 +129,19 @@ def describe(scenario: Scenario) -> Description:
     if scenario.time.has_springs and of_others < math.inf:
         of_blocks = step_of_contacts(layout, bounds, speeds)
         limits = StepLimits(of_blocks, of_others, scenario.contact.stiffness_scale * (of_blocks / of_others) ** 2)
+    rigid = None
+    if has_rigid:
+        sag = scene_sag(step / scenario.time.parts, layout.placed, scenario.gravity)
+        rigid = SagDescription(
+            why=rigid_step.reason_of_step(layout, bounds, speeds).why,
+            substeps=scenario.time.parts,
+            tolerance=nonsmooth.velocity_tolerance(scenario, count),
+            longest_step=rigid_step.longest_step(layout, bounds, speeds),
+            sag=sag.sag,
+            block=sag.block,
+            overlap=sag.overlap,
+            warning=overlap_warning(sag.overlap, sag.crushed, bounds.smallest),
+        )
     support = None
     if scenario.motion is not None:
         peaks = motion.motion_peaks(motion.motion_pieces(scenario), scenario.time.end)
@@ -147,7 +160,7 @@ def describe(scenario: Scenario) -> Description:
         frames_at_every_step=memory.is_shorter_than_step(scenario.output.every, step),
         particles=particles,
         skin=float(world.controls[0].skin),
-        rigid=_rigid(layout, bounds, speeds, step) if has_rigid else None,
+        rigid=rigid,
         systems={one.system.name: one.count for one in others},
         limits=limits,
         warnings=tuple(systems.warnings_of(scenario)),
@@ -164,21 +177,6 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
     rectangles = blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
     return OUTLINES_COST * rectangles if placement.has_outlines(scenario) else rectangles
-
-
-def _rigid(layout: Layout, bounds: Bounds, speeds: Speeds, step: float) -> SagDescription:
-    substeps = layout.scenario.time.parts
-    sag = scene_sag(step / substeps, layout.placed, layout.scenario.gravity)
-    return SagDescription(
-        why=rigid_step.reason_of_step(layout, bounds, speeds).why,
-        substeps=substeps,
-        tolerance=nonsmooth.velocity_tolerance(layout.scenario, len(layout.placed)),
-        longest_step=rigid_step.longest_step(layout, bounds, speeds),
-        sag=sag.sag,
-        block=sag.block,
-        overlap=sag.overlap,
-        warning=overlap_warning(sag.overlap, sag.crushed, bounds.smallest),
-    )
 
 
 def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:

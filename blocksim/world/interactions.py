@@ -44,8 +44,7 @@ def damping_ratio(restitution: float, law: str = LINEAR.name) -> float:
     Where the law is not linear it refers to the slope of the force at each overlap. Raises ValueError outside [0, 1].
     """
     if not 0.0 <= restitution <= 1.0:
-        message = f"a coefficient of restitution lies between 0 and 1, not {restitution}"
-        raise ValueError(message)
+        raise ValueError(f"a coefficient of restitution lies between 0 and 1, not {restitution}")
     if restitution == 1.0:
         return 0.0
     target = max(restitution, SMALLEST_RESTITUTION)

@@ -330,8 +330,7 @@ def choose_stride(layout: Layout, bounds: Bounds) -> Stride:
 def refuse_uncountable(end: float, step: float) -> None:
     """Raise StepError for more steps until the end (s) than can be counted, and for steps of no length."""
     if not 0.0 < step < math.inf or end / step > MOST_STEPS:
-        message = f"{end:.4g} s cannot be divided into steps of {step:.4g} s"
-        raise StepError(message)
+        raise StepError(f"{end:.4g} s cannot be divided into steps of {step:.4g} s")
 
 
 def choose_skin(layout: Layout, bounds: Bounds, speeds: Speeds, step: float) -> float:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import ConfigDict, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -12,11 +12,10 @@ from blocksim.scenario import units as q
 from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.scenario.models.base import OneOf, Table, setting
 
-Model = Literal["surface", "particles", "kernel"]
-Kernel = Literal["wendland-c2", "cubic-spline", "quintic-spline"]
-
-SUPPORT: dict[Kernel, float] = {"wendland-c2": 2.0, "cubic-spline": 2.0, "quintic-spline": 3.0}
+Model = Annotated[Literal["surface", "particles", "kernel"], OneOf(("surface", "particles", "kernel"))]
+SUPPORT = {"wendland-c2": 2.0, "cubic-spline": 2.0, "quintic-spline": 3.0}
 """Radius at which a kernel function ends, in smoothing lengths."""
+Kernel = Annotated[Literal["wendland-c2", "cubic-spline", "quintic-spline"], OneOf(tuple(SUPPORT))]
 SPACINGS_PER_LENGTH = 1.3  # smoothing length by default, in particle spacings
 LEAST_SPACINGS = 0.8
 """Least smoothing length, in particle spacings; below it a particle may have no neighbour on a flat side."""
@@ -114,9 +113,7 @@ class Pair(Table):
 class Contact(Table):
     """Contact model, force law and their numbers."""
 
-    model: Annotated[Model, OneOf(get_args(Model))] = setting(
-        "how contacts are found: surface, particles or kernel", "surface"
-    )
+    model: Model = setting("how contacts are found: surface, particles or kernel", "surface")
     law: Annotated[str, OneOf(tuple(LAWS))] = setting(
         f"how the force grows with the overlap: {' or '.join(LAWS)}", LINEAR.name
     )
@@ -147,7 +144,7 @@ class Contact(Table):
     smoothing_length: q.PositiveLength | None = setting(
         "smoothing length of the kernel (kernel only; default: 1.3 particle_spacing)", None
     )
-    kernel: Annotated[Kernel, OneOf(get_args(Kernel))] = setting(
+    kernel: Kernel = setting(
         "kernel function (kernel only): wendland-c2, cubic-spline or quintic-spline", "wendland-c2"
     )
 

@@ -16,7 +16,7 @@ and that of the last line after it. The resolved scenario holds the samples, so 
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
@@ -124,8 +124,7 @@ HISTORIES: dict[str, type[base.Table]] = base.by_kind(AnyHistory)
 
 
 Axes = Annotated[Literal["world", "body"], base.OneOf(("world", "body"))]
-Face = Literal["left", "right", "top", "bottom"]
-FACES: tuple[Face, ...] = get_args(Face)
+Face = Annotated[Literal["left", "right", "top", "bottom"], base.OneOf(("left", "right", "top", "bottom"))]
 WATER = 9810.0  # N/m³; unit weight of water
 BODY = setting("the name of the body that it acts on (without a name, its number)")
 
@@ -169,9 +168,7 @@ class Pressure(VaryingLoad):
 
     kind: Literal["pressure"] = setting("kind of load")
     body: str = BODY
-    face: Annotated[Face, base.OneOf(FACES)] = setting(
-        "face of the body before it is turned by its angle: left, right, top or bottom"
-    )
+    face: Face = setting("face of the body before it is turned by its angle: left, right, top or bottom")
     magnitude: q.AnyPressure | None = setting("uniform pressure, negative for suction; give this or water_level", None)
     water_level: q.NonNegativeLength | None = setting(
         "level of the water above the origin; give this or magnitude", None
@@ -244,16 +241,14 @@ def stretches_of(load: AnyLoad, tilt: float) -> tuple[Stretch, ...]:
             first, last = tilt if history.first is None else history.first, history.last or 0.0
             if last == first:
                 return (Stretch(0.0, first, 0.0),)
-            times, values = (
-                (history.start, history.start + abs(last - first) / (history.rate or math.nan)),
-                (first, last),
-            )
+            end = history.start + abs(last - first) / (history.rate or math.nan)
+            times, values = (history.start, end), (first, last)
         case Gravity():
             times, values = history.times, history.tilts
         case _:
             times, values = history.times, history.factors
     is_stepped = isinstance(history, Steps)
     rows = [Stretch(0.0, 0.0 if is_stepped else values[0], 0.0)] if times[0] > 0.0 else []
-    for (begin, one), (end, other) in pairwise(zip(times, values, strict=True)):
-        rows.append(Stretch(begin, one, 0.0 if is_stepped else (other - one) / (end - begin)))
+    for (begin, one), (until, other) in pairwise(zip(times, values, strict=True)):
+        rows.append(Stretch(begin, one, 0.0 if is_stepped else (other - one) / (until - begin)))
     return (*rows, Stretch(times[-1], values[-1], 0.0))

@@ -385,12 +385,9 @@ def _at2(lines: Sequence[Line], head: int, found: re.Match[str]) -> tuple[str, I
         message = f"line {last}: the file ends after {len(values)} samples; line {head} has NPTS = {count}"
         raise MotionTableError(message)
     _check_count(count)
-    said = (_IN_UNITS.search(line) for _, line in before)
-    return (
-        next((one[1] for one in said if one is not None and one[1]), ""),
-        (number * step for number in range(count)),
-        values,
-    )
+    units = (_IN_UNITS.search(line) for _, line in before)
+    said = next((one[1] for one in units if one is not None and one[1]), "")
+    return said, (number * step for number in range(count)), values
 
 
 def _two_columns(lines: Sequence[Line]) -> tuple[str, Iterable[float], list[float]]:
@@ -425,8 +422,7 @@ def _second_name(line: Line) -> tuple[str, bool]:
         return "", False
     text = line[1].strip()
     if not re.match(r"\W*t", text, re.IGNORECASE):
-        message = f"line {line[0]}: {q.toml(text)}: neither numbers nor columns of time and acceleration"
-        raise MotionTableError(message)
+        raise MotionTableError(f"line {line[0]}: {q.toml(text)}: neither numbers nor columns of time and acceleration")
     if re.match(r"[^,;]*(?<![a-z])ms(?![a-z/])", text, re.IGNORECASE):
         raise MotionTableError(f"line {line[0]}: {q.toml(text)}: times in s are needed")
     first = re.split(r"[,;]", text, maxsplit=1) if re.search(r"[,;]", text) else text.split(maxsplit=1)

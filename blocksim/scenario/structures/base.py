@@ -94,8 +94,7 @@ class Courses(Structure):
 
     def _check(self) -> None:
         if self.size > MAX_BLOCKS:
-            message = f"{self.size} blocks are too many; a structure has at most {MAX_BLOCKS}"
-            raise q.invalid(message, "rows")
+            raise q.invalid(f"{self.size} blocks are too many; a structure has at most {MAX_BLOCKS}", "rows")
 
 
 def poses_at(x: Floats, y: Floats, angle: Floats | None = None) -> list[Pose]:
