@@ -9,8 +9,9 @@ from pydantic import Field
 from blocksim.scenario import spelling, units as q
 from blocksim.scenario.models.base import Identifier, OneOf, Table, TimeOr, Whole, by_kind, require_one, setting
 
-SPRINGS, IMPULSES = "explicit", "nonsmooth"
-_WORDS = OneOf((SPRINGS, IMPULSES))
+Scheme = Literal["explicit", "nonsmooth"]
+SPRINGS, IMPULSES = map(str, get_args(Scheme))
+_WORDS = OneOf(get_args(Scheme))
 
 MOST_SLIPS = 2
 """Most typing errors of a scheme, so that its keys are checked as those of the scheme meant."""
@@ -32,7 +33,7 @@ class Time(Table):
     has_rigid_contacts: ClassVar[bool] = False  # whether they are impulses
     contacts: ClassVar[str] = "contacts"  # in words
     models_of_outlines: ClassVar[tuple[str, ...]] = ()  # contact models that know blocks with an outline
-    scheme: Annotated[Literal["explicit", "nonsmooth"], _WORDS] = setting(
+    scheme: Annotated[Scheme, _WORDS] = setting(
         "time stepping: explicit (springs and dashpots) or nonsmooth (impulses)", "explicit"
     )
     end: q.PositiveTime = setting("simulated time", 2.0)
