@@ -20,9 +20,10 @@ from contextlib import closing
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, Field, InstanceOf
 
 from blocksim.analysis.compare import interval
@@ -37,9 +38,6 @@ from blocksim.simulation import observables, provenance, schemes
 from blocksim.study import criterion, executors, limit_plan, manifest, plan as plans, rows, sweep, sweep_folder
 from blocksim.study.answer import Answer, Overview, Study, with_unit
 from blocksim.view import studies as view, style
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 INTENSITY, SCATTER, STRIPES, FAILS = "--intensity", "--scatter", "--stripes", "--fails"
 COLLAPSE = "outcome = fell"
@@ -332,7 +330,7 @@ class FragilityAnswer(Answer, frozen=True):
         """How many runs did not finish."""
         return sum(point.no_result for point in self.points)
 
-    def probability(self, intensity: "NDArray[np.float64]") -> "NDArray[np.float64] | None":
+    def probability(self, intensity: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return the curve at intensities in the unit of the study, None where there is no curve."""
         return self.curve.probability(intensity) if isinstance(self.curve, Curve) else None
 

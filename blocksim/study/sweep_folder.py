@@ -26,12 +26,6 @@ CASES = "cases"
 SHARD = r"(?:-\d+-of-\d+)?"
 
 
-MANIFEST_KIND, TIMINGS_KIND = (
-    files.append_only_kind(b'{"number":'),
-    files.append_only_kind(b"case,executor,seconds,host\n"),
-)
-
-
 class FolderKind:
     """What distinguishes the folders of one kind of study: its plan NAME.toml, its summary NAME.json and its tables."""
 
@@ -45,8 +39,8 @@ class FolderKind:
         self.leftover = re.compile(rf"\.({names}|{name}\.json|{name}\.toml)\..*")  # of a writer that was killed
         self.results = {
             **{table: files.prefix_kind(form.encode()) for table, form in tables.items()},
-            rf"manifest{SHARD}\.jsonl": MANIFEST_KIND,
-            rf"timings{SHARD}\.csv": TIMINGS_KIND,
+            rf"manifest{SHARD}\.jsonl": files.append_only_kind(b'{"number":'),
+            rf"timings{SHARD}\.csv": files.append_only_kind(b"case,executor,seconds,host\n"),
             rf"{name}\.json": files.has_keys("began_at"),
         }
 
@@ -77,8 +71,6 @@ class FolderKind:
 SWEEP = FolderKind(  # shards have tables of their own
     "sweep", "a sweep", "sweep", {rf"sweep{SHARD}\.csv": "case,(?:.*,)?status,reason,seconds(?:,.*)?"}
 )
-
-
 VARIED = "tables"  # folder of the copies of tables that a sweep varies
 
 
