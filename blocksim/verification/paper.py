@@ -20,8 +20,7 @@ from blocksim.analysis.compare import Verdict, compare_final
 from blocksim.analysis.experiment import ExperimentTable, load_properties, load_table
 from blocksim.errors import BlocksimError, OutputError
 from blocksim.scenario import Scenario, load_scenario
-from blocksim.simulation.files import write_text
-from blocksim.simulation.results import Result
+from blocksim.simulation import files, results
 from blocksim.simulation.run import simulate
 from blocksim.study.answer import number_text
 from blocksim.verification import closed_forms as forms
@@ -44,7 +43,7 @@ class Bounce(NamedTuple):
     flight: float
 
 
-def bounce_law(result: Result) -> studies.Law:
+def bounce_law(result: results.Result) -> studies.Law:
     """Return the height (mm) of the lower face over a bounce, and Eq. 10 from its start.
 
     The second form of Eq. 10 as printed gives the remaining rise: the height is the apex of Eq. 12 less that, 0 after
@@ -71,7 +70,7 @@ def bounce_law(result: Result) -> studies.Law:
     return studies.Law("height", "mm", "Eq. 10", frames.time, MILLI * clearance, MILLI * expected, marks)
 
 
-def bounces(result: Result) -> list[Bounce]:
+def bounces(result: results.Result) -> list[Bounce]:
     """Return apex and flight time of each bounce, by Eq. 12 and simulated.
 
     In free flight height and speed of any frame give the apex and the instant of landing; the simulated flight time is
@@ -103,7 +102,7 @@ def bounces(result: Result) -> list[Bounce]:
     ]
 
 
-def slide_law(result: Result) -> studies.Law:
+def slide_law(result: results.Result) -> studies.Law:
     """Return the speed (mm/s) of a sliding block, and Eq. 13 with the ground's friction."""
     frames, gravity = result.frames, result.scenario.gravity
     friction, start = result.scenario.friction.block_ground.kinetic, float(frames.vx[0, 0])
@@ -146,7 +145,7 @@ def properties_table(printed: Mapping[str, float], scenario: Scenario) -> str:
     return _table(("property", "printed", f"`{scenario.name}`", "unit"), rows)
 
 
-def edges_table(edges: ExperimentTable, runs: Sequence[Result]) -> str:
+def edges_table(edges: ExperimentTable, runs: Sequence[results.Result]) -> str:
     """Return Table 2: the outer edges of the blocks in all repeats, and in runs."""
     rows = []
     for quantity in ("left", "right"):
@@ -157,7 +156,7 @@ def edges_table(edges: ExperimentTable, runs: Sequence[Result]) -> str:
     return _table(("mm", *map(str, edges.replicates), "mean", *(f"`{run.name}`" for run in runs)), rows)
 
 
-def centres_table(centres: ExperimentTable, runs: Sequence[Result]) -> str:
+def centres_table(centres: ExperimentTable, runs: Sequence[results.Result]) -> str:
     """Return Table 3 and the rotations of section 3.2, with those of runs and verdicts.
 
     Table 3 has the centres in all repeats and by the paper's own simulation.
@@ -276,11 +275,11 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
         "![Speed over time, simulated and by Eq. 13, and the difference](equation13.png)",
         f"V = V0 − μgt until the block stops. Largest difference: {speed.largest:.3g} mm/s.",
     ]
-    write_text(index, "\n\n".join(parts) + "\n")
+    files.write_text(index, "\n\n".join(parts) + "\n")
     return written
 
 
-def _finished(path: Path, settings: Mapping[str, object]) -> Result:
+def _finished(path: Path, settings: Mapping[str, object]) -> results.Result:
     result = simulate(load_scenario(path, settings))
     if result.status != "finished":
         raise BlocksimError(f"{path}: the run has {result.status}: {result.reason}")
