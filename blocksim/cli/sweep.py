@@ -107,8 +107,8 @@ def _table_report(result: manifest.SweepResult) -> command_line.Report:
     if result.share_inside is not None:
         notes.append(f"{result.share_inside:.0%} of {len(table)} cases are inside all measured ranges")
     notes += _failure_lines(result, short)
-    if result.left:
-        notes.append(f"{result.left} cases have not been run; rerun the command to finish")
+    if result.missing:
+        notes.append(f"{result.missing} cases have not been run; rerun the command to finish")
     return command_line.Report(
         output.table_lines(heads[:fitting], [row[:fitting] for row in entries], left=0),
         {"folder": str(result.folder), "rows": table.to_dict(orient="records")},

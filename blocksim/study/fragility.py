@@ -313,7 +313,7 @@ class FragilityAnswer(Answer, frozen=True):
     scatter: dict[str, Any]
     records: int = 0  # that intensities share
     points: tuple[Point, ...]
-    left: int = Field(alias="missing")  # members that have not run: those of other shards
+    missing: int  # members that have not run: those of other shards
     fitted: dict[str, Any] = Field(alias="curve")
     inflation: float | None = Field(default=None, ge=1.0, lt=1e6)  # of variance: intensities share their records
     plan: InstanceOf[FragilityPlan] | None = Field(default=None, exclude=True, repr=False)
@@ -346,7 +346,7 @@ class FragilityAnswer(Answer, frozen=True):
             rows.append([*counts, *shares, str(one.moving_on), str(one.no_result)])
         heads = (self.unit or "value", *HEADS)
         places = [i for i in range(len(heads)) if i < len(heads) - 2 or any(row[i] != "0" for row in rows)]
-        code = ExitCode.SUCCESS if isinstance(self.curve, Curve) or self.left else ExitCode.OUTSIDE
+        code = ExitCode.SUCCESS if isinstance(self.curve, Curve) or self.missing else ExitCode.OUTSIDE
         notes, moving = [], sum(one.moving_on for one in self.points)
         if moving:
             notes.append(f"{moving} surviving samples were still moving at the end; increase time.end to decide them")
@@ -359,8 +359,8 @@ class FragilityAnswer(Answer, frozen=True):
         if self.failed:
             which = f"{self.failed} samples have no result, see {MEMBERS_TABLE}"
             notes.append(f"{which}; they count neither as failures nor as survivors")
-        if self.left:
-            notes.append(f"{self.left} samples have not run; after all shards, rerun without --shard")
+        if self.missing:
+            notes.append(f"{self.missing} samples have not run; after all shards, rerun without --shard")
         runs = sum(one.members + one.no_result for one in self.points)
         notes.append(f"{runs} runs, {self.run} of them now: {self.folder}")
         samples = str(sum(one.members for one in self.points))

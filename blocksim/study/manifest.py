@@ -312,7 +312,7 @@ class SweepResult:
         return int((self.table["status"] != rows.FINISHED).sum())
 
     @property
-    def left(self) -> int:
+    def missing(self) -> int:
         """How many cases were not run, where the first failure was to end the sweep."""
         return 0 if self.planned is None else self.planned - len(self.table)
 

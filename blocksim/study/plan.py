@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from statistics import fmean
 from typing import cast
@@ -235,6 +236,14 @@ def design_of(sweep: Sweep) -> Design:
     )
 
 
+def remarks(sweep: Sweep) -> list[str]:
+    """Return what whoever chose this sweep may want to know."""
+    if sweep.mode == "sobol" and sweep.samples & (sweep.samples - 1):
+        below = 1 << (sweep.samples.bit_length() - 1)
+        return [f"{sweep.samples} Sobol points are not balanced; {below} or {2 * below} are"]
+    return []
+
+
 MOST_CASES = 1_000_000
 MEASURED = "experiment.table"
 TABLE = "table"  # last part of keys that name a file
@@ -279,6 +288,9 @@ class Cases:
 
     def __getitem__(self, number: int) -> SweepCase:
         return SweepCase.of(self.document, self.design[number])
+
+    def __iter__(self) -> Iterator[SweepCase]:
+        return map(self.__getitem__, range(len(self)))
 
 
 def plan_of(base: Scenario) -> Sweep:
@@ -348,7 +360,7 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
     bare = document.without_sweep()
     cases = Cases(replace(bare, data=with_tables(bare.data, document.build())), design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
-    if all(cases[number].scenario is None for number in range(looked_at)):
+    if all(case.scenario is None for case in islice(cases, looked_at)):
         which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"
         raise InvalidInputError(f"{which} can be simulated; the first: {cases[0].problem}")
     return cases
@@ -512,15 +524,11 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
         drawn = np.random.default_rng(0).choice(len(cases), LOOKED_AT, replace=False)
         chosen = [cases[number] for number in sorted(drawn.tolist())]
     else:
-        chosen = [cases[number] for number in range(len(cases))]
+        chosen = list(cases)
     described = [describe(case.scenario) for case in chosen if case.scenario is not None]
     problems = [case.problem for case in chosen if case.scenario is None]
     share = len(described) / len(chosen)
     rows = [ROW + ROW_OF_BLOCK * len(one.bodies) + keep_cases * (one.bytes + SMALL_FILES) for one in described]
-    remarks = []
-    if plan.mode == "sobol" and plan.samples & (plan.samples - 1):
-        below = 1 << (plan.samples.bit_length() - 1)
-        remarks = [f"{plan.samples} Sobol points are not balanced; {below} or {2 * below} are"]
     return Estimate(
         cases=len(cases),
         looked_at=len(chosen),
@@ -530,5 +538,5 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
         bytes=round(share * len(cases) * fmean(rows or [0.0])),
         memory=max((one.memory for one in described), default=0),
         stop_at_rest=sum(case.scenario.time.stop_at_rest for case in chosen if case.scenario is not None),
-        remarks=tuple(remarks),
+        remarks=tuple(remarks(plan)),
     )

@@ -115,10 +115,10 @@ def test_more_members_and_another_criterion_do_not_repeat_what_has_run(tmp_path:
 
 def test_shards_in_any_order_give_the_study_that_one_process_gives(tmp_path: Path, whole: FragilityAnswer) -> None:
     parts = [slides(tmp_path, shard=Shard(index, 3)) for index in (2, 0, 1)]
-    assert [part.left for part in parts] == [27, 13, 0]
+    assert [part.missing for part in parts] == [27, 13, 0]
     assert not (tmp_path / "fragility.csv").exists()
     merged = slides(tmp_path)
-    assert (merged.run, merged.left) == (0, 0)
+    assert (merged.run, merged.missing) == (0, 0)
     for name in ("fragility.csv", "members.csv"):
         assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
 

@@ -191,9 +191,9 @@ def test_first_failure_ends_a_sweep_that_is_to_fail_fast(quick: Document, tmp_pa
     vary = {KINETIC: [0.1], OVERLAP: [1e-2] * 3 + [1e-12] + [1e-2] * 60}
     result = sweep(quick, vary, jobs=1, out=tmp_path, fail_fast=True)
     assert result.failed == 1
-    assert result.left == 64 - len(result.table) > 0
+    assert result.missing == 64 - len(result.table) > 0
     whole = sweep(quick, vary, jobs=1, out=tmp_path)
-    assert (whole.failed, whole.left, len(whole.table)) == (1, 0, 64)
+    assert (whole.failed, whole.missing, len(whole.table)) == (1, 0, 64)
     assert len(lines(tmp_path)) == 64
 
 

@@ -21,7 +21,7 @@ def test_missing_shards_are_listed(quick: Document, tmp_path: Path) -> None:
     assert shards == ["  --shard 0/4: 3 of 3 missing", "  --shard 2/4: 2 of 2 missing", "  --shard 3/4: 2 of 2 missing"]
     assert not (tmp_path / "sweep.csv").exists()
     result = merge(tmp_path, allow_missing=True)
-    assert (len(result.table), result.left) == (3, 7)
+    assert (len(result.table), result.missing) == (3, 7)
 
 
 def test_sweep_does_what_shards_have_left(quick: Document, tmp_path: Path) -> None:
