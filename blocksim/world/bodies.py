@@ -221,17 +221,9 @@ def layout_of(scenario: Scenario) -> Layout:
     placed, segments = place_bodies(scenario), place_segments(scenario)
     classes = contact_classes(scenario, placed)
     slabs = _slab_records(scenario, placed, segments, classes)
-    return Layout(
-        scenario,
-        placed,
-        segments,
-        classes,
-        interactions_of(scenario, classes),
-        drive_records(scenario, placed),
-        load_arrays(scenario, placed),
-        slabs,
-        shapes_of(placed, zip(slabs["half_x"].tolist(), slabs["half_y"].tolist(), strict=True)),
-    )
+    shapes = shapes_of(placed, zip(slabs["half_x"].tolist(), slabs["half_y"].tolist(), strict=True))
+    prescribed = drive_records(scenario, placed), load_arrays(scenario, placed)
+    return Layout(scenario, placed, segments, classes, interactions_of(scenario, classes), *prescribed, slabs, shapes)
 
 
 def _slab_records(

@@ -24,6 +24,7 @@ from blocksim.kernels.common.arrays import (
 )
 from blocksim.kernels.explicit.energy import tallied
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario.laws import LINEAR
 from blocksim.world import memory
 from blocksim.world.bodies import layout_of
 from blocksim.world.build import (
@@ -129,7 +130,7 @@ def test_automatic_step_is_the_admissible_one_and_follows_safety_and_stiffness()
     step = float(world.controls[0].step)
     (bounds,) = bounds_of([layout_of(scenario())], world.bodies[np.newaxis])
     table = interactions_of(scenario(), contact_classes(scenario(), place_bodies(scenario())))
-    assert step == admissible_step(bounds, table, 0.05, "linear", ContactLoad(0.0, 0.0))
+    assert step == admissible_step(bounds, table, 0.05, LINEAR, ContactLoad(0.0, 0.0))
     assert build_world(scenario(time={"safety": 0.025})).controls[0].step == pytest.approx(step / 2)
     assert build_world(scenario(contact={"stiffness_scale": 0.01})).controls[0].step == pytest.approx(10 * step)
     strong = damping_ratio(0.0)

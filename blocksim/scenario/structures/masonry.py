@@ -157,13 +157,8 @@ class Dominoes(Structure):
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses from left to right."""
         pitch, y = block.size_x + self.spacing, self.bottom + 0.5 * block.size_y
-        first = Pose(
-            self.left + 0.5 * block.size_x,
-            y,
-            vx=self.push,
-            vy=abs(self.push) * block.size_x / block.size_y,
-            spin=-2.0 * self.push / block.size_y,
-        )
+        rise, spin = abs(self.push) * block.size_x / block.size_y, -2.0 * self.push / block.size_y
+        first = Pose(self.left + 0.5 * block.size_x, y, vx=self.push, vy=rise, spin=spin)
         return [first, *(Pose(first.x + i * pitch, y) for i in range(1, self.count))]
 
 
