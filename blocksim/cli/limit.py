@@ -10,7 +10,6 @@ import typer
 
 from blocksim.cli import command_line, prepare, progress
 from blocksim.options import Option
-from blocksim.scenario.check import implausible_values
 from blocksim.scenario.models.timeline import SPRINGS
 from blocksim.simulation.schemes import kernels_of
 from blocksim.study import answer, criterion, fragility, limit, limit_answer, limit_plan, rows
@@ -95,10 +94,7 @@ def _warn(plan: limit_plan.LimitPlan, screen: command_line.Screen) -> None:
     """Warn of implausible values of the scenario, and of those at both ends of the range; compile what it needs."""
     ends = [plan.scenario_at(value) for value in (plan.span.low, plan.span.high)]
     prepare.announce_compilation(kernels_of(ends[0]), quiet=screen.silent)
-    if screen.silent:
-        return
-    for text in dict.fromkeys(text for scenario in ends for text in implausible_values(scenario)):
-        screen.note(f"warning: {text}")
+    prepare.warn_of_values(ends, screen)
     if not any(one.start.settle for one in ends) and all(map(limit_plan.is_sustained, ends)):
         screen.note(AT_ONCE)
 
@@ -129,8 +125,7 @@ def fragility_command(
     """
     plan = fragility.read_fragility(source.document(), options)
     base = plan.document.build()
-    if not screen.silent:
-        prepare.warn_of_values(base)
+    prepare.warn_of_values([base], screen)
     prepare.announce_compilation(kernels_of(base), quiet=screen.silent)
     heads = {head.key: head for head in plan.cases.heads}
     with progress.exit_on_stop(), progress.case_progress(heads.values(), quiet=screen.silent) as on_row:

@@ -1,6 +1,6 @@
 """What comes before a run: reading the scenario, so that later mistakes also point into the file, and compiling."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,10 +36,11 @@ class ScenarioInput:
             raise ScenarioError([document.problem(mistakes.Mistake(("contact", "skin"), str(error)))]) from None
 
 
-def warn_of_values(scenario: Scenario) -> None:
-    """Warn of values that are allowed but implausible."""
-    for text in check.implausible_values(scenario):
-        output.note(f"warning: {text}")
+def warn_of_values(scenarios: Iterable[Scenario], screen: command_line.Screen) -> None:
+    """Warn of values that are allowed but implausible, of each once."""
+    found = () if screen.silent else (text for one in scenarios for text in check.implausible_values(one))
+    for text in dict.fromkeys(found):
+        screen.note(f"warning: {text}")
 
 
 def announce_compilation(kernels: str, *, quiet: bool) -> None:

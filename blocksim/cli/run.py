@@ -43,8 +43,7 @@ def run_command(
 
     listener = RunCallbacks(on_start=start) if screen.silent else RunCallbacks(output.note, start)
     with source.built() as ready, progress.run_progress(quiet=screen.silent) as on_progress:
-        if not screen.silent:
-            prepare.warn_of_values(ready)
+        prepare.warn_of_values([ready], screen)
         out = options.out or files.default_folder(ready)
         if context.obj is not None:  # imports and compiling are waited for too
             over = time.monotonic() - context.obj

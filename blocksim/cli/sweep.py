@@ -54,8 +54,7 @@ def sweep_command(
         raise typer.BadParameter("a scenario file is needed, or --merge DIR", param_hint="SCENARIO")
     document = options.document(Document.read(scenario).with_settings(settings or []))
     base = document.build()
-    if not screen.silent:
-        prepare.warn_of_values(base)
+    prepare.warn_of_values([base], screen)
     if dry_run:
         found = plan.estimate(document, keep_cases=options.keep_cases)
         cores = options.jobs or os.cpu_count() or 1

@@ -20,12 +20,10 @@ from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.kernels.common.arrays import zeros
 from blocksim.options import Option
 from blocksim.scenario import Scenario, load_stored, resolution, units
-from blocksim.scenario.units import TIME
 from blocksim.simulation import files, instruments, provenance, results
 from blocksim.simulation.schemes import AnyScene
 from blocksim.simulation.stores.hdf5 import read_probes, read_rows
-from blocksim.world.build import arrays_of, with_parts
-from blocksim.world.free_memory import available_bytes, readable
+from blocksim.world import build, free_memory
 
 FORMAT: Literal["blocksim checkpoint 1"] = "blocksim checkpoint 1"
 COPIES = 3  # of the content, while it is read: the file, its arrays, the scene
@@ -93,7 +91,7 @@ def origin_of(scenario: Scenario) -> Origin:
 
 def write_checkpoint(path: Path, scene: AnyScene, position: Position, origin: Origin) -> None:
     """Write a checkpoint, which takes the place of an older one when it is on the disk. Raises OutputError."""
-    arrays = arrays_of(scene)
+    arrays = build.arrays_of(scene)
     types = tuple(ArrayType(str(array.dtype), array.shape) for array in arrays)
     head = CheckpointHead(format=FORMAT, position=position, origin=origin, arrays=types)
     digest = hashlib.sha256()
@@ -119,9 +117,10 @@ def read_checkpoint(path: Path) -> StoredCheckpoint:
 
 
 def _read(path: Path) -> StoredCheckpoint:
-    size, available = path.stat().st_size, available_bytes()
+    size, available = path.stat().st_size, free_memory.available_bytes()
     if available is not None and COPIES * size > available:
-        raise ValueError(f"it has {readable(size)}, but only {readable(available)} of memory are free")
+        needed, free = map(free_memory.readable, (size, available))
+        raise ValueError(f"it has {needed}, but only {free} of memory are free")
     content = path.read_bytes()
     body, digest = content[:-DIGEST_BYTES], content[-DIGEST_BYTES:]
     if hashlib.sha256(body).digest() != digest:
@@ -140,7 +139,7 @@ def restore_scene(stored: StoredCheckpoint, built: AnyScene) -> AnyScene:
     Raises InvalidInputError for arrays of another scene.
     """
     types, arrays = stored.head.arrays, stored.arrays
-    if len(types) != len(arrays_of(built)):
+    if len(types) != len(build.arrays_of(built)):
         raise InvalidInputError(f"{stored.path}: its {len(types)} arrays do not fit this scene")
     scene: AnyScene = _filled(built, zip(types, arrays, strict=True), stored.path)
     return scene
@@ -151,7 +150,7 @@ def _filled(part: Any, contents: Iterator[tuple[ArrayType, NDArray[np.uint8]]], 
     if part is None:
         return None
     if not isinstance(part, np.ndarray):
-        return with_parts(part, [_filled(one, contents, path) for one in part])
+        return build.with_parts(part, [_filled(one, contents, path) for one in part])
     kind, content = next(contents)
     count = math.prod(kind.shape)
     is_alike = kind.dtype == str(part.dtype) and len(kind.shape) == part.ndim and min(kind.shape, default=0) >= 0
@@ -165,7 +164,7 @@ def _filled(part: Any, contents: Iterator[tuple[ArrayType, NDArray[np.uint8]]], 
 
 CHECKPOINT_SECONDS = 60.0
 NEVER = sys.maxsize  # steps
-SECONDS = units.Quantity(TIME, above=0.0)
+SECONDS = units.Quantity(units.TIME, above=0.0)
 
 
 @dataclass(frozen=True)

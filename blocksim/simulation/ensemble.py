@@ -13,13 +13,11 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common import arrays, compiler, frame_times, systems
 from blocksim.kernels.common.members import Watched
-from blocksim.scenario import PlacedBody, Scenario
-from blocksim.scenario.motion import settles
+from blocksim.scenario import PlacedBody, Scenario, motion as motions
 from blocksim.simulation import balance, instruments, loop, observables, rest_state, schemes, trajectory
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
-from blocksim.simulation.schemes import AnyScene, build_stacks, ledger_names, measure_row, scheme_of, system_totals
-from blocksim.world.build import Refusal, SceneStack, member, stack_of_one
-from blocksim.world.systems.blocks import block_system, motion_of, outlines_of
+from blocksim.world import build
+from blocksim.world.systems import blocks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +42,7 @@ class MemberEnd:
     @cached_property
     def frames(self) -> trajectory.Frames:
         """One: the last."""
-        return instruments.frames_from_rows((block_system(self.placed),), self.time_step, self.rows)
+        return instruments.frames_from_rows((blocks.block_system(self.placed),), self.time_step, self.rows)
 
     @property
     def final(self) -> "pd.DataFrame":
@@ -67,9 +65,10 @@ class MemberFailure:
 EnsembleEnd = MemberEnd | MemberFailure
 
 
-def in_play_of(scenes: AnyScene | systems.Coupled, members: Sequence[int]) -> list[tuple[float, float]]:
+def in_play_of(scenes: schemes.AnyScene | systems.Coupled, members: Sequence[int]) -> list[tuple[float, float]]:
     """Return mass (kg) and energy moved (J), which decide the energy in play, of some members of a stack."""
-    further = system_totals(member(scenes, 0))[1] if isinstance(scenes, systems.Coupled) else 0.0  # in a stack of one
+    # systems are in a stack of one
+    further = schemes.system_totals(build.member(scenes, 0))[1] if isinstance(scenes, systems.Coupled) else 0.0
     mass = scenes.world.bodies.view(np.ndarray)["mass"]
     masses = [float(np.sum(mass[m])) + further for m in members]  # one by one: the order matters
     book = scenes.world.ledger[:, 0]
@@ -78,7 +77,7 @@ def in_play_of(scenes: AnyScene | systems.Coupled, members: Sequence[int]) -> li
 
 
 def member_ends(
-    scenes: AnyScene,
+    scenes: schemes.AnyScene,
     placed: list[Placed],
     measured: NDArray[np.float64],
     watch: Watch,
@@ -92,13 +91,13 @@ def member_ends(
     `watch` has seen them on the way; `turned` (m, 1) is their largest rotation (rad), where it was followed.
     """
     world, bodies = scenes.world, [body for one in placed for body in one]
-    count, names = len(placed), ledger_names(scenes)
-    motion = motion_of(world.bodies[:, : len(placed[0])])  # (m, 6, b)
+    count, names = len(placed), schemes.ledger_names(scenes)
+    motion = blocks.motion_of(world.bodies[:, : len(placed[0])])  # (m, 6, b)
     steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
     time_steps: list[float] = world.controls["step"][:, 0].tolist()
     seconds = [float(steps[m, 0]) * time_steps[m] for m in range(count)]
     sides = np.array([(one.size_x, one.size_y, one.angle) for one in bodies]).reshape(count, -1, 3).swapaxes(1, 2)
-    corners = outlines_of(bodies)  # (m, b, k, 2); None where all are rectangles
+    corners = blocks.outlines_of(bodies)  # (m, b, k, 2); None where all are rectangles
     corners = None if corners is None else corners.reshape(count, -1, *corners.shape[1:])
     tables = trajectory.final_values(motion, sides, corners).tolist()
     support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
@@ -111,7 +110,7 @@ def member_ends(
         some, ledger = slice(m, m + 1), balance.ledger_of(names, measured[m], starts[m], *in_play)
         outcome = loop.outcome_of(code, ledger)
         if outcome.status != "finished":
-            outcome = loop.diagnose(outcome, code, member(scenes, m), placed[m])
+            outcome = loop.diagnose(outcome, code, build.member(scenes, m), placed[m])
         ends[m] = MemberEnd(
             outcome=outcome,
             ledger=ledger,
@@ -171,15 +170,16 @@ def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: b
             for kernels in dict.fromkeys(map(schemes.kernels_of, batch)):
                 schemes.compile_kernels(kernels)
             ends: dict[int, EnsembleEnd] = {}
-            for one in build_stacks(batch):
-                if isinstance(one, Refusal):
+            for one in schemes.build_stacks(batch):
+                if isinstance(one, build.Refusal):
                     ends[one.number] = MemberFailure(one.error)
                     continue
                 first, stack = batch[one.numbers[0]], one
                 try:
-                    if settles(first):  # it has one scene
-                        scene, _ = rest_state.initial_scene(member(one.scenes, 0), first, one.placed[0], schemes.ALONE)
-                        stack = one._replace(scenes=stack_of_one(scene))
+                    if motions.settles(first):  # it has one scene
+                        scene = build.member(one.scenes, 0)
+                        scene, _ = rest_state.initial_scene(scene, first, one.placed[0], schemes.ALONE)
+                        stack = one._replace(scenes=build.stack_of_one(scene))
                 except BlocksimError as error:
                     ends[one.numbers[0]] = MemberFailure(error)
                     continue
@@ -206,15 +206,15 @@ def _batches(scenarios: Iterable[Scenario], most: int) -> Iterator[list[Scenario
 class Ensemble:
     """Scenes of one scheme and shape, stacked, to be advanced together once."""
 
-    def __init__(self, scenarios: Sequence[Scenario], stack: SceneStack, *, peaks: bool = False) -> None:
+    def __init__(self, scenarios: Sequence[Scenario], stack: build.SceneStack, *, peaks: bool = False) -> None:
         """Take a stack of scenes that have not moved yet, and the scenarios that its numbers count.
 
         `peaks` says whether the largest rotations on the way are followed.
         """
         self.placed = stack.placed
         self.has_peaks = peaks
-        self.scenes: AnyScene = stack.scenes
-        self.scheme, self.names = scheme_of(self.scenes), ledger_names(self.scenes)
+        self.scenes: schemes.AnyScene = stack.scenes
+        self.scheme, self.names = schemes.scheme_of(self.scenes), schemes.ledger_names(self.scenes)
         self.bodies = int(self.scenes.world.bodies.shape[1]) - 1
         self.time_steps: list[float] = self.scenes.world.controls["step"][:, 0].tolist()
         own = [scenarios[number] for number in stack.numbers]
@@ -285,7 +285,7 @@ class Ensemble:
             rows = np.zeros_like(rows)  # what is measured at the start of a later call
             is_under_way = self.codes[m] == arrays.REACHED and frame < stop
             if self.codes[m] == arrays.REACHED and frame_times.next_frame(frame - 1, self.periods[m]) == frame:
-                motion = motion_of(self.scenes.world.bodies[[m], : len(self.placed[0])])
+                motion = blocks.motion_of(self.scenes.world.bodies[[m], : len(self.placed[0])])
                 self.watch.follow([m], motion, [frame * self.time_steps[m]])
 
     def _advance_members(self, members: Steps, stops: Steps, rows: NDArray[np.float64], codes: Steps) -> None:
@@ -293,7 +293,7 @@ class Ensemble:
         if self.scheme.advance_members is not None:
             self.scheme.advance_members(self.scenes, members, stops, rows, codes, self.watched)
 
-    def _positions(self, scenes: AnyScene, which: list[int] | slice) -> NDArray[np.float64]:
+    def _positions(self, scenes: schemes.AnyScene, which: list[int] | slice) -> NDArray[np.float64]:
         """Return x, y (m) and angle (rad) of the blocks of some scenes of a stack, (k, 3, b)."""
         bodies = scenes.world.bodies.view(np.ndarray)  # a record array takes five times as long for a field
         return np.stack([bodies[name][which, : len(self.placed[0])] for name in instruments.POSITION], axis=1)
@@ -312,7 +312,7 @@ class Ensemble:
         which = [m for m, code in enumerate(codes) if self.watch.first[m] is None and code != arrays.PAIRS_FULL]
         steps = self.scenes.world.clock["steps"][which, 0].tolist()
         times = [step * self.time_steps[m] for m, step in zip(which, steps, strict=True)]
-        self.watch.follow(which, motion_of(self.scenes.world.bodies[which, : len(self.placed[0])]), times)
+        self.watch.follow(which, blocks.motion_of(self.scenes.world.bodies[which, : len(self.placed[0])]), times)
         turned = None
         if self.has_peaks:  # in frames and at the end
             turns = np.abs(self._positions(self.scenes, slice(None))[:, 2] - self.watched.start[:, 2])
@@ -325,7 +325,7 @@ class Ensemble:
 
     def _run_alone(self, m: int, start: float) -> EnsembleEnd:
         """Go on with a member whose pair list is full, from stop to stop, as `_advance` does."""
-        scene, timeline, last = member(self.scenes, m), self.timelines[m], int(self.last_steps[m])
+        scene, timeline, last = build.member(self.scenes, m), self.timelines[m], int(self.last_steps[m])
         code, continues = arrays.REACHED, True
         try:
             if not scene.world.clock[0].is_started:
@@ -345,9 +345,9 @@ class Ensemble:
                 is_under_way = code == arrays.REACHED and now < last
                 continues = is_under_way and (now != look or balance.adds_up(balance.energy_ledger(scene, start)))
                 if not continues or frame_times.next_frame(now - 1, self.periods[m]) == now:
-                    motion = motion_of(stack_of_one(scene).world.bodies[[0], : len(self.placed[0])])
+                    motion = blocks.motion_of(build.stack_of_one(scene).world.bodies[[0], : len(self.placed[0])])
                     self.watch.follow([m], motion, [now * self.time_steps[m]])
         except BlocksimError as error:
             return MemberFailure(error)
-        measured, watch = measure_row(scene)[np.newaxis], self.watch.only(m)
-        return member_ends(stack_of_one(scene), [self.placed[m]], measured, watch, [start], [code])[0]
+        measured, watch = schemes.measure_row(scene)[np.newaxis], self.watch.only(m)
+        return member_ends(build.stack_of_one(scene), [self.placed[m]], measured, watch, [start], [code])[0]

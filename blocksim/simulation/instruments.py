@@ -21,7 +21,7 @@ from blocksim.scenario.models.timeline import STEP, ForceProbe, JointProbe, Poin
 from blocksim.simulation import balance, observables, trajectory
 from blocksim.world.systems import systems_of
 from blocksim.world.systems.blocks import BLOCKS, block_system
-from blocksim.world.systems.system import BodyContacts, Floats, System, SystemInScene, Track
+from blocksim.world.systems.system import Floats, System, SystemInScene, Track
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,9 +162,12 @@ class Snapshot:
         first = self.bodies.size
         for (system, count), arrays in zip(self.parts, getattr(self.scene, "systems", ()), strict=True):
             if system.touching is not None:
-                touching = system.touching(arrays, self.scene.world)
-                rows = np.concatenate([rows, rows_of(touching._replace(part=first + touching.part))])
-                friction = np.concatenate([friction, touching.friction])
+                its = system.touching(arrays, self.scene.world)
+                added = np.zeros(len(its.body), trajectory.CONTACT_ROW)  # of bodies a with parts b
+                added["body_a"], added["body_b"] = its.body, first + its.part
+                (added["x"], added["y"]), (added["normal_x"], added["normal_y"]) = its.place.T, its.normal.T
+                added["normal_force"], added["shear_force"] = its.normal_force, its.shear_force
+                rows, friction = np.concatenate([rows, added]), np.concatenate([friction, its.friction])
             first += count
         return rows, trajectory.forces_on_a(rows), friction
 
@@ -174,15 +177,6 @@ class Snapshot:
         schemes = balance.solver_module("simulation.schemes")
         energies: list[float] = schemes.measure_row(self.scene)[: len(schemes.ledger_names(self.scene))].tolist()
         return energies
-
-
-def rows_of(touching: BodyContacts) -> Any:
-    """Return contacts of a system as those of bodies a with parts b."""
-    rows = np.zeros(len(touching.body), trajectory.CONTACT_ROW)
-    rows["body_a"], rows["body_b"] = touching.body, touching.part
-    (rows["x"], rows["y"]), (rows["normal_x"], rows["normal_y"]) = touching.place.T, touching.normal.T
-    rows["normal_force"], rows["shear_force"] = touching.normal_force, touching.shear_force
-    return rows
 
 
 def force_sampler(on: NDArray[np.bool_], by: NDArray[np.bool_]) -> Sampler:

@@ -31,8 +31,7 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
 from blocksim.kernels.common.arrays import REACHED
 from blocksim.scenario import PlacedBody, Scenario, motion, overlap, placement
-from blocksim.simulation.results import NOT_AT_REST, RestState
-from blocksim.simulation.schemes import AnyScene, Team, corner_ways, outlines_of, scheme_of
+from blocksim.simulation import results, schemes
 from blocksim.world.build import arrays_of
 
 PARTS = 50  # in which gravity and loads grow
@@ -65,8 +64,8 @@ class SettleError(BlocksimError):
 
 
 def initial_scene(
-    scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop = str
-) -> tuple[AnyScene, RestState | None]:
+    scene: schemes.AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: schemes.Team, stop: Stop = str
+) -> tuple[schemes.AnyScene, results.RestState | None]:
     """Return a scene at time zero as its run begins, and how it settled, where it did.
 
     Raises SettleError where that was asked for and fails; otherwise the scene begins as it was placed. Raises
@@ -86,8 +85,8 @@ def initial_scene(
 
 
 def settle(
-    scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop = str
-) -> tuple[AnyScene, RestState]:
+    scene: schemes.AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: schemes.Team, stop: Stop = str
+) -> tuple[schemes.AnyScene, results.RestState]:
     """Bring a scene at time zero to rest; return it, still at time zero, and how.
 
     Raises SettleError, and StoppedEarlyError where `stop` says why.
@@ -108,7 +107,7 @@ def settle(
     run.begin()
     ways = run.ways()
     far = int(np.argmax(ways))
-    return run.scene, RestState(
+    return run.scene, results.RestState(
         steps=run.steps,
         largest_displacement_mm=MILLI * float(ways[far]),
         displaced_block=placed[far].name,
@@ -121,10 +120,10 @@ class _Settlement:
     """A scene on its way to rest."""
 
     def __init__(
-        self, scene: AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: Team, stop: Stop
+        self, scene: schemes.AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: schemes.Team, stop: Stop
     ) -> None:
         self.scene, self.placed, self.team, self.stop = scene, placed, team, stop
-        self.scheme = scheme_of(scene)
+        self.scheme = schemes.scheme_of(scene)
         self.pace = self.scheme.settling
         self.count = len(placed)
         names = {body.name: number for number, body in enumerate(placed)}
@@ -147,7 +146,7 @@ class _Settlement:
         self.before = self.start
         self.energy, self.steps = 0.0, 0
         self.is_released = scenario.start.release == "always"
-        self.lean: tuple[AnyScene, list[NDArray[Any]]] | None = None
+        self.lean: tuple[schemes.AnyScene, list[NDArray[Any]]] | None = None
         self.leaving: dict[str, Floats] = {}
         self.since, self.speeds = self.start, list[float]()  # velocities were taken away; roots of kinetic energies
 
@@ -298,7 +297,7 @@ class _Settlement:
         if not last >= STEADY * before > 0.0:
             return False
         change = self._places() - self.since
-        way = float((corner_ways(change, self.bodies["radius"]) * self.is_free).max())
+        way = float((schemes.corner_ways(change, self.bodies["radius"]) * self.is_free).max())
         x, y = self.bodies["x"][self.is_free], self.bodies["y"][self.is_free]
         slenderness = max(1.0, float(max(np.ptp(x), np.ptp(y))) / self.smallest)  # of all free blocks
         give = CHAIN * self.count * slenderness * self.scheme.give(self.scene)
@@ -308,7 +307,7 @@ class _Settlement:
 
     def _meets(self, change: Floats, share: float) -> bool:
         """Return True if blocks come to bear on one another on a way from where they are, that of some share."""
-        now = outlines_of(self.scene.world)
+        now = schemes.outlines_of(self.scene.world)
         now = now.some(np.arange(now.kinds.size - 1))  # without the half-plane
         x, y, angle = self._places() + change
         places = {"x": x, "y": y, "cosine": np.cos(angle), "sine": np.sin(angle)}
@@ -347,7 +346,7 @@ class _Settlement:
 
     def ways(self) -> Floats:
         """Return how far every block has come (m)."""
-        return np.where(self.is_free, corner_ways(self._places() - self.start, self.bodies["radius"]), 0.0)
+        return np.where(self.is_free, schemes.corner_ways(self._places() - self.start, self.bodies["radius"]), 0.0)
 
     def _error(self) -> SettleError:
         bodies = self.bodies
@@ -356,13 +355,13 @@ class _Settlement:
         ways = self.ways()
         far = int(np.nanargmax(ways))
         return SettleError(
-            f"the scene {NOT_AT_REST} (start.settle): block {self.placed[fastest].name} moves at "
+            f"the scene {results.NOT_AT_REST} (start.settle): block {self.placed[fastest].name} moves at "
             f"{MILLI * float(speeds[fastest]):.3g} mm/s, block {self.placed[far].name} has come "
             f"{MILLI * float(ways[far]):.3g} mm, after {self.steps} steps"
         )
 
 
-def _restore(scene: AnyScene, kept: Sequence[NDArray[Any]]) -> None:
+def _restore(scene: schemes.AnyScene, kept: Sequence[NDArray[Any]]) -> None:
     """Give all arrays of a scene the values that they had."""
     for array, values in zip(arrays_of(scene), kept, strict=True):
         array[...] = values

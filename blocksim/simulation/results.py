@@ -1,7 +1,7 @@
 """A finished, failed or interrupted run: run.json with rest state and events, the object, and how a folder keeps it."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -93,18 +93,15 @@ def read_summary(path: Path) -> Summary:
         ) from None
 
 
-def changed_files(folder: Path, summary: Summary) -> tuple[str, ...]:
-    """Return the files of a run that do not have the checksums that run.json has for them."""
-    return tuple(
-        name
-        for name, digest in summary.sha256.items()
-        if not (folder / Path(name).name).is_file() or files.sha256_of(folder / Path(name).name) != digest
-    )
+RESULT_FILES = frozenset({files.FRAMES, files.FINAL})
+"""Those that stay as the run has written them; the other files may be renewed."""
 
 
-def changed_results(folder: Path, summary: Summary) -> tuple[str, ...]:
-    """Return which of frames and final table are not as the run has written them; the other files may be renewed."""
-    return tuple(name for name in changed_files(folder, summary) if name in {files.FRAMES, files.FINAL})
+def changed_files(folder: Path, summary: Summary, names: Collection[str] | None = None) -> tuple[str, ...]:
+    """Return which files of a run, or of some names, do not have the checksums that run.json has for them."""
+    wanted = {name: digest for name, digest in summary.sha256.items() if names is None or name in names}
+    places = {name: folder / Path(name).name for name in wanted}
+    return tuple(one for one, at in places.items() if not at.is_file() or files.sha256_of(at) != wanted[one])
 
 
 MOST_ROWS = 20  # of the table that a notebook shows

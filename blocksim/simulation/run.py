@@ -12,50 +12,43 @@ from pathlib import Path
 import numpy as np
 
 from blocksim.errors import OutputError
-from blocksim.kernels.common.arrays import World
-from blocksim.kernels.common.compiler import compiling
+from blocksim.kernels.common import arrays, compiler
 from blocksim.scenario import PlacedBody, Scenario, events, motion, placement, scenario_hash
 from blocksim.scenario.models.motion import Pulse
 from blocksim.silence import silent
-from blocksim.simulation import balance, checkpoint, files, loop, observables, provenance, rest_state, schemes
-from blocksim.simulation.files import CHECKPOINTS, folder_lock, keep_scenario, probe_tables, read_tables
-from blocksim.simulation.instruments import Recorder, bytes_of_series, probes_of
+from blocksim.simulation import balance, checkpoint, files, instruments, loop, observables, provenance, results, schemes
 from blocksim.simulation.interruption import WallTime, stop_requests
-from blocksim.simulation.observables import MovingSupport
-from blocksim.simulation.results import RestState, Result, Summary, keep_result
-from blocksim.simulation.schemes import ALONE, AnyScene, Team, build, ledger_names, measure_row, scheme_of, team_for
+from blocksim.simulation.rest_state import initial_scene
 from blocksim.simulation.stores.hdf5 import FrameFile
 from blocksim.simulation.trajectory import final_columns
-from blocksim.world.build import InitialScene, arrays_of
-from blocksim.world.free_memory import readable
-from blocksim.world.memory import is_shorter_than_step, output_count, recorded_contacts, run_bytes
-from blocksim.world.systems import others_of, warnings_of
+from blocksim.world import build, free_memory, memory, systems
 
-CHECKPOINT_FILES = len(CHECKPOINTS) + 1  # the last one while it is written
+CHECKPOINT_FILES = len(files.CHECKPOINTS) + 1  # the last one while it is written
 
 
-def refuse_full_disk(folder: Path, scenario: Scenario, scene: AnyScene) -> None:
+def refuse_full_disk(folder: Path, scenario: Scenario, scene: schemes.AnyScene) -> None:
     """Raise OutputError where a run may leave more than there is room for on the disk of a folder (yet to be made)."""
     needed = bytes_needed(scenario, scene)
     place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     free = shutil.disk_usage(place).free
     if needed > free:
+        asked, left = free_memory.readable(needed), free_memory.readable(free)
         raise OutputError(
-            f"{folder}: the results may take {readable(needed)}, but only {readable(free)} are free there; write "
-            "elsewhere with --out DIR, or store fewer frames (output.every, time.end)"
+            f"{folder}: the results may take {asked}, but only {left} are free there; write elsewhere with --out DIR, "
+            "or store fewer frames (output.every, time.end)"
         )
 
 
-def bytes_needed(scenario: Scenario, scene: AnyScene) -> int:
+def bytes_needed(scenario: Scenario, scene: schemes.AnyScene) -> int:
     """Return the bytes that the frames of a run and its checkpoints take at most."""
-    steps = loop.last_step_of(scenario.time.end, float(scene.world.controls[0].step))
-    frames = output_count(steps, scenario.time.end, scenario.output.every) + 2  # the first, and wherever it ends
-    bodies, particles = scene.world.bodies.size - 1, scene.world.particles
-    contacts = recorded_contacts(bodies, 0 if particles is None else particles.size) if scenario.output.contacts else 0
-    arrays = sum(array.nbytes for array in arrays_of(scene))
-    step = float(scene.world.controls[0].step)
-    series = bytes_of_series(scenario, steps, step, len(ledger_names(scene)))
-    return series + run_bytes(bodies, frames, contacts, others_of(scenario)) + CHECKPOINT_FILES * arrays
+    step, every = float(scene.world.controls[0].step), scenario.output.every
+    steps = loop.last_step_of(scenario.time.end, step)
+    frames = memory.output_count(steps, scenario.time.end, every) + 2  # the first, and wherever it ends
+    bodies, particles = scene.world.bodies.size - 1, 0 if scene.world.particles is None else scene.world.particles.size
+    contacts = memory.recorded_contacts(bodies, particles) if scenario.output.contacts else 0
+    state = sum(array.nbytes for array in build.arrays_of(scene))
+    series = instruments.bytes_of_series(scenario, steps, step, len(schemes.ledger_names(scene)))
+    return series + memory.run_bytes(bodies, frames, contacts, systems.others_of(scenario)) + CHECKPOINT_FILES * state
 
 
 GAINED = 0.5  # a/w
@@ -64,7 +57,7 @@ SAMPLES = 20_000  # of twice the duration of a pulse
 
 
 def _onset_warnings(
-    scenario: Scenario, placed: Sequence[PlacedBody], world: World, settled: RestState | None
+    scenario: Scenario, placed: Sequence[PlacedBody], world: arrays.World, settled: results.RestState | None
 ) -> Iterator[str]:
     """Yield a warning where springs make a slip under an abrupt pulse too large by more than the promise."""
     pulse = scenario.motion
@@ -121,17 +114,16 @@ NO_CALLBACKS = RunCallbacks()
 
 def simulate(
     scenario: Scenario, *, threads: int = 1, on_progress: loop.Watcher = silent, wall_time: float | None = None
-) -> Result:
+) -> results.Result:
     """Run a scenario in memory, without writing anything. A signal or the limit of wall time (s) interrupts it.
 
     The result does not depend on the number of threads; small scenes do not use them all.
     """
     limit, began = WallTime(wall_time), time.perf_counter()
-    built = build(scenario)
+    built = schemes.build(scenario)
     began += _compiled(scenario)
-    recorder = _recorder(scenario, built)
-    with _attended(built.scene, scenario, recorder, threads, limit, on_progress) as (team, control):
-        scene, settled = rest_state.initial_scene(built.scene, scenario, built.placed, team, control.stop)
+    with _attended(scenario, built, threads, limit, on_progress) as (recorder, team, control):
+        scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
         ended = loop.run_loop(scene, recorder, scenario.time.end, team=team, control=control)
     return _result(scenario, recorder, ended, time.perf_counter() - began, settled)
 
@@ -146,7 +138,7 @@ def simulate_into(
     precautions: checkpoint.CheckpointPolicy = checkpoint.DEFAULTS,
     on_progress: loop.Watcher = silent,
     listener: RunCallbacks = NO_CALLBACKS,
-) -> Result:
+) -> results.Result:
     """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
 
     With `resume` it continues from the newest whole checkpoint there, to the same bits as without the interruption;
@@ -156,18 +148,18 @@ def simulate_into(
     `interrupted`, and what was computed until then is kept.
     """
     limit, began = WallTime(precautions.wall_time, precautions.time_over), time.perf_counter()
-    built = build(scenario)
+    built = schemes.build(scenario)
     refuse_full_disk(folder, scenario, built.scene)
-    tables = read_tables(scenario)
-    with folder_lock(folder):
+    tables = files.read_tables(scenario)
+    with files.folder_lock(folder):
         resumption = checkpoint.find_resumption(folder, scenario) if resume else checkpoint.Resumption()
         for remark in (*resumption.remarks, *resumption.notes):
             listener.on_remark(remark)
         began += _compiled(scenario, listener)
-        recorder, stored = _recorder(scenario, built), resumption.checkpoint
-        with _attended(built.scene, scenario, recorder, threads, limit, on_progress) as (team, control):
+        stored = resumption.checkpoint
+        with _attended(scenario, built, threads, limit, on_progress) as (recorder, team, control):
             if stored is None:
-                scene, settled = rest_state.initial_scene(built.scene, scenario, built.placed, team, control.stop)
+                scene, settled = initial_scene(built.scene, scenario, built.placed, team, control.stop)
                 past = checkpoint.Past(settled=settled)
                 files.prepare_folder(folder, overwrite=overwrite or resume)
             else:
@@ -175,12 +167,12 @@ def simulate_into(
                 settled, parts = position.settled, (*position.resumed_from, position.step)
                 past = checkpoint.Past(position.total_seconds, parts, stored.path, position.step, settled)
                 checkpoint.take_over(stored, scenario, recorder)
-            toml = keep_scenario(scenario, tables, folder)
-            with FrameFile(folder / files.FRAMES, recorder, toml, ledger_names(scene)) as sink:
+            toml = files.keep_scenario(scenario, tables, folder)
+            with FrameFile(folder / files.FRAMES, recorder, toml, schemes.ledger_names(scene)) as sink:
                 recorder.sink = sink
                 del recorder.held[:-1]  # the file has them
                 # of the part before
-                files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *probe_tables(scenario)))
+                files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *files.probe_tables(scenario)))
                 periods = precautions.periods(recorder.time_step)
                 seconds = precautions.checkpoint_seconds
                 writer = checkpoint.CheckpointWriter(
@@ -201,7 +193,7 @@ def simulate_into(
                 "last_checkpoint": None if result.status == "finished" else writer.last_step,
                 "warnings": warnings,
             }
-            return keep_result(result, result.summary.model_copy(update=whole_run), folder)
+            return results.keep_result(result, result.summary.model_copy(update=whole_run), folder)
 
 
 def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> float:
@@ -211,39 +203,40 @@ def _compiled(scenario: Scenario, listener: RunCallbacks = NO_CALLBACKS) -> floa
     listener.on_start(kernels)
     schemes.compile_kernels(kernels)
     if scenario.systems:  # these need code of their own
-        with compiling():
-            measure_row(ALONE.advance(build(scenario).scene, 0)[0])
+        with compiler.compiling():
+            schemes.measure_row(schemes.ALONE.advance(schemes.build(scenario).scene, 0)[0])
     return time.perf_counter() - began
 
 
 @contextmanager
 def _attended(
-    scene: AnyScene, scenario: Scenario, recorder: Recorder, threads: int, limit: WallTime, on_progress: loop.Watcher
-) -> Iterator[tuple[Team, loop.RunControl]]:
-    """Give the threads of a run, its events, and what stops it: a signal, or the limit of wall time."""
-    elements = sum(one.count for one in others_of(scenario))
-    timeline = loop.Timeline(scenario, recorder.placed, recorder.time_step) if scenario.events else None
-    with stop_requests() as requests, team_for(scene, threads, elements) as team:
-        yield team, loop.RunControl(on_progress, lambda: requests.reason() or limit.reason(), timeline=timeline)
-
-
-def _recorder(scenario: Scenario, built: InitialScene) -> Recorder:
-    step, output = float(built.scene.world.controls[0].step), scenario.output
-    probes, others = probes_of(scenario, built.placed, step, ledger_names(built.scene)), others_of(scenario)
-    support = MovingSupport(scenario)
-    return Recorder(
+    scenario: Scenario, built: build.InitialScene, threads: int, limit: WallTime, on_progress: loop.Watcher
+) -> Iterator[tuple[instruments.Recorder, schemes.Team, loop.RunControl]]:
+    """Give what records a run, its threads and events, and what stops it: a signal, or the limit of wall time."""
+    step, output, others = float(built.scene.world.controls[0].step), scenario.output, systems.others_of(scenario)
+    probes = instruments.probes_of(scenario, built.placed, step, schemes.ledger_names(built.scene))
+    support = observables.MovingSupport(scenario)
+    recorder = instruments.Recorder(
         built.placed, output.every, step, others=others, contacts=output.contacts, probes=probes, support=support
     )
+    timeline = loop.Timeline(scenario, built.placed, step) if scenario.events else None
+    elements = sum(one.count for one in others)
+    with stop_requests() as requests, schemes.team_for(built.scene, threads, elements) as team:
+        control = loop.RunControl(on_progress, lambda: requests.reason() or limit.reason(), timeline=timeline)
+        yield recorder, team, control
 
 
 def _result(
-    scenario: Scenario, recorder: Recorder, ended: loop.LoopResult, seconds: float, settled: RestState | None
-) -> Result:
+    scenario: Scenario,
+    recorder: instruments.Recorder,
+    ended: loop.LoopResult,
+    seconds: float,
+    settled: results.RestState | None,
+) -> results.Result:
     frames = recorder.frames()
-    world = ended.scene.world
-    step, outcome = float(world.controls[0].step), ended.outcome
+    world, outcome, step = ended.scene.world, ended.outcome, recorder.time_step
     steps, ground = int(world.clock[0].steps), world.bodies[-1]
-    summary = Summary(
+    summary = results.Summary(
         name=scenario.name,
         status=outcome.status,
         reason=outcome.reason,
@@ -269,23 +262,23 @@ def _result(
         environment=provenance.environment(),
     )
     probes = recorder.probes.series()
-    return Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
+    return results.Result(scenario.name, final_columns(frames), summary, scenario, held=frames, held_probes=probes)
 
 
 def _warnings(
-    scenario: Scenario, placed: Sequence[PlacedBody], ended: loop.LoopResult, settled: RestState | None
+    scenario: Scenario, placed: Sequence[PlacedBody], ended: loop.LoopResult, settled: results.RestState | None
 ) -> Iterator[str]:
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > balance.RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
-    if is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
+    if memory.is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
-    yield from warnings_of(scenario)
+    yield from systems.warnings_of(scenario)
     for number in ended.pending if ended.outcome.status == "finished" else ():
         what = events.describe_event(scenario.events[number])
         yield f"events.{number} has not happened, as nothing came to rest: {what}"
     if ended.outcome.status == "finished" and placed:
-        sunk = scheme_of(ended.scene).warning(ended.scene, ended.overlap, placement.smallest_width(placed))
+        sunk = schemes.scheme_of(ended.scene).warning(ended.scene, ended.overlap, placement.smallest_width(placed))
         if sunk:
             yield sunk
     yield from _onset_warnings(scenario, placed, ended.scene.world, settled)

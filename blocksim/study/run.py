@@ -10,7 +10,7 @@ from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Scenario, Source, load_scenario
 from blocksim.silence import silent
 from blocksim.simulation import Result, Watcher, checkpoint, files, read_result, renew_copies, simulate, simulate_into
-from blocksim.simulation.results import changed_results, read_summary
+from blocksim.simulation.results import RESULT_FILES, changed_files, read_summary
 from blocksim.simulation.run import NO_CALLBACKS, RunCallbacks
 from blocksim.study import rows, run_folder
 
@@ -64,7 +64,7 @@ def run(scenario: Source, options: RunOptions) -> Result:
         return simulate(scenario, threads=threads, on_progress=on_progress, wall_time=precautions.wall_time)
     folder = Path(out)
     if not overwrite and files.holds_run(folder, scenario):
-        changed = changed_results(folder, read_summary(folder / files.SUMMARY))
+        changed = changed_files(folder, read_summary(folder / files.SUMMARY), RESULT_FILES)
         if changed:
             path = folder / changed[0]
             what = "does not have the checksum in run.json" if path.is_file() else "no such file"

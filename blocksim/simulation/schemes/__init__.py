@@ -19,12 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, InvalidInputError, OutputError
-from blocksim.kernels.common import arrays, compiler, jit
-from blocksim.kernels.common.systems import Coupled, measure_systems, plan_of
+from blocksim.kernels.common import arrays, compiler, jit, systems
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.scenario import PlacedBody, Scenario, overlap, placement, scenario_from_mapping
+from blocksim.scenario import PlacedBody, Scenario, motion, overlap, placement, scenario_from_mapping
 from blocksim.scenario.models.timeline import SCHEMES as TABLES
-from blocksim.scenario.motion import settles
 from blocksim.silence import silent
 from blocksim.simulation import trajectory
 from blocksim.world import build as scenes
@@ -32,7 +30,7 @@ from blocksim.world.systems import others_of
 
 AnyScene = arrays.World | Nonsmooth
 """The arrays of a scene under way; `world` are those that all schemes share."""
-Scene = TypeVar("Scene", bound=arrays.World | Nonsmooth | Coupled)
+Scene = TypeVar("Scene", bound=arrays.World | Nonsmooth | systems.Coupled)
 
 BODIES_A_THREAD = 100
 """With fewer, threads of the usual schemes wait for one another longer than they work."""
@@ -183,7 +181,7 @@ class _Schemes(Mapping[str, Scheme]):
 SCHEMES: Mapping[str, Scheme] = _Schemes()
 
 
-def scheme_of(scene: AnyScene | Coupled) -> Scheme:
+def scheme_of(scene: AnyScene | systems.Coupled) -> Scheme:
     """Return the scheme that a scene is of."""
     schemes = (one for scheme in SCHEMES.values() for one in (scheme, scheme.with_systems) if one is not None)
     return next(scheme for scheme in schemes if isinstance(scene, scheme.scene_type))
@@ -211,7 +209,7 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[scenes.SceneStack | 
     keys: list[str | None] = []
     for scenario in scenarios:
         scheme = SCHEMES[scenario.time.scheme]
-        is_alone = scenario.systems or scenario.events or scheme.advance_members is None or settles(scenario)
+        is_alone = scenario.systems or scenario.events or scheme.advance_members is None or motion.settles(scenario)
         keys.append(None if is_alone else scheme.name)
     for places in scenes.group_equal(keys):
         key = keys[places[0]]
@@ -228,31 +226,31 @@ def build_stacks(scenarios: Sequence[Scenario]) -> Iterator[scenes.SceneStack | 
                 yield scenes.SceneStack([i], [built.placed], scenes.stack_of_one(built.scene))
 
 
-def ledger_names(scene: AnyScene | Coupled) -> tuple[str, ...]:
+def ledger_names(scene: AnyScene | systems.Coupled) -> tuple[str, ...]:
     """Return the names of the energies (J) of a scene: those of its scheme, then of its further systems."""
     names = scheme_of(scene).ledger
-    if not isinstance(scene, Coupled):
+    if not isinstance(scene, systems.Coupled):
         return names
-    return (*names, *(name for energies in plan_of(scene.systems).energies for name in energies))
+    return (*names, *(name for energies in systems.plan_of(scene.systems).energies for name in energies))
 
 
-def measure_row(scene: AnyScene | Coupled) -> NDArray[np.float64]:
+def measure_row(scene: AnyScene | systems.Coupled) -> NDArray[np.float64]:
     """Return energies (J) as `ledger_names` has them, number of contacts and largest overlap (m)."""
     scheme = scheme_of(scene)
     row = np.zeros(len(scheme.row_names))
     scheme.measure(scene, row)
-    if not isinstance(scene, Coupled):
+    if not isinstance(scene, systems.Coupled):
         return row
     return np.concatenate([row[: -len(COUNTED)], system_totals(scene)[0], row[-len(COUNTED) :]])
 
 
-def system_totals(scene: AnyScene | Coupled) -> tuple[Floats, float]:
+def system_totals(scene: AnyScene | systems.Coupled) -> tuple[Floats, float]:
     """Return energies (J) of the systems beside the blocks, one after the other, and the mass (kg) of them all."""
-    if not isinstance(scene, Coupled):
+    if not isinstance(scene, systems.Coupled):
         return np.zeros(0), 0.0
-    counts = [len(names) + 1 for names in plan_of(scene.systems).energies]
+    counts = [len(names) + 1 for names in systems.plan_of(scene.systems).energies]
     row, masses = np.zeros(sum(counts)), np.cumsum(counts) - 1  # a mass after the energies of each
-    measure_systems(scene, row)
+    systems.measure_systems(scene, row)
     return np.delete(row, masses), sum(row[masses].tolist(), 0.0)
 
 

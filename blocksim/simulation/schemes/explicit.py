@@ -8,13 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common import arrays, systems
-from blocksim.kernels.explicit import depth, step
-from blocksim.kernels.explicit.energy import LEDGER_ROW, measure
-from blocksim.kernels.explicit.models import KERNEL, SURFACE as SURFACE_MODEL
-from blocksim.kernels.explicit.outlines import MOST_CORNERS
+from blocksim.kernels.explicit import depth, energy, models, outlines, step
 from blocksim.scenario.overlap import penetration
-from blocksim.simulation.schemes import BODIES_A_THREAD, Overlaps, Scheme, outlines_of, smallest_sides
-from blocksim.simulation.trajectory import CONTACT_ROW, SUPPORT, UNITS, Rows
+from blocksim.simulation import schemes, trajectory
 from blocksim.world import build
 
 WORK_SPACE = ("points", "matrices", "before", "action")
@@ -22,15 +18,15 @@ Indices = NDArray[np.intp]
 SIDES_X, SIDES_Y = (-1.0, 1.0, 1.0, -1.0), (-1.0, -1.0, 1.0, 1.0)  # of the corners, counter-clockwise from lower left
 
 
-def explicit_contacts(world: arrays.World, blocks: int) -> Rows:
+def explicit_contacts(world: arrays.World, blocks: int) -> trajectory.Rows:
     """Return all contacts in the order of pairs and slots; bodies from number `blocks` on are ground and walls."""
     pairs = world.pairs[: int(world.clock[0].pair_count)]
     pair, place = np.nonzero(np.arange(world.contacts.shape[1]) < pairs["active"][:, None])
     contacts = world.contacts[pair, place]
     a, b = pairs["a"][pair].astype(np.intp), pairs["b"][pair].astype(np.intp)
-    rows = np.zeros(len(contacts), CONTACT_ROW)
-    rows["body_a"], rows["body_b"] = a, np.where(b < blocks, b, SUPPORT)
-    for name, values in zip(list(UNITS)[:4], _places(world, contacts, a, b), strict=True):
+    rows = np.zeros(len(contacts), trajectory.CONTACT_ROW)
+    rows["body_a"], rows["body_b"] = a, np.where(b < blocks, b, trajectory.SUPPORT)
+    for name, values in zip(list(trajectory.UNITS)[:4], _places(world, contacts, a, b), strict=True):
         rows[name] = values
     rows["overlap"] = contacts["depth"]
     rows["normal_force"] = contacts["normal_force"]
@@ -39,10 +35,10 @@ def explicit_contacts(world: arrays.World, blocks: int) -> Rows:
         # what a stiffness does that changes by slip and tilt: a force along the tangent, and a couple, that of a normal
         # force that acts a little beside its corner; without a normal force there is no such place
         power = float(world.controls[0].exponent) + 1.0
-        energy = rows["overlap"] ** power / power  # stored per stiffness
-        rows["shear_force"] -= pairs["slide"][pair] * energy
+        stored = rows["overlap"] ** power / power  # per stiffness
+        rows["shear_force"] -= pairs["slide"][pair] * stored
         normal = rows["normal_force"]
-        way = np.divide(pairs["turn"][pair] * energy, normal, out=np.zeros_like(normal), where=normal > 0.0)
+        way = np.divide(pairs["turn"][pair] * stored, normal, out=np.zeros_like(normal), where=normal > 0.0)
         rows["x"] -= way * rows["normal_y"]
         rows["y"] += way * rows["normal_x"]
     return rows
@@ -52,7 +48,7 @@ def _places(world: arrays.World, contacts: Any, a: Indices, b: Indices) -> list[
     """Return place (m) and normal of contacts: those of particles keep them, corners are found again as kernels do."""
     if "nx" in (contacts.dtype.names or ()):
         return [contacts[name] for name in ("x", "y", "nx", "ny")]
-    half = arrays.HALF if world.corners is None else MOST_CORNERS  # slots of the corners of a, then those of b
+    half = arrays.HALF if world.corners is None else outlines.MOST_CORNERS  # slots of the corners of a, then those of b
     is_of_a = contacts["slot"] < half
     owner, touched = world.bodies[np.where(is_of_a, a, b)], world.bodies[np.where(is_of_a, b, a)]
     number, face = contacts["slot"] % half, contacts["face"]
@@ -99,34 +95,34 @@ def _depths(world: arrays.World) -> tuple[Any, NDArray[np.float64]]:
     return pairs, np.where(is_active, contacts["depth"], 0.0).max(axis=1, initial=0.0)
 
 
-def overlaps_of_springs(scene: Any) -> Overlaps:
+def overlaps_of_springs(scene: Any) -> schemes.Overlaps:
     """Return how deep bodies overlap: by contacts, or where these have lost them, by outlines."""
     world = scene.world
     pairs, deepest = _depths(world)
     is_pressed = deepest > pairs["limit"]
-    outlines = outlines_of(world)
-    below = world.bodies[-1].y - outlines.bottom[pairs["a"]]
-    inside = penetration(outlines.some(pairs["a"]), outlines.some(pairs["b"]))
+    shapes = schemes.outlines_of(world)
+    below = world.bodies[-1].y - shapes.bottom[pairs["a"]]
+    inside = penetration(shapes.some(pairs["a"]), shapes.some(pairs["b"]))
     lost = np.where(is_pressed, 0.0, np.where(pairs["b"] == world.bodies.size - 1, below, inside))
     limit = pairs["limit"]
-    if world.controls[0].model != SURFACE_MODEL:
-        middle = depth.MIDDLE * smallest_sides(world, pairs["a"], pairs["b"])
+    if world.controls[0].model != models.SURFACE:
+        middle = depth.MIDDLE * schemes.smallest_sides(world, pairs["a"], pairs["b"])
         limit = np.where(is_pressed, limit, np.minimum(_reach(world), middle))
-    return Overlaps(pairs["a"], pairs["b"], np.maximum(deepest, lost), limit)
+    return schemes.Overlaps(pairs["a"], pairs["b"], np.maximum(deepest, lost), limit)
 
 
 def _reach(world: arrays.World) -> float:
     """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.explicit.depth."""
     controls = world.controls[0]
-    return float(controls.support if controls.model == KERNEL else depth.ROWS_APART * controls.particle_size)
+    return float(controls.support if controls.model == models.KERNEL else depth.ROWS_APART * controls.particle_size)
 
 
-def particle_depth_warning(scene: Any, overlaps: Overlaps) -> str:
+def particle_depth_warning(scene: Any, overlaps: schemes.Overlaps) -> str:
     """Return what limits the deepest overlap where that is how far particles reach; nothing where it is not."""
     model, reach = scene.world.controls[0].model, _reach(scene.world)
-    if model == SURFACE_MODEL or overlaps.limit[np.nanargmax(overlaps.depth / overlaps.limit)] != reach:
+    if model == models.SURFACE or overlaps.limit[np.nanargmax(overlaps.depth / overlaps.limit)] != reach:
         return ""
-    what = "the reach of the kernel" if model == KERNEL else f"{depth.ROWS_APART:g} contact.particle_spacing"
+    what = "the reach of the kernel" if model == models.KERNEL else f"{depth.ROWS_APART:g} contact.particle_spacing"
     return f"an overlap exceeds {what}, {1e3 * reach:.3g} mm, beyond which particles lose one another"
 
 
@@ -139,14 +135,14 @@ def _inside(change: Callable[..., Any]) -> Callable[..., systems.Coupled]:
     return lambda scene, *values: scene._replace(world=change(scene.world, *values))
 
 
-WORLDS = Scheme(
+WORLDS = schemes.Scheme(
     name="explicit",
     scene_type=arrays.World,
     construction=build.EXPLICIT,
     advance=step.advance,
     advance_in_team=step.advance_in_team,
     advance_members=step.advance_members,
-    least_bodies=BODIES_A_THREAD,
+    least_bodies=schemes.BODIES_A_THREAD,
     with_more_room=build.with_more_room,
     with_threads=build.with_threads,
     threads_of=lambda scene: int(scene.world.shares.size),
@@ -160,8 +156,8 @@ WORLDS = Scheme(
         SURFACE_OF_OUTLINES: {"blocks": POLYGON},
     },
     give=lambda scene: float(_depths(scene.world)[1].max(initial=0.0)),
-    ledger=LEDGER_ROW,
-    measure=measure,
+    ledger=energy.LEDGER_ROW,
+    measure=energy.measure,
     contacts=lambda scene, blocks: explicit_contacts(scene.world, blocks),
     overlaps=overlaps_of_springs,
     lost_contact=particle_depth_warning,
@@ -175,6 +171,6 @@ COUPLED = replace(
     with_more_room=_inside(build.with_more_room),
     with_threads=_inside(build.with_threads),
     for_another_thread=_inside(with_own_work_space),
-    measure=lambda scene, row: measure(scene.world, row),
+    measure=lambda scene, row: energy.measure(scene.world, row),
 )
 EXPLICIT = replace(WORLDS, with_systems=COUPLED)

@@ -18,7 +18,7 @@ from queue import SimpleQueue
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
 from blocksim.simulation import MemberFailure, Summary, files, provenance, run_in_batches, trajectory
-from blocksim.simulation.results import changed_results, read_summary
+from blocksim.simulation.results import RESULT_FILES, changed_files, read_summary
 from blocksim.study.executors import Batch, BatchSize, RunSetting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
 from blocksim.study.run import run
@@ -115,7 +115,11 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
             summary = read_summary(folder / files.SUMMARY)
             # a case that failed has come to its end too
             has_ended = (folder / files.DONE).is_file() if summary.status == FINISHED else summary.status != INTERRUPTED
-            if has_ended and summary.run == provenance.run_hash(scenario) and not changed_results(folder, summary):
+            if (
+                has_ended
+                and summary.run == provenance.run_hash(scenario)
+                and not changed_files(folder, summary, RESULT_FILES)
+            ):
                 return _row_of(summary, trajectory.read_table(folder / files.FINAL))
         try:
             result = run(scenario, out=folder, resume=True)

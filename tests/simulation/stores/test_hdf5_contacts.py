@@ -12,7 +12,7 @@ from blocksim.simulation.stores.hdf5 import FrameFile, read_frames
 from blocksim.simulation.trajectory import CONTACT_ROW, Rows
 from tests.simulation.conftest import Shipped
 
-MEASURED = SCHEMES["explicit"].measured
+MEASURED = SCHEMES["explicit"].row_names
 
 
 def table_of(step: int) -> Rows:

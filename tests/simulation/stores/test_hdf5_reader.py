@@ -20,7 +20,7 @@ from tests.simulation.conftest import Shipped
 UNITS = {"x": "m", "angle": "rad", "vy": "m s-1", "spin": "rad s-1", "time": "s", "mass": "kg", "inertia": "kg m2"}
 
 
-MEASURED = SCHEMES["explicit"].measured
+MEASURED = SCHEMES["explicit"].row_names
 
 
 def file_of(result: Result) -> Path:
