@@ -73,8 +73,7 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
-        message = f"module 'blocksim' has no attribute '{name}'"
-        raise AttributeError(message)
+        raise AttributeError(f"module 'blocksim' has no attribute '{name}'")
     module, attribute = _HOMES[name]
     return getattr(import_module(module), attribute)
 

@@ -48,8 +48,7 @@ def quantile(probability: float, degrees: int) -> float:
     bounded. Raises ValueError outside these limits.
     """
     if degrees < 1 or not 0.0 < probability < 1.0:
-        message = "needs at least one degree of freedom and a probability between 0 and 1"
-        raise ValueError(message)
+        raise ValueError("needs at least one degree of freedom and a probability between 0 and 1")
     is_odd = degrees % 2 == 1
     low, high = 0.0, pi / 2
     for _ in range(BISECTIONS):
@@ -178,8 +177,7 @@ def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: Ex
     names = [str(name) for name in final["block"]]
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
-        message = f"the final table has more than one row for block {quote_names(twice)}"
-        raise InvalidInputError(message)
+        raise InvalidInputError(f"the final table has more than one row for block {quote_names(twice)}")
     table.refuse_unknown(names, "the run")
     measured = {(row.block, row.quantity): row for row in table.summaries()}
     values = {quantity: [float(value) for value in final[column]] for quantity, column in columns.items()}

@@ -43,11 +43,9 @@ class Members:
         """Raise InvalidInputError for a table that is not a sweep's, or in which nothing has finished."""
         missing = [name for name in ("case", "status") if name not in self.table]
         if missing:
-            message = f"{self.source}: not the table of a sweep: no column {' and '.join(missing)}"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{self.source}: not the table of a sweep: no column {' and '.join(missing)}")
         if not self.has_ended.any():
-            message = f"{self.source}: none of the {self.count} cases has finished; nothing to compare"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{self.source}: none of the {self.count} cases has finished; nothing to compare")
 
     @property
     def count(self) -> int:
@@ -95,8 +93,7 @@ class Members:
         texts = np.flatnonzero(numbers.isna() & column.notna())
         if texts.size:
             row = int(texts[0])
-            message = f"{self.source}: {name}: '{column.iloc[row]}' in row {row + 1} is not a number"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{self.source}: {name}: '{column.iloc[row]}' in row {row + 1} is not a number")
         values = np.where(self.has_ended, numbers.to_numpy(dtype=float, na_value=np.nan), np.nan)
         return np.where(np.isfinite(values), values, np.nan)
 

@@ -120,8 +120,7 @@ class ExperimentTable:
         if located:
             input_files.raise_problems(located)
         if unknown:
-            message = f"{self.source} measures block {quote_names(unknown)}, {known}"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"{self.source} measures block {quote_names(unknown)}, {known}")
 
     def absence_messages(self, blocks: Sequence[str]) -> tuple[str, ...]:
         """Return a message that names those of `blocks` that are not in the table; none where all are."""

@@ -402,11 +402,9 @@ class Settings:
     def __post_init__(self) -> None:
         """Raise InvalidInputError for an invalid share or uncertainty."""
         if not 0.0 <= self.threshold <= 1.0:
-            message = f"threshold {self.threshold} is not a share from 0 to 1"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"threshold {self.threshold} is not a share from 0 to 1")
         if not 0.0 <= self.u_num < inf:
-            message = f"u_num {self.u_num} is not an uncertainty in mm: a number from 0 up"
-            raise InvalidInputError(message)
+            raise InvalidInputError(f"u_num {self.u_num} is not an uncertainty in mm: a number from 0 up")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

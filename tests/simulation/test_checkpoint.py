@@ -107,7 +107,7 @@ def test_shapes_that_no_array_has_are_refused(written: Path, shape: str) -> None
 
 
 def test_checkpoint_larger_than_the_memory_is_not_read(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blocksim.simulation.checkpoint.available_bytes", lambda: 2 * written.stat().st_size)
+    monkeypatch.setattr("blocksim.world.free_memory.available_bytes", lambda: 2 * written.stat().st_size)
     with pytest.raises(InvalidInputError, match="of memory are free"):
         read_checkpoint(written)
 

@@ -11,7 +11,7 @@ import pytest
 from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.scenario import place_bodies
-from blocksim.simulation import run as running, run_ensemble, simulate, simulate_into
+from blocksim.simulation import run_ensemble, schemes, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
 from blocksim.simulation.loop import BY_CODE, RESIDUAL, Outcome, diagnose
 from blocksim.simulation.schemes import build, build_scene
@@ -36,7 +36,7 @@ def forced(monkeypatch: pytest.MonkeyPatch) -> None:
         built.scene.world.controls[0].step *= TIMES_THE_LIMIT
         return built
 
-    monkeypatch.setattr(running, "build", forced_build)
+    monkeypatch.setattr(schemes, "build", forced_build)
 
 
 @pytest.mark.usefixtures("forced")

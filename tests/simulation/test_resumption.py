@@ -34,7 +34,7 @@ def two_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     def team(_: AnyScene, threads: int, _elements: int) -> Team:
         return Team(threads)
 
-    monkeypatch.setattr("blocksim.simulation.run.team_for", team)
+    monkeypatch.setattr("blocksim.simulation.schemes.team_for", team)
 
 
 def points(whole: Result, seed: str, count: int) -> list[int]:
