@@ -9,7 +9,7 @@ import signal
 from datetime import datetime
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -24,6 +24,7 @@ from blocksim.world.step import StepError
 from tests.simulation.sliding import sliding
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from tests.simulation.conftest import Shipped
@@ -206,13 +207,13 @@ def test_too_small_a_disk_is_reported_with_both_sizes(tmp_path: Path, monkeypatc
 
 def test_blocks_are_placed_once_from_loading_to_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     times: list[str] = []
-    place = placement._placed
+    new = placement.Placement
 
-    def counted(scenario: Scenario) -> placement.Placement:
-        times.append(scenario.name)
-        return place(scenario)
+    def counted(scenario: Callable[[], Scenario], *parts: Any) -> placement.Placement:
+        times.append(scenario().name)
+        return new(scenario, *parts)
 
-    monkeypatch.setattr(placement, "_placed", counted)
+    monkeypatch.setattr(placement, "Placement", counted)
     compile_kernels.cache_clear()  # the scene that is compiled with is placed on the way
     simulate_into(sliding({"time": {"scheme": "nonsmooth"}}, end=0.01), tmp_path / "run")
     assert times.count("sliding") == 1
