@@ -43,7 +43,7 @@ class Bounce(NamedTuple):
     flight: float
 
 
-def bounce_law(result: results.Result) -> studies.Law:
+def bounce_law(result: results.Result) -> studies.LawCurve:
     """Return the height (mm) of the lower face over a bounce, and Eq. 10 from its start.
 
     The second form of Eq. 10 as printed gives the remaining rise: the height is the apex of Eq. 12 less that, 0 after
@@ -67,7 +67,7 @@ def bounce_law(result: results.Result) -> studies.Law:
 
     expected = np.array([height(float(time)) for time in frames.time])
     marks = [time for time in impacts if time < float(frames.time[-1])]
-    return studies.Law("height", "mm", "Eq. 10", frames.time, MILLI * clearance, MILLI * expected, marks)
+    return studies.LawCurve("height", "mm", "Eq. 10", frames.time, MILLI * clearance, MILLI * expected, marks)
 
 
 def bounces(result: results.Result) -> list[Bounce]:
@@ -102,13 +102,13 @@ def bounces(result: results.Result) -> list[Bounce]:
     ]
 
 
-def slide_law(result: results.Result) -> studies.Law:
+def slide_law(result: results.Result) -> studies.LawCurve:
     """Return the speed (mm/s) of a sliding block, and Eq. 13 with the ground's friction."""
     frames, gravity = result.frames, result.scenario.gravity
     friction, start = result.scenario.friction.block_ground.kinetic, float(frames.vx[0, 0])
     expected = np.array([forms.sliding_speed(float(time), start, friction, gravity) for time in frames.time])
     marks = [forms.sliding_stop_time(start, friction, gravity)]
-    return studies.Law("speed", "mm/s", "Eq. 13", frames.time, MILLI * frames.vx[:, 0], MILLI * expected, marks)
+    return studies.LawCurve("speed", "mm/s", "Eq. 13", frames.time, MILLI * frames.vx[:, 0], MILLI * expected, marks)
 
 
 PAPER_X = {"1": "16", "2": "76.05", "3": "about 130"}  # mm, section 3.3 of the paper

@@ -43,7 +43,7 @@ EXPECTED: dict[str, Any] = {"color": style.INK, "linewidth": 1.0, "linestyle": (
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class LawCurve:
     """n values of one quantity: simulated and by a formula, in the unit of `quantity`; NaN where there is no formula.
 
     `marks` are times (s) worth a thin line, such as impacts.
@@ -63,7 +63,7 @@ class Law:
         return float(np.nanmax(np.abs(self.simulated - self.expected)))
 
 
-def draw_law(law: Law, path: Path | str, title: str, paper: style.Paper = style.OWN) -> None:
+def draw_law(law: LawCurve, path: Path | str, title: str, paper: style.Paper = style.OWN) -> None:
     """Draw the quantity, and its difference to the formula, and write PNG, SVG or PDF; the same input, the same bytes.
 
     Raises InvalidInputError for an unknown picture format or a page that is too small, and OutputError when the file
