@@ -128,12 +128,6 @@ def hull_of(body: arrays.Record, table: arrays.Records) -> Hull:
 
 
 @jit.kernel
-def corner_at(hull: Hull, number: int) -> arrays.Record:
-    """Return a corner, with the face that begins there."""
-    return hull.table[hull.first + number]
-
-
-@jit.kernel
 def next_corner(hull: Hull, number: int) -> int:
     """Return the number of the corner after one, counter-clockwise."""
     return number + 1 if number + 1 < hull.size else 0

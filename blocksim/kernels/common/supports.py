@@ -131,22 +131,17 @@ def path_piece(motion: arrays.Records, piece: int, end: int, time: float) -> int
 
 
 @jit.rare_kernel
-def shift_at(world: arrays.World, one: arrays.Record, time: float) -> arrays.Record:
-    """Return the piece of the shift of a driven body that holds at a time (s) that is not before the current step."""
-    return world.motion[path_piece(world.motion, one.shift, one.shift_end, time)]
-
-
-@jit.rare_kernel
-def turn_at(world: arrays.World, one: arrays.Record, time: float) -> arrays.Record:
-    """Return the piece of the turn of a driven body that holds at a time (s) that is not before the current step."""
-    return world.motion[path_piece(world.motion, one.turn, one.turn_end, time)]
+def pieces_at(world: arrays.World, one: arrays.Record, time: float) -> tuple[arrays.Record, arrays.Record]:
+    """Return the pieces of shift and turn of a driven body that hold at a time (s) not before the current step."""
+    shift = path_piece(world.motion, one.shift, one.shift_end, time)
+    return world.motion[shift], world.motion[path_piece(world.motion, one.turn, one.turn_end, time)]
 
 
 @jit.rare_kernel
 def pose_at(world: arrays.World, one: arrays.Record, time: float) -> Pose:
     """Return where a driven body is at a time (s) that is not before the current step."""
-    shift = displacement(shift_at(world, one, time), time)
-    turn = displacement(turn_at(world, one, time), time)
+    shift_piece, turn_piece = pieces_at(world, one, time)
+    shift, turn = displacement(shift_piece, time), displacement(turn_piece, time)
     rx = one.x - one.about_x
     ry = one.y - one.about_y
     lost = math.cos(turn) - 1.0  # without a turn bodies come back to the last bit
@@ -206,8 +201,8 @@ def move_driven(world: arrays.World, step: float) -> None:
 def note_rates(world: arrays.World, one: arrays.Record, body: arrays.Record, time: float) -> None:
     """Give a driven body the velocity that it has at a time (s)."""
     pose = pose_at(world, one, time)
-    shift = shift_at(world, one, time)
-    spin = rate(turn_at(world, one, time), time)
+    shift, turn = pieces_at(world, one, time)
+    spin = rate(turn, time)
     moved = displacement(shift, time)
     speed = rate(shift, time)
     body.spin = spin
@@ -219,8 +214,7 @@ def note_rates(world: arrays.World, one: arrays.Record, body: arrays.Record, tim
 def note_accelerations(world: arrays.World, one: arrays.Record, body: arrays.Record, time: float) -> None:
     """Give a driven body the accelerations that it has at a time (s), as contacts predict velocities with them."""
     pose = pose_at(world, one, time)
-    shift = shift_at(world, one, time)
-    turn = turn_at(world, one, time)
+    shift, turn = pieces_at(world, one, time)
     moved = displacement(shift, time)
     spin = rate(turn, time)
     rx = pose.x - one.about_x - one.along_x * moved

@@ -16,7 +16,7 @@ same bits for any number of threads it gathers: what acts on one thing is summed
 """
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba.extending import overload
@@ -187,24 +187,20 @@ def _measure(wanted: Plan) -> Callable[..., Any]:
     return found
 
 
-def _written(write: Callable[[Plan], Callable[..., Any]], types: Sequence[type]) -> Callable[..., Any]:
-    return write(PLANS[tuple(types)])
-
-
 def step_systems(systems: Systems, world: World, k: int, step: float) -> None:
     """Advance all systems by one step (s), as thread k; the blocks have drifted, and their forces come next."""
-    _written(_step, [*map(type, systems)])(systems, world, k, step)
+    _step(PLANS[(*map(type, systems),)])(systems, world, k, step)
 
 
 def survey_systems(systems: Systems, world: World) -> tuple[float, float, float]:
     """Return the highest speed (m/s), the kinetic energy (J) and the weights' power (W) of all systems."""
-    found: tuple[float, float, float] = _written(_survey, [*map(type, systems)])(systems, world)
+    found: tuple[float, float, float] = _survey(PLANS[(*map(type, systems),)])(systems, world)
     return found
 
 
 def measure_of(systems: Systems, world: World, row: Floats) -> None:
     """Write the energies (J) and the mass (kg) of all systems, one after the other."""
-    _written(_measure, [*map(type, systems)])(systems, world, row)
+    _measure(PLANS[(*map(type, systems),)])(systems, world, row)
 
 
 def _compiled_as(stub: Callable[..., Any], write: Callable[[Plan], Callable[..., Any]]) -> None:
@@ -212,7 +208,7 @@ def _compiled_as(stub: Callable[..., Any], write: Callable[[Plan], Callable[...,
     options: Any = {name: OPTIONS[name] for name in ("error_model", "_nrt")}
 
     def chosen(systems: Any, *_: Any) -> Callable[..., Any]:
-        written: Any = _written(write, [one.instance_class for one in systems.types])
+        written: Any = write(PLANS[tuple(one.instance_class for one in systems.types)])
         found: Callable[..., Any] = written.py_func
         return found
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import ALL, Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import corner_at, face_towards, hull_of, least_along
+from blocksim.kernels.common.shapes import face_towards, hull_of, least_along
 
 MOST_CORNERS = 16  # of a block: slots from there on are corners of the second body of a pair
 UPPER = 2  # the face of the ground that counts
@@ -46,7 +46,8 @@ def number_before(body: Record, number: int) -> int:
 @kernel
 def corner_of(body: Record, table: Records, number: int) -> Record:
     """Return a corner of a body, with the face that begins there, in the frame of the body."""
-    return corner_at(hull_of(body, table), number)
+    first: Any = np.int64(body.first_corner)  # compiled code makes floats of signed and unsigned ones together
+    return table[first + number]
 
 
 @kernel

@@ -85,12 +85,6 @@ def strength(kind: arrays.Record, total: float) -> float:
 
 
 @jit.kernel
-def work_of(state: arrays.Record, sxx: float, syy: float, sxy: float, dxx: float, dyy: float, dxy: float) -> float:
-    """Return the work per volume (J/m3) of the mean of the stress before, given, and now over a strain (-)."""
-    return 0.5 * ((sxx + state.sxx) * dxx + (syy + state.syy) * dyy + 2.0 * (sxy + state.sxy) * dxy)
-
-
-@jit.kernel
 def return_to_surface(state: arrays.Record, kind: arrays.Record) -> float:
     """Bring the stress of a particle back to the yield surface; return the root of J2 (Pa) that was too much, or 0."""
     total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
@@ -146,7 +140,8 @@ def stretch(state: arrays.Record, kind: arrays.Record, dxx: float, dyy: float, d
     total, deviator = invariants(sxx, syy, szz, sxy)
     held = strain_energy(kind, total, deviator)
     total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
-    work = kind.volume * work_of(state, sxx, syy, sxy, dxx, dyy, dxy)
+    # of the mean of both stresses, over the strain
+    work = 0.5 * kind.volume * ((sxx + state.sxx) * dxx + (syy + state.syy) * dyy + 2.0 * (sxy + state.sxy) * dxy)
     return work - (strain_energy(kind, total, deviator) - held)
 
 
