@@ -58,6 +58,10 @@ class OneOf(units.FieldReader):
         hint = f"did you mean {units.toml(similar)}?" if similar else f"use {self.wanted}"
         raise units.invalid(f"{units.toml(value)} is unknown, {hint}")
 
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
+        """Return the JSON Schema with the words, which a literal has by itself."""
+        return usual if {"enum", "const"} & usual.keys() else {**usual, "enum": [*self.available]}
+
 
 @dataclass(frozen=True)
 class TimeOr(units.FieldReader):
