@@ -140,14 +140,14 @@ def bench_command(
 def _groups(outcomes: list[harness.BenchmarkRun]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
     """Yield the name and the rows of each measurement."""
 
-    def shown(value: float) -> str:
+    def text_of(value: float) -> str:
         return f"{value:.0f}" if LARGE <= abs(value) < math.inf else case.number(value, BENCH_DIGITS)
 
     for one in outcomes:
         rows = []
         for found in one.findings.numbers:
             spread = (min(found.samples), max(found.samples)) if len(found.samples) > 1 else (math.nan, math.nan)
-            rows.append((f"  {found.quantity}", found.unit, *map(shown, (found.median, *spread))))
+            rows.append((f"  {found.quantity}", found.unit, *map(text_of, (found.median, *spread))))
         yield f"{one.measurement.name}: {one.measurement.title}", rows
 
 

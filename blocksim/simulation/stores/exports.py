@@ -315,7 +315,7 @@ FORMATS: dict[str, Format] = {
 }
 
 
-def format_named(name: str) -> Format:
+def find_format(name: str) -> Format:
     """Return what writes files of a format. Raises InvalidInputError for an unknown one."""
     if name not in FORMATS:
         raise InvalidInputError(f"--format {name}: unsupported format; use {' or '.join(FORMATS)}")
