@@ -15,7 +15,7 @@ from blocksim.simulation.loop import last_step_of
 from blocksim.simulation.schemes import BODIES_A_THREAD, SCHEMES, Team, useful_threads
 
 
-class Extent(NamedTuple):
+class WallGrid(NamedTuple):
     """Blocks in a course, and courses; about 1.6 times as many, so that walls of all sizes look alike."""
 
     columns: int
@@ -27,29 +27,29 @@ class Extent(NamedTuple):
         return self.columns * self.rows
 
 
-SIZES = (Extent(10, 10), Extent(40, 25), Extent(125, 80), Extent(400, 250))
-QUICK_SIZES = (Extent(10, 10), Extent(25, 16))
+SIZES = (WallGrid(10, 10), WallGrid(40, 25), WallGrid(125, 80), WallGrid(400, 250))
+QUICK_SIZES = (WallGrid(10, 10), WallGrid(25, 16))
 STIFFNESS_SCALE = 1e-4  # long steps, so that blocks move and pair lists are updated, as in a whole collapse
 STEPS, QUICK_STEPS = 300, 150
 FEWEST_BLOCKS = 3000  # of one sample: smaller walls are advanced several times
-RIGID_SIZES = (Extent(40, 25), Extent(90, 56), Extent(180, 112))
-QUICK_RIGID_SIZES = (Extent(8, 5), Extent(16, 10))
+RIGID_SIZES = (WallGrid(40, 25), WallGrid(90, 56), WallGrid(180, 112))
+QUICK_RIGID_SIZES = (WallGrid(8, 5), WallGrid(16, 10))
 END = 1.0  # s, of the first wall; where it ends is known
 COMMON, QUICK_END = 0.5, 0.1  # s, of all walls
 USUAL = harness.TimeSteps(1e-3)
 
 
-def explicit_wall(size: Extent, stiffness_scale: float = STIFFNESS_SCALE) -> harness.Rerun:
+def explicit_wall(size: WallGrid, stiffness_scale: float = STIFFNESS_SCALE) -> harness.Rerun:
     """Return the wall on springs, at its start."""
     return harness.Rerun(harness.pushed_wall(*size, contact={"stiffness_scale": stiffness_scale}))
 
 
-def nonsmooth_wall(size: Extent) -> harness.Rerun:
+def nonsmooth_wall(size: WallGrid) -> harness.Rerun:
     """Return the wall of the non-smooth scheme, at its start."""
     return harness.Rerun(harness.pushed_wall(*size, time=USUAL.time(), upright=harness.LOW_COURSES))
 
 
-def growth(sizes: Sequence[Extent], block_times: Sequence[harness.Number]) -> float:
+def growth(sizes: Sequence[WallGrid], block_times: Sequence[harness.Number]) -> float:
     """Return the exponent that fits time per step over number of blocks best, both in logarithms.
 
     `block_times` are those of a step and block, in any unit.
@@ -94,7 +94,7 @@ def measure_nonsmooth(effort: harness.Effort) -> harness.Readings:
     end, common = (QUICK_END, QUICK_END) if effort.quick else (END, COMMON)
     sizes = QUICK_RIGID_SIZES if effort.quick else RIGID_SIZES
 
-    def watch(size: Extent, end: float) -> tuple[tuple[float, ...], harness.Number, dict[str, Any]]:
+    def watch(size: WallGrid, end: float) -> tuple[tuple[float, ...], harness.Number, dict[str, Any]]:
         """Return the CPU seconds of all repeats, those of a substep and block, and more for programs."""
         scene = nonsmooth_wall(size)
         steps = last_step_of(end, scene.step)
@@ -145,8 +145,8 @@ def measure_threads(
     effort: harness.Effort,
     *,
     scheme: str,
-    wall: Callable[[Extent], harness.Rerun],
-    sizes: tuple[tuple[Extent, ...], tuple[Extent, ...]],
+    wall: Callable[[WallGrid], harness.Rerun],
+    sizes: tuple[tuple[WallGrid, ...], tuple[WallGrid, ...]],
     block_steps: tuple[int, int],
     most_steps: tuple[int, int],
 ) -> harness.Readings:
@@ -205,7 +205,7 @@ EXPLICIT_THREADS = harness.Benchmark(
         measure_threads,
         scheme=SPRINGS,
         wall=functools.partial(explicit_wall, stiffness_scale=SOFT_SCALE),
-        sizes=((Extent(10, 10), Extent(20, 10), Extent(40, 25), Extent(125, 80)), QUICK_SIZES),
+        sizes=((WallGrid(10, 10), WallGrid(20, 10), WallGrid(40, 25), WallGrid(125, 80)), QUICK_SIZES),
         block_steps=(2_000_000, 200_000),
         most_steps=(5000, 5000),
     ),
@@ -219,8 +219,8 @@ NONSMOOTH_THREADS = harness.Benchmark(
         scheme=IMPULSES,
         wall=nonsmooth_wall,
         sizes=(
-            (Extent(10, 10), Extent(20, 10), Extent(40, 25), Extent(90, 56)),
-            (Extent(8, 5), Extent(40, 25)),
+            (WallGrid(10, 10), WallGrid(20, 10), WallGrid(40, 25), WallGrid(90, 56)),
+            (WallGrid(8, 5), WallGrid(40, 25)),
         ),
         block_steps=(1_000_000, 1_000_000),
         most_steps=(1000, 20),
@@ -235,8 +235,8 @@ BRICK_SCALE = 1e-4  # of the block, which then allows the steps that the soil ne
 SOIL_STEPS, QUICK_SOIL_STEPS = 300, 60  # of small soils; new lists every 20
 MOST, QUICK_MOST = 2_000_000, 30_000  # particles times steps of one sample
 # particles of the soils, of the one that two threads advance, its steps, and the wall that they are compared with
-FULL = ((1000, 3600, 10_000, 50_000), 10_000, 200, Extent(40, 25))
-QUICK = ((250, 500), 500, 20, Extent(10, 10))
+FULL = ((1000, 3600, 10_000, 50_000), 10_000, 200, WallGrid(40, 25))
+QUICK = ((250, 500), 500, 20, WallGrid(10, 10))
 
 
 def pushed_soil(particles: int) -> tuple[int, harness.Rerun]:
