@@ -24,7 +24,7 @@ from blocksim.world.step import StepError
 from tests.simulation.sliding import sliding
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import weakref
     from pathlib import Path
 
     from tests.simulation.conftest import Shipped
@@ -209,8 +209,8 @@ def test_blocks_are_placed_once_from_loading_to_the_result(tmp_path: Path, monke
     times: list[str] = []
     new = placement.Placement
 
-    def counted(scenario: Callable[[], Scenario], *parts: Any) -> placement.Placement:
-        times.append(scenario().name)
+    def counted(scenario: weakref.ref[Scenario], *parts: Any) -> placement.Placement:
+        times.append(getattr(scenario(), "name", ""))
         return new(scenario, *parts)
 
     monkeypatch.setattr(placement, "Placement", counted)

@@ -30,7 +30,9 @@ class Material(Table):
 
     model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": ["density"]}, {"required": ["unit_weight"]}]})
 
-    given_density: q.Density | None = setting("mass per volume; give this or unit_weight", None, alias="density")
+    given_density: q.Density | None = pydantic.Field(  # an alias that type checkers are to see
+        default=None, alias="density", description="mass per volume; give this or unit_weight"
+    )
     unit_weight: q.UnitWeight | None = setting("weight per volume, divided by 9.81 m/s^2; give this or density", None)
     young_modulus: q.Pressure = setting("Young's modulus E")
     poisson_ratio: q.PoissonRatio = setting("Poisson's ratio")

@@ -75,7 +75,7 @@ STIFFNESS = 1e6  # N/m, or N/m^1.5
 class Dragged:
     """One point whose overlap and slip are prescribed, with its shear spring."""
 
-    def __init__(self, law: int, friction: float) -> None:
+    def __init__(self, law: float, friction: float) -> None:
         self.law, self.friction = law, friction
         self.values = zeros(1, INTERACTION)[0]
         self.values.shear_ratio = 0.8
