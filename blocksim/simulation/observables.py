@@ -1,7 +1,8 @@
-"""Observables: what a run came to, in numbers and words. A new one is one entry of OBSERVABLES.
+"""Observables: what a run came to, in numbers and words. A new one is one entry of `_ALL`.
 
-run.json, rows and columns of sweeps, criteria such as "moved < 5 mm", what is printed, axes and
-reports read that table. All are computed from the ends of m scenes at once; a single run is a stack of one.
+It then stands in run.json (`in_runs`), in rows (`in_rows`), sweep.csv and limit.csv (`in_tables`), in criteria such as
+"moved < 5 mm" (`word`), on screen, axes and in reports (`title`); not in final.csv, nor in run.h5, whose group
+`observables` holds energies. All are computed from the ends of m scenes at once; a single run is a stack of one.
 
 A block has moved where its centre, or a corner by its turn, is more than a hundredth of its shortest side away from
 where it started. It has fallen where it is turned by more than 45 degrees, or its centre is lower by more than half its

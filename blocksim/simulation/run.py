@@ -141,6 +141,7 @@ def simulate_into(
 ) -> results.Result:
     """Run a scenario and keep everything in a folder, frames while it runs, the mark of a finished run last.
 
+    In this order: scenario.toml and copies of its tables, run.h5 and checkpoints while it runs, then `keep_result`.
     With `resume` it continues from the newest whole checkpoint there, to the same bits as without the interruption;
     without any it starts again. Raises InvalidInputError for checkpoints of another scenario or version of the code,
     OutputExistsError where the folder is not free, or another run is in progress in it, and OutputError where writing

@@ -2,7 +2,7 @@
 
 A study plans its runs, has them done by `runs_of` (sweep.py), and makes an `Answer` of their rows: one model that is
 written as NAME.json beside the table NAME.csv, read back from there, printed, drawn and put into reports. A new study
-is a module with its search, another with its answer, and a line in STUDIES.
+is one module or two, for its search and its answer, and a line in STUDIES; see README.md.
 """
 
 import json

@@ -3,6 +3,7 @@
 import re
 import sys
 import threading
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
 
@@ -64,3 +65,20 @@ def test_a_run_passes_through_the_modules_of_the_page_in_their_order(
 
 def test_the_way_is_short() -> None:
     assert len([name for name in modules_named() if not name.startswith("kernels/")]) <= MOST
+
+
+def places_named() -> list[tuple[str, str]]:
+    """Return the modules, and after each line's modules its functions, of the table of places."""
+    text = (PACKAGE / "README.md").read_text(encoding="utf-8").split("## Where is …")[1]
+    lines = [line.split("|")[2:4] for line in text.split("\n\n")[1].splitlines()[2:]]
+    return [
+        (path, name)
+        for modules, names in lines
+        for path, name in zip(re.findall(r"\(([\w/]+\.py)\)", modules), re.findall(r"`(\w+)`", names), strict=False)
+    ]
+
+
+@pytest.mark.parametrize(("path", "name"), places_named())
+def test_what_the_page_says_where_it_is_is_there(path: str, name: str) -> None:
+    module = import_module(f"blocksim.{path.removesuffix('.py').replace('/', '.')}")
+    assert getattr(module, name).__module__ == module.__name__
