@@ -84,8 +84,13 @@ def _values(found: calibrate.Fit) -> list[str]:
     """Return the fitted values or, where trials tie, the ranges of those that are equally good."""
     rows = [(prior, str(found.best.values[prior.key])) for prior in found.plan.priors]
     if len(found.ties) < 2:
-        return output.table_lines(COLUMNS, [[prior.key, str(prior), value] for prior, value in rows], left=1)
-    tied = [[prior.key, str(prior), prior.range_of(*found.equally_good(prior)), value] for prior, value in rows]
+        return output.table_lines(
+            COLUMNS, [[prior.key, prior.range_of(prior.low, prior.high), value] for prior, value in rows], left=1
+        )
+    tied = [
+        [prior.key, prior.range_of(prior.low, prior.high), prior.range_of(*found.equally_good(prior)), value]
+        for prior, value in rows
+    ]
     return [
         *output.table_lines(TIED, tied, left=1),
         "",

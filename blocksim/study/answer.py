@@ -120,15 +120,12 @@ class Answer(BaseModel, frozen=True):
         """Draw the picture of an answer that was read. Raises InvalidInputError where there is nothing to draw."""
         raise NotImplementedError
 
-    def comparable(self) -> Any:
-        """Return its values without the names of folders, in which the code has a part."""
-        return _without_cases(self.to_dict())
 
-
-def _without_cases(data: Any) -> Any:
+def without_cases(data: Any) -> Any:
+    """Return the values of an answer without the names of folders, in which the code has a part."""
     if isinstance(data, dict):
-        return {name: _without_cases(value) for name, value in data.items() if name != "case"}
-    return [_without_cases(one) for one in data] if isinstance(data, list) else data
+        return {name: without_cases(value) for name, value in data.items() if name != "case"}
+    return [without_cases(one) for one in data] if isinstance(data, list) else data
 
 
 class Study(NamedTuple):
@@ -154,10 +151,11 @@ def load_study(name: str) -> Study:
 def draw_study(folder: Path, study: Study, options: "PlotOptions") -> Path:
     """Draw a study; return the picture's path (default: NAME_KIND.png).
 
-    `options.table` is one of others to draw beside it. Raises InvalidInputError for another kind of picture, an unknown
-    format, a table for another study and what cannot be read, InputMissingError, OutputExistsError, OutputError.
+    `options.experiment` is a table of others to draw beside it. Raises InvalidInputError for another kind of picture,
+    an unknown format, a table for another study and what cannot be read, InputMissingError, OutputExistsError,
+    OutputError.
     """
-    kind, published = study.answer, options.table
+    kind, published = study.answer, None if options.experiment is None else Path(options.experiment)
     if options.kind not in {None, kind.picture}:
         raise InvalidInputError(f"{folder}: {kind.files.what} is drawn as {kind.picture!r}, not as {options.kind!r}")
     if published is not None and not kind.takes_table:

@@ -288,5 +288,5 @@ def _provenance(fit: Fit) -> dict[str, str]:
     for prior in plan.priors:
         span = prior.range_of(*fit.equally_good(prior))
         among = f", one of {len(fit.ties)} equally good trials ({span})" if len(fit.ties) > 1 else ""
-        texts[prior.key] = f"{verb}{among}, prior {prior}, {found}"
+        texts[prior.key] = f"{verb}{among}, prior {prior.range_of(prior.low, prior.high)}, {found}"
     return texts

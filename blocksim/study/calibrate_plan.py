@@ -84,10 +84,6 @@ class Prior:
         unit = f" {self.unit}" if self.unit else ""
         return f"{low:g} to {high:g}{unit}"
 
-    def __str__(self) -> str:
-        """Write the whole range."""
-        return self.range_of(self.low, self.high)
-
 
 def prior_of(key: str, table: Uniform, written: object) -> Prior:
     """Return the prior that a distribution says; `written` is its lower end as the user wrote it, for the unit."""

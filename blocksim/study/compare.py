@@ -100,7 +100,7 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
         now = (load_scenario(run) if Path(run).is_file() else was).experiment
         named = now.table if now else None
     if summary is not None and summary.status != rows.FINISHED:
-        how = run_folder.ending_text(summary.status, summary.reason)
+        how = f"this run {'was' if summary.status == 'interrupted' else 'has'} {summary.status} ({summary.reason})"
         raise InvalidInputError(f"{name}: {how}; only a finished run can be compared")
     table = experiment or named
     if table is None:

@@ -17,7 +17,7 @@ dissertation, Stanford 2003): member i has record i modulo their number. Curves 
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -139,12 +139,8 @@ class FragilityPlan:
     members: int  # at every intensity
     seed: int
     fails: tuple[criterion.Criterion, ...]  # any of them
-    stripes: Mapping[str, tuple[object, ...]] = field(default_factory=dict)  # values of a key by record
-
-    @property
-    def records(self) -> int:
-        """How many records the intensities share; 0 where every draw is independent."""
-        return len(next(iter(self.stripes.values()), ()))
+    stripes: Mapping[str, tuple[object, ...]]  # values of a key by record
+    records: int  # that the intensities share; 0 where every draw is independent
 
     @property
     def spread(self) -> Mapping[str, Variation]:
@@ -160,7 +156,7 @@ class FragilityPlan:
         if self.stripes:
             about.append({key: list(map(str, values)) for key, values in self.stripes.items()})
         tables = plans.table_digests(self.document, self.spread)
-        return sweep.short_hash([*about, tables] if tables else about)
+        return manifest.short_hash([*about, tables] if tables else about)
 
     @cached_property
     def cases(self) -> plans.Cases:
@@ -240,7 +236,7 @@ def read_fragility(document: Document, options: FragilityOptions) -> FragilityPl
         raise InvalidInputError(f"{head.key} is the intensity; it cannot scatter too")
     if twice is not None:
         raise InvalidInputError(f"{overrides.format_key(twice)} is given as stripes; it cannot be drawn too")
-    return FragilityPlan(bare, head, levels, spread, members, seed, criteria, shared)
+    return FragilityPlan(bare, head, levels, spread, members, seed, criteria, shared, records)
 
 
 def _stripes(document: Document, given: plans.Variations) -> dict[str, tuple[object, ...]]:

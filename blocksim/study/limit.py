@@ -49,8 +49,8 @@ from blocksim.scenario.laws import LAWS
 from blocksim.scenario.models import motion as motions, timeline
 from blocksim.silence import silent
 from blocksim.simulation import observables, provenance, schemes
-from blocksim.study import limit_answer, limit_plan, sweep, sweep_folder
-from blocksim.study.answer import Study
+from blocksim.study import limit_answer, limit_plan, manifest, sweep, sweep_folder
+from blocksim.study.answer import Study, without_cases
 from blocksim.study.criterion import Stability, falls_before_zero
 from blocksim.study.executors import Execution, ensemble
 from blocksim.study.limit_plan import Change, LimitPlan, Number
@@ -136,7 +136,7 @@ def find_curve(
         refuse_without_springs(*plan.searches.values())
     one = next(iter(plan.searches.values()))
     base, kind = one.scenario_at(one.span.low), limit_answer.CurveAnswer.files
-    name = sweep.short_hash([plan.head.key, *(search.name for search in plan.searches.values())])
+    name = manifest.short_hash([plan.head.key, *(search.name for search in plan.searches.values())])
     folder = sweep.make_folder(options.out, base, kind, name, overwrite=options.overwrite)
     found: dict[float, limit_answer.LimitAnswer] = {}
     for number, search in plan.searches.items():
@@ -196,11 +196,6 @@ class Levels:
 def extrapolate_limit(softer: float, stiffer: float, ratio: float) -> float:
     """Return the value of stiff contacts from two that springs are off by, the second `ratio` times less."""
     return (ratio * stiffer - softer) / (ratio - 1.0)
-
-
-def ratio_of(scenario: Scenario) -> float:
-    """Return by how much less springs of RATIO times the stiffness give way."""
-    return LAWS[scenario.contact.law].compression(1.0, RATIO)
 
 
 def can_be_stiffer(plan: LimitPlan) -> bool:
@@ -397,19 +392,20 @@ class _Search:
 
         Its rows are kept as `known[place]`. With `may_stay` nothing more is run where both ends came to the same again.
         """
-        below, above = _fallen({0: near.below, 1: near.above}).values()
+        stands = Stability.STANDS  # what moves on at the end without having fallen counts as standing here
+        below, above = (stands if end is Stability.UNDECIDED else end for end in (near.below, near.above))
         near = replace(near, below=below, above=above)
         if place not in known:
             self.on_other(plan)
 
         def choose(rows: Rows) -> list[Number]:
-            verdicts = _fallen(plan.verdicts(rows))
+            verdicts = plan.verdicts(rows, stands)
             is_same = may_stay and limit_plan.changes_in(verdicts) == [near]
             return [] if is_same else limit_plan.next_near(plan.span, verdicts, near, plan.tolerance)
 
         rows = self._searched(plan, choose)
         known.setdefault(place, {}).update(rows)
-        changes = limit_plan.changes_in(_fallen(self.plan.verdicts(rows)))
+        changes = limit_plan.changes_in(self.plan.verdicts(rows, stands))
         return changes[0] if len(changes) == 1 and {changes[0].below, changes[0].above} == limit_answer.LIMIT else None
 
     def _half(self, change: Change[Stability]) -> limit_answer.HalfStep:
@@ -430,7 +426,9 @@ class _Search:
         change, scenario = side.change, self.plan.scenario_at(side.change.low)
         first = scale = scenario.contact.stiffness_scale
         given = limit_answer.StiffnessLevel(stiffness_scale=scale, low=change.low, high=change.high)
-        levels = Levels((given,), ratio_of(scenario), is_at_rest=motion.settles(scenario))
+        levels = Levels(
+            (given,), LAWS[scenario.contact.law].compression(1.0, RATIO), is_at_rest=motion.settles(scenario)
+        )
         share = side.give.share if side.give is not None else 0.0
         while levels.is_far and len(levels.levels) < MOST_LEVELS:
             scale *= RATIO
@@ -456,13 +454,6 @@ class _Search:
         return replace(levels, problem=STILL_FAR) if levels.is_far else levels
 
 
-def _fallen(verdicts: Mapping[Number, Stability]) -> dict[Number, Stability]:
-    """Return what runs came to, those that move on at the end without having fallen among those that stand."""
-    return {
-        value: Stability.STANDS if verdict is Stability.UNDECIDED else verdict for value, verdict in verdicts.items()
-    }
-
-
 def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
     """Run both sides of the first brackets once more, into folders of their own, unless they are there.
 
@@ -473,7 +464,7 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
     plan = answer.plan
     assert plan is not None  # noqa: S101 - it was just searched
     sides: dict[float, limit_answer.Side] = {}
-    for side in [one for bracket in answer.falls[:MOST_PICTURED] for one in bracket.sides.values()]:
+    for side in [one for bracket in answer.falls[:MOST_PICTURED] for one in (bracket.below, bracket.above)]:
         falls = falls_before_zero(side.model_dump())
         if side.value in sides or not (falls or side.status == FINISHED):
             continue
@@ -495,10 +486,10 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
                 {name: row.get(name) for name in (*observables.table_columns(), observables.PEAK)} if is_seen else {}
             )
             sides[side.value] = side.model_copy(update={**update, "case": name})
-    brackets = [
-        one.model_copy(update={name: sides.get(side.value, side) for name, side in one.sides.items()})
-        for one in answer.brackets
-    ]
+    brackets = []
+    for one in answer.brackets:
+        below, above = (sides.get(side.value, side) for side in (one.below, one.above))
+        brackets.append(one.model_copy(update={"below": below, "above": above}))
     return answer.model_copy(update={"brackets": tuple(brackets)})
 
 
@@ -526,7 +517,7 @@ def repeat_limit(answer: limit_answer.LimitAnswer, execution: sweep.Replay, out:
                 again = with_sides(again)
                 again.write()
             tried.append(again)
-            if again.comparable() == answer.comparable():
+            if without_cases(again.to_dict()) == without_cases(answer.to_dict()):
                 return again
     if not tried:
         raise InvalidInputError(f"{answer.folder}: the manifest lacks runs of this search")

@@ -127,16 +127,6 @@ class Bracket(BaseModel, frozen=True):
         return Change(self.below.value, self.above.value, self.below.verdict, self.above.verdict)
 
     @property
-    def change(self) -> Change[Stability]:
-        """The answer."""
-        return replace(self.given, low=self.low, high=self.high)
-
-    @property
-    def sides(self) -> dict[str, Side]:
-        """Both sides by their names."""
-        return {"below": self.below, "above": self.above}
-
-    @property
     def verdicts(self) -> set[Stability]:
         """What both sides came to."""
         return {self.below.verdict, self.above.verdict}
@@ -257,12 +247,12 @@ class LimitAnswer(Answer, frozen=True):
     @property
     def changes(self) -> list[Change[Stability]]:
         """The brackets: of stiff contacts where springs of several stiffnesses were searched."""
-        return [one.change for one in self.brackets]
+        return [Change(one.low, one.high, one.below.verdict, one.above.verdict) for one in self.brackets]
 
     @property
     def limits(self) -> list[Change[Stability]]:
         """Those between standing and falling."""
-        return [one.change for one in self.brackets if one.verdicts == LIMIT]
+        return [one for one in self.changes if {one.below, one.above} == LIMIT]
 
     @property
     def limits_as_given(self) -> list[Change[Stability]]:
@@ -278,7 +268,7 @@ class LimitAnswer(Answer, frozen=True):
     @property
     def case_folders(self) -> dict[float, str]:
         """Folders in `cases` of runs with frames, by value."""
-        sides = (side for one in self.brackets for side in one.sides.values())
+        sides = (side for one in self.brackets for side in (one.below, one.above))
         return {side.value: side.case for side in sides if side.case is not None}
 
     def overview(self) -> Overview:
@@ -287,7 +277,7 @@ class LimitAnswer(Answer, frozen=True):
         The notes say what is undecided, what springs shift, what is not seen, and where the runs are.
         """
         plan, notes = self.plan, []
-        sides = [side for one in self.brackets for side in one.sides.values()]
+        sides = [side for one in self.brackets for side in (one.below, one.above)]
         if not sides and plan is not None:
             verdicts = list(plan.verdicts(self.rows).items())
             sides = [Side.of(value, verdict, self.rows[value]) for value, verdict in (verdicts[0], verdicts[-1])]
@@ -301,7 +291,7 @@ class LimitAnswer(Answer, frozen=True):
             which = f"islands narrower than {spacing}, between values of the scan, are not seen"
             notes.append(f"{which}: --scan N for more values")
         notes.append(f"{self.runs} runs, {self.run} of them now: {self.folder / 'limit.csv'}")
-        if any({side.value for side in one.sides.values()} <= self.case_folders.keys() for one in self.falls):
+        if any({one.below.value, one.above.value} <= self.case_folders.keys() for one in self.falls):
             notes.append(f"picture of the mechanism: blocksim plot {self.folder}")
         contacts, lines = NAMES.get(self.scheme, self.scheme), []
         for one in self.brackets:

@@ -29,7 +29,7 @@ from blocksim.scenario.models import loads, study, timeline
 from blocksim.scenario.placement import smallest_width
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
-from blocksim.study import answer, criterion, executors, sweep
+from blocksim.study import answer, criterion, executors, manifest
 from blocksim.study.criterion import Criterion, Stability
 from blocksim.study.plan import RANGE, Values, Variations, build_distributions, levels_of, variations_option
 from blocksim.study.rows import Head, Row, heads_of
@@ -332,15 +332,18 @@ class LimitPlan:
         """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
         return self.document.with_values(self.settings(number)).build()
 
-    def verdicts(self, rows: Mapping[Number, Row]) -> dict[Number, Stability]:
-        """Return what runs came to, from the smallest value up."""
-        return {value: self.criterion.verdict(rows[value]) for value in sorted(rows)}
+    def verdicts(
+        self, rows: Mapping[Number, Row], undecided: Stability = Stability.UNDECIDED
+    ) -> dict[Number, Stability]:
+        """Return what runs came to, from the smallest value up; `undecided` is what those count as that move on."""
+        found = {value: self.criterion.verdict(rows[value]) for value in sorted(rows)}
+        return {value: undecided if one is Stability.UNDECIDED else one for value, one in found.items()}
 
     @property
     def name(self) -> str:
         """A hash of everything that decides the answer."""
         ends = [self.key, self.unit, *vars(self.span).values(), self.criterion.text, self.tolerance]
-        return sweep.short_hash([scenario_hash(self.scenario), ends, code_hash()])
+        return manifest.short_hash([scenario_hash(self.scenario), ends, code_hash()])
 
 
 class CurvePlan(NamedTuple):

@@ -21,7 +21,7 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
-from blocksim.simulation import files, observables
+from blocksim.simulation import files, observables, provenance
 from blocksim.study import plan, rows
 from blocksim.study.executors import Batch
 
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 SHARD_FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
 MANIFEST = "manifest.jsonl"
 PATTERN = "manifest*.jsonl"
-DIGITS = 12
 SUM = b',"sum":"'
 NEWLINE = b"\n"
 NO_LINK = getattr(os, "O_NOFOLLOW", 0)
@@ -110,9 +109,9 @@ class Entry:
         return cls(number, case, values, row) if is_ours else None
 
 
-def values_hash(settings: dict[str, object]) -> str:
-    """Return a hash of the varied values of a case, in the form in which they were given."""
-    return hashlib.sha256(json.dumps(settings, default=str).encode()).hexdigest()[:DIGITS]
+def short_hash(data: object) -> str:
+    """Return a hash of varied values, in the form in which they were given, or of all that a study is named by."""
+    return hashlib.sha256(json.dumps(data, default=str).encode()).hexdigest()[: provenance.HASH_DIGITS]
 
 
 class Manifest:
@@ -194,12 +193,12 @@ class CaseIndex:
         self.state[number] = ENDED_WELL if entry.row.get("status") == rows.FINISHED else ENDED_BADLY
         self.starts[number], self.sources[number] = start, self.paths.index(path)
         self.values[number] = int(entry.values, 16)
-        blocks = rows.blocks_in(entry.row)
+        blocks = tuple(name.removesuffix(rows.X) for name in entry.row if name.endswith(rows.X))
         self.blocks[blocks] = min(number, self.blocks.get(blocks, number))
 
     def holds(self, number: int, settings: dict[str, object]) -> bool:
         """Return True if a case has a row, and that with these values: other code may have numbered the cases again."""
-        if self.state[number] != MISSING and self.values[number] != int(values_hash(settings), 16):
+        if self.state[number] != MISSING and self.values[number] != int(short_hash(settings), 16):
             self.state[number] = MISSING
         return bool(self.state[number] != MISSING)
 

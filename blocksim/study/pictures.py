@@ -19,7 +19,7 @@ from blocksim.silence import silent
 from blocksim.simulation import files
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
-from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, blocks_in, quarter_turns
+from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns
 from blocksim.view import animation, history, run_data, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
 from blocksim.view.paints import COLOURS, paint_of
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 LARGEST = 1e30  # of inputs (SI) and of places (mm) that are drawn
 
 
-def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
+def read_sweep_data(folder: Path, experiment: Path | str | None = None) -> SweepData:
     """Return what a sweep's folder holds, beside the scenario's experiment or another table.
 
     Raises InputMissingError or InvalidInputError: where files are missing or damaged, no case has finished, or the
@@ -42,7 +42,7 @@ def read_sweep_data(folder: Path, experiment: Path | None = None) -> SweepData:
     """
     table = manifest.read_sweep(folder).table
     scenario = load_stored(folder / sweep_folder.PLAN)
-    blocks = blocks_in(map(str, table.columns))
+    blocks = tuple(name.removesuffix(X) for name in map(str, table.columns) if name.endswith(X))
     finished = (table["status"] == FINISHED).to_numpy(dtype=bool)
     if not blocks or not finished.any():
         raise InvalidInputError(f"{folder}: no case of this sweep has finished; nothing to draw")
@@ -108,11 +108,12 @@ def _input(scenario: Scenario, head: Head, column: "pd.Series", vary: Variation)
             with suppress(ValueError):
                 numbers.append(read(str(value)))
                 break
-    values = np.array(numbers, dtype=np.float64) * head.si(1.0)
+    factor = float(units.parse_unit(head.unit).factor) if head.unit else 1.0
+    values = np.array(numbers, dtype=np.float64) * factor
     if not (np.abs(values) <= LARGEST).all():
         raise InvalidInputError(f"{TABLE}: the column {head.key} holds values that are not numbers or too large")
     if len(values) == len(column):
-        typed = InputUnit(head.unit, head.si(1.0)) if head.unit else None
+        typed = InputUnit(head.unit, factor) if head.unit else None
         is_even = isinstance(vary, Normal) or (isinstance(vary, Uniform) and vary.scale == "linear")
         unit = unit_of(scenario, head.key) or ("rad" if head.is_angle else "")
         return Input(head.key, unit, values, is_even=is_even, typed=typed)
@@ -325,11 +326,6 @@ class PlotOptions(style.PageOptions):
         files.refuse_foreign(path, overwrite=self.overwrite)
         return path
 
-    @property
-    def table(self) -> Path | None:
-        """The experiment table."""
-        return None if self.experiment is None else Path(self.experiment)
-
 
 def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
     """Draw a run, or its probes; return the picture's path and a remark on an unfinished run.
@@ -342,7 +338,7 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
     options.refuse(kind, f"this picture is of kind {kind}")
     stored = run_folder.read_run(run)
     scenario = stored.scenario
-    table = options.table or (scenario.experiment.table if scenario.experiment is not None else None)
+    table = options.experiment or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None or draw is None else load_table(table).summaries()
     picture = options.picture(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
     if draw is None:
@@ -484,7 +480,7 @@ def _draw_sweep(folder: Path, options: PlotOptions) -> Path:
     if kind is not None and kind not in SWEEP_KINDS:
         message = f"--kind {kind}: unknown kind, {spelling.did_you_mean_or_list(kind, [*SWEEP_KINDS, TORNADO])}"
         raise InvalidInputError(message)
-    found = read_sweep_data(folder, options.table)
+    found = read_sweep_data(folder, options.experiment)
     chosen = kind_for(found) if kind is None else SWEEP_KINDS[kind]
     if kind is not None and (reason := chosen.refusal(found)):
         raise InvalidInputError(f"{folder}: {reason}")

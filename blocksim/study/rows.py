@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Row = dict[str, object]
 FINISHED = "finished"  # status of a run that has come to its end
 TABLE = "sweep.csv"  # rows of all cases; it makes a folder one of a sweep
-X = ".x_mm"
+X = ".x_mm"  # of every block that a row has, after its name
 KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final table, for every block
 QUARTER = 90.0  # deg
 DIGITS = 12  # of a number in the table: more show the rounding of the unit
@@ -57,11 +57,6 @@ def invalid_row(problem: str) -> Row:
     return {"status": "invalid", "reason": problem, "seconds": 0.0}
 
 
-def blocks_in(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the blocks of a row, or of a table of rows."""
-    return tuple(name.removesuffix(X) for name in names if name.endswith(X))
-
-
 def quarter_turns(rotations: Iterable[float]) -> tuple[int, ...]:
     """Return the class of an outcome: the rotations (degrees) of all blocks, rounded to quarters of a turn."""
     return tuple(round(rotation / QUARTER) * int(QUARTER) for rotation in rotations)
@@ -80,22 +75,6 @@ class Head:
         found = HEAD.fullmatch(name)
         return cls(name) if found is None else cls(found["key"], found["unit"])
 
-    @classmethod
-    def of(cls, key: str, values: object) -> "Head":
-        """Return the column of values: with the first unit that was typed, where all are numbers."""
-        if not isinstance(values, tuple):
-            return cls(key, str(getattr(values, "unit", "")))
-        head = cls(
-            key, next((unit for value in values if isinstance(value, str) and (unit := units.unit_in(value))), "")
-        )
-        if head.is_angle and not all(isinstance(value, str) or value == 0 for value in values):
-            return cls(key)  # friction angles among friction coefficients: no unit holds for both
-        numbers = all(
-            not isinstance(value, bool) and (isinstance(value, int | float) or bool(units.unit_in(str(value))))
-            for value in values
-        )
-        return head if numbers else cls(key)
-
     @property
     def is_angle(self) -> bool:
         """Return True for a unit of angles, as friction angles have it."""
@@ -111,14 +90,24 @@ class Head:
             return value
         return float(f"{si_number(value) / float(units.parse_unit(self.unit).factor):.{DIGITS}g}")
 
-    def si(self, cell: float) -> float:
-        """Return a number of the column in SI."""
-        return cell * float(units.parse_unit(self.unit).factor) if self.unit else cell
-
 
 def heads_of(sweep: Sweep) -> tuple[Head, ...]:
-    """Return the columns of the keys that a sweep varies, in their order."""
-    return tuple(Head.of(key, values) for key, values in sweep.vary.items())
+    """Return the columns of the keys that a sweep varies: with the first unit that was typed, where all are numbers."""
+    heads = []
+    for key, values in sweep.vary.items():
+        head = Head(key, str(getattr(values, "unit", "")))
+        if isinstance(values, tuple):
+            typed = (units.unit_in(value) for value in values if isinstance(value, str))
+            head = Head(key, next(filter(None, typed), ""))
+            are_numbers = all(
+                not isinstance(value, bool) and (isinstance(value, int | float) or bool(units.unit_in(str(value))))
+                for value in values
+            )
+            # friction angles among friction coefficients: no unit holds for both
+            are_mixed = head.is_angle and not all(isinstance(value, str) or value == 0 for value in values)
+            head = head if are_numbers and not are_mixed else Head(key)
+        heads.append(head)
+    return tuple(heads)
 
 
 def si_number(value: object) -> float:

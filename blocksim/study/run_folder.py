@@ -112,8 +112,8 @@ def read_run(place: Path | str) -> StoredRun:
         state = f"{files.SUMMARY} of this run is damaged"
         with suppress(BlocksimError):
             summary = results.read_summary(folder / files.SUMMARY)
-            is_whole, events = summary.status == FINISHED, summary.events
-            state = "" if is_whole else ending_text(summary.status, summary.reason)
+            events, was = summary.events, "was" if summary.status == "interrupted" else "has"
+            state = f"this run {was} {summary.status} ({summary.reason})" if summary.status != FINISHED else ""
     end = f"{folder}: {state}; its {len(frames)} frames end at {float(frames.time[-1]):.4g} s"
     return StoredRun(folder, scenario, frames, events, end if state else choice(Path(place), folder))
 
@@ -122,8 +122,3 @@ def choice(place: Path, folder: Path) -> str:
     """Say which run was taken where a folder holds several; changed by --set, they have the same name."""
     count = sum(1 for _ in place.glob(f"*/{files.DONE}")) if place.is_dir() and place != folder else 0
     return f"{place}: the newest of {count} runs is taken: {folder}" if count > 1 else ""
-
-
-def ending_text(status: str, reason: str) -> str:
-    """Return what a run that did not finish has come to, in words."""
-    return f"this run {'was' if status == 'interrupted' else 'has'} {status} ({reason})"

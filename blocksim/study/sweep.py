@@ -5,8 +5,6 @@ table is written from the manifest: it depends neither on the executor nor on th
 Studies whose runs follow from the rows of others (`Runs`) keep them in a manifest as well, and are repeated from there.
 """
 
-import hashlib
-import json
 import re
 import time
 from collections.abc import Callable, Generator, Hashable, Iterator, Mapping, Sequence
@@ -103,7 +101,7 @@ def run_sweep(document: Document, options: SweepOptions) -> manifest.SweepResult
     cases = plans.cases_of(document, plan)
     tables = plans.table_digests(document, plan.vary)
     about = [scenario_hash(base), plan.as_table(), *([tables] if tables else []), provenance.code_hash()]
-    name = short_hash(about)
+    name = manifest.short_hash(about)
     folder = Path(options.out) if options.out is not None else files.RESULTS / base.name / f"sweep-{name}"
     rounds, setting = options.ready(folder / sweep_folder.CASES if options.keep_cases else None)
     sweep_folder.prepare(folder, base, name, overwrite=options.overwrite)
@@ -227,7 +225,7 @@ class SweepRun:
         ended, self.invalid = [*ended, *self.invalid], []
         if not ended:
             return
-        entries = [manifest.Entry(one, case, manifest.values_hash(values), row) for one, case, values, row in ended]
+        entries = [manifest.Entry(one, case, manifest.short_hash(values), row) for one, case, values, row in ended]
         for start, entry in zip(self.manifest.append(entries), entries, strict=True):
             self.done.note(self.manifest.path, start, entry)
         self.new += len(ended)
@@ -286,11 +284,11 @@ class Runs:
 
         Values that do not go together have a row that says so. Raises StoppedEarlyError on Ctrl-C.
         """
-        names = {key: manifest.values_hash(settings) for key, settings in wanted.items()}
+        names = {key: manifest.short_hash(settings) for key, settings in wanted.items()}
         missing = {name: key for key, name in names.items() if name not in self.known}
 
         def keep(settings: plans.Settings, case: str, row: rows.Row) -> None:
-            name = manifest.values_hash(settings)
+            name = manifest.short_hash(settings)
             # to the disk before it is reported
             self.manifest.append([manifest.Entry(len(self.known), case, name, row)])
             self.known[name] = row
@@ -358,11 +356,6 @@ def make_folder(
     return folder
 
 
-def short_hash(data: object) -> str:
-    """Return a hash of data that can be written as JSON, to name a study."""
-    return hashlib.sha256(json.dumps(data, default=str).encode()).hexdigest()[: provenance.HASH_DIGITS]
-
-
 @dataclass(frozen=True)
 class Replay(executors.Execution):
     """An executor that runs nothing: rows come from the manifests of a folder."""
@@ -384,7 +377,7 @@ class Replay(executors.Execution):
     def _run(self, tasks: Iterator[executors.Task], _: executors.RunSetting) -> Generator[executors.Batch, None, None]:
         """Yield every task with the row that it has. Raises InvalidInputError."""
         for task in tasks:
-            entry = self.entries.get(task.number if self.by_number else manifest.values_hash(task.settings))
+            entry = self.entries.get(task.number if self.by_number else manifest.short_hash(task.settings))
             if entry is None:
                 values = ", ".join(f"{key} = {value}" for key, value in task.settings.items())
                 raise errors.InvalidInputError(f"the manifest has no run with {values}")

@@ -44,10 +44,6 @@ class FolderKind:
             rf"{name}\.json": files.has_keys("began_at"),
         }
 
-    def kind_of(self, name: str) -> files.Kind | None:
-        """Return the kind of content that a file of this name has, None for a file that is no result."""
-        return next((kind for pattern, kind in self.results.items() if re.fullmatch(pattern, name)), None)
-
     def records_of(self, path: Path) -> tuple[files.TableRecord, ...] | None:
         """Return what the summary says of a table; None for anything else, and where the study is older than that."""
         if not self.tables.fullmatch(path.name) or not path.is_file() or path.is_symlink():
@@ -62,8 +58,9 @@ class FolderKind:
         """Return True for a file that a study has written, or left half written when it was killed."""
         if (records := self.records_of(path)) is not None:
             return files.is_own(path, records)
-        if (kind := self.kind_of(path.name)) is not None:
-            return files.is_written(path, {path.name: kind}, self.plan)
+        for pattern, kind in self.results.items():
+            if re.fullmatch(pattern, path.name):
+                return files.is_written(path, {path.name: kind}, self.plan)
         named = self.leftover.fullmatch(path.name)
         return named is not None and files.is_leftover(path.name, (named[1],)) and path.is_file()
 
@@ -158,7 +155,8 @@ def _refuse_foreign(present: Sequence[Path], kind: FolderKind, *, overwrite: boo
     With `overwrite` a table may be replaced to which a person has added something; returns those, and tells what goes.
     """
     whose = kind.what.replace("a ", "the ", 1)
-    changed = [path for path in present if kind.kind_of(path.name) and not kind.is_ours(path)]
+    results = [path for path in present if any(re.fullmatch(pattern, path.name) for pattern in kind.results)]
+    changed = [path for path in results if not kind.is_ours(path)]
     told = []
     for path in changed:
         added = files.extra_columns(path, kind.records_of(path) or ())  # None: it is no table of the study any more

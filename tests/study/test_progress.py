@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import OutputExistsError
-from blocksim.study.manifest import CaseIndex, Entry, Manifest, read_entries, values_hash
+from blocksim.study.manifest import CaseIndex, Entry, Manifest, read_entries, short_hash
 
 ROW: dict[str, object] = {"status": "finished", "reason": 'at "rest",\n', "seconds": 0.1, "1.x_mm": 1.0 / 3.0}
 ENTRIES = [Entry(number, f"{number:012x}", "00ff", {**ROW, "1.y_mm": 0.1 * number}) for number in range(4)]
@@ -82,7 +82,7 @@ OTHER: dict[str, object] = {"friction": 0.3}
 
 
 def entry(status: str, settings: dict[str, object] = ONE) -> Entry:
-    return Entry(0, "case", values_hash(settings), {"status": status})
+    return Entry(0, "case", short_hash(settings), {"status": status})
 
 
 def test_row_of_other_values_is_none_of_this_case(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def test_drawn_angles_are_numbers_in_the_unit_of_their_range(nominal: Document) 
 def test_head_is_read_back_and_bare_keys_of_older_tables_too() -> None:
     assert Head.read("ground.tilt [deg]") == Head(TILT, "deg")
     assert Head.read("ground.tilt") == Head(TILT)
-    assert Head(TILT, "deg").si(180.0) == pytest.approx(3.141592653589793)
+    assert Head(TILT, "deg").cell(3.141592653589793) == pytest.approx(180.0)
 
 
 def test_table_pictures_and_verification_agree_on_the_unit(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any
 
 from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.extras import CLUSTER, load_module
@@ -89,6 +89,8 @@ class Submission:
         self.again: deque[tuple[Task, ...]] = deque()
         self.room = AHEAD
         self.counted_at = -COUNT_EVERY
+        gone = f"the Dask scheduler at {setting.scheduler} is gone; rerun the command to finish"
+        self.scheduler_gone = UnavailableError(gone)
 
     def batches(self) -> Iterator[Batch]:
         """Yield batches as they end, until there are no more or the user wants to stop."""
@@ -100,7 +102,7 @@ class Submission:
                 key = self.ended.get(timeout=POLL)
             except queue.Empty:
                 if self.client.status not in {"running", "connecting"}:
-                    self._scheduler_has_gone()
+                    raise self.scheduler_gone from None
             else:
                 yield from self._gathered(*self.pending.pop(key))
 
@@ -109,7 +111,7 @@ class Submission:
             try:  # how many batches the workers run at a time, all together
                 self.room = AHEAD * max(1, sum(self.client.nthreads().values()))
             except (OSError, TimeoutError):
-                self._scheduler_has_gone()
+                raise self.scheduler_gone from None
             self.counted_at = time.monotonic()
         while len(self.pending) < self.room:
             tasks = self.again.popleft() if self.again else take(self.tasks, self.size.count, self.setting.is_stopped)
@@ -126,7 +128,7 @@ class Submission:
     def _gathered(self, future: Any, tasks: tuple[Task, ...]) -> Iterator[Batch]:
         """Yield a batch that has ended, unless it has to be run again."""
         if future.status == "cancelled":
-            self._scheduler_has_gone()
+            raise self.scheduler_gone
         try:
             rows, seconds, host = future.result(timeout=GATHERING)
         except InvalidInputError:
@@ -142,6 +144,3 @@ class Submission:
         else:
             self.size.adapt(len(tasks), seconds)
             yield Batch(tasks, rows, seconds, host)
-
-    def _scheduler_has_gone(self) -> NoReturn:
-        raise UnavailableError(f"the Dask scheduler at {self.setting.scheduler} is gone; rerun the command to finish")
