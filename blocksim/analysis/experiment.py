@@ -209,10 +209,9 @@ def _measurement(row: dict[str, input_files.TableCell], problems: list[Problem])
     elif len(block.text) > LONGEST_NAME:
         problems.append(block.problem(f"the name has {len(block.text)} characters, at most {LONGEST_NAME}"))
     if quantity is None:
-        complaint = (
-            f"unknown quantity '{row['quantity'].text}', {spelling.suggestion(row['quantity'].text, tuple(QUANTITIES))}"
-        )
-        problems.append(row["quantity"].problem(complaint))
+        name = row["quantity"].text
+        hint = spelling.did_you_mean_or_list(name, QUANTITIES, "allowed")
+        problems.append(row["quantity"].problem(f"unknown quantity '{name}', {hint}"))
     is_number = number.text.isascii() and number.text.isdigit() and len(number.text) <= len(str(LARGEST_REPLICATE))
     if not is_number or not 1 <= int(number.text) <= LARGEST_REPLICATE:
         problems.append(number.problem(f"'{number.text}' is not a repeat number; count repeats as 1, 2, 3, ..."))
@@ -280,8 +279,8 @@ def load_properties(path: Path | str) -> PropertyTable:
         cell, unit = row["property"], row["unit"]
         name = cell.text
         if name not in PROPERTIES:
-            complaint = f"unknown property '{name}', {spelling.suggestion(name, tuple(PROPERTIES))}"
-            table.problems.append(cell.problem(complaint))
+            hint = spelling.did_you_mean_or_list(name, PROPERTIES, "allowed", len(PROPERTIES))
+            table.problems.append(cell.problem(f"unknown property '{name}', {hint}"))
             continue
         if name in values:
             table.problems.append(cell.problem(f"'{name}' is given twice"))

@@ -31,10 +31,7 @@ class Interrupts:
     """Handler of Ctrl-C of the whole process; a part that can stop in a better way may replace it for a while."""
 
     gives_way = True
-
-    def __init__(self) -> None:
-        """Begin to be loaded."""
-        self.has_to_clear_up = self.has_come = False
+    has_to_clear_up = has_come = False  # while it begins to be loaded
 
     def __call__(self, _number: int, _frame: Any) -> None:
         """Take Ctrl-C."""
@@ -54,17 +51,6 @@ class Interrupts:
         again = threading.Timer(AGAIN, os.kill, (os.getpid(), signal.SIGINT))
         again.daemon = True
         again.start()
-
-
-def take_interrupts() -> None:
-    """Take over Ctrl-C for the rest of the process, unless it is taken or ignored."""
-    with suppress(ValueError):  # not the main thread, which alone receives signals
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            interrupts = Interrupts()
-            signal.signal(signal.SIGINT, interrupts)
-            sys.unraisablehook = interrupts.come_again
-            # Python's end would bring the system's handler back, and with it another exit code; what is ignored stays
-            atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
@@ -108,7 +94,13 @@ def main() -> None:
     """Run the command line; every error becomes a message and an exit code."""
     began = time.monotonic()
     gc.set_threshold(50_000)  # what imports and pictures make by the thousand lives to the end
-    take_interrupts()
+    with suppress(ValueError):  # not the main thread, which alone receives signals
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # neither taken nor ignored
+            interrupts = Interrupts()
+            signal.signal(signal.SIGINT, interrupts)
+            sys.unraisablehook = interrupts.come_again
+            # Python's end would bring the system's handler back, and with it another exit code; what is ignored stays
+            atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without ± is no reason to fail

@@ -36,7 +36,8 @@ def run_command(
         )
 
     def start(kernels: str) -> None:
-        if options.threads > (count := cores()):  # all wait for one another at every step
+        count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        if options.threads > count:  # all wait for one another at every step
             plural = "s" if count > 1 else ""
             output.note(f"warning: {options.threads} threads on {count} core{plural}: oversubscribed, use {count}")
         prepare.announce_compilation(kernels, quiet=screen.silent)
@@ -53,11 +54,6 @@ def run_command(
     with nullcontext() if result.status == rows.FINISHED else suppress(OSError):
         screen.show(_report(result))
     raise typer.Exit(result.summary.exit_code)
-
-
-def cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _report(result: Result) -> command_line.Report:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
-from blocksim.scenario.spelling import nearest, suggestion
+from blocksim.scenario.spelling import did_you_mean_or_list, nearest
 from blocksim.scenario.units import toml
 
 MEGABYTE = 1_000_000
@@ -248,7 +248,7 @@ def read_table(path: Path, columns: Sequence[str] = (), limit: int = LARGEST_FIL
         if head.text in names[:index] and (head.text or columns):
             problems.append(head.problem("column given twice"))
         elif columns and head.text not in columns:
-            problems.append(head.problem(f"unknown column, {suggestion(head.text, columns)}"))
+            problems.append(head.problem(f"unknown column, {did_you_mean_or_list(head.text, columns, 'allowed')}"))
         elif not head.text:
             problems.append(head.problem("this column has no name"))
     missing = [column for column in columns if column not in names]

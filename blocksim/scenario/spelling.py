@@ -88,13 +88,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"did you mean {similar!r}?" if similar else ""
 
 
-def did_you_mean_or_list(word: str, known: Iterable[object]) -> str:
-    """Suggest the known word that may have been meant, or list the first known words."""
+def did_you_mean_or_list(word: str, known: Iterable[object], what: str = "known", most: int = MAX_LISTED) -> str:
+    """Suggest the known word that may have been meant, or list the first known words after what they are."""
     names = [str(name) for name in known]
-    first = ", ".join(names[:MAX_LISTED]) + (", …" if len(names) > MAX_LISTED else "")
-    return did_you_mean(word, names) or (f"known: {first}" if names else "none is defined")
-
-
-def suggestion(word: str, allowed: Sequence[str]) -> str:
-    """Suggest the allowed word that may have been meant, or list them all."""
-    return did_you_mean(word, allowed) or "allowed: " + ", ".join(allowed)
+    first = ", ".join(names[:most]) + (", …" if len(names) > most else "")
+    return did_you_mean(word, names) or (f"{what}: {first}" if names else "none is defined")

@@ -9,7 +9,7 @@ import numpy as np
 
 from blocksim.scenario import events, geometry, laws, overlap, overrides, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
-from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS
+from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS, SUPPORT
 from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
@@ -297,10 +297,11 @@ def _unfit_lengths(scenario: Scenario, smallest: float, farthest: float) -> Iter
     if contact.model != "surface":
         if spacing > 0.5 * smallest:
             yield Mistake(("contact", "particle_spacing"), f"{_mm(spacing)} is more than half of {side}", relation=True)
-        elif contact.model == "kernel" and contact.support_radius >= smallest:
+        elif contact.model == "kernel" and SUPPORT[contact.kernel] * contact.resolved_smoothing_length >= smallest:
             key = "particle_spacing" if contact.smoothing_length is None else "smoothing_length"
-            length = _mm(contact.resolved_smoothing_length)
-            message = f"a {contact.kernel} of smoothing length {length} reaches {_mm(contact.support_radius)}"
+            length = contact.resolved_smoothing_length
+            reach = _mm(SUPPORT[contact.kernel] * length)
+            message = f"a {contact.kernel} of smoothing length {_mm(length)} reaches {reach}"
             yield Mistake(("contact", key), f"{message}, through {side}", relation=True)
         sides = [length / spacing for block in scenario.blocks.values() for length in (block.size_x, block.size_y)]
         if max(sides) > MAX_INTERVALS or 2.0 * sum(sides) > MAX_PARTICLES:

@@ -43,9 +43,9 @@ def bytes_needed(scenario: Scenario, scene: schemes.AnyScene) -> int:
     """Return the bytes that the frames of a run and its checkpoints take at most."""
     step, every = float(scene.world.controls[0].step), scenario.output.every
     steps = loop.last_step_of(scenario.time.end, step)
-    frames = memory.output_count(steps, scenario.time.end, every) + 2  # the first, and wherever it ends
+    frames = round(min(steps, scenario.time.end / every)) + 2  # the first, and wherever it ends
     bodies, particles = scene.world.bodies.size - 1, 0 if scene.world.particles is None else scene.world.particles.size
-    contacts = memory.recorded_contacts(bodies, particles) if scenario.output.contacts else 0
+    contacts = max(memory.CONTACTS_OF_A_BODY * bodies, particles) if scenario.output.contacts else 0
     state = sum(array.nbytes for array in build.arrays_of(scene))
     series = instruments.bytes_of_series(scenario, steps, step, len(schemes.ledger_names(scene)))
     return series + memory.run_bytes(bodies, frames, contacts, systems.others_of(scenario)) + CHECKPOINT_FILES * state
@@ -272,7 +272,7 @@ def _warnings(
     residual, every = ended.ledger.relative_residual, scenario.output.every
     if residual > balance.RESIDUAL_PROMISE:
         yield f"relative energy error {residual:.1e}, above {balance.RESIDUAL_PROMISE:g}"
-    if memory.is_shorter_than_step(every, float(ended.scene.world.controls[0].step)):
+    if every < (1.0 - memory.ROUNDING) * float(ended.scene.world.controls[0].step):
         yield f"output.every = {every:.3g} s is shorter than a step: a frame at every step"
     yield from systems.warnings_of(scenario)
     for number in ended.pending if ended.outcome.status == "finished" else ():

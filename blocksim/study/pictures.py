@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from blocksim.simulation import files
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns
-from blocksim.view import animation, history, run_data, studies, style, time_panels
-from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, kind_for, run_kind
+from blocksim.view import animation, run_data, studies, style, time_panels
+from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, run_kind
 from blocksim.view.paints import COLOURS, paint_of
+from blocksim.view.scene import PictureOptions
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 
 if TYPE_CHECKING:
@@ -345,23 +346,20 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
         probes = read_probes(stored.folder / files.FRAMES, scenario)
         time_panels.draw_probes(probes, picture, f"{scenario.name}: probes", tuple(options.probes or ()), options.paper)
         return picture, stored.remark
-    chosen: dict[str, Any] = {"times": options.times}
-    if kind == HISTORY:
-        names = tuple(options.panels or ()), tuple(options.blocks or ())
-        chosen = {"choice": history.Choice(*names, options.relative)}
-    elif kind == STRIP:
-        chosen["count"] = options.frames
-    draw(
-        stored.frames,
-        picture,
-        title=scenario.name,
-        measured=measured,
-        support=run_data.support_of(scenario, stored.events),
+    asked = PictureOptions(
+        scenario.name,
+        measured,
+        run_data.support_of(scenario, stored.events),
         forces=options.forces,
+        times=options.times,
+        count=options.frames,
+        panels=options.panels or (),
+        blocks=options.blocks or (),
+        relative=options.relative,
         paint=paint_of(options.colour, stored.frames, scenario),
         paper=options.paper,
-        **chosen,
     )
+    draw(stored.frames, picture, asked)
     return picture, stored.remark
 
 
@@ -481,7 +479,8 @@ def _draw_sweep(folder: Path, options: PlotOptions) -> Path:
         message = f"--kind {kind}: unknown kind, {spelling.did_you_mean_or_list(kind, [*SWEEP_KINDS, TORNADO])}"
         raise InvalidInputError(message)
     found = read_sweep_data(folder, options.experiment)
-    chosen = kind_for(found) if kind is None else SWEEP_KINDS[kind]
+    suited = (name for name, picture in SWEEP_KINDS.items() if picture.suits(found))
+    chosen = SWEEP_KINDS[kind or next(suited)]
     if kind is not None and (reason := chosen.refusal(found)):
         raise InvalidInputError(f"{folder}: {reason}")
     path = options.picture(f"{load_stored(folder / sweep_folder.PLAN).name}.png")

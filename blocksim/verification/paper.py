@@ -9,6 +9,7 @@ paper's own simulation are here.
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
@@ -27,6 +28,7 @@ from blocksim.verification import closed_forms as forms
 from blocksim.verification.reference import markdown
 from blocksim.view import run_data, studies, style
 from blocksim.view.final import draw_final
+from blocksim.view.scene import PictureOptions
 from blocksim.view.strip import draw_strip
 
 MILLI = 1e3
@@ -227,11 +229,9 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
     names = ("figure3.png", "figure4.png", "equation10.png", "equation13.png", "README.md")
     final, strip, equation10, equation13, index = written = [folder / name for name in names]
     support = run_data.support_of(first.scenario)
-    draw_final(first.frames, final, f"Figure 3: {first.name}", centres.summaries(), support, paper=PAPER)
-    title = f"Figure 4: {first.name}"
-    draw_strip(
-        first.frames, strip, title=title, measured=centres.summaries(), support=support, count=PANELS, paper=PAPER
-    )
+    options = PictureOptions(f"Figure 3: {first.name}", centres.summaries(), support, count=PANELS, paper=PAPER)
+    draw_final(first.frames, final, options)
+    draw_strip(first.frames, strip, replace(options, title=f"Figure 4: {first.name}"))
     studies.draw_law(height, equation10, "Equation 10: height over a bounce", PAPER)
     studies.draw_law(speed, equation13, "Equation 13: speed of a sliding block", PAPER)
     parts = [

@@ -195,7 +195,7 @@ def draw_animation(
     path = Path(path)
     write = writer_of(path)
     chosen, seconds = frame_times(frames, run_data.drawable_frames(frames), pace or Pace())
-    animation = Animation(frames, support or run_data.Support(), look or Look())
+    animation = Animation(frames, support or run_data.LEVEL, look or Look())
 
     def pictures() -> Iterator[Pixels]:
         for number, frame in enumerate(chosen, start=1):

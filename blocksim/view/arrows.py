@@ -179,9 +179,10 @@ class Actions:
     @property
     def sizes(self) -> str:
         """The largest load of each kind that has arrows, in words; empty where there is none."""
-        straight = ", ".join(in_words(self.largest[kind], UNITS[kind]) for kind in (FORCE, PRESSURE) if self._has(kind))
+        kinds = [kind for kind in (FORCE, PRESSURE) if kind in self.largest]
+        straight = ", ".join(in_words(self.largest[kind], UNITS[kind]) for kind in kinds)
         parts = [f"the longest {straight}"] if straight else []
-        parts += [f"round {in_words(self.largest[MOMENT], UNITS[MOMENT])}"] if self._has(MOMENT) else []
+        parts += [f"round {in_words(self.largest[MOMENT], UNITS[MOMENT])}"] if MOMENT in self.largest else []
         return ", ".join(parts)
 
     @property
@@ -189,12 +190,9 @@ class Actions:
         """Explanation of all arrows for the reader; empty where there is none."""
         texts = [f"Red arrows: loads, {self.sizes}."] if self.sizes else []
         texts += ["Above the panels: loads on all blocks."] if any(self.marks) else []
-        if self._has(SPEED):
+        if SPEED in self.largest:
             texts.append(f"Black arrows: velocity of driven bodies, the longest {self.largest[SPEED]:.3g} m/s.")
         return " ".join(texts)
-
-    def _has(self, kind: str) -> bool:
-        return self.largest.get(kind, 0.0) > 0.0
 
 
 def actions_on(frames: Frames, chosen: Indices, support: Support) -> Actions:
@@ -217,7 +215,8 @@ def actions_on(frames: Frames, chosen: Indices, support: Support) -> Actions:
         bodies = [body for body, _ in found]
         radius = MILLIMETRES * RADIUS * np.minimum(frames.size_x, frames.size_y)[bodies]
         turns = Turns(MILLIMETRES * poses.places[:, bodies], radius, SWEEP * moments / (largest[MOMENT] or 1.0))
-    return Actions(scaled, turns, _marks(poses.time, support), largest)
+    present = {kind: size for kind, size in largest.items() if size > 0.0}
+    return Actions(scaled, turns, _marks(poses.time, support), present)
 
 
 def in_words(value: float, unit: str) -> str:

@@ -101,37 +101,26 @@ def labels_of(frames: Frames, frame: int, page: scene.Page, ranges: Sequence[sce
     return Labels(lines, (column + 0.5) * room / columns, rows, is_listed=True)
 
 
-def draw_final(
-    frames: Frames,
-    path: Path | str,
-    title: str | None = None,
-    measured: run_data.Repeats | None = None,
-    support: run_data.Support | None = None,
-    *,
-    forces: bool = False,
-    times: Sequence[float] | None = None,
-    paint: paints.Paint | None = None,
-    paper: style.Paper = style.OWN,
-) -> None:
-    """Draw the last frame, or the one nearest to the last of `times` (s).
+def draw_final(frames: Frames, path: Path | str, options: scene.PictureOptions = scene.PLAIN) -> None:
+    """Draw the last frame, or the one nearest to the last of the times that were asked for.
 
     Labels below each block give x, rotation, and the measured mean and range of its centre, if the labels of all
-    blocks fit. `forces` draws those of all contacts, `paint` colours the blocks. The same input gives the
-    same bytes. Raises InvalidInputError for an unknown picture format, a time or forces that were not stored, a page
-    that is too small or nothing to draw, and OutputError when the file cannot be written.
+    blocks fit. The same input gives the same bytes. Raises InvalidInputError for an unknown picture format, a time or
+    forces that were not stored, a page that is too small or nothing to draw, and OutputError when the file cannot be
+    written.
     """
     path = style.picture_path(path)
-    support, paint = support or run_data.Support(), paint or paints.by_block(frames)
+    support, paint, paper = options.support, options.paint or paints.by_block(frames), options.paper
     drawable = run_data.drawable_frames(frames)
-    chosen = drawable[-1:] if times is None else run_data.moments_at(frames, drawable, times)[-1:]
+    chosen = drawable[-1:] if options.times is None else run_data.moments_at(frames, drawable, options.times)[-1:]
     frame = int(chosen[0])
-    scale = arrows.force_scale(frames) if forces else None
+    scale = arrows.force_scale(frames) if options.forces else None
     acts = arrows.actions_on(frames, chosen, support)
     extent = run_data.extent_of(frames, chosen, support)
     extent, length = arrows.with_room(extent, acts)
     ranges = []
-    if measured is not None and frame == drawable[-1]:  # measurements are of the final state
-        ranges = ranges_of(measured, frames.names, extent.width)
+    if options.measured is not None and frame == drawable[-1]:  # measurements are of the final state
+        ranges = ranges_of(options.measured, frames.names, extent.width)
     extent, rows = widen(extent, ranges), 1 + max((one.row for one in ranges), default=-1)
     width, tallest = paper.width(WIDTH, LEAST_WIDTH), TALLEST
     margins = SIDE, HEAD + MARKS * any(acts.marks), AXIS
@@ -158,7 +147,7 @@ def draw_final(
         scene.finish_panel(canvas, labelled=True, rows=rows)
         if labels.row_count:
             scene.draw_centres(canvas, frames, frame)
-            scene.draw_repeats(canvas, ranges, scene.ROW_HEIGHT)
+            scene.draw_repeats(canvas, ranges)
             _draw_labels(style.add_axes(figure, SIDE, height - page.height - room, page.panel_width, room), labels)
         arrows.draw_actions(canvas, acts, 0, length)
         arrows.draw_marks(canvas, acts.marks[0])
@@ -168,7 +157,7 @@ def draw_final(
         caption = f"{float(frames.time[frame]):.3f} s" + (", final" if frame == len(frames.time) - 1 else "")
         beside = SIDE + (style.width_of(caption, style.FONT_SIZE) + SPACE[0]) / style.POINTS_PER_INCH
         style.write_text(figure, width - SIDE, height - style.EDGE, caption, ha="right", va="top")
-        style.write_heading(figure, title, SIDE, beside)
+        style.write_heading(figure, options.title, SIDE, beside)
         style.write_text(figure, SIDE, 0.06, "\n".join(notes), color=style.FAINT_INK, va="bottom")
         style.save_figure(figure, path)
 

@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
 from blocksim.simulation.trajectory import Frames, force_on_supports
-from blocksim.view import arrows, paints, run_data, style, time_panels
+from blocksim.view import arrows, paints, run_data, scene, style, time_panels
 from blocksim.world.systems.blocks import BLOCKS
 from blocksim.world.systems.system import Channel
 
@@ -39,18 +39,6 @@ ENERGY_LOOKS: dict[str, tuple[str, Any]] = {  # the same in every picture; dashe
 }
 OTHER_ENERGY: tuple[str, Any] = ("#999999", "-")
 INK: dict[str, Any] = {"color": style.INK, "linewidth": 0.8}
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Panels by name (none: the default ones) and blocks by name (none: those that move farthest).
-
-    With `relative`, positions and velocities are relative to the moving ground.
-    """
-
-    panels: tuple[str, ...] = ()
-    blocks: tuple[str, ...] = ()
-    relative: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,10 +75,6 @@ class FramesInView:
         carried = self.support.offset(self.time) * bool(self.from_ground)
         return np.asarray(run_data.MILLIMETRES * (places - carried[:, axis, None]))
 
-    def displacement(self, axis: int) -> run_data.Floats:
-        """Return displacements (mm) from the first frame of the run."""
-        return np.asarray(self.place(axis) - run_data.MILLIMETRES * (self.frames.x, self.frames.y)[axis][0])
-
     def velocity(self, axis: int) -> run_data.Floats:
         """Return velocities (mm/s) along x (0) or y (1)."""
         velocities = (self.frames.vx, self.frames.vy)[axis][self.chosen]
@@ -101,8 +85,8 @@ class FramesInView:
 MOTIONS: dict[str, Callable[[FramesInView], Motion]] = {
     "x": lambda seen: Motion(f"x{seen.from_ground} (mm)", seen.place(0), "" if seen.from_ground else "x"),
     "y": lambda seen: Motion(f"y{seen.from_ground} (mm)", seen.place(1), "" if seen.from_ground else "y"),
-    "dx": lambda seen: Motion(f"Δx{seen.from_ground} (mm)", seen.displacement(0)),
-    "dy": lambda seen: Motion(f"Δy{seen.from_ground} (mm)", seen.displacement(1)),
+    "dx": lambda seen: Motion(f"Δx{seen.from_ground} (mm)", seen.place(0) - run_data.MILLIMETRES * seen.frames.x[0]),
+    "dy": lambda seen: Motion(f"Δy{seen.from_ground} (mm)", seen.place(1) - run_data.MILLIMETRES * seen.frames.y[0]),
     "rotation": lambda seen: Motion("rotation (°)", np.degrees(seen.frames.rotation[seen.chosen]), "rotation"),
     "vx": lambda seen: Motion(f"vx{seen.from_ground} (mm/s)", seen.velocity(0)),
     "vy": lambda seen: Motion(f"vy{seen.from_ground} (mm/s)", seen.velocity(1)),
@@ -128,45 +112,30 @@ MOTIONS |= {one.name: _shown(one) for one in BLOCKS.outputs if one.name not in M
 PANELS = (*MOTIONS, *SCENE, *GROUPS)
 
 
-def draw_history(
-    frames: Frames,
-    path: Path | str,
-    title: str | None = None,
-    measured: run_data.Repeats | None = None,
-    support: run_data.Support | None = None,
-    **asked: Any,
-) -> None:
+def draw_history(frames: Frames, path: Path | str, options: scene.PictureOptions = scene.PLAIN) -> None:
     """Draw a history as `draw_history_page` gives it and write PNG, SVG or PDF; the same input gives the same bytes.
 
     Raises as that does, InvalidInputError for an unknown picture format, and OutputError when the file cannot be
     written.
     """
     path = style.picture_path(path)
-    with draw_history_page(frames, title, measured, support, **asked) as (figure, _):
+    with draw_history_page(frames, options) as (figure, _):
         style.save_figure(figure, path)
 
 
 @contextmanager
 def draw_history_page(
-    frames: Frames,
-    title: str | None = None,
-    measured: run_data.Repeats | None = None,
-    support: run_data.Support | None = None,
-    *,
-    forces: bool = False,
-    choice: Choice | None = None,
-    paint: paints.Paint | None = None,
-    paper: style.Paper = style.OWN,
+    frames: Frames, options: scene.PictureOptions
 ) -> "Iterator[tuple[style.Figure, dict[str, style.Axes]]]":
-    """Give x, y, rotation, energies and contacts over time, or the panels of `choice`, by the name of each.
+    """Give x, y, rotation, energies and contacts over time, or the panels that were asked for, by the name of each.
 
     Measured means and ranges are drawn at the end. If contacts were stored, a panel shows the force of ground and walls
     on all blocks; `forces` requires it. A moving ground has a panel of its displacement. Of more than
-    six blocks the six that move farthest are coloured, the others grey, unless `choice` names blocks. Raises
+    six blocks the six that move farthest are coloured, the others grey, unless blocks were named. Raises
     InvalidInputError for unknown panels or blocks, forces that were not stored, a page that is too small or nothing to
     draw.
     """
-    choice, support, paint = choice or Choice(), support or run_data.Support(), paint or paints.by_block(frames)
+    measured, paint = options.measured, options.paint or paints.by_block(frames)
     if paint.scale is not None and not any(paint.elements):  # a block does not keep its colour throughout the run
         raise InvalidInputError("a history is coloured by block or material; speed and rotation are separate panels")
     if not frames.names:
@@ -174,11 +143,11 @@ def draw_history_page(
     chosen = run_data.drawable_frames(frames)
     if len(chosen) > MOST_POINTS:
         chosen = chosen[np.linspace(0, len(chosen) - 1, MOST_POINTS).round().astype(np.intp)]
-    seen = FramesInView(frames, chosen, support, choice.relative)
-    blocks = _blocks_named(frames, choice.blocks)
+    seen = FramesInView(frames, chosen, options.support, options.relative)
+    blocks = _blocks_named(frames, options.blocks)
     shown = blocks or _farthest_blocks(seen)
     looks = {frames.names[block]: look for block, look in line_looks(paint.fills(0), shown).items()}
-    names = _panel_names(seen, choice, forces=forces)
+    names = _panel_names(seen, options)
     notes = _notes(seen, names, len(shown), is_measured=measured is not None, is_chosen=bool(blocks))
     motions = {name: MOTIONS[name](seen) for name in names if name in MOTIONS}
     panels = []
@@ -193,7 +162,7 @@ def draw_history_page(
         panels.append(time_panels.TimePanel(motions[name].label, lines, limits=limits, looks=looks, legend=legend))
     own, start = _panel_height(names, len(shown)), float(seen.time[0])
     span = start, start + LATER * (float(seen.time[-1]) - start)
-    with time_panels.open_time_panels(panels, title, notes, paper, own, span) as (figure, rows):
+    with time_panels.open_time_panels(panels, options.title, notes, options.paper, own, span) as (figure, rows):
         axes_of = dict(zip(names, rows, strict=True))
         for name, motion in motions.items():
             if not blocks:
@@ -240,24 +209,24 @@ def _farthest_blocks(seen: FramesInView) -> list[int]:
     return sorted(ordered[:MOST_BLOCKS])
 
 
-def _panel_names(seen: FramesInView, choice: Choice, *, forces: bool) -> tuple[str, ...]:
+def _panel_names(seen: FramesInView, options: scene.PictureOptions) -> tuple[str, ...]:
     """Return the panels from top to bottom; force and ground in addition to the default ones where available.
 
     Raises InvalidInputError for an unknown one, and for forces that were not stored.
     """
-    for name in choice.panels:
+    for name in options.panels:
         if name not in PANELS:
             meant = nearest(name, PANELS, MOST_SLIPS)
             hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join(PANELS)}"
             raise InvalidInputError(f"--panels {name}: unknown panel, {hint}")
-    names = [one for name in choice.panels for one in GROUPS.get(name, (name,))] or [*USUAL]
-    if not choice.panels and seen.frames.contacts is not None and seen.support.weight > 0.0:
+    names = [one for name in options.panels for one in GROUPS.get(name, (name,))] or [*USUAL]
+    if not options.panels and seen.frames.contacts is not None and seen.support.weight > 0.0:
         names.append(FORCE)
-    if not choice.panels and seen.support.motion is not None:
+    if not options.panels and seen.support.motion is not None:
         names.append(GROUND)
-    if FORCE in names or forces:
+    if FORCE in names or options.forces:
         arrows.contacts_of(seen.frames)  # has advice where none were stored
-    return tuple(dict.fromkeys([*names, *([FORCE] if forces else [])]))
+    return tuple(dict.fromkeys([*names, *([FORCE] if options.forces else [])]))
 
 
 def _panel_height(names: Sequence[str], blocks: int) -> float:
@@ -294,9 +263,7 @@ def _draw_measured(
 def _energies(seen: FramesInView) -> time_panels.TimePanel:
     """Return energies (J) by name, each in its own colour and dashes."""
     energies = time_panels.energy_groups(seen.frames.energy, seen.chosen)
-    factor, unit = time_panels.unit_for(
-        max((float(np.abs(values).max()) for values in energies.values()), default=0.0), "J"
-    )
+    factor, unit = time_panels.unit_for(float(np.abs([*energies.values()]).max(initial=0.0)), "J")
     looks = {name: ENERGY_LOOKS.get(name, OTHER_ENERGY) for name in energies}
     return time_panels.TimePanel(
         f"energy ({unit})",

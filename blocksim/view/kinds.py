@@ -7,14 +7,14 @@ from pathlib import Path
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
-from blocksim.view import final, history, strip, style
+from blocksim.simulation.trajectory import Frames
+from blocksim.view import final, history, scene, strip, style
 from blocksim.view.sweeps import data, lines, outcome_map, scatter
 
 STRIP, FINAL, HISTORY, PROFILE = "strip", "final", "history", "profile"
 MOTION = "motion"  # of the supports; needs no run
 PROBE = "probe"
-# Each draws frames to a path, with title, measured table and support.
-RUN_KINDS: dict[str, Callable[..., None]] = {
+RUN_KINDS: dict[str, Callable[[Frames, Path, scene.PictureOptions], None]] = {
     STRIP: strip.draw_strip,
     FINAL: final.draw_final,
     HISTORY: history.draw_history,
@@ -49,15 +49,10 @@ SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
 }
 
 
-def run_kind(name: str) -> Callable[..., None]:
+def run_kind(name: str) -> Callable[[Frames, Path, scene.PictureOptions], None]:
     """Return what draws pictures of a kind. Raises InvalidInputError for an unknown one."""
     if name not in RUN_KINDS:
         meant = nearest(name, [*RUN_KINDS, MOTION, PROBE], MOST_SLIPS)
         hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join([*RUN_KINDS, MOTION, PROBE])}"
         raise InvalidInputError(f"--kind {name}: unknown kind for a run, {hint}")
     return RUN_KINDS[name]
-
-
-def kind_for(sweep: data.SweepData) -> SweepPicture:
-    """Return the first kind that suits a sweep."""
-    return next(kind for kind in SWEEP_KINDS.values() if kind.suits(sweep))

@@ -174,7 +174,7 @@ def draw_mechanisms(
     most = max(float(paints.displacements(side.frames, side.support)[side.frame].max()) for side in sides)
     paint = paints.by_displacement(sides[0].frames, sides[0].support, most)
     texts = [ARROWS_OF_LOADS] if any(side.acts.sizes for side in sides) else []
-    texts += [ARROWS_OF_SPEED] if any(side.acts.largest.get(arrows.SPEED, 0.0) > 0.0 for side in sides) else []
+    texts += [ARROWS_OF_SPEED] if any(arrows.SPEED in side.acts.largest for side in sides) else []
     notes = style.break_lines(" ".join(texts), width - 2.0 * SIDE) if texts else []
     columns = ENTRIES if width >= ENTRIES_WIDTH else 1
     legend = style.LINE * (len(notes) + ENTRIES // columns)

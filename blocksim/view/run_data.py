@@ -180,6 +180,9 @@ class Support:
         return np.asarray(line[1:-1][turns])
 
 
+LEVEL = Support()
+
+
 def is_fixed(frames: Frames, support: Support) -> Flags:
     """Return for every block whether it moves with the support or by a motion of its own, (b,)."""
     return np.array(support.fixed or (False,) * len(frames.names), dtype=bool)
@@ -273,7 +276,7 @@ def extent_of(frames: Frames, chosen: Indices, support: Support | None = None, b
     The ground below every block is shown, and the corners of the ground and the walls that are near. `blocks` (b,)
     selects the blocks that count, by default all.
     """
-    support = support or Support()
+    support = support or LEVEL
     tilt, reached = support.tilt, _reached(frames, chosen, support)
     if blocks is not None:
         reached = reached[:, blocks]
@@ -312,7 +315,7 @@ def blocks_in_view(frames: Frames, chosen: Indices, support: Support | None = No
     count = len(frames.names)
     if count < LEAST_TOGETHER:
         return np.ones(count, dtype=bool)
-    support = support or Support()
+    support = support or LEVEL
     reached = _reached(frames, chosen, support)
     low, high = reached.min(axis=0), reached.max(axis=0)
     most, share = max(1, int(FEW_LEFT_OUT * count)), GAP if count >= MANY else WIDE_GAP

@@ -1,7 +1,7 @@
 """One moment of a run as a drawing: canvas and axis, ground and walls, blocks with their names. Millimetres."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -62,16 +62,12 @@ class Page:
 
     width: float
     height: float
+    panel_width: float
     panel_height: float
     side: float
     foot: float
     points_per_mm: float
     extent: run_data.Extent
-
-    @property
-    def panel_width(self) -> float:
-        """Width of the panel."""
-        return self.width - 2.0 * self.side
 
     def canvas(self, figure: "style.Figure", left: float | None = None, bottom: float | None = None) -> Canvas:
         """Return the panel in a figure; `left` and `bottom` are its lower left corner where it is not the page's."""
@@ -93,7 +89,7 @@ def page_for(
     extent = replace(extent, left=extent.left - 0.5 * missing, right=extent.right + 0.5 * missing)
     scale = across / extent.width  # inches per mm
     height = panel_height(extent, scale, rows)
-    return Page(width, head + height + foot, height, side, foot, scale * style.POINTS_PER_INCH, extent)
+    return Page(width, head + height + foot, across, height, side, foot, scale * style.POINTS_PER_INCH, extent)
 
 
 def panel_height(extent: run_data.Extent, scale: float, rows: int) -> float:
@@ -289,6 +285,33 @@ class Scene:
     with_others: bool = True
 
 
+@dataclass(frozen=True)
+class PictureOptions:
+    """What a picture of a run shows beside its blocks, and on which page.
+
+    `measured` is drawn beside the final state, `support` is what the blocks stand on: level ground at rest if it is not
+    given. `forces` draws those of all contacts, `paint` colours the blocks. `times` (s) selects frames, `count` is the
+    largest number of panels of a strip. A history has these panels (by default the usual ones) and blocks (those that
+    move farthest), `relative` to the moving ground or not.
+    """
+
+    title: str | None = None
+    measured: run_data.Repeats | None = None
+    support: run_data.Support = run_data.LEVEL
+    _: KW_ONLY
+    forces: bool = False
+    times: Sequence[float] | None = None
+    count: int | None = None
+    panels: Sequence[str] = ()
+    blocks: Sequence[str] = ()
+    relative: bool = False
+    paint: paints.Paint | None = None
+    paper: style.Paper = style.OWN
+
+
+PLAIN = PictureOptions()
+
+
 def draw_scene(canvas: Canvas, scene: Scene, frame: int) -> None:
     """Draw the support and the blocks of one frame."""
     draw_surroundings(canvas, scene, frame)
@@ -348,17 +371,17 @@ def draw_centres(canvas: Canvas, frames: Frames, frame: int) -> None:
         canvas.axes.plot([x, x], ends, color=style.INK, linewidth=1.2, transform=canvas.scene)
 
 
-def draw_repeats(canvas: Canvas, measured: list[MeasuredRange], row_height: float) -> None:
-    """Draw measured mean and range of each block in rows of `row_height` (points) below the ground."""
+def draw_repeats(canvas: Canvas, measured: list[MeasuredRange]) -> None:
+    """Draw measured mean and range of each block in rows below the ground."""
     line: dict[str, Any] = {"color": style.MEASURED_COLOUR, "linewidth": 1.2, "transform": canvas.scene}
     point = 1.0 / canvas.points_per_mm
     for item in measured:
-        y = canvas.floor - (item.row + 0.6) * row_height * point
+        y = canvas.floor - (item.row + 0.6) * ROW_HEIGHT * point
         canvas.axes.plot([item.minimum, item.maximum], [y, y], **line)
         for end in (item.minimum, item.maximum):
             canvas.axes.plot([end, end], [y - 2.2 * point, y + 2.2 * point], **line)
         canvas.axes.plot(item.mean, y, marker="o", markersize=3.2, **line)
-        font = style.fitting_font(item.block, (30.0, row_height), 6.0)
+        font = style.fitting_font(item.block, (30.0, ROW_HEIGHT), 6.0)
         if font:
             look = canvas.along | {"fontsize": font, "color": style.MEASURED_COLOUR, "va": "center"}
             canvas.axes.text(item.maximum + 3.0 * point, y, style.shorten(item.block, LETTERS), **look)

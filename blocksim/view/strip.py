@@ -1,6 +1,5 @@
 """A run as a strip of panels on one scale, and the surface of soil at several times."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -104,41 +103,27 @@ def _panel_width(columns: int, width: float) -> float:
     return (width - 2.0 * SIDE - (columns - 1) * GAP) / columns
 
 
-def draw_strip(
-    frames: Frames,
-    path: Path | str,
-    times: Sequence[float] | None = None,
-    title: str | None = None,
-    measured: run_data.Repeats | None = None,
-    support: run_data.Support | None = None,
-    *,
-    forces: bool = False,
-    count: int | None = None,
-    paint: paints.Paint | None = None,
-    paper: style.Paper = style.OWN,
-) -> None:
+def draw_strip(frames: Frames, path: Path | str, options: scene.PictureOptions = scene.PLAIN) -> None:
     """Draw the run as 6 to 8 panels from release to the final state and write them as PNG, SVG or PDF.
 
-    `times` (s) selects the panels, `count` is their maximum number. With `measured` the last panel shows
-    mean and range of the measured centres below the ground. `support` is what the blocks stand on: level ground at rest
-    if it is not given. `forces` draws those of all contacts; `paint` colours the blocks. The same input gives the same
-    bytes. Raises InvalidInputError for an unknown picture format, a time that was not recorded, forces that were not, a
-    page that is too small or nothing to draw, and OutputError when the file cannot be written.
+    The last panel shows mean and range of what was measured below the ground. The same input gives the same bytes.
+    Raises InvalidInputError for an unknown picture format, a time that was not recorded, forces that were not, a page
+    that is too small or nothing to draw, and OutputError when the file cannot be written.
     """
     path = style.picture_path(path)
-    support, paint = support or run_data.Support(), paint or paints.by_block(frames)
+    support, paint, paper = options.support, options.paint or paints.by_block(frames), options.paper
     drawable = run_data.drawable_frames(frames)
-    scale = arrows.force_scale(frames) if forces else None
+    scale = arrows.force_scale(frames) if options.forces else None
     extent = run_data.extent_of(frames, drawable, support)
     extent, length = arrows.with_room(extent, arrows.actions_on(frames, drawable, support))
-    ranges = [] if measured is None else final.ranges_of(measured, frames.names, extent.width)
+    ranges = [] if options.measured is None else final.ranges_of(options.measured, frames.names, extent.width)
     extent = final.widen(extent, ranges)
     columns, usual = arrangement(extent, scene.readable_scale(frames))
-    if times is None:
+    if options.times is None:
         carried = support.offset(frames.time[drawable])
-        chosen = run_data.moments_by_motion(frames, drawable, count or usual, carried)
+        chosen = run_data.moments_by_motion(frames, drawable, options.count or usual, carried)
     else:
-        chosen = run_data.moments_at(frames, drawable, times)
+        chosen = run_data.moments_at(frames, drawable, options.times)
         ranges = ranges if chosen[-1] == drawable[-1] else []  # they belong to the final state
     rows = 1 + max((one.row for one in ranges), default=-1)
     acts = arrows.actions_on(frames, chosen, support)
@@ -153,7 +138,7 @@ def draw_strip(
             scene.draw_scene(canvas, scene.Scene(frames, support, paint), frame)
             if index == len(chosen) - 1 and ranges:
                 scene.draw_centres(canvas, frames, frame)
-                scene.draw_repeats(canvas, ranges, scene.ROW_HEIGHT)
+                scene.draw_repeats(canvas, ranges)
             scene.finish_panel(canvas, labelled=index + layout.columns >= len(chosen), rows=rows)
             arrows.draw_actions(canvas, acts, index, length)
             arrows.draw_marks(canvas, acts.marks[index], up=2.0)
@@ -161,7 +146,7 @@ def draw_strip(
             canvas.axes.set_title(_caption(frames, frame, support), loc="left", pad=pad)
             if scale is not None:
                 arrows.draw_forces(canvas, frames, frame, scale)
-        style.write_heading(figure, title, SIDE)
+        style.write_heading(figure, options.title, SIDE)
         style.write_text(figure, SIDE, 0.05, "\n".join(notes), color=style.FAINT_INK, va="bottom")
         paints.draw_key(figure, paint, SIDE, 0.05 + len(notes) * style.LINE)
         style.save_figure(figure, path)
@@ -201,19 +186,8 @@ PALE = "#e8e8e8"
 THICK = 1.4  # points
 
 
-def draw_profile(
-    frames: Frames,
-    path: Path | str,
-    title: str | None = None,
-    measured: run_data.Repeats | None = None,  # noqa: ARG001 - of blocks
-    support: run_data.Support | None = None,
-    *,
-    forces: bool = False,  # noqa: ARG001 - of blocks
-    times: Sequence[float] | None = None,
-    paint: paints.Paint | None = None,  # noqa: ARG001 - lines are coloured by time
-    paper: style.Paper = style.OWN,
-) -> None:
-    """Draw the surface of soil at these times (s), by default at six that are even in motion.
+def draw_profile(frames: Frames, path: Path | str, options: scene.PictureOptions = scene.PLAIN) -> None:
+    """Draw the surface of soil, by default at six times that are even in motion; lines are coloured by time.
 
     Raises InvalidInputError for an unknown picture format, a run without soil, a time that was not stored or a page
     that is too small, and OutputError when the file cannot be written.
@@ -221,11 +195,11 @@ def draw_profile(
     from matplotlib import colormaps, colors
 
     path = style.picture_path(path)
-    support, drawable = support or run_data.Support(), run_data.drawable_frames(frames)
-    if times is None:
+    support, paper, drawable = options.support, options.paper, run_data.drawable_frames(frames)
+    if options.times is None:
         chosen = np.unique(run_data.moments_by_motion(frames, drawable, LINES))
     else:
-        chosen = np.unique(run_data.moments_at(frames, drawable, times))
+        chosen = np.unique(run_data.moments_at(frames, drawable, options.times))
     surfaces = [(track, track.system.profile) for track in frames.others if track.system.profile is not None]
     lines = [[line for track, profile in surfaces for line in profile(track, frame)] for frame in chosen.tolist()]
     if not any(lines):
@@ -245,5 +219,5 @@ def draw_profile(
                 canvas.axes.plot(*(run_data.MILLIMETRES * line).T, color=shade, linewidth=THICK, transform=canvas.scene)
         scene.finish_panel(canvas, labelled=True)
         paints.draw_key(figure, key, side, 0.06)
-        style.write_heading(figure, title and f"{title}: surface", side)
+        style.write_heading(figure, options.title and f"{options.title}: surface", side)
         style.save_figure(figure, path)

@@ -216,7 +216,7 @@ def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
         return [panel("joint", "mm", MILLIMETRES, {**ends, "slip": probe["slip"]})]
     if probe.kind == instruments.ENERGY:
         energies = energy_groups(probe.columns, np.arange(len(probe)))
-        factor, unit = unit_for(max((_largest(one) for one in energies.values()), default=0.0), "J")
+        factor, unit = unit_for(float(np.nanmax(np.abs([*energies.values()]), initial=0.0)), "J")
         return [panel("energy", unit, factor, energies)] if energies else []
     if probe.kind == instruments.POINT:
         moves = any(not np.array_equal(probe[one], probe[f"relative_{one}"]) for one in ("dx", "dy"))
@@ -227,7 +227,7 @@ def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
             panel("rotation", "°", 1.0, {"rotation": np.degrees(probe["rotation"])}),
         ]
     forces = columns("fx", "fy")
-    largest = max(map(_largest, forces.values()))
+    largest = float(np.nanmax(np.abs([*forces.values()]), initial=0.0))
     usual = max(float(np.percentile(np.abs(values), PERCENT)) for values in forces.values())  # hardly exceeded
     is_cut = usual > 0.0 and largest > MOST_USUAL * usual
     factor, unit = unit_for(usual if is_cut else largest, "N")
@@ -242,10 +242,6 @@ def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
     mobilised = columns("mobilised")
     is_known = np.isfinite(probe["mobilised"]).any()
     return [force, *([panel("share of friction", "", 1.0, mobilised)] if is_known else [])]
-
-
-def _largest(values: Floats) -> float:
-    return float(np.nanmax(np.abs(values), initial=0.0))
 
 
 BETWEEN = 4

@@ -113,7 +113,7 @@ def describe(scenario: Scenario) -> Description:
         size = memory.scene_size(count, world.pairs.size, slots, has_particles=has_particles)
     step = float(world.controls[0].step)
     steps = max(1, round(scenario.time.end / step))
-    frames = memory.output_count(steps, scenario.time.end, scenario.output.every) + 1
+    frames = round(min(steps, scenario.time.end / scenario.output.every)) + 1
     (bounds,) = bounds_of([layout], build.stack_of_one(world.bodies))
     speeds = speeds_of(layout, bounds)
     spacing = scenario.contact.particle_spacing
@@ -122,7 +122,7 @@ def describe(scenario: Scenario) -> Description:
         for corners, number in Counter(body.corners for body in layout.placed).items()
     )
     touching = 0 if world.particles is None else particles // PARTICLES_OF_A_CONTACT
-    contacts = memory.recorded_contacts(count, touching) if scenario.output.contacts else 0
+    contacts = max(memory.CONTACTS_OF_A_BODY * count, touching) if scenario.output.contacts else 0
     more = sum(one.count * one.system.cost.memory for one in others)
     of_systems = sum(one.count * one.system.cost.seconds * one.system.dearer(scenario) for one in others)
     limits, of_others = None, systems.largest_step(scenario)
@@ -131,9 +131,10 @@ def describe(scenario: Scenario) -> Description:
         limits = StepLimits(of_blocks, of_others, scenario.contact.stiffness_scale * (of_blocks / of_others) ** 2)
     rigid = None
     if has_rigid:
+        reason = rigid_step.reason_of_step(layout, bounds, speeds)
         sag = scene_sag(step / scenario.time.parts, layout.placed, scenario.gravity)
         rigid = SagDescription(
-            why=rigid_step.reason_of_step(layout, bounds, speeds).why,
+            why=reason.text.format(*reason.numbers),
             substeps=scenario.time.parts,
             tolerance=nonsmooth.velocity_tolerance(scenario, count),
             longest_step=rigid_step.longest_step(layout, bounds, speeds),
@@ -157,7 +158,7 @@ def describe(scenario: Scenario) -> Description:
         seconds=steps * (_seconds_per_step(scenario, count, particles) + of_systems),
         bytes=memory.run_bytes(count, frames, contacts, others),
         memory=memory.PROCESS_BYTES + size.bytes + more,  # without frames: into a folder, they are written as they come
-        frames_at_every_step=memory.is_shorter_than_step(scenario.output.every, step),
+        frames_at_every_step=scenario.output.every < (1.0 - memory.ROUNDING) * step,
         particles=particles,
         skin=float(world.controls[0].skin),
         rigid=rigid,

@@ -70,27 +70,12 @@ def rigid_size(bodies: int, pairs: int) -> Size:
     return Size(bodies, pairs, bodies * body + pairs * pair)
 
 
-def output_count(steps: int, end: float, every: float) -> int:
-    """Return how many frames follow the first, one every `every` (s) until `end` (s), but at most one a step."""
-    return round(min(steps, end / every))
-
-
-def is_shorter_than_step(every: float, step: float) -> bool:
-    """Return True if frames every `every` (s) would be closer than steps (s), so that there is one at every step."""
-    return every < (1.0 - ROUNDING) * step
-
-
 def run_bytes(bodies: int, frames: int, contacts: int = 0, others: Sequence[SystemInScene] = ()) -> int:
     """Return the bytes of run.h5 with so many frames, the room of the last chunk included, and contacts in each."""
     rows = chunk_rows(max([bodies, *(one.count for one in others)]))
     whole = -(-frames // rows) * rows
     values = FRAME_VALUES + MOTION_VALUES * bodies + sum(one.count * len(one.system.quantities) for one in others)
     return FILE_BYTES + VALUE * (whole * values + frames * CONTACT_VALUES * contacts)
-
-
-def recorded_contacts(bodies: int, particles: int) -> int:
-    """Return how many contacts a frame hardly ever has more of, where they are recorded."""
-    return max(CONTACTS_OF_A_BODY * bodies, particles)
 
 
 def refuse_if_too_large(size: Size) -> None:

@@ -185,11 +185,6 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
     )
 
 
-def threads_of(scene: arrays.Nonsmooth) -> int:
-    """Return for how many threads there is room to exchange data."""
-    return int(scene.contacts.residuals.shape[1]) // LINE_WORDS
-
-
 def with_more_constraints(scene: arrays.Nonsmooth) -> arrays.Nonsmooth:
     """Return the same scene with more room for pairs. Raises SceneTooLargeError."""
     old = scene.contacts

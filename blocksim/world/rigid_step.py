@@ -76,11 +76,6 @@ class ContactJoint(NamedTuple):
     normal: Point  # from one to the other
     points: tuple[Point, ...]  # m: one, or the two ends
 
-    @property
-    def width(self) -> float:
-        """Length in m, zero of a point."""
-        return math.dist(self.points[0], self.points[-1])
-
 
 class _Side(NamedTuple):
     """What a body shows to others: faces from corner to corner, with the solid on the left."""
@@ -323,7 +318,7 @@ def _greatest_shift(frame: _Frame, moved: Floats, pressed: Floats, sheared: Floa
     y = (moves[:, :, 1] + moves[:, :, 2] * frame.arms[:, :, 0]).mean(axis=1)
     aside = pressed * (x * forces[frame.joint, 1] - y * forces[frame.joint, 0])
     total = np.bincount(frame.joint, pressed, count)
-    widths = np.array([joint.width for joint in frame.joints])
+    widths = np.array([math.dist(joint.points[0], joint.points[-1]) for joint in frame.joints])  # m, zero of a point
     most = _greatest_forces(frame, np.hypot(forces[:, 0], forces[:, 1]))
     carries = (total > 0.0) & (widths > 0.0) & (most > 0.0)
     shift = np.abs(np.bincount(frame.joint, aside, count)[carries]) / (total * widths * most)[carries]
@@ -360,11 +355,6 @@ class Reason(NamedTuple):
     step: float
     text: str
     numbers: tuple[float, ...] = ()
-
-    @property
-    def why(self) -> str:
-        """The reason, with its numbers."""
-        return self.text.format(*self.numbers)
 
 
 def choose_rigid_stride(layout: Layout, bounds: Bounds) -> Stride:

@@ -128,7 +128,7 @@ def test_threads_change_nothing_but_the_time(blocksim: Command) -> None:
 
 
 def test_more_threads_than_cores_are_a_warning(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blocksim.cli.run.cores", lambda: 2)
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1}, raising=False)
     assert "warning" not in blocksim(*RUN, "--threads", "2", "--out", "two").err
     answer = blocksim(*RUN, "--threads", "3", "--out", "three")
     assert answer.code == 0

@@ -14,6 +14,7 @@ from blocksim.study.run import open_run
 from blocksim.view.kinds import run_kind
 from blocksim.view.paints import paint_of
 from blocksim.view.report.player import pack_frames
+from blocksim.view.scene import PictureOptions
 from tests.soils import DEPTH, LEFT, column, scene
 from tests.view.made_up import toppling
 
@@ -68,7 +69,7 @@ def test_the_end_of_soils_is_a_table_of_the_folder_and_of_the_result(run: Result
 @pytest.mark.parametrize("kind", ["strip", "final", "profile"])
 def test_pictures_show_soil(run: Result, kind: str, tmp_path: Path) -> None:
     paint = paint_of("pressure", run.frames, SCENE)
-    run_kind(kind)(run.frames, tmp_path / "one.svg", title="title", paint=paint)
+    run_kind(kind)(run.frames, tmp_path / "one.svg", PictureOptions("title", paint=paint))
     text = (tmp_path / "one.svg").read_text()
     assert text.count("<path") > (100 if kind != "profile" else 8)
 
@@ -87,7 +88,7 @@ def test_soil_has_the_colour_asked_for_and_blocks_keep_theirs(run: Result) -> No
 
 def test_a_run_without_soil_has_no_profile(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="no soil in this run"):
-        run_kind("profile")(toppling(3), tmp_path / "one.svg")
+        run_kind("profile")(toppling(3), tmp_path / "one.svg", PictureOptions())
 
 
 def test_the_player_gets_every_shade_with_its_scale(run: Result) -> None:

@@ -14,10 +14,11 @@ from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, 
 from blocksim.scenario.motion import MotionPieces
 from blocksim.view import style
 from blocksim.view.final import draw_final
-from blocksim.view.history import Choice, draw_history
+from blocksim.view.history import draw_history
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.paints import by_speed, by_turn
 from blocksim.view.run_data import ActingLoad, Support
+from blocksim.view.scene import PictureOptions
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, LevelPanel, draw_levels, draw_tornado
 from blocksim.view.sweeps.lines import Series, draw_series
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     Drawing = Callable[[Path, Paper], None]
 
 TABLE = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv").summaries()
-RUN: dict[str, Any] = {"title": "a run", "measured": TABLE}
+RUN = PictureOptions("a run", TABLE)
 KEYS = ("contact.restitution", "friction.block_block.static", "friction.block_ground.static")
 PIECES = MotionPieces(np.array([0.0, 0.3, 1.0]), np.array([[0.0, 0.0, 0.1, 0.0], [0.009, 0.0, 0.0, 0.0]]), 0.0)
 MOVING = Support(motion=PIECES, direction=(np.cos(0.3), np.sin(0.3)), fixed=(True, False, False), weight=12.0)
@@ -102,7 +103,7 @@ def bars() -> list[Bars]:
 
 
 def of_run(draw: Callable[..., None], frames: Frames, **values: Any) -> Drawing:
-    return lambda path, paper: draw(frames, path, paper=paper, **{**RUN, **values})
+    return lambda path, paper: draw(frames, path, replace(RUN, paper=paper, **values))
 
 
 def of_sweep(kind: str, sweep: SweepData) -> Drawing:
@@ -152,7 +153,7 @@ def odd(blocks: int) -> Frames:
 
 
 ODD = ("W" * 200, *HOSTILE)
-CHOICE = Choice(("displacement", "energy"), ("3",))
+CHOICE: dict[str, Any] = {"panels": ("displacement", "energy"), "blocks": ("3",)}
 DRAWINGS: dict[str, Drawing] = {
     "strip": of_run(draw_strip, toppling(3)),
     "strip at chosen times": of_run(draw_strip, toppling(3, steps=61), times=[0.1, 0.3]),
@@ -184,11 +185,11 @@ DRAWINGS: dict[str, Drawing] = {
     "history of a shaken run": of_run(draw_history, pressed(toppling(3)), support=MOVING, forces=True),
     "history of impacts": of_run(draw_history, pressed(toppling(3)), support=Support(weight=0.1)),
     "history seen from the ground": of_run(
-        draw_history, toppling(3), support=MOVING, choice=replace(CHOICE, relative=True)
+        draw_history, toppling(3), support=MOVING, relative=True, **CHOICE
     ),
-    "history of chosen panels": of_run(draw_history, toppling(20), support=MOVING, choice=CHOICE),
+    "history of chosen panels": of_run(draw_history, toppling(20), support=MOVING, **CHOICE),
     "history with many names": of_run(
-        draw_history, toppling(20), choice=Choice(("x", "energy"), tuple(map(str, range(1, 13))))
+        draw_history, toppling(20), panels=("x", "energy"), blocks=tuple(map(str, range(1, 13)))
     ),
     "history with odd names": of_run(draw_history, odd(6), title=HOSTILE[0] * 20),
     "levels": lambda path, paper: draw_levels([panel()], path, title="slide", measured={"b1": 7.0}, paper=paper),

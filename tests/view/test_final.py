@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 
 from blocksim.simulation.trajectory import final_columns
 from blocksim.view.final import draw_final
-from blocksim.view.history import Choice, draw_history
+from blocksim.view.history import draw_history
 from blocksim.view.paints import by_turn
+from blocksim.view.scene import PictureOptions
 from tests.view.drawings import TABLE
 from tests.view.made_up import boxes_of, stacked, toppling
 from tests.view.test_loads import support
@@ -15,7 +16,7 @@ from tests.view.test_loads import support
 
 def test_labels_and_measured_ranges_stand_below_what_they_are_about(caught: list[Figure]) -> None:
     frames = toppling(3)
-    draw_final(frames, "final.png", measured=TABLE)
+    draw_final(frames, "final.png", PictureOptions(measured=TABLE))
     panel, _ = caught[0].axes
     boxes = dict(boxes_of(caught[0]))
     for place in 1000.0 * frames.x[-1]:
@@ -39,7 +40,7 @@ def test_rotation_of_what_turned_while_settling_is_that_of_the_table(caught: lis
     frames.angle[:] = np.radians(1.24)  # from the first frame on, which is after settling
     (rotation,) = final_columns(frames)["rotation_deg"]
     draw_final(frames, "final.png")
-    draw_history(frames, "history.png", choice=Choice(("rotation",)))
+    draw_history(frames, "history.png", PictureOptions(panels=("rotation",)))
     assert f"{rotation:.2f}°" == "1.24°" in [text for text, _ in boxes_of(caught[0])]
     (curve,) = (line for axes in caught[1].axes for line in axes.lines if np.size(line.get_xdata()) == len(frames))
     assert np.asarray(curve.get_ydata())[-1] == pytest.approx(rotation)
@@ -51,7 +52,7 @@ def test_rotation_of_what_turned_while_settling_is_that_of_the_table(caught: lis
 def test_loads_are_drawn_and_explained_with_room_for_what_acts_on_all_blocks(caught: list[Figure]) -> None:
     force: dict[str, object] = {"kind": "force", "body": "1", "magnitude": "20 N"}
     loads = [force, {"kind": "horizontal", "magnitude": 0.1}]
-    draw_final(toppling(1), "final.png", support=support(loads))
+    draw_final(toppling(1), "final.png", PictureOptions(support=support(loads)))
     draw_final(toppling(1), "final.png")
     loaded, bare = (dict(boxes_of(figure)) for figure in caught)
     assert any("Red arrows: loads, the longest 20 N." in text.replace("\n", " ") for text in loaded)

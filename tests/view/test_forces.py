@@ -13,6 +13,7 @@ from blocksim.simulation.trajectory import CONTACT_ROW, Contacts
 from blocksim.view.animation import Look, Pace, draw_animation
 from blocksim.view.arrows import FORCES, ForceScale, arrows, force_scale, round_down
 from blocksim.view.kinds import RUN_KINDS
+from blocksim.view.scene import PictureOptions
 from tests.view.made_up import pressed, toppling
 
 SCALE = ForceScale(mm_per_newton=10.0, longest=35.0)
@@ -57,7 +58,7 @@ def test_round_numbers_are_not_larger(value: float, expected: float) -> None:
 
 @pytest.mark.parametrize("kind", ["strip", "final"])
 def test_every_panel_has_its_arrows(caught: list[Figure], kind: str) -> None:
-    RUN_KINDS[kind](pressed(toppling(3)), "picture.png", forces=True)
+    RUN_KINDS[kind](pressed(toppling(3)), Path("picture.png"), PictureOptions(forces=True))
     panels = [axes for axes in caught[0].axes if axes.get_xlabel() == "x (mm)" or axes.get_title(loc="left")]
     assert panels
     for axes in panels:
@@ -68,7 +69,7 @@ def test_every_panel_has_its_arrows(caught: list[Figure], kind: str) -> None:
 @pytest.mark.parametrize("kind", [kind for kind in RUN_KINDS if kind != "profile"])  # draws soil, without forces
 def test_missing_contacts_are_reported_with_what_to_do(tmp_path: Path, kind: str) -> None:
     with pytest.raises(InvalidInputError, match=r"stored no contacts.* --set output\.contacts=true"):
-        RUN_KINDS[kind](toppling(3), tmp_path / "picture.png", forces=True)
+        RUN_KINDS[kind](toppling(3), tmp_path / "picture.png", PictureOptions(forces=True))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.trajectory import force_on_supports
 from blocksim.view import style
-from blocksim.view.history import ENERGY_LOOKS, Choice, draw_history, line_looks
+from blocksim.view.history import ENERGY_LOOKS, draw_history, line_looks
 from blocksim.view.paints import by_speed
 from blocksim.view.run_data import Support
+from blocksim.view.scene import PictureOptions
 from blocksim.view.time_panels import LEAST_SPAN, energy_groups, unit_for
 from tests.golden import Golden
 from tests.view.drawings import MOVING
@@ -25,7 +26,7 @@ def lines_of(figure: Figure, panel: int) -> list[np.ndarray]:
 
 def test_lines_are_what_was_recorded_in_millimetres_and_degrees(caught: list[Figure]) -> None:
     frames = pressed(toppling(3))
-    draw_history(frames, "history.png", support=Support(weight=12.0))
+    draw_history(frames, "history.png", PictureOptions(support=Support(weight=12.0)))
     values = (1000.0 * frames.x, 1000.0 * frames.y, np.degrees(frames.rotation))
     for panel, expected in enumerate(values):
         np.testing.assert_allclose(lines_of(caught[0], panel)[:3], expected.T)
@@ -57,8 +58,8 @@ def test_long_runs_are_thinned_and_many_grey_lines_stored_as_an_image(tmp_path: 
 def test_displacements_and_velocities_are_those_seen_from_the_moving_ground(caught: list[Figure]) -> None:
     frames, along = toppling(3), np.array(MOVING.direction)
     for relative in (False, True):
-        choice = Choice(("displacement", "velocity"), ("3",), relative=relative)
-        draw_history(frames, "history.png", support=MOVING, choice=choice)
+        asked = PictureOptions(support=MOVING, panels=("displacement", "velocity"), blocks=("3",), relative=relative)
+        draw_history(frames, "history.png", asked)
     moved = 1000.0 * MOVING.offset(frames.time).T
     speed = np.where(frames.time < 0.3, 200.0 * frames.time, 0.0)  # of 0.1 m/s2 and then none
     there = 1000.0 * np.array([frames.x[:, 2] - frames.x[0, 2], frames.y[:, 2] - frames.y[0, 2]])
@@ -70,7 +71,7 @@ def test_displacements_and_velocities_are_those_seen_from_the_moving_ground(caug
 
 
 def test_a_block_has_one_colour_in_all_pictures_and_dashes_tell_equal_ones_apart(caught: list[Figure]) -> None:
-    draw_history(toppling(20), "history.png", choice=Choice(("x",), ("2", "8", "14", "3")))
+    draw_history(toppling(20), "history.png", PictureOptions(panels=("x",), blocks=("2", "8", "14", "3")))
     assert [line.get_color() for line in caught[0].axes[0].lines] == ["#E69F00"] * 3 + ["#009E73"]
     looks = line_looks([style.block_colour(block) for block in range(20)], [1, 7, 13, 2]).values()
     assert len({str(look) for look in looks}) == 4
@@ -80,7 +81,7 @@ def test_an_energy_has_one_colour_whatever_else_is_drawn(caught: list[Figure]) -
     for energy in ({"kinetic": 1.0, "friction": 1.0}, {"kinetic": 1.0, "stored_normal": 1.0, "friction": 1.0}):
         frames = toppling(1)
         frames = replace(frames, energy={name: value + frames.time for name, value in energy.items()})
-        draw_history(frames, "history.png", choice=Choice(("energy",)))
+        draw_history(frames, "history.png", PictureOptions(panels=("energy",)))
     drawn = [{line.get_label(): line.get_color() for line in figure.axes[0].lines} for figure in caught]
     assert {figure["lost to friction"] for figure in drawn} == {ENERGY_LOOKS["lost to friction"][0]}
 
@@ -88,7 +89,7 @@ def test_an_energy_has_one_colour_whatever_else_is_drawn(caught: list[Figure]) -
 def test_round_off_looks_flat(caught: list[Figure]) -> None:
     frames = toppling(1)
     frames.x[:] = 0.1 + 1e-15 * np.arange(len(frames))[:, None]
-    draw_history(frames, "history.png", choice=Choice(("x", "dx")))
+    draw_history(frames, "history.png", PictureOptions(panels=("x", "dx")))
     for panel, axes in enumerate(caught[0].axes):
         low, high = axes.get_ylim()
         assert high - low > 0.999 * LEAST_SPAN
@@ -99,7 +100,7 @@ def test_round_off_looks_flat(caught: list[Figure]) -> None:
 def test_numbers_along_a_constant_differ_and_leave_room_for_its_name(caught: list[Figure], speed: float) -> None:
     frames = toppling(1)
     frames.vx[:] = speed + 1e-9 * np.sin(frames.time)[:, None]
-    draw_history(frames, "history.png", choice=Choice(("vx", "x")))
+    draw_history(frames, "history.png", PictureOptions(panels=("vx", "x")))
     (figure,) = caught
     figure.draw_without_rendering()
     axes = figure.axes[0]
@@ -111,16 +112,16 @@ def test_numbers_along_a_constant_differ_and_leave_room_for_its_name(caught: lis
 
 
 @pytest.mark.parametrize(
-    "values",
+    "options",
     [
-        {"choice": Choice(("speeed",))},
-        {"choice": Choice(blocks=("9",))},
-        {"choice": Choice(("force",))},
-        {"paint": by_speed(toppling(3))},
+        PictureOptions(panels=("speeed",)),
+        PictureOptions(blocks=("9",)),
+        PictureOptions(panels=("force",)),
+        PictureOptions(paint=by_speed(toppling(3))),
     ],
     ids=["panel", "block", "contacts", "speed"],
 )
-def test_what_a_run_does_not_have_or_lines_cannot_show_is_refused(golden: Golden, values: dict[str, object]) -> None:
+def test_what_a_run_does_not_have_or_lines_cannot_show_is_refused(golden: Golden, options: PictureOptions) -> None:
     with pytest.raises(InvalidInputError) as caught:
-        draw_history(toppling(3), "history.png", **values)  # type: ignore[arg-type]
+        draw_history(toppling(3), "history.png", options)
     golden(str(caught.value))

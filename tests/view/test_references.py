@@ -5,6 +5,7 @@ reference; look at it, and rename it if it is better: NAME.new.png to NAME.png.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +19,7 @@ from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.run_data import Support
+from blocksim.view.scene import PictureOptions
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, draw_tornado
 from tests.view.made_up import pressed, toppling
@@ -34,6 +36,7 @@ FRAMES = pressed(toppling(3))
 ROWS = [("x", "2", 98.0, 104.0, 110.0), ("x", "3", 139.0, 141.5, 145.0), ("rotation", "2", -90.0, -90.0, -90.0)]
 NAMES = "quantity", "block", "minimum", "mean", "maximum"
 REPEATS = [SimpleNamespace(**dict(zip(NAMES, row, strict=True))) for row in ROWS]  # in mm and degrees
+MADE_UP = PictureOptions("made up", REPEATS)
 
 
 def tornado(path: Path) -> None:
@@ -45,9 +48,9 @@ def tornado(path: Path) -> None:
 
 
 PICTURES: dict[str, Callable[[Path], None]] = {
-    "strip": lambda path: draw_strip(FRAMES, path, [0.0, 0.4, 0.6], "made up", measured=REPEATS, forces=True),
-    "final": lambda path: draw_final(FRAMES, path, title="made up", measured=REPEATS),
-    "history": lambda path: draw_history(FRAMES, path, title="made up", support=Support(weight=12.0)),
+    "strip": lambda path: draw_strip(FRAMES, path, replace(MADE_UP, times=[0.0, 0.4, 0.6], forces=True)),
+    "final": lambda path: draw_final(FRAMES, path, MADE_UP),
+    "history": lambda path: draw_history(FRAMES, path, PictureOptions("made up", None, Support(weight=12.0))),
     "map": lambda path: SWEEP_KINDS["map"].draw(made_up(grid(3), failed=5), path),
     "tornado": tornado,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -53,12 +54,12 @@ def test_ends_of_a_joint_are_corners_of_either_block_and_corners_alone_are_no_jo
     assert by_pair[0, 2].normal == pytest.approx((0.0, 1.0))
     assert by_pair[0, 4].normal == pytest.approx((0.0, -1.0))  # towards the ground, which comes last
     assert by_pair[0, 1].normal == pytest.approx((1.0, 0.0))
-    assert by_pair[1, 2].width == pytest.approx(0.15)
+    assert math.dist(*by_pair[1, 2].points) == pytest.approx(0.15)
 
 
 def test_a_corner_on_a_face_is_a_joint_of_one_point_and_fixed_blocks_have_none_among_themselves() -> None:
     tip = {"block": "triangle", "angle": "180 deg", "x": 0.1, "y": 0.2}
-    (joint,) = [one for one in joints({"x": 0.1, "y": 0.05, "fixed": True}, tip) if one.width == 0.0]
+    (joint,) = [one for one in joints({"x": 0.1, "y": 0.05, "fixed": True}, tip) if len(one.points) == 1]
     assert (joint.one, joint.other) == (0, 1)
     assert joint.normal == pytest.approx((0.0, 1.0))
     (point,) = joint.points

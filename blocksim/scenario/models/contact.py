@@ -153,11 +153,6 @@ class Contact(Table):
         """Smoothing length in m, as given or by default."""
         return SPACINGS_PER_LENGTH * self.particle_spacing if self.smoothing_length is None else self.smoothing_length
 
-    @property
-    def support_radius(self) -> float:
-        """Radius in m at which the kernel function ends."""
-        return SUPPORT[self.kernel] * self.resolved_smoothing_length
-
     def _check(self) -> None:
         if not LAWS[self.law].is_linear and self.normal_stiffness is not None:
             raise q.invalid(NO_FIXED_STIFFNESS.format(self.law), "normal_stiffness")

@@ -71,7 +71,7 @@ def sets_of_frames(
         for k, (place, one) in enumerate(zip(places_of(present.system), present.system.quantities, strict=True)):
             yield DataSet(
                 place,
-                one.stored_unit,
+                one.unit.replace("/s", " s-1"),  # as H5MD writes it
                 partial(lambda n, k, frames: np.stack([frame.states[n][k] for frame in frames]), n, k),
                 row=(present.count,),
                 chunk=chunk,
@@ -448,7 +448,7 @@ class FrameFile:
             place = f"{PARTICLES}/{system.name}"
             for constant, values in zip(system.constants, elements.constants, strict=True):
                 data_set = self.file.create_dataset(f"{place}/{constant.name}", data=values)
-                data_set.attrs["unit"] = constant.stored_unit
+                data_set.attrs["unit"] = constant.unit.replace("/s", " s-1")
             if elements.outlines is not None:  # (b, k, 2) of every element, the last corner repeated
                 self.file.create_dataset(f"{place}/outlines", data=elements.outlines).attrs["unit"] = "m"
         text = self.file.create_dataset(SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))

@@ -23,6 +23,7 @@ from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 from blocksim.view import kinds, run_data, style, time_panels
 from blocksim.view.history import draw_history_page
 from blocksim.view.report.player import MOST_BYTES, pack_forces, pack_frames, pack_loads, scene_data
+from blocksim.view.scene import PictureOptions
 from blocksim.view.sweeps import outcome_map
 from blocksim.view.sweeps.data import SweepData, short_names
 
@@ -150,7 +151,7 @@ def history_of(
     frames: trajectory.Frames, support: run_data.Support, measured: run_data.Repeats | None
 ) -> tuple[str, list[dict[str, Any]]]:
     """Return the histories of a run, and of each panel its name, place and the ends of its axes."""
-    with draw_history_page(frames, None, measured, support) as (figure, panels):
+    with draw_history_page(frames, PictureOptions(None, measured, support)) as (figure, panels):
         places = [
             {"name": name, "place": _place(axes), "time": axes.get_xlim(), "values": axes.get_ylim()}
             for name, axes in panels.items()
@@ -364,11 +365,6 @@ class CaseTable:
         known = {CASE, *self.keys}
         return tuple(name for name in self.columns if name not in known and not name.endswith(OF_BLOCKS))
 
-    @property
-    def blocks(self) -> tuple[str, ...]:
-        """Names of the blocks."""
-        return tuple(name.removesuffix(".x_mm") for name in self.columns if name.endswith(".x_mm"))
-
     def column(self, name: str) -> list[str]:
         """Return one column; empty texts where there is none."""
         if name not in self.columns:
@@ -399,7 +395,8 @@ def sweep_subject(
     """
     name = table.folder.name if scenario is None else scenario.name
     inside = [value for value in table.column("inside") if value]
-    shown = table.blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
+    blocks = tuple(name.removesuffix(".x_mm") for name in table.columns if name.endswith(".x_mm"))
+    shown = blocks[: max(1, MOST_VALUES // (2 * max(1, len(table.rows))))]
     rows = [] if judged is None else judged["metrics"]["inside"]["rows"]
     limits = {  # of inside, by the column of the table
         f"{row['block']}.{COLUMN_OF[row['quantity']]}": list(row["limits"])
@@ -417,7 +414,7 @@ def sweep_subject(
             ("runs in this page", str(len(members))),
         ],
         "problems": [local_text(text) for text in problems],
-        "hidden_blocks": len(table.blocks) - len(shown),
+        "hidden_blocks": len(blocks) - len(shown),
         "has_members": bool(members),
         "judged": judged,
         "pictures": [(one["label"], one["source"]) for one in pictures],

@@ -53,7 +53,7 @@ def variables_of(sweep: SweepData) -> list[Variable]:
         repeats = sweep.measured.x_mm.get(name)
         ends = np.nanpercentile(x, [RARE, 100.0 - RARE])
         known = ends if repeats is None else np.concatenate([ends, repeats])
-        variables.append(Variable(_in_lines(f"x of {name} (mm)"), x, _around(known, None), repeats=repeats))
+        variables.append(Variable(f"x of {name} (mm)", x, _around(known, None), repeats=repeats))
     return variables
 
 
@@ -62,15 +62,16 @@ def draw_matrix(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[s
     """Give the lower half of the matrix, with histograms on its diagonal and names beside that."""
     variables = variables_of(sweep)
     count, levels = len(variables), [level for one in variables for level in one.levels]
+    gaps = (count - 1) * GAP
     widest = max((style.width_of(level, SMALL_FONT) for level in levels), default=0.0) / style.POINTS_PER_INCH + 0.12
     left, foot = max(LEFT, widest), max(FOOT, widest if levels else 0.0)
-    width = paper.width(style.PAGE_WIDTH, left + _right_of(variables, LOWEST) + _grid(count, LOWEST))
+    width = paper.width(style.PAGE_WIDTH, left + _right_of(variables, LOWEST) + (count * LOWEST + gaps))
     size = LARGEST
     for _ in range(FITTINGS):
-        size = min(size, (width - left - _right_of(variables, size) - (count - 1) * GAP) / count)
+        size = min(size, (width - left - _right_of(variables, size) - gaps) / count)
     size = max(size, LOWEST)
     room = style.COLUMN_WIDTH if paper.size is None else width
-    right = max(_right_of(variables, size), room - left - _grid(count, size))
+    right = max(_right_of(variables, size), room - left - (count * size + gaps))
     own, least, sides = (size, size), (LOWEST, LOWEST), (left, right, HEAD, foot)
     more: dict[str, Any] = {"title": sweep.title, "handles": _entries(sweep), "columns": 4}
     with style.open_panels(paper, range(1, count + 1), own, least, sides, (GAP, GAP), **more) as (figure, panels):
@@ -79,12 +80,9 @@ def draw_matrix(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[s
                 _draw_panel(axes, sweep, up, across)
                 _finish(axes, up, across, is_left=column == 0 < row, is_last=row == count - 1)
             beside: dict[str, Any] = {"transform": axes_of_row[row].transAxes, "va": "center", "fontsize": NAME_FONT}
-            axes_of_row[row].text(1.0 + 0.04 / size, 0.5, up.name, **beside)
+            lines = style.break_lines(up.name, NAME_ROOM, NAME_FONT)
+            axes_of_row[row].text(1.0 + 0.04 / size, 0.5, "\n".join(lines), **beside)
         yield figure
-
-
-def _grid(count: int, size: float) -> float:
-    return count * size + (count - 1) * GAP
 
 
 def _right_of(variables: Sequence[Variable], size: float) -> float:
@@ -92,7 +90,7 @@ def _right_of(variables: Sequence[Variable], size: float) -> float:
     widths = [
         style.width_of(line, NAME_FONT) / style.POINTS_PER_INCH - (len(variables) - 1 - row) * (size + GAP)
         for row, one in enumerate(variables)
-        for line in one.name.split("\n")
+        for line in style.break_lines(one.name, NAME_ROOM, NAME_FONT)
     ]
     return max(*widths, 0.0) + 0.04 + style.EDGE
 
@@ -102,14 +100,10 @@ def _of_input(one: Input, name: str) -> Variable:
         spread = SCATTER * (np.arange(len(one.values)) * GOLDEN % 1.0 - 0.5)
         room = LONGEST_LEVEL * style.POINTS_PER_INCH
         levels = tuple(style.cut_to(level, room, SMALL_FONT) for level in one.levels)
-        return Variable(_in_lines(name), one.values + spread, (-0.5, len(levels) - 0.5), levels=levels)
+        return Variable(name, one.values + spread, (-0.5, len(levels) - 0.5), levels=levels)
     axis = value_axis(one.values, name, one.unit, is_even=one.is_even, typed=one.typed)
     values = axis.scale(one.values)
-    return Variable(_in_lines(axis.label), values, _around(values, axis), is_log=axis.is_log)
-
-
-def _in_lines(name: str) -> str:
-    return "\n".join(style.break_lines(name, NAME_ROOM, NAME_FONT))
+    return Variable(axis.label, values, _around(values, axis), is_log=axis.is_log)
 
 
 def _around(values: run_data.Floats, axis: ValueAxis | None) -> tuple[float, float]:

@@ -301,14 +301,10 @@ SHADES = (
 )
 
 
-def places_of(scenario: Scenario) -> list[system.Floats]:
-    """Return the places (m, (n, 2)) of the particles of each soil."""
-    return [geometry.fill_lattice(table.corners, table.spacing) for table in start.soil_tables(scenario)]
-
-
 def elements_of(scenario: Scenario) -> system.Elements:
     """Return the particles of all soils of a scenario."""
-    tables, places = start.soil_tables(scenario), places_of(scenario)
+    tables = start.soil_tables(scenario)
+    places = [geometry.fill_lattice(table.corners, table.spacing) for table in tables]  # m, (n, 2)
     soils = [*zip(tables, places, strict=True)]
     names = tuple(f"{table.name}.{number}" for table, one in soils for number in range(1, len(one) + 1))
     depth = depth_of_scene(scenario)

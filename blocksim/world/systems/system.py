@@ -27,11 +27,6 @@ class Dataset:
     name: str
     unit: str  # SI, as in "m/s"
 
-    @property
-    def stored_unit(self) -> str:
-        """The unit as H5MD writes it, "m s-1"."""
-        return self.unit.replace("/s", " s-1")
-
 
 def datasets(**units: str) -> tuple[Dataset, ...]:
     """Return numbers by their names and units."""
