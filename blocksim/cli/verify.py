@@ -128,24 +128,21 @@ def bench_command(
             if out is not None:
                 files.write_text(out, json.dumps(data, indent=2) + "\n")
             written = [] if out is None else [f"written: {out}"]
-            notes: list[str] = []
+            groups, notes = [], list[str]()
             for one in outcomes:
-                notes += [f"{one.measurement.name}: {text}" for text in one.findings.notes]
-                notes += [f"{one.measurement.name} shortened: {one.shortened}"] if one.shortened else []
+                name = one.measurement.name
+                groups.append((f"{name}: {one.measurement.title}", [_row(found) for found in one.findings.numbers]))
+                notes += [f"{name}: {text}" for text in one.findings.notes]
+                notes += [f"{name} shortened: {one.shortened}"] if one.shortened else []
             seconds = sum(one.seconds for one in outcomes)
             notes += [*harness.machine_lines(machine), f"{seconds:.0f} s", *written]
-            screen.print(command_line.Report(output.grouped_lines(QUANTITIES, _groups(outcomes), left=2), data, notes))
+            screen.print(command_line.Report(output.grouped_lines(QUANTITIES, groups, left=2), data, notes))
 
 
-def _groups(outcomes: list[harness.BenchmarkRun]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
-    """Yield the name and the rows of each measurement."""
-    for one in outcomes:
-        rows = []
-        for found in one.findings.numbers:
-            spread = (min(found.samples), max(found.samples)) if len(found.samples) > 1 else (math.nan, math.nan)
-            texts = (
-                f"{value:.0f}" if LARGE <= abs(value) < math.inf else case.number(value, BENCH_DIGITS)
-                for value in (found.median, *spread)
-            )
-            rows.append((f"  {found.quantity}", found.unit, *texts))
-        yield f"{one.measurement.name}: {one.measurement.title}", rows
+def _row(found: harness.Number) -> tuple[str, ...]:
+    spread = (min(found.samples), max(found.samples)) if len(found.samples) > 1 else (math.nan, math.nan)
+    texts = (
+        f"{value:.0f}" if LARGE <= abs(value) < math.inf else case.number(value, BENCH_DIGITS)
+        for value in (found.median, *spread)
+    )
+    return f"  {found.quantity}", found.unit, *texts

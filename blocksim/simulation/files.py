@@ -18,7 +18,7 @@ from typing import BinaryIO, Self
 from pydantic import BaseModel
 
 from blocksim.errors import BlocksimError, OutputError, OutputExistsError
-from blocksim.scenario import Scenario, events, input_files, resolution, scenario_to_toml
+from blocksim.scenario import Scenario, input_files, resolution, scenario_to_toml
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, TABLED
 from blocksim.simulation.provenance import run_hash
 
@@ -226,11 +226,6 @@ def is_resolved(plan: Path) -> bool:
 
 
 COPIES = (EXPERIMENT, MOTION, *BODY_MOTIONS)
-
-
-def probe_tables(scenario: Scenario) -> list[str]:
-    """Return the names of the CSV files of the probes of a scenario."""
-    return [f"{PROBE}{name}.csv" for name in events.probe_names(scenario)]
 
 
 def is_of_run(path: Path) -> bool:

@@ -217,8 +217,9 @@ def keep_result(result: Result, summary: Summary, folder: Path) -> Result:
     files.write_text(folder / files.FINAL, trajectory.csv_text(result.columns))
     for name, table in result.endings.items():
         files.write_text(folder / f"{name}.csv", trajectory.csv_text(table))
-    tables = files.probe_tables(result.scenario)
-    for name, series in zip(tables, read_probes(folder / files.FRAMES, result.scenario).values(), strict=True):
+    probes = read_probes(folder / files.FRAMES, result.scenario)
+    tables = {f"{files.PROBE}{name}.csv": series for name, series in probes.items()}
+    for name, series in tables.items():
         files.write_text(folder / name, "".join(series.csv_lines()))
     summary = _with_checksums(summary, folder, tables)
     files.write_text(folder / files.SUMMARY, summary.to_json())

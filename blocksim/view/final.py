@@ -58,16 +58,10 @@ class Labels(NamedTuple):
     rows: NDArray[np.intp]
     is_listed: bool  # in the order of the blocks, and not each below its own
 
-    @property
-    def row_height(self) -> float:
-        """How far apart rows are (points)."""
-        return max(map(len, self.lines), default=0) * LINE + SPACE[1]
-
-    @property
-    def row_count(self) -> int:
-        """How many rows there are; none where there are too many to draw them."""
-        rows = int(self.rows.max(initial=-1)) + 1
-        return rows if rows * max(map(len, self.lines), default=0) <= MOST_LINES else 0
+    def spacing(self) -> tuple[int, float]:
+        """Return how many rows there are, none where there are too many to draw them, and how far apart (points)."""
+        most, rows = max(map(len, self.lines), default=0), int(self.rows.max(initial=-1)) + 1
+        return rows if rows * most <= MOST_LINES else 0, most * LINE + SPACE[1]
 
 
 def labels_of(frames: Frames, frame: int, page: scene.Page, ranges: Sequence[scene.MeasuredRange]) -> Labels:
@@ -130,7 +124,8 @@ def draw_final(frames: Frames, path: Path | str, options: scene.PictureOptions =
         labels = labels_of(frames, frame, page, ranges)
         texts = [_notes(labels, is_measured=bool(ranges)), *explanations, acts.explanation]
         notes = style.break_lines(" ".join(filter(None, texts)), width - 2.0 * SIDE)
-        room = labels.row_count * labels.row_height / style.POINTS_PER_INCH
+        label_rows, apart = labels.spacing()
+        room = label_rows * apart / style.POINTS_PER_INCH
         foot = FOOT + len(notes) * style.LINE + paint.height
         height = page.height + room + foot
         paper.panel(0.0, 1, height - page.panel_height, LOWEST)  # refuses a page that is too small
@@ -145,7 +140,7 @@ def draw_final(frames: Frames, path: Path | str, options: scene.PictureOptions =
         canvas = page.canvas(figure, bottom=height - margins[1] - page.panel_height)
         scene.draw_scene(canvas, scene.Scene(frames, support, paint), frame)
         scene.finish_panel(canvas, labelled=True, rows=rows)
-        if labels.row_count:
+        if label_rows:
             scene.draw_centres(canvas, frames, frame)
             scene.draw_repeats(canvas, ranges)
             _draw_labels(style.add_axes(figure, SIDE, height - page.height - room, page.panel_width, room), labels)
@@ -166,19 +161,20 @@ def _draw_labels(axes: "style.Axes", labels: Labels) -> None:
     """Draw the labels below the axis, on a scale of points."""
     axes.set_axis_off()
     axes.set_xlim(0.0, style.size_of(axes)[0] * style.POINTS_PER_INCH)
-    axes.set_ylim(-labels.row_count * labels.row_height, 0.0)
+    count, apart = labels.spacing()
+    axes.set_ylim(-count * apart, 0.0)
     at: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": FONT}
     for lines, middle, row in zip(labels.lines, labels.middles, labels.rows, strict=True):
         for number, line in enumerate(lines):
             look: dict[str, Any] = {"weight": "bold"} if number == 0 else {}
             look |= {"color": style.MEASURED_COLOUR} if line.startswith("measured") and number else {}
-            axes.text(middle, -row * labels.row_height - number * LINE, line, **look, **at)
+            axes.text(middle, -row * apart - number * LINE, line, **look, **at)
 
 
 def _notes(labels: Labels, *, is_measured: bool) -> str:
     if not labels.lines:
         return ""
-    if not labels.row_count:
+    if not labels.spacing()[0]:
         return f"{len(labels.lines)} blocks: too many to name x and rotation of each. {scene.TOP}"
     where = "Listed by block" if labels.is_listed else "Below each block"
     bars = "Dot and bar: measured mean and range of the centre (mm). " if is_measured else ""

@@ -34,9 +34,10 @@ def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version
 def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
     """Return the text of the page; those subjects that have a parent are reached from it only."""
     listed = [subject for subject in subjects if not subject.page.get("parent")]
-    style = _part("style.css")
+    names = ("style.css", *(f"{name}.js" for name in SCRIPTS))
+    style, *scripts = ((PARTS / name).read_text(encoding="utf-8") for name in names)
     # all scripts as one, whose names are seen by nothing else in the page
-    script = '\n(() => {\n"use strict";\n' + "\n".join(_part(f"{name}.js") for name in SCRIPTS) + "\n})();\n"
+    script = '\n(() => {\n"use strict";\n' + "\n".join(scripts) + "\n})();\n"
     # what the page may load and run: its own style and script and pictures within it, nothing else
     nothing = (f"{name} 'none'" for name in ("default-src", "base-uri", "form-action"))
     hashes = {kind: sha256(text.encode()).digest() for kind, text in (("style", style), ("script", script))}
@@ -49,21 +50,17 @@ def page_text(subjects: Sequence[Subject], *, title: str, version: str) -> str:
 
 @functools.cache
 def _environment() -> Any:
-    from jinja2 import DictLoader, Environment, StrictUndefined
+    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    texts = {name: _part(name) for name in ("page.html", "parts.html")}
+    loader = PackageLoader("blocksim.view.report", "parts")
     environment = Environment(
-        loader=DictLoader(texts), autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
+        loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
     environment.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}
     environment.filters["fixed"] = lambda value, digits: f"{value:z.{digits}f}".replace("-", "−")  # for people
     environment.filters["own"] = Markup  # for our own style and scripts, never for what comes from a scenario
     return environment
-
-
-def _part(name: str) -> str:
-    return (PARTS / name).read_text(encoding="utf-8")
 
 
 def labels(subjects: Sequence[Subject]) -> dict[str, str]:
