@@ -126,7 +126,7 @@ def scaled(stack: Stack, length: float, scheme: str) -> Simulation:
         {"static": mu, "kinetic": 0.8 * mu, "transition_speed": 5e-3 * time}
         for mu in (stack.friction, stack.ground_friction)
     ]
-    stepping = {"step": RIGID_STEP * time, "velocity_tolerance": 1e-11 * time, "restitution_threshold": 0.01 * time}
+    stepping = {"step": RIGID_STEP * time, "velocity_tolerance": 1e-9 * time, "restitution_threshold": 0.01 * time}
     material = {"density": 2700.0, "young_modulus": 69e9 * SCALE * length, "poisson_ratio": 0.3}
     sizes = [{name: body[name] * length for name in (*SIZES, "length")} for body in stack.bodies]
     scene = build_scene(
@@ -150,6 +150,5 @@ def scaled(stack: Stack, length: float, scheme: str) -> Simulation:
             }
         )
     )
-    if scheme == EXPLICIT:
-        scene.world.controls[0].check_every = 100
+    scene.world.controls[0].check_every = 100
     return Simulation(scene)

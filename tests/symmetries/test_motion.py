@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import assume, strategies as st
 
+from blocksim.scenario import scenario_from_mapping
+from blocksim.simulation.schemes import build_scene
+from blocksim.verification.scene import Simulation
 from tests.symmetries.scenes import (
     BEFORE_CHAOS,
     EXPLICIT,
@@ -109,30 +114,59 @@ def test_collisions_are_the_same_in_a_moving_frame(scheme: str, examples: int) -
     for_all(st.tuples(stacks(3), st.integers(0, 1000), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), examples, check)
 
 
+@SCHEMES
 @some(6, 150)
-def test_larger_stack_moves_alike_to_the_last_bit(examples: int) -> None:
+def test_larger_stack_moves_alike_to_the_last_bit(scheme: str, examples: int) -> None:
     """Lengths by 4^k, times by 2^k: powers of two change no digit."""
 
     def check(scene: tuple[Stack, int]) -> None:
         stack, power = scene
         length, time = 4.0**power, 2.0**power
-        one, two = scaled(stack, 1.0, EXPLICIT), scaled(stack, length, EXPLICIT)
+        one, two = scaled(stack, 1.0, scheme), scaled(stack, length, scheme)
         assert two.step == one.step * time
         units = np.array([length, length, 1.0, length / time, length / time, 1.0 / time])
-        for steps in (1, 1000, round(0.1 / one.step)):
+        for steps in (1, 200) if scheme == RIGID else (1, 1000, round(0.1 / one.step)):
             np.testing.assert_array_equal(two.to_step(steps).state() / units, one.to_step(steps).state())
 
     for_all(st.tuples(stacks(), st.integers(-8, 10).filter(bool)), examples, check)
 
 
-@some(6, 150)
-def test_larger_stack_of_rigid_contacts_moves_alike(examples: int) -> None:
-    """A tie between faces is decided by 1e-7 m at any scale, so some points lift off a step sooner."""
+@pytest.mark.parametrize(("offset", "sides", "restitution"), [(0.6, 4, 0.2), (0.6, 4, 0.6), (0.65, 6, 0.2)])
+def test_blocks_of_a_tenth_of_a_millimetre_and_of_a_kilometre_move_as_those_of_a_metre(
+    offset: float, sides: int, restitution: float
+) -> None:
+    """A staircase of rigid contacts falls; what a user sets, and the threshold of rebounds, is scaled with it."""
 
-    def check(scene: tuple[Stack, int]) -> None:
-        stack, power = scene
-        length = 4.0**power
-        one, two = (scaled(stack, size, RIGID).to_step(200).state() for size in (1.0, length))
-        assert apart(two / np.array([length, length, 1.0, 1.0, 1.0, 1.0]), one) <= allowed(stack, RIGID)
+    def states(size: float) -> list[Any]:
+        time = float(np.sqrt(size))
+        corners = [[size * np.cos(k * np.pi / 3), size * np.sin(k * np.pi / 3)] for k in range(6)]
+        box: dict[str, object] = {"width": size, "height": 0.8 * size, "length": size}
+        shape = box if sides == 4 else {"outline": corners, "depth": size}
+        height = size * (0.8 if sides == 4 else np.sqrt(3.0))
+        friction = {"static": 0.4, "kinetic": 0.3, "transition_speed": 5e-3 * time}
+        tables = {
+            "schema": 1,
+            "name": "scaled",
+            "materials": {"any": {"density": 2700.0, "young_modulus": 69e9 * size, "poisson_ratio": 0.3}},
+            "blocks": {"block": {**shape, "material": "any"}},
+            "bodies": [{"block": "block", "x": i * offset * size, "y": height * (i + 0.5)} for i in range(3)],
+            "friction": {"block_block": friction, "block_ground": friction},
+            "contact": {"restitution": restitution},
+            "time": {
+                "scheme": RIGID,
+                "end": 10.0 * time,
+                "stop_at_rest": False,
+                "step": 2e-3 * time,
+                "velocity_tolerance": 1e-9 * time,
+                "restitution_threshold": 0.01 * time,
+            },
+        }
+        run = Simulation(build_scene(scenario_from_mapping(tables)))
+        units = np.array([size, size, 1.0, size / time, size / time, 1.0 / time])
+        return [run.to_step(steps).state() / units for steps in (100, 400)]
 
-    for_all(st.tuples(stacks(), st.integers(-2, 4).filter(bool)), examples, check)
+    metre = states(1.0)
+    assert np.abs(metre[-1][:, 2]).max() > 0.3  # rad: it falls
+    for size in (1e-4, 1e3):
+        for one, two in zip(metre, states(size), strict=True):
+            np.testing.assert_allclose(two, one, atol=1e-9)

@@ -4,7 +4,7 @@ Contact laws are Newton's restitution and Coulomb's friction, both as impulses; 
 that steps are 0.1 to 1 ms long. A step of length dt is
 
     neighbours is the list of pairs still good? else make it and its colours anew            neighbours.py
-    manifolds  the contact manifold of every pair, kept for the whole step                  manifold.py
+    manifolds  the contact manifold of every pair, kept for the whole step                  narrow_phase.py
     substeps   each of length h: kick, warm start, position pass, drift, velocity pass      passes.py, motion.py
     finish     poses and velocities back to the bodies                                      motion.py
 

@@ -27,12 +27,12 @@ CONSTRAINT = record_type(
     "shear_arm_a shear_arm_b "  # m: r x t, the same for both points, as they lie on one face
     "gap_one gap_two "  # m: when the step began; FAR where there is no such point
     "normal_one normal_two shear "  # N s: impulses of the last substep: pushing apart, on body a along the tangent
-    "bend shear_bend",  # m/s: gain of the velocities at the points in half a substep, as bodies turn; faces.py
+    "bend shear_bend",  # m/s: gain of the velocities at the points in half a substep, as bodies turn; slip.py
     indices="a b material",  # bodies; place in the table of interactions
     # of the manifold in the current step: AWAY, OPEN or TOUCHING; its impulses are those of impacts that are over:
     # NOT_STRUCK, STRUCK, STRUCK_AT_REST; FORGOTTEN of the last one when the next step has begun without them
     flags="reach is_struck "
-    "corner_one corner_two",  # of a polygon's pair: the corners that the points are, see polygons.py; else zero
+    "corner_one corner_two",  # of a polygon's pair: the corners that the points are, see narrow_phase.py; else zero
 )
 # Four active constraints of one colour, field by field; see groups.py. Two fields share a cache line, and those that a
 # sweep needs lie side by side: crowds fill the cache, and wait for memory more than for anything else.

@@ -74,24 +74,6 @@ def coupling(group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: B
     return load(lane, group.friction) * greater(abs(by_one) / one, abs(by_two) / two)
 
 
-@rare_kernel
-def find_couplings(contacts: Contacts, begin: int, end: int) -> None:
-    """Mark those of some groups that have a constraint which sweeps alone may not bring to an end."""
-    for m in range(begin, end):
-        group = contacts.groups[m]
-        if group.count == 1:
-            group.is_coupled = is_coupled(contacts, group, 0)
-        else:
-            group.is_coupled = is_coupled(contacts, group, None)
-
-
-@rare_kernel
-def forget_couplings(contacts: Contacts, begin: int, end: int) -> None:
-    """Mark none of some groups."""
-    for m in range(begin, end):
-        contacts.groups[m].is_coupled = 0
-
-
 @kernel
 def is_coupled(contacts: Contacts, group: Record, lane: Lane) -> bool:
     """Return True if the coupling of a constraint of a group is strong."""

@@ -204,8 +204,10 @@ def unpack_groups(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @jit.kernel
-def total(x: Lanes, count: int) -> float:
-    """Return the sum of the first `count` lanes, at least two."""
+def total(lane: Lane, x: Lanes, count: int) -> float:
+    """Return the sum of the first `count` lanes, at least two, or the number of a single one."""
+    if lane is not None:
+        return x
     one, two, three, four = split(x)
     return (one + two) + ((three if count > 2 else 0.0) + (four if count > 3 else 0.0))
 

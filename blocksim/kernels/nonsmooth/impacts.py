@@ -44,7 +44,7 @@ from blocksim.kernels.common.arrays import TEAM_SIZE, Integers, Record, Records
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.common.simd import WIDTH, load, store
-from blocksim.kernels.nonsmooth import arrays, clusters, motion, rounds, sweeps
+from blocksim.kernels.nonsmooth import arrays, clusters, motion, passes, rounds, sweeps
 
 NEITHER, LOW, HIGH = range(3)  # what the last solution of a cluster is kept as: that with too little or too much energy
 
@@ -273,14 +273,17 @@ def between(x: float, y: float, share: float) -> float:
 
 MOST_ROUNDS = 100  # what approaches then does not rebound
 MOST_TRIES = 30  # shares of rebounds; what energy is left then is made up between the last two
-# of impacts, what they miss is energy: such a share of the tolerance of the velocity pass, between these (m/s)
-TOLERANCE_SHARE, LEAST_TOLERANCE, MOST_TOLERANCE = 1e-7, 1e-10, 1e-6
+TOLERANCE_SHARE = 1e-7  # of the tolerance of the velocity pass: what impacts miss is energy
+LEAST_TOLERANCE, MOST_TOLERANCE = 1e-8, 1e-4  # of the threshold, between these
 
 
 @rare_kernel
 def tolerance_of(stepping: Record) -> float:
-    """Return to what (m/s) a round of impacts is solved."""
-    return max(LEAST_TOLERANCE, min(MOST_TOLERANCE, TOLERANCE_SHARE * stepping.tolerance))
+    """Return to what (m/s) a round of impacts is solved; without a threshold no better than round-off of gaps."""
+    wanted = TOLERANCE_SHARE * stepping.tolerance
+    if stepping.threshold > 0.0:
+        return max(LEAST_TOLERANCE * stepping.threshold, min(MOST_TOLERANCE * stepping.threshold, wanted))
+    return max(stepping.touch_gap * stepping.open_bias, wanted)
 
 
 @rare_kernel
@@ -347,7 +350,7 @@ def restrain(
     for number in range(MOST_TRIES):
         aim_share(contacts, groups[0], groups[1])
         barrier(team)
-        sweeps.velocity_pass(contacts, team, k, sweeps.VELOCITY, tolerance_of(stepping))
+        sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(stepping))
         barrier(team)
         if k == 0:
             stepping.has_gain = judge(contacts, number == MOST_TRIES - 1)
@@ -366,7 +369,7 @@ def go_round(
     contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]
 ) -> None:
     """Solve one round that has been aimed."""
-    sweeps.velocity_pass(contacts, team, k, sweeps.VELOCITY, tolerance_of(contacts.stepping[0]))
+    sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(contacts.stepping[0]))
     barrier(team)
     if k == 0:
         contacts.stepping[0].has_gain = clusters.weigh(contacts)
@@ -407,6 +410,6 @@ def follow_impacts(
     barrier(team)
     rounds.aim_rest(contacts, groups[0], groups[1])
     barrier(team)
-    sweeps.velocity_pass(contacts, team, k, sweeps.VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
+    sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
     rounds.bring_back(contacts, groups[0], groups[1], False)
     barrier(team)

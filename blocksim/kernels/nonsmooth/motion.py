@@ -85,40 +85,45 @@ def is_in_flight(state: Record, before: Record, kx: float, ky: float) -> bool:
 
 
 @kernel
-def place(body: Record, state: Record, before: Record, share: float, h: float, gravity: tuple[float, float]) -> None:
+def place(body: Record, state: Record, before: Record, share: float, kick: tuple[float, float, float]) -> None:
     """End a step: bring the pose of a body up to date, exactly turned, and its velocities too.
 
     Velocities live half a substep before positions; that of a body in flight is brought up to the positions. That of
-    one in touch is left: a support holds against the half kick too. `share` is that of the last kick.
+    one in touch is left: a support holds against the half kick too. `kick` is what a substep of gravity and loads
+    changes velocities by (m/s, m/s, rad/s), `share` is that of the last one.
     """
-    hx = h * gravity[0]
-    hy = h * gravity[1]
+    kx, ky, turned = kick
     body.vx = state.vx
     body.vy = state.vy
     body.spin = state.spin
-    if is_in_flight(state, before, share * hx, share * hy):
-        body.vx += 0.5 * hx
-        body.vy += 0.5 * hy
+    if is_in_flight(state, before, share * kx, share * ky):
+        body.vx += 0.5 * kx
+        body.vy += 0.5 * ky
+        body.spin += 0.5 * turned
     body.x += state.dx
     body.y += state.dy
     body.angle += state.turned
     body.cos, body.sin = turn(body.cos, body.sin, state.turned)
-    before.lifted += state.dx * gravity[0] + state.dy * gravity[1]
     state.dx = 0.0
     state.dy = 0.0
     state.turned = 0.0
 
 
 @kernel
-def place_all(
-    bodies: Records, contacts: arrays.Contacts, first: int, last: int, share: float, gravity: tuple[float, float]
-) -> None:
+def place_all(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> None:
     """End a step of the free bodies from `first` to before `last`."""
+    contacts = scene.contacts
     h = contacts.stepping[0].substep
+    gx, gy = scene.world.controls[0].gravity_x, scene.world.controls[0].gravity_y
+    kick = (h * gx, h * gy, 0.0)
     for i in range(first, last):
         state = contacts.states[i]
         if state.inverse_mass > 0.0:
-            place(bodies[i], state, contacts.before[i], share, h, gravity)
+            contacts.before[i].lifted += state.dx * gx + state.dy * gy
+            if scene.pushes.size > 1:
+                one = scene.pushes[i]
+                kick = (h * (gx + one.ax), h * (gy + one.ay), h * one.rate)
+            place(scene.world.bodies[i], state, contacts.before[i], share, kick)
 
 
 @rare_kernel
@@ -179,29 +184,6 @@ def tally_loads(scene: arrays.Nonsmooth, first: int, last: int, share: float) ->
             along = one.ax * (before.vx + state.vx) + one.ay * (before.vy + state.vy)
             turning = one.rate * (before.spin + state.spin)
             one.work += half * (body.mass * along + body.inertia * turning)
-
-
-@rare_kernel
-def show_velocities(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> None:
-    """Bring the velocities of bodies in flight up to their places, at the end of a step; `share` is of the last kick.
-
-    As motion.place does with gravity alone.
-    """
-    h = scene.contacts.stepping[0].substep
-    controls = scene.world.controls[0]
-    for i in range(first, last):
-        state = scene.contacts.states[i]
-        if state.inverse_mass > 0.0:
-            body = scene.world.bodies[i]
-            before = scene.contacts.before[i]
-            one = scene.pushes[i]
-            kx = h * (controls.gravity_x + one.ax)
-            ky = h * (controls.gravity_y + one.ay)
-            off = abs(state.vx - before.vx - share * kx) + abs(state.vy - before.vy - share * ky)
-            flies = off <= IN_FLIGHT * (abs(kx) + abs(ky))
-            body.vx = state.vx + (0.5 * kx if flies else 0.0)
-            body.vy = state.vy + (0.5 * ky if flies else 0.0)
-            body.spin = state.spin + (0.5 * h * one.rate if flies else 0.0)
 
 
 @rare_kernel

@@ -16,6 +16,7 @@ from blocksim.kernels.common.simd import (
     Lanes,
     branch,
     fields_0,
+    four,
     greater,
     is_all,
     lesser,
@@ -25,7 +26,7 @@ from blocksim.kernels.common.simd import (
     store,
     write_fields_0,
 )
-from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
+from blocksim.kernels.nonsmooth.arrays import FAR, PART, Contacts
 from blocksim.kernels.nonsmooth.cone import shear_limits, shear_within, solve_two
 from blocksim.kernels.nonsmooth.groups import (
     Bodies,
@@ -33,6 +34,7 @@ from blocksim.kernels.nonsmooth.groups import (
     constraints_of,
     normal_masses,
     tangent_mass,
+    total,
 )
 from blocksim.kernels.nonsmooth.slip import Constraints, Slip, presses, slip_of
 
@@ -41,7 +43,7 @@ from blocksim.kernels.nonsmooth.slip import Constraints, Slip, presses, slip_of
 def gaps(
     group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies, bend_time: float
 ) -> tuple[Lanes, Lanes]:
-    """Return both gaps (m) as they are now; `bend_time` (s) is that of faces.py now."""
+    """Return both gaps (m) as they are now; `bend_time` (s) is that of slip.py now."""
     slip = slip_of(constraint, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
     bent = bend_time * load(lane, group.bend)
     return load(lane, group.gap_one) + slip.one + bent, load(lane, group.gap_two) + slip.two + bent
@@ -257,25 +259,6 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
 
 
 @kernel
-def first_velocity_group(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
-    """Begin the velocity pass of constraints; return the largest changes of velocity (m/s)."""
-    constraint = constraints_of(group, lane)
-    a = bodies_at(contacts, group.a, lane)
-    b = bodies_at(contacts, group.b, lane)
-    t_one, t_two = aim(contacts, group, lane, constraint, a, b)
-    return reach(contacts, group, lane, constraint, a, b, t_one, t_two)
-
-
-@kernel
-def velocity_group(contacts: Contacts, group: Record, lane: Lane) -> Lanes:
-    """Continue the velocity pass of constraints; return the largest changes of velocity (m/s)."""
-    constraint = constraints_of(group, lane)
-    a = bodies_at(contacts, group.a, lane)
-    b = bodies_at(contacts, group.b, lane)
-    return reach(contacts, group, lane, constraint, a, b, load(lane, group.target_one), load(lane, group.target_two))
-
-
-@kernel
 def reach(
     contacts: Contacts,
     group: Record,
@@ -318,6 +301,28 @@ def reach(
     d_shear = shear - old_shear
     push_and_drag(contacts, group, lane, constraint, a, b, normal, d_two, d_shear)
     return (a.inverse_mass + b.inverse_mass) * greater(greater(abs(d_one), abs(d_two)), abs(d_shear))
+
+
+WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
+
+
+@kernel
+def solve_group(contacts: Contacts, group: Record, lane: Lane, task: int) -> Lanes:
+    """Do one task for the constraints of a group; return the largest changes of velocity (m/s) of a velocity pass."""
+    if task == WARM:
+        warm_group(contacts, group, lane)
+        return four(lane, 0.0, 0.0, 0.0, 0.0)
+    if task == POSITION:
+        position_group(contacts, group, lane)
+        return four(lane, 0.0, 0.0, 0.0, 0.0)
+    constraint = constraints_of(group, lane)
+    a = bodies_at(contacts, group.a, lane)
+    b = bodies_at(contacts, group.b, lane)
+    if task == FIRST_VELOCITY:
+        t_one, t_two = aim(contacts, group, lane, constraint, a, b)
+    else:
+        t_one, t_two = load(lane, group.target_one), load(lane, group.target_two)
+    return reach(contacts, group, lane, constraint, a, b, t_one, t_two)
 
 
 @kernel
@@ -374,3 +379,15 @@ def taken_by(
     else:
         given = 0.0 * shear
     return slip.one * normal_one + slip.two * normal_two, slip.shear * shear, -given
+
+
+@kernel
+def tally_group(contacts: Contacts, then: Records, m: int, lane: Lane, gx: float, gy: float) -> None:
+    """Tally the constraints of group m; fields of `then` and (gx, gy) as in taken_by."""
+    group = contacts.groups[m]
+    tally = contacts.tallies[m // PART]
+    normals, shears, gifts = taken_by(contacts, then, group, lane, gx, gy)
+    tally.impacts -= 0.5 * total(lane, normals, group.count)
+    tally.friction -= 0.5 * total(lane, shears, group.count)
+    if contacts.stepping[0].is_shaken:
+        tally.to_support += total(lane, gifts, group.count)

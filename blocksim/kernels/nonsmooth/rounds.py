@@ -157,17 +157,10 @@ def tally_round(contacts: arrays.Contacts, begin: int, end: int, gx: float, gy: 
         aside = contacts.asides[m]
         if aside.is_hit:
             group = contacts.groups[m]
-            tally = contacts.tallies[m // arrays.PART]
             if group.count == 1:
-                normal, shear, given = passes.taken_by(contacts, contacts.impacts, group, 0, gx, gy)
-                tally.impacts -= 0.5 * normal
-                tally.friction -= 0.5 * shear
-                tally.to_support += given
+                passes.tally_group(contacts, contacts.impacts, m, 0, gx, gy)
             else:
-                normals, shears, gifts = passes.taken_by(contacts, contacts.impacts, group, None, gx, gy)
-                tally.impacts -= 0.5 * groups.total(normals, group.count)
-                tally.friction -= 0.5 * groups.total(shears, group.count)
-                tally.to_support += groups.total(gifts, group.count)
+                passes.tally_group(contacts, contacts.impacts, m, None, gx, gy)
             store(None, aside.normal_one, load(None, aside.normal_one) + load(None, group.normal_one))
             store(None, aside.normal_two, load(None, aside.normal_two) + load(None, group.normal_two))
             store(None, aside.shear, load(None, aside.shear) + load(None, group.shear))

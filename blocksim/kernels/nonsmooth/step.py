@@ -21,19 +21,18 @@ from blocksim.kernels.common.arrays import (
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.energy import weights_power
 from blocksim.kernels.common.members import Watched, frame_to_watch, member as world_of, of_member, watch
-from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth import (
     arrays,
     energy,
-    faces,
     groups,
     impacts,
-    manifold,
     motion,
+    narrow_phase,
     neighbours,
     parts,
-    polygon_fours,
+    passes,
     rounds,
+    slip,
     sweeps,
 )
 from blocksim.kernels.nonsmooth.begin import is_start, load_states
@@ -62,7 +61,7 @@ def prepare(scene: arrays.Nonsmooth, number: int, share: float) -> None:
     stepping.is_shaken = supports.has_motion(controls)
     if stepping.is_shaken:
         motion.drive(scene, number)
-    faces.follow_curvature(stepping, number)
+    slip.follow_curvature(stepping, number)
     stepping.fall_x = stepping.substep * controls.gravity_x
     stepping.fall_y = stepping.substep * controls.gravity_y
     stepping.pull_x = stepping.fall_x
@@ -91,7 +90,7 @@ def start(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -> 
         if scene.world.loads.size > 0:
             motion.kick_by_loads(scene, number, first, last, share, 0.0)
         barrier(team)
-        sweeps.sweep(contacts, sweeps.WARM, team, k)
+        sweeps.sweep(contacts, passes.WARM, team, k)
     else:
         last_share = kick_share(number - 1, is_first_step)
         motion.kick_all_warm(contacts.states, contacts.before, first, last, last_share, hx, hy)
@@ -168,11 +167,11 @@ def substep(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -
         prepare(scene, number, share)
     note_what_presses(scene, k, number, is_first_step, contacts.asides)
     start(scene, k, number, is_first_step)
-    sweeps.sweep(contacts, sweeps.POSITION, team, k)
+    sweeps.sweep(contacts, passes.POSITION, team, k)
     ground = last + (k == team[TEAM_SIZE] - 1)  # which may move, is the last
     motion.drift_all(contacts.states, first, ground, stepping.substep)
     barrier(team)
-    sweeps.velocity_pass(contacts, team, k, sweeps.FIRST_VELOCITY, stepping.tolerance)
+    sweeps.velocity_pass(contacts, team, k, passes.FIRST_VELOCITY, stepping.tolerance)
     go_through_impacts(scene, k, (first, last), share, contacts.asides)
     first, last = tally(scene, k, share)
     if number == stepping.substeps - 1:
@@ -262,40 +261,6 @@ def supervise(scene: arrays.Nonsmooth, k: int, task: int) -> int:
 
 
 @jit.kernel
-def find_manifolds(scene: arrays.Nonsmooth, begin: int, end: int) -> None:
-    """Find the manifolds of some constraints."""
-    contacts = scene.contacts
-    bodies = scene.world.bodies
-    constraints = contacts.constraints
-    ground = bodies.size - 1
-    stepping = contacts.stepping[0]
-    h = stepping.substep
-    ahead = 0.5 * (stepping.length - h)
-    polygon_fours.find_manifolds_of_polygons(contacts, bodies, begin, end, ahead, scene.world.corners)
-    r = begin
-    while r < end:
-        if r + WIDTH <= end and manifold.are_four_of_blocks(constraints, r, bodies):
-            manifold.collide_four(contacts, bodies, r, ahead)
-            r += WIDTH
-        elif polygon_fours.is_left_to_fours(constraints[r], bodies, scene.world.corners):
-            r += 1
-        else:
-            constraint = constraints[r]
-            states = contacts.states
-            place = manifold.Place(stepping.margin, ahead, 0.5 * h, constraint.b == ground, stepping)
-            manifold.collide(
-                constraint,
-                bodies[constraint.a],
-                bodies[constraint.b],
-                states[constraint.a],
-                states[constraint.b],
-                place,
-                scene.world.corners,
-            )
-            r += 1
-
-
-@jit.kernel
 def do_step(scene: arrays.Nonsmooth, k: int) -> int:
     """Take one step as thread k, in as many parts as it takes; return the status code."""
     contacts = scene.contacts
@@ -320,7 +285,7 @@ def do_part(scene: arrays.Nonsmooth, k: int) -> int:
     first, last = sweeps.part_of(0, contacts.stepping[0].constraint_count, k, size)
     if contacts.stepping[0].parts > 0:
         rounds.forget_struck(contacts, first, last)
-    find_manifolds(scene, first, last)
+    narrow_phase.find_manifolds(scene, first, last)
     if supervise(scene, k, GATHER) == UNDER_WAY:
         return UNDER_WAY
     begin, end = sweeps.part_of(0, contacts.stepping[0].group_count, k, size)
@@ -331,11 +296,7 @@ def do_part(scene: arrays.Nonsmooth, k: int) -> int:
         substep(scene, k, number, is_first)
     groups.unpack_groups(contacts, begin, end)
     first, last = bodies_of(contacts, k, size)
-    gravity = (world.controls[0].gravity_x, world.controls[0].gravity_y)
-    share = kick_share(count - 1, is_first)
-    motion.place_all(world.bodies, contacts, first, last, share, gravity)
-    if world.loads.size > 0:
-        motion.show_velocities(scene, first, last, share)
+    motion.place_all(scene, first, last, kick_share(count - 1, is_first))
     return supervise(scene, k, CHECK)
 
 
@@ -352,13 +313,6 @@ def advance_thread(scene: arrays.Nonsmooth, last_step: int, k: int) -> int:
         status = do_step(scene, k)
     barrier(scene.world.team)
     return status
-
-
-@jit.kernel
-def advance_single(scene: arrays.Nonsmooth, last_step: int) -> int:
-    """Step a world with one thread; see advance."""
-    scene.world.team[TEAM_SIZE] = 1
-    return advance_thread(scene, last_step, 0)
 
 
 @jit.entry_kernel
@@ -407,7 +361,8 @@ def member(scenes: arrays.Nonsmooth, m: int) -> arrays.Nonsmooth:
 @jit.rare_kernel
 def advance_member(scene: arrays.Nonsmooth, last_step: int) -> int:
     """Step one member; see advance."""
-    return advance_single(scene, last_step)
+    scene.world.team[TEAM_SIZE] = 1
+    return advance_thread(scene, last_step, 0)
 
 
 @jit.entry_kernel

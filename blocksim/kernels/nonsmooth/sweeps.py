@@ -22,91 +22,28 @@ def part_of(begin: int, end: int, k: int, size: int) -> tuple[int, int]:
 
 
 @kernel
-def warm_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Warm-start the constraints of some groups."""
-    for m in range(begin, end):
-        group = contacts.groups[m]
-        if group.count == 1:
-            passes.warm_group(contacts, group, 0)
-        else:
-            passes.warm_group(contacts, group, None)
-
-
-@kernel
-def position_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Go through the position pass of some groups."""
-    for m in range(begin, end):
-        group = contacts.groups[m]
-        if group.count == 1:
-            passes.position_group(contacts, group, 0)
-        else:
-            passes.position_group(contacts, group, None)
-
-
-@kernel
-def first_velocity_constraints(contacts: arrays.Contacts, begin: int, end: int) -> float:
-    """Begin the velocity pass of some groups; return the largest change of velocity (m/s)."""
+def go_through(contacts: arrays.Contacts, task: int, begin: int, end: int) -> float:
+    """Do one task of passes.py for some groups; return the largest change of velocity (m/s) of a velocity pass."""
     largest = spread(0.0)
     single = 0.0
     for m in range(begin, end):
         group = contacts.groups[m]
         if group.count == 1:
-            single = greater(passes.first_velocity_group(contacts, group, 0), single)
+            single = greater(passes.solve_group(contacts, group, 0, task), single)
         else:
-            largest = greater(passes.first_velocity_group(contacts, group, None), largest)
-    return max(single, groups.highest(largest))
-
-
-@kernel
-def velocity_constraints(contacts: arrays.Contacts, begin: int, end: int) -> float:
-    """Go once more through the velocity pass of some groups; return the largest change of velocity (m/s)."""
-    largest = spread(0.0)
-    single = 0.0
-    for m in range(begin, end):
-        group = contacts.groups[m]
-        if group.count == 1:
-            single = greater(passes.velocity_group(contacts, group, 0), single)
-        else:
-            largest = greater(passes.velocity_group(contacts, group, None), largest)
+            largest = greater(passes.solve_group(contacts, group, None, task), largest)
     return max(single, groups.highest(largest))
 
 
 @kernel
 def tally_constraints(contacts: arrays.Contacts, begin: int, end: int, gx: float, gy: float) -> None:
     """Tally the constraints of some groups; (gx, gy), m/s, is what velocities lack of gravity."""
-    is_shaken = contacts.stepping[0].is_shaken
     for m in range(begin, end):
         group = contacts.groups[m]
-        tally = contacts.tallies[m // arrays.PART]
         if group.count == 1:
-            normal, shear, given = passes.taken_by(contacts, contacts.before, group, 0, gx, gy)
-            tally.impacts -= 0.5 * normal
-            tally.friction -= 0.5 * shear
-            if is_shaken:
-                tally.to_support += given
+            passes.tally_group(contacts, contacts.before, m, 0, gx, gy)
         else:
-            normals, shears, gifts = passes.taken_by(contacts, contacts.before, group, None, gx, gy)
-            tally.impacts -= 0.5 * groups.total(normals, group.count)
-            tally.friction -= 0.5 * groups.total(shears, group.count)
-            if is_shaken:
-                tally.to_support += groups.total(gifts, group.count)
-
-
-WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
-
-
-@kernel
-def go_through(contacts: arrays.Contacts, task: int, begin: int, end: int) -> float:
-    """Do one task for some groups; return the largest change of velocity (m/s) where it is of interest."""
-    if task == WARM:
-        warm_constraints(contacts, begin, end)
-    elif task == POSITION:
-        position_constraints(contacts, begin, end)
-    elif task == FIRST_VELOCITY:
-        return first_velocity_constraints(contacts, begin, end)
-    else:
-        return velocity_constraints(contacts, begin, end)
-    return 0.0
+            passes.tally_group(contacts, contacts.before, m, None, gx, gy)
 
 
 @kernel
@@ -146,10 +83,12 @@ def agree(contacts: arrays.Contacts, team: Integers, k: int, number: int, larges
 def hold_back(contacts: arrays.Contacts, team: Integers, k: int, is_late: bool) -> None:
     """Let friction that couples strongly go a share of the way from now on, or all of it again; see cone.py."""
     first, last = part_of(0, contacts.stepping[0].group_count, k, team[TEAM_SIZE])
-    if is_late:
-        cone.find_couplings(contacts, first, last)
-    else:
-        cone.forget_couplings(contacts, first, last)
+    for m in range(first, last):
+        group = contacts.groups[m]
+        if group.count == 1:
+            group.is_coupled = is_late and cone.is_coupled(contacts, group, 0)
+        else:
+            group.is_coupled = is_late and cone.is_coupled(contacts, group, None)
     barrier(team)
 
 
@@ -164,7 +103,7 @@ def velocity_pass(contacts: arrays.Contacts, team: Integers, k: int, task: int, 
             hold_back(contacts, team, k, True)
         sweeps += 1
         largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
-        task = VELOCITY
+        task = passes.VELOCITY
     if sweeps > cone.LATE:
         hold_back(contacts, team, k, False)
     if k == 0:

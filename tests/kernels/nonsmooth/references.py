@@ -7,13 +7,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
+from blocksim.kernels.common.arrays import BODY, zeros
 from blocksim.kernels.common.shapes import separation
+from blocksim.kernels.nonsmooth import arrays
 from blocksim.kernels.nonsmooth.arrays import FAR
+from blocksim.kernels.nonsmooth.narrow_phase import Lists, collide_one
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
-    from blocksim.kernels.common.arrays import Record
+    from blocksim.kernels.common.arrays import Record, Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
     from tests.kernels.conftest import MakeBody
 
@@ -116,6 +121,34 @@ def brought_near(make_body: MakeBody, b: Record, sides_of_a: Vector, angle: floa
         if far - near < 1e-7:
             return a
         near, far = (near, distance) if separation(a, b) > gap else (distance, far)
+
+
+def meet(
+    a: Record,
+    b: Record,
+    margin: float,
+    constraint: Record | None = None,
+    states: Records | None = None,
+    *,
+    ahead: float = 0.0,
+    is_ground: bool = False,
+    stepping: Mapping[str, float] | None = None,
+) -> Record:
+    """Return the constraint of two bodies, or of a body and the ground, as it is after its manifold was found."""
+    bodies, constraints, all_stepping = (
+        zeros(2 if is_ground else 3, BODY),
+        zeros(1, arrays.CONSTRAINT),
+        zeros(1, arrays.STEPPING),
+    )
+    bodies[0], bodies[1] = a, b
+    if constraint is not None:
+        constraints[0] = constraint
+    constraints[0].b = 1
+    for name, value in {"margin": margin, **(stepping or {})}.items():
+        all_stepping[0][name] = value
+    lists = Lists(constraints, zeros(2, arrays.STATE) if states is None else states, bodies, all_stepping[0])
+    collide_one(lists, 0, ahead, None)
+    return constraints[0]
 
 
 class Dense(NamedTuple):

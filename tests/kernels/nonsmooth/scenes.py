@@ -14,8 +14,9 @@ from blocksim.kernels.common.arrays import TEAM_SIZE
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.nonsmooth.begin import load_states
 from blocksim.kernels.nonsmooth.groups import gather, pack_groups
+from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
-from blocksim.kernels.nonsmooth.step import find_manifolds, substep
+from blocksim.kernels.nonsmooth.step import substep
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, Scene

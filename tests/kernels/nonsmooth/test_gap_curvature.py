@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import zeros
-from blocksim.kernels.nonsmooth.arrays import CONSTRAINT, FAR, STATE, STEPPING
-from blocksim.kernels.nonsmooth.faces import bend_of, bend_time, follow_curvature
-from blocksim.kernels.nonsmooth.manifold import Place, collide
-from blocksim.kernels.nonsmooth.slip import Constraints, Motion, slip_of
-from tests.kernels.nonsmooth.references import brought_near, corners, meeting, places_of, sides
+from blocksim.kernels.nonsmooth.arrays import FAR, STEPPING
+from blocksim.kernels.nonsmooth.slip import Constraints, Motion, bend_of, bend_time, follow_curvature, slip_of
+from tests.kernels.nonsmooth.references import brought_near, corners, meet, meeting, places_of, sides
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,8 +62,7 @@ def examples(make_body: MakeBody) -> list[Moving]:
         angle, way, gap = b.angle + random.uniform(0.2, 1.3), random.uniform(-3.0, 3.0), random.uniform(-2e-4, 2e-4)
         a = brought_near(make_body, b, np.array([0.02, 0.03]), angle, way, gap)
         known = meeting(a, b, MARGIN)
-        constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
-        collide(constraint, a, b, states[0], states[1], Place(MARGIN, 0.0, 0.0, False, zeros(1, STEPPING)[0]), None)
+        constraint = meet(a, b, MARGIN)
         if known.is_of_b == (len(found) % 2 == 0) and max(constraint.gap_one, constraint.gap_two) >= FAR:
             other, of, sign = (a, b, 1.0) if known.is_of_b else (b, a, -1.0)
             ways = np.abs(corners(other) - known.places[0]).sum(axis=1)

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import zeros
-from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, STEPPING, TOUCHING
-from blocksim.kernels.nonsmooth.manifold import Place, collide
-from blocksim.kernels.nonsmooth.step import find_manifolds
-from tests.kernels.nonsmooth.references import apart, brought_near, meeting, places_of
+from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, TOUCHING
+from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
+from tests.kernels.nonsmooth.references import apart, brought_near, meet, meeting, places_of
 from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, posed
 
 if TYPE_CHECKING:
@@ -41,9 +40,7 @@ def pairs(make_body: MakeBody, pace: int) -> list[tuple[Record, Record]]:
 
 def row_of(a: Record, b: Record, margin: float = MARGIN) -> Record:
     """Return the constraint of two bodies at rest that have not touched before."""
-    constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
-    collide(constraint, a, b, states[0], states[1], Place(margin, 0.0, 0.0, False, zeros(1, STEPPING)[0]), None)
-    return constraint
+    return meet(a, b, margin)
 
 
 def test_manifold_is_what_two_clipped_polygons_have(pairs: list[tuple[Record, Record]]) -> None:
@@ -170,17 +167,16 @@ def test_four_pairs_at_a_time_have_the_bits_of_each_alone(seed: int, pace: int) 
 def test_impulses_are_kept_until_the_normal_has_turned_by_25_degrees(
     make_body: MakeBody, degrees: float, is_kept: bool
 ) -> None:
-    a, b = make_body(0.0, 0.025), make_body()
-    constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
+    constraint = zeros(1, CONSTRAINT)[0]
     constraint.normal_one, constraint.normal_two, constraint.shear = 3.0, 2.0, 1.0
     constraint.nx, constraint.ny = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-    collide(constraint, a, b, states[0], states[1], Place(MARGIN, 0.0, 0.0, False, zeros(1, STEPPING)[0]), None)
+    constraint = meet(make_body(0.0, 0.025), make_body(), MARGIN, constraint)
     expected = (3.0, 2.0, 1.0) if is_kept else (0.0, 0.0, 0.0)
     assert (constraint.normal_one, constraint.normal_two, constraint.shear) == expected
 
 
 def test_impulses_are_forgotten_where_blocks_have_parted(make_body: MakeBody) -> None:
-    constraint, states = zeros(1, CONSTRAINT)[0], zeros(2, STATE)
+    constraint = zeros(1, CONSTRAINT)[0]
     constraint.normal_one, constraint.normal_two, constraint.shear, constraint.ny, constraint.reach = (
         3.0,
         2.0,
@@ -188,15 +184,7 @@ def test_impulses_are_forgotten_where_blocks_have_parted(make_body: MakeBody) ->
         1.0,
         TOUCHING,
     )
-    collide(
-        constraint,
-        make_body(0.0, 0.025 + 2 * MARGIN),
-        make_body(),
-        states[0],
-        states[1],
-        Place(MARGIN, 0.0, 0.0, False, zeros(1, STEPPING)[0]),
-        None,
-    )
+    constraint = meet(make_body(0.0, 0.025 + 2 * MARGIN), make_body(), MARGIN, constraint)
     assert (constraint.normal_one, constraint.normal_two, constraint.shear, constraint.reach) == (0.0, 0.0, 0.0, AWAY)
 
 
@@ -210,14 +198,13 @@ def test_contact_that_presses_has_the_normal_and_arms_of_the_middle_of_the_step(
     states, constraint = zeros(2, STATE), zeros(1, CONSTRAINT)[0]
     states.vx, states.vy, states.spin = (0.4, -0.1), (-0.3, 0.2), (8.0, -9.0)
     states.inverse_mass = 9.0
-    stepping = zeros(1, STEPPING)[0]
-    stepping.touch_gap, stepping.open_bias = 1e-14, 1e4
     constraint.normal_one, constraint.nx, constraint.ny = (
         (1e-8 if pressed else 1e-13),
         0.0,
         1.0,
     )  # 18/kg makes 1e-10 m/s
-    collide(constraint, a, b, states[0], states[1], Place(MARGIN, ahead, 0.5e-3, False, stepping), None)
+    stepping = {"touch_gap": 1e-14, "open_bias": 1e4, "substep": 1e-3}
+    constraint = meet(a, b, MARGIN, constraint, states, ahead=ahead, stepping=stepping)
     time = ahead if pressed else 0.0
     late_a, late_b = (
         make_body(body.x + time * state.vx, body.y + time * state.vy, body.angle + time * state.spin)

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from tests.kernels.conftest import MakeBody
 
 H = 1e-3
-GRAVITY = (0.5, -9.0)  # m/s2
 KICK = (0.5 * H, -9.0 * H)
 
 
@@ -71,7 +70,7 @@ def test_step_ends_with_the_pose_that_the_drifts_add_up_to(
     one.vy += 0.1 * is_touching
     one.dx, one.dy, one.turned = 0.01, -0.02, turned
     velocity = np.array([one.vx, one.vy, one.spin])
-    place(body, one, before, 1.0, H, GRAVITY)
+    place(body, one, before, 1.0, (*KICK, 0.0))
     assert (body.x, body.y, body.angle) == pytest.approx((0.21, 0.08, 0.6 + turned), abs=1e-15)
     assert (body.cos, body.sin) == pytest.approx((math.cos(body.angle), math.sin(body.angle)), abs=1e-14)
     brought = np.array([0.0, 0.0, 0.0]) if is_touching else np.array([*KICK, 0.0]) / 2

@@ -12,8 +12,9 @@ from hypothesis import given, strategies as st
 from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.nonsmooth.cone import shear_limit
 from blocksim.kernels.nonsmooth.motion import kick_all
+from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, WARM
 from blocksim.kernels.nonsmooth.step import substep
-from blocksim.kernels.nonsmooth.sweeps import FIRST_VELOCITY, POSITION, WARM, sweep
+from blocksim.kernels.nonsmooth.sweeps import sweep
 from blocksim.world.sag import soft_contact
 from tests.kernels.nonsmooth.references import Dense, dense, least_change
 from tests.kernels.nonsmooth.scenes import Block, after_substep, collided, pile, posed, velocities

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, TOUCHING
-from blocksim.kernels.nonsmooth.step import find_manifolds
+from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.verification.scene import HEIGHT, WIDTH
 from tests.kernels.nonsmooth import references
 from tests.kernels.nonsmooth.polygons import HEXAGON, depth_below, random_outline, rectangle, turned

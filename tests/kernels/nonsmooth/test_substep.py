@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.nonsmooth.arrays import PART
+from blocksim.kernels.nonsmooth.passes import VELOCITY
 from blocksim.kernels.nonsmooth.step import bodies_of, kick_share
-from blocksim.kernels.nonsmooth.sweeps import VELOCITY, part_of, velocity_pass
+from blocksim.kernels.nonsmooth.sweeps import part_of, velocity_pass
 from tests.kernels.nonsmooth.scenes import Block, after_substep, pile, posed, velocities
 
 if TYPE_CHECKING:

@@ -305,14 +305,10 @@ def _define_memory() -> None:
         typed(function, columns, types.NoneType, types.Array, types.UniTuple)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.NestedArray)(_read_fields(part))
         typed(function, single, types.Integer, types.Array, types.UniTuple)(_read_fields(part))
-    end = (MaskType, types.UniTuple)
     for writer, part in ((functions.write_fields_0, 0), (functions.write_fields_4, 1), (functions.write_fields_8, 2)):
-        typed(writer, types.none, types.NoneType, types.Array, types.NestedArray, *end)(_write_fields(part))
-        typed(writer, types.none, types.NoneType, types.Array, types.UniTuple, *end)(_write_fields(part))
-    single_end = (types.Boolean, types.UniTuple)
-    typed(functions.write_fields_0, types.none, types.Integer, types.Array, types.NestedArray, *single_end)(
-        _write_fields(0)
-    )
+        for lane, mask in ((types.NoneType, MaskType), (types.Integer, types.Boolean)):
+            for places in (types.NestedArray, types.UniTuple):
+                typed(writer, types.none, lane, types.Array, places, mask, types.UniTuple)(_write_fields(part))
     typed(functions.split, single, LanesType)(_split)
     typed(functions.split, single, types.Float)(_repeat)
     typed(functions.four, LANES, types.NoneType, *[types.Float] * functions.WIDTH)(_four)
