@@ -68,16 +68,11 @@ def quantile(probability: float, degrees: int) -> float:
 def interval(count: int, total: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """Return the two-sided limits of the probability, given `count` of `total`; (0, 1) where `total` is 0."""
     tail = 0.5 * (1.0 - confidence)
-    return _lower(count, total, tail), 1.0 - _lower(total - count, total, tail)
+    return lower_bound(count, total, tail), 1.0 - lower_bound(total - count, total, tail)
 
 
-def lower_bound(count: int, total: int, confidence: float = CONFIDENCE) -> float:
-    """Return the one-sided lower limit: (1 - confidence)^(1/n) where all n agree."""
-    return _lower(count, total, 1.0 - confidence)
-
-
-def _lower(count: int, total: int, tail: float) -> float:
-    """Return p with P(at least `count` of `total`; p) = `tail`."""
+def lower_bound(count: int, total: int, tail: float = 1.0 - CONFIDENCE) -> float:
+    """Return the one-sided lower limit p, P(at least `count` of `total`; p) = `tail`: tail^(1/n) where all n agree."""
     if count == 0:
         return 0.0
     return float(load_module("scipy.special", "judging a sweep").betaincinv(count, total - count + 1, tail))
@@ -169,7 +164,7 @@ def compare_final(final: "pd.DataFrame | Mapping[str, Sequence[Any]]", table: Ex
     Raises InvalidInputError when the final table lacks a measured block or quantity, or names a block twice.
     A block that was not measured has rows with the verdict "no data"; a message names all of them.
     """
-    columns = {quantity: QUANTITIES[quantity].final_column for quantity in table.quantities}
+    columns = {one.quantity: QUANTITIES[one.quantity].final_column for one in table.measurements}
     missing = [column for column in ["block", *columns.values()] if column not in final]
     if missing:
         message = f"the final table has no column {', '.join(missing)}, which {table.source} is compared with"

@@ -132,17 +132,13 @@ class SamplePair(NamedTuple):
     simulated: Floats  # by the members, NaN where one has none
     known: Floats  # of the members that have one
     limits: Interval  # of inside, as for a single run
+    scatters: bool  # whether the repeats differ; equal ones only show that the scatter is below the reading
     name: str  # in a message
     head: Row  # first cells of its row in a table
 
     def between(self, ends: Interval) -> NDArray[np.bool_]:
         """Return for each member whether it lies between two ends, ends included; one without a value does not."""
         return (self.simulated >= ends[0]) & (self.simulated <= ends[1])
-
-    @property
-    def scatters(self) -> bool:
-        """Whether the repeats differ; equal ones only show that the scatter is below the reading."""
-        return self.measured.minimum < self.measured.maximum
 
 
 class Evidence(NamedTuple):
@@ -166,7 +162,8 @@ def evidence_of(members: Members, table: experiment.ExperimentTable, u_num: floa
         limits = compare.limits(row.quantity, row.mean, row.minimum, row.maximum)
         head: Row = {"block": row.block, "quantity": row.quantity, "unit": row.unit}
         name, known = f"{row.quantity} of block {row.block}", values[np.isfinite(values)]
-        pairs.append(SamplePair(row, repeats[row.block, row.quantity], values, known, limits, name, head))
+        values_of, scatters = repeats[row.block, row.quantity], row.minimum < row.maximum
+        pairs.append(SamplePair(row, values_of, values, known, limits, scatters, name, head))
     inside: NDArray[np.bool_] = np.all([pair.between(pair.limits) for pair in pairs], axis=0)
     return Evidence(members, u_num, tuple(pairs), tuple(one for one in pairs if one.measured.unit == "mm"), inside)
 

@@ -90,11 +90,6 @@ class ExperimentTable:
         return tuple(dict.fromkeys(one.block for one in self.measurements))
 
     @property
-    def quantities(self) -> tuple[str, ...]:
-        """The measured quantities, in order of first appearance."""
-        return tuple(dict.fromkeys(one.quantity for one in self.measurements))
-
-    @property
     def replicates(self) -> tuple[int, ...]:
         """The numbers of the repeats, ascending; a block need not appear in all of them."""
         return tuple(sorted({one.replicate for one in self.measurements}))

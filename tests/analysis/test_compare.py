@@ -139,7 +139,7 @@ def test_frame_and_dictionary_say_the_same() -> None:
     assert list(frame.columns[:5]) == ["block", "quantity", "unit", "simulated", "mean"]
     assert plain["inside"] is True
     assert plain["experiment"] == TABLE.source
-    assert len(frame) == len(TABLE.blocks) * len(TABLE.quantities)
+    assert len(frame) == len(TABLE.blocks) * len({one.quantity for one in TABLE.measurements})
 
 
 finite = st.floats(-1e4, 1e4)

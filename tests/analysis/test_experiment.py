@@ -96,7 +96,7 @@ def test_rotations_say_that_the_paper_states_them_once(centres: ExperimentTable)
 
 def test_table_knows_its_blocks_quantities_and_repeats(centres: ExperimentTable) -> None:
     assert centres.blocks == ("1", "2", "3")
-    assert centres.quantities == ("x", "rotation")
+    assert {one.quantity for one in centres.measurements} == {"x", "rotation"}
     assert centres.replicates == (1, 2, 3, 4, 5, 6)
     assert centres.values("9", "x").empty
 
