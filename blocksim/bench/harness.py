@@ -5,7 +5,7 @@ import os
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,25 +34,20 @@ UNTIL_SOLVED = int(Nonsmooth.model_fields["velocity_sweeps"].default)
 
 @dataclass(frozen=True)
 class TimeSteps:
-    """A step and its parts; each is solved to the default tolerance, or gone through as often as `sweeps` says."""
+    """A step and its parts; each is solved to the default tolerance, or gone through as often as `velocity_sweeps`."""
 
     step: float  # s
     substeps: int = SUBSTEPS
-    sweeps: int = UNTIL_SOLVED
+    velocity_sweeps: int = UNTIL_SOLVED
 
     @property
     def setting(self) -> str:
         """For people."""
         return f"step {1e3 * self.step:g} ms / {self.substeps}"
 
-    @property
-    def keys(self) -> dict[str, float]:
-        """Its keys of [time], all of them numbers."""
-        return {"step": self.step, "substeps": self.substeps, "velocity_sweeps": self.sweeps}
-
     def time(self, **more: object) -> dict[str, object]:
         """Return the table [time], with more keys."""
-        return {"scheme": IMPULSES, **self.keys, **more}
+        return {"scheme": IMPULSES, **asdict(self), **more}
 
 
 def three_blocks(contact: Table | None = None, time: Table | None = None, friction: Table = FRICTION) -> Scenario:
@@ -105,11 +100,6 @@ class TimedRun(NamedTuple):
     seconds: float  # CPU time of this process
     waited: float  # of the clock
     outcome: loop.Outcome
-
-    @property
-    def steps(self) -> int:
-        """Steps done."""
-        return int(self.scene.world.clock[0].steps)
 
     @property
     def bodies(self) -> Any:

@@ -5,7 +5,7 @@ import statistics
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +84,7 @@ DURATION, QUICK_DURATION = 0.4, 0.01  # s
 SCALES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)
 QUICK_SCALES = (1e-4, 1e-3, 1e-2)
 SAFETIES = (0.1, 0.05)
-ONE_SWEEP = harness.TimeSteps(1e-3, substeps=1, sweeps=1)  # enough without restitution
+ONE_SWEEP = harness.TimeSteps(1e-3, substeps=1, velocity_sweeps=1)  # enough without restitution
 STEPS = (1e-3, 5e-4, 2e-4, 1e-4)  # s
 QUICK_STEPS = (1e-3, 5e-4)
 SUBSTEPS = (1, 2, 4)
@@ -134,8 +134,8 @@ def solve_level(setting: Mapping[str, float], scenario: Scenario, repeats: int) 
     scene = harness.Rerun(scenario)
     last = last_step_of(scenario.time.end, scene.step)
     runs = [scene.run(last) for _ in range(repeats)]
-    bodies = runs[-1].bodies  # every run ends with the same bits
-    return Solution(setting, np.array([bodies.x, bodies.y]), tuple(run.seconds for run in runs), runs[-1].steps)
+    bodies, steps = runs[-1].bodies, int(runs[-1].scene.world.clock[0].steps)  # every run ends with the same bits
+    return Solution(setting, np.array([bodies.x, bodies.y]), tuple(run.seconds for run in runs), steps)
 
 
 def measure_explicit(effort: harness.Effort) -> harness.Readings:
@@ -172,7 +172,7 @@ def measure_nonsmooth(effort: harness.Effort) -> harness.Readings:
 
     def solve(stepping: harness.TimeSteps, restitution: float = harness.RESTITUTION) -> Solution:
         scenario = harness.three_blocks({"restitution": restitution}, stepping.time())
-        return solve_level(stepping.keys, scenario, effort.repeats)
+        return solve_level(asdict(stepping), scenario, effort.repeats)
 
     without = solve(ONE_SWEEP, 0.0)
     steps, finest_step = (QUICK_STEPS, QUICK_FINEST) if effort.quick else (STEPS, FINEST)

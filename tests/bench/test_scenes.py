@@ -20,12 +20,12 @@ def test_three_blocks_are_those_of_the_scenario_that_ships() -> None:
 
 
 def test_a_stepping_is_what_the_scenario_gets() -> None:
-    time = three_blocks(time=TimeSteps(2e-3, substeps=3, sweeps=5).time(end=0.5)).time
+    time = three_blocks(time=TimeSteps(2e-3, substeps=3, velocity_sweeps=5).time(end=0.5)).time
     assert isinstance(time, Nonsmooth)
     assert (time.step, time.substeps, time.velocity_sweeps, time.end) == (2e-3, 3, 5, 0.5)
     default = three_blocks(time={"scheme": "nonsmooth"}).time
     assert isinstance(default, Nonsmooth)
-    assert TimeSteps(1e-3).sweeps == UNTIL_SOLVED == default.velocity_sweeps
+    assert TimeSteps(1e-3).velocity_sweeps == UNTIL_SOLVED == default.velocity_sweeps
 
 
 def test_a_wall_is_pushed_in_proportion_to_height() -> None:
