@@ -16,7 +16,7 @@ two outcomes is no error of discretisation: it has no order, and that it shrinks
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import closing, suppress
+from contextlib import closing, nullcontext, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
@@ -346,10 +346,11 @@ class LevelRuns:
         missing = [name for name in dict.fromkeys(names) if name not in self.rows]
         tasks = [Task(number, name, {}, named[name][1]) for number, name in enumerate(missing)]
         jobs = min(self.jobs, len(tasks))
-        run = processes.run_tasks if jobs > 1 else processes.run_here
+        rounds = processes.for_rounds() if jobs > 1 else nullcontext(processes.run_here)
         try:
             with (
                 interruption.interruptible(),
+                rounds as run,
                 closing(run(iter(tasks), RunSetting(jobs, folder=self.folder))) as batches,
             ):
                 for task, row in (pair for batch in batches for pair in zip(batch.tasks, batch.rows, strict=True)):

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
 from statistics import fmean
 from typing import cast
@@ -360,7 +359,7 @@ def cases_of(document: Document, sweep: Sweep) -> Cases:
     bare = document.without_sweep()
     cases = Cases(replace(bare, data=with_tables(bare.data, document.build())), design, heads_of(sweep))
     looked_at = min(len(cases), MOST_LOOKED_AT)
-    if all(case.scenario is None for case in islice(cases, looked_at)):
+    if all(cases[number].scenario is None for number in range(looked_at)):
         which = f"none of the {len(cases)} cases" if looked_at == len(cases) else f"none of the first {looked_at} cases"
         raise InvalidInputError(f"{which} can be simulated; the first: {cases[0].problem}")
     return cases
@@ -520,11 +519,10 @@ def estimate(document: Document, *, keep_cases: bool = False) -> Estimate:
 
     plan = plan_of(document.build())
     cases = cases_of(document, plan)
+    numbers = list(range(len(cases)))
     if len(cases) > LOOKED_AT:  # a random choice: evenly spaced ones may meet one value of a key only
-        drawn = np.random.default_rng(0).choice(len(cases), LOOKED_AT, replace=False)
-        chosen = [cases[number] for number in sorted(drawn.tolist())]
-    else:
-        chosen = list(cases)
+        numbers = sorted(np.random.default_rng(0).choice(len(cases), LOOKED_AT, replace=False).tolist())
+    chosen = [cases[number] for number in numbers]
     described = [describe(case.scenario) for case in chosen if case.scenario is not None]
     problems = [case.problem for case in chosen if case.scenario is None]
     share = len(described) / len(chosen)

@@ -178,7 +178,8 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
     again = simulate(scenario, threads=threads, on_progress=on_progress)
     if again.status == INTERRUPTED:
         raise StoppedEarlyError(f"{folder}: stopped before the new run was complete")
-    origins, now = origin_differences(summary.environment), scenario_hash(stored.scenario)
+    origins, is_same_code = origin_differences(summary.environment)
+    now = scenario_hash(stored.scenario)
     if now != summary.scenario_hash:
         origins = (OriginDifference("scenario", summary.scenario_hash, now), *origins)
     return RunVerdict(
@@ -190,23 +191,23 @@ def verify_run(place: Path | str, *, threads: int = 1, on_progress: Watcher = si
         frames=differences(stored.frames, again.frames),
         origins=origins,
         entries=(
-            *differing_entries(folder, summary, again.summary, same_code=not tells_of_code(origins)),
+            *differing_entries(folder, summary, again.summary, same_code=is_same_code),
             *differing_samples(stored.probes, again.probes),
         ),
     )
 
 
-def tells_of_code(found: tuple[OriginDifference, ...]) -> bool:
-    """Return True if the code is among what is not the same: what is named by its hash then has another name."""
-    return any(one.name in {CODE, "blocksim"} or one.name.startswith(provenance.ROOM_PREFIX) for one in found)
+def origin_differences(then: Mapping[str, str]) -> tuple[tuple[OriginDifference, ...], bool]:
+    """Return which entries of an older `environment` are others now, and whether the code is none of them.
 
-
-def origin_differences(then: Mapping[str, str]) -> tuple[OriginDifference, ...]:
-    """Return which entries of an older `environment` are others now; what it lacks cannot be compared."""
+    What it lacks cannot be compared. What is named by the hash of other code has another name.
+    """
     now = provenance.environment()
     whole = () if any(name.startswith(provenance.ROOM_PREFIX) for name in then) else (CODE,)  # rooms say more
     known = [name for name in now if name in then and (name in whole or name.startswith(DECIDES))]
-    return tuple(OriginDifference(name, then[name], now[name]) for name in known if then[name] != now[name])
+    others = tuple(OriginDifference(name, then[name], now[name]) for name in known if then[name] != now[name])
+    is_code = (one.name in {CODE, "blocksim"} or one.name.startswith(provenance.ROOM_PREFIX) for one in others)
+    return others, not any(is_code)
 
 
 @dataclass(frozen=True)
@@ -335,8 +336,7 @@ def _chosen(count: int, sample: int, seed: int) -> list[int]:
 def _origins(folder: Path, kind: sweep_folder.FolderKind) -> tuple[tuple[OriginDifference, ...], bool]:
     """Return what is not the same as when a study was made, and whether its code is known to be."""
     origin = sweep_folder.read_origin(folder, kind)
-    origins = () if origin is None else origin_differences(origin.environment)
-    return origins, origin is not None and not tells_of_code(origins)
+    return ((), False) if origin is None else origin_differences(origin.environment)
 
 
 def _cells_apart(path: Path, now: list[list[str]]) -> Iterator[CellDifference]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from math import isnan, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -229,7 +230,7 @@ def test_dead_worker_fails_its_runs_and_says_what_to_do(
     def dying(tasks: Iterator[Task], _: RunSetting) -> Iterator[Batch]:
         yield from (Batch((task,), (DEAD,), 0.0, "") for task in tasks)
 
-    monkeypatch.setattr(processes, "run_tasks", dying)
+    monkeypatch.setattr(processes, "for_rounds", lambda: nullcontext(dying))
     study = converge(slide, studies=["step"], out=tmp_path, jobs=2).studies[0]
     assert {level.status for level in study.levels} == {"failed"}
     assert "rerun the command to repeat this case" in study.own.reason

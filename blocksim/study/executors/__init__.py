@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import KW_ONLY, dataclass
 from importlib import import_module
@@ -59,10 +59,6 @@ class RunSetting:
     folder: Path | None = None  # where folders of runs are kept
     peaks: bool = False  # whether rows need the largest rotation on the way
     is_stopped: Callable[[], bool] = lambda: False
-
-    def folders(self, tasks: Iterable[Task]) -> list[Path]:
-        """Return where runs are kept, nothing where they are not."""
-        return [] if self.folder is None else [self.folder / task.name for task in tasks]
 
 
 Run = Callable[[Iterator[Task], RunSetting], Generator[Batch, None, None]]

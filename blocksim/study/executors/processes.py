@@ -145,16 +145,10 @@ def for_rounds() -> Iterator[Run]:
         yield LastingPool(ended).run
 
 
-def run_tasks(tasks: Iterator[Task], setting: RunSetting) -> Generator[Batch, None, None]:
-    """Run the tasks of one round."""
-    with for_rounds() as run:
-        yield from run(tasks, setting)
-
-
 def run_here(tasks: Iterable[Task], setting: RunSetting) -> Generator[Batch, None, None]:
     """Run tasks one after the other in this process, as a worker does. Raises KeyboardInterrupt on Ctrl-C."""
     for task in tasks:
-        folders = setting.folders([task])
+        folders = [] if setting.folder is None else [setting.folder / task.name]
         yield Batch((task,), *ensemble.run_batch([task.scenario], folders, provenance.code_hash(), peaks=setting.peaks))
 
 
@@ -171,10 +165,11 @@ class Work:
 
     def run_on(self, pool: ProcessPoolExecutor) -> Iterator[Batch]:
         """Run until nothing is left. Raises BrokenProcessPool where a process dies, and StoppedError."""
-        peaks, code = self.setting.peaks, provenance.code_hash()
+        peaks, place, code = self.setting.peaks, self.setting.folder, provenance.code_hash()
         while True:
             while (job := self._next()) is not None:
-                scenarios, folders = [task.scenario for task in job.tasks], self.setting.folders(job.tasks)
+                scenarios = [task.scenario for task in job.tasks]
+                folders = [] if place is None else [place / task.name for task in job.tasks]
                 try:
                     self.pending[pool.submit(ensemble.run_batch, scenarios, folders, code, peaks=peaks)] = job
                 except BrokenProcessPool:  # it died before it got the job
