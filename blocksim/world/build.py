@@ -27,13 +27,14 @@ from blocksim.world.systems import acts_of
 from blocksim.world.systems.system import SystemInScene
 
 MOST_BYTES = 1 << 26  # of a stack of more than one scene
-MOST_LARGE = 64  # bodies that are checked one by one, outside the grid of the broad phase
+MOST_LARGE = 64  # bodies that are checked one by one, outside the grid
 LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
 SURFACE = "surface"  # the model without particles
 CHECK_INTERVAL = 1e-4  # s of simulated time between checks of rest, overlap and finiteness
 CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long, at most for
 LONGEST_CHECK = 1e-3  # s
 LEAST_PAIRS = 16
+LEAST_CELLS = 16
 PAIRS_PER_BODY = 3
 GROWTH = 1.25  # of the room for pairs, each time that it does not suffice
 Floats = NDArray[np.float64]
@@ -305,10 +306,9 @@ def assemble_world(
         **empty_lists(capacity, slots, before),
         particles=parts.particles,
         corners=join_records(tables) if tables else None,
-        heads=numbers((members, 1 << max(4, (2 * blocks - 1).bit_length())), np.uint32),
-        links=numbers((members, blocks), np.uint32),
+        starts=numbers((members, 3 * max(blocks, LEAST_CELLS) + 3), np.uint32),
+        order=numbers((members, blocks), np.uint32),
         large=numbers(large.shape, np.uint32),
-        neighbours=numbers((members, blocks), np.uint32),
         interactions=interactions.interaction_tables([layout.interactions for layout in layouts]),
         ledger=arrays.zeros((members, count // arrays.GROUP + 1), arrays.LEDGER),
         action=arrays.zeros((members, 1), arrays.ACTION),

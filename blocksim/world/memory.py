@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, CONSTRAINT, GROUP, IMPACT, KEPT, LISTED, PART, STATE, TALLY
+from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, CONSTRAINT, GROUP, IMPACT, KEPT, PART, STATE, TALLY
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems.system import SystemInScene
 
@@ -63,8 +63,8 @@ def scene_size(bodies: int, pairs: int, slots: int, *, has_particles: bool = Fal
 
 def rigid_size(bodies: int, pairs: int) -> Size:
     """Return the size of a scene of the non-smooth scheme."""
-    kinds = (BODY, STATE, BEFORE, IMPACT, LISTED)
-    body = sum(kind.itemsize for kind in kinds) + 2 * VALUE + OBJECT_BYTES
+    kinds = (BODY, STATE, BEFORE, IMPACT)
+    body = sum(kind.itemsize for kind in kinds) + 3 * VALUE + OBJECT_BYTES
     group = GROUP.itemsize + ASIDE.itemsize
     pair = CONSTRAINT.itemsize + KEPT.itemsize + -(-group // WIDTH) + -(-TALLY.itemsize // (WIDTH * PART))
     return Size(bodies, pairs, bodies * body + pairs * pair)

@@ -177,7 +177,7 @@ def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1)
         world=world,
         contacts=contacts,
         kept=zeros((*members, capacity), arrays.KEPT),
-        listed=zeros((*members, bodies), arrays.LISTED),
+        reaches=build.numbers((*members, bodies), np.float64),
         firsts=build.numbers((*members, bodies), np.int64),
         begins=build.numbers((*members, arrays.COLOURS + 1), np.int64),
         used=build.numbers((*members, bodies), np.int64),
@@ -194,7 +194,7 @@ def with_more_constraints(scene: arrays.Nonsmooth) -> arrays.Nonsmooth:
     for name in ("constraints", "tallies"):
         getattr(larger.contacts, name)[: getattr(old, name).size] = getattr(old, name)
     contacts = larger.contacts._replace(states=old.states, before=old.before, ends=old.ends, residuals=old.residuals)
-    return larger._replace(contacts=contacts, listed=scene.listed, begins=scene.begins, pushes=scene.pushes)
+    return larger._replace(contacts=contacts, reaches=scene.reaches, begins=scene.begins, pushes=scene.pushes)
 
 
 def with_more_threads(scene: arrays.Nonsmooth, threads: int) -> arrays.Nonsmooth:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tests.conftest import PaperBlock, Start
 
 # work space
-WORK_SPACE = {"points", "matrices", "before", "action", "heads", "links", "neighbours", "shares", "between", "team"}
+WORK_SPACE = {"points", "matrices", "before", "action", "starts", "order", "shares", "between", "team"}
 NOT_STATE = {*WORK_SPACE, "spare_pairs", "spare_candidates"}
 END = 0.24  # s, after the first impacts
 

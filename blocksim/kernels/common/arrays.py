@@ -192,7 +192,7 @@ CONTROLS = record_type(
     "motion_x motion_y "  # -: direction of the support's motion, both zero without one
     "max_overlap "  # m, zero: a share of the smallest side of each pair
     "push loads_end "  # m/s2: no load gives any point more; s: from then on none changes with time
-    "cell_width cell_radius "  # m: of the grid of the broad phase; half diagonal of the largest body in it
+    "cell_width cell_radius "  # m: of the grid; half diagonal of the largest body in it
     "particle_size smoothing_length support "  # m: diameter; of the SPH kernel; radius beyond which it is zero
     "exponent",  # -: of the overlap in the normal force
     "model sph_kernel "  # codes
@@ -277,10 +277,9 @@ class World(NamedTuple):
     points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
     spare_pairs: Records  # (p,) PAIR, the list being built
     spare_candidates: Any  # (p, s) as candidates
-    heads: Any  # (power of two,) uint32: first body of each bucket of the grid, numbers from 1; 0 where there is none
-    links: Any  # (n,) uint32: the next body of the same bucket, numbers from 1
+    starts: Any  # (3 c + 3,) uint32: where cells of the grid, at most 3 c + 1, begin in the order; neighbours.py
+    order: Any  # (n,) uint32: bodies cell by cell
     large: Any  # (l,) uint32: bodies too large for the grid, sorted
-    neighbours: Any  # (n + 1,) uint32, work space of the broad phase
     action: Records  # (1,) ACTION, work space of one pair
     before: Records  # (c,) CONTACT or PARTICLE_CONTACT, work space of one pair whose contacts change
     matrices: Floats  # (8, 3, 3) work space of one pair

@@ -408,4 +408,4 @@ def pair_forces(world: World, p: int, step: float) -> None:
     shear_pass(world, p, count, values, before, shared, action)
     force_pass(world, p, count, action)
     bearing.measure_soon(pair, world.points[0].slipping, step * (a.spin - b.spin), world.corners)
-    history.keep_places(world, p, count)
+    history.keep_places(world, p, count, world.particles)

@@ -43,15 +43,6 @@ TAKEN = 0xFFFFFFFF  # slot of an old contact that has found its successor; no co
 
 
 @rare_kernel
-def clear_contact(contact: Record) -> None:
-    """Forget all history of a contact."""
-    contact.spring = 0.0
-    contact.depth = 0.0
-    contact.normal_force = 0.0
-    contact.shear_force = 0.0
-
-
-@rare_kernel
 def carry_on(world: World, p: int, i: int, count: int) -> None:
     """Give point i the history of the same corner on the same face, if there is one among `count`."""
     point = world.points[i]
@@ -62,18 +53,9 @@ def carry_on(world: World, p: int, i: int, count: int) -> None:
             old.slot = TAKEN
             return
     contact = world.contacts[p, i]
-    clear_contact(contact)
+    contact.spring = contact.depth = contact.normal_force = contact.shear_force = 0.0
     contact.slot = point.slot
     contact.face = point.face
-
-
-@rare_kernel
-def was_in_contact(slot: int, old: Records, count: int) -> bool:
-    """Return True if a corner had a contact, on whichever face."""
-    for j in range(count):
-        if old[j].slot == slot:
-            return True
-    return False
 
 
 @rare_kernel
@@ -84,7 +66,7 @@ def take_over(world: World, p: int, i: int, count: int) -> None:
     """
     pair = world.pairs[p]
     point = world.points[i]
-    if kinematics.has_just_begun(point) or was_in_contact(point.slot, world.before, count):
+    if kinematics.has_just_begun(point) or surface.was_touching(point.slot, world.before, count):
         return
     for j in range(count):
         old = world.before[j]
@@ -92,10 +74,9 @@ def take_over(world: World, p: int, i: int, count: int) -> None:
             nx, ny = slot_normal(world, pair, old.slot, old.face)
             if nx * point.nx + ny * point.ny > surface.PARALLEL:
                 contact = world.contacts[p, i]
-                contact.spring = old.spring
-                contact.depth = old.depth
-                contact.normal_force = old.normal_force
-                contact.shear_force = old.shear_force
+                world.contacts[p, i] = old
+                contact.slot = point.slot
+                contact.face = point.face
                 old.slot = TAKEN
                 return
 
@@ -145,15 +126,12 @@ def change_contacts(world: World, p: int, count: int, step: float, tally: Record
     pair.idle = broad_phase.idle_candidates(pair)
 
 
-@rare_kernel
-def keep_places(world: World, p: int, count: int) -> None:
-    """Note what only the models with particles keep: that a contact has ended shows when its particle is gone."""
-    keep_places_of(world, p, count, world.particles)
-
-
 @kernel
-def keep_places_of(world: World, p: int, count: int, particles: Records | None) -> None:
-    """As keep_places; corners (no particles) are found again."""
+def keep_places(world: World, p: int, count: int, particles: Records | None) -> None:
+    """Note what only the models with particles keep: that a contact has ended shows when its particle is gone.
+
+    Corners (no particles) are found again.
+    """
     if particles is not None:
         for i in range(count):
             point = world.points[i]

@@ -151,14 +151,11 @@ def check(world: arrays.World, systems: Systems | None) -> int:
 @jit.rare_kernel
 def update_neighbours(world: arrays.World) -> int:
     """Keep the pair list valid; return PAIRS_FULL where it does not fit, TOO_FAST where none would do, else REACHED."""
-    if broad_phase.outruns_lists(world):
-        return arrays.TOO_FAST
     rebuilds = world.clock[0].rebuilds
-    if not broad_phase.update_pairs(world):
-        return arrays.PAIRS_FULL
+    status = broad_phase.update_pairs(world)
     if world.clock[0].rebuilds != rebuilds:
         partition(world, world.team[arrays.TEAM_SIZE])
-    return arrays.REACHED
+    return status
 
 
 @jit.rare_kernel

@@ -93,11 +93,6 @@ ASIDE_LANES = (
 ASIDE = on_own_lines(
     np.dtype([*((name, np.float64, (WIDTH,)) for name in ASIDE_LANES.split()), ("is_hit", np.uint8)], align=True)
 )
-LISTED = record_type(
-    "x y "  # m
-    "radius "  # m: half diagonal and reach
-    "reach",  # m: how far beyond itself the body's neighbours were sought
-)
 KEPT = record_type(
     "nx ny normal_one normal_two shear",  # of a constraint whose pair is in the next list too
     indices="a b colour next",  # bodies of a listed pair, its colour; the next old one with the same body a, from 1
@@ -175,7 +170,7 @@ class Nonsmooth(NamedTuple):
     world: World
     contacts: Contacts
     kept: Records  # (p,) KEPT, work space of a new pair list
-    listed: Records  # (n + 1,) LISTED, where bodies were when the list was made
+    reaches: Floats  # (n + 1,) m: how far beyond each body its neighbours were sought; of the ground zero
     firsts: Integers  # (n + 1,) work space: the first old constraint of a body a, from 1; 0 where there is none
     begins: Integers  # (COLOURS + 1,) where every colour begins among the constraints
     used: Integers  # (n + 1,) work space: bits of the colours that a body's pairs have

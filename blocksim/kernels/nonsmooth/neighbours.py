@@ -17,40 +17,13 @@ not depend on who takes which part. Greedy in the order of the list: the same li
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.common import arrays, grid, jit, shapes, supports
+from blocksim.kernels.common import arrays, jit, neighbours, supports
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, Nonsmooth
+from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, KEPT, Nonsmooth
 from blocksim.kernels.nonsmooth.groups import LONELY
 
 ONE = 1
-
-
-@jit.rare_kernel
-def lowest_free(used: int) -> int:
-    """Return the first colour whose bit is not set; the last one where there is none."""
-    colour = 0
-    while colour < COLOURS - 1 and (used >> colour) & ONE == ONE:
-        colour += 1
-    return colour
-
-
-@jit.rare_kernel
-def bit_of(colour: int) -> int:
-    """Return the bit of a colour; none for the last one, which anybody can have (and which would be the sign)."""
-    return ONE << colour if colour < COLOURS - 1 else 0
-
-
-@jit.kernel
-def forget(one: arrays.Record) -> None:
-    """Set what a constraint keeps from step to step to zero."""
-    one.nx = 0.0
-    one.ny = 0.0
-    one.normal_one = 0.0
-    one.normal_two = 0.0
-    one.shear = 0.0
-    one.corner_one = 0
-    one.corner_two = 0
-    one.is_struck = 0
+NEW_PAIR = arrays.zeros(1, KEPT)
 
 
 @jit.kernel
@@ -69,8 +42,7 @@ def copy_impulses(source: arrays.Record, target: arrays.Record) -> None:
 @jit.rare_kernel
 def keep_impulses(scene: Nonsmooth, count: int) -> None:
     """Copy the impulses of pairs that are in the old list and in the new one of `count` pairs."""
-    constraints = scene.contacts.constraints
-    kept = scene.kept
+    constraints, kept = scene.contacts.constraints, scene.kept
     for i in range(scene.firsts.size):
         scene.firsts[i] = 0
     for r in range(scene.contacts.stepping[0].constraint_count):
@@ -85,14 +57,16 @@ def keep_impulses(scene: Nonsmooth, count: int) -> None:
         if r > 0:
             copy_impulses(constraints[r - 1], one)
         else:
-            forget(one)
+            copy_impulses(NEW_PAIR[0], one)
 
 
 @jit.rare_kernel
 def colour_pairs(scene: Nonsmooth, count: int) -> None:
-    """Give every pair a colour, and set where the constraints of every colour begin."""
-    states = scene.contacts.states
-    used = scene.used
+    """Give every pair a colour, and set where the constraints of every colour begin.
+
+    Colours are bits; the last one, which anybody can have, has none (and would be the sign).
+    """
+    states, used = scene.contacts.states, scene.used
     for i in range(used.size):
         used[i] = 0
     for colour in range(COLOURS + 1):
@@ -102,11 +76,15 @@ def colour_pairs(scene: Nonsmooth, count: int) -> None:
         pair = scene.kept[p]
         free_a = states[pair.a].inverse_mass > 0.0
         free_b = states[pair.b].inverse_mass > 0.0
-        colour = lowest_free((used[pair.a] if free_a else 0) | (used[pair.b] if free_b else 0))
+        taken = (used[pair.a] if free_a else 0) | (used[pair.b] if free_b else 0)
+        colour = 0
+        while colour < COLOURS - 1 and (taken >> colour) & ONE == ONE:
+            colour += 1
+        bit = ONE << colour if colour < COLOURS - 1 else 0
         if free_a:
-            used[pair.a] |= bit_of(colour)
+            used[pair.a] |= bit
         if free_b:
-            used[pair.b] |= bit_of(colour)
+            used[pair.b] |= bit
         pair.colour = colour
         scene.begins[colour + 1] += 1
         last = max(last, colour + 1)
@@ -124,26 +102,6 @@ def most_groups(scene: Nonsmooth) -> int:
         most_left = min(size, LONELY if size % WIDTH >= LONELY else 1)  # groups of fewer than four; see gather
         count += size if colour == COLOURS - 1 else size // WIDTH + most_left
     return count
-
-
-@jit.rare_kernel
-def place_constraints(scene: Nonsmooth, count: int) -> None:
-    """Make the constraints of all pairs, sorted by colour, with the impulses that were kept."""
-    bodies = scene.world.bodies
-    classes = scene.world.interactions.shape[0]
-    next_place = scene.contacts.ends
-    for colour in range(next_place.size):
-        next_place[colour] = scene.begins[colour]
-    for p in range(count):
-        pair = scene.kept[p]
-        constraint = scene.contacts.constraints[next_place[pair.colour]]
-        next_place[pair.colour] += 1
-        constraint.a = pair.a
-        constraint.b = pair.b
-        constraint.material = bodies[pair.a].contact_class * classes + bodies[pair.b].contact_class
-        constraint.reach = AWAY
-        copy_impulses(pair, constraint)
-    scene.contacts.stepping[0].constraint_count = count
 
 
 STEPS = 16.0  # that a body should be able to continue before its reach is used up
@@ -178,53 +136,34 @@ def common_frame(scene: Nonsmooth) -> Frame:
         body = bodies[i]
         if body.inverse_mass == 0.0:
             return frame_of_supports(scene)
-        way += body.x - scene.listed[i].x
+        way += body.x - body.list_x
         speed += body.vx
     count = max(1, bodies.size - 1)
     return Frame(way / count, 0.0, speed / count, 0.0)
 
 
-@jit.kernel
-def corner_speed(body: arrays.Record, frame: Frame) -> float:
-    """Return an upper bound (m/s) of the speed of a body's points in a frame."""
-    return math.sqrt((body.vx - frame.vx) ** 2 + (body.vy - frame.vy) ** 2) + body.radius * abs(body.spin)
-
-
-@jit.kernel
-def travel(scene: Nonsmooth, i: int, frame: Frame) -> float:
-    """Return how far (m) a corner of a body may have come in a frame since the pair list was made."""
-    body = scene.world.bodies[i]
-    dx = body.x - scene.listed[i].x - frame.x
-    dy = body.y - scene.listed[i].y - frame.y
-    return math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
-
-
 @jit.rare_kernel
 def update_driven(scene: Nonsmooth, frame: Frame) -> tuple[float, bool]:
-    """Return the speed (m/s) of the fastest driven body in the next step, and whether none uses up its reach."""
-    step = scene.world.controls[0].step
-    fastest = 0.0
-    is_good = True
-    for one in scene.world.moved:
-        if supports.is_driven(one):
-            rate = coming_speed(scene, one, frame)
-            reach = scene.listed[one.body].reach
-            fastest = max(fastest, rate)
-            is_good = is_good and travel(scene, one.body, frame) + min(rate * step, MOST_MARGIN * reach) <= reach
-    return fastest, is_good
+    """Return the speed (m/s) of the fastest driven body in the next step, and whether none uses up its reach.
 
-
-@jit.rare_kernel
-def coming_speed(scene: Nonsmooth, one: arrays.Record, frame: Frame) -> float:
-    """Return an upper bound (m/s) of the mean speed of the points of a driven body in the next step, in a frame.
-
-    A path may begin, end or turn back at once: the velocity until now does not show it.
+    It is an upper bound of the mean speed of its points in a frame. A path may begin, end or turn back at once: the
+    velocity until now does not show it.
     """
     world = scene.world
     step = world.controls[0].step
-    way = supports.way_over(world, one, world.clock[0].steps * step, step)
-    rate = math.sqrt((way.x / step - frame.vx) ** 2 + (way.y / step - frame.vy) ** 2)
-    return rate + world.bodies[one.body].radius * abs(way.angle) / step
+    fastest = 0.0
+    is_good = True
+    for one in world.moved:
+        if supports.is_driven(one):
+            body = world.bodies[one.body]
+            way = supports.way_over(world, one, world.clock[0].steps * step, step)
+            rate = math.sqrt((way.x / step - frame.vx) ** 2 + (way.y / step - frame.vy) ** 2)
+            rate += body.radius * abs(way.angle) / step
+            reach = scene.reaches[one.body]
+            fastest = max(fastest, rate)
+            gone = neighbours.travel(body, frame.x, frame.y)
+            is_good = is_good and gone + min(rate * step, MOST_MARGIN * reach) <= reach
+    return fastest, is_good
 
 
 @jit.kernel
@@ -243,12 +182,12 @@ def update_pairs(scene: Nonsmooth) -> bool:
     is_finite = True
     for i in range(world.bodies.size - 1):
         body = world.bodies[i]
-        listed = scene.listed[i]
-        rate = corner_speed(body, frame) + falls
+        reach = scene.reaches[i]
+        rate = neighbours.top_speed(body, frame.vx, frame.vy) + falls
         fastest = max(fastest, rate)
-        gone = travel(scene, i, frame)
+        gone = neighbours.travel(body, frame.x, frame.y)
         is_finite = is_finite and math.isfinite(rate + gone)
-        is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * listed.reach) <= listed.reach
+        is_good = is_good and gone + min(2.0 * rate * controls.step, MOST_MARGIN * reach) <= reach
     if controls.driven != 0:
         coming, stays = update_driven(scene, frame)
         fastest = max(fastest, coming)
@@ -258,114 +197,42 @@ def update_pairs(scene: Nonsmooth) -> bool:
 
 
 @jit.rare_kernel
-def note_places(scene: Nonsmooth, frame: Frame) -> None:
-    """Write where all bodies are and how far they reach."""
-    world = scene.world
-    stepping = scene.contacts.stepping[0]
+def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
+    """Rebuild the pair list and its constraints, sorted by colour; how far a body reaches follows from its speed.
+
+    Returns False, with the constraints untouched, where the list does not fit.
+    """
+    world, contacts = scene.world, scene.contacts
+    stepping = contacts.stepping[0]
+    neighbours.note_places(world.bodies)
     stepping.listed_x = stepping.support_x
     stepping.listed_y = stepping.support_y
-    for i in range(world.bodies.size):
-        body = world.bodies[i]
-        listed = scene.listed[i]
-        ahead = STEPS * world.controls[0].step * corner_speed(body, frame)
-        listed.x = body.x
-        listed.y = body.y
-        listed.reach = min(max(ahead, stepping.least_reach), stepping.most_reach)
-        listed.radius = body.radius + listed.reach
-        body.list_angle = body.angle
-
-
-@jit.kernel
-def add(scene: Nonsmooth, count: int, i: int, j: int) -> int:
-    """List a pair, if there is room; return the count needed."""
-    if count < scene.kept.size:
-        scene.kept[count].a = min(i, j)
-        scene.kept[count].b = max(i, j)
-    return count + 1
-
-
-@jit.kernel
-def are_near(scene: Nonsmooth, i: int, j: int) -> bool:
-    """Return True if the reaches of two bodies meet, at least one of them free."""
-    one = scene.listed[i]
-    two = scene.listed[j]
-    dx = one.x - two.x
-    dy = one.y - two.y
-    limit = one.radius + two.radius
-    if dx * dx + dy * dy > limit * limit:
+    for i in range(world.bodies.size - 1):
+        ahead = STEPS * world.controls[0].step * neighbours.top_speed(world.bodies[i], frame.vx, frame.vy)
+        scene.reaches[i] = min(max(ahead, stepping.least_reach), stepping.most_reach)
+    count = neighbours.list_pairs(world, scene.kept, scene.reaches, 0.0, False)
+    fits = count <= scene.kept.size
+    if fits:
+        keep_impulses(scene, count)
+        colour_pairs(scene, count)
+        fits = most_groups(scene) <= contacts.groups.size
+    if not fits:
+        world.clock[0].rebuilds = 0
         return False
-    states = scene.contacts.states
-    if states[i].inverse_mass + states[j].inverse_mass == 0.0:
-        return False
-    return shapes.separation(scene.world.bodies[i], scene.world.bodies[j]) <= one.reach + two.reach
-
-
-@jit.rare_kernel
-def add_from_cell(scene: Nonsmooth, i: int, column: int, row: int, least: int, count: int) -> int:
-    """List the neighbours of body i in one cell, from body number `least` on; return the count needed."""
-    world = scene.world
-    width = world.controls[0].cell_width
-    j = world.heads[grid.bucket(column, row, world.heads.size)]
-    while j > 0:
-        if j > least and are_near(scene, i, j - 1):
-            other = scene.listed[j - 1]  # cells share buckets
-            if grid.cell_of(other.x, width) == column and grid.cell_of(other.y, width) == row:
-                count = add(scene, count, i, j - 1)
-        j = world.links[j - 1]
-    return count
-
-
-@jit.rare_kernel
-def add_large(scene: Nonsmooth, i: int, count: int) -> int:
-    """List the neighbours of body i among those too large for the grid."""
-    for j in scene.world.large:
-        is_new = j > i or scene.world.bodies[i].radius <= scene.world.controls[0].cell_radius
-        if j != i and is_new and are_near(scene, i, j):
-            count = add(scene, count, i, j)
-    return count
-
-
-@jit.rare_kernel
-def list_pairs(scene: Nonsmooth) -> int:
-    """List all pairs whose reaches meet; return how many there are, fitting or not.
-
-    Every two neighbouring cells are visited from one of them only.
-    """
-    world = scene.world
-    width = world.controls[0].cell_width
-    ground = world.bodies.size - 1
-    level = world.bodies[ground].y
-    grid.fill_grid(world)
-    count = 0
-    for i in range(ground):
-        body = world.bodies[i]
-        if body.radius <= world.controls[0].cell_radius:
-            column = grid.cell_of(body.x, width)
-            row = grid.cell_of(body.y, width)
-            count = add_from_cell(scene, i, column, row, i + 1, count)
-            count = add_from_cell(scene, i, column + 1, row, 0, count)
-            for x in range(column - 1, column + 2):
-                count = add_from_cell(scene, i, x, row + 1, 0, count)
-        count = add_large(scene, i, count)
-        if body.inverse_mass > 0.0 and shapes.ground_gap(body) <= level + scene.listed[i].reach:
-            count = add(scene, count, i, ground)
-    return count
-
-
-@jit.rare_kernel
-def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
-    """Rebuild the pair list; return False, with the constraints untouched, where it does not fit."""
-    note_places(scene, frame)
-    count = list_pairs(scene)
-    if count > scene.kept.size:
-        scene.world.clock[0].rebuilds = 0
-        return False
-    keep_impulses(scene, count)
-    colour_pairs(scene, count)
-    if most_groups(scene) > scene.contacts.groups.size:
-        scene.world.clock[0].rebuilds = 0
-        return False
-    place_constraints(scene, count)
-    scene.world.clock[0].pair_count = count
-    scene.world.clock[0].rebuilds += 1
+    next_place = contacts.ends
+    for colour in range(next_place.size):
+        next_place[colour] = scene.begins[colour]
+    bodies, classes = world.bodies, world.interactions.shape[0]
+    for p in range(count):
+        pair = scene.kept[p]
+        constraint = contacts.constraints[next_place[pair.colour]]
+        next_place[pair.colour] += 1
+        constraint.a = pair.a
+        constraint.b = pair.b
+        constraint.material = bodies[pair.a].contact_class * classes + bodies[pair.b].contact_class
+        constraint.reach = AWAY
+        copy_impulses(pair, constraint)
+    stepping.constraint_count = count
+    world.clock[0].pair_count = count
+    world.clock[0].rebuilds += 1
     return True

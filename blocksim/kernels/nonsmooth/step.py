@@ -350,7 +350,7 @@ def member(scenes: arrays.Nonsmooth, m: int) -> arrays.Nonsmooth:
             contacts.stepping[m],
         ),
         scenes.kept[m],
-        scenes.listed[m],
+        scenes.reaches[m],
         scenes.firsts[m],
         scenes.begins[m],
         scenes.used[m],

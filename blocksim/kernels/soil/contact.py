@@ -17,12 +17,11 @@ beyond an end is its neighbour's affair. The half-plane, the last of all bodies,
 
 import math
 
-from blocksim.kernels.common import arrays, jit, supports, systems
+from blocksim.kernels.common import arrays, jit, neighbours, supports, systems
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.soil.arrays import GROUP, Soils
 from blocksim.kernels.soil.neighbours import grid_of
-from blocksim.kernels.sph.cells import clipped_cell
 
 UPPER_RIGHT, UPPER_LEFT = 4, 8  # bits of corners that can be touched
 
@@ -250,14 +249,9 @@ def find_near(soils: Soils, world: arrays.World, b: int, count: int) -> int:
     left, right, bottom, top = extent_of(body, is_ground, reach)
     if right < controls.least_x or left > controls.most_x or top < controls.least_y or bottom > controls.most_y:
         return count
-    first = clipped_cell(left - grid.left, grid.size, grid.columns)
-    last = clipped_cell(right - grid.left, grid.size, grid.columns)
-    low = clipped_cell(bottom - grid.bottom, grid.size, grid.rows)
-    high = clipped_cell(top - grid.bottom, grid.size, grid.rows)
-    for row in range(low, high + 1):
-        begin = soils.starts[row * grid.columns + first]
-        end = soils.starts[row * grid.columns + last + 1]
-        for i in range(begin, end):
+    first, last = neighbours.column_of(grid, left), neighbours.column_of(grid, right)
+    for row in range(neighbours.row_of(grid, bottom), neighbours.row_of(grid, top) + 1):
+        for i in range(soils.starts[row * grid.columns + first], soils.starts[row * grid.columns + last + 1]):
             if is_near(body, is_ground, soils.points[i].x, soils.points[i].y, reach):
                 if count < soils.by_body.size:
                     soils.by_body[count] = i

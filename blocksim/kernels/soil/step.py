@@ -206,7 +206,7 @@ def start(soils: arrays.Soils, world: World, k: int, step: float) -> None:
         start_group(soils, world, g, time, step)
     barrier(world.team)
     travel = neighbours.travelled(soils, world, step)
-    is_due = neighbours.are_lists_due(soils, travel)
+    is_due = soils.controls[0].is_listed == 0 or not 2.0 * travel <= soils.controls[0].skin  # of two that approach
     barrier(world.team)
     if k == 0:
         soils.controls[0].travel = 0.0 if is_due else travel
@@ -218,9 +218,7 @@ def start(soils: arrays.Soils, world: World, k: int, step: float) -> None:
 def renew_lists(soils: arrays.Soils, world: World, k: int) -> None:
     """Sort the particles, and make all lists anew."""
     if k == 0:
-        neighbours.lay_cells(soils)
         neighbours.sort_particles(soils)
-        neighbours.move_particles(soils)
         contact.make_touches(soils, world)
         if soils.controls[0].is_listed == 0:
             contact.preload(soils, world)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import HALF, NORMAL, SHEAR, Records, World
-from blocksim.kernels.common.grid import FARTHEST_CELL, bucket, cell_of, fill_grid
+from blocksim.kernels.common.arrays import NORMAL, PAIR, SHEAR, Records, World, zeros
 from blocksim.kernels.common.integrate import renew_rotations
-from blocksim.kernels.explicit.broad_phase import carry_history, insert_sorted, neighbours_of
+from blocksim.kernels.common.neighbours import list_pairs
+from blocksim.kernels.explicit.broad_phase import carry_history
 from blocksim.verification.scene import scenario_of
 from blocksim.world.build import build_world, empty_lists
 
@@ -86,8 +86,16 @@ def expected_neighbours(world: World) -> list[list[int]]:
 
 
 def found_neighbours(world: World) -> list[list[int]]:
-    fill_grid(world)
-    return [world.neighbours[: neighbours_of(world, i)].tolist() for i in range(world.bodies.size - 1)]
+    """Return the same from the list of pairs, sorted or not, without the ground."""
+    ground, reach = world.bodies.size - 1, float(world.controls[0].skin)
+    kept: Any = zeros(ground * ground, PAIR)
+    found: list[list[int]] = [[] for _ in range(ground)]
+    for a, b in kept[: list_pairs(world, kept, None, reach, True)][["a", "b"]].tolist():
+        if b < ground:
+            found[a].append(b)
+    others = kept[: list_pairs(world, kept, 0.5 * np.full(ground + 1, reach), 0.0, False)][["a", "b"]].tolist()
+    assert sorted(pair for pair in others if pair[1] < ground) == [(a, b) for a in range(ground) for b in found[a]]
+    return found
 
 
 HEAPS = [
@@ -114,13 +122,6 @@ def test_grid_finds_the_pairs_that_looking_at_all_of_them_finds(
     assert large <= is_large.sum() <= COUNT // 8
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_bodies_in_one_bucket_are_reported_apart_and_listed_once(seed: int) -> None:
-    world = heap(seed, up_to(3.0), 0.3)
-    world = world._replace(heads=np.zeros(1, dtype=np.uint32))  # nine examines everything
-    assert found_neighbours(world) == expected_neighbours(world)
-
-
 @pytest.mark.parametrize("place", [(1e3, -1e3), (-3e6, 2e6), (2e8, -3e8)])
 def test_bodies_that_have_flown_far_still_find_one_another(place: tuple[float, float]) -> None:
     world = heap(4, alike, 0.4)
@@ -132,37 +133,6 @@ def test_bodies_that_have_flown_far_still_find_one_another(place: tuple[float, f
     assert sum(map(len, expected[::2])) > 5
 
 
-@given(place=st.floats(-1e6, 1e6), width=st.floats(1e-3, 1.0))
-def test_cells_are_numbered_from_left_to_right_through_zero(place: float, width: float) -> None:
-    cell = cell_of(place, width)
-    assert cell * width <= place + 1e-9 * abs(place)
-    assert place <= (cell + 1) * width + 1e-9 * abs(place)
-
-
-def test_cell_number_has_a_bound() -> None:
-    assert cell_of(1e9, 1e-3) == FARTHEST_CELL
-    assert cell_of(-1e9, 1e-3) == -FARTHEST_CELL
-
-
-@given(column=st.integers(-(10**9), 10**9), row=st.integers(-(10**9), 10**9), bits=st.integers(0, 24))
-def test_bucket_is_one_of_the_table(column: int, row: int, bits: int) -> None:
-    assert 0 <= bucket(column, row, 1 << bits) < 1 << bits
-
-
-def test_cells_of_a_large_scene_spread_over_the_buckets() -> None:
-    used = {bucket(column, row, 4096) for column in range(-16, 16) for row in range(64)}  # 2048 cells
-    assert len(used) > 1400  # as many as of random numbers: 4096 (1 - exp(-1/2)) = 1612
-
-
-@given(numbers=st.lists(st.integers(0, 20), max_size=20))
-def test_row_stays_sorted_and_without_repetition(numbers: list[int]) -> None:
-    row: Any = np.zeros(21, dtype=np.uint32)
-    count = 0
-    for number in numbers:
-        count = insert_sorted(row, count, number)
-    assert row[:count].tolist() == sorted(set(numbers))
-
-
 BODIES = 12
 CAPACITY = BODIES * (BODIES - 1) // 2
 
@@ -170,11 +140,13 @@ CAPACITY = BODIES * (BODIES - 1) // 2
 @pytest.fixture(scope="module")
 def worlds() -> dict[str, World]:
     """Return a world with room for all pairs, with contacts of either kind."""
-    bodies = [{"x": 0.1 * i, "y": 1.0} for i in range(BODIES)]
+    bodies = [{"x": 0.04 * i, "y": 1.0} for i in range(BODIES)]
     contact = {"particle_spacing": 0.008}
     made = {
         model: build_world(scenario_of(bodies, contact={"model": model, **contact})) for model in ("surface", "kernel")
     }
+    for world in made.values():
+        world.controls.approach = 1.0  # m: all are near to one another
     return {
         model: world._replace(**empty_lists(CAPACITY, world.candidates.shape[1], world.before))
         for model, world in made.items()
@@ -231,9 +203,7 @@ def test_every_pair_keeps_its_own_history_wherever_it_moves_in_the_list(
     axes = {(int(pair.a), int(pair.b)): int(pair.axis) for pair in world.pairs[: len(old)]}
     for spare, (a, b) in zip(world.spare_pairs, new, strict=False):
         spare.a, spare.b = a, b
-        spare.near, spare.active, spare.duplicates, spare.axis = HALF, 0, 0, 0
-        spare.normal_left = spare.shear_left = spare.slides = 0
-    carry_history(world, len(new))
+    assert carry_history(world, len(new)) == len(new)
     after = remembered(world, world.spare_pairs, len(new))
     assert after == {pair: history for pair, history in before.items() if pair in set(new)}
     assert world.spare_pairs.axis[: len(new)].tolist() == [axes.get(pair, 0) for pair in new]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import ACTION, zeros
-from blocksim.kernels.explicit.history import TAKEN, change_contacts, was_in_contact
+from blocksim.kernels.explicit.history import TAKEN, change_contacts
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point
-from blocksim.kernels.explicit.models.surface import face_normal, slot_normal
+from blocksim.kernels.explicit.models.surface import face_normal, slot_normal, was_touching
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, World
@@ -157,10 +157,10 @@ def test_ended_contact_tallies_half_the_work_of_its_last_step(pose: Pose) -> Non
 
 def test_corner_was_in_contact_on_whichever_face(pose: Pose) -> None:
     old = stacked(pose, OTHER, TWO).contacts[0]
-    assert [was_in_contact(slot, old, 2) for slot in range(8)] == [True, True] + [False] * 6
-    assert not was_in_contact(1, old, 1)
+    assert [was_touching(slot, old, 2) for slot in range(8)] == [True, True] + [False] * 6
+    assert not was_touching(1, old, 1)
     old.slot = TAKEN
-    assert not was_in_contact(0, old, 2)
+    assert not was_touching(0, old, 2)
 
 
 def test_broken_contact_tallies_its_shear_springs_and_forgets_everything(start: Start, paper_block: PaperBlock) -> None:

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import MOTION_PIECE, World, zeros
+from blocksim.kernels.common.arrays import MOTION_PIECE, PAIRS_FULL, REACHED, World, zeros
+from blocksim.kernels.common.neighbours import travel
 from blocksim.kernels.common.shapes import separation
 from blocksim.kernels.explicit.broad_phase import (
     MOST_UNSEEN,
     MOST_UNSEEN_DRIVEN,
     PAIR_SHARE,
-    travel,
     unseen_steps,
     update_pairs,
 )
@@ -41,9 +41,9 @@ def world() -> World:
 def test_travel_is_that_of_the_farthest_corner(make_body: MakeBody) -> None:
     body = make_body(0.3, -0.2, 1.0)
     body.list_x, body.list_y, body.list_angle = 0.1, 0.1, 1.5
-    assert travel(body) == pytest.approx(np.hypot(0.2, 0.3) + 0.5 * body.radius)
+    assert travel(body, 0.0, 0.0) == pytest.approx(np.hypot(0.2, 0.3) + 0.5 * body.radius)
     body.list_x, body.list_y, body.list_angle = body.x, body.y, body.angle
-    assert travel(body) == 0.0
+    assert travel(body, 0.0, 0.0) == 0.0
 
 
 shares = st.floats(0.0, 0.999)
@@ -93,7 +93,7 @@ def test_list_that_reaches_far_enough_is_kept_and_one_that_does_not_is_made_anew
     share = PAIR_SHARE * float(world.controls[0].skin)
     for moved, rebuilds in ((0.9, 1), (1.01, 2), (0.9, 2), (-1.01, 3), (50.0, 4)):
         world.bodies[0].x = world.bodies[0].list_x + moved * share
-        assert update_pairs(world)
+        assert update_pairs(world) == REACHED
         assert world.clock[0].rebuilds == rebuilds
         assert world.clock[0].next_update > world.clock[0].steps
     assert world.bodies[0].list_x == world.bodies[0].x
@@ -111,7 +111,7 @@ def test_look_that_finds_no_room_changes_nothing(start: Start) -> None:
     world = scene.world._replace(**empty_lists(1, 8, scene.world.before))
     world.bodies[0].list_x += 1.0
     clock = world.clock.tobytes()
-    assert not update_pairs(world)
+    assert update_pairs(world) == PAIRS_FULL
     assert world.clock.tobytes() == clock
     assert world.bodies[0].list_x == world.bodies[0].x + 1.0
 
@@ -121,7 +121,7 @@ def test_look_that_finds_no_room_changes_nothing(start: Start) -> None:
 def test_state_that_is_not_finite_is_left_to_the_next_check(start: Start, name: str, value: float) -> None:
     world = start([{"y": 1.0}], contact=SOFT).world
     world.bodies[0][name] = value
-    assert update_pairs(world)
+    assert update_pairs(world) == REACHED
     assert world.clock[0].rebuilds == 1
     assert 10 < world.clock[0].next_update <= MOST_UNSEEN
 

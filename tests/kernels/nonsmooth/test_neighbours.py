@@ -65,7 +65,7 @@ def test_list_has_all_pairs_whose_reaches_meet_each_once(seed: int) -> None:
     constraints = listed_constraints(scene)
     assert len(pairs_of(scene)) == constraints.size
     assert np.all(constraints.a < constraints.b)
-    reaches = scene.listed.reach
+    reaches = scene.reaches
     assert len(set(reaches.tolist())) > BLOCKS // 3  # by speed
     expected = near(scene, reaches)
     assert pairs_of(scene) == expected

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.kernels.sph.cells import find_neighbours, lay_grid, make_cells
+from blocksim.kernels.sph.cells import find_neighbours
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Floats
@@ -52,25 +52,6 @@ def test_points_far_outside_have_no_neighbours() -> None:
     far = np.array([[5.0, 0.5], [-5.0, 0.5], [0.5, 1e30], [-1e90, -1e90]])
     assert by_cells(positions, far, 0.2) == [[], [], [], []]
     assert by_cells(positions, np.empty((0, 2)), 0.2) == []
-
-
-@given(positions=CLOUDS, radius=st.sampled_from([1e-9, RADIUS, 1e12]))
-def test_cells_are_few_and_hold_every_particle_once(positions: Floats, radius: float) -> None:
-    cells = make_cells(positions, radius)
-    count = cells.grid.columns * cells.grid.rows
-    assert count <= 3 * len(positions) + 1
-    assert cells.grid.size >= radius
-    assert sorted(cells.order.tolist()) == list(range(len(positions)))
-    assert (cells.starts[0], cells.starts[count]) == (0, len(positions))
-    for begin, end in zip(cells.starts[:count], cells.starts[1:], strict=False):
-        assert (np.diff(cells.order[begin:end]) > 0).all()
-
-
-def test_cells_of_an_even_cloud_have_the_size_of_the_radius() -> None:
-    positions = np.random.default_rng(3).uniform(0.0, 1.0, (1000, 2))
-    grid = lay_grid(positions, 0.1)
-    assert grid.size == 0.1
-    assert (grid.columns, grid.rows) == (10, 10)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

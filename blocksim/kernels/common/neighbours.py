@@ -1,0 +1,226 @@
+"""Who is near whom: square cells over bodies or particles, and the pairs of bodies whose reaches meet.
+
+Cells lie over the bounding box, so that neighbouring ones of a row are one stretch of the sorted places. Where a few
+have flown so far that there would be too many cells, they lie over the bulk: what is beyond counts to the outermost.
+
+No neighbour is missed to round-off. If |x_b - x| <= radius as computed, the cell of x_b lies between the cells of
+x - radius and x + radius, because rounding keeps order. So lists equal those of a search over all pairs, on cell edges
+too.
+
+Lists reach farther than contacts, and stay good until something has moved by what they reach farther (L. Verlet, Phys.
+Rev. 159 (1967) 98). How far that is, and what is done with a pair, is a matter of each scheme.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from blocksim.kernels.common import arrays, jit, shapes
+
+FAR = 4.0  # mean distances from the middle, beyond which places count to the outermost cells where cells are too many
+FARTHEST = 1e9  # cells; places beyond share one
+
+
+class CellGrid(NamedTuple):
+    """Square cells, numbered row by row from the lower left one."""
+
+    x: float  # m: where the lower left corner of a cell is, the first one or another
+    y: float  # m
+    size: float  # m, side of a cell
+    columns: int
+    rows: int
+    left: float  # cells from there to the first column
+    bottom: float  # and to the first row
+
+
+@jit.kernel
+def column_of(grid: CellGrid, x: float) -> int:
+    """Return the column that a place (m) is in; places outside count to the nearest one."""
+    return int(min(max(np.floor((x - grid.x) / grid.size) - grid.left, 0.0), grid.columns - 1.0))
+
+
+@jit.kernel
+def row_of(grid: CellGrid, y: float) -> int:
+    """Return the row that a place (m) is in; places outside count to the nearest one."""
+    return int(min(max(np.floor((y - grid.y) / grid.size) - grid.bottom, 0.0), grid.rows - 1.0))
+
+
+@jit.kernel
+def cell_number(grid: CellGrid, x: float, y: float) -> int:
+    """Return the number of the cell of a place (m); one that is no number is in the first cell."""
+    return row_of(grid, y) * grid.columns + column_of(grid, x) if math.isfinite(x + y) else 0
+
+
+@jit.rare_kernel
+def ends_along(places: arrays.Records, is_x: bool, most: float) -> tuple[float, float]:
+    """Return from where to where (m) all lie along an axis, those farther than `most` from its origin taken there."""
+    low, high = math.inf, -math.inf
+    for i in range(places.size):
+        place = places[i].x if is_x else places[i].y
+        if math.isfinite(place):
+            place = min(max(place, -most), most)
+            low, high = min(low, place), max(high, place)
+    return (low, high) if low <= high else (0.0, 0.0)
+
+
+@jit.rare_kernel
+def bulk_along(places: arrays.Records, is_x: bool, low: float, high: float) -> tuple[float, float]:
+    """Return the part of an extent (m) that holds all but a few, those beyond it taken to be at its ends."""
+    middle, away = 0.0, 0.0
+    for i in range(places.size):
+        place = places[i].x if is_x else places[i].y
+        if math.isfinite(place):
+            middle += min(max(place, low), high) / places.size
+    for i in range(places.size):
+        place = places[i].x if is_x else places[i].y
+        if math.isfinite(place):
+            away += FAR * abs(min(max(place, low), high) - middle) / places.size
+    return max(low, middle - away), max(low, min(high, middle + away))
+
+
+@jit.rare_kernel
+def lay_cells(places: arrays.Records, size: float, count: float, is_fixed: bool) -> CellGrid:
+    """Return cells of a size (m) over all places, over the bulk or larger where there would be more than 3 count + 1.
+
+    With w and h the sides and s at least w/n, h/n and (w h/n)^(1/2) there are no more than (w/s + 1)(h/s + 1), at most
+    3 n + 1, cells, however thin or wide the box is. Where they are to be `is_fixed`, and are not larger, they are those
+    of one and the same grid, wherever the outermost places lie.
+    """
+    left, right = ends_along(places, True, FARTHEST * size)
+    bottom, top = ends_along(places, False, FARTHEST * size)
+    column, row = (np.floor(left / size), np.floor(bottom / size)) if is_fixed else (0.0, 0.0)
+    left, bottom = (size * column, size * row) if is_fixed else (left, bottom)
+    before = math.inf
+    while True:
+        width, height = right - left, top - bottom
+        fitting = max(size, width / count, height / count, math.sqrt(width / count) * math.sqrt(height))
+        if fitting <= size or not fitting < 0.5 * before:
+            columns, rows = int(width / fitting) + 1, int(height / fitting) + 1
+            if is_fixed and fitting <= size:
+                return CellGrid(0.0, 0.0, size, columns, rows, column, row)
+            return CellGrid(left, bottom, fitting, columns, rows, 0.0, 0.0)
+        before = fitting
+        left, right = bulk_along(places, True, left, right)
+        bottom, top = bulk_along(places, False, bottom, top)
+
+
+@jit.rare_kernel
+def sort_into_cells(places: arrays.Records, grid: CellGrid, starts: arrays.Integers, order: arrays.Integers) -> None:
+    """Sort by counting: places of cell c are order[starts[c]:starts[c + 1]], in rising order.
+
+    Counts are kept two entries late, so that summed up they are the cells' beginnings one entry late; every place that
+    is written moves its entry on, up to the beginning of the next cell. So `starts` has two entries more than cells.
+    """
+    cells = grid.columns * grid.rows
+    for c in range(cells + 2):
+        starts[c] = 0
+    for i in range(places.size):
+        starts[cell_number(grid, places[i].x, places[i].y) + 2] += 1
+    for c in range(cells + 1):
+        starts[c + 1] += starts[c]
+    for i in range(places.size):
+        c = cell_number(grid, places[i].x, places[i].y)
+        order[starts[c + 1]] = i
+        starts[c + 1] += 1
+
+
+@jit.kernel
+def top_speed(body: arrays.Record, vx: float, vy: float) -> float:
+    """Return an upper bound (m/s) of the speed of a body's points in a frame of some velocity (m/s)."""
+    return math.sqrt((body.vx - vx) ** 2 + (body.vy - vy) ** 2) + body.radius * abs(body.spin)
+
+
+@jit.kernel
+def travel(body: arrays.Record, x: float, y: float) -> float:
+    """Return how far (m) a corner of a body may have come since the list was made, in a frame that has come (x, y)."""
+    dx = body.x - body.list_x - x
+    dy = body.y - body.list_y - y
+    return math.sqrt(dx * dx + dy * dy) + body.radius * abs(body.angle - body.list_angle)
+
+
+@jit.rare_kernel
+def note_places(bodies: arrays.Records) -> None:
+    """Note where all bodies are when a list is made."""
+    for body in bodies:
+        body.list_x = body.x
+        body.list_y = body.y
+        body.list_angle = body.angle
+
+
+@jit.rare_kernel
+def add_if_near(
+    world: arrays.World, pairs: Any, reaches: arrays.Floats | None, reach: float, i: int, j: int, count: int
+) -> int:
+    """List two bodies, at least one of them free, if they are near and there is room; return the count needed.
+
+    Near means a gap (m) of no more than `reach`, or than what the `reaches` of both, if there are any, add up to.
+    """
+    body, other = world.bodies[i], world.bodies[j]
+    if reaches is not None:
+        reach = reaches[i] + reaches[j]
+    if j == world.bodies.size - 1:
+        is_near = body.inverse_mass > 0.0 and shapes.ground_gap(body) <= other.y + reach
+    else:
+        dx, dy = body.x - other.x, body.y - other.y
+        limit = body.radius + other.radius + reach
+        is_near = dx * dx + dy * dy <= limit * limit and body.inverse_mass + other.inverse_mass > 0.0
+        is_near = is_near and shapes.separation(body, other) <= reach
+    if is_near and count < pairs.size:
+        pairs[count].a = min(i, j)
+        pairs[count].b = max(i, j)
+    return count + 1 if is_near else count
+
+
+@jit.rare_kernel
+def list_pairs(world: arrays.World, pairs: Any, reaches: arrays.Floats | None, reach: float, is_sorted: bool) -> int:
+    """List all pairs of bodies that are near one another; return how many there are, fitting or not.
+
+    Bodies too large for the cells, and the ground, are tested one by one. Sorted by both bodies, each pair is found
+    from the first of them, in the cells all around it. Else each two neighbouring cells are visited from one of them
+    only: from the left one, or the lower one.
+    """
+    controls, bodies, starts = world.controls[0], world.bodies, world.starts
+    ground = bodies.size - 1
+    blocks: Any = bodies[:ground]
+    grid = lay_cells(blocks, controls.cell_width, (starts.size - 3) / 3.0, True)
+    sort_into_cells(blocks, grid, starts, world.order)
+    count = 0
+    for i in range(ground):
+        body = bodies[i]
+        is_large = body.radius > controls.cell_radius
+        first_pair = count
+        if is_large and is_sorted:
+            for j in range(i + 1, ground):
+                count = add_if_near(world, pairs, reaches, reach, i, j, count)
+        if not is_large:
+            column, row = column_of(grid, body.x), row_of(grid, body.y)
+            cell = row * grid.columns + column
+            after = ground if is_sorted else starts[cell + 1]  # from there on all count, before it those after i
+            for line in range(max(row - 1, 0) if is_sorted else row, min(row + 2, grid.rows)):
+                left = max(column - 1, 0) if is_sorted or line > row else column
+                right = min(column + 1, grid.columns - 1)
+                for k in range(starts[line * grid.columns + left], starts[line * grid.columns + right + 1]):
+                    j = world.order[k]
+                    if (j > i or k >= after) and bodies[j].radius <= controls.cell_radius:
+                        count = add_if_near(world, pairs, reaches, reach, i, j, count)
+        if not (is_large and is_sorted):
+            for j in world.large:
+                if j > i or (not is_sorted and not is_large):
+                    count = add_if_near(world, pairs, reaches, reach, i, j, count)
+        if is_sorted:
+            sort_by_second(pairs, first_pair, min(count, pairs.size))
+        count = add_if_near(world, pairs, reaches, reach, i, ground, count)
+    return count
+
+
+@jit.rare_kernel
+def sort_by_second(pairs: Any, begin: int, end: int) -> None:
+    """Sort a few pairs of the same first body by the second one."""
+    for m in range(begin + 1, end):
+        b = pairs[m].b
+        k = m
+        while k > begin and pairs[k - 1].b > b:
+            pairs[k].b = pairs[k - 1].b
+            k -= 1
+        pairs[k].b = b
