@@ -16,8 +16,8 @@ Integers = NDArray[np.int64]
 Pairs = tuple[Integers, Integers]
 
 MOST_AT_ONCE = 1_000_000  # pairs that are examined together; more only takes more memory
-FEW = 32  # number of boxes up to which all pairs are examined; sorting into cells would take longer
-ROOM = 1.01
+FEW = 32  # number of boxes up to which all pairs are examined; sorting them would take longer
+FARTHEST = 10**12  # strips; what is beyond shares one
 RECTANGLE = -1  # number of the polygon of what is a rectangle
 POLYGONS_AT_ONCE = 10_000  # pairs with a polygon that are examined together; each takes up to 2 kB
 
@@ -165,25 +165,34 @@ def overlapping_pairs(
 def near_pairs(outlines: Outlines) -> Iterator[Pairs]:
     """Yield the indices of all pairs whose axis-parallel boxes meet, each pair once, many at a time.
 
-    Sorted into cells as large as the largest box, a box reaches over four cells at most. Boxes of very different sizes
-    would share one cell, so every size (from one power of two to the next) has cells of its own, in which the boxes of
-    that size meet one another and all smaller ones.
+    Boxes lie in level strips as high as they are in the mean, so that all sizes together reach into three a box at
+    most. In a strip, sorted by their left ends, those that follow a box up to its right end meet it along x.
     """
-    extents = np.stack([outlines.half_extent(1.0, 0.0), outlines.half_extent(0.0, 1.0)], axis=1)
-    middles = np.stack([outlines.x, outlines.y], axis=1)
-    low, high = middles - extents, middles + extents
-    if len(middles) <= FEW:
-        one, other = _all_pairs(len(middles))
-        near = _meet(low, high, one, other)
-        yield one[near], other[near]
+    half_x, half_y = outlines.half_extent(1.0, 0.0), outlines.half_extent(0.0, 1.0)
+    left, right, low, high = outlines.x - half_x, outlines.x + half_x, outlines.y - half_y, outlines.y + half_y
+    if left.size <= FEW:
+        i, j = _all_pairs(left.size)
+        is_near = (left[i] <= right[j]) & (left[j] <= right[i]) & (low[i] <= high[j]) & (low[j] <= high[i])
+        yield i[is_near], j[is_near]
         return
-    level = np.frexp(extents.max(axis=1))[1]
-    for size in np.unique(level):
-        members = np.flatnonzero(level <= size)
-        cell = 2.0 * ROOM * extents[members].max(axis=0)  # m: a little more than the largest box, which touches two
-        cell[cell == 0.0] = 1.0
-        for one, other in _in_cells(low[members], high[members], level[members] < size, cell):
-            yield members[one], members[other]
+    strip_height = 2.0 * float(half_y.mean()) if half_y.any() else 1.0  # m
+    with np.errstate(over="ignore"):
+        first, last = (np.clip(np.floor(end / strip_height), -FARTHEST, FARTHEST).astype(int) for end in (low, high))
+    counts = last - first + 1
+    box = np.repeat(np.arange(counts.size), counts)
+    strip = first[box] + np.arange(box.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    ends = np.concatenate([left[box], right[box]])
+    order = np.lexsort((np.repeat([0, 1], box.size), ends, np.tile(strip, 2)))
+    is_left = order < box.size
+    begun = np.cumsum(is_left)  # boxes whose left end comes no later than an end, in all strips up to that
+    followed = np.empty(box.size, int)
+    followed[order[~is_left] - box.size] = begun[~is_left]
+    order = order[is_left]
+    box, strip, partners = box[order], strip[order], followed[order] - np.arange(box.size) - 1
+    for one, other in _expanded(partners):
+        i, j = box[one], box[other]  # they may share several strips; they count in the lowest one
+        is_near = (strip[one] == np.maximum(first[i], first[j])) & (low[i] <= high[j]) & (low[j] <= high[i])
+        yield i[is_near], j[is_near]
 
 
 @functools.cache
@@ -191,37 +200,6 @@ def _all_pairs(count: int) -> Pairs:
     """Return the indices of all pairs among so many; kept, as numpy takes longer for them than for all the rest."""
     one, other = np.triu_indices(count, 1)
     return one, other
-
-
-def _in_cells(low: Floats, high: Floats, is_small: NDArray[np.bool_], cell: Floats) -> Iterator[Pairs]:
-    """Yield pairs of boxes that meet, at least one of each not small; no box is larger than a cell (m, m)."""
-    with np.errstate(over="ignore"):  # places beyond the last number share a cell
-        first, last = np.floor(low / cell), np.floor(high / cell)
-    wide, tall = (last != first).T
-    box = np.concatenate([np.flatnonzero(one) for one in (np.ones_like(wide), tall, wide, wide & tall)])
-    column, row = first[box].T
-    alone, of_tall, of_wide = len(first), int(tall.sum()), int(wide.sum())  # each box in each cell that it reaches into
-    column[alone + of_tall :] = last[box[alone + of_tall :], 0]
-    row[alone : alone + of_tall] = last[box[alone : alone + of_tall], 1]
-    row[alone + of_tall + of_wide :] = last[box[alone + of_tall + of_wide :], 1]
-    order = np.lexsort((is_small[box], row, column))
-    box, column, row = box[order], column[order], row[order]
-    is_new = (column[1:] != column[:-1]) | (row[1:] != row[:-1])
-    begins = np.append(0, np.flatnonzero(is_new) + 1)
-    ends = np.repeat(np.append(begins[1:], box.size), np.diff(np.append(begins, box.size)))
-    partners = np.where(is_small[box], 0, ends - np.arange(box.size) - 1)
-    for one, other in _expanded(partners):
-        i, j = box[one], box[other]
-        # a pair may meet in several cells; it counts in that of the lower left corner of what it has in common
-        corner = np.maximum(first[i], first[j])
-        near = (corner[:, 0] == column[one]) & (corner[:, 1] == row[one]) & _meet(low, high, i, j)
-        yield i[near], j[near]
-
-
-def _meet(low: Floats, high: Floats, i: Integers, j: Integers) -> NDArray[np.bool_]:
-    """Return for each two boxes whether they touch or overlap."""
-    is_near: NDArray[np.bool_] = np.all((low[i] <= high[j]) & (low[j] <= high[i]), axis=1)
-    return is_near
 
 
 def _expanded(partners: Integers) -> Iterator[Pairs]:
