@@ -20,10 +20,9 @@ from blocksim.simulation import files
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns
-from blocksim.view import animation, run_data, studies, style, time_panels
+from blocksim.view import animation, run_data, scene, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, run_kind
 from blocksim.view.paints import COLOURS, paint_of
-from blocksim.view.scene import PictureOptions
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 
 if TYPE_CHECKING:
@@ -346,7 +345,7 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
         probes = read_probes(stored.folder / files.FRAMES, scenario)
         time_panels.draw_probes(probes, picture, f"{scenario.name}: probes", tuple(options.probes or ()), options.paper)
         return picture, stored.remark
-    asked = PictureOptions(
+    asked = scene.PictureOptions(
         scenario.name,
         measured,
         run_data.support_of(scenario, stored.events),

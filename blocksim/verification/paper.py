@@ -26,9 +26,8 @@ from blocksim.simulation.run import simulate
 from blocksim.study.answer import number_text
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.reference import markdown
-from blocksim.view import run_data, studies, style
+from blocksim.view import run_data, scene, studies, style
 from blocksim.view.final import draw_final
-from blocksim.view.scene import PictureOptions
 from blocksim.view.strip import draw_strip
 
 MILLI = 1e3
@@ -229,7 +228,7 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
     names = ("figure3.png", "figure4.png", "equation10.png", "equation13.png", "README.md")
     final, strip, equation10, equation13, index = written = [folder / name for name in names]
     support = run_data.support_of(first.scenario)
-    options = PictureOptions(f"Figure 3: {first.name}", centres.summaries(), support, count=PANELS, paper=PAPER)
+    options = scene.PictureOptions(f"Figure 3: {first.name}", centres.summaries(), support, count=PANELS, paper=PAPER)
     draw_final(first.frames, final, options)
     draw_strip(first.frames, strip, replace(options, title=f"Figure 4: {first.name}"))
     studies.draw_law(height, equation10, "Equation 10: height over a bounce", PAPER)

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, motion, placement
-from blocksim.scenario.laws import LAWS
+from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, laws, motion, placement
 from blocksim.world import build, interactions, memory, nonsmooth, rigid_step, systems
 from blocksim.world.bodies import Layout, division, layout_of
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
@@ -215,7 +214,7 @@ def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
                     normal_damping_ratio=None if has_rigid else float(row.normal_damping),
                     shear_damping_ratio=None if has_rigid else float(row.shear_damping),
                     normal_stiffness=normal_stiffness,
-                    stiffness_unit=LAWS[scenario.contact.law].unit,
+                    stiffness_unit=laws.LAWS[scenario.contact.law].unit,
                     shear_stiffness_ratio=None if has_rigid else float(row.shear_ratio),
                     rules=rules,
                 )

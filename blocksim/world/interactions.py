@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.kernels.common.arrays import INTERACTION, Records, zeros
-from blocksim.scenario import GROUND, PlacedBody, Scenario, resolution, resolve_pair
-from blocksim.scenario.laws import LAWS, LINEAR
+from blocksim.scenario import GROUND, PlacedBody, Scenario, laws, resolution, resolve_pair
 
 # e = 0 would need infinite damping; this rebound counts as none (the promise is at most 1 % of the impact speed)
 SMALLEST_RESTITUTION = 0.009
@@ -38,7 +37,7 @@ def restitution_of(damping_ratio: float) -> float:
 
 
 @functools.lru_cache(MOST_KNOWN)
-def damping_ratio(restitution: float, law: str = LINEAR.name) -> float:
+def damping_ratio(restitution: float, law: str = laws.LINEAR.name) -> float:
     """Return the damping ratio (-) for a coefficient of restitution in [0, 1]; the inverse of `restitution_of`.
 
     Where the law is not linear it refers to the slope of the force at each overlap. Raises ValueError outside [0, 1].
@@ -54,7 +53,7 @@ def damping_ratio(restitution: float, law: str = LINEAR.name) -> float:
         if not low < middle < high:
             break
         low, high = (middle, high) if restitution_of(middle) > target else (low, middle)
-    return 0.5 * (low + high) * LAWS[law].damping_share
+    return 0.5 * (low + high) * laws.LAWS[law].damping_share
 
 
 class ContactClass(NamedTuple):
@@ -121,7 +120,7 @@ def interaction(scenario: Scenario, a: ContactClass, b: ContactClass) -> Interac
     if pair.normal_stiffness is not None:
         stiffness = contact.stiffness_scale * pair.normal_stiffness
     else:
-        size = LAWS[contact.law].size(min(a.depth, b.depth), contact.contact_radius)
+        size = laws.LAWS[contact.law].size(min(a.depth, b.depth), contact.contact_radius)
         stiffness = contact.stiffness_scale * size / compliance
     shear_ratio = pair.shear_stiffness_ratio
     if shear_ratio is None:

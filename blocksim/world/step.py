@@ -45,8 +45,7 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import OUTLINE
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
-from blocksim.scenario import Scenario, motion, placement
-from blocksim.scenario.laws import LAWS, Law
+from blocksim.scenario import Scenario, laws, motion, placement
 from blocksim.scenario.models.timeline import Explicit
 from blocksim.world import excitation, systems
 from blocksim.world.bodies import Layout, Shapes
@@ -244,7 +243,7 @@ def stable_step(pairs: Iterable[tuple[BlockKind, BlockKind | None, ContactStiffn
     return step
 
 
-def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: Law, load: ContactLoad) -> float:
+def admissible_step(bounds: Bounds, table: Interactions, safety: float, law: laws.Law, load: ContactLoad) -> float:
     """Return the largest safe step (s) of blocks within these bounds with these contact parameters."""
     kinds = bounds.standing
 
@@ -285,7 +284,7 @@ def expected_load(layout: Layout, bounds: Bounds, speeds: Speeds) -> ContactLoad
 
 def step_of_contacts(layout: Layout, bounds: Bounds, speeds: Speeds) -> float:
     """Return the largest safe step (s) of the contacts of a scenario's blocks. Raises ValueError without springs."""
-    load, law = expected_load(layout, bounds, speeds), LAWS[layout.scenario.contact.law]
+    load, law = expected_load(layout, bounds, speeds), laws.LAWS[layout.scenario.contact.law]
     return admissible_step(bounds, layout.interactions, safety_of(layout.scenario), law, load)
 
 

@@ -8,8 +8,7 @@ from pydantic import ConfigDict, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from blocksim.scenario import units as q
-from blocksim.scenario.laws import LAWS, LINEAR
+from blocksim.scenario import laws, units as q
 from blocksim.scenario.models.base import OneOf, Table, setting
 
 Model = Annotated[Literal["surface", "particles", "kernel"], OneOf(("surface", "particles", "kernel"))]
@@ -114,8 +113,8 @@ class Contact(Table):
     """Contact model, force law and their numbers."""
 
     model: Model = setting("how contacts are found: surface, particles or kernel", "surface")
-    law: Annotated[str, OneOf(tuple(LAWS))] = setting(
-        f"how the force grows with the overlap: {' or '.join(LAWS)}", LINEAR.name
+    law: Annotated[str, OneOf(tuple(laws.LAWS))] = setting(
+        f"how the force grows with the overlap: {' or '.join(laws.LAWS)}", laws.LINEAR.name
     )
     restitution: Restitution = setting("rebound speed over impact speed", Restitution())
     stiffness_scale: q.PositiveNumber = setting("factor on the stiffness of every contact", 1.0)
@@ -154,7 +153,7 @@ class Contact(Table):
         return SPACINGS_PER_LENGTH * self.particle_spacing if self.smoothing_length is None else self.smoothing_length
 
     def _check(self) -> None:
-        if not LAWS[self.law].is_linear and self.normal_stiffness is not None:
+        if not laws.LAWS[self.law].is_linear and self.normal_stiffness is not None:
             raise q.invalid(NO_FIXED_STIFFNESS.format(self.law), "normal_stiffness")
         least = LEAST_SPACINGS * self.particle_spacing
         if self.model == "kernel" and self.smoothing_length is not None and self.smoothing_length < least:

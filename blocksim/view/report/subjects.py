@@ -20,10 +20,8 @@ from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, document, input_files, load_stored
 from blocksim.simulation import files, instruments, observables, results as result, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
-from blocksim.view import kinds, run_data, style, time_panels
-from blocksim.view.history import draw_history_page
+from blocksim.view import history, kinds, run_data, scene, style, time_panels
 from blocksim.view.report.player import MOST_BYTES, pack_forces, pack_frames, pack_loads, scene_data
-from blocksim.view.scene import PictureOptions
 from blocksim.view.sweeps import outcome_map
 from blocksim.view.sweeps.data import SweepData, short_names
 
@@ -151,7 +149,7 @@ def history_of(
     frames: trajectory.Frames, support: run_data.Support, measured: run_data.Repeats | None
 ) -> tuple[str, list[dict[str, Any]]]:
     """Return the histories of a run, and of each panel its name, place and the ends of its axes."""
-    with draw_history_page(frames, PictureOptions(None, measured, support)) as (figure, panels):
+    with history.draw_history_page(frames, scene.PictureOptions(None, measured, support)) as (figure, panels):
         places = [
             {"name": name, "place": _place(axes), "time": axes.get_xlim(), "values": axes.get_ylim()}
             for name, axes in panels.items()
@@ -230,7 +228,7 @@ def run_subject(
 
     `parent` is the key of the sweep that it is a member of.
     """
-    data, notes, problems, history = _player_data(run, comparison, most_bytes)
+    data, notes, problems, address = _player_data(run, comparison, most_bytes)
     probes = [
         {
             "text": f"{name}: {one.kind}, {len(one)} samples to {one.time[-1]:.4g} s, in probe-{name}.csv",
@@ -256,7 +254,7 @@ def run_subject(
         "provenance": _provenance(run),
         "probes": probes,
         "has_player": data is not None,
-        "history": history,
+        "history": address,
         "names": data["names"] if data else [],
         "has_particles": bool(data and data["scene"]["particles"]),
         "has_forces": bool(data and data["forces"]),
@@ -279,12 +277,12 @@ def _player_data(
     except InvalidInputError as error:
         return None, [], [str(error)], None
     happened = () if run.summary is None else run.summary.events
-    scene = scene_data(frames, scenario, kept, happened)
-    forces, found = pack_forces(frames, kept, scene["tilt"]), pack_loads(frames, scenario, kept, happened)
+    drawn = scene_data(frames, scenario, kept, happened)
+    forces, found = pack_forces(frames, kept, drawn["tilt"]), pack_loads(frames, scenario, kept, happened)
     notes, loads = [*notes, NO_FORCES if forces is None else forces["told"]], None
     if found is not None:
         loads, extent, more = found
-        scene["extent"], notes = [extent.left, extent.right, extent.bottom, extent.top], notes + more
+        drawn["extent"], notes = [extent.left, extent.right, extent.bottom, extent.top], notes + more
     rows = [] if comparison is None else comparison["rows"]
     numbers = {name: number for number, name in enumerate(data["names"])}
     measured = [  # mean and range of the repeats (mm or degrees) by the number of the block
@@ -292,13 +290,13 @@ def _player_data(
         for row in rows
         if row["block"] in numbers and row["quantity"] in DRAWN and row["mean"] is not None
     ]
-    data |= {"scene": scene, "forces": forces, "loads": loads, "measured": measured}
-    history = None
+    data |= {"scene": drawn, "forces": forces, "loads": loads, "measured": measured}
+    address = None
     if data["names"]:
         repeats = [SimpleNamespace(**row) for row in rows if row["mean"] is not None]
         support = run_data.support_of(scenario, happened)
-        history, data["histories"] = history_of(frames, support, repeats if comparison else None)
-    return data, notes, [], history
+        address, data["histories"] = history_of(frames, support, repeats if comparison else None)
+    return data, notes, [], address
 
 
 def _summary(run: PartialRun) -> list[tuple[str, str]]:
