@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from blocksim.kernels.common.arrays import ALL, BODY, zeros
+from blocksim.kernels.common.arrays import ALL, BODY, NORMAL, zeros
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.common.shapes import place_corners
@@ -124,6 +124,23 @@ def dashpots_by_definition(points: Records, masses: np.ndarray, ratio: float, st
     c = 2.0 * ratio * weighted[:, None] * ((vectors * powers) @ vectors.T) * weighted
     free = points.rate + 0.5 * step * masses @ (points.before - points.force)
     return np.asarray(np.linalg.solve(np.eye(points.size) + 0.5 * step * c @ masses, c @ free))
+
+
+def jacobian(points: Records, a: Record, b: Record, direction: int) -> np.ndarray:
+    """Return the closing or slip rates of all points as rows of (v_a, w_a, v_b, w_b)."""
+    rows = []
+    for point in points:
+        ax = (-point.nx, -point.ny) if direction == NORMAL else (-point.ny, point.nx)
+        arms = [ax[1] * (point.x - body.x) - ax[0] * (point.y - body.y) for body in (a, b)]
+        rows.append([*ax, arms[0], -ax[0], -ax[1], -arms[1]])
+    return np.array(rows)
+
+
+def delassus(points: Records, a: Record, b: Record, direction: int) -> np.ndarray:
+    """Return the inverse masses (1/kg) that points see of one another."""
+    masses = [a.inverse_mass] * 2 + [a.inverse_inertia] + [b.inverse_mass] * 2 + [b.inverse_inertia]
+    rows = jacobian(points, a, b, direction)
+    return np.asarray((rows * masses) @ rows.T)
 
 
 @cache

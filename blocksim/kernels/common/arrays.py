@@ -169,14 +169,12 @@ INTERACTION = record_type(
 POINT = record_type(
     "x y nx ny depth "  # m: contact point; normal; m: overlap
     "beside "  # m: the greater overlap, with the other face that the corner may touch; infinite where there is none
-    "normal_arm_a normal_arm_b shear_arm_a shear_arm_b "  # m: lever arms of normal and tangent about both bodies
     "closing slipping "  # m: relative displacement of the last drift, against the normal and along the tangent
     "closing_rate slip_rate "  # m/s: the same as rates at the end of the drift, predicted
     "share "  # -: stiffness over that of a corner contact, in the models with particles
     "weight drawn "  # first steps of a contact: weight of the dashpot, share of the drift that draws the shear spring
     "stiffness rate before force "  # N/m, m/s, N, N: of the current pass; force of the step before; force now
-    "spring_force normal_force limit "  # N: spring of the current pass; normal total; Coulomb limit of the other
-    "lost",  # N: what the shear force of the step before was more than that of its spring
+    "push",  # N: spring and dashpot along the normal
     indices="slot face",
 )
 OPERATOR = record_type(
@@ -212,7 +210,7 @@ ACTION = record_type(
     "fx fy torque_a torque_b "  # N, N m: force of a pair on body a and its torque; torque on b is against torque_b
     "dashpot friction broken",  # J: lost in the drift that led here
     indices="pair",  # its number
-    flags="touches is_changed "  # whether it has contacts; whether it was not one that persistent_pairs.py handles
+    flags="touches is_changed "  # whether it has contacts; whether it was not one that persistent_forces.py handles
     "asks "  # whether its number of contacts has changed
     "is_too_deep",  # whether its bodies overlap more than they may
 )

@@ -26,6 +26,7 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import ALL, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit import damping, outlines
+from blocksim.kernels.explicit.laws import LINEAR
 from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, PARALLEL
 
 FLAT = 0.01  # sine of the angle between two faces up to which they are parallel
@@ -150,12 +151,6 @@ def overlap_of(
 
 
 @rare_kernel
-def bearing_of_faces(a: Record, b: Record, nx: float, ny: float) -> Bearing:
-    """Return the share of a corner that touches a face along the normal (nx, ny), whether or not the other end does."""
-    return bearing_of_interval(interval_of(a, b, nx, ny), a, b)
-
-
-@rare_kernel
 def bearing_of_interval(found: Interval, a: Record, b: Record) -> Bearing:
     """Return the share of a corner at an end of an interval, whether or not there is a contact at the other end."""
     part = (found.right - found.left) * found.per_length / found.cosine
@@ -224,7 +219,7 @@ def flat_of(facing: Facing) -> float:
     return min(FLAT, FLAT_SHARE * facing.cone)
 
 
-MOST_CHANGE = 0.01  # of its stiffness, that a pair of polygons may miss until it is measured again
+MOST_CHANGE = 0.01  # of its stiffness, that a pair may miss until it is measured again
 
 
 @rare_kernel
@@ -236,12 +231,13 @@ def keep_bearing(pair: Record, bearing: Bearing, stiffness: float) -> None:
 
 
 @kernel
-def measure_soon(pair: Record, slip: float, turned: float, corners: Records | None) -> None:
-    """Have the stiffness of a pair of polygons measured in the next step where it changes fast, as on slivers.
+def measure_soon(pair: Record, slip: float, turned: float, exponent: float, corners: Records | None) -> None:
+    """Have the stiffness of a pair measured in the next step where it changes fast.
 
-    `slip` (m) and `turned` (rad) are how far a has moved ahead of b, and turned, in the last drift.
+    It does between polygons, as on slivers, and with laws other than the linear one, whose steps are longer. `slip` (m)
+    and `turned` (rad) are how far a has moved ahead of b, and turned, in the last drift.
     """
-    if corners is not None:
+    if corners is not None or exponent != LINEAR:
         change = abs(pair.slide * slip + pair.turn * turned)
         if damping.OPERATOR_LIFE * change > MOST_CHANGE * pair.stiffness:
             damping.renew_dashpots(pair)

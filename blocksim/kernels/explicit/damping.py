@@ -21,7 +21,7 @@ stable as an implicit dashpot.
 Dashpots of a pair that touches in more than two points, in the three relative coordinates of two rigid bodies.
 
 Any number of points of one pair moves with three coordinates only: the relative velocity of the two bodies at a place
-(here the centre of body a) and their relative spin, V. With one row g_i of G a point, its rate is g_i V; with W the 3x3
+(here the centre of body b) and their relative spin, V. With one row g_i of G a point, its rate is g_i V; with W the 3x3
 inverse mass of V the points see A = G W G^T of one another. The damping matrix above,
 C = 2 z k^(1/2) B^(-1/2) k^(1/2) with B = k^(1/2) A k^(1/2), is then
 
@@ -54,20 +54,6 @@ ROUND_OFF = 1e-15
 def inverse_root(eigenvalue: float, largest: float) -> float:
     """Return eigenvalue^(-1/2), or zero outside the range of the matrix (pseudo-inverse)."""
     return 1.0 / math.sqrt(eigenvalue) if eigenvalue > RANK_TOLERANCE * largest else 0.0
-
-
-@rare_kernel
-def inverse_root_2(a: float, b: float, d: float) -> tuple[float, float, float]:
-    """Return the inverse square root of the symmetric positive matrix [[a, b], [b, d]], over its range only."""
-    middle = 0.5 * (a + d)
-    half = 0.5 * (a - d)
-    radius = math.sqrt(half * half + b * b)
-    high = inverse_root(middle + radius, middle + radius)
-    low = inverse_root(max(middle - radius, 0.0), middle + radius)
-    # f(A) = mean I + slope (A - middle I) for any function f of a 2 x 2 matrix with eigenvalues middle +- radius
-    mean = 0.5 * (high + low)
-    slope = 0.5 * (high - low) / radius if radius > 0.0 else 0.0
-    return mean + slope * half, slope * b, mean - slope * half
 
 
 @rare_kernel
@@ -176,21 +162,26 @@ def solve_in_place(matrix: Floats, right: Floats, n: int) -> None:
 
 BOTH = 3  # pattern of two points with a dashpot
 OPERATOR_LIFE = 32  # steps
+STEADY = 1e-5  # of an overlap: where it changes by no more in a step operators of other laws than the linear one last
+STEADY_STEPS = 8
 LEAST_MASS_SHARE = 0.1  # of the inverse mass without friction
 
 
 @kernel
-def damp_one(operator: Record, force: float, before: float, rate: float) -> float:
-    """Return spring and dashpot force (N) of a single point: f + E (u + H (f_before - f))."""
-    return force + operator.e_one * (rate + operator.h_one * (before - force))
-
-
-@kernel
-def damp_two(
-    operator: Record, one: float, two: float, before_one: float, before_two: float, rate_one: float, rate_two: float
+def damp(
+    operator: Record,
+    is_two: bool,
+    one: float,
+    two: float,
+    before_one: float,
+    before_two: float,
+    rate_one: float,
+    rate_two: float,
 ) -> tuple[float, float]:
-    """Return spring and dashpot forces (N) of two points: f + E (u + H (f_before - f))."""
+    """Return spring and dashpot forces (N) of one or two points: f + E (u + H (f_before - f))."""
     change_one = before_one - one
+    if not is_two:
+        return one + operator.e_one * (rate_one + operator.h_one * change_one), 0.0
     change_two = before_two - two
     free_one = rate_one + operator.h_one * change_one + operator.h_mixed * change_two
     free_two = rate_two + operator.h_mixed * change_one + operator.h_two * change_two
@@ -201,65 +192,62 @@ def damp_two(
 
 
 @kernel
-def fill_single(
-    operator: Record, i: int, ratio: float, half: float, inverse: float, stiffness: float, weight: float
+def fill_operator(
+    operator: Record,
+    pattern: int,
+    ratio: float,
+    half: float,
+    a: float,
+    b: float,
+    d: float,
+    k_one: float,
+    k_two: float,
+    w_one: float,
+    w_two: float,
 ) -> None:
-    """Only point i has a dashpot: c = 2 z sqrt(k/A), E = c/(1 + dt/2 A c); `inverse` is A (1/kg)."""
-    c = weight * 2.0 * ratio * math.sqrt(stiffness / inverse)
-    damped = c / (1.0 + half * inverse * c)
-    operator.e_one = damped if i == 0 else 0.0
-    operator.e_two = damped if i == 1 else 0.0
-    operator.e_mixed = 0.0
+    """Make E = (I + dt/2 C A)^-1 C of the points in `pattern`; A = [[a, b], [b, d]] (1/kg), `half` = dt/2 (s).
 
-
-@kernel
-def fill_alike(operator: Record, g: float, half: float, a: float, b: float, d: float) -> None:
-    """Two points of the same stiffness and weight: E = (I + dt/2 C A)^-1 C with C = g A^(-1/2), g = 2 z w k^(1/2).
-
-    A = [[a, b], [b, d]], A^(1/2) = (A + s I)/t with s^2 = det A and t^2 = tr A + 2 s. Parallel tangents make A
-    singular; then A^(-1/2) over its range is A tr(A)^(-3/2).
+    Of one c = 2 z w (k/A)^(1/2). Of two C = W^(1/2) C0 W^(1/2), and from B^(1/2) = (B + s I)/t, s^2 = det B and
+    t^2 = tr B + 2 s, follows C0^-1 = (A + s k^-1)/(2 z t), so that E = W^(1/2) M^-1 W^(1/2) with
+    M = C0^-1 + dt/2 W^(1/2) A W^(1/2). Parallel tangents make A singular, a product u u^T; then C = g v v^T with
+    v = W^(1/2) k u and g = 2 z (tr B)^(-3/2) over its range, and E = g/(1 + dt/2 g (u v)^2) v v^T.
     """
-    trace = a + d
-    determinant = a * d - b * b
+    if pattern != BOTH:
+        is_one = pattern == 1
+        inverse = a if is_one else d
+        c = 2.0 * ratio * (w_one * math.sqrt(k_one / inverse) if is_one else w_two * math.sqrt(k_two / inverse))
+        damped = c / (1.0 + half * inverse * c)
+        operator.e_one = damped if is_one else 0.0
+        operator.e_two = 0.0 if is_one else damped
+        operator.e_mixed = 0.0
+        return
+    root_one = root_two = 1.0
+    if w_one != 1.0 or w_two != 1.0:
+        root_one = math.sqrt(w_one)
+        root_two = math.sqrt(w_two)
+    trace = k_one * a + k_two * d
+    determinant = k_one * k_two * (a * d - b * b)
     if determinant <= RANK_TOLERANCE * trace * trace:
-        root = math.sqrt(trace)
-        scale = g / (trace * (root + half * g * trace))
-        operator.e_one = scale * a
-        operator.e_mixed = scale * b
-        operator.e_two = scale * d
+        side_one = root_one * k_one
+        side_two = root_two * k_two
+        along = side_one * a + side_two * d
+        scale = 2.0 * ratio / (trace * math.sqrt(trace) + half * 2.0 * ratio * along * along)
+        operator.e_one = scale * side_one * side_one * a
+        operator.e_mixed = scale * side_one * side_two * b
+        operator.e_two = scale * side_two * side_two * d
         return
     s = math.sqrt(determinant)
-    t = math.sqrt(trace + 2.0 * s)
-    implicit = half * g / t
-    m_one = 1.0 + implicit * (a + s)
-    m_two = 1.0 + implicit * (d + s)
-    m_mixed = implicit * b
-    scale = g / (t * s * (m_one * m_two - m_mixed * m_mixed))
-    operator.e_one = scale * (m_two * (d + s) + m_mixed * b)
-    operator.e_two = scale * (m_one * (a + s) + m_mixed * b)
-    operator.e_mixed = -scale * (m_two * b + m_mixed * (a + s))
-
-
-@rare_kernel
-def fill_different(
-    operator: Record, ratio: float, half: float, a: float, b: float, d: float, one: Record, two: Record
-) -> None:
-    """Points `one` and `two` of different stiffness or weight: E = (I + dt/2 C A)^-1 C, symmetric as C and A are."""
-    mixed = math.sqrt(one.stiffness * two.stiffness)
-    root_one, root_mixed, root_two = inverse_root_2(a * one.stiffness, b * mixed, d * two.stiffness)
-    g_one = math.sqrt(one.stiffness * one.weight)
-    g_two = math.sqrt(two.stiffness * two.weight)
-    c_one = 2.0 * ratio * g_one * g_one * root_one
-    c_mixed = 2.0 * ratio * g_one * g_two * root_mixed
-    c_two = 2.0 * ratio * g_two * g_two * root_two
-    m_11 = 1.0 + half * (c_one * a + c_mixed * b)
-    m_12 = half * (c_one * b + c_mixed * d)
-    m_21 = half * (c_mixed * a + c_two * b)
-    m_22 = 1.0 + half * (c_mixed * b + c_two * d)
-    determinant = m_11 * m_22 - m_12 * m_21
-    operator.e_one = (m_22 * c_one - m_12 * c_mixed) / determinant
-    operator.e_mixed = (m_22 * c_mixed - m_12 * c_two) / determinant
-    operator.e_two = (m_11 * c_two - m_21 * c_mixed) / determinant
+    t = ratio * math.sqrt(trace + 2.0 * s)
+    product = k_one * k_two
+    over = 1.0 / (product * t)  # one quotient for three
+    c = 0.5 * product * over
+    m_one = c * a + half * w_one * a + 0.5 * s * k_two * over
+    m_two = c * d + half * w_two * d + 0.5 * s * k_one * over
+    m_mixed = (c + half * root_one * root_two) * b
+    scale = 1.0 / (m_one * m_two - m_mixed * m_mixed)
+    operator.e_one = scale * w_one * m_two
+    operator.e_mixed = -scale * root_one * root_two * m_mixed
+    operator.e_two = scale * w_two * m_one
 
 
 @kernel
@@ -311,12 +299,6 @@ def are_dashpots_due(pair: Record, direction: int) -> bool:
 
 
 @kernel
-def count_down(pair: Record) -> None:
-    """Note that the operator along the normals of a pair, which is not due, is used in one more step."""
-    pair.normal_left -= 1
-
-
-@kernel
 def keep_dashpots(pair: Record, direction: int, pattern: int, left: int) -> None:
     """Note for how many steps an operator of a pair holds, and the bits of the points that have a dashpot in it."""
     if direction == NORMAL:
@@ -334,34 +316,36 @@ SIZE = 3
 
 @rare_kernel
 def fill_mobility(a: Record, b: Record, out: Floats) -> None:
-    """Write the inverse mass W of the relative motion at the centre of a: (1/kg, 1/(kg m), 1/(kg m2) by blocks)."""
-    dx = a.x - b.x
-    dy = a.y - b.y
+    """Write the inverse mass W of the relative motion at the centre of b: (1/kg, 1/(kg m), 1/(kg m2) by blocks)."""
+    dx = b.x - a.x
+    dy = b.y - a.y
     translation = a.inverse_mass + b.inverse_mass
-    turning = b.inverse_inertia
+    turning = a.inverse_inertia
     out[0, 0] = translation + turning * dy * dy
     out[1, 1] = translation + turning * dx * dx
     out[0, 1] = out[1, 0] = -turning * dx * dy
     out[0, 2] = out[2, 0] = -turning * dy
     out[1, 2] = out[2, 1] = turning * dx
-    out[2, 2] = turning + a.inverse_inertia
+    out[2, 2] = turning + b.inverse_inertia
 
 
 @rare_kernel
-def fill_row(point: Record, direction: int, row: Floats) -> None:
+def fill_row(place: Record, b: Record, direction: int, row: Floats) -> None:
     """Write how the closing rate or the slip rate of a point follows from the relative motion (-, -, m)."""
+    x = place.x - b.x
+    y = place.y - b.y
     if direction == NORMAL:
-        row[0] = -point.nx
-        row[1] = -point.ny
-        row[2] = -point.normal_arm_a
+        row[0] = -place.nx
+        row[1] = -place.ny
+        row[2] = -(x * place.ny - y * place.nx)
     else:
-        row[0] = -point.ny
-        row[1] = point.nx
-        row[2] = point.shear_arm_a
+        row[0] = -place.ny
+        row[1] = place.nx
+        row[2] = x * place.nx + y * place.ny
 
 
 @rare_kernel
-def gather(points: Records, count: int, direction: int, work: Floats) -> None:
+def gather(points: Records, count: int, b: Record, direction: int, work: Floats) -> None:
     """Sum over the points: G^T k G, Q = G^T w^(1/2) k G, P^T u and G^T (f_before - f_spring)."""
     vectors = work[ROWS]
     for i in range(SIZE):
@@ -370,7 +354,7 @@ def gather(points: Records, count: int, direction: int, work: Floats) -> None:
             work[STIFFNESS, i, j] = work[PRODUCT, i, j] = 0.0
     for n in range(count):
         point = points[n]
-        fill_row(point, direction, vectors[ROW])
+        fill_row(point, b, direction, vectors[ROW])
         weighted = math.sqrt(point.weight) * point.stiffness
         for i in range(SIZE):
             vectors[CHANGE, i] += vectors[ROW, i] * (point.before - point.force)
@@ -417,18 +401,23 @@ def solve_forces(step: float, work: Floats) -> None:
 
 
 @rare_kernel
-def add_coupled_dashpots(points: Records, count: int, direction: int, ratio: float, step: float, work: Floats) -> None:
-    """Add the dashpot forces (N) to `force` of every point, which holds the spring force; `work` holds the mobility.
+def add_coupled_dashpots(
+    points: Records, count: int, a: Record, b: Record, direction: int, ratio: float, step: float, work: Floats
+) -> None:
+    """Add the dashpot forces (N) to `force` of every point, which holds the spring force.
 
     Points without stiffness (they slide) have no dashpot.
     """
-    gather(points, count, direction, work)
+    if ratio == 0.0:
+        return
+    fill_mobility(a, b, work[MOBILITY])
+    gather(points, count, b, direction, work)
     fill_gain(ratio, work)
     solve_forces(step, work)
     vectors = work[ROWS]
     for n in range(count):
         point = points[n]
-        fill_row(point, direction, vectors[ROW])
+        fill_row(point, b, direction, vectors[ROW])
         total = 0.0
         for i in range(SIZE):
             total += vectors[ROW, i] * vectors[CHANGE, i]

@@ -4,7 +4,7 @@ import math
 
 from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.friction import friction_coefficient
-from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.jit import kernel
 
 
 @kernel
@@ -76,14 +76,6 @@ def draw_same_spring(
     return spring, limit, True, 0.5 * stiffness * ((old + spring) * slip - (spring - old) * (spring + old))
 
 
-@rare_kernel
-def draw_changed_spring(
-    values: Record, stiffness: float, old_stiffness: float, old: float, slip: float, normal_force: float, rate: float
-) -> tuple[float, float, bool, float]:
-    """As draw_spring, over the whole drift; kept out of the hot path."""
-    return draw_spring(values, stiffness, old_stiffness, old, slip, 1.0, normal_force, rate)
-
-
 @kernel
 def draw_lasting_spring(
     values: Record,
@@ -91,14 +83,15 @@ def draw_lasting_spring(
     old_stiffness: float,
     old: float,
     slip: float,
+    drawn: float,
     normal_force: float,
     rate: float,
-    may_change: bool,
+    lasts: bool,
 ) -> tuple[float, float, bool, float]:
-    """As draw_spring, over the whole drift, quick where the stiffness has not changed, or cannot have."""
-    if not may_change or stiffness == old_stiffness:
+    """As draw_spring, quick where the stiffness has not changed, or cannot have, as `lasts` says."""
+    if lasts or (stiffness == old_stiffness and drawn == 1.0):
         return draw_same_spring(values, stiffness, old, slip, normal_force, rate)
-    return draw_changed_spring(values, stiffness, old_stiffness, old, slip, normal_force, rate)
+    return draw_spring(values, stiffness, old_stiffness, old, slip, drawn, normal_force, rate)
 
 
 @kernel

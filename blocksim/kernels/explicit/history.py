@@ -22,21 +22,17 @@ def stiffness_before(contact: Record, of_corners: float, values: Record, particl
 
 
 @kernel
+def stiffness_of_pair(pair: Record, values: Record, particles: Records | None) -> float:
+    """Return the stiffness of a contact of a pair with the share one, in units of `normal_stiffness`."""
+    if particles is None:
+        return pair.stiffness
+    return values.normal_stiffness
+
+
+@kernel
 def shear_stiffness_before(contact: Record, stiffness: float, values: Record, exponent: float) -> float:
     """Return the stiffness (N/m) that the shear spring of a contact had; `stiffness` as above."""
     return values.shear_ratio * laws.tangent_stiffness(exponent, stiffness, contact.depth)
-
-
-@kernel
-def normal_loss(contact: Record, stiffness: float, exponent: float) -> float:
-    """Return the part (N) of the normal force that was dashpot, less what clipping took; `stiffness` as above."""
-    return contact.normal_force - laws.elastic_force(exponent, stiffness, contact.depth)
-
-
-@kernel
-def shear_loss(contact: Record, stiffness: float) -> float:
-    """Return the part (N) of the shear force that was not that of the spring of this stiffness (N/m)."""
-    return contact.shear_force - stiffness * contact.spring
 
 
 TAKEN = 0xFFFFFFFF  # slot of an old contact that has found its successor; no corner or particle has this number
@@ -98,8 +94,8 @@ def release(world: World, p: int, old: Record, step: float, tally: Record) -> No
     kinematics.resolve_point(point, a, b, step)
     of_spring = stiffness_before(old, pair.stiffness, values, world.particles)
     stiffness = shear_stiffness_before(old, of_spring, values, exponent)
-    lost = normal_loss(old, of_spring, exponent) * point.closing
-    tally.dashpot += 0.5 * (lost + shear_loss(old, stiffness) * point.slipping)
+    lost = (old.normal_force - laws.elastic_force(exponent, of_spring, old.depth)) * point.closing
+    tally.dashpot += 0.5 * (lost + (old.shear_force - stiffness * old.spring) * point.slipping)
     tally.broken += 0.5 * stiffness * old.spring * (old.spring + point.slipping)
 
 

@@ -8,7 +8,7 @@ anyone, and kept; then every thread adds what comes from before, and goes throug
 
 from blocksim.kernels.common.arrays import GROUP, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.persistent_forces import Effect
+from blocksim.kernels.explicit.forces import Effect
 
 
 @rare_kernel

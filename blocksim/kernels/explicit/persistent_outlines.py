@@ -14,8 +14,7 @@ import numpy as np
 from blocksim.kernels.common.arrays import NO_FACE, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import END_RATIO
-from blocksim.kernels.explicit import kinematics, outlines, persistent_contacts
-from blocksim.kernels.explicit.bearing import bearing_of_facing, facing_of, flat_of
+from blocksim.kernels.explicit import kinematics, outlines
 from blocksim.kernels.explicit.models.outlines import DEEPEST, HAND_OVER, can_touch, corner_seen, face_met, has_inner
 from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver, least_ratio, meets_along
 
@@ -48,12 +47,12 @@ def follow_on_outlines(
     b: Record,
     dx: float,
     dy: float,
-    motion: persistent_contacts.Motion,
+    motion: kinematics.Motion,
     step: float,
     turns: bool,
     duplicates: int,
     table: Records,
-) -> tuple[bool, persistent_contacts.PersistentContact]:
+) -> tuple[bool, kinematics.Point]:
     """As follow in persistent_contacts.py, with corners and faces of the table."""
     slot: Any = np.int64(contact.slot)
     face: Any = np.int64(contact.face)
@@ -71,9 +70,7 @@ def follow_on_outlines(
     depth = side.distance - (x * nx + y * ny)
     along = y * nx - x * ny - side.middle
     end = side.half - abs(along)
-    found = persistent_contacts.contact_at(
-        x if is_own else ox, y if is_own else oy, sign * nx, sign * ny, depth, motion, step
-    )
+    found = kinematics.moving_point(x if is_own else ox, y if is_own else oy, sign * nx, sign * ny, depth, motion, step)
     goes_on = depth > 0.0
     if outlines.is_piece(touched):
         goes_on = goes_on and depth <= END_RATIO * end
@@ -147,9 +144,7 @@ def goes_inwards(owner: Record, number: int, nx: float, ny: float, is_last: bool
 
 
 @kernel
-def ends_in_sliver(
-    contact: Record, a: Record, b: Record, found: persistent_contacts.PersistentContact, table: Records
-) -> bool:
+def ends_in_sliver(contact: Record, a: Record, b: Record, found: kinematics.Point, table: Records) -> bool:
     """Return True if two bodies with one contact overlap by a sliver.
 
     No other axis, of faces that are not parallel, is less deep than the way to the end of the face times the sine of
@@ -179,8 +174,8 @@ def ends_in_sliver(
 def lie_on_sliver(
     a: Record,
     b: Record,
-    one: persistent_contacts.PersistentContact,
-    two: persistent_contacts.PersistentContact,
+    one: kinematics.Point,
+    two: kinematics.Point,
     table: Records,
 ) -> bool:
     """Return True if two bodies with two contacts overlap by a sliver; no axis is less deep than the way between."""
@@ -273,19 +268,3 @@ def has_crossed(world: World, p: int, a: Record, b: Record, table: Records) -> b
     back = abs(side.nx * corner.back_x + side.ny * corner.back_y)
     cone = outlines.cone_of(a, b, table)
     return min(ahead, back) > (flat_within(cone) if world.pairs[p].normal_left == 0 else cone)
-
-
-@rare_kernel
-def measure_on_outlines(pair: Record, a: Record, b: Record, nx: float, ny: float, k: float, table: Records) -> None:
-    """Measure the stiffness of a single contact of the normal (nx, ny); `k` is that of a corner alone."""
-    bearing = bearing_of_facing(facing_of(a, b, nx, ny, table))
-    pair.stiffness = k * bearing.share
-    pair.slide = k * bearing.slide
-    pair.turn = k * bearing.turn
-
-
-@rare_kernel
-def are_parallel(a: Record, b: Record, nx: float, ny: float, table: Records) -> bool:
-    """Return True if the faces of two blocks that look at each other along a normal are parallel."""
-    facing = facing_of(a, b, nx, ny, table)
-    return facing.sine <= flat_of(facing)

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from blocksim.kernels.common.arrays import POINT, zeros
-from blocksim.kernels.explicit.contact import clip_tension, pair_forces
+from blocksim.kernels.common.arrays import CONTACT, INTERACTION, zeros
+from blocksim.kernels.explicit.contact import pair_forces
+from blocksim.kernels.explicit.forces import grip_of, keep
+from blocksim.kernels.explicit.kinematics import Point
+from blocksim.kernels.explicit.laws import LINEAR
 from blocksim.kernels.explicit.persistent_forces import TOUCHING, persistent_forces
 from blocksim.verification.scene import HEIGHT, WIDTH
 
@@ -18,18 +21,22 @@ if TYPE_CHECKING:
 TILT, STEP = 0.3, 1e-7
 
 
+def pushed(force: float, closing: float) -> tuple[float, float]:
+    """Return the force that is left of spring (5 N) and dashpot, and what has been lost (J); none was before."""
+    point = Point(0.0, 0.0, 0.0, 1.0, 1e-6, closing, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+    contact, values = zeros(1, CONTACT)[0], zeros(1, INTERACTION)[0]
+    grip = grip_of(contact, point, values, force, 5e6, 5e6, LINEAR, True)
+    lost = 0.5 * keep(contact, point, grip, 0.0, 5e6, 5e6, LINEAR)
+    assert contact.normal_force == grip.normal
+    return grip.normal, lost
+
+
 def test_dashpot_that_pulls_more_than_the_spring_pushes_leaves_no_force() -> None:
-    point = zeros(1, POINT)[0]
-    point.force, point.spring_force, point.closing = -3.0, 5.0, -1e-6
-    assert clip_tension(point, 2.0) == pytest.approx(0.5 * (2.0 - 5.0) * -1e-6, rel=1e-12)
-    assert point.normal_force == 0.0
+    assert pushed(-3.0, -1e-6) == pytest.approx((0.0, 0.5 * -5.0 * -1e-6), rel=1e-12, abs=0.0)
 
 
 def test_push_is_not_clipped() -> None:
-    point = zeros(1, POINT)[0]
-    point.force, point.spring_force, point.closing = 7.0, 5.0, 1e-6
-    assert clip_tension(point, 0.0) == pytest.approx(0.5 * 2.0 * 1e-6, rel=1e-12)
-    assert point.normal_force == 7.0
+    assert pushed(7.0, 1e-6) == pytest.approx((7.0, 0.5 * 2.0 * 1e-6), rel=1e-12)
 
 
 @pytest.mark.parametrize("speed", [0.1, 1.0])

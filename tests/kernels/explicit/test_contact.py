@@ -9,20 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
-from blocksim.kernels.common.arrays import NORMAL, SHEAR
-from blocksim.kernels.explicit.contact import (
-    damp,
-    draw_springs,
-    has_new_neighbours,
-    pair_forces,
-    shared_step,
-    spare_lost_faces,
-)
-from blocksim.kernels.explicit.damping import BOTH, OPERATOR_LIFE, RANK_TOLERANCE
-from blocksim.kernels.explicit.inertia import Piece
-from blocksim.kernels.explicit.kinematics import mutual_mass, resolve_point
+from blocksim.kernels.common.arrays import NORMAL, OPERATOR, SHEAR
+from blocksim.kernels.explicit.contact import has_new_neighbours, pair_forces, shared_step, spare_lost_faces
+from blocksim.kernels.explicit.damping import BOTH, OPERATOR_LIFE, RANK_TOLERANCE, damp
+from blocksim.kernels.explicit.forces import Touch, grip_of, renew_operator, shear_of
+from blocksim.kernels.explicit.kinematics import point_of, resolve_point
+from blocksim.kernels.explicit.laws import LINEAR
 from blocksim.kernels.explicit.models import KERNEL, PARTICLES, SURFACE
-from tests.kernels.conftest import dashpots_by_definition
+from tests.kernels.conftest import dashpots_by_definition, delassus
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import World
@@ -149,6 +143,19 @@ def lives(world: World) -> list[int]:
     return [int(world.pairs[0].normal_left), int(world.pairs[0].shear_left)]
 
 
+def renew(
+    world: World, count: int, direction: int, pattern: int, *, step: float = STEP, k: float = K, steady: bool = False
+) -> None:
+    """Rebuild the operator of one or two points of the work space where it is due."""
+    a, b = world.bodies[:2]
+    values, contacts = world.interactions[1, 1], world.contacts[0]
+    values.normal_damping = values.shear_damping = 0.7
+    operators = world.operators[0, NORMAL], world.operators[0, SHEAR]
+    touch = Touch(world.pairs[0], a, b, values, contacts[0], contacts[1], *operators)
+    one, two = (point_of(world.points[i], b) for i in (0, count - 1))
+    renew_operator(touch, one, two, count == 2, direction, pattern, k, k, step, LINEAR, steady)
+
+
 @pytest.mark.parametrize("direction", [NORMAL, SHEAR])
 @pytest.mark.parametrize(("count", "pattern"), [(1, 1), (2, BOTH), (2, 1), (2, 2)])
 @given(seed=st.integers(0, 10_000), weights=st.sampled_from([(1.0, 1.0), (0.7, 0.7), (0.6, 1.2), (0.0, 1.0)]))
@@ -163,14 +170,16 @@ def test_dashpots_of_a_pair_follow_the_definition(
     points.weight = weights[:count]
     if count == 2 and pattern != BOTH:
         points.stiffness[2 - pattern] = 0.0  # it slides
-    of_a, of_b = (Piece(body.inverse_mass, body.inverse_inertia, 0.0) for body in (a, b))
-    masses = np.array([[mutual_mass(one, two, of_a, of_b, direction) for two in points] for one in points])
+    masses = delassus(points, a, b, direction)
     expected = points.force + dashpots_by_definition(points, masses, 0.7, STEP)
-    damp(world, 0, count, direction, pattern, 0.7, STEP)
+    renew(world, count, direction, pattern)
+    one, two = points[0], points[-1]
+    numbers = one.force, two.force, one.before, two.before, one.rate, two.rate
+    found = damp(world.operators[0, direction], count == 2, *numbers)[:count]
     # masses of rank one but for an eigenvalue that counts as zero: A tr(A)^(-3/2) is off by its share of the other
     share = np.linalg.eigvalsh(masses)[0] / np.trace(masses)
     rank_one = share < RANK_TOLERANCE and points.size == 2
-    assert points.force == pytest.approx(expected, rel=1e-7 + 2.0 * share * rank_one, abs=1e-9 * np.abs(expected).max())
+    assert found == pytest.approx(expected, rel=1e-7 + 2.0 * share * rank_one, abs=1e-9 * np.abs(expected).max())
     assert lives(world)[direction] == (OPERATOR_LIFE if weights[0] == weights[count - 1] == 1.0 else 0)
     assert lives(world)[1 - direction] == 0
     assert direction == NORMAL or world.pairs[0].sticking == pattern
@@ -180,36 +189,45 @@ def test_dashpots_of_a_pair_follow_the_definition(
 def test_operator_is_kept_for_lasting_contacts_and_then_made_anew(pose: Pose) -> None:
     world = two_points(pose, 1, NORMAL)
     operator = world.operators[0, NORMAL]
-    damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+    renew(world, 2, NORMAL, BOTH)
     first = float(operator.e_one)
-    world.points.stiffness = 4.0 * K
     for left in range(OPERATOR_LIFE - 1, -1, -1):
-        damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+        renew(world, 2, NORMAL, BOTH, k=4.0 * K, steady=True)
         assert (lives(world)[NORMAL], operator.e_one) == (left, first)
-    damp(world, 0, 2, NORMAL, BOTH, 0.7, STEP)
+    renew(world, 2, NORMAL, BOTH, k=4.0 * K, steady=True)
     assert lives(world)[NORMAL] == OPERATOR_LIFE
     assert operator.e_one > 1.1 * first
 
 
+def test_operator_of_contacts_that_are_not_steady_keeps_its_masses_only(pose: Pose) -> None:
+    world, other = two_points(pose, 1, NORMAL), two_points(pose, 1, NORMAL)
+    renew(world, 2, NORMAL, BOTH)
+    world.points.x += 1e-3  # other masses
+    renew(world, 2, NORMAL, BOTH, k=4.0 * K)
+    renew(other, 2, NORMAL, BOTH, k=4.0 * K)
+    made = [[one.operators[0, NORMAL][name] for name in OPERATOR.names or ()] for one in (world, other)]
+    assert made[0] == pytest.approx(made[1], rel=1e-12)
+    assert lives(world)[NORMAL] == OPERATOR_LIFE - 1
+
+
 def test_operator_of_a_step_without_length_is_not_kept(pose: Pose) -> None:
     world = two_points(pose, 1, NORMAL)
-    damp(world, 0, 2, NORMAL, BOTH, 0.7, 0.0)
+    renew(world, 2, NORMAL, BOTH, step=0.0)
     assert lives(world)[NORMAL] == 0
     assert world.operators[0, NORMAL].e_one > 0.0
 
 
-def test_point_that_slides_has_no_dashpot_and_the_other_one_keeps_its_own(pose: Pose) -> None:
+def test_point_slides_where_its_spring_alone_exceeds_the_limit(pose: Pose) -> None:
     world = two_points(pose, 1, SHEAR)
-    values, action = world.interactions[1, 1], world.action[0]
-    one, two = world.points[:2]
-    one.force, two.force = 100.0, 0.0
-    one.slipping, two.slipping = 1e-9, 1e-9
+    values, contact, b = world.interactions[1, 1], world.contacts[0, 0], world.bodies[1]
+    world.points[0].slipping = 1e-9
+    point = point_of(world.points[0], b)
     stiffness = float(values.shear_ratio) * K
-    assert draw_springs(world, 0, 2, values, K, action) == 1
-    assert (one.stiffness, two.stiffness) == (pytest.approx(stiffness), 0.0)
-    assert (one.force, two.force) == (pytest.approx(stiffness * 1e-9), 0.0)
-    assert world.contacts[0].spring.tolist() == [1e-9, 0.0]
-    assert world.contacts[0].normal_force.tolist() == [100.0, 0.0]
+    sticks, slides = (grip_of(contact, point, values, force, K, K, LINEAR, True) for force in (100.0, 1e-3))
+    assert [sticks.slides, slides.slides] == [False, True]
+    assert [sticks.elastic, slides.elastic] == pytest.approx([stiffness * 1e-9, slides.limit])
+    assert shear_of(point, values, slides, 1e9) == slides.elastic
+    assert abs(shear_of(point, values, sticks, 1e9)) <= float(values.static_friction) * 100.0
 
 
 @pytest.mark.parametrize(("beside", "lost"), [(np.inf, False), (1.1e-6, False), (0.9e-6, True)])

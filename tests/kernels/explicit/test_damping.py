@@ -13,11 +13,8 @@ from blocksim.kernels.common.arrays import NORMAL, OPERATOR, PAIR, POINT, SHEAR,
 from blocksim.kernels.explicit.damping import (
     BOTH,
     are_dashpots_due,
-    damp_one,
-    damp_two,
-    fill_alike,
-    fill_different,
-    fill_single,
+    damp,
+    fill_operator,
     keep_dashpots,
     keep_masses,
     renew_dashpots,
@@ -60,22 +57,15 @@ def operator_of(points: Records, masses: np.ndarray, ratio: float, pattern: int,
     one, two = points[0], points[-1]
     a, b, d = masses[0, 0], masses[0, -1], masses[-1, -1]
     keep_masses(operator, half, a, b, d)
-    if pattern != BOTH:
-        i = pattern - 1
-        fill_single(operator, i, ratio, half, masses[i, i], points[i].stiffness, points[i].weight)
-    elif one.weight == two.weight and one.stiffness == two.stiffness:
-        fill_alike(operator, one.weight * 2.0 * ratio * one.stiffness**0.5, half, a, b, d)
-    else:
-        fill_different(operator, ratio, half, a, b, d, one, two)
+    weights = one.weight, two.weight
+    fill_operator(operator, pattern, ratio, half, a, b, d, one.stiffness, two.stiffness, *weights)
     return operator
 
 
 def damped(points: Records, operator: Record) -> np.ndarray:
     """Return spring and dashpot forces of all points."""
-    one, two = points[0], points[-1]
-    if points.size == 1:
-        return np.array([damp_one(operator, one.force, one.before, one.rate)])
-    return np.array(damp_two(operator, one.force, two.force, one.before, two.before, one.rate, two.rate))
+    one, two, n = points[0], points[-1], points.size
+    return np.array(damp(operator, n == 2, one.force, two.force, one.before, two.before, one.rate, two.rate)[:n])
 
 
 def damping_matrix(points: Records, masses: np.ndarray, ratio: float) -> np.ndarray:

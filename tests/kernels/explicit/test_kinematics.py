@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import NORMAL, POINT, SHEAR, SLOTS, zeros
-from blocksim.kernels.explicit.inertia import Piece
-from blocksim.kernels.explicit.kinematics import mutual_mass, resolve_point, weigh_first_step
+from blocksim.kernels.common.arrays import (
+    CONTACT,
+    INTERACTION,
+    NORMAL,
+    OPERATOR,
+    PAIR,
+    POINT,
+    SHEAR,
+    SLOTS,
+    zeros,
+)
+from blocksim.kernels.explicit.forces import Touch, inverse_masses
+from blocksim.kernels.explicit.kinematics import point_of, resolve_point, weigh_first_step
 from blocksim.kernels.explicit.laws import LINEAR
+from tests.kernels.conftest import delassus
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, Records
@@ -47,11 +58,6 @@ def directions(point: Record) -> tuple[np.ndarray, np.ndarray]:
     return np.array([point.nx, point.ny]), np.array([-point.ny, point.nx])
 
 
-def whole(body: Record) -> Piece:
-    """Return a body that no other pair bears."""
-    return Piece(body.inverse_mass, body.inverse_inertia, 0.0)
-
-
 @given(seed=SEEDS)
 def test_displacements_and_rates_are_those_of_rigid_bodies(make_body: MakeBody, seed: int) -> None:
     a, b, points = scene(make_body, seed, 1)
@@ -69,13 +75,14 @@ def test_displacements_and_rates_are_those_of_rigid_bodies(make_body: MakeBody, 
 @given(seed=SEEDS, count=st.integers(1, 2))
 def test_inverse_masses_are_those_of_the_jacobian(make_body: MakeBody, seed: int, count: int) -> None:
     a, b, points = scene(make_body, seed, count)
-    masses = [a.inverse_mass] * 2 + [a.inverse_inertia] + [b.inverse_mass] * 2 + [b.inverse_inertia]
-    for direction, along in ((NORMAL, 0), (SHEAR, 1)):
-        found = [
-            [mutual_mass(one, two, whole(a), whole(b), direction) for two in points[:count]] for one in points[:count]
-        ]
-        rows = np.array([jacobian(point, a, b, directions(point)[along]) for point in points[:count]])
-        assert np.array(found) == pytest.approx((rows * masses) @ rows.T, rel=1e-10, abs=1e-10)
+    some: Any = points[:count]
+    contact, operator = zeros(1, CONTACT)[0], zeros(1, OPERATOR)[0]
+    touch = Touch(zeros(1, PAIR)[0], a, b, zeros(1, INTERACTION)[0], contact, contact, operator, operator)
+    one, two = (point_of(points[i], b) for i in (0, count - 1))
+    for direction in (NORMAL, SHEAR):
+        expected = delassus(some, a, b, direction)
+        found = inverse_masses(touch, one, two, count == 2, direction)
+        assert found == pytest.approx((expected[0, 0], expected[0, -1], expected[-1, -1]), rel=1e-10, abs=1e-10)
 
 
 @pytest.mark.parametrize(("depth", "weight"), [(0.0, 0.5), (0.25e-6, 0.75), (1e-6, 1.5)])

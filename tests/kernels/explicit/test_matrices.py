@@ -8,7 +8,6 @@ from blocksim.kernels.explicit.damping import (
     RANK_TOLERANCE,
     cholesky,
     inverse_root,
-    inverse_root_2,
     inverse_three_halves,
     multiply,
     multiply_transposed,
@@ -40,11 +39,6 @@ def by_jacobi(matrix: np.ndarray) -> np.ndarray:
     return out
 
 
-def by_closed_form(matrix: np.ndarray) -> np.ndarray:
-    one, mixed, two = inverse_root_2(matrix[0, 0], matrix[0, 1], matrix[1, 1])
-    return np.array([[one, mixed], [mixed, two]])
-
-
 @given(seed=SEEDS, rank=st.integers(1, 3))
 def test_power_of_three_agrees_with_eigenvalues(seed: int, rank: int) -> None:
     matrix = positive(3, rank, seed)
@@ -69,21 +63,7 @@ def test_products_agree_with_numpy(seed: int) -> None:
     assert out == pytest.approx(left.T @ right, abs=1e-14)
 
 
-@given(seed=SEEDS, rank=st.integers(1, 2))
-def test_closed_form_of_two_agrees_with_eigenvalues(seed: int, rank: int) -> None:
-    matrix = positive(2, rank, seed)
-    assert by_closed_form(matrix) == pytest.approx(power(matrix, -0.5), abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    "matrix", [np.diag([4.0, 4.0]), np.diag([4.0, 0.0]), np.diag([0.0, 9.0]), np.full((2, 2), 3.0)]
-)
-def test_special_matrices_of_two_agree_with_eigenvalues(matrix: np.ndarray) -> None:
-    assert by_closed_form(matrix) == pytest.approx(power(matrix, -0.5), abs=1e-14)
-
-
 def test_zero_matrix_has_the_root_zero_not_infinity() -> None:
-    assert not by_closed_form(np.zeros((2, 2))).any()
     assert not by_jacobi(np.zeros((3, 3))).any()
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import ACTION, BODY, GROUP, LEDGER, zeros
+from blocksim.kernels.explicit.forces import Effect
 from blocksim.kernels.explicit.partition import (
     add_from_before,
     add_kept,
@@ -18,7 +19,6 @@ from blocksim.kernels.explicit.partition import (
     pairs_before,
     partition,
 )
-from blocksim.kernels.explicit.persistent_forces import Effect
 from blocksim.world.build import with_threads
 from tests.kernels.crews import among_fixed, listed, on_hills, rows, shake, soft_world
 

@@ -9,20 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from blocksim.kernels.common.arrays import NORMAL, OPERATOR, SHEAR, zeros
-from blocksim.kernels.explicit.contact import fill_operator
-from blocksim.kernels.explicit.kinematics import resolve_point
+from blocksim.kernels.explicit.kinematics import Point, relative_motion, resolve_point
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, corner_signs, face_normal, opens
-from blocksim.kernels.explicit.persistent_contacts import (
-    PersistentContact,
-    admits,
-    face_frame,
-    follow,
-    relative_motion,
-    renew_double,
-    renew_single,
-)
+from blocksim.kernels.explicit.persistent_contacts import admits, face_frame, follow
 from blocksim.verification.scene import HEIGHT
 
 if TYPE_CHECKING:
@@ -51,7 +41,7 @@ def moving(pose: Pose, seed: int, angle: float, shift: float) -> World:
     return world
 
 
-def contacts_of(world: World) -> tuple[list[bool], list[PersistentContact]]:
+def contacts_of(world: World) -> tuple[list[bool], list[Point]]:
     """Return whether the contacts of the points found continue, and the contacts."""
     a, b = world.bodies[:2]
     count = contact_points(world, 0)
@@ -78,35 +68,6 @@ def test_spots_are_the_points_of_the_general_way(pose: Pose, angle: float, seed:
         assert [one.nx, one.ny] == pytest.approx([point.nx, point.ny], abs=1e-15)
         assert [one.closing, one.slip] == pytest.approx([point.closing, point.slipping], abs=1e-20)
         assert [one.closing_rate, one.slip_rate] == pytest.approx([point.closing_rate, point.slip_rate], abs=1e-14)
-
-
-@pytest.mark.parametrize("direction", [NORMAL, SHEAR])
-@given(
-    case=st.sampled_from([(0.3, 1), (0.0, 1), (0.0, 2), (0.0, 3)]), seed=SEEDS, shift=st.floats(-4e-3, 4e-3)
-)  # angle and pattern
-def test_dashpots_are_those_of_the_general_way(
-    pose: Pose, direction: int, case: tuple[float, int], seed: int, shift: float
-) -> None:
-    angle, pattern = case
-    world = moving(pose, seed, angle, shift)
-    a, b = world.bodies[:2]
-    _, contacts = contacts_of(world)
-    for point in world.points[: len(contacts)]:
-        resolve_point(point, a, b, STEP)
-        point.stiffness = 1e8
-    world.pairs.stiffness = 0.3 * world.interactions[1, 1].normal_stiffness
-    fill_operator(world, 0, len(contacts), direction, pattern, 0.7, STEP)
-    expected, operator, pair = world.operators[0, direction], zeros(1, OPERATOR)[0], world.pairs[0].copy()
-    if len(contacts) == 1:
-        renew_single(operator, pair, a, b, contacts[0], direction, 0.7, STEP, 1e8)
-    else:
-        renew_double(operator, pair, a, b, contacts[0], contacts[1], direction, pattern, 0.7, STEP, 1e8)
-    kept = [(made.normal_left, made.shear_left, made.sticking) for made in (pair, world.pairs[0])]
-    assert kept[0] == kept[1]
-    assert kept[0][direction] > 0
-    for names in (("e_one", "e_mixed", "e_two"), ("h_one", "h_mixed", "h_two")):
-        numbers = np.array([[made[name] for name in names] for made in (operator, expected)])
-        assert numbers[0] == pytest.approx(numbers[1], abs=1e-12 * np.abs(numbers).max())
 
 
 @given(angle=angles, face=st.integers(0, 3), along=st.floats(-0.01, 0.01), above=st.floats(-0.01, 0.01))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import SUPPORT
-from blocksim.kernels.explicit.bearing import FLAT, LEAST, bearing_of_faces, interval_of
+from blocksim.kernels.explicit.bearing import FLAT, LEAST, bearing_along, interval_of
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE
 from blocksim.verification.scene import HEIGHT, WIDTH
@@ -47,10 +47,10 @@ def test_share_refers_to_the_face_of_the_free_body_and_of_two_to_the_longer(
 def test_changes_of_a_share_are_its_derivatives(make_body: MakeBody, sine: float, shift: float) -> None:
     def share(slip: float = 0.0, turned: float = 0.0) -> float:
         a, b = make_body(x=shift - slip, y=HEIGHT, angle=asin(sine) + turned), make_body()
-        return float(bearing_of_faces(a, b, *UP).share)
+        return float(bearing_along(a, b, *UP, None)[1].share)
 
     a, b = make_body(x=shift, y=HEIGHT, angle=asin(sine)), make_body()
-    bearing = bearing_of_faces(a, b, *UP)
+    bearing = bearing_along(a, b, *UP, None)[1]
     assert LEAST <= bearing.share <= 1.0
     h = 1e-7
     if abs(shift) > 1e-3:  # no end passes the other's within the difference

@@ -109,16 +109,6 @@ def has_inner(duplicates: int, of_b: bool, touched: Record, face: int, along: fl
     return (duplicates >> (end + outlines.MOST_CORNERS if of_b else end)) & 1 == 1
 
 
-@rare_kernel
-def has_passed(point: Record, duplicates: int, a: Record, b: Record, table: Records) -> bool:
-    """Return True if a point is farther out than the corner that was dropped as its duplicate, if there is one."""
-    of_b = bool(point.slot < outlines.MOST_CORNERS)
-    touched = b if of_b else a
-    face: Any = np.int64(point.face)
-    along, half = place_on(point, touched, table)
-    return has_inner(duplicates, of_b, touched, face, along, abs(along) - half - HAND_OVER * point.depth)
-
-
 DEEPEST = 0.01  # of the half diagonal, under the sharp end of a face
 BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
 

@@ -142,7 +142,7 @@ def bouncing(shape: dict[str, object], law: str, nudge: float = 0.0) -> Simulati
         {"x": -0.02, "y": 0.5 * height},
         {"x": 0.02, "y": 0.5 * height},
         {"x": 0.003 + nudge, "y": 1.5 * height + 0.01},
-        {"x": 0.09 + nudge, "y": 0.03, "angle": 0.4, "velocity": [0.1, -0.3], "spin": 3.0},
+        {"x": 0.09 + nudge, "y": 0.03, "angle": 0.4, "velocity": [0.1, -0.3], "spin": 3.3},
     ]
     contact = {"law": law, "stiffness_scale": 1e-2 if law == "linear" else 1.0}
     return Scene([{**pose, **shape} for pose in poses], restitution=0.6, friction=0.3, contact=contact).start()
