@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.explicit.outlines import into_world, next_number, number_before
-from blocksim.kernels.explicit.persistent_outlines import is_nearer_than_beside, stays_on
+from blocksim.kernels.explicit.persistent_forces import is_nearer_than_beside, stays_on
 from blocksim.kernels.explicit.sliver_axes import is_sliver, meets_along
 from blocksim.verification.scene import Scene
 
