@@ -44,8 +44,7 @@ from typing import Any
 
 from blocksim.errors import InvalidInputError, OutputError, StoppedEarlyError
 from blocksim.options import takes
-from blocksim.scenario import Document, Scenario, Source, document_of, motion, place_bodies, placement
-from blocksim.scenario.laws import LAWS
+from blocksim.scenario import Document, Scenario, Source, document_of, laws, motion, place_bodies, placement
 from blocksim.scenario.models import motion as motions, timeline
 from blocksim.silence import silent
 from blocksim.simulation import observables, provenance, schemes
@@ -289,7 +288,7 @@ def largest_static_compression(scenario: Scenario) -> float:
     stiffness = min(
         one.normal_stiffness * min(1.0, one.shear_ratio) for row in table for one in row if one.normal_stiffness > 0.0
     )
-    return LAWS[scenario.contact.law].compression(stiffness, weight)
+    return laws.LAWS[scenario.contact.law].compression(stiffness, weight)
 
 
 def rest_acceleration(scenario: Scenario, least_moved: float | None) -> float:
@@ -427,7 +426,7 @@ class _Search:
         first = scale = scenario.contact.stiffness_scale
         given = limit_answer.StiffnessLevel(stiffness_scale=scale, low=change.low, high=change.high)
         levels = Levels(
-            (given,), LAWS[scenario.contact.law].compression(1.0, RATIO), is_at_rest=motion.settles(scenario)
+            (given,), laws.LAWS[scenario.contact.law].compression(1.0, RATIO), is_at_rest=motion.settles(scenario)
         )
         share = side.give.share if side.give is not None else 0.0
         while levels.is_far and len(levels.levels) < MOST_LEVELS:

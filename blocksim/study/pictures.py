@@ -20,9 +20,8 @@ from blocksim.simulation import files
 from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns
-from blocksim.view import animation, run_data, scene, studies, style, time_panels
+from blocksim.view import animation, paints, run_data, scene, studies, style, time_panels
 from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, run_kind
-from blocksim.view.paints import COLOURS, paint_of
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 
 if TYPE_CHECKING:
@@ -241,8 +240,8 @@ def _moments(text: str) -> tuple[float, ...]:
 
 def _colour(text: str) -> str:
     """Return a way to colour blocks. Raises ValueError for an unknown one."""
-    if text not in COLOURS:
-        raise ValueError(f"{text[:MOST_SHOWN]!r} is unknown; choose {', '.join(COLOURS)}")
+    if text not in paints.COLOURS:
+        raise ValueError(f"{text[:MOST_SHOWN]!r} is unknown; choose {', '.join(paints.COLOURS)}")
     return text
 
 
@@ -355,7 +354,7 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
         panels=options.panels or (),
         blocks=options.blocks or (),
         relative=options.relative,
-        paint=paint_of(options.colour, stored.frames, scenario),
+        paint=paints.paint_of(options.colour, stored.frames, scenario),
         paper=options.paper,
     )
     draw(stored.frames, picture, asked)
@@ -409,7 +408,7 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
     path = Path(options.out or f"{scenario.name}.gif")
     files.refuse_foreign(path, overwrite=options.overwrite)
     older = OLDER if path.exists() else ""
-    paint = paint_of(options.colour, stored.frames, scenario)
+    paint = paints.paint_of(options.colour, stored.frames, scenario)
     look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)
     support, pace = run_data.support_of(scenario, stored.events), animation.Pace(options.speed, options.fps)
     count, beyond = animation.draw_animation(stored.frames, path, pace, look, support, options.on_picture)

@@ -13,9 +13,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.simd import Lanes, Mask, is_all, lesser, select
-from blocksim.kernels.nonsmooth import faces, references, slip
-from blocksim.kernels.nonsmooth.arrays import FAR
-from blocksim.kernels.nonsmooth.references import Best
+from blocksim.kernels.nonsmooth import arrays, faces, references, slip
 
 SLIVER = 1e-5  # of the smaller half perimeter of the boxes of a pair: with less between them two points are one
 
@@ -39,7 +37,7 @@ class Manifold(NamedTuple):
     points: Points
     is_near: Mask  # there is a point
     is_of_b: Mask
-    best: Best
+    best: references.Best
     is_left: Mask
     is_right: Mask
 
@@ -56,14 +54,14 @@ def points_of(
     nx = sign * face.nx
     ny = sign * face.ny
     width = edge.right - edge.left
-    left_gap = select(edge.is_left, edge.left_gap, FAR)
-    right_gap = select(edge.is_right, edge.right_gap, FAR)
-    left_gap = select(left_gap <= margin, left_gap, FAR)
-    right_gap = select(right_gap <= margin, right_gap, FAR)
+    left_gap = select(edge.is_left, edge.left_gap, arrays.FAR)
+    right_gap = select(edge.is_right, edge.right_gap, arrays.FAR)
+    left_gap = select(left_gap <= margin, left_gap, arrays.FAR)
+    right_gap = select(right_gap <= margin, right_gap, arrays.FAR)
     is_sliver = width < SLIVER * lesser(a.half_x + a.half_y, b.half_x + b.half_y)
     is_left_less = left_gap <= right_gap
-    right_gap = select(is_sliver & is_left_less, FAR, right_gap)
-    left_gap = select(is_sliver & (is_left_less ^ is_sliver), FAR, left_gap)
+    right_gap = select(is_sliver & is_left_less, arrays.FAR, right_gap)
+    left_gap = select(is_sliver & (is_left_less ^ is_sliver), arrays.FAR, left_gap)
     one = select(is_of_b, edge.right, edge.left)
     # point one in world axes, on the face
     x = face.x + face.nx * face.distance + face.ny * one
@@ -79,7 +77,7 @@ def points_of(
     )
     gap_one = select(is_of_b, right_gap, left_gap)
     gap_two = select(is_of_b, left_gap, right_gap)
-    return Points(constraint, gap_one, gap_two, is_of_b), lesser(gap_one, gap_two) < FAR
+    return Points(constraint, gap_one, gap_two, is_of_b), lesser(gap_one, gap_two) < arrays.FAR
 
 
 @jit.kernel
@@ -101,14 +99,14 @@ def is_any_odd(found: Manifold, hulls_a: faces.AnyHulls, hulls_b: faces.AnyHulls
         return False
     points = found.points
     is_sliver = points.constraint.width < references.EDGE * lesser(hulls_a.inner, hulls_b.inner)
-    is_empty = found.is_of_b & (lesser(points.gap_one, points.gap_two) >= FAR)
+    is_empty = found.is_of_b & (lesser(points.gap_one, points.gap_two) >= arrays.FAR)
     return not is_all(select((found.best.gap <= margin) & (is_sliver | is_empty), 1.0, 0.0) <= 0.0)
 
 
 @jit.rare_kernel
 def manifold_beside(
     is_of_b: bool,
-    best: Best,
+    best: references.Best,
     a: faces.Block,
     hulls_a: faces.Hulls,
     b: faces.Block,

@@ -9,17 +9,14 @@ after the substep, contacts included; so their work adds up exactly, see energy.
 Prescribed motion: of the supports (the ground, its pieces, walls, fixed bodies) and of driven bodies.
 """
 
+from blocksim.kernels.common import jit, loads, shapes, supports
 from blocksim.kernels.common.arrays import LOAD_FORCE, Record, Records, World
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.loads import acceleration_at, accelerations
-from blocksim.kernels.common.shapes import turn
-from blocksim.kernels.common.supports import displacement, follow_pieces, is_driven, piece_at, pose_at, put, way_over
 from blocksim.kernels.nonsmooth import arrays, parts
 
 IN_FLIGHT = 1e-9  # of a kick: bodies whose velocity changes by no more beside it touch nothing
 
 
-@kernel
+@jit.kernel
 def kick(state: Record, before: Record, share: float, hx: float, hy: float) -> None:
     """Begin the first substep of a step: remember the velocity, add a share of that of gravity (m/s)."""
     before.vx = state.vx
@@ -30,7 +27,7 @@ def kick(state: Record, before: Record, share: float, hx: float, hy: float) -> N
     state.vy += share * hy
 
 
-@kernel
+@jit.kernel
 def kick_warm(state: Record, before: Record, last: float, hx: float, hy: float) -> None:
     """Begin another substep: remember the velocity, add that of gravity (m/s) and of the last impulses.
 
@@ -49,7 +46,7 @@ def kick_warm(state: Record, before: Record, last: float, hx: float, hy: float) 
     before.spin = spin
 
 
-@kernel
+@jit.kernel
 def kick_all(states: Records, before: Records, first: int, last: int, share: float, hx: float, hy: float) -> None:
     """Kick the free bodies from `first` to before `last`."""
     for i in range(first, last):
@@ -57,7 +54,7 @@ def kick_all(states: Records, before: Records, first: int, last: int, share: flo
             kick(states[i], before[i], share, hx, hy)
 
 
-@kernel
+@jit.kernel
 def kick_all_warm(
     states: Records, before: Records, first: int, last: int, last_share: float, hx: float, hy: float
 ) -> None:
@@ -67,7 +64,7 @@ def kick_all_warm(
             kick_warm(states[i], before[i], last_share, hx, hy)
 
 
-@kernel
+@jit.kernel
 def drift_all(states: Records, first: int, last: int, h: float) -> None:
     """Move the bodies from `first` to before `last` for h (s)."""
     for i in range(first, last):
@@ -77,14 +74,14 @@ def drift_all(states: Records, first: int, last: int, h: float) -> None:
         state.turned += h * state.spin
 
 
-@kernel
+@jit.kernel
 def is_in_flight(state: Record, before: Record, kx: float, ky: float) -> bool:
     """Return True if nothing but the last kick (m/s) has changed a velocity in the last substep."""
     off = abs(state.vx - before.vx - kx) + abs(state.vy - before.vy - ky)
     return off <= IN_FLIGHT * (abs(kx) + abs(ky))
 
 
-@kernel
+@jit.kernel
 def place(body: Record, state: Record, before: Record, share: float, kick: tuple[float, float, float]) -> None:
     """End a step: bring the pose of a body up to date, exactly turned, and its velocities too.
 
@@ -103,13 +100,13 @@ def place(body: Record, state: Record, before: Record, share: float, kick: tuple
     body.x += state.dx
     body.y += state.dy
     body.angle += state.turned
-    body.cos, body.sin = turn(body.cos, body.sin, state.turned)
+    body.cos, body.sin = shapes.turn(body.cos, body.sin, state.turned)
     state.dx = 0.0
     state.dy = 0.0
     state.turned = 0.0
 
 
-@kernel
+@jit.kernel
 def place_all(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> None:
     """End a step of the free bodies from `first` to before `last`."""
     contacts = scene.contacts
@@ -126,20 +123,20 @@ def place_all(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> N
             place(scene.world.bodies[i], state, contacts.before[i], share, kick)
 
 
-@rare_kernel
+@jit.rare_kernel
 def pull_of_loads(world: World, time: float) -> tuple[float, float]:
     """Return the acceleration (m/s2) that loads give all free bodies at a time (s)."""
     x = 0.0
     y = 0.0
     for load in world.loads:
         if load.kind < LOAD_FORCE:
-            ax, ay = acceleration_at(world, load, time)
+            ax, ay = loads.acceleration_at(world, load, time)
             x += ax
             y += ay
     return x, y
 
 
-@rare_kernel
+@jit.rare_kernel
 def kick_by_loads(scene: arrays.Nonsmooth, number: int, first: int, last: int, share: float, last_share: float) -> None:
     """Add the kick of loads to bodies that gravity has kicked in substep `number` of a step.
 
@@ -147,7 +144,7 @@ def kick_by_loads(scene: arrays.Nonsmooth, number: int, first: int, last: int, s
     """
     h = scene.contacts.stepping[0].substep
     time = scene.world.clock[0].steps * scene.world.controls[0].step + number * h
-    accelerations(scene.world, scene.contacts.states, scene.pushes, first, last, time)
+    loads.accelerations(scene.world, scene.contacts.states, scene.pushes, first, last, time)
     new = share * h
     old = last_share * h
     for i in range(first, last):
@@ -159,7 +156,7 @@ def kick_by_loads(scene: arrays.Nonsmooth, number: int, first: int, last: int, s
             state.spin += new * one.rate - old * one.last_rate
 
 
-@rare_kernel
+@jit.rare_kernel
 def kick_again(contacts: arrays.Contacts, pushes: Records, first: int, last: int, share: float) -> None:
     """Add the kick of loads to bodies of clusters that were hit, whose substep begins after the last impact."""
     kick = share * contacts.stepping[0].substep
@@ -171,7 +168,7 @@ def kick_again(contacts: arrays.Contacts, pushes: Records, first: int, last: int
             state.spin += kick * pushes[i].rate
 
 
-@rare_kernel
+@jit.rare_kernel
 def tally_loads(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> None:
     """Tally what loads have brought the bodies from `first` to before `last` in a substep with that share of a kick."""
     half = 0.5 * share * scene.contacts.stepping[0].substep
@@ -186,13 +183,13 @@ def tally_loads(scene: arrays.Nonsmooth, first: int, last: int, share: float) ->
             one.work += half * (body.mass * along + body.inertia * turning)
 
 
-@rare_kernel
+@jit.rare_kernel
 def displacement_at(world: World, time: float) -> float:
     """Return the displacement (m) of the supports at a time (s) that is not before the current step."""
-    return displacement(world.motion[piece_at(world.motion, world.clock[0].motion_piece, time)], time)
+    return supports.displacement(world.motion[supports.piece_at(world.motion, world.clock[0].motion_piece, time)], time)
 
 
-@rare_kernel
+@jit.rare_kernel
 def drive(scene: arrays.Nonsmooth, number: int) -> None:
     """Give supports and driven bodies their velocity in substep `number`: displacement over time."""
     world = scene.world
@@ -204,7 +201,7 @@ def drive(scene: arrays.Nonsmooth, number: int) -> None:
     stepping.support_vx = controls.motion_x * rate
     stepping.support_vy = controls.motion_y * rate
     for one in world.moved:
-        if is_driven(one):
+        if supports.is_driven(one):
             drive_own(scene, one, begin)
             continue
         state = scene.contacts.states[one.body]
@@ -213,32 +210,32 @@ def drive(scene: arrays.Nonsmooth, number: int) -> None:
         state.vy = before.vy = stepping.support_vy
 
 
-@rare_kernel
+@jit.rare_kernel
 def drive_own(scene: arrays.Nonsmooth, one: Record, begin: float) -> None:
     """Give a driven body its velocity in the substep that begins at a time (s)."""
     h = scene.contacts.stepping[0].substep
     state = scene.contacts.states[one.body]
     before = scene.contacts.before[one.body]
-    way = way_over(scene.world, one, begin, h)
+    way = supports.way_over(scene.world, one, begin, h)
     state.vx = before.vx = way.x / h
     state.vy = before.vy = way.y / h
     state.spin = before.spin = way.angle / h
 
 
-@rare_kernel
+@jit.rare_kernel
 def place_supports(scene: arrays.Nonsmooth) -> None:
     """End a step of supports and driven bodies, which is not counted yet: where they have to be, never summed up."""
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
     now = parts.end_of_part(scene)
-    clock.motion_piece = piece_at(world.motion, clock.motion_piece, now)
-    moved = displacement(world.motion[clock.motion_piece], now)
+    clock.motion_piece = supports.piece_at(world.motion, clock.motion_piece, now)
+    moved = supports.displacement(world.motion[clock.motion_piece], now)
     stepping = scene.contacts.stepping[0]
     stepping.support_x = controls.motion_x * moved
     stepping.support_y = controls.motion_y * moved
     for one in world.moved:
-        if is_driven(one):
+        if supports.is_driven(one):
             place_driven(scene, one, now)
             continue
         body = world.bodies[one.body]
@@ -251,14 +248,14 @@ def place_supports(scene: arrays.Nonsmooth) -> None:
         state.dy = 0.0
 
 
-@rare_kernel
+@jit.rare_kernel
 def place_driven(scene: arrays.Nonsmooth, one: Record, time: float) -> None:
     """End a step of one driven body, at a time (s)."""
     world = scene.world
     body = world.bodies[one.body]
     state = scene.contacts.states[one.body]
-    follow_pieces(world, one, time)
-    put(body, pose_at(world, one, time))
+    supports.follow_pieces(world, one, time)
+    supports.put(body, supports.pose_at(world, one, time))
     body.vx = state.vx
     body.vy = state.vy
     body.spin = state.spin

@@ -26,22 +26,13 @@ from blocksim.kernels.common.simd import (
     store,
     write_fields_0,
 )
-from blocksim.kernels.nonsmooth.arrays import FAR, PART, Contacts
-from blocksim.kernels.nonsmooth.cone import shear_limits, shear_within, solve_two
-from blocksim.kernels.nonsmooth.groups import (
-    Bodies,
-    bodies_at,
-    constraints_of,
-    normal_masses,
-    tangent_mass,
-    total,
-)
+from blocksim.kernels.nonsmooth import arrays, cone, groups
 from blocksim.kernels.nonsmooth.slip import Constraints, Slip, presses, slip_of
 
 
 @kernel
 def gaps(
-    group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies, bend_time: float
+    group: Record, lane: Lane, constraint: Constraints, a: groups.Bodies, b: groups.Bodies, bend_time: float
 ) -> tuple[Lanes, Lanes]:
     """Return both gaps (m) as they are now; `bend_time` (s) is that of slip.py now."""
     slip = slip_of(constraint, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
@@ -50,7 +41,7 @@ def gaps(
 
 
 @kernel
-def pulls(constraint: Constraints, a: Bodies, b: Bodies, stepping: Record) -> Lanes:
+def pulls(constraint: Constraints, a: groups.Bodies, b: groups.Bodies, stepping: Record) -> Lanes:
     """Return by how much gravity changes J v of constraints in a substep (m/s) as long as nothing touches.
 
     So do loads that act on all bodies. Those on single ones are left out: a rebound is off by their share of a kick.
@@ -83,12 +74,12 @@ def target(impulse: Lanes, inverse_mass: Lanes, gap: Lanes, least: Lanes, steppi
     A gap that is still open must not slow an approach down: it would take a part of it in the substep before the
     impact, and restitution would vanish for small substeps.
     """
-    return branch(presses(impulse, inverse_mass, stepping) | (gap <= stepping.touch_gap), least, -FAR)
+    return branch(presses(impulse, inverse_mass, stepping) | (gap <= stepping.touch_gap), least, -arrays.FAR)
 
 
 @kernel
 def aim(
-    contacts: Contacts, group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies
+    contacts: arrays.Contacts, group: Record, lane: Lane, constraint: Constraints, a: groups.Bodies, b: groups.Bodies
 ) -> tuple[Lanes, Lanes]:
     """Set what the velocity pass has to reach at the points of constraints."""
     stepping = contacts.stepping[0]
@@ -96,7 +87,7 @@ def aim(
     normal_one = load(lane, group.normal_one)
     normal_two = load(lane, group.normal_two)
     if is_all((lesser(gap_one, gap_two) > stepping.touch_gap) & (greater(normal_one, normal_two) <= 0.0)):
-        none = 0.0 * gap_one - FAR
+        none = 0.0 * gap_one - arrays.FAR
         store(lane, group.target_one, none)
         store(lane, group.target_two, none)
         return none, none
@@ -108,7 +99,7 @@ def aim(
     least_two = -branch(gap_two > 0.0, gap_two, 0.0) * stepping.open_bias
     t_one = target(normal_one, inverse_mass, gap_one, least_one, stepping)
     t_two = target(normal_two, inverse_mass, gap_two, least_two, stepping)
-    if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -FAR)):
+    if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -arrays.FAR)):
         t_one, t_two = with_rebounds(contacts, group, lane, constraint, a, b, u, t_one, t_two)
     store(lane, group.target_one, t_one)
     store(lane, group.target_two, t_two)
@@ -117,12 +108,12 @@ def aim(
 
 @kernel
 def with_rebounds(
-    contacts: Contacts,
+    contacts: arrays.Contacts,
     group: Record,
     lane: Lane,
     constraint: Constraints,
-    a: Bodies,
-    b: Bodies,
+    a: groups.Bodies,
+    b: groups.Bodies,
     u: Slip,
     t_one: Lanes,
     t_two: Lanes,
@@ -134,8 +125,8 @@ def with_rebounds(
     after_one = rebound(u.one, load(lane, group.start_one), pull, restitution, stepping)
     after_two = rebound(u.two, load(lane, group.start_two), pull, restitution, stepping)
     rebounds = restitution > (-1.0 if stepping.is_divided else 0.0)  # then it is an impact without any rebound too
-    t_one = select(rebounds & (u.one < -stepping.threshold) & (t_one > -FAR), after_one, t_one)
-    t_two = select(rebounds & (u.two < -stepping.threshold) & (t_two > -FAR), after_two, t_two)
+    t_one = select(rebounds & (u.one < -stepping.threshold) & (t_one > -arrays.FAR), after_one, t_one)
+    t_two = select(rebounds & (u.two < -stepping.threshold) & (t_two > -arrays.FAR), after_two, t_two)
     if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):
         stepping.has_rebounds = 1
     return t_one, t_two
@@ -143,12 +134,12 @@ def with_rebounds(
 
 @kernel
 def push(
-    contacts: Contacts,
+    contacts: arrays.Contacts,
     group: Record,
     lane: Lane,
     constraint: Constraints,
-    a: Bodies,
-    b: Bodies,
+    a: groups.Bodies,
+    b: groups.Bodies,
     normal: Lanes,
     second: Lanes,
 ) -> None:
@@ -161,12 +152,12 @@ def push(
 
 @kernel
 def push_and_drag(
-    contacts: Contacts,
+    contacts: arrays.Contacts,
     group: Record,
     lane: Lane,
     constraint: Constraints,
-    a: Bodies,
-    b: Bodies,
+    a: groups.Bodies,
+    b: groups.Bodies,
     normal: Lanes,
     second: Lanes,
     shear: Lanes,
@@ -182,7 +173,12 @@ def push_and_drag(
 
 @kernel
 def shove(
-    contacts: Contacts, group: Record, lane: Lane, a: Bodies, b: Bodies, impulse: tuple[Lanes, Lanes, Lanes, Lanes]
+    contacts: arrays.Contacts,
+    group: Record,
+    lane: Lane,
+    a: groups.Bodies,
+    b: groups.Bodies,
+    impulse: tuple[Lanes, Lanes, Lanes, Lanes],
 ) -> None:
     """Change the velocities of the bodies by an impulse: along x and y (N s), its moments about both (N m s)."""
     px, py, turn_a, turn_b = impulse
@@ -197,42 +193,46 @@ def shove(
 
 
 @kernel
-def masses(group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
+def masses(
+    group: Record, lane: Lane, constraint: Constraints, a: groups.Bodies, b: groups.Bodies
+) -> tuple[Lanes, Lanes, Lanes]:
     """Return A (1/kg) of the two normals: of one, mixed, of two.
 
     Of four constraints it is computed again each time, which is cheaper than to load it, of one it is kept.
     """
     if lane is None:
-        return normal_masses(constraint, a, b)
+        return groups.normal_masses(constraint, a, b)
     return group.one, group.mixed, group.two
 
 
 @kernel
-def shear_mass(group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
+def shear_mass(group: Record, lane: Lane, constraint: Constraints, a: groups.Bodies, b: groups.Bodies) -> Lanes:
     """Return A (1/kg) along the tangent; kept as in masses."""
     if lane is None:
-        return tangent_mass(constraint, a, b)
+        return groups.tangent_mass(constraint, a, b)
     return group.along
 
 
 @kernel
-def warm_group(contacts: Contacts, group: Record, lane: Lane) -> None:
+def warm_group(contacts: arrays.Contacts, group: Record, lane: Lane) -> None:
     """Begin with the impulses of the last substep."""
     second = load(lane, group.normal_two)
     normal = load(lane, group.normal_one) + second
     if not is_all(normal <= 0.0):
-        a = bodies_at(contacts, group.a, lane)
-        b = bodies_at(contacts, group.b, lane)
-        push_and_drag(contacts, group, lane, constraints_of(group, lane), a, b, normal, second, load(lane, group.shear))
+        a = groups.bodies_at(contacts, group.a, lane)
+        b = groups.bodies_at(contacts, group.b, lane)
+        push_and_drag(
+            contacts, group, lane, groups.constraints_of(group, lane), a, b, normal, second, load(lane, group.shear)
+        )
 
 
 @kernel
-def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
+def position_group(contacts: arrays.Contacts, group: Record, lane: Lane) -> None:
     """Solve both normals of constraints with soft contacts and gaps that may just close."""
     stepping = contacts.stepping[0]
-    constraint = constraints_of(group, lane)
-    a = bodies_at(contacts, group.a, lane)
-    b = bodies_at(contacts, group.b, lane)
+    constraint = groups.constraints_of(group, lane)
+    a = groups.bodies_at(contacts, group.a, lane)
+    b = groups.bodies_at(contacts, group.b, lane)
     gap_one, gap_two = gaps(group, lane, constraint, a, b, stepping.bend_time)
     store(lane, group.start_one, gap_one)
     store(lane, group.start_two, gap_two)
@@ -251,7 +251,7 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
     q_two = slip.two + (rate_two - (mixed * old_one + two * old_two))
     if is_all((lesser(q_one, q_two) >= 0.0) & (greater(old_one, old_two) <= 0.0)):
         return  # gaps that stay open
-    new_one, new_two = solve_two(lane, k_one, mixed, k_two, q_one, q_two)
+    new_one, new_two = cone.solve_two(lane, k_one, mixed, k_two, q_one, q_two)
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
     second = new_two - old_two
@@ -260,17 +260,17 @@ def position_group(contacts: Contacts, group: Record, lane: Lane) -> None:
 
 @kernel
 def reach(
-    contacts: Contacts,
+    contacts: arrays.Contacts,
     group: Record,
     lane: Lane,
     constraint: Constraints,
-    a: Bodies,
-    b: Bodies,
+    a: groups.Bodies,
+    b: groups.Bodies,
     t_one: Lanes,
     t_two: Lanes,
 ) -> Lanes:
     """Solve both normals without softness, then friction; return the largest changes of velocity (m/s)."""
-    if is_all((greater(t_one, t_two) <= -FAR) & (abs(load(lane, group.shear)) <= 0.0)):
+    if is_all((greater(t_one, t_two) <= -arrays.FAR) & (abs(load(lane, group.shear)) <= 0.0)):
         return 0.0 * t_one  # no normal impulse, so no friction either
     slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
     one, mixed, two = masses(group, lane, constraint, a, b)
@@ -281,7 +281,7 @@ def reach(
     bend = share * load(lane, group.bend)
     q_one = slip.one + (bend - t_one - (one * old_one + mixed * old_two))
     q_two = slip.two + (bend - t_two - (mixed * old_one + two * old_two))
-    new_one, new_two = solve_two(lane, one, mixed, two, q_one, q_two)
+    new_one, new_two = cone.solve_two(lane, one, mixed, two, q_one, q_two)
     store(lane, group.normal_one, new_one)
     store(lane, group.normal_two, new_two)
     d_one = new_one - old_one
@@ -295,8 +295,8 @@ def reach(
     rate = (slip.shear + share * load(lane, group.shear_bend)) + (by_normal * normal - by_width * d_two)
     mass = shear_mass(group, lane, constraint, a, b)
     needed = old_shear - rate * (1.0 / mass)
-    limit = shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)
-    shear = shear_within(group, lane, constraint, a, b, old_shear, needed, limit)
+    limit = cone.shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)
+    shear = cone.shear_within(group, lane, constraint, a, b, old_shear, needed, limit)
     store(lane, group.shear, shear)
     d_shear = shear - old_shear
     push_and_drag(contacts, group, lane, constraint, a, b, normal, d_two, d_shear)
@@ -307,7 +307,7 @@ WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
 
 
 @kernel
-def solve_group(contacts: Contacts, group: Record, lane: Lane, task: int) -> Lanes:
+def solve_group(contacts: arrays.Contacts, group: Record, lane: Lane, task: int) -> Lanes:
     """Do one task for the constraints of a group; return the largest changes of velocity (m/s) of a velocity pass."""
     if task == WARM:
         warm_group(contacts, group, lane)
@@ -315,9 +315,9 @@ def solve_group(contacts: Contacts, group: Record, lane: Lane, task: int) -> Lan
     if task == POSITION:
         position_group(contacts, group, lane)
         return four(lane, 0.0, 0.0, 0.0, 0.0)
-    constraint = constraints_of(group, lane)
-    a = bodies_at(contacts, group.a, lane)
-    b = bodies_at(contacts, group.b, lane)
+    constraint = groups.constraints_of(group, lane)
+    a = groups.bodies_at(contacts, group.a, lane)
+    b = groups.bodies_at(contacts, group.b, lane)
     if task == FIRST_VELOCITY:
         t_one, t_two = aim(contacts, group, lane, constraint, a, b)
     else:
@@ -327,7 +327,7 @@ def solve_group(contacts: Contacts, group: Record, lane: Lane, task: int) -> Lan
 
 @kernel
 def given_to(
-    constraint: Constraints, a: Bodies, b: Bodies, normal_one: Lanes, normal_two: Lanes, shear: Lanes
+    constraint: Constraints, a: groups.Bodies, b: groups.Bodies, normal_one: Lanes, normal_two: Lanes, shear: Lanes
 ) -> Lanes:
     """Return the work (J) of the impulses on body a, did it move as the fixed body of its constraint does."""
     is_b = a.inverse_mass > 0.0
@@ -346,7 +346,7 @@ def given_to(
 
 @kernel
 def taken_by(
-    contacts: Contacts, then: Records, group: Record, lane: Lane, gx: float, gy: float
+    contacts: arrays.Contacts, then: Records, group: Record, lane: Lane, gx: float, gy: float
 ) -> tuple[Lanes, Lanes, Lanes]:
     """Return what normal and shear impulses of constraints have taken from the energy in this substep (J), both twice.
 
@@ -361,10 +361,10 @@ def taken_by(
     normal_two = load(lane, group.normal_two)
     if is_all(normal_one + normal_two <= 0.0):
         return 0.0 * normal_one, 0.0 * normal_one, 0.0 * normal_one
-    constraint = constraints_of(group, lane)
+    constraint = groups.constraints_of(group, lane)
     shear = load(lane, group.shear)
-    a = bodies_at(contacts, group.a, lane)
-    b = bodies_at(contacts, group.b, lane)
+    a = groups.bodies_at(contacts, group.a, lane)
+    b = groups.bodies_at(contacts, group.b, lane)
     vx_a, vy_a, spin_a, _ = fields_0(lane, then, group.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, then, group.b)
     free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
@@ -382,12 +382,12 @@ def taken_by(
 
 
 @kernel
-def tally_group(contacts: Contacts, then: Records, m: int, lane: Lane, gx: float, gy: float) -> None:
+def tally_group(contacts: arrays.Contacts, then: Records, m: int, lane: Lane, gx: float, gy: float) -> None:
     """Tally the constraints of group m; fields of `then` and (gx, gy) as in taken_by."""
     group = contacts.groups[m]
-    tally = contacts.tallies[m // PART]
+    tally = contacts.tallies[m // arrays.PART]
     normals, shears, gifts = taken_by(contacts, then, group, lane, gx, gy)
-    tally.impacts -= 0.5 * total(lane, normals, group.count)
-    tally.friction -= 0.5 * total(lane, shears, group.count)
+    tally.impacts -= 0.5 * groups.total(lane, normals, group.count)
+    tally.friction -= 0.5 * groups.total(lane, shears, group.count)
     if contacts.stepping[0].is_shaken:
-        tally.to_support += total(lane, gifts, group.count)
+        tally.to_support += groups.total(lane, gifts, group.count)

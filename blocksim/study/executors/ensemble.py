@@ -17,8 +17,7 @@ from queue import SimpleQueue
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.scenario import Document, Scenario
-from blocksim.simulation import MemberFailure, Summary, files, provenance, run_in_batches, trajectory
-from blocksim.simulation.results import RESULT_FILES, changed_files, read_summary
+from blocksim.simulation import MemberFailure, Summary, files, provenance, results, run_in_batches, trajectory
 from blocksim.study.executors import Batch, BatchSize, RunSetting, Task, take
 from blocksim.study.rows import FINISHED, Row, row_of, row_of_error
 from blocksim.study.run import run
@@ -112,13 +111,13 @@ def run_case(scenario: Scenario, folder: Path) -> Row:
     """Run one case into its folder, or what is left of it, unless it is there already, and return its row."""
     try:
         with suppress(BlocksimError):
-            summary = read_summary(folder / files.SUMMARY)
+            summary = results.read_summary(folder / files.SUMMARY)
             # a case that failed has come to its end too
             has_ended = (folder / files.DONE).is_file() if summary.status == FINISHED else summary.status != INTERRUPTED
             if (
                 has_ended
                 and summary.run == provenance.run_hash(scenario)
-                and not changed_files(folder, summary, RESULT_FILES)
+                and not results.changed_files(folder, summary, results.RESULT_FILES)
             ):
                 return _row_of(summary, trajectory.read_table(folder / files.FINAL))
         try:
