@@ -128,12 +128,6 @@ def hull_of(body: arrays.Record, table: arrays.Records) -> Hull:
 
 
 @jit.kernel
-def next_corner(hull: Hull, number: int) -> int:
-    """Return the number of the corner after one, counter-clockwise."""
-    return number + 1 if number + 1 < hull.size else 0
-
-
-@jit.kernel
 def least_along(hull: Hull, nx: float, ny: float) -> float:
     """Return how far (m) a body reaches from its centre along a unit vector given in its own frame, at least."""
     least = math.inf

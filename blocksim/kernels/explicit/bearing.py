@@ -244,12 +244,6 @@ def measure_soon(pair: Record, slip: float, turned: float, exponent: float, corn
 
 
 @rare_kernel
-def are_alike(one: Record, two: Record) -> bool:
-    """Return True if two contacts have nearly the same normal."""
-    return one.nx * two.nx + one.ny * two.ny > PARALLEL
-
-
-@rare_kernel
 def measure(world: World, p: int, count: int, stiffness: float) -> None:
     """Measure the stiffness of the contacts of a pair where dashpots are due; `stiffness` is that of a corner alone."""
     pair = world.pairs[p]
@@ -292,7 +286,7 @@ def measure_faces(
     found, bearing, flat = bearing_along(a, b, deeper.nx, deeper.ny, corners)
     keep_bearing(pair, bearing, stiffness)
     is_two = one.slot != two.slot
-    is_ends = not is_two or (are_alike(one, two) and flat and bearing.share > LEAST)
+    is_ends = not is_two or (one.nx * two.nx + one.ny * two.ny > PARALLEL and flat and bearing.share > LEAST)
     pair.bearing = ENDS if is_ends else APART
     if is_two and is_ends and bearing.slide != 0.0:
         pair.slide = stiffness * found.slide * found.per_length

@@ -10,7 +10,7 @@ exactly aligned), the contact itself continues under another corner, and its his
 from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.explicit import broad_phase, damping, kinematics, laws
-from blocksim.kernels.explicit.models import SURFACE, place_ended, slot_normal, surface
+from blocksim.kernels.explicit.models import SURFACE, place_of, slot_normal, surface
 
 
 @kernel
@@ -90,7 +90,7 @@ def release(world: World, p: int, old: Record, step: float, tally: Record) -> No
     values = world.interactions[a.contact_class, b.contact_class]
     exponent = world.controls[0].exponent
     point = world.points[world.points.size - 1]
-    place_ended(world, p, old, point)
+    place_of(world, p, old, point, world.particles)
     kinematics.resolve_point(point, a, b, step)
     of_spring = stiffness_before(old, pair.stiffness, values, world.particles)
     stiffness = shear_stiffness_before(old, of_spring, values, exponent)

@@ -191,7 +191,7 @@ def test_every_engine_has_one_finest_setting_finer_than_its_levels(restitution: 
         if isinstance(one.reference, Nonsmooth):
             steppings = [level.stepping for level in one.levels if isinstance(level, Nonsmooth)]
             assert one.reference.stepping.step < min(stepping.step for stepping in steppings)
-            assert {stepping.sweeps == 1 for stepping in steppings} == {restitution == 0.0}
+            assert {stepping.velocity_sweeps == 1 for stepping in steppings} == {restitution == 0.0}
 
 
 def test_levels_have_the_iterations_that_their_curve_is_labelled_with() -> None:

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from blocksim.errors import ScenarioError
+from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Document, scenario_hash, scenario_to_toml
 from blocksim.scenario.models.contact import Contact, PairFriction, Restitution
 
@@ -47,7 +48,8 @@ def test_equal_friction_is_equal_however_it_was_written() -> None:
 )
 def test_smoothing_length_and_reach_of_the_kernel(given: dict[str, object], length: float, support: float) -> None:
     contact = Contact.model_validate({"model": "kernel", **given})
-    assert [contact.resolved_smoothing_length, contact.support_radius] == pytest.approx([length, support])
+    reach = support_radius(KERNEL_CODES[contact.kernel], contact.resolved_smoothing_length)
+    assert [contact.resolved_smoothing_length, reach] == pytest.approx([length, support])
 
 
 @pytest.mark.parametrize("model", ["surface", "particles"])

@@ -8,7 +8,7 @@ A model is one file with
 one code here and one branch in each dispatcher below. The `surface` model has two: with polygons in a scene, all its
 corners lie in a table (`corners` below), which outlines.py reads. How many slots a pair needs is said in
 world/bodies.py. Where an ended contact was is derived again for corners and kept in the slot for particles
-(`place_ended`). All models share laws, friction, dashpots, history and the energy ledger.
+(`place_of`). All models share laws, friction, dashpots, history and the energy ledger.
 """
 
 from blocksim.kernels.common.arrays import Integers, Record, Records, World
@@ -85,15 +85,9 @@ def place_of_slot(world: World, pair: Record, slot: int, corners: Records | None
     return outlines.slot_place(world, pair, slot, corners)
 
 
-@rare_kernel
-def place_ended(world: World, p: int, old: Record, point: Record) -> None:
-    """Set place, normal and share of a contact of pair p that has just ended."""
-    place_of(world, p, old, point, world.particles)
-
-
 @kernel
 def place_of(world: World, p: int, old: Record, point: Record, particles: Records | None) -> None:
-    """As place_ended; see points_of."""
+    """Set place and normal of a contact of pair p that has just ended; see points_of."""
     if particles is None:
         point.x, point.y = slot_place(world, world.pairs[p], old.slot)
         point.nx, point.ny = slot_normal(world, world.pairs[p], old.slot, old.face)

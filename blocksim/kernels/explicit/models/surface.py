@@ -176,15 +176,6 @@ def face_normal(face: int, body: Record) -> tuple[float, float]:
 
 
 @rare_kernel
-def slab_overlap(px: float, py: float, slab: Record, sx: float, sy: float, c: float, s: float) -> float:
-    """Return the overlap (m) of a corner with the upper face of a slab; zero where it does not touch it.
-
-    The arguments are those of `face_below_corner`.
-    """
-    return slab_depth(px, py, slab) if opens(UPPER_FACE, sx, sy, c, s) else 0.0
-
-
-@rare_kernel
 def add_corner(
     owner: Record, touched: Record, corner: int, x0: float, y0: float, c: float, s: float, points: Records, count: int
 ) -> int:
@@ -200,7 +191,8 @@ def add_corner(
     if touched.faces == ALL:
         face, depth, beside = face_below_corner(px, py, touched, sx, sy, c, s)
     else:
-        face, depth, beside = UPPER_FACE, slab_overlap(px, py, touched, sx, sy, c, s), math.inf
+        face, beside = UPPER_FACE, math.inf
+        depth = slab_depth(px, py, touched) if opens(UPPER_FACE, sx, sy, c, s) else 0.0
     if depth <= 0.0:
         return count
     point = points[count]
