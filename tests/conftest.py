@@ -13,7 +13,7 @@ import pytest
 from hypothesis.internal.conjecture import providers
 
 from blocksim.scenario import load_scenario
-from blocksim.verification.scene import PaperBlock, Scene, Simulation
+from blocksim.verification.scene import CaseScene, PaperBlock, Simulation
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def start() -> Start:
         change: Callable[[World], None] | None = None,
         **values: Any,
     ) -> Simulation:
-        return Scene(bodies, **values).start(change)
+        return CaseScene(bodies, **values).start(change)
 
     return start_scene
 

@@ -10,7 +10,7 @@ from typing import Any
 from blocksim.kernels.common.arrays import World
 from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.scenario.models.timeline import SCHEMES, SPRINGS
-from blocksim.verification.scene import Scene, Simulation
+from blocksim.verification.scene import CaseScene, Simulation
 
 NUMBERS = ("quantity", "unit", "expected", "measured", "error", "tolerance")  # of a row, for programs
 VELOCITY_TOLERANCE = 1e-6
@@ -100,13 +100,13 @@ class Setting:
         """Return True if the stiffness of a contact changes with its overlap."""
         return not LAWS[self.law].is_linear
 
-    def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:
-        """Return a scene with this model, law and stepping; `values` are more fields of Scene."""
+    def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> CaseScene:
+        """Return a scene with this model, law and stepping; `values` are more fields of CaseScene."""
         contact = {"model": self.model, "law": self.law, **values.pop("contact", {})}
         stepping: dict[str, object] = {} if self.has_springs else {"scheme": self.scheme}
         if stepping and self.rigid_step is not None:
             stepping |= {"step": self.rigid_step, "substeps": 1, "velocity_tolerance": VELOCITY_TOLERANCE}
-        return Scene(bodies, contact=contact, time={**stepping, **values.pop("time", {})}, **values)
+        return CaseScene(bodies, contact=contact, time={**stepping, **values.pop("time", {})}, **values)
 
     def start(
         self, bodies: Sequence[Mapping[str, object]], change: Callable[[World], None] | None = None, **values: Any

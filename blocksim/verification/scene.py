@@ -117,7 +117,7 @@ class Simulation:
 
 
 @dataclass(frozen=True)
-class Scene:
+class CaseScene:
     """Single bodies on the ground, each with sides of its own (default: the paper's block)."""
 
     bodies: Sequence[Mapping[str, object]]  # keys of [[bodies]] without `block`; width, height, length, or outline
@@ -194,7 +194,7 @@ class Thrower:
     """A world with one block, ready to be thrown."""
 
     def __init__(self, setting: "Setting", restitution: float, speed: float = 1.0, **values: Any) -> None:
-        """Build the world for impacts at `speed` (m/s), on which its step may depend; `values` go to Scene."""
+        """Build the world for impacts at `speed` (m/s), on which its step may depend; `values` go to CaseScene."""
         body = {"y": 1.0, "velocity": [0.0, -speed]}
         self.speed = speed
         self.scene = build_scene(setting.scene([body], restitution=restitution, gravity=0.0, **values).scenario())

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from blocksim.scenario.geometry import Corners, centre_outline, regular, section_of
-from blocksim.verification.scene import Scene, Simulation
+from blocksim.verification.scene import CaseScene, Simulation
 
 G = 9.81
 RADIUS = 0.02  # m
@@ -43,7 +43,7 @@ def test_wedge_slides_in_between_jaws_with_the_force_of_limit_equilibrium(fricti
     push, carry = math.cos(BETA) - friction * math.sin(BETA), math.sin(BETA) + friction * math.cos(BETA)
     sinks = G / (1.0 + 2.0 * ratio * math.tan(BETA) * carry / push)
     bodies = [table(corners) for corners in (shape, jaw, left)]
-    run = Scene(bodies, restitution=0.0, friction=friction, ground_friction=0.0).start().to_time(0.005)
+    run = CaseScene(bodies, restitution=0.0, friction=friction, ground_friction=0.0).start().to_time(0.005)
     assert run.bodies.vy[0] == pytest.approx(-sinks * run.time, rel=1e-3)
     assert run.bodies.vx[1] == pytest.approx(sinks * run.time * math.tan(BETA), rel=1e-3)
 
@@ -54,7 +54,7 @@ def test_slope_holds_a_polygon_below_the_friction_angle_only(corners: int, degre
     outline, tilt = regular(corners, RADIUS), math.atan(0.3) + math.radians(degrees)
     lifted = tuple((x, y - min(y for _, y in outline)) for x, y in outline)
     values: dict[str, object] = {"ground_friction": 0.3, "tilt": -tilt, "contact": {"stiffness_scale": 0.01}}
-    run = Scene([table(lifted)], restitution=0.0, **values).start().to_time(0.05)  # type: ignore[arg-type]
+    run = CaseScene([table(lifted)], restitution=0.0, **values).start().to_time(0.05)  # type: ignore[arg-type]
     place, speed, began = float(run.bodies.x[0]), float(run.bodies.vx[0]), run.time
     run.to_time(0.1)
     if slides:
@@ -71,7 +71,7 @@ def test_hexagon_that_rolls_onto_its_next_face_keeps_eleven_seventeenths_of_its_
     pivot = min(outline, key=lambda corner: corner[1])
     above = tuple((x, y - pivot[1]) for x, y in outline)
     moving: dict[str, object] = {"velocity": [spin * pivot[1], -spin * pivot[0]], "spin": spin}
-    run = Scene(
+    run = CaseScene(
         [table(above, **moving)], restitution=0.0, ground_friction=5.0, contact={"stiffness_scale": 0.1}
     ).start()
     spins = spins_until(run, 0.006)

@@ -14,7 +14,7 @@ from blocksim.verification import energy
 from blocksim.verification.case import Case, Row, Setting, run_case
 from blocksim.verification.cases import CASES, SettingError, choose_cases, exclusions
 from blocksim.verification.reference import RIGID, STORE, read_store, rows_of
-from blocksim.verification.scene import HEIGHT, Scene, Throw, Thrower
+from blocksim.verification.scene import HEIGHT, CaseScene, Throw, Thrower
 from blocksim.world import nonsmooth
 from tests.verification.rocking import rocking_peaks
 from tests.verification.rows import allowed, missed, same_kind
@@ -57,7 +57,7 @@ def peaks(width: float, height: float, restitution: float, **time: object) -> ND
     place = {"x": -cos(tilt) * width + sin(tilt) * height, "y": sin(tilt) * width + cos(tilt) * height}
     body = {"x": place["x"] / 2, "y": place["y"] / 2, "angle": -tilt, "width": width, "height": height}
     stepping = {"scheme": "nonsmooth", "end": 100.0, **time}
-    run = Scene([body], restitution=restitution, ground_friction=5.0, time=stepping).start()
+    run = CaseScene([body], restitution=restitution, ground_friction=5.0, time=stepping).start()
     found: list[float] = []
     angle, spin = float(run.bodies.angle[0]), 0.0
     while len(found) < 4:
@@ -107,7 +107,7 @@ class Wrong(Setting):
     name: str = ""
     stepping_too: tuple[tuple[str, object], ...] = ()
 
-    def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:
+    def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> CaseScene:
         """Return the scene that is wrong."""
         time = {**values.pop("time", {}), **dict(self.stepping_too)}
         scene = super().scene(bodies, time=time, **values)
@@ -145,7 +145,7 @@ def test_a_stack_on_leaning_ground_is_noticed() -> None:
 
     @dataclass(frozen=True)
     class Leaning(Wrong):
-        def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> Scene:
+        def scene(self, bodies: Sequence[Mapping[str, object]], **values: Any) -> CaseScene:
             return replace(super().scene(bodies, **values), tilt=-0.03)
 
     assert rows_missed(Leaning(scheme="nonsmooth"), "V13")

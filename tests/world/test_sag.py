@@ -10,15 +10,15 @@ from blocksim.bench.harness import three_blocks
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.simulation.run import simulate
 from blocksim.simulation.schemes import build_scene
-from blocksim.verification.scene import HEIGHT, WIDTH, Scene, Simulation
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation
 from blocksim.world.describe import describe
 from blocksim.world.sag import loads_at_rest, point_stiffness, scene_sag
 
 
-def stack(count: int, **time: Any) -> Scene:
+def stack(count: int, **time: Any) -> CaseScene:
     bodies = [{"y": (i + 0.5) * HEIGHT} for i in range(count)]
     rigid = {"scheme": "nonsmooth", "step": 1e-3, "velocity_tolerance": 1e-6, "end": 10.0, **time}
-    return Scene(bodies, restitution=0.0, time=rigid)
+    return CaseScene(bodies, restitution=0.0, time=rigid)
 
 
 @pytest.mark.parametrize(("count", "substeps"), [(1, 4), (5, 1), (5, 4)])
@@ -55,7 +55,7 @@ def cube_on_two() -> Scenario:
     small = {"y": 0.025, "width": 0.05, "height": 0.05}
     cube = {"y": 0.55, "width": 1.0, "height": 1.0, "length": 1.0}
     time = {"scheme": "nonsmooth", "step": 1e-3, "end": 10.0}
-    return Scene([{**small, "x": -0.4}, {**small, "x": 0.4}, cube], restitution=0.0, time=time).scenario()
+    return CaseScene([{**small, "x": -0.4}, {**small, "x": 0.4}, cube], restitution=0.0, time=time).scenario()
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_brick_carries_half_of_each_that_stands_on_two() -> None:
     """A course of two on one of three: the middle one below has both halves and its own weight."""
     below = [{"x": i * WIDTH, "y": HEIGHT / 2} for i in (-1, 0, 1)]
     above = [{"x": i * WIDTH, "y": 1.5 * HEIGHT} for i in (-0.5, 0.5)]
-    placed = place_bodies(Scene([*below, *above]).scenario())
+    placed = place_bodies(CaseScene([*below, *above]).scenario())
     on_ground: dict[str, float] = {}
     for load in loads_at_rest(placed, 1.0 / placed[0].mass):
         if load.lower is None:
@@ -155,5 +155,5 @@ def test_springs_have_no_sag_to_tell_of() -> None:
 
 
 def test_a_block_so_far_away_that_its_corners_are_one_place_halves_its_load() -> None:
-    placed = place_bodies(Scene([{"x": 1e16, "y": 0.5 * HEIGHT}]).scenario())
+    placed = place_bodies(CaseScene([{"x": 1e16, "y": 0.5 * HEIGHT}]).scenario())
     assert [load.force for load in loads_at_rest(placed, 2.0 / placed[0].mass)] == pytest.approx([1.0, 1.0])

@@ -14,7 +14,7 @@ from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.models.outlines import near_slots
 from blocksim.kernels.explicit.outlines import cone_of
 from blocksim.kernels.explicit.sliver_axes import nearest_axis
-from blocksim.verification.scene import Scene
+from blocksim.verification.scene import CaseScene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,7 +43,7 @@ class Pair:
         """Begin with the bodies apart."""
         self.outlines = SHAPES[one], SHAPES[two]
         bodies = [{"y": 1.0, "outline": self.outlines[0]}, {"x": 2.0 * RADIUS, "y": 1.0, "outline": self.outlines[1]}]
-        scene = Scene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact={"law": law, "max_overlap": 2e-3})
+        scene = CaseScene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact={"law": law, "max_overlap": 2e-3})
         self.world = scene.start().world
         self.a: Any = self.world.bodies[0]
         self.b: Any = self.world.bodies[1]

@@ -10,7 +10,7 @@ import pytest
 from blocksim.kernels.explicit.outlines import into_world, next_number, number_before
 from blocksim.kernels.explicit.persistent_forces import is_nearer_than_beside, stays_on
 from blocksim.kernels.explicit.sliver_axes import is_sliver, meets_along
-from blocksim.verification.scene import Scene
+from blocksim.verification.scene import CaseScene
 
 if TYPE_CHECKING:
     from blocksim.verification.scene import Simulation
@@ -22,7 +22,7 @@ QUADRANGLE = [[-1.0, -0.5], [1.2, -0.7], [0.6, 0.8], [-0.9, 0.4]]
 
 
 def of_two(one: list[list[float]], two: list[list[float]]) -> Simulation:
-    return Scene([{"y": 1.0, "outline": one}, {"y": 5.0, "outline": two}], gravity=0.0).start()
+    return CaseScene([{"y": 1.0, "outline": one}, {"y": 5.0, "outline": two}], gravity=0.0).start()
 
 
 PAIRS = pytest.mark.parametrize(("one", "two"), [(HEXAGON, HEXAGON), (WEDGE, HEXAGON), (QUADRANGLE, WEDGE)])

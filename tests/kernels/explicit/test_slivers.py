@@ -10,7 +10,7 @@ import pytest
 
 from blocksim.kernels.explicit import slivers
 from blocksim.kernels.explicit.sliver_axes import nearest_axis
-from blocksim.verification.scene import Scene
+from blocksim.verification.scene import CaseScene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +50,7 @@ def struck(name: str, law: str = "linear", **values: float) -> tuple[Simulation,
         {"x": x, "y": 0.1 + high - low + 1e-6, "outline": above, "angle": turn, "velocity": [0.3, -1.0]},
     ]
     contact: dict[str, object] = {"stiffness_scale": scale, "law": law}
-    run = Scene(bodies, gravity=0.0, contact=contact, **values).start()  # type: ignore[arg-type]
+    run = CaseScene(bodies, gravity=0.0, contact=contact, **values).start()  # type: ignore[arg-type]
     before = run.kinetic
     run.to_step(STEPS)
     return run, before
@@ -96,7 +96,7 @@ def past_corner(one: Outline, two: Outline, angle: float) -> tuple[NDArray[np.fl
 def test_energy_of_a_sliver_has_no_step_and_the_force_is_its_slope(name: str) -> None:
     """Along a way on which the nearest face changes: a step of the energy is no integral of a force."""
     one, two, power = PAIRS[name]
-    world = Scene([{"y": 1.0, "outline": one}, {"x": 1.0, "y": 1.0, "outline": two}], gravity=0.0).start().world
+    world = CaseScene([{"y": 1.0, "outline": one}, {"x": 1.0, "y": 1.0, "outline": two}], gravity=0.0).start().world
     a: Any = world.bodies[0]
     b: Any = world.bodies[1]
     faces = set()

@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.simulation.schemes import build_scene
-from blocksim.verification.scene import Scene, Simulation
+from blocksim.verification.scene import CaseScene, Simulation
 from tests.kernels.nonsmooth.scenes import ENDLESS, RIGID, rigid
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def single() -> Callable[..., Simulation]:
 
     def start(bodies: Sequence[Mapping[str, object]], **values: Any) -> Simulation:
         stepping = {name: values.pop(name) for name in list(values) if name in Nonsmooth.model_fields}
-        scenario = Scene(bodies, time=RIGID, **values).scenario()
+        scenario = CaseScene(bodies, time=RIGID, **values).scenario()
         return Simulation(build_scene(rigid(scenario, end=ENDLESS, **stepping)))
 
     return start

@@ -19,7 +19,7 @@ from blocksim.kernels.nonsmooth.neighbours import update_pairs
 from blocksim.kernels.nonsmooth.step import substep
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
-from blocksim.verification.scene import HEIGHT, WIDTH, Scene
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene
 from blocksim.world.nonsmooth import with_more_constraints
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class Block:
 
     @property
     def shape(self) -> dict[str, object]:
-        """Return what its body table has for it in a Scene."""
+        """Return what its body table has for it in a CaseScene."""
         sides: dict[str, object] = {"width": self.width, "height": self.height}
         return {"outline": [list(corner) for corner in self.outline]} if self.outline else sides
 
@@ -71,7 +71,7 @@ def posed(blocks: Sequence[Block], **values: Any) -> Nonsmooth:
     stepping = {name: values.pop(name) for name in list(values) if name in Stepping.model_fields}
     size = max([1.0, *(abs(place) for one in blocks for corner in one.outline for place in corner)])
     apart = [{"x": 3.0 * size * i, "y": 2.0 * size, "fixed": one.fixed, **one.shape} for i, one in enumerate(blocks)]
-    scene: Any = build_scene(rigid(Scene(apart, time=RIGID, **values).scenario(), end=ENDLESS, **stepping))
+    scene: Any = build_scene(rigid(CaseScene(apart, time=RIGID, **values).scenario(), end=ENDLESS, **stepping))
     place(scene, blocks)
     load_states(scene)
     scene.world.clock[0].is_started = 1

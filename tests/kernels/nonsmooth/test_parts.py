@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.parts import set_length
-from blocksim.verification.scene import HEIGHT, WIDTH, Scene, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,7 +67,9 @@ def test_velocity_of_a_block_that_rolls_does_not_depend_on_lengths_that_are_not_
     found = []
     for lengths in ((0.3,), (0.7, 0.3), (0.1, 0.9, 0.3)):
         tilted = {"y": 0.5 * (np.sin(0.1) * WIDTH + np.cos(0.1) * HEIGHT), "angle": 0.1}
-        run = Scene([tilted], restitution=0.0, ground_friction=5.0, time={"scheme": "nonsmooth", "end": 1.0}).start()
+        run = CaseScene(
+            [tilted], restitution=0.0, ground_friction=5.0, time={"scheme": "nonsmooth", "end": 1.0}
+        ).start()
         run.to_step(30)
         assert isinstance(run.scene, Nonsmooth)
         for share in lengths:

@@ -15,7 +15,7 @@ from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team, advance_nonsmooth_members
 from blocksim.scenario.geometry import centre_outline, regular, section_of
 from blocksim.verification.collapse import SIZES, staircase
-from blocksim.verification.scene import Scene, Simulation
+from blocksim.verification.scene import CaseScene, Simulation
 from blocksim.world.build import build_stacks, only_stack
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
 from tests.kernels.nonsmooth.polygons import HEXAGON, RADIUS, TRIANGLE, depth_below, random_outline, turned
@@ -47,7 +47,7 @@ def test_rectangles_given_as_outlines_collapse_as_rectangles_do() -> None:
     half_x, half_y = SIZES["width"] / 2, SIZES["height"] / 2
     outline = [[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]]
     collapses = [
-        Scene([{**body, **extra} for body in staircase()], restitution=0.0, time={"scheme": "nonsmooth"}).start()
+        CaseScene([{**body, **extra} for body in staircase()], restitution=0.0, time={"scheme": "nonsmooth"}).start()
         for extra in ({}, {"outline": outline})
     ]
     usual, other = (run.to_time(0.5).state()[:, :3] for run in collapses)
@@ -217,7 +217,7 @@ def test_heap_of_polygons_has_the_same_bits_for_any_number_of_threads_and_calls(
 def test_members_of_an_ensemble_of_polygons_have_the_same_bits() -> None:
     def dropped(radius: float) -> Any:
         corners = [list(corner) for corner in regular(5, radius)]
-        return rigid(Scene([{"outline": corners, "y": 1.2 * radius, "spin": 3.0}], time=RIGID).scenario())
+        return rigid(CaseScene([{"outline": corners, "y": 1.2 * radius, "spin": 3.0}], time=RIGID).scenario())
 
     scenarios = [dropped(radius) for radius in (0.02, 0.03)]
     alone = [Simulation(build_nonsmooth(scenario)).to_step(100) for scenario in scenarios]

@@ -22,7 +22,7 @@ import math
 from blocksim.kernels.explicit.persistent_forces import TOUCHING, persistent_forces
 from blocksim.scenario.document import scenario_from_mapping
 from blocksim.scenario.laws import LAWS
-from blocksim.verification.scene import HEIGHT, WIDTH, Scene, Simulation
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation
 from blocksim.world.interactions import damping_ratio
 
 LAW = LAWS["power-1.25"]
@@ -38,7 +38,7 @@ def strike(shape, angle, restitution, on_block):
     below = [{"y": y, "fixed": True, **SHAPES[shape]}] if on_block else []
     height = HEIGHT if on_block else 0.0
     block = {"y": height + reach + 1e-9, "angle": angle, "velocity": [0.0, -1.0], **SHAPES[shape]}
-    scene = Scene([*below, block], gravity=0.0, restitution=restitution, contact=CONTACT).start()
+    scene = CaseScene([*below, block], gravity=0.0, restitution=restitution, contact=CONTACT).start()
     steady = 0
     while scene.contacts or scene.bodies[-1].vy < 0.0:
         scene.to_step(scene.steps + 1)
@@ -68,7 +68,7 @@ for shape in SHAPES:
 
 stiff, soft = (LAW.greatest_slope(1e9, 2.0, speed, 0.0) for speed in (4.0, 1.0))
 assert math.isclose(stiff / soft, 4.0 ** (2.0 * 0.25 / 2.25))  # of d^0.25, d going with v^(2/2.25)
-light = [Scene([{"y": height}], contact=CONTACT).start().step for height in (0.1, 1.0)]
+light = [CaseScene([{"y": height}], contact=CONTACT).start().step for height in (0.1, 1.0)]
 assert light[1] < light[0]  # harder impacts, smaller steps
 tables = {
     "schema": 1, "name": "one", "contact": {"law": LAW.name}, "materials": {"m": {"density": 1e3, "young_modulus": 1e9,

@@ -13,7 +13,7 @@ from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.models.outlines import HAND_OVER, near_slots
 from blocksim.kernels.explicit.outlines import cone_of
 from blocksim.kernels.explicit.sliver_axes import flat_within
-from blocksim.verification.scene import Scene
+from blocksim.verification.scene import CaseScene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,7 +49,7 @@ def test_elastic_impact_keeps_its_energy_where_corners_pass_one_another(name: st
         {"x": x, "y": 0.2 + high - low + 1e-6, "outline": above, "angle": turn, "velocity": list(velocity)},
     ]
     contact: dict[str, object] = {"stiffness_scale": scale, "law": law}
-    run = Scene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact=contact).start()
+    run = CaseScene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact=contact).start()
     before = run.kinetic
     run.to_step(STEPS)
     assert run.mechanical == pytest.approx(before, rel=1e-3)
@@ -67,7 +67,7 @@ def forces_along(ways: NDArray[np.float64], law: str, tilt: float) -> NDArray[np
     high = RADIUS * cos(turn)
     bodies = [{"y": 1.0 + 2.0 * high, "outline": ROUND, "angle": turn}, {"y": 1.0, "outline": ROUND, "angle": turn}]
     contact: dict[str, object] = {"law": law, "max_overlap": 10.0 * DEEP}
-    world: Any = Scene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact=contact).start().world
+    world: Any = CaseScene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact=contact).start().world
     a, b, pair = world.bodies[0], world.bodies[1], world.pairs[0]
     pair.a, pair.b = 0, 1
     sine = tilt * float(flat_within(cone_of(a, b, world.corners)))

@@ -11,7 +11,7 @@ import pytest
 from blocksim.kernels.explicit.models.outlines import near_slots
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.scenario.laws import LAWS
-from blocksim.verification.scene import Scene
+from blocksim.verification.scene import CaseScene
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import World
@@ -32,7 +32,7 @@ def landed(outline: Outline, angle: float, **values: object) -> tuple[Simulation
     places = [(cos(angle) * x - sin(angle) * y, sin(angle) * x + cos(angle) * y) for x, y in outline]
     arm, low = min(places, key=lambda place: place[1])
     block = {"y": ABOVE - low, "outline": outline, "angle": angle, "velocity": [0.0, -1.0]}
-    run = Scene([block], gravity=0.0, ground_friction=0.0, **values).start()  # type: ignore[arg-type]
+    run = CaseScene([block], gravity=0.0, ground_friction=0.0, **values).start()  # type: ignore[arg-type]
     run.to_step(STEPS)
     return run, float(run.bodies[0].vy + run.bodies[0].spin * arm)
 
@@ -63,7 +63,7 @@ def fell_on(below: Outline, angle: float, x: float, **values: object) -> Simulat
         {"y": 0.1, "outline": below, "angle": angle},
         {"x": x, "y": 0.1 + high + RADIUS * cos(pi / 6) + ABOVE, "outline": regular(6), "velocity": [0.3, -1.0]},
     ]
-    return Scene(bodies, gravity=0.0, **values).start()  # type: ignore[arg-type]
+    return CaseScene(bodies, gravity=0.0, **values).start()  # type: ignore[arg-type]
 
 
 def momenta(run: Simulation) -> np.ndarray:
@@ -98,7 +98,7 @@ def test_force_does_not_jump_where_a_corner_passes_from_one_face_to_the_next() -
         {"y": 0.1, "outline": corner},
         {"y": 0.1 + low - RADIUS - 2e-4, "outline": regular(6), "angle": 0.5 * pi, "fixed": True},
     ]
-    run = Scene(bodies, gravity=0.0, friction=0.0, restitution=1.0, contact={"max_overlap": 1e-4}).start()
+    run = CaseScene(bodies, gravity=0.0, friction=0.0, restitution=1.0, contact={"max_overlap": 1e-4}).start()
     forces = []
     for x in np.linspace(-2e-6, 2e-6, 41).tolist():
         run.bodies[0].x, run.bodies[0].y, run.bodies[0].angle = x, 0.1 - 2e-4 - 2e-6, 0.0
@@ -120,7 +120,7 @@ def test_rectangles_given_as_outlines_have_the_same_motion(angle: float) -> None
     states = []
     shapes: tuple[dict[str, object], ...] = ({"width": 0.04, "height": 0.06}, {"outline": sides})
     for shape in shapes:
-        run = Scene([{**pose, **shape} for pose in poses], friction=0.3).start()
+        run = CaseScene([{**pose, **shape} for pose in poses], friction=0.3).start()
         run.to_step(2 * STEPS)
         states.append(run.state())
     assert states[0][1, 5] != 0.0 or angle == 0.0
@@ -145,7 +145,7 @@ def bouncing(shape: dict[str, object], law: str, nudge: float = 0.0) -> Simulati
         {"x": 0.09 + nudge, "y": 0.03, "angle": 0.4, "velocity": [0.1, -0.3], "spin": 3.3},
     ]
     contact = {"law": law, "stiffness_scale": 1e-2 if law == "linear" else 1.0}
-    return Scene([{**pose, **shape} for pose in poses], restitution=0.6, friction=0.3, contact=contact).start()
+    return CaseScene([{**pose, **shape} for pose in poses], restitution=0.6, friction=0.3, contact=contact).start()
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -187,7 +187,7 @@ def test_rectangles_given_as_outlines_keep_their_energy_near_the_ends_of_faces(
             "outline": rectangle(*above),
         },
     ]
-    run = Scene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact={"stiffness_scale": scale}).start()
+    run = CaseScene(bodies, gravity=0.0, restitution=1.0, friction=0.0, contact={"stiffness_scale": scale}).start()
     before = run.kinetic
     run.to_step(490)
     assert run.contacts == 0
@@ -200,7 +200,7 @@ def test_only_corners_near_the_other_body_are_candidates() -> None:
         {"y": 0.1, "outline": regular(3), "angle": 0.5 * pi},
         {"y": 0.1 - 0.011 - RADIUS, "outline": regular(6), "angle": 0.5 * pi},
     ]
-    world: Any = Scene(bodies, gravity=0.0).start().scene
+    world: Any = CaseScene(bodies, gravity=0.0).start().scene
     found = np.zeros(2 * MOST_CORNERS, dtype=np.int64)
     count = near_slots(world, 0, 1, 1.1e-3, found, world.corners)
     assert found[:count].tolist() == [MOST_CORNERS]
@@ -218,7 +218,7 @@ def test_no_end_of_a_face_is_lost_between_two_sharp_corners() -> None:
         def press(world: World) -> None:
             world.bodies[1].y -= depth
 
-        run = Scene(bodies, gravity=0.0, restitution=1.0).start(press)
+        run = CaseScene(bodies, gravity=0.0, restitution=1.0).start(press)
         contacts = run.contact_records
         assert contacts.depth == pytest.approx([depth, depth], rel=1e-6)
         assert run.bodies[1].ay * run.bodies[1].mass == pytest.approx(contacts.normal_force.sum(), rel=1e-9)
