@@ -1,7 +1,8 @@
 """Who is near whom: square cells over bodies or particles, and the pairs of bodies whose reaches meet.
 
-Cells lie over the bounding box, so that neighbouring ones of a row are one stretch of the sorted places. Where a few
-have flown so far that there would be too many cells, they lie over the bulk: what is beyond counts to the outermost.
+Cells of particles lie over their bounding box, so that neighbouring ones of a row are one stretch of the sorted places.
+Where a few have flown so far that there would be too many cells, they lie over the bulk: what is beyond counts to the
+outermost. Those of bodies are parts of an endless grid, so that what is elsewhere does not change the order of pairs.
 
 No neighbour is missed to round-off. If |x_b - x| <= radius as computed, the cell of x_b lies between the cells of
 x - radius and x + radius, because rounding keeps order. So lists equal those of a search over all pairs, on cell edges
@@ -25,31 +26,46 @@ FARTHEST = 1e9  # cells; places beyond share one
 class CellGrid(NamedTuple):
     """Square cells, numbered row by row from the lower left one."""
 
-    x: float  # m: where the lower left corner of a cell is, the first one or another
+    x: float  # m: where the lower left corner of the first cell is
     y: float  # m
     size: float  # m, side of a cell
     columns: int
     rows: int
-    left: float  # cells from there to the first column
-    bottom: float  # and to the first row
+    is_endless: bool  # whether columns and rows, powers of two then, follow one another over and over again
+
+
+@jit.kernel
+def cell_along(place: float, begin: float, size: float) -> int:
+    """Return how many cells of a size (m) lie between a beginning and a place."""
+    return int(min(max(np.floor((place - begin) / size), -FARTHEST), FARTHEST))
 
 
 @jit.kernel
 def column_of(grid: CellGrid, x: float) -> int:
     """Return the column that a place (m) is in; places outside count to the nearest one."""
-    return int(min(max(np.floor((x - grid.x) / grid.size) - grid.left, 0.0), grid.columns - 1.0))
+    return min(max(cell_along(x, grid.x, grid.size), 0), grid.columns - 1)
 
 
 @jit.kernel
 def row_of(grid: CellGrid, y: float) -> int:
     """Return the row that a place (m) is in; places outside count to the nearest one."""
-    return int(min(max(np.floor((y - grid.y) / grid.size) - grid.bottom, 0.0), grid.rows - 1.0))
+    return min(max(cell_along(y, grid.y, grid.size), 0), grid.rows - 1)
+
+
+@jit.kernel
+def endless_number(grid: CellGrid, column: int, row: int) -> int:
+    """Return the number of a cell of an endless grid."""
+    return (row & (grid.rows - 1)) * grid.columns + (column & (grid.columns - 1))
 
 
 @jit.kernel
 def cell_number(grid: CellGrid, x: float, y: float) -> int:
     """Return the number of the cell of a place (m); one that is no number is in the first cell."""
-    return row_of(grid, y) * grid.columns + column_of(grid, x) if math.isfinite(x + y) else 0
+    if not math.isfinite(x + y):
+        return 0
+    if grid.is_endless:
+        return endless_number(grid, cell_along(x, grid.x, grid.size), cell_along(y, grid.y, grid.size))
+    return row_of(grid, y) * grid.columns + column_of(grid, x)
 
 
 @jit.rare_kernel
@@ -80,26 +96,28 @@ def bulk_along(places: arrays.Records, is_x: bool, low: float, high: float) -> t
 
 
 @jit.rare_kernel
-def lay_cells(places: arrays.Records, size: float, count: float, is_fixed: bool) -> CellGrid:
-    """Return cells of a size (m) over all places, over the bulk or larger where there would be more than 3 count + 1.
+def lay_cells(places: arrays.Records, size: float, count: float, is_endless: bool) -> CellGrid:
+    """Return cells of a size (m) over all places, at most 3 count + 1.
 
-    With w and h the sides and s at least w/n, h/n and (w h/n)^(1/2) there are no more than (w/s + 1)(h/s + 1), at most
-    3 n + 1, cells, however thin or wide the box is. Where they are to be `is_fixed`, and are not larger, they are those
-    of one and the same grid, wherever the outermost places lie.
+    An endless grid is the same whatever lies in it: cells far apart may share a number. Else, where there would be too
+    many, they lie over the bulk or are larger. With w and h the sides and s at least w/n, h/n and (w h/n)^(1/2) there
+    are no more than (w/s + 1)(h/s + 1), at most 3 n + 1, cells, however thin or wide the box is.
     """
     left, right = ends_along(places, True, FARTHEST * size)
     bottom, top = ends_along(places, False, FARTHEST * size)
-    column, row = (np.floor(left / size), np.floor(bottom / size)) if is_fixed else (0.0, 0.0)
-    left, bottom = (size * column, size * row) if is_fixed else (left, bottom)
+    if is_endless:
+        columns = rows = 1
+        while columns * size < right - left + size and 2.0 * columns <= 3.0 * count:
+            columns *= 2
+        while rows * size < top - bottom + size and 2.0 * rows * columns <= 3.0 * count:
+            rows *= 2
+        return CellGrid(0.0, 0.0, size, columns, rows, True)
     before = math.inf
     while True:
         width, height = right - left, top - bottom
         fitting = max(size, width / count, height / count, math.sqrt(width / count) * math.sqrt(height))
         if fitting <= size or not fitting < 0.5 * before:
-            columns, rows = int(width / fitting) + 1, int(height / fitting) + 1
-            if is_fixed and fitting <= size:
-                return CellGrid(0.0, 0.0, size, columns, rows, column, row)
-            return CellGrid(left, bottom, fitting, columns, rows, 0.0, 0.0)
+            return CellGrid(left, bottom, fitting, int(width / fitting) + 1, int(height / fitting) + 1, False)
         before = fitting
         left, right = bulk_along(places, True, left, right)
         bottom, top = bulk_along(places, False, bottom, top)
@@ -173,6 +191,32 @@ def add_if_near(
 
 
 @jit.rare_kernel
+def add_from_cell(
+    world: arrays.World,
+    pairs: Any,
+    reaches: arrays.Floats | None,
+    reach: float,
+    i: int,
+    grid: CellGrid,
+    cell: tuple[int, int],
+    least: int,
+    count: int,
+) -> int:
+    """List body i with what is near it in a cell (column, row), from number `least` on; return the count needed."""
+    column, row = cell
+    number = endless_number(grid, column, row)
+    for k in range(world.starts[number], world.starts[number + 1]):
+        j = world.order[k]
+        other = world.bodies[j]
+        if j >= least and other.radius <= world.controls[0].cell_radius:
+            more = add_if_near(world, pairs, reaches, reach, i, j, count)
+            # the cell may share its number with others
+            if more > count and cell_along(other.x, grid.x, grid.size) == column:
+                count += int(cell_along(other.y, grid.y, grid.size) == row)
+    return count
+
+
+@jit.rare_kernel
 def list_pairs(world: arrays.World, pairs: Any, reaches: arrays.Floats | None, reach: float, is_sorted: bool) -> int:
     """List all pairs of bodies that are near one another; return how many there are, fitting or not.
 
@@ -194,16 +238,11 @@ def list_pairs(world: arrays.World, pairs: Any, reaches: arrays.Floats | None, r
             for j in range(i + 1, ground):
                 count = add_if_near(world, pairs, reaches, reach, i, j, count)
         if not is_large:
-            column, row = column_of(grid, body.x), row_of(grid, body.y)
-            cell = row * grid.columns + column
-            after = ground if is_sorted else starts[cell + 1]  # from there on all count, before it those after i
-            for line in range(max(row - 1, 0) if is_sorted else row, min(row + 2, grid.rows)):
-                left = max(column - 1, 0) if is_sorted or line > row else column
-                right = min(column + 1, grid.columns - 1)
-                for k in range(starts[line * grid.columns + left], starts[line * grid.columns + right + 1]):
-                    j = world.order[k]
-                    if (j > i or k >= after) and bodies[j].radius <= controls.cell_radius:
-                        count = add_if_near(world, pairs, reaches, reach, i, j, count)
+            own_column, own_row = cell_along(body.x, 0.0, grid.size), cell_along(body.y, 0.0, grid.size)
+            for row in range(own_row - 1 if is_sorted else own_row, own_row + 2):
+                for column in range(own_column - 1 if is_sorted or row > own_row else own_column, own_column + 2):
+                    least = i + 1 if is_sorted or (row == own_row and column == own_column) else 0
+                    count = add_from_cell(world, pairs, reaches, reach, i, grid, (column, row), least, count)
         if not (is_large and is_sorted):
             for j in world.large:
                 if j > i or (not is_sorted and not is_large):

@@ -33,7 +33,7 @@ def travelled(soils: Soils, world: arrays.World, step: float) -> float:
 def grid_of(soils: Soils) -> neighbours.CellGrid:
     """Return the cells."""
     controls = soils.controls[0]
-    return neighbours.CellGrid(controls.left, controls.bottom, controls.cell, controls.columns, controls.rows, 0.0, 0.0)
+    return neighbours.CellGrid(controls.left, controls.bottom, controls.cell, controls.columns, controls.rows, False)
 
 
 @jit.rare_kernel
