@@ -21,8 +21,9 @@ stable as an implicit dashpot.
 Dashpots of a pair that touches in more than two points, in the three relative coordinates of two rigid bodies.
 
 Any number of points of one pair moves with three coordinates only: the relative velocity of the two bodies at a place
-(here the centre of body b) and their relative spin, V. With one row g_i of G a point, its rate is g_i V; with W the 3x3
-inverse mass of V the points see A = G W G^T of one another. The damping matrix above,
+(here the centre of body a, as that of a piece of ground may be far away) and their relative spin, V. With one row g_i
+of G a point, its rate is g_i V; with W the 3x3 inverse mass of V the points see A = G W G^T of one another. The damping
+matrix above,
 C = 2 z k^(1/2) B^(-1/2) k^(1/2) with B = k^(1/2) A k^(1/2), is then
 
     C = k G D G^T k,   D = 2 z L S^(-3/2) L^T,   S = L^T (G^T k G) L,   W = L L^T,
@@ -316,24 +317,24 @@ SIZE = 3
 
 @rare_kernel
 def fill_mobility(a: Record, b: Record, out: Floats) -> None:
-    """Write the inverse mass W of the relative motion at the centre of b: (1/kg, 1/(kg m), 1/(kg m2) by blocks)."""
-    dx = b.x - a.x
-    dy = b.y - a.y
+    """Write the inverse mass W of the relative motion at the centre of a: (1/kg, 1/(kg m), 1/(kg m2) by blocks)."""
+    dx = a.x - b.x
+    dy = a.y - b.y
     translation = a.inverse_mass + b.inverse_mass
-    turning = a.inverse_inertia
+    turning = b.inverse_inertia
     out[0, 0] = translation + turning * dy * dy
     out[1, 1] = translation + turning * dx * dx
     out[0, 1] = out[1, 0] = -turning * dx * dy
     out[0, 2] = out[2, 0] = -turning * dy
     out[1, 2] = out[2, 1] = turning * dx
-    out[2, 2] = turning + b.inverse_inertia
+    out[2, 2] = turning + a.inverse_inertia
 
 
 @rare_kernel
-def fill_row(place: Record, b: Record, direction: int, row: Floats) -> None:
+def fill_row(place: Record, a: Record, direction: int, row: Floats) -> None:
     """Write how the closing rate or the slip rate of a point follows from the relative motion (-, -, m)."""
-    x = place.x - b.x
-    y = place.y - b.y
+    x = place.x - a.x
+    y = place.y - a.y
     if direction == NORMAL:
         row[0] = -place.nx
         row[1] = -place.ny
@@ -345,7 +346,7 @@ def fill_row(place: Record, b: Record, direction: int, row: Floats) -> None:
 
 
 @rare_kernel
-def gather(points: Records, count: int, b: Record, direction: int, work: Floats) -> None:
+def gather(points: Records, count: int, a: Record, direction: int, work: Floats) -> None:
     """Sum over the points: G^T k G, Q = G^T w^(1/2) k G, P^T u and G^T (f_before - f_spring)."""
     vectors = work[ROWS]
     for i in range(SIZE):
@@ -354,7 +355,7 @@ def gather(points: Records, count: int, b: Record, direction: int, work: Floats)
             work[STIFFNESS, i, j] = work[PRODUCT, i, j] = 0.0
     for n in range(count):
         point = points[n]
-        fill_row(point, b, direction, vectors[ROW])
+        fill_row(point, a, direction, vectors[ROW])
         weighted = math.sqrt(point.weight) * point.stiffness
         for i in range(SIZE):
             vectors[CHANGE, i] += vectors[ROW, i] * (point.before - point.force)
@@ -411,13 +412,13 @@ def add_coupled_dashpots(
     if ratio == 0.0:
         return
     fill_mobility(a, b, work[MOBILITY])
-    gather(points, count, b, direction, work)
+    gather(points, count, a, direction, work)
     fill_gain(ratio, work)
     solve_forces(step, work)
     vectors = work[ROWS]
     for n in range(count):
         point = points[n]
-        fill_row(point, b, direction, vectors[ROW])
+        fill_row(point, a, direction, vectors[ROW])
         total = 0.0
         for i in range(SIZE):
             total += vectors[ROW, i] * vectors[CHANGE, i]

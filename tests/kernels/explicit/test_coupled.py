@@ -56,7 +56,7 @@ def test_rows_and_mobility_give_the_inverse_masses_that_points_see(
     mobility, rows = np.zeros((SIZE, SIZE)), np.zeros((5, SIZE))
     fill_mobility(a, b, mobility)
     for point, row in zip(points, rows, strict=True):
-        fill_row(point, b, direction, row)
+        fill_row(point, a, direction, row)
     assert rows @ mobility @ rows.T == pytest.approx(delassus(points, a, b, direction), rel=1e-10, abs=1e-9)
 
 
