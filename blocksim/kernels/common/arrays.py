@@ -132,14 +132,14 @@ CORNER = on_own_lines(
 )
 PAIR = record_type(
     "limit "  # m: a deeper overlap ends the run
-    "stiffness "  # of each of its corner contacts, in units of normal_stiffness; see tributary.py
+    "stiffness "  # of each of its corner contacts, in units of normal_stiffness; see bearing.py
     "slide turn",  # how that changes with the slip of a ahead of b, per m, and by turning a, per rad
     indices="a b "  # bodies, sorted
     "duplicates "  # bits of the slots whose corner is in touch, but marks the same end of a face contact as another
     "fronts",  # of the first candidates, 4 bits each: face of the other polygon that each was last seen in front of
     small="near active "  # number of candidate slots; of contacts
     "idle",  # candidates that are neither in contact nor a duplicate
-    flags="bearing "  # PLANE, ENDS or APART: what its contacts are; see tributary.py
+    flags="bearing "  # PLANE, ENDS or APART: what its contacts are; see bearing.py
     "is_coming "  # flag: about to touch
     "is_sliver "  # flag: its overlap is about as deep as long; see slivers.py
     "axis "  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a

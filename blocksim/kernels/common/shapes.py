@@ -39,7 +39,10 @@ def turn(cos: float, sin: float, angle: float) -> tuple[float, float]:
 
 @jit.kernel
 def relative_pose(body: arrays.Record, other: arrays.Record) -> tuple[float, float, float, float]:
-    """Return the centre of `body` and the cosine and sine of its rotation, all in the frame of `other`."""
+    """Return the centre of `body` and the cosine and sine of its rotation, all in the frame of `other`.
+
+    Both are records, or anything else with a place and a rotation: one body, or four in vector registers.
+    """
     dx = body.x - other.x
     dy = body.y - other.y
     return (
@@ -114,9 +117,6 @@ class Hull(NamedTuple):
     first: int
     size: int  # number of corners
     inner: float  # m, from the centroid to the nearest face
-
-
-AnyHull = Any  # None, a type of its own, for rectangles among themselves, whose corners are in no table
 
 
 @jit.kernel

@@ -1,4 +1,8 @@
-"""Coulomb friction with a static and a kinetic coefficient."""
+"""Coulomb friction with a static and a kinetic coefficient.
+
+`draw_spring` clips the shear spring of a contact, `clip_to_cone` spring and dashpot together. forces.py calls both, and
+soil/contact.py for particles of soil.
+"""
 
 import math
 

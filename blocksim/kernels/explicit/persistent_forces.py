@@ -30,7 +30,7 @@ from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver
 
 @kernel
 def admits(owner: Record, corner: int, nx: float, ny: float) -> bool:
-    """Return True if a corner of `owner` can touch a face of the outward normal (nx, ny); see models/duplicates.py."""
+    """Return True if a corner of `owner` can touch a face of the outward normal (nx, ny); see models/surface.py."""
     sx, sy = corner_signs(corner)
     along_x = sx * (nx * owner.cos + ny * owner.sin)
     along_y = sy * (ny * owner.cos - nx * owner.sin)

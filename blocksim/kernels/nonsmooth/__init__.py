@@ -4,8 +4,11 @@ Contact laws are Newton's restitution and Coulomb's friction, both as impulses; 
 that steps are 0.1 to 1 ms long. A step of length dt is
 
     neighbours is the list of pairs still good? else make it and its colours anew            neighbours.py
+    cut        does an impact come first? then a shorter part, where that may be            parts.py
     manifolds  the contact manifold of every pair, kept for the whole step                  narrow_phase.py
+               which faces meet, and where they do                                          references.py, manifold.py
     substeps   each of length h: kick, warm start, position pass, drift, velocity pass      passes.py, motion.py
+               the shear impulse within the cone of friction                                cone.py
     finish     poses and velocities back to the bodies                                      motion.py
 
 For every contact point with the unit normal n (from body b to body a), gap s, approach J v = n (v_a - v_b) at the
@@ -23,7 +26,7 @@ side, and an impulse is one if it moves the bodies by more than that in a subste
 
 Velocity pass: points with an impulse after the position pass, or s <= 0, have 0 <= lambda  complementary to
 J v - t >= 0, with the target t = -e u where the approach u before the substep was faster than a threshold (and what
-gravity does meanwhile: aims.rebound), and -max(s, 0) / h elsewhere. What the position pass adds to velocities moves
+gravity does meanwhile: passes.rebound), and -max(s, 0) / h elsewhere. What the position pass adds to velocities moves
 bodies, but is gone after the velocity pass.
 
 Impacts of bodies that touch one another go in rounds instead (in crowds only where restitution is high; see

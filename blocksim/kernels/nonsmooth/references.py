@@ -11,7 +11,7 @@ a little. Polygons in which that may be so are looked at alone (manifold.py).
 
 from typing import NamedTuple
 
-from blocksim.kernels.common import jit
+from blocksim.kernels.common import jit, shapes
 from blocksim.kernels.common.simd import Lane, Lanes, Mask, greater, is_all, lesser, select
 from blocksim.kernels.nonsmooth import arrays, faces
 
@@ -57,14 +57,8 @@ class Best(NamedTuple):
 @jit.kernel
 def pose_of(other: faces.Block, body: faces.Block) -> Pose:
     """Return another body in the frame of a body; (c, s) turns directions of this frame into the frame of the other."""
-    dx = other.x - body.x
-    dy = other.y - body.y
-    return Pose(
-        body.cos * dx + body.sin * dy,
-        body.cos * dy - body.sin * dx,
-        body.cos * other.cos + body.sin * other.sin,
-        body.sin * other.cos - body.cos * other.sin,
-    )
+    x, y, c, s = shapes.relative_pose(other, body)
+    return Pose(x, y, c, -s)
 
 
 class Reference(NamedTuple):
@@ -84,15 +78,9 @@ class Reference(NamedTuple):
 @jit.kernel
 def reference_of_rectangles(a: faces.Block, b: faces.Block) -> Reference:
     """Return the reference faces of rectangles."""
-    dx = a.x - b.x
-    dy = a.y - b.y
-    c = a.cos * b.cos + a.sin * b.sin
-    s = a.sin * b.cos - a.cos * b.sin
+    bx, by, c, s = shapes.relative_pose(a, b)
+    ax, ay, _, _ = shapes.relative_pose(b, a)
     c_abs, s_abs = abs(c), abs(s)
-    bx = b.cos * dx + b.sin * dy
-    by = b.cos * dy - b.sin * dx
-    ax = a.cos * dx + a.sin * dy
-    ay = a.cos * dy - a.sin * dx
     gap_bx = abs(bx) - b.half_x - c_abs * a.half_x - s_abs * a.half_y
     gap_by = abs(by) - b.half_y - s_abs * a.half_x - c_abs * a.half_y
     gap_ax = abs(ax) - a.half_x - c_abs * b.half_x - s_abs * b.half_y
@@ -107,7 +95,7 @@ def reference_of_rectangles(a: faces.Block, b: faces.Block) -> Reference:
     best, other = greater(of_x, of_y), lesser(of_x, of_y)
     passes_edge = (lesser(c_abs, s_abs) < LEVEL) & (-EDGE * least < other) & (other < best)
     along_x = (of_x > of_y) ^ passes_edge
-    towards = select(along_x, select(is_of_b, bx, -ax), select(is_of_b, by, -ay))
+    towards = select(along_x, select(is_of_b, bx, ax), select(is_of_b, by, ay))
     sign = select(towards >= 0.0, 1.0, -1.0)
     # the face of the other body is on its other axis where it is turned by more than 45 degrees
     is_turned = (c_abs < s_abs) | (along_x & (c_abs <= s_abs))

@@ -19,7 +19,7 @@ Ends of the interval of two faces of polygons: which of two corners that mark th
 Where a corner of a and a corner of b mark one end, that nearer to the other end is the inner one. Both may lie in the
 other body: behind a blunt end the outer one does until it is as far out as the overlap over the tangent of the angle
 there, 2.4 times the overlap of 16-gons. Its depth below the face drawn out beyond that end differs by the tilt times
-that way from the depth of the inner one, and the stiffness, which is measured from contact to contact (tributary.py),
+that way from the depth of the inner one, and the stiffness, which is measured from contact to contact (bearing.py),
 would grow while the interval shrinks. So the inner one takes over as soon as the corners have passed one another,
 where both are equally deep: later the energy would change by a step, up to 5 % of it. Corners that are flush would
 change places at every step by the last digits; so the one in contact stays for HAND_OVER of its overlap.
