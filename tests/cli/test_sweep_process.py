@@ -101,9 +101,9 @@ def test_same_sweep_twice_at_a_time_is_refused(process: Process, tmp_path: Path)
 
 SLOWLY = """
 import time
-from blocksim.study import sweep_folder
-look = sweep_folder.is_resolved
-sweep_folder.is_resolved = lambda plan: time.sleep(2.0) or look(plan)  # until the others are there too
+from blocksim.simulation import files
+look = files.is_resolved
+files.is_resolved = lambda plan: time.sleep(2.0) or look(plan)  # until the others are there too
 """
 
 
