@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common import arrays
 from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
-from blocksim.kernels.explicit import broad_phase, models
+from blocksim.kernels.common.tolerances import TRAVELLED
+from blocksim.kernels.explicit import models
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import PlacedBody, Scenario, laws, motion
 from blocksim.world import interactions, memory
@@ -275,7 +276,7 @@ def _assemble(parts: Parts, strides: Sequence[Stride]) -> arrays.World:
     else:
         contacts = arrays.zeros((members, parts.slots), arrays.PARTICLE_CONTACT)
     controls = run_controls(parts, strides)
-    reach = np.maximum(controls["skin"], broad_phase.TRAVELLED * controls["skin"] + controls["approach"])
+    reach = np.maximum(controls["skin"], TRAVELLED * controls["skin"] + controls["approach"])
     controls["cell_width"] = 2.0 * controls["cell_radius"] + reach
     return assemble_world(parts, controls, first_capacity(bodies), parts.slots, contacts)
 

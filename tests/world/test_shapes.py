@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import ALL, OUTLINE
-from blocksim.kernels.explicit.outlines import MOST_CORNERS, UPPER, WIDEST_CONE
+from blocksim.kernels.common.tolerances import CONE_TOLERANCE
+from blocksim.kernels.explicit.outlines import MOST_CORNERS, UPPER
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.geometry import MOST, centre_outline, least_width, regular
 from blocksim.world.bodies import body_records, cone_of, corner_rows, layout_of
@@ -136,6 +137,6 @@ def test_faces_of_blunt_and_sharp_shapes_are_parallel_within_less_than_those_of_
     def even(sides: int) -> tuple[tuple[float, float], ...]:
         return tuple((math.cos(2.0 * math.pi * k / sides), math.sin(2.0 * math.pi * k / sides)) for k in range(sides))
 
-    assert cone_of(even(4)) == cone_of(even(6)) == WIDEST_CONE
+    assert cone_of(even(4)) == cone_of(even(6)) == CONE_TOLERANCE
     assert cone_of(even(16)) == pytest.approx(math.sin(math.pi / 16))
     assert cone_of(((0.0, 0.0), (1.0, -0.05), (1.0, 0.05))) == pytest.approx(math.sin(math.atan(0.05)))

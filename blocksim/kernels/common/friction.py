@@ -3,9 +3,7 @@
 import math
 
 from blocksim.kernels.common.jit import kernel
-
-# beyond this multiple of the transition speed the static share is below double precision
-FULLY_KINETIC = 40.0
+from blocksim.kernels.common.tolerances import FULLY_KINETIC
 
 
 @kernel

@@ -11,12 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blocksim.kernels.common import arrays, jit
-
-SMALL_TURN = 1e-2
-
-# A piece of ground is a slab of which only the upper face counts. Near a convex joint a point may lie in the end of a
-# slab, where the next one bears it; at most this many times deeper below the face than behind the end it still touches.
-END_RATIO = 3.0
+from blocksim.kernels.common.tolerances import END_RATIO, SMALL_TURN
 
 
 @jit.kernel

@@ -25,13 +25,18 @@ from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import ALL, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.tolerances import (
+    CONE_TOLERANCE,
+    FLAT,
+    LEAST_SHARE,
+    MISSED_STIFFNESS,
+    OPERATOR_LIFE,
+    SAME_FACE,
+)
 from blocksim.kernels.explicit import damping, outlines
 from blocksim.kernels.explicit.laws import LINEAR
-from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, PARALLEL
 
-FLAT = 0.01  # sine of the angle between two faces up to which they are parallel
 FLAT_SHARE = FLAT / CONE_TOLERANCE  # the same of the cone, where that of polygons is narrower
-LEAST = 1e-6  # share of a corner that is about to pass the end of a face
 
 
 class Bearing(NamedTuple):
@@ -154,8 +159,8 @@ def overlap_of(
 def bearing_of_interval(found: Interval, a: Record, b: Record) -> Bearing:
     """Return the share of a corner at an end of an interval, whether or not there is a contact at the other end."""
     part = (found.right - found.left) * found.per_length / found.cosine
-    if part > 1.0 or part < LEAST:
-        return bearing_of(min(max(part, LEAST), 1.0), 0.0, a, b)
+    if part > 1.0 or part < LEAST_SHARE:
+        return bearing_of(min(max(part, LEAST_SHARE), 1.0), 0.0, a, b)
     return bearing_of(part, found.slide * found.per_length / found.cosine, a, b)
 
 
@@ -207,8 +212,8 @@ def bearing_of_facing(facing: Facing) -> Bearing:
     found = facing.interval
     flat = flat_of(facing)
     part = found.per_length * (found.right - found.left) / found.cosine
-    if part > 1.0 or part < LEAST:
-        return bearing_at(facing.sine, facing.rate, min(max(part, LEAST), 1.0), 0.0, flat, facing.cone)
+    if part > 1.0 or part < LEAST_SHARE:
+        return bearing_at(facing.sine, facing.rate, min(max(part, LEAST_SHARE), 1.0), 0.0, flat, facing.cone)
     slide = found.slide * found.per_length / found.cosine
     return bearing_at(facing.sine, facing.rate, part, slide, flat, facing.cone)
 
@@ -217,9 +222,6 @@ def bearing_of_facing(facing: Facing) -> Bearing:
 def flat_of(facing: Facing) -> float:
     """Return the sine up to which two faces are parallel."""
     return min(FLAT, FLAT_SHARE * facing.cone)
-
-
-MOST_CHANGE = 0.01  # of its stiffness, that a pair may miss until it is measured again
 
 
 @rare_kernel
@@ -239,7 +241,7 @@ def measure_soon(pair: Record, slip: float, turned: float, exponent: float, corn
     """
     if corners is not None or exponent != LINEAR:
         change = abs(pair.slide * slip + pair.turn * turned)
-        if damping.OPERATOR_LIFE * change > MOST_CHANGE * pair.stiffness:
+        if OPERATOR_LIFE * change > MISSED_STIFFNESS * pair.stiffness:
             damping.renew_dashpots(pair)
 
 
@@ -286,7 +288,7 @@ def measure_faces(
     found, bearing, flat = bearing_along(a, b, deeper.nx, deeper.ny, corners)
     keep_bearing(pair, bearing, stiffness)
     is_two = one.slot != two.slot
-    is_ends = not is_two or (one.nx * two.nx + one.ny * two.ny > PARALLEL and flat and bearing.share > LEAST)
+    is_ends = not is_two or (one.nx * two.nx + one.ny * two.ny > SAME_FACE and flat and bearing.share > LEAST_SHARE)
     pair.bearing = ENDS if is_ends else APART
     if is_two and is_ends and bearing.slide != 0.0:
         pair.slide = stiffness * found.slide * found.per_length

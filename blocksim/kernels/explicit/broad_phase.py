@@ -7,17 +7,13 @@ come since it was made is looked at again before any can have come too far.
 import math
 
 from blocksim.kernels.common import arrays, energy, jit, neighbours, supports
+from blocksim.kernels.common.tolerances import MOST_UNSEEN, MOST_UNSEEN_DRIVEN, SPEED_GROWTH, TRAVELLED, WAY_SHARE
 from blocksim.kernels.explicit.depth import overlap_limit
 from blocksim.kernels.explicit.models import near_slots
 
 MOST_SLOTS = 32  # of corners of a pair
-TRAVELLED = 0.8  # of the skin, by which two bodies may have come nearer since the list was made
 NEW_PAIR = arrays.zeros(1, arrays.PAIR)
 PAIR_SHARE = 0.5 * TRAVELLED  # of the skin, that a body may move; the rest covers what was not foreseen
-GROWTH = 4.0  # until the next check a body may become this many times as fast as the fastest one is now
-MOST_UNSEEN = 1000  # steps
-WAY_SHARE = 0.25  # of the smallest side, by which two bodies may come nearer in a step
-MOST_UNSEEN_DRIVEN = 8  # steps, where a support moves: how fast it will, nothing here knows
 
 
 @jit.rare_kernel
@@ -118,7 +114,7 @@ def unseen_steps(world: arrays.World, farthest: float, fastest: float) -> int:
         return 0
     gravity = math.sqrt(controls.gravity_x**2 + controls.gravity_y**2) + controls.push
     most = MOST_UNSEEN_DRIVEN if supports.has_motion(controls) else MOST_UNSEEN
-    drift = controls.step * (GROWTH * fastest + math.sqrt(2.0 * gravity * left))
+    drift = controls.step * (SPEED_GROWTH * fastest + math.sqrt(2.0 * gravity * left))
     return most if left > drift * most else int(left / drift)
 
 

@@ -6,6 +6,7 @@ continue as they were, which is what nearly all pairs do at nearly all steps.
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.tolerances import IMPACT_STEPS
 from blocksim.kernels.explicit import bearing, damping, depth, history, kinematics, slivers
 from blocksim.kernels.explicit.forces import NOTHING, Touch, forces_of, forces_of_many
 from blocksim.kernels.explicit.models import SURFACE, contact_points
@@ -22,7 +23,7 @@ def spare_lost_faces(world: World, p: int, count: int) -> None:
     """
     for i in range(count):
         point = world.points[i]
-        if point.beside < kinematics.IMPACT_STEPS * abs(point.closing):
+        if point.beside < IMPACT_STEPS * abs(point.closing):
             point.weight = 0.0
             damping.renew_dashpots(world.pairs[p])
 
@@ -69,7 +70,7 @@ def resolve_points(world: World, p: int, count: int, step: float, tally: Record)
         if i < pair.active:
             contact = world.contacts[p, i]
             continuing += 1 if contact.slot == point.slot and contact.face == point.face else 0
-        loses_face = loses_face or point.beside < kinematics.IMPACT_STEPS * abs(point.closing)
+        loses_face = loses_face or point.beside < IMPACT_STEPS * abs(point.closing)
     if continuing != count or count != pair.active:
         history.change_contacts(world, p, count, step, tally)
     if loses_face:

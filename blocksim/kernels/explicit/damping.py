@@ -43,18 +43,13 @@ import math
 
 from blocksim.kernels.common.arrays import AHEAD, BACK, NORMAL, Floats, Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-
-# eigenvalues below this share of the largest count as zero: tangents of points on one face are parallel, so that
-# their matrix has rank one up to the difference of two overlaps
-RANK_TOLERANCE = 1e-4
-SWEEPS = 6  # quadratic convergence: five bring any 3 x 3 matrix to round-off
-ROUND_OFF = 1e-15
+from blocksim.kernels.common.tolerances import DASHPOT_RANK, EIGEN_ROUND_OFF, EIGEN_SWEEPS, LEAST_MASS_SHARE
 
 
 @rare_kernel
 def inverse_root(eigenvalue: float, largest: float) -> float:
     """Return eigenvalue^(-1/2), or zero outside the range of the matrix (pseudo-inverse)."""
-    return 1.0 / math.sqrt(eigenvalue) if eigenvalue > RANK_TOLERANCE * largest else 0.0
+    return 1.0 / math.sqrt(eigenvalue) if eigenvalue > DASHPOT_RANK * largest else 0.0
 
 
 @rare_kernel
@@ -85,7 +80,7 @@ def sweep_pairs(matrix: Floats, vectors: Floats, n: int) -> None:
     """Rotate every pair of axes once, where it is not diagonal to round-off."""
     for p in range(n - 1):
         for q in range(p + 1, n):
-            if abs(matrix[p, q]) > ROUND_OFF * math.sqrt(abs(matrix[p, p] * matrix[q, q])):
+            if abs(matrix[p, q]) > EIGEN_ROUND_OFF * math.sqrt(abs(matrix[p, p] * matrix[q, q])):
                 rotate_pair(matrix, vectors, n, p, q)
 
 
@@ -98,7 +93,7 @@ def inverse_three_halves(matrix: Floats, vectors: Floats, out: Floats) -> None:
     for i in range(SIZE):
         for j in range(SIZE):
             vectors[i, j] = 1.0 if i == j else 0.0
-    for _ in range(SWEEPS):
+    for _ in range(EIGEN_SWEEPS):
         sweep_pairs(matrix, vectors, SIZE)
     largest = max(matrix[0, 0], matrix[1, 1], matrix[2, 2])
     for i in range(SIZE):
@@ -162,10 +157,6 @@ def solve_in_place(matrix: Floats, right: Floats, n: int) -> None:
 
 
 BOTH = 3  # pattern of two points with a dashpot
-OPERATOR_LIFE = 32  # steps
-STEADY = 1e-5  # of an overlap: where it changes by no more in a step operators of other laws than the linear one last
-STEADY_STEPS = 8
-LEAST_MASS_SHARE = 0.1  # of the inverse mass without friction
 
 
 @kernel
@@ -228,7 +219,7 @@ def fill_operator(
         root_two = math.sqrt(w_two)
     trace = k_one * a + k_two * d
     determinant = k_one * k_two * (a * d - b * b)
-    if determinant <= RANK_TOLERANCE * trace * trace:
+    if determinant <= DASHPOT_RANK * trace * trace:
         side_one = root_one * k_one
         side_two = root_two * k_two
         along = side_one * a + side_two * d

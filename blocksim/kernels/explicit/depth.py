@@ -9,12 +9,9 @@ found.
 """
 
 from blocksim.kernels.common import arrays, energy, jit, shapes
+from blocksim.kernels.common.tolerances import MIDDLE, OVERLAP_SHARE, ROWS_APART
 from blocksim.kernels.explicit.models import KERNEL, SURFACE
 from blocksim.kernels.explicit.outlines import deepest_overlap
-
-OVERLAP_SHARE = 0.05  # of the smallest side of a pair, unless a limit is given
-MIDDLE = 0.5  # of it, beyond which no limit can be
-ROWS_APART = 0.75  # of a particle; at 0.35 two rows may rest in the gaps of one another, at 1 their centres meet
 
 
 @jit.rare_kernel

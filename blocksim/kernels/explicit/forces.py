@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.tolerances import OPERATOR_LIFE, STEADY, STEADY_STEPS
 from blocksim.kernels.explicit import bearing, damping, friction, history, inertia, kinematics, laws
 
 
@@ -181,13 +182,13 @@ def renew_operator(
     half = 0.5 * step
     left = touch.pair.normal_left if direction == NORMAL else touch.pair.shear_left
     is_due = damping.are_dashpots_due(touch.pair, direction)
-    if is_steady and not is_due and (exponent == laws.LINEAR or left % damping.STEADY_STEPS != 0):
+    if is_steady and not is_due and (exponent == laws.LINEAR or left % STEADY_STEPS != 0):
         return
     if is_due:
         m_one, m_mixed, m_two = inverse_masses(touch, one, two, is_two, direction)
         damping.keep_masses(operator, half, m_one, m_mixed, m_two)
         is_usual = half > 0.0 and one.weight == 1.0 and two.weight == 1.0
-        damping.keep_dashpots(touch.pair, direction, pattern, damping.OPERATOR_LIFE if is_usual else 0)
+        damping.keep_dashpots(touch.pair, direction, pattern, OPERATOR_LIFE if is_usual else 0)
     else:
         rate = 1.0 / half
         m_one, m_mixed, m_two = operator.h_one * rate, operator.h_mixed * rate, operator.h_two * rate
@@ -199,7 +200,7 @@ def renew_operator(
 @kernel
 def is_kept(contact: Record, point: kinematics.Point) -> bool:
     """Return True if an overlap has hardly changed in the last drift."""
-    return abs(point.depth - contact.depth) <= damping.STEADY * point.depth
+    return abs(point.depth - contact.depth) <= STEADY * point.depth
 
 
 @rare_kernel

@@ -30,13 +30,11 @@ from typing import NamedTuple
 from blocksim.kernels.common.arrays import ALL, HALF, SHEAR, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import corner_offset, ground_gap
+from blocksim.kernels.common.tolerances import APPROACH, LEAST_GYRATION, MOST_PERIOD, SHARE_PERIOD, SUM_PERIOD
 from blocksim.kernels.explicit import outlines, separation
 from blocksim.kernels.explicit.bearing import are_blocks, bearing_along
 from blocksim.kernels.explicit.models import SURFACE, slot_normal, slot_place
 
-LEAST_GYRATION = 0.1
-SHARE_PERIOD, MOST_PERIOD, SUM_PERIOD = 32, 128, 256  # steps
-APPROACH = 1.5
 APPROACH_STEPS = APPROACH * SHARE_PERIOD  # two bodies that may touch within so many steps count as touching
 NEVER = 2**62
 

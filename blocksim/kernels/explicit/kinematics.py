@@ -7,11 +7,8 @@ is then v + w x r with one v and one w for all points of the pair. A `Point` is 
 from typing import NamedTuple
 
 from blocksim.kernels.common import arrays, jit
+from blocksim.kernels.common.tolerances import CLOSING_ROUND_OFF, ONSET_STEPS
 from blocksim.kernels.explicit.laws import LINEAR, dashpot_weight
-
-ROUND_OFF = 1e-6  # of an overlap after one drift: a small difference of places, where the closing is a small product
-IMPACT_STEPS = 10.0  # an impact lasts some thirty steps; a face lost in a third of that cannot stop a corner
-ONSET_STEPS = 16.0  # after which the mean over a step and the value in its middle differ by less than 1/30000
 
 
 class Motion(NamedTuple):
@@ -109,7 +106,7 @@ def arms(point: Point, dx: float, dy: float, direction: int) -> tuple[float, flo
 @jit.rare_kernel
 def has_just_begun(place: arrays.Record) -> bool:
     """Return True if a point came into contact within the last drift: it is no deeper than it closed, to round-off."""
-    return place.closing > 0.0 and place.depth <= place.closing * (1.0 + ROUND_OFF)
+    return place.closing > 0.0 and place.depth <= place.closing * (1.0 + CLOSING_ROUND_OFF)
 
 
 @jit.rare_kernel

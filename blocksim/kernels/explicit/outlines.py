@@ -15,7 +15,6 @@ from blocksim.kernels.common.shapes import face_towards, hull_of, least_along
 
 MOST_CORNERS = 16  # of a block: slots from there on are corners of the second body of a pair
 UPPER = 2  # the face of the ground that counts
-WIDEST_CONE = 0.2  # as between rectangles; see models/surface.py
 
 
 @kernel

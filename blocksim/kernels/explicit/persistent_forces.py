@@ -17,15 +17,16 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import ALL, HALF, NO_FACE, NORMAL, SHEAR, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import END_RATIO, corner_offset
+from blocksim.kernels.common.shapes import corner_offset
+from blocksim.kernels.common.tolerances import CONE_TOLERANCE, DEEPEST_END, END_RATIO, HAND_OVER, IMPACT_STEPS, SLIVER
 from blocksim.kernels.explicit import damping, kinematics, laws, outlines, separation
 from blocksim.kernels.explicit.bearing import APART, PLANE, are_blocks, bearing_along, keep_bearing, stiffness_between
 from blocksim.kernels.explicit.contact import has_new_neighbours
 from blocksim.kernels.explicit.forces import NOTHING, Effect, Touch, forces_of
 from blocksim.kernels.explicit.models import SURFACE, surface
-from blocksim.kernels.explicit.models.outlines import DEEPEST, HAND_OVER, can_touch, corner_seen, face_met, has_inner
-from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, corner_signs
-from blocksim.kernels.explicit.sliver_axes import SLIVER, flat_within, is_sliver, least_ratio, meets_along
+from blocksim.kernels.explicit.models.outlines import can_touch, corner_seen, face_met, has_inner
+from blocksim.kernels.explicit.models.surface import corner_signs
+from blocksim.kernels.explicit.sliver_axes import flat_within, is_sliver, least_ratio, meets_along
 
 
 @kernel
@@ -71,7 +72,7 @@ def follow(
     beside = half_length - abs(along)
     goes_on = depth > 0.0 and beside >= 0.0 and (not turns or admits(owner, corner, nx, ny))
     found = kinematics.moving_point(x if is_own else ox, y if is_own else oy, side * nx, side * ny, depth, motion, step)
-    if beside < max(depth, kinematics.IMPACT_STEPS * abs(found.closing)):
+    if beside < max(depth, IMPACT_STEPS * abs(found.closing)):
         other = 1.0 if along > 0.0 else -1.0
         goes_on = goes_on and not admits(owner, corner, -other * ny, other * nx)
     return goes_on, found
@@ -134,7 +135,7 @@ def follow_on_outlines(
     if outlines.is_piece(touched):
         goes_on = goes_on and depth <= END_RATIO * end
     elif end < math.inf:  # else the half-plane
-        way = kinematics.IMPACT_STEPS * abs(found.closing)
+        way = IMPACT_STEPS * abs(found.closing)
         if side.clear * end - depth <= max(depth, way) or depth > side.distance:
             beside = outlines.next_number(touched, face) if along > 0.0 else outlines.number_before(touched, face)
             goes_on = goes_on and not has_inner(duplicates, is_own, touched, face, along, -end - HAND_OVER * depth)
@@ -253,7 +254,7 @@ def face_below(owner: Record, number: int, touched: Record, last: int, table: Re
     x, y = outlines.into_frame(touched, owner.x - touched.x + ox, owner.y - touched.y + oy)
     if outlines.is_piece(touched):
         return outlines.UPPER if y > touched.half_y else NO_FACE
-    room = DEEPEST * touched.radius
+    room = DEEPEST_END * touched.radius
     count = outlines.number_of_corners(touched)
     k = last if last < count else 0
     for _ in range(count):

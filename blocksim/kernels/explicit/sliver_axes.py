@@ -15,6 +15,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.tolerances import FLAT, SLIVER, TILTED
 from blocksim.kernels.explicit import bearing, outlines
 
 
@@ -82,12 +83,6 @@ def cosine_of(sine: Jet) -> Jet:
     """Return the cosine of an angle of less than a right one, given its sine."""
     cosine = math.sqrt(1.0 - sine.value * sine.value)
     return mapped(sine, cosine, -sine.value / cosine)
-
-
-SLIVER = 0.1  # overlap on the nearest axis over that on the next one, from where on a pair has its own potential
-# of the cone: such an overlap over the next one, from where on the second of two tilted ends counts less; at twice that
-# not at all, before the faces are no longer parallel
-TILTED = 0.45
 
 
 class Axis(NamedTuple):
@@ -179,7 +174,7 @@ def tilt_of(axis: Axis, across: int, a: Record, b: Record, table: Records) -> Je
 @rare_kernel
 def flat_within(cone: float) -> float:
     """Return the sine up to which faces are parallel."""
-    return min(bearing.FLAT, bearing.FLAT_SHARE * cone)
+    return min(FLAT, bearing.FLAT_SHARE * cone)
 
 
 @kernel
@@ -236,9 +231,7 @@ def meets_along(
     cos_back = nx * bx + ny * by
     is_ahead = cos_ahead < cos_back  # that face goes to the end of f where `along` is least
     sine = abs(nx * ay - ny * ax) if is_ahead else abs(nx * by - ny * bx)
-    if min(cos_ahead, cos_back) > 0.0 or sine > 0.5 * min(
-        bearing.FLAT, bearing.FLAT_SHARE * min(side.cone, ahead.cone)
-    ):
+    if min(cos_ahead, cos_back) > 0.0 or sine > 0.5 * min(FLAT, bearing.FLAT_SHARE * min(side.cone, ahead.cone)):
         return False
     place = along if is_ahead else -along
     length = 2.0 * (ahead.half if is_ahead else back.half)

@@ -46,7 +46,18 @@ from typing import NamedTuple
 
 from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.explicit.bearing import LEAST, are_blocks, face_per_length
+from blocksim.kernels.common.tolerances import (
+    ALIKE,
+    AS_NEAR,
+    FALLS,
+    LEAST_FORCE,
+    LEAST_SHARE,
+    NEGLIGIBLE,
+    ONE_END,
+    SLIVER,
+    TILTED,
+)
+from blocksim.kernels.explicit.bearing import are_blocks, face_per_length
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.laws import stored_energy
 from blocksim.kernels.explicit.outlines import (
@@ -60,8 +71,6 @@ from blocksim.kernels.explicit.outlines import (
 )
 from blocksim.kernels.explicit.sliver_axes import (
     CONSTANT_ONE,
-    SLIVER,
-    TILTED,
     Axis,
     Jet,
     absolute,
@@ -79,8 +88,6 @@ from blocksim.kernels.explicit.sliver_axes import (
     stepped,
     tilt_of,
 )
-
-ROUND = 0.5  # of the overlap, of a sliver: corners nearer than that are one end
 
 
 class Across(NamedTuple):
@@ -174,8 +181,8 @@ def share_of(axis: Axis, across: int, length: Jet, tilt: Jet, up: Jet, a: Record
     per_length = face_per_length(a, b, corner_of(a, table, of_a).half, corner_of(b, table, of_b).half)
     along = quotient(length, cosine_of(tilt))  # the face across is seen shorter
     part = mapped(along, per_length * along.value, per_length)
-    if part.value < LEAST or part.value > 1.0:
-        part = Jet(min(max(part.value, LEAST), 1.0), 0.0, 0.0, 0.0)
+    if part.value < LEAST_SHARE or part.value > 1.0:
+        part = Jet(min(max(part.value, LEAST_SHARE), 1.0), 0.0, 0.0, 0.0)
     return plus(part, product(plus(CONSTANT_ONE, part, -1.0), up), 1.0)
 
 
@@ -193,7 +200,7 @@ def energy_of_faces(
     up = stepped(tilt, flat, cone_of(a, b, table))
     parallel = plus(CONSTANT_ONE, stepped(tilt, flat, 2.0 * flat), -1.0)
     depth = depth_behind(axis.of_b, axis.face, axis.corner, a, b, table)
-    reach = mapped(depth, ROUND * depth.value, ROUND)
+    reach = mapped(depth, ONE_END * depth.value, ONE_END)
     wide = product(plus(CONSTANT_ONE, long, -1.0), reach)
     deep = product(plus(CONSTANT_ONE, product(parallel, long), -1.0), reach)
     found = across_from(axis, across, deep, wide, a, b, table)
@@ -202,13 +209,6 @@ def energy_of_faces(
         counts = plus(CONSTANT_ONE, product(up, plus(CONSTANT_ONE, shallow, -1.0)), -1.0)
         energy = plus(energy, product(counts, powered(found.other, power)), 1.0)
     return product(share_of(axis, across, found.length, tilt, up, a, b, table), energy)
-
-
-AS_NEAR = 1.25  # depth of the second of two faces over that of the nearer one, at most, where both count as that
-FALLS = 2.0  # power of D1/D with which the weight of an axis falls, as the energy on it rises
-ALIKE = 1e-3  # of the energy of a pair, that it may miss where its contacts are those of bearing.py
-NEGLIGIBLE = 1e-6  # of the limit of overlap: what such an overlap holds may be round-off
-LEAST_FORCE = 0.1  # of that of a spring of constant stiffness: the force along the normal never vanishes
 
 
 class Nearness(NamedTuple):

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from blocksim.kernels.common import tolerances
 from blocksim.kernels.common.arrays import CACHE_LINE, Floats, Integers, Records, World, on_own_lines, record_type
 from blocksim.kernels.common.simd import WIDTH
 
@@ -141,7 +142,7 @@ PUSH = record_type(
 )
 TALLY = record_type("impacts friction to_support")  # J: what normal and shear impulses have taken, and given, so far
 
-FAR = 1e9  # m or m/s: of points that are not there, or do not count
+FAR = tolerances.FAR  # m or m/s: of points that are not there, or do not count
 AWAY, OPEN, TOUCHING = range(3)  # no point within the margin; a gap at all points; a point that touches or pressed
 NOT_STRUCK, STRUCK, STRUCK_AT_REST, FORGOTTEN = range(4)  # the last two pressed before the impact too
 COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it

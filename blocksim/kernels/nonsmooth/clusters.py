@@ -4,9 +4,8 @@ Fixed bodies join no cluster, as no impulse moves them: two blocks on one table 
 """
 
 from blocksim.kernels.common import arrays, jit
+from blocksim.kernels.common.tolerances import IMPACT_ROUND_OFF
 from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
-
-ROUND_OFF = 1e-9  # of the kinetic energy of a cluster; impacts are solved no better
 
 
 @jit.rare_kernel
@@ -114,7 +113,7 @@ def work_of(contacts: Contacts, group: arrays.Record, lane: int) -> float:
 @jit.rare_kernel
 def has_gain(root: arrays.Record) -> bool:
     """Return True if impacts have created energy in a cluster."""
-    return root.now > root.then * (1.0 + ROUND_OFF)
+    return root.now > root.then * (1.0 + IMPACT_ROUND_OFF)
 
 
 @jit.rare_kernel

@@ -15,12 +15,10 @@ from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.friction import friction_coefficient
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import Lane, Lanes, branch, four, greater, is_all, load, select, split
+from blocksim.kernels.common.tolerances import STRONG
 from blocksim.kernels.nonsmooth.arrays import Contacts
 from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, constraints_of, material_of, normal_masses
 from blocksim.kernels.nonsmooth.slip import Constraints
-
-LATE = 50  # sweeps
-STRONG = 0.75  # coupling from which on shear goes a share of the way: 50 sweeps of less end within a millionth
 
 
 @kernel

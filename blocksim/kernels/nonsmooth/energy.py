@@ -11,13 +11,10 @@ from (J + m h (g + a)) times that mean, the change of K(v). So their work needs 
 """
 
 from blocksim.kernels.common import arrays, energy, integrate, jit
+from blocksim.kernels.common.tolerances import MIDDLE
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
 from blocksim.kernels.nonsmooth.begin import is_start
 
-DEEPEST = (
-    0.5  # of the smallest side of a pair: what goes deeper comes out on the other side. Impacts of fast blocks that
-)
-# are found late, in steps as long as theirs, go as deep as a tenth and are pushed out again
 NONSMOOTH_LEDGER = ("kinetic", "potential", "impacts", "friction", "correction", "to_support", "to_loads", "events")
 
 
@@ -112,7 +109,7 @@ def has_excessive_overlap(scene: Nonsmooth) -> bool:
         overlap = max(-constraint.gap_one, -constraint.gap_two)
         if constraint.reach == TOUCHING and overlap > 0.0:
             side = min(energy.smallest_side(bodies[constraint.a]), energy.smallest_side(bodies[constraint.b]))
-            if overlap > (given if given > 0.0 else DEEPEST * side):
+            if overlap > (given if given > 0.0 else MIDDLE * side):
                 return True
     return False
 

@@ -44,6 +44,14 @@ from blocksim.kernels.common.arrays import TEAM_SIZE, Integers, Record, Records
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.common.simd import WIDTH, load, store
+from blocksim.kernels.common.tolerances import (
+    IMPACT_ROUND_OFF,
+    LEAST_TOLERANCE,
+    MOST_ROUNDS,
+    MOST_TOLERANCE,
+    MOST_TRIES,
+    TOLERANCE_SHARE,
+)
 from blocksim.kernels.nonsmooth import arrays, clusters, motion, passes, rounds, sweeps
 
 NEITHER, LOW, HIGH = range(3)  # what the last solution of a cluster is kept as: that with too little or too much energy
@@ -182,7 +190,7 @@ def try_next(root: Record, is_last: bool) -> None:
     """Set the share that a cluster tries next, or where it ends up between its two solutions."""
     room = root.then - root.least
     excess = root.most - root.then
-    if is_last or room <= 0.0 or abs(root.now - root.then) <= clusters.ROUND_OFF * root.then:
+    if is_last or room <= 0.0 or abs(root.now - root.then) <= IMPACT_ROUND_OFF * root.then:
         root.is_open = 0
         root.share = share_of(room, room + excess, root.between)
         return
@@ -269,12 +277,6 @@ def settle_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
 def between(x: float, y: float, share: float) -> float:
     """Return what lies between x and y; exactly y where the share is one."""
     return y if share >= 1.0 else x + share * (y - x)
-
-
-MOST_ROUNDS = 100  # what approaches then does not rebound
-MOST_TRIES = 30  # shares of rebounds; what energy is left then is made up between the last two
-TOLERANCE_SHARE = 1e-7  # of the tolerance of the velocity pass: what impacts miss is energy
-LEAST_TOLERANCE, MOST_TOLERANCE = 1e-8, 1e-4  # of the threshold, between these
 
 
 @rare_kernel

@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.simd import Lanes, Mask, is_all, lesser, select
+from blocksim.kernels.common.tolerances import EDGE, ONE_POINT
 from blocksim.kernels.nonsmooth import arrays, faces, references, slip
-
-SLIVER = 1e-5  # of the smaller half perimeter of the boxes of a pair: with less between them two points are one
 
 
 class Points(NamedTuple):
@@ -58,7 +57,7 @@ def points_of(
     right_gap = select(edge.is_right, edge.right_gap, arrays.FAR)
     left_gap = select(left_gap <= margin, left_gap, arrays.FAR)
     right_gap = select(right_gap <= margin, right_gap, arrays.FAR)
-    is_sliver = width < SLIVER * lesser(a.half_x + a.half_y, b.half_x + b.half_y)
+    is_sliver = width < ONE_POINT * lesser(a.half_x + a.half_y, b.half_x + b.half_y)
     is_left_less = left_gap <= right_gap
     right_gap = select(is_sliver & is_left_less, arrays.FAR, right_gap)
     left_gap = select(is_sliver & (is_left_less ^ is_sliver), arrays.FAR, left_gap)
@@ -98,7 +97,7 @@ def is_any_odd(found: Manifold, hulls_a: faces.AnyHulls, hulls_b: faces.AnyHulls
     if hulls_a is None:
         return False
     points = found.points
-    is_sliver = points.constraint.width < references.EDGE * lesser(hulls_a.inner, hulls_b.inner)
+    is_sliver = points.constraint.width < EDGE * lesser(hulls_a.inner, hulls_b.inner)
     is_empty = found.is_of_b & (lesser(points.gap_one, points.gap_two) >= arrays.FAR)
     return not is_all(select((found.best.gap <= margin) & (is_sliver | is_empty), 1.0, 0.0) <= 0.0)
 
@@ -115,7 +114,7 @@ def manifold_beside(
 ) -> Manifold:
     """Return the manifold on the best face of a body, or on the next best where it faces the other over a sliver."""
     found = manifold_on(references.reference_on(is_of_b, best, best, hulls_a, hulls_b, 0), a, b, margin)
-    least = references.EDGE * min(hulls_a.inner, hulls_b.inner)
+    least = EDGE * min(hulls_a.inner, hulls_b.inner)
     if found.points.constraint.width < least:
         body, hulls, other, others = (b, hulls_b, a, hulls_a) if is_of_b else (a, hulls_a, b, hulls_b)
         beside = references.next_above(-least, best.number, body, hulls, other, others)

@@ -11,9 +11,8 @@ Prescribed motion: of the supports (the ground, its pieces, walls, fixed bodies)
 
 from blocksim.kernels.common import jit, loads, shapes, supports
 from blocksim.kernels.common.arrays import LOAD_FORCE, Record, Records, World
+from blocksim.kernels.common.tolerances import IN_FLIGHT
 from blocksim.kernels.nonsmooth import arrays, parts
-
-IN_FLIGHT = 1e-9  # of a kick: bodies whose velocity changes by no more beside it touch nothing
 
 
 @jit.kernel

@@ -26,10 +26,10 @@ from blocksim.kernels.common.simd import (
     write_fields_4,
     write_fields_8,
 )
+from blocksim.kernels.common.tolerances import TURNED
 from blocksim.kernels.nonsmooth import arrays, faces, manifold, references, segments, slip
 
 NOT_THERE = 0.5 * arrays.FAR  # m: what is FAR changes a little as bodies move
-TURNED = 0.906307787036650  # cosine of 25 degrees
 OF_B = 32  # added to the number of a corner of body b, which counts from 1
 
 Places = tuple[int, int, int, int]

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 from blocksim.kernels.common import arrays, jit, neighbours, supports
 from blocksim.kernels.common.simd import WIDTH
+from blocksim.kernels.common.tolerances import MOST_MARGIN, REACH_STEPS
 from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, KEPT, Nonsmooth
 from blocksim.kernels.nonsmooth.groups import LONELY
 
@@ -102,10 +103,6 @@ def most_groups(scene: Nonsmooth) -> int:
         most_left = min(size, LONELY if size % WIDTH >= LONELY else 1)  # groups of fewer than four; see gather
         count += size if colour == COLOURS - 1 else size // WIDTH + most_left
     return count
-
-
-STEPS = 16.0  # that a body should be able to continue before its reach is used up
-MOST_MARGIN = 0.5  # of the least reach of two bodies
 
 
 class Frame(NamedTuple):
@@ -208,7 +205,7 @@ def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
     stepping.listed_x = stepping.support_x
     stepping.listed_y = stepping.support_y
     for i in range(world.bodies.size - 1):
-        ahead = STEPS * world.controls[0].step * neighbours.top_speed(world.bodies[i], frame.vx, frame.vy)
+        ahead = REACH_STEPS * world.controls[0].step * neighbours.top_speed(world.bodies[i], frame.vx, frame.vy)
         scene.reaches[i] = min(max(ahead, stepping.least_reach), stepping.most_reach)
     count = neighbours.list_pairs(world, scene.kept, scene.reaches, 0.0, False)
     fits = count <= scene.kept.size

@@ -18,11 +18,8 @@ import math
 
 from blocksim.kernels.common.arrays import Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
+from blocksim.kernels.common.tolerances import FINE, MOST_PARTS, MOST_RESTRAINT
 from blocksim.kernels.nonsmooth import arrays, begin, slip
-
-FINE = 1.0 / 64.0  # of a step: the part in which an impact falls
-MOST_PARTS = 32  # of a step; what is left then is one more
-MOST_CHANGE = 1.5  # of the square of gravity: that of an acceleration with which something is held that turns
 
 
 @kernel
@@ -183,7 +180,7 @@ def held_change(state: Record, before: Record, h: float, controls: Record) -> tu
     turn = (state.spin - before.spin) / h
     size = ax * ax + ay * ay + turn * turn * state.inverse_mass / state.inverse_inertia
     gravity = controls.gravity_x * controls.gravity_x + controls.gravity_y * controls.gravity_y
-    if size > MOST_CHANGE * gravity:
+    if size > MOST_RESTRAINT * gravity:
         return 0.0, 0.0, 0.0
     return ax, ay, turn
 

@@ -9,16 +9,15 @@ block that slides over the flush joint of two others would else be stopped by th
 a little. Polygons in which that may be so are looked at alone (manifold.py).
 """
 
+import math
 from typing import NamedTuple
 
 from blocksim.kernels.common import jit, shapes
 from blocksim.kernels.common.simd import Lane, Lanes, Mask, greater, is_all, lesser, select
+from blocksim.kernels.common.tolerances import EDGE, LEVEL, TIE
 from blocksim.kernels.nonsmooth import arrays, faces
 
-TIE = 6.25e-6  # of the least half side of a pair: by so much a face of body a has to be better than one of body b
-EDGE = 0.01  # of the smaller inner radius: two faces that face each other over less are passed by
-LEVEL = 0.1  # sine of the angle between two faces up to which that is so
-LEVEL_COSINE = -0.99498743710662  # of the normals of such faces
+LEVEL_COSINE = -math.sqrt(1.0 - LEVEL * LEVEL)  # of the normals of faces at that angle
 
 
 class Pose(NamedTuple):

@@ -5,9 +5,8 @@ import math
 from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import WIDTH, Lane, Lanes, Mask, fields_0, greater, lesser, load, select, store
+from blocksim.kernels.common.tolerances import UPRIGHT
 from blocksim.kernels.nonsmooth import arrays, clusters, groups, passes, slip
-
-UPRIGHT = 0.1  # cosine of the angle between a normal and gravity, from which on it presses at the start of a run
 
 
 @rare_kernel

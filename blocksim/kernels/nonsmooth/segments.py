@@ -10,11 +10,9 @@ continues belong to one of the two segments or are no edges.
 from typing import NamedTuple
 
 from blocksim.kernels.common import jit
+from blocksim.kernels.common.tolerances import FACING, PARALLEL_COSINE, TIE
 from blocksim.kernels.nonsmooth import arrays, faces, references
 from blocksim.kernels.nonsmooth.manifold import Manifold, points_of
-
-FACING = -0.01  # cosine: faces of a block that look more away than that from a segment do not touch its edge
-PARALLEL = -0.99995  # cosine: faces within 0.01 rad of each other meet as faces, if the end of the segment is no edge
 
 UPPER_RIGHT, UPPER_LEFT, SHARP_RIGHT, SHARP_LEFT = 2, 3, 4, 5  # bits of corners
 
@@ -94,8 +92,8 @@ def manifold_on_segment(
         other = meeting_on(block, hulls, segment, corners, k)
         if other.gap > meeting.gap:
             meeting = other
-    tie = references.TIE * min(block.half_x, block.half_y)
-    is_of_block = meeting.gap > gap + tie and (is_edge(meeting) or meeting.cosine > PARALLEL)
+    tie = TIE * min(block.half_x, block.half_y)
+    is_of_block = meeting.gap > gap + tie and (is_edge(meeting) or meeting.cosine > PARALLEL_COSINE)
     if is_of_block:
         face = meeting.face
         _, against = faces.side_opposite(-face.nx, -face.ny, block, hulls, 0)

@@ -9,6 +9,7 @@ from blocksim.kernels.common.arrays import TEAM_SIZE, Integers
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import greater, spread
+from blocksim.kernels.common.tolerances import LATE
 from blocksim.kernels.nonsmooth import arrays, cone, groups, passes
 
 
@@ -99,12 +100,12 @@ def velocity_pass(contacts: arrays.Contacts, team: Integers, k: int, task: int, 
     largest = math.inf
     sweeps = 0
     while largest > tolerance and sweeps < stepping.velocity_sweeps:
-        if sweeps == cone.LATE:
+        if sweeps == LATE:
             hold_back(contacts, team, k, True)
         sweeps += 1
         largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
         task = passes.VELOCITY
-    if sweeps > cone.LATE:
+    if sweeps > LATE:
         hold_back(contacts, team, k, False)
     if k == 0:
         stepping.sweeps += sweeps

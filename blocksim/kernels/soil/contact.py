@@ -19,6 +19,7 @@ import math
 
 from blocksim.kernels.common import arrays, jit, neighbours, supports, systems
 from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.tolerances import AT_TOUCH
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.soil.arrays import GROUP, Soils
 from blocksim.kernels.soil.neighbours import grid_of
@@ -220,9 +221,6 @@ def touch_supports(soils: Soils, _: arrays.World, world: arrays.World, k: int, s
         barrier(world.team)
         if k == 0:
             load_bodies(soils, world, soils.controls[0].blocks, world.bodies.size)
-
-
-AT_TOUCH = 1e-3  # of the radius; what is nearer to touching a body than this at the start is in contact
 
 
 @jit.rare_kernel

@@ -49,12 +49,9 @@ from blocksim.kernels.common.simd import (
     spread,
     write_fields_4,
 )
+from blocksim.kernels.common.tolerances import LEAST_SPREAD, SOFTENING
 from blocksim.kernels.soil import arrays, contact, neighbours, stress
 from blocksim.kernels.sph.functions import wendland_fading, wendland_steepness
-
-# Smallest eigenvalue of M with which a particle is corrected: 1 inside, 0.5 on a flat surface, above 0.1 in a corner.
-# What lies beyond is no surface but a few particles that fly.
-LEAST_SPREAD = 0.05
 
 
 @jit.kernel
@@ -100,9 +97,6 @@ def correction(
         select(are_few, 0.0, -xy / determinant),
         select(are_few, 1.0, xx / determinant),
     )
-
-
-SOFTENING = 0.01  # h^2; keeps the viscosity finite where two particles meet
 
 
 @jit.kernel

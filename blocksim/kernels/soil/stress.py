@@ -43,6 +43,7 @@ That is for rows that stand against an upright or level face as the lattice of a
 import math
 
 from blocksim.kernels.common import arrays, jit
+from blocksim.kernels.common.tolerances import DECAY, OUT_OF_LINE
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.contact import from_body, is_near
 
@@ -159,9 +160,7 @@ def strain(state: arrays.Record, kind: arrays.Record, ux: float, uy: float, wx: 
     return lost
 
 
-DECAY = 0.2383014  # -z, for Wendland's C2 with h = 1.5 spacings
 ROWS = 5  # the next one wants 1.0003
-OUT_OF_LINE = 1e-3  # spacings; rows nearer than this to where they ought to be stand against a face
 
 
 @jit.kernel

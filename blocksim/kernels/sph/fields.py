@@ -47,6 +47,7 @@ from numpy.typing import ArrayLike
 
 from blocksim.kernels.common.arrays import Floats, Integers
 from blocksim.kernels.common.jit import entry_kernel, kernel, rare_kernel
+from blocksim.kernels.common.tolerances import GRADIENT_RANK, LARGEST
 from blocksim.kernels.sph import cells, functions
 
 PLAIN = 0
@@ -54,9 +55,6 @@ SHEPARD, LINEAR = 1, 2
 SYMMETRIC, DIFFERENCE, CORRECTED = 1, 2, 3
 INTERPOLATION_CODES = {"plain": PLAIN, "shepard": SHEPARD, "linear": LINEAR}
 GRADIENT_CODES = {"plain": PLAIN, "symmetric": SYMMETRIC, "difference": DIFFERENCE, "corrected": CORRECTED}
-
-# Eigenvalues below this share of their scale count as zero: of neighbours on a line one is zero up to round-off.
-RANK_TOLERANCE = 1e-8
 
 
 class Sources(NamedTuple):
@@ -133,7 +131,7 @@ def fit_line(
         yy += w * (dy - mean_y) * (dy - mean_y)
         x_a += w * (dx - mean_x) * (values[b] - mean)
         y_a += w * (dy - mean_y) * (values[b] - mean)
-    least = RANK_TOLERANCE * weights * sources.smoothing_length * sources.smoothing_length
+    least = GRADIENT_RANK * weights * sources.smoothing_length * sources.smoothing_length
     inverse_xx, inverse_xy, inverse_yy = pseudo_inverse(xx, xy, yy, least)
     return inverse_xx * x_a + inverse_xy * y_a, inverse_xy * x_a + inverse_yy * y_a
 
@@ -206,7 +204,7 @@ def gradient_at(form: int, sources: Sources, values: Floats, a: int, near: Integ
         yy += spread * dy * dy
     if form != CORRECTED:
         return sum_x, sum_y
-    inverse_xx, inverse_xy, inverse_yy = pseudo_inverse(xx, xy, yy, RANK_TOLERANCE * (xx + yy))
+    inverse_xx, inverse_xy, inverse_yy = pseudo_inverse(xx, xy, yy, GRADIENT_RANK * (xx + yy))
     return inverse_xx * sum_x + inverse_xy * sum_y, inverse_xy * sum_x + inverse_yy * sum_y
 
 
@@ -222,8 +220,6 @@ def differentiate_particles(
 KernelName = Literal["wendland-c2", "cubic-spline", "quintic-spline"]
 InterpolationForm = Literal["plain", "shepard", "linear"]
 GradientForm = Literal["plain", "symmetric", "difference", "corrected"]
-
-LARGEST = 1e30  # with numbers up to this, and down to its inverse, no product in a sum overflows or vanishes
 
 
 def _numbers(numbers: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common import arrays, systems
-from blocksim.kernels.explicit import depth, energy, models, outlines, step
+from blocksim.kernels.common.tolerances import MIDDLE, ROWS_APART
+from blocksim.kernels.explicit import energy, models, outlines, step
 from blocksim.scenario.overlap import penetration
 from blocksim.simulation import schemes, trajectory
 from blocksim.world import build
@@ -106,7 +107,7 @@ def overlaps_of_springs(scene: Any) -> schemes.Overlaps:
     lost = np.where(is_pressed, 0.0, np.where(pairs["b"] == world.bodies.size - 1, below, inside))
     limit = pairs["limit"]
     if world.controls[0].model != models.SURFACE:
-        middle = depth.MIDDLE * schemes.smallest_sides(world, pairs["a"], pairs["b"])
+        middle = MIDDLE * schemes.smallest_sides(world, pairs["a"], pairs["b"])
         limit = np.where(is_pressed, limit, np.minimum(_reach(world), middle))
     return schemes.Overlaps(pairs["a"], pairs["b"], np.maximum(deepest, lost), limit)
 
@@ -114,7 +115,7 @@ def overlaps_of_springs(scene: Any) -> schemes.Overlaps:
 def _reach(world: arrays.World) -> float:
     """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.explicit.depth."""
     controls = world.controls[0]
-    return float(controls.support if controls.model == models.KERNEL else depth.ROWS_APART * controls.particle_size)
+    return float(controls.support if controls.model == models.KERNEL else ROWS_APART * controls.particle_size)
 
 
 def particle_depth_warning(scene: Any, overlaps: schemes.Overlaps) -> str:
@@ -122,7 +123,7 @@ def particle_depth_warning(scene: Any, overlaps: schemes.Overlaps) -> str:
     model, reach = scene.world.controls[0].model, _reach(scene.world)
     if model == models.SURFACE or overlaps.limit[np.nanargmax(overlaps.depth / overlaps.limit)] != reach:
         return ""
-    what = "the reach of the kernel" if model == models.KERNEL else f"{depth.ROWS_APART:g} contact.particle_spacing"
+    what = "the reach of the kernel" if model == models.KERNEL else f"{ROWS_APART:g} contact.particle_spacing"
     return f"an overlap exceeds {what}, {1e3 * reach:.3g} mm, beyond which particles lose one another"
 
 

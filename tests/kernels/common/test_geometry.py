@@ -11,8 +11,6 @@ from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import BODY, zeros
 from blocksim.kernels.common.shapes import (
-    END_RATIO,
-    SMALL_TURN,
     corner_offset,
     ground_gap,
     place_corners,
@@ -22,6 +20,7 @@ from blocksim.kernels.common.shapes import (
     to_world,
     turn,
 )
+from blocksim.kernels.common.tolerances import END_RATIO, SMALL_TURN
 from tests.kernels.rectangles import corners, distances, gap as largest_gap, turned
 
 if TYPE_CHECKING:

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import example, given, strategies as st
 
 from blocksim.kernels.common.arrays import NORMAL, OPERATOR, SHEAR
+from blocksim.kernels.common.tolerances import DASHPOT_RANK, OPERATOR_LIFE
 from blocksim.kernels.explicit.contact import has_new_neighbours, pair_forces, shared_step, spare_lost_faces
-from blocksim.kernels.explicit.damping import BOTH, OPERATOR_LIFE, RANK_TOLERANCE, damp
+from blocksim.kernels.explicit.damping import BOTH, damp
 from blocksim.kernels.explicit.forces import Touch, grip_of, renew_operator, shear_of
 from blocksim.kernels.explicit.kinematics import point_of, resolve_point
 from blocksim.kernels.explicit.laws import LINEAR
@@ -178,7 +179,7 @@ def test_dashpots_of_a_pair_follow_the_definition(
     found = damp(world.operators[0, direction], count == 2, *numbers)[:count]
     # masses of rank one but for an eigenvalue that counts as zero: A tr(A)^(-3/2) is off by its share of the other
     share = np.linalg.eigvalsh(masses)[0] / np.trace(masses)
-    rank_one = share < RANK_TOLERANCE and points.size == 2
+    rank_one = share < DASHPOT_RANK and points.size == 2
     assert found == pytest.approx(expected, rel=1e-7 + 2.0 * share * rank_one, abs=1e-9 * np.abs(expected).max())
     assert lives(world)[direction] == (OPERATOR_LIFE if weights[0] == weights[count - 1] == 1.0 else 0)
     assert lives(world)[1 - direction] == 0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.explicit.bearing import FLAT
+from blocksim.kernels.common.tolerances import FLAT
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.models.outlines import near_slots

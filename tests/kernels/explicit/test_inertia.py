@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR
-from blocksim.kernels.explicit.inertia import SHARE_PERIOD, piece_of
+from blocksim.kernels.common.tolerances import SHARE_PERIOD
+from blocksim.kernels.explicit.inertia import piece_of
 from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from blocksim.kernels.common.tolerances import DASHPOT_RANK
 from blocksim.kernels.explicit.damping import (
-    RANK_TOLERANCE,
     cholesky,
     inverse_root,
     inverse_three_halves,
@@ -29,7 +29,7 @@ def positive(n: int, rank: int, seed: int) -> np.ndarray:
 def power(matrix: np.ndarray, exponent: float) -> np.ndarray:
     """Return a power of a symmetric matrix over its range."""
     values, vectors = np.linalg.eigh(matrix)
-    kept = values > RANK_TOLERANCE * values.max()
+    kept = values > DASHPOT_RANK * values.max()
     return np.asarray((vectors[:, kept] * values[kept] ** exponent) @ vectors[:, kept].T)
 
 
@@ -68,8 +68,8 @@ def test_zero_matrix_has_the_root_zero_not_infinity() -> None:
 
 
 def test_eigenvalues_below_the_rank_tolerance_count_as_zero() -> None:
-    assert inverse_root(0.9 * RANK_TOLERANCE, 1.0) == 0.0
-    assert inverse_root(1.1 * RANK_TOLERANCE, 1.0) == pytest.approx((1.1 * RANK_TOLERANCE) ** -0.5)
+    assert inverse_root(0.9 * DASHPOT_RANK, 1.0) == 0.0
+    assert inverse_root(1.1 * DASHPOT_RANK, 1.0) == pytest.approx((1.1 * DASHPOT_RANK) ** -0.5)
 
 
 @given(n=st.integers(1, 8), seed=SEEDS)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 
+from blocksim.kernels.common.tolerances import CONE_TOLERANCE
 from blocksim.kernels.explicit.kinematics import Point, relative_motion, resolve_point
 from blocksim.kernels.explicit.models import contact_points
-from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE, corner_signs, face_normal, opens
+from blocksim.kernels.explicit.models.surface import corner_signs, face_normal, opens
 from blocksim.kernels.explicit.persistent_forces import admits, face_frame, follow
 from blocksim.verification.scene import HEIGHT
 

@@ -11,11 +11,11 @@ import pytest
 
 from blocksim.kernels.common.arrays import HALF, NORMAL, SHEAR
 from blocksim.kernels.common.integrate import start_all
+from blocksim.kernels.common.tolerances import IMPACT_STEPS
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import BOTH
 from blocksim.kernels.explicit.forces import NOTHING
-from blocksim.kernels.explicit.kinematics import IMPACT_STEPS
 from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.kernels.explicit.partition import add_kept, keep
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, UNTOUCHED, persistent_forces

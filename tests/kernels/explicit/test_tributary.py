@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import SUPPORT
-from blocksim.kernels.explicit.bearing import FLAT, LEAST, bearing_along, interval_of
+from blocksim.kernels.common.tolerances import CONE_TOLERANCE, FLAT, LEAST_SHARE
+from blocksim.kernels.explicit.bearing import bearing_along, interval_of
 from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.models.surface import CONE_TOLERANCE
 from blocksim.verification.scene import HEIGHT, WIDTH
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def test_changes_of_a_share_are_its_derivatives(make_body: MakeBody, sine: float
 
     a, b = make_body(x=shift, y=HEIGHT, angle=asin(sine)), make_body()
     bearing = bearing_along(a, b, *UP, None)[1]
-    assert LEAST <= bearing.share <= 1.0
+    assert LEAST_SHARE <= bearing.share <= 1.0
     h = 1e-7
     if abs(shift) > 1e-3:  # no end passes the other's within the difference
         if abs(sine) <= FLAT:

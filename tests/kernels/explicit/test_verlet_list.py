@@ -12,13 +12,8 @@ from hypothesis import given, strategies as st
 from blocksim.kernels.common.arrays import MOTION_PIECE, PAIRS_FULL, REACHED, World, zeros
 from blocksim.kernels.common.neighbours import travel
 from blocksim.kernels.common.shapes import separation
-from blocksim.kernels.explicit.broad_phase import (
-    MOST_UNSEEN,
-    MOST_UNSEEN_DRIVEN,
-    PAIR_SHARE,
-    unseen_steps,
-    update_pairs,
-)
+from blocksim.kernels.common.tolerances import MOST_UNSEEN, MOST_UNSEEN_DRIVEN
+from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, unseen_steps, update_pairs
 from blocksim.verification.scene import Simulation, scenario_of
 from blocksim.world.build import build_world, empty_lists
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.nonsmooth.cone import LATE
+from blocksim.kernels.common.tolerances import LATE
 from tests.kernels.nonsmooth.references import dense
 from tests.kernels.nonsmooth.scenes import Block, after_substep, velocities
 

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.soil.stress import DECAY, ROWS, part_of_kernel, share_of_row
+from blocksim.kernels.common.tolerances import DECAY
+from blocksim.kernels.soil.stress import ROWS, part_of_kernel, share_of_row
 from blocksim.kernels.sph.functions import wendland_slope
 from blocksim.scenario import Scenario
 from blocksim.world.systems.soils import SMOOTHING, earth_pressure_at_rest

@@ -33,12 +33,16 @@ import numpy as np
 from blocksim.kernels.common.arrays import CONTACTS, NO_FACE, Integers, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import relative_pose, slab_depth, to_world
+from blocksim.kernels.common.tolerances import (
+    BESIDE_SHARE,
+    CONE_TOLERANCE,
+    DEEPEST_END,
+    HAND_OVER,
+    ONE_PLACE,
+    SAME_FACE,
+)
 from blocksim.kernels.explicit import outlines
-from blocksim.kernels.explicit.models.surface import CLOSE, PARALLEL, drop_point, keeps_first
-
-# calibrated: of the overlap. What an end holds changes by twice that times the tilt (0.01) as it changes hands, 4e-4 of
-# it; stacks at rest stay flush within less
-HAND_OVER = 0.02
+from blocksim.kernels.explicit.models.surface import drop_point, keeps_first
 
 
 @kernel
@@ -57,7 +61,7 @@ def is_same_end(of_a: Record, of_b: Record, a: Record, b: Record, table: Records
     """Return True if a corner of a and a corner of b (both points) mark the same end of one face contact."""
     nx = of_a.nx
     ny = of_a.ny
-    if nx * of_b.nx + ny * of_b.ny < PARALLEL:
+    if nx * of_b.nx + ny * of_b.ny < SAME_FACE:
         return False
     end_a = -from_middle(a, of_a.slot, table, -nx, -ny)
     return end_a * from_middle(b, of_b.slot - outlines.MOST_CORNERS, table, nx, ny) > 0.0
@@ -107,10 +111,6 @@ def has_inner(duplicates: int, of_b: bool, touched: Record, face: int, along: fl
         return False
     end = outlines.next_number(touched, face) if along > 0.0 else face
     return (duplicates >> (end + outlines.MOST_CORNERS if of_b else end)) & 1 == 1
-
-
-DEEPEST = 0.01  # of the half diagonal, under the sharp end of a face
-BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
 
 
 class Corner(NamedTuple):
@@ -204,7 +204,7 @@ def side_over_end(
         level = outlines.corner_of(touched, table, k)
         over = level.distance - (level.nx * corner.x + level.ny * corner.y)
         cosine = level.nx * side.nx + level.ny * side.ny
-        is_under = 0.0 < over < DEEPEST * touched.radius and beyond >= over * cosine
+        is_under = 0.0 < over < DEEPEST_END * touched.radius and beyond >= over * cosine
         if (
             is_under
             and can_touch(corner, level.nx, level.ny, cone)
@@ -303,7 +303,7 @@ def do_meet(one: Record, two: Record, cone: float) -> bool:
     """Return True if two corners meet: they are as near to one another as two faces outside the cone can have them."""
     dx = one.x - two.x
     dy = one.y - two.y
-    reach = CLOSE * outlines.WIDEST_CONE / cone * max(one.depth, two.depth)
+    reach = ONE_PLACE * CONE_TOLERANCE / cone * max(one.depth, two.depth)
     return dx * dx + dy * dy < reach * reach
 
 

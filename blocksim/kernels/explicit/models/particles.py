@@ -21,7 +21,7 @@ import math
 from blocksim.kernels.common import arrays, jit, shapes
 
 ROWS = 4
-FACE = 2.0  # stiffness of a face contact over that of a corner contact
+FACE = 2  # stiffness of a face contact over that of a corner contact
 
 
 @jit.kernel

@@ -27,12 +27,9 @@ import math
 from blocksim.kernels.common.arrays import ALL, Integers, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import slab_depth, to_world
+from blocksim.kernels.common.tolerances import LEAST_FACING, NEAR_RATIO
 from blocksim.kernels.explicit.models import particles
 from blocksim.kernels.sph.functions import kernel_value
-
-NO_SUM = 1e-30
-NEAR_RATIO = 4.0  # a face that is deeper than this many times the nearest one is not the one that is touched
-LEAST_FACING = 1e-9  # of two normals that oppose one another; at right angles they do not, whatever round-off says
 
 
 @rare_kernel
@@ -112,7 +109,7 @@ def weighted_sums(
 def smoothed_overlap(sums: Record) -> float:
     """Normalise the sums: unit normal in `nx`, `ny`; return the overlap (m)."""
     length = math.sqrt(sums.nx * sums.nx + sums.ny * sums.ny)
-    if length <= NO_SUM:
+    if length <= 0.0:
         return 0.0
     sums.nx /= length
     sums.ny /= length

@@ -13,15 +13,7 @@ import math
 from blocksim.kernels.common.arrays import ALL, CONTACTS, HALF, NO_FACE, Integers, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.shapes import corner_offset, relative_pose, slab_depth, to_world
-
-# A corner can touch a face only where the face normal, reversed, lies between the outward normals of the two sides
-# that meet in the corner (the vertex-face pairs of the Minkowski difference of two convex bodies). The tolerance
-# (sine of an angle) lets both ends of a nearly parallel face contact count. Without this rule the corner of an
-# aligned stack, which lies nearer to the side of the block below than to its top, would touch the wrong face.
-CONE_TOLERANCE = 0.2
-
-PARALLEL = 0.9
-CLOSE = 8.0  # overlaps; two corners nearer than that meet in one place
+from blocksim.kernels.common.tolerances import BESIDE_SHARE, CONE_TOLERANCE, ONE_PLACE, SAME_FACE
 
 
 @kernel
@@ -41,7 +33,7 @@ def outward_along(body: Record, corner: int, tx: float, ty: float) -> float:
 @rare_kernel
 def same_end(of_a: Record, of_b: Record, a: Record, b: Record) -> bool:
     """Return True if a corner of a and a corner of b (both points) mark the same end of one face contact."""
-    if of_a.nx * of_b.nx + of_a.ny * of_b.ny < PARALLEL:
+    if of_a.nx * of_b.nx + of_a.ny * of_b.ny < SAME_FACE:
         return False
     end_a = outward_along(a, of_a.slot, -of_a.ny, of_a.nx)
     end_b = outward_along(b, of_b.slot - HALF, -of_a.ny, of_a.nx)
@@ -61,7 +53,7 @@ def coincide(one: Record, two: Record) -> bool:
     """Return True if two corners meet: they are about as near to one another as they are deep."""
     dx = one.x - two.x
     dy = one.y - two.y
-    reach = CLOSE * max(one.depth, two.depth)
+    reach = ONE_PLACE * max(one.depth, two.depth)
     return dx * dx + dy * dy < reach * reach
 
 
@@ -121,7 +113,6 @@ def drop_duplicates(a: Record, b: Record, pair: Record, contacts: Records, point
     return count
 
 
-BESIDE_SHARE = 0.1  # of the half diagonal; a face farther than that below a corner is not beside it
 UPPER_FACE = 1  # of a piece of ground, the only one that counts
 
 

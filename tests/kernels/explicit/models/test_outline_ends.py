@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from blocksim.kernels.common.tolerances import HAND_OVER
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import renew_dashpots
-from blocksim.kernels.explicit.models.outlines import HAND_OVER, near_slots
+from blocksim.kernels.explicit.models.outlines import near_slots
 from blocksim.kernels.explicit.outlines import cone_of
 from blocksim.kernels.explicit.sliver_axes import flat_within
 from blocksim.verification.scene import CaseScene

@@ -11,9 +11,9 @@ from hypothesis import assume, given, strategies as st
 
 from blocksim.kernels.common.arrays import CONTACT, CONTACTS, HALF, PAIR, POINT, SLOTS, zeros
 from blocksim.kernels.common.shapes import ground_gap, separation
+from blocksim.kernels.common.tolerances import CONE_TOLERANCE
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.models.surface import (
-    CONE_TOLERANCE,
     block_points,
     corner_signs,
     corners_near,
