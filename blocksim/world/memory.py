@@ -11,7 +11,7 @@ import numpy as np
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth.arrays import ASIDE, BEFORE, CONSTRAINT, GROUP, IMPACT, KEPT, PART, STATE, TALLY
+from blocksim.kernels.nonsmooth import arrays as rigid
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems.system import SystemInScene
 
@@ -63,10 +63,11 @@ def scene_size(bodies: int, pairs: int, slots: int, *, has_particles: bool = Fal
 
 def rigid_size(bodies: int, pairs: int) -> Size:
     """Return the size of a scene of the non-smooth scheme."""
-    kinds = (BODY, STATE, BEFORE, IMPACT)
+    kinds = (BODY, rigid.STATE, rigid.BEFORE, rigid.IMPACT)
     body = sum(kind.itemsize for kind in kinds) + 3 * VALUE + OBJECT_BYTES
-    group = GROUP.itemsize + ASIDE.itemsize
-    pair = CONSTRAINT.itemsize + KEPT.itemsize + -(-group // WIDTH) + -(-TALLY.itemsize // (WIDTH * PART))
+    pack = rigid.PACK.itemsize + rigid.IMPACT_LANES.itemsize
+    pair = rigid.CONSTRAINT.itemsize + rigid.KEPT.itemsize + -(-pack // WIDTH)
+    pair += -(-rigid.TALLY.itemsize // (WIDTH * rigid.TALLY_PACKS))
     return Size(bodies, pairs, bodies * body + pairs * pair)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import CACHE_LINE, Records, World, zeros
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth import arrays, groups
+from blocksim.kernels.nonsmooth import arrays, packs
 from blocksim.scenario import PlacedBody, Scenario, place_bodies, placement
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.world import build, memory, rigid_step, sag, step
@@ -53,7 +53,7 @@ def velocity_tolerance(scenario: Scenario, blocks: int) -> float:
 
 def is_cut_at_impacts(scenario: Scenario, free: int) -> bool:
     """Return True if steps of so many free blocks may be cut at impacts, where these go in rounds."""
-    return free < rigid_step.FEW and not scenario.loads  # parts shift velocities by what gravity alone brings them
+    return free < rigid_step.FEW and not scenario.loads  # cuts shift velocities by what gravity alone brings them
 
 
 def has_row(placed: Sequence[PlacedBody]) -> bool:
@@ -147,7 +147,7 @@ def _stepping(layout: Layout, stride: step.Stride) -> dict[str, float]:
         "substeps": time.substeps,
         "velocity_sweeps": time.velocity_sweeps,
         "is_guarded": rounds,
-        "is_divided": rounds and is_cut_at_impacts(layout.scenario, free),
+        "has_cuts": rounds and is_cut_at_impacts(layout.scenario, free),
         "least_reach": 0.5 * stride.skin,
         "most_reach": MOST_REACH * stride.skin,
         "is_driven": layout.drives.driven.size > 0,
@@ -157,19 +157,19 @@ def _stepping(layout: Layout, stride: step.Stride) -> dict[str, float]:
 def with_lists(world: World, stepping: Records, capacity: int, threads: int = 1) -> arrays.Nonsmooth:
     """Return worlds (one, or a stack) with empty constraints, as many as there is room for pairs."""
     *members, bodies = world.bodies.shape
-    # full groups, and those in every colour that are not
-    count = min(capacity, capacity // WIDTH + groups.LONELY * arrays.COLOURS)
+    # full packs, and those in every colour that are not
+    count = min(capacity, capacity // WIDTH + packs.LONELY * arrays.COLOURS)
     follows = bool(stepping["is_guarded"].any())
     contacts = arrays.Contacts(
         states=zeros((*members, bodies), arrays.STATE),
         before=zeros((*members, bodies), arrays.BEFORE),
         constraints=zeros((*members, capacity), arrays.CONSTRAINT),
-        groups=zeros((*members, count), arrays.GROUP),
+        packs=zeros((*members, count), arrays.PACK),
         ends=build.numbers((*members, arrays.COLOURS + 1), np.int64),
         materials=world.interactions.reshape(*members, -1).view(np.recarray),
-        tallies=zeros((*members, count // arrays.PART + 1), arrays.TALLY),
+        tallies=zeros((*members, count // arrays.TALLY_PACKS + 1), arrays.TALLY),
         impacts=zeros((*members, bodies), arrays.IMPACT) if follows else None,
-        asides=zeros((*members, count), arrays.ASIDE) if follows else None,
+        impact_lanes=zeros((*members, count), arrays.IMPACT_LANES) if follows else None,
         residuals=build.numbers((*members, 2, LINE_WORDS * threads), np.float64),
         stepping=stepping,
     )

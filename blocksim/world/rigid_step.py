@@ -14,7 +14,7 @@ number, so that costs are about the same, and that of a crowd is the usual one. 
 numbers, so that outputs fall on the ends of steps. So with the way in a step at the speed of an impact. Supports that
 move count as bodies that are driven do: they come no farther towards a block in a step than blocks may move, and a step
 is a twentieth of their shortest period at most. Where few blocks rebound strongly that is not enough, as hops multiply
-errors a hundredfold: their steps are cut at impacts, see blocksim.kernels.nonsmooth.parts.
+errors a hundredfold: their steps are cut at impacts, see blocksim.kernels.nonsmooth.cuts.
 
 Contacts give way at rest as if they were springs, in proportion to the step squared. The step of few blocks is so short
 that this leaves their strength as it is: heavy blocks on light ones sink no farther than sag.py allows, and the thrust

@@ -48,5 +48,5 @@ def test_blocks_with_outlines_have_sets_of_kernels_of_their_own() -> None:
 def test_scenes_without_impacts_in_rounds_have_kernels_without_them(change: dict[str, Any]) -> None:
     scenario = scenario_from_mapping({**schemes.SMALLEST_SCENE, **change})
     scene: Any = build_scene(scenario)
-    in_rounds = hasattr(scene, "kept") and scene.contacts.asides is not None
+    in_rounds = hasattr(scene, "kept") and scene.contacts.impact_lanes is not None
     assert in_rounds == (schemes.kernels_of(scenario) in IN_ROUNDS.values())

@@ -151,9 +151,9 @@ STRONG = 0.75  # calibrated | coupling
 IN_FLIGHT = 1e-9  # round-off | kick
 # Normals with a greater share of gravity press at the start of a run.
 UPRIGHT = 0.1  # calibrated | cosine of an angle
-# Parts of a step that are cut at impacts: the one in which an impact falls, and how many there are, with one more.
+# Steps cut at impacts: the interval in which an impact falls, and the most cuts of a step.
 FINE = 1.0 / 64.0  # calibrated | step
-MOST_PARTS = 32  # calibrated | parts of a step
+MOST_CUTS = 32  # calibrated | cuts of a step
 # Acceleration with which something is held that turns.
 MOST_RESTRAINT = 1.5  # calibrated | square of gravity
 # What still approaches after so many rounds of impacts does not rebound.
@@ -164,8 +164,8 @@ MOST_TRIES = 30  # round-off | tries
 TOLERANCE_SHARE = 1e-7  # round-off | tolerance of the velocity pass
 LEAST_TOLERANCE = 1e-8  # round-off | restitution threshold
 MOST_TOLERANCE = 1e-4  # round-off | restitution threshold
-# Energy that impacts of a cluster may create: they are solved no better.
-IMPACT_ROUND_OFF = 1e-9  # round-off | kinetic energy of the cluster
+# Energy that impacts of a contact group may create: they are solved no better.
+IMPACT_ROUND_OFF = 1e-9  # round-off | kinetic energy of the group
 
 # Soil and SPH
 

@@ -4,7 +4,7 @@ Contact laws are Newton's restitution and Coulomb's friction, both as impulses; 
 that steps are 0.1 to 1 ms long. A step of length dt is
 
     neighbours is the list of pairs still good? else make it and its colours anew            neighbours.py
-    cut        does an impact come first? then a shorter part, where that may be            parts.py
+    cut        does an impact come first? then a shorter part, where that may be            cuts.py
     manifolds  the contact manifold of every pair, kept for the whole step                  narrow_phase.py
                which faces meet, and where they do                                          references.py, manifold.py
     substeps   each of length h: kick, warm start, position pass, drift, velocity pass      passes.py, motion.py
@@ -31,9 +31,9 @@ bodies, but is gone after the velocity pass.
 
 Impacts of bodies that touch one another go in rounds instead (in crowds only where restitution is high; see
 world/nonsmooth.py), and create no energy:
-impacts.py, clusters.py, rounds.py.
+impacts.py, contact_groups.py, impact_rounds.py.
 
-Where few blocks rebound (two at all, up to twelve above 0.5), and of a single one, steps are cut at impacts: parts.py.
+Where few blocks rebound (two at all, up to twelve above 0.5), and of a single one, steps are cut at impacts: cuts.py.
 
 Gravity kicks half a substep at first and whole ones then: velocities live half a substep before positions (leap-frog).
 """

@@ -35,7 +35,7 @@ CONSTRAINT = record_type(
     flags="reach is_struck "
     "corner_one corner_two",  # of a polygon's pair: the corners that the points are, see narrow_phase.py; else zero
 )
-# Four active constraints of one colour, field by field; see groups.py. Two fields share a cache line, and those that a
+# Four active constraints of one colour, field by field; see packs.py. Two fields share a cache line, and those that a
 # sweep needs lie side by side: crowds fill the cache, and wait for memory more than for anything else.
 LANE_INDICES = "a b constraint"  # bodies; number of the constraint
 LANE_FLOATS = (
@@ -46,13 +46,13 @@ LANE_FLOATS = (
     "friction restitution"  # -: coefficients of kinetic friction and of restitution
 )
 LANES_AT = {name: CACHE_LINE + 8 * WIDTH * k for k, name in enumerate(LANE_FLOATS.split())}  # bytes
-SINGLE_FLOATS = {  # 1/kg: A of a group of one, of both normals and along the tangent; in lanes that it does not use
+SINGLE_FLOATS = {  # 1/kg: A of a pack of one, of both normals and along the tangent; in lanes that it does not use
     "one": LANES_AT["restitution"] + 8,
     "mixed": LANES_AT["restitution"] + 16,
     "two": LANES_AT["restitution"] + 24,
     "along": LANES_AT["friction"] + 8,
 }
-GROUP = np.dtype(
+PACK = np.dtype(
     {
         "names": [*LANE_INDICES.split(), "count", "are_simple", "is_coupled", *LANES_AT, *SINGLE_FLOATS],
         "formats": [(np.uint32, (WIDTH,))] * 3
@@ -72,27 +72,27 @@ IMPACT = on_own_lines(
         "low_vx low_vy low_spin "  # m/s, m/s, rad/s: of the last solution that does not gain energy; see impacts.py
         "share "  # -: of rebounds, that is tried; at last, of the way from the lower solution to the higher one
         "low high "  # -: shares of rebounds of both solutions; this and the following of roots
-        "then now "  # J: kinetic energy of the cluster before the round, and after it or as last tried
+        "then now "  # J: kinetic energy of the group before the round, and after it or as last tried
         "least most "  # J: of both solutions
         "between "  # J: of their difference
         "stale",  # -: what the solution that stays counts for
-        counters="root",  # the body that stands for the cluster
-        # anything in the cluster rebounds in the substep; its share is being sought; what its last solution is kept as
+        counters="root",  # the body that stands for the group
+        # anything in the group rebounds in the substep; its share is being sought; what its last solution is kept as
         flags="is_hit is_open side",
     )
 )
-# of a group, beside GROUP, while its bodies go through impacts; see impacts.py
-ASIDE_LANES = (
-    "normal_one normal_two shear "  # N s: of clusters that are not hit, and those of all rounds of others
-    "target_one target_two "  # m/s: as GROUP has them, of the velocity pass before; -FAR if not hit
+# of a pack, beside PACK, while its bodies go through impacts; see impacts.py
+IMPACT_FIELDS = (
+    "normal_one normal_two shear "  # N s: of groups that are not hit, and those of all rounds of others
+    "target_one target_two "  # m/s: as PACK has them, of the velocity pass before; -FAR if not hit
     "rise_one rise_two "  # m/s: that a rebound gets against gravity after all rounds; -FAR before it is hit
     "all_one all_two "  # m/s: targets of a round with all rebounds
     "after_one after_two after_shear "  # N s: of the solutions of impacts.py, as in IMPACT
     "low_one low_two low_shear "
     "held"  # N s: normal impulses of the substep before; FAR of what presses though they are forgotten
 )
-ASIDE = on_own_lines(
-    np.dtype([*((name, np.float64, (WIDTH,)) for name in ASIDE_LANES.split()), ("is_hit", np.uint8)], align=True)
+IMPACT_LANES = on_own_lines(
+    np.dtype([*((name, np.float64, (WIDTH,)) for name in IMPACT_FIELDS.split()), ("is_hit", np.uint8)], align=True)
 )
 KEPT = record_type(
     "nx ny normal_one normal_two shear",  # of a constraint whose pair is in the next list too
@@ -119,21 +119,21 @@ STEPPING = record_type(
     "rest_gap "  # m: points with no larger one touch others at an impact
     "touch_gap "  # m: points with no larger one touch: round-off is smaller, and must not decide
     "frequency damping "  # 1/s, -: w and zeta of points in contact
-    "length gone "  # s: of the current part of a step, and of the step before it; parts.py
-    "last_substep",  # s: with which bodies have moved last, in the part before
+    "length gone "  # s: of the current interval of a step, and of the step before it; cuts.py
+    "last_substep",  # s: with which bodies have moved last, in the interval before
     "substeps "
     "velocity_sweeps "  # at most
-    "colours constraint_count active_count group_count "  # now
+    "colours constraint_count active_count pack_count "  # now
     "sweeps "  # of the velocity pass, in all so far
-    "parts "  # of the current step, before this one
-    "is_divided "  # flag: steps are cut at impacts; parts.py
+    "cuts "  # of the current step so far
+    "has_cuts "  # flag: steps are cut at impacts; cuts.py
     "is_guarded "  # flag: impacts go one after the other, in rounds
     "is_driven "  # flag: bodies move differently from the supports
     "is_settled "  # flag: the run begins at rest, with impulses that hold against gravity
     "is_shaken "  # flag: supports or driven bodies move, so that impulses on them do work
-    "has_forgotten "  # flag: impulses of what pressed are forgotten in the current part of a step, after an impact
+    "has_forgotten "  # flag: impulses of what pressed are forgotten in the current interval, after an impact
     "has_rebounds "  # flag: anything rebounds in the current substep
-    "has_gain",  # flag: the last round has created energy in a cluster
+    "has_gain",  # flag: the last round has created energy in a group
 )
 PUSH = record_type(
     "ax ay rate "  # m/s2, m/s2, rad/s2: of loads, in the current substep
@@ -146,7 +146,7 @@ FAR = tolerances.FAR  # m or m/s: of points that are not there, or do not count
 AWAY, OPEN, TOUCHING = range(3)  # no point within the margin; a gap at all points; a point that touches or pressed
 NOT_STRUCK, STRUCK, STRUCK_AT_REST, FORGOTTEN = range(4)  # the last two pressed before the impact too
 COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it
-PART = 4  # groups that share a tally; threads take whole ones
+TALLY_PACKS = 4  # packs that share a tally; threads take whole ones
 
 
 class Contacts(NamedTuple):
@@ -155,12 +155,12 @@ class Contacts(NamedTuple):
     states: Records  # (n + 1,) STATE
     before: Records  # (n + 1,) BEFORE
     constraints: Records  # (p,) CONSTRAINT, colour after colour, in the order of the pair list
-    groups: Records  # (g,) GROUP of the constraints with a point within the margin, colour after colour
-    ends: Integers  # (COLOURS + 1,) where every colour begins among the groups, and where the last one ends
+    packs: Records  # (g,) PACK of the constraints with a point within the margin, colour after colour
+    ends: Integers  # (COLOURS + 1,) where every colour begins among the packs, and where the last one ends
     materials: Records  # (k k,) INTERACTION of all pairs of contact classes, those of the world in one row
-    tallies: Records  # (p / PART + 1,) TALLY
+    tallies: Records  # (p / TALLY_PACKS + 1,) TALLY
     impacts: Any  # (n + 1,) IMPACT; None where impacts do not follow from one another
-    asides: Any  # (g,) ASIDE; likewise
+    impact_lanes: Any  # (g,) IMPACT_LANES; likewise
     residuals: Floats  # (2, 8 t) m/s: the largest change of velocity that each thread found in a sweep, twice
     stepping: Records  # (1,) STEPPING
 

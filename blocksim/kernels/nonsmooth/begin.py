@@ -15,7 +15,7 @@ from blocksim.kernels.nonsmooth.arrays import AWAY, Nonsmooth
 def is_start(scene: Nonsmooth) -> bool:
     """Return True if velocities are those of time zero, not half a substep before."""
     stepping = scene.contacts.stepping[0]
-    return scene.world.clock[0].steps == 0 and stepping.parts == 0 and stepping.is_settled == 0
+    return scene.world.clock[0].steps == 0 and stepping.cuts == 0 and stepping.is_settled == 0
 
 
 @jit.rare_kernel

@@ -17,7 +17,7 @@ from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import Lane, Lanes, branch, four, greater, is_all, load, select, split
 from blocksim.kernels.common.tolerances import STRONG
 from blocksim.kernels.nonsmooth.arrays import Contacts
-from blocksim.kernels.nonsmooth.groups import Bodies, bodies_at, constraints_of, material_of, normal_masses
+from blocksim.kernels.nonsmooth.packs import Bodies, bodies_at, constraints_of, material_of, normal_masses
 from blocksim.kernels.nonsmooth.slip import Constraints
 
 
@@ -38,19 +38,19 @@ def shear_limit(material: Record, normal: float, needed: float, mass: float) -> 
 
 
 @kernel
-def shear_limits(contacts: Contacts, group: Record, lane: Lane, normal: Lanes, needed: Lanes, mass: Lanes) -> Lanes:
+def shear_limits(contacts: Contacts, pack: Record, lane: Lane, normal: Lanes, needed: Lanes, mass: Lanes) -> Lanes:
     """Return the largest shear impulses (N s) of constraints; see shear_limit."""
-    if group.are_simple:
-        return load(lane, group.friction) * normal
+    if pack.are_simple:
+        return load(lane, pack.friction) * normal
     n_0, n_1, n_2, n_3 = split(normal)
     s_0, s_1, s_2, s_3 = split(needed)
     m_0, m_1, m_2, m_3 = split(mass)
     return four(
         lane,
-        shear_limit(material_of(contacts, group, 0), n_0, s_0, m_0),
-        shear_limit(material_of(contacts, group, 1), n_1, s_1, m_1),
-        shear_limit(material_of(contacts, group, 2), n_2, s_2, m_2),
-        shear_limit(material_of(contacts, group, 3), n_3, s_3, m_3),
+        shear_limit(material_of(contacts, pack, 0), n_0, s_0, m_0),
+        shear_limit(material_of(contacts, pack, 1), n_1, s_1, m_1),
+        shear_limit(material_of(contacts, pack, 2), n_2, s_2, m_2),
+        shear_limit(material_of(contacts, pack, 3), n_3, s_3, m_3),
     )
 
 
@@ -62,37 +62,37 @@ def within(needed: Lanes, limit: Lanes) -> Lanes:
 
 
 @kernel
-def coupling(group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
+def coupling(pack: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
     """Return the change of a normal impulse over that which it brings by sliding friction, of the worse point (-)."""
     coupled_a = a.inverse_inertia * constraint.shear_arm_a
     coupled_b = b.inverse_inertia * constraint.shear_arm_b
     by_one = coupled_a * constraint.arm_a + coupled_b * constraint.arm_b
     by_two = by_one - (coupled_a + coupled_b) * constraint.width
     one, _, two = normal_masses(constraint, a, b)
-    return load(lane, group.friction) * greater(abs(by_one) / one, abs(by_two) / two)
+    return load(lane, pack.friction) * greater(abs(by_one) / one, abs(by_two) / two)
 
 
 @kernel
-def is_coupled(contacts: Contacts, group: Record, lane: Lane) -> bool:
-    """Return True if the coupling of a constraint of a group is strong."""
-    a = bodies_at(contacts, group.a, lane)
-    b = bodies_at(contacts, group.b, lane)
-    return not is_all(coupling(group, lane, constraints_of(group, lane), a, b) <= STRONG)
+def is_coupled(contacts: Contacts, pack: Record, lane: Lane) -> bool:
+    """Return True if the coupling of a constraint of a pack is strong."""
+    a = bodies_at(contacts, pack.a, lane)
+    b = bodies_at(contacts, pack.b, lane)
+    return not is_all(coupling(pack, lane, constraints_of(pack, lane), a, b) <= STRONG)
 
 
 @kernel
 def shear_within(
-    group: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies, old: Lanes, needed: Lanes, limit: Lanes
+    pack: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies, old: Lanes, needed: Lanes, limit: Lanes
 ) -> Lanes:
     """Return the shear impulses (N s) nearest to those needed that the limits allow, or a share of the way there."""
-    if group.is_coupled:
-        return approached(group, lane, constraint, a, b, old, needed, limit)
+    if pack.is_coupled:
+        return approached(pack, lane, constraint, a, b, old, needed, limit)
     return within(needed, limit)
 
 
 @rare_kernel
 def approached(
-    group: Record,
+    pack: Record,
     lane: Lane,
     constraint: Constraints,
     a: Bodies,
@@ -103,7 +103,7 @@ def approached(
 ) -> Lanes:
     """Return shear impulses (N s) as `within` does, of bodies that slide a share of the way there from the old ones."""
     shear = within(needed, limit)
-    factor = coupling(group, lane, constraint, a, b)
+    factor = coupling(pack, lane, constraint, a, b)
     return select((factor > STRONG) & (abs(needed) > limit), old + (shear - old) / (1.0 + factor), shear)
 
 

@@ -5,7 +5,7 @@ its normal is theirs. The face of the other body that looks most against it is c
 
 What is known of a shape is in few functions: its number of faces, a face by its number, and the face that looks most
 against a direction. Rectangles among themselves have their half sides in registers and no hulls (None),
-which the compiler knows; all bodies of a scene with polygons have their corners in one table. As in groups.py one
+which the compiler knows; all bodies of a scene with polygons have their corners in one table. As in packs.py one
 source serves four bodies and a single one: `lane` is None for four. Of four bodies with different numbers of faces the
 table has faces after those of each that are never found (world/bodies.py).
 """

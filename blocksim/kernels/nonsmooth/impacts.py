@@ -1,4 +1,4 @@
-"""Impacts one after the other within a substep, for clusters in which anything rebounds.
+"""Impacts one after the other within a substep, for contact groups in which anything rebounds.
 
 The velocity pass gives every point that approached before the substep its rebound, and stops the approach of all other
 points: a block that is struck and strikes the next one in the same substep would lose its rebound there. So impacts go
@@ -16,16 +16,16 @@ Without friction the energy of a round changes by -(1 - e) / 2 sum(lambda |u|): 
 lost (M. Smith et al., Reflections on simultaneous impact, ACM Trans. Graph. 31 (2012) 106). With friction Newton's
 restitution can create energy (T. R. Kane and D. A. Levinson, Dynamics (1985), section 5.8). Without rebounds a round
 creates none: with lambda_n t = 0 and friction against the slip that is left the change is at most
--1/2 lambda A lambda. A cluster that gains has the round solved again with the share of its rebounds that leaves it the
+-1/2 lambda A lambda. A group that gains has the round solved again with the share of its rebounds that leaves it the
 energy that it had.
 
-How much of its rebounds a cluster gets that would gain energy with all of them.
+How much of its rebounds a group gets that would gain energy with all of them.
 
 A share x of the rebounds of a round, from 0 to 1, has a solution of its own: the round with all targets above zero
 times x. Velocities v(x) are straight lines in x with bends where a point begins or ends to slide or to press, and the
 energy K(x) is a parabola on each of them. Without rebounds no energy is gained, so that between 0 and 1 it is at some x
-what it was. A cluster gets v(x) there. With more restitution x falls in proportion, and v(x) is the same: what a
-cluster does grows with restitution until it would gain energy, and stays.
+what it was. A group gets v(x) there. With more restitution x falls in proportion, and v(x) is the same: what a
+group does grows with restitution until it would gain energy, and stays.
 
 For one point there is one such x: with y its velocity after the round along the normal, w that along the tangent and
 A = J M^-1 J^T, energy changes by dK = y d(lambda_n) + w d(lambda_t). Where it sticks, that is y d(lambda_n) >= 0. Where
@@ -52,18 +52,18 @@ from blocksim.kernels.common.tolerances import (
     MOST_TRIES,
     TOLERANCE_SHARE,
 )
-from blocksim.kernels.nonsmooth import arrays, clusters, motion, passes, rounds, sweeps
+from blocksim.kernels.nonsmooth import arrays, contact_groups, impact_rounds, motion, passes, sweeps
 
-NEITHER, LOW, HIGH = range(3)  # what the last solution of a cluster is kept as: that with too little or too much energy
+NEITHER, LOW, HIGH = range(3)  # what the last solution of a group is kept as: that with too little or too much energy
 
 
 @rare_kernel
 def begin_search(contacts: arrays.Contacts) -> None:
-    """Let all clusters that have gained energy begin without rebounds; the others keep all of theirs."""
+    """Let all groups that have gained energy begin without rebounds; the others keep all of theirs."""
     bodies = contacts.impacts
     for body in bodies:
         root = bodies[body.root]
-        body.is_open = 1 if clusters.has_gain(root) else 0
+        body.is_open = 1 if contact_groups.has_gain(root) else 0
         body.share = 0.0 if body.is_open else 1.0
         body.side = NEITHER
         body.low = 0.0
@@ -76,28 +76,28 @@ def begin_search(contacts: arrays.Contacts) -> None:
 def keep_all(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Keep the targets of a round and the impulses with all rebounds."""
     for m in range(begin, end):
-        aside = contacts.asides[m]
-        if aside.is_hit:
-            group = contacts.groups[m]
-            store(None, aside.all_one, load(None, group.target_one))
-            store(None, aside.all_two, load(None, group.target_two))
-            store(None, aside.after_one, load(None, group.normal_one))
-            store(None, aside.after_two, load(None, group.normal_two))
-            store(None, aside.after_shear, load(None, group.shear))
+        lanes = contacts.impact_lanes[m]
+        if lanes.is_hit:
+            pack = contacts.packs[m]
+            store(None, lanes.all_one, load(None, pack.target_one))
+            store(None, lanes.all_two, load(None, pack.target_two))
+            store(None, lanes.after_one, load(None, pack.normal_one))
+            store(None, lanes.after_two, load(None, pack.normal_two))
+            store(None, lanes.after_shear, load(None, pack.shear))
 
 
 @rare_kernel
 def aim_share(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Begin a round again with the share of its rebounds that is to be tried; leave out clusters that are done."""
+    """Begin a round again with the share of its rebounds that is to be tried; leave out groups that are done."""
     for m in range(begin, end):
-        aside = contacts.asides[m]
-        if aside.is_hit:
-            group = contacts.groups[m]
-            rounds.clear(group)
+        lanes = contacts.impact_lanes[m]
+        if lanes.is_hit:
+            pack = contacts.packs[m]
+            impact_rounds.clear(pack)
             for lane in range(WIDTH):
-                body = clusters.of_constraint(contacts, group, min(lane, group.count - 1))
-                group.target_one[lane] = part_of_target(aside.all_one[lane], body)
-                group.target_two[lane] = part_of_target(aside.all_two[lane], body)
+                body = contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1))
+                pack.target_one[lane] = part_of_target(lanes.all_one[lane], body)
+                pack.target_two[lane] = part_of_target(lanes.all_two[lane], body)
 
 
 @rare_kernel
@@ -112,7 +112,7 @@ def part_of_target(target: float, body: Record) -> float:
 def judge(contacts: arrays.Contacts, is_last: bool) -> bool:
     """Decide as what the solutions just found are to be kept, and what is to be tried next; return whether anything is.
 
-    Clusters that are done have in `share` where they are between their two solutions.
+    Contact groups that are done have in `share` where they are between their two solutions.
     """
     bodies = contacts.impacts
     weigh_again(contacts)
@@ -134,7 +134,7 @@ def judge(contacts: arrays.Contacts, is_last: bool) -> bool:
 
 @rare_kernel
 def weigh_again(contacts: arrays.Contacts) -> None:
-    """Sum up the energies of all clusters that are not done."""
+    """Sum up the energies of all groups that are not done."""
     states = contacts.states
     bodies = contacts.impacts
     for body in bodies:
@@ -142,15 +142,15 @@ def weigh_again(contacts: arrays.Contacts) -> None:
             body.now = 0.0
     for i in range(bodies.size):
         if bodies[i].is_open and states[i].inverse_mass > 0.0:
-            bodies[bodies[i].root].now += clusters.energy(
+            bodies[bodies[i].root].now += contact_groups.energy(
                 contacts, states[i], states[i].vx, states[i].vy, states[i].spin
             )
-    clusters.count_work(contacts)
+    contact_groups.count_work(contacts)
 
 
 @rare_kernel
 def close_in(root: Record) -> None:
-    """Let the solution just found replace the one on the same side of the energy that a cluster had."""
+    """Let the solution just found replace the one on the same side of the energy that a group had."""
     last = root.side
     if not root.is_open:
         root.side = NEITHER
@@ -165,7 +165,7 @@ def close_in(root: Record) -> None:
 
 @rare_kernel
 def find_between(contacts: arrays.Contacts) -> None:
-    """Sum up the energy of the difference between the two solutions of every cluster, and give its bodies the side."""
+    """Sum up the energy of the difference between the two solutions of every group, and give its bodies the side."""
     states = contacts.states
     bodies = contacts.impacts
     ux = contacts.stepping[0].support_vx
@@ -182,12 +182,12 @@ def find_between(contacts: arrays.Contacts) -> None:
             vx = state.vx - (body.after_vx if is_low else body.low_vx) + ux
             vy = state.vy - (body.after_vy if is_low else body.low_vy) + uy
             spin = state.spin - (body.after_spin if is_low else body.low_spin)
-            root.between += clusters.energy(contacts, state, vx, vy, spin)
+            root.between += contact_groups.energy(contacts, state, vx, vy, spin)
 
 
 @rare_kernel
 def try_next(root: Record, is_last: bool) -> None:
-    """Set the share that a cluster tries next, or where it ends up between its two solutions."""
+    """Set the share that a group tries next, or where it ends up between its two solutions."""
     room = root.then - root.least
     excess = root.most - root.then
     if is_last or room <= 0.0 or abs(root.now - root.then) <= IMPACT_ROUND_OFF * root.then:
@@ -216,26 +216,26 @@ def share_of(room: float, gain: float, between: float) -> float:
 
 @rare_kernel
 def keep_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Keep the impulses just found, on the side that their cluster is on."""
+    """Keep the impulses just found, on the side that their group is on."""
     for m in range(begin, end):
-        aside = contacts.asides[m]
-        if aside.is_hit:
-            group = contacts.groups[m]
+        lanes = contacts.impact_lanes[m]
+        if lanes.is_hit:
+            pack = contacts.packs[m]
             for lane in range(WIDTH):
-                side = clusters.of_constraint(contacts, group, min(lane, group.count - 1)).side
+                side = contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1)).side
                 if side == LOW:
-                    aside.low_one[lane] = group.normal_one[lane]
-                    aside.low_two[lane] = group.normal_two[lane]
-                    aside.low_shear[lane] = group.shear[lane]
+                    lanes.low_one[lane] = pack.normal_one[lane]
+                    lanes.low_two[lane] = pack.normal_two[lane]
+                    lanes.low_shear[lane] = pack.shear[lane]
                 elif side == HIGH:
-                    aside.after_one[lane] = group.normal_one[lane]
-                    aside.after_two[lane] = group.normal_two[lane]
-                    aside.after_shear[lane] = group.shear[lane]
+                    lanes.after_one[lane] = pack.normal_one[lane]
+                    lanes.after_two[lane] = pack.normal_two[lane]
+                    lanes.after_shear[lane] = pack.shear[lane]
 
 
 @rare_kernel
 def keep_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
-    """Keep the velocities just found, on the side that their cluster is on, and go back to the start of the round."""
+    """Keep the velocities just found, on the side that their group is on, and go back to the start of the round."""
     for i in range(first, last):
         body = contacts.impacts[i]
         state = contacts.states[i]
@@ -249,21 +249,21 @@ def keep_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
 
 @rare_kernel
 def settle_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Give constraints the impulses that their cluster ends up with."""
+    """Give constraints the impulses that their group ends up with."""
     for m in range(begin, end):
-        aside = contacts.asides[m]
-        if aside.is_hit:
-            group = contacts.groups[m]
+        lanes = contacts.impact_lanes[m]
+        if lanes.is_hit:
+            pack = contacts.packs[m]
             for lane in range(WIDTH):
-                s = clusters.of_constraint(contacts, group, min(lane, group.count - 1)).share
-                group.normal_one[lane] = between(aside.low_one[lane], aside.after_one[lane], s)
-                group.normal_two[lane] = between(aside.low_two[lane], aside.after_two[lane], s)
-                group.shear[lane] = between(aside.low_shear[lane], aside.after_shear[lane], s)
+                s = contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1)).share
+                pack.normal_one[lane] = between(lanes.low_one[lane], lanes.after_one[lane], s)
+                pack.normal_two[lane] = between(lanes.low_two[lane], lanes.after_two[lane], s)
+                pack.shear[lane] = between(lanes.low_shear[lane], lanes.after_shear[lane], s)
 
 
 @rare_kernel
 def settle_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
-    """Give bodies the velocities that their cluster ends up with."""
+    """Give bodies the velocities that their group ends up with."""
     for i in range(first, last):
         body = contacts.impacts[i]
         if body.is_hit:
@@ -290,7 +290,7 @@ def tolerance_of(stepping: Record) -> float:
 
 @rare_kernel
 def rewind(contacts: arrays.Contacts, first: int, last: int) -> None:
-    """Bring the bodies of clusters that are hit back to their velocities before the substep."""
+    """Bring the bodies of groups that are hit back to their velocities before the substep."""
     for i in range(first, last):
         if contacts.impacts[i].is_hit:
             state = contacts.states[i]
@@ -325,7 +325,7 @@ def undo(contacts: arrays.Contacts, first: int, last: int) -> None:
 
 @rare_kernel
 def resume(contacts: arrays.Contacts, first: int, last: int, gx: float, gy: float) -> None:
-    """Let the substep of the bodies of clusters that were hit begin after the last impact, with gravity (m/s)."""
+    """Let the substep of the bodies of groups that were hit begin after the last impact, with gravity (m/s)."""
     for i in range(first, last):
         if contacts.impacts[i].is_hit:
             state = contacts.states[i]
@@ -339,45 +339,45 @@ def resume(contacts: arrays.Contacts, first: int, last: int, gx: float, gy: floa
 
 @rare_kernel
 def restrain(
-    contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]
+    contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], packs: tuple[int, int]
 ) -> None:
-    """Leave clusters that have gained energy in a round that share of their rebounds with which they do not."""
+    """Leave groups that have gained energy in a round that share of their rebounds with which they do not."""
     stepping = contacts.stepping[0]
-    keep_all(contacts, groups[0], groups[1])
+    keep_all(contacts, packs[0], packs[1])
     undo(contacts, bodies[0], bodies[1])
     barrier(team)
     if k == 0:
         begin_search(contacts)
     barrier(team)
     for number in range(MOST_TRIES):
-        aim_share(contacts, groups[0], groups[1])
+        aim_share(contacts, packs[0], packs[1])
         barrier(team)
         sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(stepping))
         barrier(team)
         if k == 0:
             stepping.has_gain = judge(contacts, number == MOST_TRIES - 1)
         barrier(team)
-        keep_constraints(contacts, groups[0], groups[1])
+        keep_constraints(contacts, packs[0], packs[1])
         keep_bodies(contacts, bodies[0], bodies[1])
         barrier(team)
         if not stepping.has_gain:
             break
-    settle_constraints(contacts, groups[0], groups[1])
+    settle_constraints(contacts, packs[0], packs[1])
     settle_bodies(contacts, bodies[0], bodies[1])
 
 
 @rare_kernel
 def go_round(
-    contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], groups: tuple[int, int]
+    contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], packs: tuple[int, int]
 ) -> None:
     """Solve one round that has been aimed."""
     sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(contacts.stepping[0]))
     barrier(team)
     if k == 0:
-        contacts.stepping[0].has_gain = clusters.weigh(contacts)
+        contacts.stepping[0].has_gain = contact_groups.weigh(contacts)
     barrier(team)
     if contacts.stepping[0].has_gain:
-        restrain(contacts, team, k, bodies, groups)
+        restrain(contacts, team, k, bodies, packs)
         barrier(team)
 
 
@@ -385,33 +385,33 @@ def go_round(
 def follow_impacts(
     contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], share: float, pushes: Records
 ) -> None:
-    """Let clusters in which anything rebounds go through their impacts one after the other.
+    """Let groups in which anything rebounds go through their impacts one after the other.
 
     `bodies` are those of thread k, `share` is that of a kick of gravity in this substep, `pushes` are of loads.
     """
     stepping = contacts.stepping[0]
-    groups = sweeps.part_of(0, stepping.group_count, k, team[TEAM_SIZE])
+    packs = sweeps.range_of_thread(0, stepping.pack_count, k, team[TEAM_SIZE])
     if k == 0:
-        clusters.find_clusters(contacts)
+        contact_groups.find_contact_groups(contacts)
     barrier(team)
     rewind(contacts, bodies[0], bodies[1])
-    rounds.set_aside(contacts, groups[0], groups[1])
+    impact_rounds.set_aside(contacts, packs[0], packs[1])
     barrier(team)
     for number in range(MOST_ROUNDS):
         note(contacts, bodies[0], bodies[1] + (k == team[TEAM_SIZE] - 1))  # the ground, which may move, is the last
-        hits = rounds.aim_round(contacts, groups[0], groups[1], number == 0)
+        hits = impact_rounds.aim_round(contacts, packs[0], packs[1], number == 0)
         if sweeps.agree(contacts, team, k, number, hits) == 0.0:
             break
-        go_round(contacts, team, k, bodies, groups)
+        go_round(contacts, team, k, bodies, packs)
         lacks = 2.0 * stepping.lag  # once before the round, once after it
-        rounds.tally_round(contacts, groups[0], groups[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
+        impact_rounds.tally_round(contacts, packs[0], packs[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
         barrier(team)
     resume(contacts, bodies[0], bodies[1], share * stepping.fall_x, share * stepping.fall_y)
     if pushes.size > 1:
         motion.kick_again(contacts, pushes, bodies[0], bodies[1], share)
     barrier(team)
-    rounds.aim_rest(contacts, groups[0], groups[1])
+    impact_rounds.aim_rest(contacts, packs[0], packs[1])
     barrier(team)
     sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
-    rounds.bring_back(contacts, groups[0], groups[1], False)
+    impact_rounds.bring_back(contacts, packs[0], packs[1], False)
     barrier(team)

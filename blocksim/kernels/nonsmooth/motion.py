@@ -12,7 +12,7 @@ Prescribed motion: of the supports (the ground, its pieces, walls, fixed bodies)
 from blocksim.kernels.common import jit, loads, shapes, supports
 from blocksim.kernels.common.arrays import LOAD_FORCE, Record, Records, World
 from blocksim.kernels.common.tolerances import IN_FLIGHT
-from blocksim.kernels.nonsmooth import arrays, parts
+from blocksim.kernels.nonsmooth import arrays, cuts
 
 
 @jit.kernel
@@ -157,7 +157,7 @@ def kick_by_loads(scene: arrays.Nonsmooth, number: int, first: int, last: int, s
 
 @jit.rare_kernel
 def kick_again(contacts: arrays.Contacts, pushes: Records, first: int, last: int, share: float) -> None:
-    """Add the kick of loads to bodies of clusters that were hit, whose substep begins after the last impact."""
+    """Add the kick of loads to bodies of groups that were hit, whose substep begins after the last impact."""
     kick = share * contacts.stepping[0].substep
     for i in range(first, last):
         if contacts.impacts[i].is_hit and contacts.states[i].inverse_mass > 0.0:
@@ -195,7 +195,7 @@ def drive(scene: arrays.Nonsmooth, number: int) -> None:
     controls = world.controls[0]
     stepping = scene.contacts.stepping[0]
     h = stepping.substep
-    begin = parts.begin_of_part(scene) + number * h
+    begin = cuts.begin_of_interval(scene) + number * h
     rate = (displacement_at(world, begin + h) - displacement_at(world, begin)) / h
     stepping.support_vx = controls.motion_x * rate
     stepping.support_vy = controls.motion_y * rate
@@ -227,7 +227,7 @@ def place_supports(scene: arrays.Nonsmooth) -> None:
     world = scene.world
     controls = world.controls[0]
     clock = world.clock[0]
-    now = parts.end_of_part(scene)
+    now = cuts.end_of_interval(scene)
     clock.motion_piece = supports.piece_at(world.motion, clock.motion_piece, now)
     moved = supports.displacement(world.motion[clock.motion_piece], now)
     stepping = scene.contacts.stepping[0]

@@ -21,7 +21,7 @@ from blocksim.kernels.common import arrays, jit, neighbours, supports
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.common.tolerances import MOST_MARGIN, REACH_STEPS
 from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, KEPT, Nonsmooth
-from blocksim.kernels.nonsmooth.groups import LONELY
+from blocksim.kernels.nonsmooth.packs import LONELY
 
 ONE = 1
 NEW_PAIR = arrays.zeros(1, KEPT)
@@ -95,12 +95,12 @@ def colour_pairs(scene: Nonsmooth, count: int) -> None:
 
 
 @jit.rare_kernel
-def most_groups(scene: Nonsmooth) -> int:
-    """Return how many groups the constraints can make, whichever are active; the last colour's are solved singly."""
+def most_packs(scene: Nonsmooth) -> int:
+    """Return how many packs the constraints can make, whichever are active; the last colour's are solved singly."""
     count = 0
     for colour in range(COLOURS):
         size = scene.begins[colour + 1] - scene.begins[colour]
-        most_left = min(size, LONELY if size % WIDTH >= LONELY else 1)  # groups of fewer than four; see gather
+        most_left = min(size, LONELY if size % WIDTH >= LONELY else 1)  # packs of fewer than four; see gather
         count += size if colour == COLOURS - 1 else size // WIDTH + most_left
     return count
 
@@ -212,7 +212,7 @@ def rebuild(scene: Nonsmooth, frame: Frame) -> bool:
     if fits:
         keep_impulses(scene, count)
         colour_pairs(scene, count)
-        fits = most_groups(scene) <= contacts.groups.size
+        fits = most_packs(scene) <= contacts.packs.size
     if not fits:
         world.clock[0].rebuilds = 0
         return False

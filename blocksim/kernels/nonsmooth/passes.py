@@ -26,22 +26,22 @@ from blocksim.kernels.common.simd import (
     store,
     write_fields_0,
 )
-from blocksim.kernels.nonsmooth import arrays, cone, groups
+from blocksim.kernels.nonsmooth import arrays, cone, packs
 from blocksim.kernels.nonsmooth.slip import Constraints, Slip, presses, slip_of
 
 
 @kernel
 def gaps(
-    group: Record, lane: Lane, constraint: Constraints, a: groups.Bodies, b: groups.Bodies, bend_time: float
+    pack: Record, lane: Lane, constraint: Constraints, a: packs.Bodies, b: packs.Bodies, bend_time: float
 ) -> tuple[Lanes, Lanes]:
     """Return both gaps (m) as they are now; `bend_time` (s) is that of slip.py now."""
     slip = slip_of(constraint, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
-    bent = bend_time * load(lane, group.bend)
-    return load(lane, group.gap_one) + slip.one + bent, load(lane, group.gap_two) + slip.two + bent
+    bent = bend_time * load(lane, pack.bend)
+    return load(lane, pack.gap_one) + slip.one + bent, load(lane, pack.gap_two) + slip.two + bent
 
 
 @kernel
-def pulls(constraint: Constraints, a: groups.Bodies, b: groups.Bodies, stepping: Record) -> Lanes:
+def pulls(constraint: Constraints, a: packs.Bodies, b: packs.Bodies, stepping: Record) -> Lanes:
     """Return by how much gravity changes J v of constraints in a substep (m/s) as long as nothing touches.
 
     So do loads that act on all bodies. Those on single ones are left out: a rebound is off by their share of a kick.
@@ -79,20 +79,20 @@ def target(impulse: Lanes, inverse_mass: Lanes, gap: Lanes, least: Lanes, steppi
 
 @kernel
 def aim(
-    contacts: arrays.Contacts, group: Record, lane: Lane, constraint: Constraints, a: groups.Bodies, b: groups.Bodies
+    contacts: arrays.Contacts, pack: Record, lane: Lane, constraint: Constraints, a: packs.Bodies, b: packs.Bodies
 ) -> tuple[Lanes, Lanes]:
     """Set what the velocity pass has to reach at the points of constraints."""
     stepping = contacts.stepping[0]
-    gap_one, gap_two = gaps(group, lane, constraint, a, b, stepping.next_bend_time)
-    normal_one = load(lane, group.normal_one)
-    normal_two = load(lane, group.normal_two)
+    gap_one, gap_two = gaps(pack, lane, constraint, a, b, stepping.next_bend_time)
+    normal_one = load(lane, pack.normal_one)
+    normal_two = load(lane, pack.normal_two)
     if is_all((lesser(gap_one, gap_two) > stepping.touch_gap) & (greater(normal_one, normal_two) <= 0.0)):
         none = 0.0 * gap_one - arrays.FAR
-        store(lane, group.target_one, none)
-        store(lane, group.target_two, none)
+        store(lane, pack.target_one, none)
+        store(lane, pack.target_two, none)
         return none, none
-    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, group.a)
-    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, group.b)
+    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, pack.a)
+    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, pack.b)
     u = slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
     inverse_mass = a.inverse_mass + b.inverse_mass
     least_one = -branch(gap_one > 0.0, gap_one, 0.0) * stepping.open_bias
@@ -100,31 +100,31 @@ def aim(
     t_one = target(normal_one, inverse_mass, gap_one, least_one, stepping)
     t_two = target(normal_two, inverse_mass, gap_two, least_two, stepping)
     if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -arrays.FAR)):
-        t_one, t_two = with_rebounds(contacts, group, lane, constraint, a, b, u, t_one, t_two)
-    store(lane, group.target_one, t_one)
-    store(lane, group.target_two, t_two)
+        t_one, t_two = with_rebounds(contacts, pack, lane, constraint, a, b, u, t_one, t_two)
+    store(lane, pack.target_one, t_one)
+    store(lane, pack.target_two, t_two)
     return t_one, t_two
 
 
 @kernel
 def with_rebounds(
     contacts: arrays.Contacts,
-    group: Record,
+    pack: Record,
     lane: Lane,
     constraint: Constraints,
-    a: groups.Bodies,
-    b: groups.Bodies,
+    a: packs.Bodies,
+    b: packs.Bodies,
     u: Slip,
     t_one: Lanes,
     t_two: Lanes,
 ) -> tuple[Lanes, Lanes]:
     """Return the targets (m/s) of constraints with those of points that rebound, which approach with u."""
     stepping = contacts.stepping[0]
-    restitution = load(lane, group.restitution)
+    restitution = load(lane, pack.restitution)
     pull = pulls(constraint, a, b, stepping)
-    after_one = rebound(u.one, load(lane, group.start_one), pull, restitution, stepping)
-    after_two = rebound(u.two, load(lane, group.start_two), pull, restitution, stepping)
-    rebounds = restitution > (-1.0 if stepping.is_divided else 0.0)  # then it is an impact without any rebound too
+    after_one = rebound(u.one, load(lane, pack.start_one), pull, restitution, stepping)
+    after_two = rebound(u.two, load(lane, pack.start_two), pull, restitution, stepping)
+    rebounds = restitution > (-1.0 if stepping.has_cuts else 0.0)  # then it is an impact without any rebound too
     t_one = select(rebounds & (u.one < -stepping.threshold) & (t_one > -arrays.FAR), after_one, t_one)
     t_two = select(rebounds & (u.two < -stepping.threshold) & (t_two > -arrays.FAR), after_two, t_two)
     if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):
@@ -135,11 +135,11 @@ def with_rebounds(
 @kernel
 def push(
     contacts: arrays.Contacts,
-    group: Record,
+    pack: Record,
     lane: Lane,
     constraint: Constraints,
-    a: groups.Bodies,
-    b: groups.Bodies,
+    a: packs.Bodies,
+    b: packs.Bodies,
     normal: Lanes,
     second: Lanes,
 ) -> None:
@@ -147,17 +147,17 @@ def push(
     turn = constraint.width * second
     turn_a = constraint.arm_a * normal - turn
     turn_b = constraint.arm_b * normal - turn
-    shove(contacts, group, lane, a, b, (constraint.nx * normal, constraint.ny * normal, turn_a, turn_b))
+    shove(contacts, pack, lane, a, b, (constraint.nx * normal, constraint.ny * normal, turn_a, turn_b))
 
 
 @kernel
 def push_and_drag(
     contacts: arrays.Contacts,
-    group: Record,
+    pack: Record,
     lane: Lane,
     constraint: Constraints,
-    a: groups.Bodies,
-    b: groups.Bodies,
+    a: packs.Bodies,
+    b: packs.Bodies,
     normal: Lanes,
     second: Lanes,
     shear: Lanes,
@@ -168,16 +168,16 @@ def push_and_drag(
     turn = constraint.width * second
     turn_a = constraint.arm_a * normal - turn + constraint.shear_arm_a * shear
     turn_b = constraint.arm_b * normal - turn + constraint.shear_arm_b * shear
-    shove(contacts, group, lane, a, b, (px, py, turn_a, turn_b))
+    shove(contacts, pack, lane, a, b, (px, py, turn_a, turn_b))
 
 
 @kernel
 def shove(
     contacts: arrays.Contacts,
-    group: Record,
+    pack: Record,
     lane: Lane,
-    a: groups.Bodies,
-    b: groups.Bodies,
+    a: packs.Bodies,
+    b: packs.Bodies,
     impulse: tuple[Lanes, Lanes, Lanes, Lanes],
 ) -> None:
     """Change the velocities of the bodies by an impulse: along x and y (N s), its moments about both (N m s)."""
@@ -185,66 +185,66 @@ def shove(
     vx = a.vx + a.inverse_mass * px
     vy = a.vy + a.inverse_mass * py
     spin = a.spin + a.inverse_inertia * turn_a
-    write_fields_0(lane, contacts.states, group.a, a.inverse_mass > 0.0, (vx, vy, spin, a.inverse_mass))
+    write_fields_0(lane, contacts.states, pack.a, a.inverse_mass > 0.0, (vx, vy, spin, a.inverse_mass))
     vx = b.vx - b.inverse_mass * px
     vy = b.vy - b.inverse_mass * py
     spin = b.spin - b.inverse_inertia * turn_b
-    write_fields_0(lane, contacts.states, group.b, b.inverse_mass > 0.0, (vx, vy, spin, b.inverse_mass))
+    write_fields_0(lane, contacts.states, pack.b, b.inverse_mass > 0.0, (vx, vy, spin, b.inverse_mass))
 
 
 @kernel
 def masses(
-    group: Record, lane: Lane, constraint: Constraints, a: groups.Bodies, b: groups.Bodies
+    pack: Record, lane: Lane, constraint: Constraints, a: packs.Bodies, b: packs.Bodies
 ) -> tuple[Lanes, Lanes, Lanes]:
     """Return A (1/kg) of the two normals: of one, mixed, of two.
 
     Of four constraints it is computed again each time, which is cheaper than to load it, of one it is kept.
     """
     if lane is None:
-        return groups.normal_masses(constraint, a, b)
-    return group.one, group.mixed, group.two
+        return packs.normal_masses(constraint, a, b)
+    return pack.one, pack.mixed, pack.two
 
 
 @kernel
-def shear_mass(group: Record, lane: Lane, constraint: Constraints, a: groups.Bodies, b: groups.Bodies) -> Lanes:
+def shear_mass(pack: Record, lane: Lane, constraint: Constraints, a: packs.Bodies, b: packs.Bodies) -> Lanes:
     """Return A (1/kg) along the tangent; kept as in masses."""
     if lane is None:
-        return groups.tangent_mass(constraint, a, b)
-    return group.along
+        return packs.tangent_mass(constraint, a, b)
+    return pack.along
 
 
 @kernel
-def warm_group(contacts: arrays.Contacts, group: Record, lane: Lane) -> None:
+def warm_pack(contacts: arrays.Contacts, pack: Record, lane: Lane) -> None:
     """Begin with the impulses of the last substep."""
-    second = load(lane, group.normal_two)
-    normal = load(lane, group.normal_one) + second
+    second = load(lane, pack.normal_two)
+    normal = load(lane, pack.normal_one) + second
     if not is_all(normal <= 0.0):
-        a = groups.bodies_at(contacts, group.a, lane)
-        b = groups.bodies_at(contacts, group.b, lane)
+        a = packs.bodies_at(contacts, pack.a, lane)
+        b = packs.bodies_at(contacts, pack.b, lane)
         push_and_drag(
-            contacts, group, lane, groups.constraints_of(group, lane), a, b, normal, second, load(lane, group.shear)
+            contacts, pack, lane, packs.constraints_of(pack, lane), a, b, normal, second, load(lane, pack.shear)
         )
 
 
 @kernel
-def position_group(contacts: arrays.Contacts, group: Record, lane: Lane) -> None:
+def position_pack(contacts: arrays.Contacts, pack: Record, lane: Lane) -> None:
     """Solve both normals of constraints with soft contacts and gaps that may just close."""
     stepping = contacts.stepping[0]
-    constraint = groups.constraints_of(group, lane)
-    a = groups.bodies_at(contacts, group.a, lane)
-    b = groups.bodies_at(contacts, group.b, lane)
-    gap_one, gap_two = gaps(group, lane, constraint, a, b, stepping.bend_time)
-    store(lane, group.start_one, gap_one)
-    store(lane, group.start_two, gap_two)
+    constraint = packs.constraints_of(pack, lane)
+    a = packs.bodies_at(contacts, pack.a, lane)
+    b = packs.bodies_at(contacts, pack.b, lane)
+    gap_one, gap_two = gaps(pack, lane, constraint, a, b, stepping.bend_time)
+    store(lane, pack.start_one, gap_one)
+    store(lane, pack.start_two, gap_two)
     slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    one, mixed, two = masses(group, lane, constraint, a, b)
-    old_one = load(lane, group.normal_one)
-    old_two = load(lane, group.normal_two)
+    one, mixed, two = masses(pack, lane, constraint, a, b)
+    old_one = load(lane, pack.normal_one)
+    old_two = load(lane, pack.normal_two)
     is_open_one = gap_one > stepping.touch_gap
     is_open_two = gap_two > stepping.touch_gap
     k_one = one + branch(is_open_one, 0.0, stepping.softness) * one
     k_two = two + branch(is_open_two, 0.0, stepping.softness) * two
-    bend = stepping.bend_share * load(lane, group.bend)
+    bend = stepping.bend_share * load(lane, pack.bend)
     rate_one = bend + branch(is_open_one, stepping.open_bias, stepping.closed_bias) * gap_one
     rate_two = bend + branch(is_open_two, stepping.open_bias, stepping.closed_bias) * gap_two
     q_one = slip.one + (rate_one - (one * old_one + mixed * old_two))
@@ -252,38 +252,38 @@ def position_group(contacts: arrays.Contacts, group: Record, lane: Lane) -> None
     if is_all((lesser(q_one, q_two) >= 0.0) & (greater(old_one, old_two) <= 0.0)):
         return  # gaps that stay open
     new_one, new_two = cone.solve_two(lane, k_one, mixed, k_two, q_one, q_two)
-    store(lane, group.normal_one, new_one)
-    store(lane, group.normal_two, new_two)
+    store(lane, pack.normal_one, new_one)
+    store(lane, pack.normal_two, new_two)
     second = new_two - old_two
-    push(contacts, group, lane, constraint, a, b, new_one - old_one + second, second)
+    push(contacts, pack, lane, constraint, a, b, new_one - old_one + second, second)
 
 
 @kernel
 def reach(
     contacts: arrays.Contacts,
-    group: Record,
+    pack: Record,
     lane: Lane,
     constraint: Constraints,
-    a: groups.Bodies,
-    b: groups.Bodies,
+    a: packs.Bodies,
+    b: packs.Bodies,
     t_one: Lanes,
     t_two: Lanes,
 ) -> Lanes:
     """Solve both normals without softness, then friction; return the largest changes of velocity (m/s)."""
-    if is_all((greater(t_one, t_two) <= -arrays.FAR) & (abs(load(lane, group.shear)) <= 0.0)):
+    if is_all((greater(t_one, t_two) <= -arrays.FAR) & (abs(load(lane, pack.shear)) <= 0.0)):
         return 0.0 * t_one  # no normal impulse, so no friction either
     slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    one, mixed, two = masses(group, lane, constraint, a, b)
-    old_one = load(lane, group.normal_one)
-    old_two = load(lane, group.normal_two)
-    old_shear = load(lane, group.shear)
+    one, mixed, two = masses(pack, lane, constraint, a, b)
+    old_one = load(lane, pack.normal_one)
+    old_two = load(lane, pack.normal_two)
+    old_shear = load(lane, pack.shear)
     share = contacts.stepping[0].bend_share
-    bend = share * load(lane, group.bend)
+    bend = share * load(lane, pack.bend)
     q_one = slip.one + (bend - t_one - (one * old_one + mixed * old_two))
     q_two = slip.two + (bend - t_two - (mixed * old_one + two * old_two))
     new_one, new_two = cone.solve_two(lane, one, mixed, two, q_one, q_two)
-    store(lane, group.normal_one, new_one)
-    store(lane, group.normal_two, new_two)
+    store(lane, pack.normal_one, new_one)
+    store(lane, pack.normal_two, new_two)
     d_one = new_one - old_one
     d_two = new_two - old_two
     normal = d_one + d_two
@@ -292,14 +292,14 @@ def reach(
     coupled_b = b.inverse_inertia * constraint.shear_arm_b
     by_normal = coupled_a * constraint.arm_a + coupled_b * constraint.arm_b
     by_width = (coupled_a + coupled_b) * constraint.width
-    rate = (slip.shear + share * load(lane, group.shear_bend)) + (by_normal * normal - by_width * d_two)
-    mass = shear_mass(group, lane, constraint, a, b)
+    rate = (slip.shear + share * load(lane, pack.shear_bend)) + (by_normal * normal - by_width * d_two)
+    mass = shear_mass(pack, lane, constraint, a, b)
     needed = old_shear - rate * (1.0 / mass)
-    limit = cone.shear_limits(contacts, group, lane, new_one + new_two, abs(needed), mass)
-    shear = cone.shear_within(group, lane, constraint, a, b, old_shear, needed, limit)
-    store(lane, group.shear, shear)
+    limit = cone.shear_limits(contacts, pack, lane, new_one + new_two, abs(needed), mass)
+    shear = cone.shear_within(pack, lane, constraint, a, b, old_shear, needed, limit)
+    store(lane, pack.shear, shear)
     d_shear = shear - old_shear
-    push_and_drag(contacts, group, lane, constraint, a, b, normal, d_two, d_shear)
+    push_and_drag(contacts, pack, lane, constraint, a, b, normal, d_two, d_shear)
     return (a.inverse_mass + b.inverse_mass) * greater(greater(abs(d_one), abs(d_two)), abs(d_shear))
 
 
@@ -307,27 +307,27 @@ WARM, POSITION, FIRST_VELOCITY, VELOCITY = range(4)
 
 
 @kernel
-def solve_group(contacts: arrays.Contacts, group: Record, lane: Lane, task: int) -> Lanes:
-    """Do one task for the constraints of a group; return the largest changes of velocity (m/s) of a velocity pass."""
+def solve_pack(contacts: arrays.Contacts, pack: Record, lane: Lane, task: int) -> Lanes:
+    """Do one task for the constraints of a pack; return the largest changes of velocity (m/s) of a velocity pass."""
     if task == WARM:
-        warm_group(contacts, group, lane)
+        warm_pack(contacts, pack, lane)
         return four(lane, 0.0, 0.0, 0.0, 0.0)
     if task == POSITION:
-        position_group(contacts, group, lane)
+        position_pack(contacts, pack, lane)
         return four(lane, 0.0, 0.0, 0.0, 0.0)
-    constraint = groups.constraints_of(group, lane)
-    a = groups.bodies_at(contacts, group.a, lane)
-    b = groups.bodies_at(contacts, group.b, lane)
+    constraint = packs.constraints_of(pack, lane)
+    a = packs.bodies_at(contacts, pack.a, lane)
+    b = packs.bodies_at(contacts, pack.b, lane)
     if task == FIRST_VELOCITY:
-        t_one, t_two = aim(contacts, group, lane, constraint, a, b)
+        t_one, t_two = aim(contacts, pack, lane, constraint, a, b)
     else:
-        t_one, t_two = load(lane, group.target_one), load(lane, group.target_two)
-    return reach(contacts, group, lane, constraint, a, b, t_one, t_two)
+        t_one, t_two = load(lane, pack.target_one), load(lane, pack.target_two)
+    return reach(contacts, pack, lane, constraint, a, b, t_one, t_two)
 
 
 @kernel
 def given_to(
-    constraint: Constraints, a: groups.Bodies, b: groups.Bodies, normal_one: Lanes, normal_two: Lanes, shear: Lanes
+    constraint: Constraints, a: packs.Bodies, b: packs.Bodies, normal_one: Lanes, normal_two: Lanes, shear: Lanes
 ) -> Lanes:
     """Return the work (J) of the impulses on body a, did it move as the fixed body of its constraint does."""
     is_b = a.inverse_mass > 0.0
@@ -346,7 +346,7 @@ def given_to(
 
 @kernel
 def taken_by(
-    contacts: arrays.Contacts, then: Records, group: Record, lane: Lane, gx: float, gy: float
+    contacts: arrays.Contacts, then: Records, pack: Record, lane: Lane, gx: float, gy: float
 ) -> tuple[Lanes, Lanes, Lanes]:
     """Return what normal and shear impulses of constraints have taken from the energy in this substep (J), both twice.
 
@@ -357,16 +357,16 @@ def taken_by(
     Both velocities together lack (`gx`, `gy`), m/s, of gravity: they live half a substep before positions, but those
     after a whole kick count without it, as a supported body does not fall.
     """
-    normal_one = load(lane, group.normal_one)
-    normal_two = load(lane, group.normal_two)
+    normal_one = load(lane, pack.normal_one)
+    normal_two = load(lane, pack.normal_two)
     if is_all(normal_one + normal_two <= 0.0):
         return 0.0 * normal_one, 0.0 * normal_one, 0.0 * normal_one
-    constraint = groups.constraints_of(group, lane)
-    shear = load(lane, group.shear)
-    a = groups.bodies_at(contacts, group.a, lane)
-    b = groups.bodies_at(contacts, group.b, lane)
-    vx_a, vy_a, spin_a, _ = fields_0(lane, then, group.a)
-    vx_b, vy_b, spin_b, _ = fields_0(lane, then, group.b)
+    constraint = packs.constraints_of(pack, lane)
+    shear = load(lane, pack.shear)
+    a = packs.bodies_at(contacts, pack.a, lane)
+    b = packs.bodies_at(contacts, pack.b, lane)
+    vx_a, vy_a, spin_a, _ = fields_0(lane, then, pack.a)
+    vx_b, vy_b, spin_b, _ = fields_0(lane, then, pack.b)
     free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
     vx = a.vx - b.vx + vx_a - vx_b
     vy = a.vy - b.vy + vy_a - vy_b
@@ -382,12 +382,12 @@ def taken_by(
 
 
 @kernel
-def tally_group(contacts: arrays.Contacts, then: Records, m: int, lane: Lane, gx: float, gy: float) -> None:
-    """Tally the constraints of group m; fields of `then` and (gx, gy) as in taken_by."""
-    group = contacts.groups[m]
-    tally = contacts.tallies[m // arrays.PART]
-    normals, shears, gifts = taken_by(contacts, then, group, lane, gx, gy)
-    tally.impacts -= 0.5 * groups.total(lane, normals, group.count)
-    tally.friction -= 0.5 * groups.total(lane, shears, group.count)
+def tally_pack(contacts: arrays.Contacts, then: Records, m: int, lane: Lane, gx: float, gy: float) -> None:
+    """Tally the constraints of pack m; fields of `then` and (gx, gy) as in taken_by."""
+    pack = contacts.packs[m]
+    tally = contacts.tallies[m // arrays.TALLY_PACKS]
+    normals, shears, gifts = taken_by(contacts, then, pack, lane, gx, gy)
+    tally.impacts -= 0.5 * packs.total(lane, normals, pack.count)
+    tally.friction -= 0.5 * packs.total(lane, shears, pack.count)
     if contacts.stepping[0].is_shaken:
-        tally.to_support += groups.total(lane, gifts, group.count)
+        tally.to_support += packs.total(lane, gifts, pack.count)

@@ -23,15 +23,15 @@ from blocksim.kernels.common.energy import weights_power
 from blocksim.kernels.common.members import Watched, frame_to_watch, member as world_of, of_member, watch
 from blocksim.kernels.nonsmooth import (
     arrays,
+    cuts,
     energy,
-    groups,
+    impact_rounds,
     impacts,
     motion,
     narrow_phase,
     neighbours,
-    parts,
+    packs,
     passes,
-    rounds,
     slip,
     sweeps,
 )
@@ -45,7 +45,7 @@ def kick_share(number: int, is_first_step: bool) -> float:
 
 
 @jit.kernel
-def bodies_of(contacts: arrays.Contacts, k: int, size: int) -> tuple[int, int]:
+def bodies_of_thread(contacts: arrays.Contacts, k: int, size: int) -> tuple[int, int]:
     """Return the bodies of thread k, from the first to before the last; the ground belongs to no thread."""
     count = contacts.states.size - 1
     if size == 1:
@@ -84,7 +84,7 @@ def start(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -> 
     hx = h * scene.world.controls[0].gravity_x
     hy = h * scene.world.controls[0].gravity_y
     share = kick_share(number, is_first_step)
-    first, last = bodies_of(contacts, k, team[TEAM_SIZE])
+    first, last = bodies_of_thread(contacts, k, team[TEAM_SIZE])
     if number == 0:
         motion.kick_all(contacts.states, contacts.before, first, last, share, hx, hy)
         if scene.world.loads.size > 0:
@@ -101,45 +101,43 @@ def start(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -> 
 
 @jit.kernel
 def tally(scene: arrays.Nonsmooth, k: int, share: float) -> tuple[int, int]:
-    """Tally bodies and constraints of thread k, whose groups are returned, in a substep with that share of a kick."""
+    """Tally bodies and constraints of thread k, whose packs are returned, in a substep with that share of a kick."""
     contacts = scene.contacts
     stepping = contacts.stepping[0]
     team = scene.world.team
     if scene.world.loads.size > 0:
-        first, last = bodies_of(contacts, k, team[TEAM_SIZE])
+        first, last = bodies_of_thread(contacts, k, team[TEAM_SIZE])
         motion.tally_loads(scene, first, last, share)
-    first, last = sweeps.part_of(0, stepping.group_count, k, team[TEAM_SIZE])
-    hx = stepping.substep * scene.world.controls[0].gravity_x
-    hy = stepping.substep * scene.world.controls[0].gravity_y
-    sweeps.tally_constraints(contacts, first, last, (share - 1.0) * hx, (share - 1.0) * hy)
+    first, last = sweeps.range_of_thread(0, stepping.pack_count, k, team[TEAM_SIZE])
+    sweeps.tally_constraints(contacts, first, last, (share - 1.0) * stepping.fall_x, (share - 1.0) * stepping.fall_y)
     return first, last
 
 
 @jit.kernel
 def note_what_presses(
-    scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool, asides: Records | None
+    scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool, impact_lanes: Records | None
 ) -> None:
-    """Note what presses before substep `number` as thread k; `asides` as in go_through_impacts."""
-    if asides is None:
+    """Note what presses before substep `number` as thread k; `impact_lanes` as in go_through_impacts."""
+    if impact_lanes is None:
         return
     contacts = scene.contacts
-    first, last = sweeps.part_of(0, contacts.stepping[0].group_count, k, scene.world.team[TEAM_SIZE])
-    rounds.keep_held(contacts, first, last)
+    first, last = sweeps.range_of_thread(0, contacts.stepping[0].pack_count, k, scene.world.team[TEAM_SIZE])
+    impact_rounds.keep_held(contacts, first, last)
     if number == 0 and (is_first_step or contacts.stepping[0].has_forgotten):
         controls = scene.world.controls[0]
         share = 1.0 if is_first_step else 0.0
-        rounds.hold(contacts, first, last, share * controls.gravity_x, share * controls.gravity_y)
+        impact_rounds.hold(contacts, first, last, share * controls.gravity_x, share * controls.gravity_y)
 
 
 @jit.kernel
 def go_through_impacts(
-    scene: arrays.Nonsmooth, k: int, bodies: tuple[int, int], share: float, asides: Records | None
+    scene: arrays.Nonsmooth, k: int, bodies: tuple[int, int], share: float, impact_lanes: Records | None
 ) -> None:
     """Let impacts of a substep follow from one another as thread k; see follow_impacts.
 
-    Where there are no `asides` nothing rebounds that much, and the compiler leaves this out altogether.
+    Where there are no `impact_lanes` nothing rebounds that much, and the compiler leaves this out altogether.
     """
-    if asides is None:
+    if impact_lanes is None:
         return
     if scene.contacts.stepping[0].has_rebounds:
         barrier(scene.world.team)
@@ -147,12 +145,12 @@ def go_through_impacts(
 
 
 @jit.kernel
-def report_impacts(contacts: arrays.Contacts, first: int, last: int, asides: Records | None) -> None:
-    """Give some groups the impulses of impacts at the end of a step; `asides` as in go_through_impacts."""
-    if asides is None:
+def report_impacts(contacts: arrays.Contacts, first: int, last: int, impact_lanes: Records | None) -> None:
+    """Give some packs the impulses of impacts at the end of a step; `impact_lanes` as in go_through_impacts."""
+    if impact_lanes is None:
         return
     if contacts.stepping[0].has_rebounds:
-        rounds.bring_back(contacts, first, last, True)
+        impact_rounds.bring_back(contacts, first, last, True)
 
 
 @jit.kernel
@@ -162,20 +160,20 @@ def substep(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -
     team = scene.world.team
     stepping = contacts.stepping[0]
     share = kick_share(number, is_first_step)
-    first, last = bodies_of(contacts, k, team[TEAM_SIZE])
+    first, last = bodies_of_thread(contacts, k, team[TEAM_SIZE])
     if k == 0:
         prepare(scene, number, share)
-    note_what_presses(scene, k, number, is_first_step, contacts.asides)
+    note_what_presses(scene, k, number, is_first_step, contacts.impact_lanes)
     start(scene, k, number, is_first_step)
     sweeps.sweep(contacts, passes.POSITION, team, k)
     ground = last + (k == team[TEAM_SIZE] - 1)  # which may move, is the last
     motion.drift_all(contacts.states, first, ground, stepping.substep)
     barrier(team)
     sweeps.velocity_pass(contacts, team, k, passes.FIRST_VELOCITY, stepping.tolerance)
-    go_through_impacts(scene, k, (first, last), share, contacts.asides)
+    go_through_impacts(scene, k, (first, last), share, contacts.impact_lanes)
     first, last = tally(scene, k, share)
     if number == stepping.substeps - 1:
-        report_impacts(contacts, first, last, contacts.asides)
+        report_impacts(contacts, first, last, contacts.impact_lanes)
     barrier(team)
 
 
@@ -225,13 +223,13 @@ def check(scene: arrays.Nonsmooth) -> int:
 
 
 @jit.kernel
-def end_part(scene: arrays.Nonsmooth) -> int:
-    """End a part of a step for all; return UNDER_WAY, or the status of a step that has come to its end."""
+def end_interval(scene: arrays.Nonsmooth) -> int:
+    """End an interval of a step for all; return UNDER_WAY, or the status of a step that has come to its end."""
     clock = scene.world.clock[0]
     scene.contacts.stepping[0].has_forgotten = 0
     if supports.has_motion(scene.world.controls[0]):
         motion.place_supports(scene)
-    if parts.is_continued(scene, scene.contacts.asides):
+    if cuts.is_continued(scene, scene.contacts.impact_lanes):
         return UNDER_WAY
     clock.steps += 1
     return check(scene) if clock.steps % scene.world.controls[0].check_every == 0 else REACHED
@@ -246,56 +244,56 @@ def supervise(scene: arrays.Nonsmooth, k: int, task: int) -> int:
         team[STATUS] = REACHED
         if task == NEIGHBOURS:
             if neighbours.update_pairs(scene):
-                parts.begin_step(scene, scene.contacts.asides)
+                cuts.begin_step(scene, scene.contacts.impact_lanes)
             else:
                 team[STATUS] = PAIRS_FULL
         elif task == GATHER:
-            if parts.is_shortened(scene, scene.contacts.asides):
+            if cuts.is_shortened(scene, scene.contacts.impact_lanes):
                 team[STATUS] = UNDER_WAY
             else:
-                groups.gather(scene.contacts, scene.begins)
+                packs.gather(scene.contacts, scene.begins)
         else:
-            team[STATUS] = end_part(scene)
+            team[STATUS] = end_interval(scene)
     barrier(team)
     return team[STATUS]
 
 
 @jit.kernel
 def do_step(scene: arrays.Nonsmooth, k: int) -> int:
-    """Take one step as thread k, in as many parts as it takes; return the status code."""
+    """Take one step as thread k, in as many intervals as it takes; return the status code."""
     contacts = scene.contacts
     if contacts.stepping[0].is_guarded:
-        first, last = sweeps.part_of(0, contacts.stepping[0].constraint_count, k, scene.world.team[TEAM_SIZE])
-        rounds.forget_struck(contacts, first, last)
+        first, last = sweeps.range_of_thread(0, contacts.stepping[0].constraint_count, k, scene.world.team[TEAM_SIZE])
+        impact_rounds.forget_struck(contacts, first, last)
     status = supervise(scene, k, NEIGHBOURS)
     if status != REACHED:
         return status
     status = UNDER_WAY
     while status == UNDER_WAY:
-        status = do_part(scene, k)
+        status = take_interval(scene, k)
     return status
 
 
 @jit.kernel
-def do_part(scene: arrays.Nonsmooth, k: int) -> int:
-    """Take one part of a step as thread k, or find that it has to be shorter; return UNDER_WAY or the status code."""
+def take_interval(scene: arrays.Nonsmooth, k: int) -> int:
+    """Take one interval of a step as thread k, or find that it must be shorter; return UNDER_WAY or the status code."""
     world = scene.world
     contacts = scene.contacts
     size = world.team[TEAM_SIZE]
-    first, last = sweeps.part_of(0, contacts.stepping[0].constraint_count, k, size)
-    if contacts.stepping[0].parts > 0:
-        rounds.forget_struck(contacts, first, last)
+    first, last = sweeps.range_of_thread(0, contacts.stepping[0].constraint_count, k, size)
+    if contacts.stepping[0].cuts > 0:
+        impact_rounds.forget_struck(contacts, first, last)
     narrow_phase.find_manifolds(scene, first, last)
     if supervise(scene, k, GATHER) == UNDER_WAY:
         return UNDER_WAY
-    begin, end = sweeps.part_of(0, contacts.stepping[0].group_count, k, size)
-    groups.pack_groups(contacts, begin, end)
+    begin, end = sweeps.range_of_thread(0, contacts.stepping[0].pack_count, k, size)
+    packs.pack_all(contacts, begin, end)
     count = contacts.stepping[0].substeps
     is_first = is_start(scene)
     for number in range(count):
         substep(scene, k, number, is_first)
-    groups.unpack_groups(contacts, begin, end)
-    first, last = bodies_of(contacts, k, size)
+    packs.unpack_all(contacts, begin, end)
+    first, last = bodies_of_thread(contacts, k, size)
     motion.place_all(scene, first, last, kick_share(count - 1, is_first))
     return supervise(scene, k, CHECK)
 
@@ -340,12 +338,12 @@ def member(scenes: arrays.Nonsmooth, m: int) -> arrays.Nonsmooth:
             contacts.states[m],
             contacts.before[m],
             contacts.constraints[m],
-            contacts.groups[m],
+            contacts.packs[m],
             contacts.ends[m],
             contacts.materials[m],
             contacts.tallies[m],
             of_member(contacts.impacts, m),
-            of_member(contacts.asides, m),
+            of_member(contacts.impact_lanes, m),
             contacts.residuals[m],
             contacts.stepping[m],
         ),

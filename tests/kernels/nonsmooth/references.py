@@ -183,12 +183,12 @@ def jacobian(n: Vector, r_a: Vector, r_b: Vector, a: int, b: int, bodies: int) -
 
 
 def dense(scene: Nonsmooth) -> Dense:
-    """Return the matrices of the packed groups of a scene; its bodies have not been placed since they were made."""
+    """Return the matrices of the packed packs of a scene; its bodies have not been placed since they were made."""
     contacts, bodies = scene.contacts, scene.world.bodies
     points, tangents, constraints, starts, targets, impulses, shears = [], [], [], [], [], [], []
-    for group in contacts.groups[: contacts.stepping[0].group_count]:
-        for k in range(group["count"]):
-            constraint = contacts.constraints[group.constraint[k]]
+    for pack in contacts.packs[: contacts.stepping[0].pack_count]:
+        for k in range(pack["count"]):
+            constraint = contacts.constraints[pack.constraint[k]]
             constraints.append(constraint)
             n, t = np.array([constraint.nx, constraint.ny]), np.array([-constraint.ny, constraint.nx])
             a, b = bodies[constraint.a], bodies[constraint.b]
@@ -199,10 +199,10 @@ def dense(scene: Nonsmooth) -> Dense:
             ends = [(r_a, place - (b.x, b.y)) for r_a, place in zip(of_a, of_b, strict=True)]
             points += [jacobian(n, r_a, r_b, constraint.a, constraint.b, bodies.size) for r_a, r_b in ends]
             tangents.append(jacobian(t, *ends[0], constraint.a, constraint.b, bodies.size))
-            impulses += [group.normal_one[k], group.normal_two[k]]
-            starts += [group.start_one[k], group.start_two[k]]
-            targets += [group.target_one[k], group.target_two[k]]
-            shears.append(group.shear[k])
+            impulses += [pack.normal_one[k], pack.normal_two[k]]
+            starts += [pack.start_one[k], pack.start_two[k]]
+            targets += [pack.target_one[k], pack.target_two[k]]
+            shears.append(pack.shear[k])
     states = contacts.states
     inverse = np.array([states.inverse_mass, states.inverse_mass, states.inverse_inertia]).T.ravel()
     materials = contacts.materials[[int(constraint.material) for constraint in constraints]]

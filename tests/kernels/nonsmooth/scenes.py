@@ -13,9 +13,9 @@ import numpy as np
 from blocksim.kernels.common.arrays import TEAM_SIZE
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.nonsmooth.begin import load_states
-from blocksim.kernels.nonsmooth.groups import gather, pack_groups
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
+from blocksim.kernels.nonsmooth.packs import gather, pack_all
 from blocksim.kernels.nonsmooth.step import substep
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
@@ -95,16 +95,16 @@ def listed(scene: Nonsmooth) -> Nonsmooth:
 
 
 def collided(scene: Nonsmooth) -> Nonsmooth:
-    """Return a scene with the manifolds of its pairs, packed in groups."""
+    """Return a scene with the manifolds of its pairs, packed in packs."""
     scene = listed(scene)
     find_manifolds(scene, 0, int(scene.contacts.stepping[0].constraint_count))
     gather(scene.contacts, scene.begins)
-    pack_groups(scene.contacts, 0, int(scene.contacts.stepping[0].group_count))
+    pack_all(scene.contacts, 0, int(scene.contacts.stepping[0].pack_count))
     return scene
 
 
 def after_substep(blocks: Sequence[Block], *, is_first: bool = False, **values: Any) -> Nonsmooth:
-    """Return blocks after the first substep of a step; the impulses are in the groups, velocities in the states."""
+    """Return blocks after the first substep of a step; the impulses are in the packs, velocities in the states."""
     scene = collided(posed(blocks, **values))
     substep(scene, 0, 0, is_first)
     return scene

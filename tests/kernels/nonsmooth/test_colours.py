@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, TOUCHING
-from blocksim.kernels.nonsmooth.groups import gather
-from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, most_groups, rebuild
+from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, most_packs, rebuild
+from blocksim.kernels.nonsmooth.packs import gather
 from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, pairs_of, place, posed
 
 if TYPE_CHECKING:
@@ -79,8 +79,8 @@ def test_pairs_beyond_the_last_colour_are_solved_one_by_one() -> None:
     gather(scene.contacts, scene.begins)
     first, last = scene.contacts.ends[COLOURS - 1 : COLOURS + 1]
     assert last - first == len(colours[-1])
-    assert np.all(scene.contacts.groups["count"][first:last] == 1)
-    assert last <= most_groups(scene) <= scene.contacts.groups.size
+    assert np.all(scene.contacts.packs["count"][first:last] == 1)
+    assert last <= most_packs(scene) <= scene.contacts.packs.size
 
 
 def test_constraints_know_how_the_materials_of_their_bodies_touch() -> None:

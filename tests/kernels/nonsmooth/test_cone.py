@@ -53,7 +53,7 @@ def test_sweeps_end_and_obey_coulomb_where_friction_couples_strongly(
     sliding = 0
     for _ in range(60):
         scene, is_late = solved(on_a_corner(random, outline), friction)
-        if not scene.contacts.stepping[0].group_count:
+        if not scene.contacts.stepping[0].pack_count:
             continue
         assert scene.contacts.stepping[0].sweeps < FEW
         all_of = dense(scene)

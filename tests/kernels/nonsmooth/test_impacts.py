@@ -70,13 +70,13 @@ def constraint(gap: float) -> list[dict[str, Any]]:
     return blocks
 
 
-@pytest.mark.parametrize("is_divided", [0, 1])  # in rounds of one substep, or in parts of steps
+@pytest.mark.parametrize("has_cuts", [0, 1])  # in rounds of one substep, or in steps that are cut
 @pytest.mark.parametrize(("gap", "within"), [(1e-4, 1e-6), (1e-5, 1e-3)])
 def test_row_of_blocks_apart_passes_a_blow_on(
-    single: Callable[..., Simulation], gap: float, within: float, is_divided: int
+    single: Callable[..., Simulation], gap: float, within: float, has_cuts: int
 ) -> None:
     run = single(constraint(gap), restitution=1.0, gravity=0.0, **SMOOTH)
-    run.scene.contacts.stepping[0].is_divided = is_divided
+    run.scene.contacts.stepping[0].has_cuts = has_cuts
     run.to_time(0.02)
     assert run.bodies.vx == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0], abs=within)
 
@@ -176,7 +176,7 @@ def test_blocks_that_press_on_one_another_are_struck_as_one(single: Callable[...
 
 def test_contacts_report_the_impulses_of_all_rounds(single: Callable[..., Simulation]) -> None:
     run = single(constraint(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
-    run.scene.contacts.stepping[0].is_divided = 0  # it would be in a part each
+    run.scene.contacts.stepping[0].has_cuts = 0  # it would be in an interval each
     before = run.bodies.vx.copy()
     run.to_step(1)
     constraints = run.scene.contacts.constraints[: run.scene.contacts.stepping[0].constraint_count]

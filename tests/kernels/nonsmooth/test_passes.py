@@ -237,7 +237,7 @@ def test_block_that_slides_off_a_block_takes_from_it_what_it_gives(friction: flo
 
 
 def test_tallies_have_what_impulses_take_from_blocks_that_meet_without_gravity() -> None:
-    blocks = pile(np.random.default_rng(1), 4, 2)  # some colour has a group of more than one
+    blocks = pile(np.random.default_rng(1), 4, 2)  # some colour has a pack of more than one
     scene = collided(posed(blocks, gravity=0.0, **{**EXACT, "velocity_sweeps": 3}))
     bodies: Any = scene.world.bodies[:-1]
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.nonsmooth.arrays import PART
+from blocksim.kernels.nonsmooth.arrays import TALLY_PACKS
 from blocksim.kernels.nonsmooth.passes import VELOCITY
-from blocksim.kernels.nonsmooth.step import bodies_of, kick_share
-from blocksim.kernels.nonsmooth.sweeps import part_of, velocity_pass
+from blocksim.kernels.nonsmooth.step import bodies_of_thread, kick_share
+from blocksim.kernels.nonsmooth.sweeps import range_of_thread, velocity_pass
 from tests.kernels.nonsmooth.scenes import Block, after_substep, pile, posed, velocities
 
 if TYPE_CHECKING:
@@ -73,13 +73,13 @@ def test_uniform_motion_is_added_to_all_that_happens() -> None:
 
 @pytest.mark.parametrize("size", [1, 2, 3, 5])
 @pytest.mark.parametrize("count", [0, 1, 3, 4, 7, 23, 64])
-def test_threads_divide_groups_in_whole_tallies_and_leave_none_out(size: int, count: int) -> None:
+def test_threads_divide_packs_in_whole_tallies_and_leave_none_out(size: int, count: int) -> None:
     begin, end = 8, 8 + count
-    parts = [part_of(begin, end, k, size) for k in range(size)]
-    assert [m for first, last in parts for m in range(first, last)] == list(range(begin, end))
-    assert all((first - begin) % PART == 0 for first, last in parts if first < last)
+    ranges = [range_of_thread(begin, end, k, size) for k in range(size)]
+    assert [m for first, last in ranges for m in range(first, last)] == list(range(begin, end))
+    assert all((first - begin) % TALLY_PACKS == 0 for first, last in ranges if first < last)
     scene = posed([Block(0.1 * i, 1.0) for i in range(7)])
-    assert [i for k in range(size) for i in range(*bodies_of(scene.contacts, k, size))] == list(range(7))
+    assert [i for k in range(size) for i in range(*bodies_of_thread(scene.contacts, k, size))] == list(range(7))
 
 
 def test_only_the_first_substep_of_a_run_has_half_a_kick() -> None:
@@ -105,6 +105,6 @@ def test_velocity_pass_ends_at_its_tolerance_or_after_its_sweeps() -> None:
 
 def test_block_at_rest_is_held_by_the_impulse_of_its_weight() -> None:
     scene = after_substep([Block(0.0, 0.0125)], restitution=0.0, substeps=1)
-    (group,) = scene.contacts.groups[: scene.contacts.stepping[0].group_count]
+    (pack,) = scene.contacts.packs[: scene.contacts.stepping[0].pack_count]
     weight = float(scene.world.bodies.mass[0]) * 9.81e-3
-    assert float(group.normal_one[0] + group.normal_two[0]) == pytest.approx(weight, rel=1e-9)
+    assert float(pack.normal_one[0] + pack.normal_two[0]) == pytest.approx(weight, rel=1e-9)

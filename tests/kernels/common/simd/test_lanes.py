@@ -24,7 +24,7 @@ from blocksim.kernels.common.simd import (
     store,
     write_fields_0,
 )
-from blocksim.kernels.nonsmooth.arrays import BEFORE, CONSTRAINT, GROUP, STATE
+from blocksim.kernels.nonsmooth.arrays import BEFORE, CONSTRAINT, PACK, STATE
 
 FIELDS = {
     "LINE": (STATE, "vx vy spin inverse_mass inverse_inertia dx dy turned", 0),
@@ -77,7 +77,7 @@ def one_by_one(groups: Records) -> None:
 
 
 def random_groups(seed: int) -> Records:
-    groups = zeros(50, GROUP)
+    groups = zeros(50, PACK)
     random = np.random.default_rng(seed)
     groups["nx"], groups["ny"] = random.normal(size=(2, 50, WIDTH))
     return groups
@@ -107,7 +107,7 @@ def exchange(lines: Records, groups: Records, limit: float) -> bool:
 
 
 def test_records_are_gathered_and_written_where_flags_say() -> None:
-    lines, groups = zeros(10, STATE), zeros(1, GROUP)
+    lines, groups = zeros(10, STATE), zeros(1, PACK)
     numbers: Floats = lines.view(np.float64).reshape(10, 8)
     numbers[:] = np.arange(80.0).reshape(10, 8)
     before = numbers.copy()

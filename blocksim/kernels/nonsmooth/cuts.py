@@ -1,15 +1,15 @@
-"""A step in parts: few blocks come to an impact at the end of one part, and go through it in a short one.
+"""Steps cut at impacts: few blocks come to an impact at the end of one interval, and go through it in a short one.
 
 A block that meets something stays where it touches until the substep ends, though it has the velocity after the impact
-already, and it is struck with the arms that it had when the part began. So an impact is off by what happens in the
+already, and it is struck with the arms that it had when the interval began. So an impact is off by what happens in the
 rest of its substep, first order in the length of that. Hops multiply it: a change of restitution from 0.8 to 0.80008
 moves the fourth peak of a block of 32 x 50 mm that rocks by 0.9 %. So the time t at which the next point meets
 something is predicted from gap s, approach u and the pull p of gravity,
 
     s + u t + p t^2 / 2 = 0,
 
-a part ends just before it, one of FINE of a step follows, then it is predicted again. Substeps of parts are as many as
-those of a step. The springs of the position pass keep their stiffness in seconds, so that what is at rest does not
+an interval ends just before it, one of FINE of a step follows, then it is predicted again. An interval has as many
+substeps as a step. The springs of the position pass keep their stiffness in seconds, so that what is at rest does not
 move when the length changes, and impulses that a substep begins with go with it. Velocities live half a substep behind
 and are shifted with its length: by gravity in flight, by their own change where something holds a body.
 """
@@ -18,73 +18,73 @@ import math
 
 from blocksim.kernels.common.arrays import Record, Records
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.tolerances import FINE, MOST_PARTS, MOST_RESTRAINT
+from blocksim.kernels.common.tolerances import FINE, MOST_CUTS, MOST_RESTRAINT
 from blocksim.kernels.nonsmooth import arrays, begin, slip
 
 
 @kernel
-def begin_of_part(scene: arrays.Nonsmooth) -> float:
-    """Return the time (s) at which the current part begins."""
+def begin_of_interval(scene: arrays.Nonsmooth) -> float:
+    """Return the time (s) at which the current interval begins."""
     return scene.world.clock[0].steps * scene.world.controls[0].step + scene.contacts.stepping[0].gone
 
 
 @kernel
 def is_cut(scene: arrays.Nonsmooth) -> bool:
-    """Return True if the step goes on after the current part."""
+    """Return True if the step goes on after the current interval."""
     stepping = scene.contacts.stepping[0]
     return stepping.length < scene.world.controls[0].step - stepping.gone
 
 
 @kernel
-def end_of_part(scene: arrays.Nonsmooth) -> float:
-    """Return the time (s) at which the current part ends; a step ends at a multiple of its length."""
+def end_of_interval(scene: arrays.Nonsmooth) -> float:
+    """Return the time (s) at which the current interval ends; a step ends at a multiple of its length."""
     if is_cut(scene):
-        return begin_of_part(scene) + scene.contacts.stepping[0].length
+        return begin_of_interval(scene) + scene.contacts.stepping[0].length
     return (scene.world.clock[0].steps + 1) * scene.world.controls[0].step
 
 
 @kernel
-def begin_step(scene: arrays.Nonsmooth, asides: Records | None) -> None:
-    """Begin a step with a part as long as it is.
+def begin_step(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> None:
+    """Begin a step with an interval as long as it is.
 
-    Where there are no `asides` no impact follows from another, and the compiler leaves parts out altogether.
+    Where there are no `impact_lanes` no impact follows from another, and the compiler leaves cuts out altogether.
     """
-    if asides is None:
+    if impact_lanes is None:
         return
     stepping = scene.contacts.stepping[0]
-    if stepping.is_divided:
-        stepping.parts = 0
+    if stepping.has_cuts:
+        stepping.cuts = 0
         stepping.gone = 0.0
         stepping.last_substep = stepping.substep
         set_length(scene, scene.world.controls[0].step)
 
 
 @kernel
-def is_continued(scene: arrays.Nonsmooth, asides: Records | None) -> bool:
-    """Begin the next part of a step that was cut; return False where there is none. `asides` as in begin_step."""
-    if asides is None:
+def is_continued(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> bool:
+    """Begin the next interval of a step that was cut; return False where none is. `impact_lanes` as in begin_step."""
+    if impact_lanes is None:
         return False
     if is_cut(scene):
-        begin_next_part(scene)
+        begin_next_interval(scene)
         return True
     return False
 
 
 @kernel
-def is_shortened(scene: arrays.Nonsmooth, asides: Records | None) -> bool:
-    """Cut the current part where an impact comes; return False if none does. `asides` as in begin_step."""
-    if asides is None:
+def is_shortened(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> bool:
+    """Cut the current interval where an impact comes; return False if none does. `impact_lanes` as in begin_step."""
+    if impact_lanes is None:
         return False
-    if scene.contacts.stepping[0].is_divided:
+    if scene.contacts.stepping[0].has_cuts:
         return cut(scene)
     return False
 
 
 @rare_kernel
-def begin_next_part(scene: arrays.Nonsmooth) -> None:
-    """Continue a step that was cut, with a part as long as what is left of it."""
+def begin_next_interval(scene: arrays.Nonsmooth) -> None:
+    """Continue a step that was cut, with an interval as long as what is left of it."""
     stepping = scene.contacts.stepping[0]
-    stepping.parts += 1
+    stepping.cuts += 1
     stepping.gone += stepping.length
     stepping.last_substep = stepping.substep
     set_length(scene, scene.world.controls[0].step - stepping.gone)
@@ -92,7 +92,7 @@ def begin_next_part(scene: arrays.Nonsmooth) -> None:
 
 @rare_kernel
 def set_length(scene: arrays.Nonsmooth, length: float) -> None:
-    """Give the next part a length (s)."""
+    """Give the next interval a length (s)."""
     stepping = scene.contacts.stepping[0]
     h = length / stepping.substeps
     if h == stepping.substep:
@@ -195,9 +195,9 @@ def kinetic_ahead(vx: float, vy: float, time: float, controls: Record) -> float:
 
 @rare_kernel
 def cut(scene: arrays.Nonsmooth) -> bool:
-    """Cut the current part, which ends with the step, before or after the next impact; return True if it was cut."""
+    """Cut the current interval, which ends the step, before or after the next impact; return True if it was cut."""
     stepping = scene.contacts.stepping[0]
-    if is_cut(scene) or stepping.parts >= MOST_PARTS:
+    if is_cut(scene) or stepping.cuts >= MOST_CUTS:
         return False
     fine = FINE * scene.world.controls[0].step
     time = time_to_impact(scene)

@@ -1,4 +1,4 @@
-"""Groups of four: every active constraint once, in its colour, and back again; a block is solved as alone."""
+"""Packs of four: every active constraint once, in its colour, and back again; a block is solved as alone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING
-from blocksim.kernels.nonsmooth.groups import gather, pack_groups, unpack_groups
+from blocksim.kernels.nonsmooth.packs import gather, pack_all, unpack_all
 from blocksim.kernels.nonsmooth.step import substep
 from tests.kernels.nonsmooth.scenes import (
     Block,
@@ -30,32 +30,32 @@ OF_ROW = ("nx", "ny", "arm_a", "arm_b", "width", "shear_arm_a", "shear_arm_b", "
 
 
 def members(scene: Nonsmooth) -> list[list[int]]:
-    """Return the constraints of all groups, without copies."""
-    groups = scene.contacts.groups[: scene.contacts.stepping[0].group_count]
-    return [group.constraint[: group["count"]].tolist() for group in groups]
+    """Return the constraints of all packs, without copies."""
+    packs = scene.contacts.packs[: scene.contacts.stepping[0].pack_count]
+    return [pack.constraint[: pack["count"]].tolist() for pack in packs]
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_constraint_within_the_margin_is_in_one_group_of_its_colour(seed: int) -> None:
+def test_every_constraint_within_the_margin_is_in_one_pack_of_its_colour(seed: int) -> None:
     random = np.random.default_rng(seed)
     scene = listed(posed([Block(*random.uniform(0.0, (0.15, 0.15, 6.0))) for _ in range(25)]))
     constraints: Any = listed_constraints(scene)
     constraints["reach"] = random.integers(3, size=constraints.size)
     gather(scene.contacts, scene.begins)
-    groups = members(scene)
-    assert sorted(r for group in groups for r in group) == np.flatnonzero(constraints.reach != AWAY).tolist()
+    packs = members(scene)
+    assert sorted(r for pack in packs for r in pack) == np.flatnonzero(constraints.reach != AWAY).tolist()
     assert scene.contacts.stepping[0].active_count == np.count_nonzero(constraints.reach != AWAY)
     for colour in range(scene.contacts.stepping[0].colours):
         first, last = scene.contacts.ends[colour : colour + 2]
-        inside = [r for group in groups[first:last] for r in group]
+        inside = [r for pack in packs[first:last] for r in pack]
         assert all(scene.begins[colour] <= r < scene.begins[colour + 1] for r in inside)
         touching = [constraints.reach[r] == TOUCHING for r in inside]
         assert touching == sorted(touching, reverse=True)  # those that touch first
         left = len(inside) % WIDTH
         sizes = [WIDTH] * (len(inside) // WIDTH) + ([1] * left if left <= 2 else [left])
-        assert [len(group) for group in groups[first:last]] == sizes
-    for group, inside in zip(scene.contacts.groups, groups, strict=False):
-        assert group.constraint.tolist() == inside + [inside[-1]] * (WIDTH - len(inside))
+        assert [len(pack) for pack in packs[first:last]] == sizes
+    for pack, inside in zip(scene.contacts.packs, packs, strict=False):
+        assert pack.constraint.tolist() == inside + [inside[-1]] * (WIDTH - len(inside))
 
 
 def test_constraints_are_packed_as_they_are_and_get_their_impulses_back() -> None:
@@ -65,14 +65,14 @@ def test_constraints_are_packed_as_they_are_and_get_their_impulses_back() -> Non
     for name in BACK:
         constraints[name] = random.uniform(size=constraints.size)
     before = constraints.copy()
-    count = int(scene.contacts.stepping[0].group_count)
-    pack_groups(scene.contacts, 0, count)
-    for group, inside in zip(scene.contacts.groups, members(scene), strict=False):
+    count = int(scene.contacts.stepping[0].pack_count)
+    pack_all(scene.contacts, 0, count)
+    for pack, inside in zip(scene.contacts.packs, members(scene), strict=False):
         for name in (*OF_ROW, *BACK, "bend", "shear_bend", "a", "b"):
-            assert group[name][: len(inside)].tolist() == constraints[name][inside].tolist(), name
+            assert pack[name][: len(inside)].tolist() == constraints[name][inside].tolist(), name
     for name in BACK:
         constraints[name] = -1.0
-    unpack_groups(scene.contacts, 0, count)
+    unpack_all(scene.contacts, 0, count)
     near = constraints.reach != AWAY
     assert 0 < near.sum() < constraints.size
     for name in BACK:
@@ -80,7 +80,7 @@ def test_constraints_are_packed_as_they_are_and_get_their_impulses_back() -> Non
         assert np.all(constraints[name][~near] == -1.0)
 
 
-def test_constraints_of_one_group_have_the_restitution_and_friction_of_their_own_materials() -> None:
+def test_constraints_of_one_pack_have_the_restitution_and_friction_of_their_own_materials() -> None:
     """Blocks that land and slide on the ground, and on fixed blocks, of other materials."""
     landing: dict[str, Any] = {"vy": -1.0, "vx": 3.0}
     blocks = [Block(0.0, 0.0125 + 1e-5, **landing), Block(0.1, 0.0125 + 1e-5, **landing)]
@@ -99,7 +99,7 @@ def test_constraints_of_one_group_have_the_restitution_and_friction_of_their_own
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
-def test_block_beside_others_of_its_group_has_the_bits_that_it_has_alone(count: int) -> None:
+def test_block_beside_others_of_its_pack_has_the_bits_that_it_has_alone(count: int) -> None:
     random = np.random.default_rng(7)
     motions = random.normal(size=(count, 3)) * (1.0, 2e-3, 3.0)
     blocks = [Block(0.2 * i, 0.0126, angle, vx, -1.0, spin) for i, (vx, angle, spin) in enumerate(motions)]

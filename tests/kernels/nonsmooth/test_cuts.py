@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.kernels.nonsmooth.parts import set_length
+from blocksim.kernels.nonsmooth.cuts import set_length
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ HOPPING = {"x": 1.0, "y": ON_GROUND + 2e-3, "velocity": [0.0, -0.3]}  # at most 
 
 
 def cut_steps(run: Simulation, count: int) -> int:
-    """Go on for some steps; return how many of them were taken in parts."""
+    """Go on for some steps; return how many of them were cut."""
     stepping = run.scene.contacts.stepping[0]
-    return sum(int(run.to_step(run.steps + 1) is run and stepping.parts > 0) for _ in range(count))
+    return sum(int(run.to_step(run.steps + 1) is run and stepping.cuts > 0) for _ in range(count))
 
 
 @pytest.mark.parametrize("start", [0.5e-4, 1.0e-4, 1.7e-4, 2.9e-4])

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from blocksim.kernels.nonsmooth.arrays import FAR
-from blocksim.kernels.nonsmooth.clusters import find_clusters
+from blocksim.kernels.nonsmooth.contact_groups import find_contact_groups
 from tests.kernels.nonsmooth.scenes import Block, after_substep, collided, listed_constraints, posed, velocities
 
 if TYPE_CHECKING:
@@ -76,10 +76,10 @@ def test_block_that_stands_keeps_its_impulses_while_another_lands() -> None:
     blocks = [Block(0.0, HALF), Block(1.0, HALF + 1e-5, vy=-1.0)]
     scene = after_substep(blocks, restitution=0.9, substeps=2)
     assert float(scene.contacts.states.vy[1]) > 0.8
-    groups: Any = scene.contacts.groups[: scene.contacts.stepping[0].group_count]
-    pressing = groups["normal_one"][:, 0] + groups["normal_two"][:, 0]
+    packs: Any = scene.contacts.packs[: scene.contacts.stepping[0].pack_count]
+    pressing = packs["normal_one"][:, 0] + packs["normal_two"][:, 0]
     weight = float(scene.world.bodies.mass[0]) * 9.81 * 0.5e-3
-    assert float(pressing[groups["a"][:, 0] == 0].sum()) == pytest.approx(weight, rel=1e-6)
+    assert float(pressing[packs["a"][:, 0] == 0].sum()) == pytest.approx(weight, rel=1e-6)
 
 
 def aimed(seed: int, count: int) -> Nonsmooth:
@@ -88,28 +88,28 @@ def aimed(seed: int, count: int) -> Nonsmooth:
     places = random.uniform(0.0, (0.3, 0.3, 6.0), (count, 3)).tolist()
     blocks = [Block(x, y, angle, fixed=bool(random.uniform() < 0.15)) for x, y, angle in places]
     scene = collided(posed(blocks, restitution=0.9))
-    groups: Any = scene.contacts.groups[: scene.contacts.stepping[0].group_count]
+    packs: Any = scene.contacts.packs[: scene.contacts.stepping[0].pack_count]
     for name in ("target_one", "target_two"):
-        groups[name] = random.choice([-FAR, -0.1, 0.0, 0.2], p=[0.5, 0.25, 0.2, 0.05], size=groups[name].shape)
+        packs[name] = random.choice([-FAR, -0.1, 0.0, 0.2], p=[0.5, 0.25, 0.2, 0.05], size=packs[name].shape)
     return scene
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_clusters_are_the_free_blocks_joined_by_points_that_count(seed: int) -> None:
+def test_contact_groups_are_the_free_blocks_joined_by_points_that_count(seed: int) -> None:
     scene = aimed(seed, 40)
     count = scene.world.bodies.size
     free = scene.contacts.states.inverse_mass > 0.0
     joined, struck = [], np.zeros(count, dtype=bool)
-    for group in scene.contacts.groups[: scene.contacts.stepping[0].group_count]:
-        for lane in range(group["count"]):
-            a, b = int(group.a[lane]), int(group.b[lane])
-            target = max(group.target_one[lane], group.target_two[lane])
+    for pack in scene.contacts.packs[: scene.contacts.stepping[0].pack_count]:
+        for lane in range(pack["count"]):
+            a, b = int(pack.a[lane]), int(pack.b[lane])
+            target = max(pack.target_one[lane], pack.target_two[lane])
             if target > -FAR and free[a] and free[b]:
                 joined.append((a, b))
             struck[[i for i in (a, b) if free[i]]] |= target > 0.0
     one, two = np.array(joined).T
     _, labels = connected_components(coo_array((np.ones(len(one)), (one, two)), shape=(count, count)), directed=False)
-    find_clusters(scene.contacts)
+    find_contact_groups(scene.contacts)
     impacts: Any = scene.contacts.impacts
     assert len(set(zip(labels.tolist(), impacts.root.tolist(), strict=True))) == len(set(labels.tolist()))
     assert len(set(impacts.root.tolist())) == len(set(labels.tolist()))

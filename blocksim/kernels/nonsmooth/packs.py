@@ -1,0 +1,219 @@
+"""Active constraints in fours, packed for the registers of a processor, and their impulses brought back.
+
+The constraints of a pack are of one colour, so they share no free body and can be solved at the same time. A pack
+that is not full has its last constraint several times: all of these copies find the same, so that no lane needs to be
+left out.
+"""
+
+from typing import NamedTuple
+
+from blocksim.kernels.common import arrays, jit
+from blocksim.kernels.common.simd import (
+    WIDTH,
+    Lane,
+    Lanes,
+    fields_0,
+    fields_4,
+    fields_8,
+    fields_12,
+    load,
+    split,
+    store,
+)
+from blocksim.kernels.nonsmooth.arrays import COLOURS, OPEN, TOUCHING, Contacts
+from blocksim.kernels.nonsmooth.slip import Constraints
+
+LONELY = 2  # constraints: so many that are left make two packs of one, which are solved faster than one of two
+
+
+class Bodies(NamedTuple):
+    """Four bodies, fields as in STATE."""
+
+    vx: Lanes
+    vy: Lanes
+    spin: Lanes
+    inverse_mass: Lanes
+    inverse_inertia: Lanes
+    dx: Lanes
+    dy: Lanes
+    turned: Lanes
+
+
+@jit.kernel
+def constraints_of(pack: arrays.Record, lane: Lane) -> Constraints:
+    """Return the constraints of a pack."""
+    return Constraints(
+        load(lane, pack.nx),
+        load(lane, pack.ny),
+        load(lane, pack.arm_a),
+        load(lane, pack.arm_b),
+        load(lane, pack.width),
+        load(lane, pack.shear_arm_a),
+        load(lane, pack.shear_arm_b),
+    )
+
+
+@jit.kernel
+def bodies_at(contacts: Contacts, places: arrays.Integers, lane: Lane) -> Bodies:
+    """Return the bodies of a pack."""
+    vx, vy, spin, inverse_mass = fields_0(lane, contacts.states, places)
+    inverse_inertia, dx, dy, turned = fields_4(lane, contacts.states, places)
+    return Bodies(vx, vy, spin, inverse_mass, inverse_inertia, dx, dy, turned)
+
+
+@jit.kernel
+def normal_masses(constraint: Constraints, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
+    """Return A (1/kg) of the two normals: of one, mixed, of two."""
+    together = a.inverse_mass + b.inverse_mass
+    two_a = constraint.arm_a - constraint.width
+    two_b = constraint.arm_b - constraint.width
+    turned_a = a.inverse_inertia * constraint.arm_a
+    turned_b = b.inverse_inertia * constraint.arm_b
+    one = together + turned_a * constraint.arm_a + turned_b * constraint.arm_b
+    mixed = together + turned_a * two_a + turned_b * two_b
+    two = together + a.inverse_inertia * two_a * two_a + b.inverse_inertia * two_b * two_b
+    return one, mixed, two
+
+
+@jit.kernel
+def tangent_mass(constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
+    """Return A (1/kg) along the tangent."""
+    coupled_a = a.inverse_inertia * constraint.shear_arm_a
+    coupled_b = b.inverse_inertia * constraint.shear_arm_b
+    return a.inverse_mass + b.inverse_mass + coupled_a * constraint.shear_arm_a + coupled_b * constraint.shear_arm_b
+
+
+@jit.kernel
+def material_of(contacts: Contacts, pack: arrays.Record, k: int) -> arrays.Record:
+    """Return how the bodies of one constraint of a pack interact."""
+    return contacts.materials[contacts.constraints[pack.constraint[k]].material]
+
+
+@jit.kernel
+def gather(contacts: Contacts, begins: arrays.Integers) -> None:
+    """Make packs of the constraints within the margin, colour after colour.
+
+    Those that touch come first, so that packs of which none does can be passed by.
+    """
+    stepping = contacts.stepping[0]
+    constraints = contacts.constraints
+    count = 0
+    number = 0
+    for colour in range(stepping.colours):
+        contacts.ends[colour] = number
+        most = 1 if colour == COLOURS - 1 else WIDTH
+        lane = 0
+        for reach in (TOUCHING, OPEN):
+            for r in range(begins[colour], begins[colour + 1]):
+                if constraints[r].reach == reach:
+                    contacts.packs[number].constraint[lane] = r
+                    lane += 1
+                    count += 1
+                    if lane == most:
+                        close(contacts.packs[number], lane)
+                        number += 1
+                        lane = 0
+        if lane == LONELY:
+            contacts.packs[number + 1].constraint[0] = contacts.packs[number].constraint[1]
+            close(contacts.packs[number], 1)
+            close(contacts.packs[number + 1], 1)
+            number += 2
+        elif lane > 0:
+            close(contacts.packs[number], lane)
+            number += 1
+    contacts.ends[stepping.colours] = number
+    stepping.active_count = count
+    stepping.pack_count = number
+
+
+@jit.kernel
+def close(pack: arrays.Record, count: int) -> None:
+    """Fill a pack of `count` constraints up with the last one."""
+    pack.count = count
+    for lane in range(count, WIDTH):
+        pack.constraint[lane] = pack.constraint[count - 1]
+
+
+@jit.kernel
+def pack_all(contacts: Contacts, begin: int, end: int) -> None:
+    """Copy the constraints of some packs into them."""
+    for m in range(begin, end):
+        pack = contacts.packs[m]
+        if pack.count == 1:
+            fill(contacts, pack, 0)
+        else:
+            fill(contacts, pack, None)
+        pack.are_simple = 1
+        pack.is_coupled = 0
+        for lane in range(1 if pack.count == 1 else WIDTH):
+            constraint = contacts.constraints[pack.constraint[lane]]
+            pack.a[lane] = constraint.a
+            pack.b[lane] = constraint.b
+            material = contacts.materials[constraint.material]
+            pack.friction[lane] = material.kinetic_friction
+            pack.restitution[lane] = material.restitution
+            if material.static_friction != material.kinetic_friction:
+                pack.are_simple = 0
+        if pack.count == 1:
+            keep_masses(contacts, pack)
+
+
+@jit.kernel
+def keep_masses(contacts: Contacts, pack: arrays.Record) -> None:
+    """Keep A of a pack of one, the same for all substeps of a step."""
+    constraint = constraints_of(pack, 0)
+    a = bodies_at(contacts, pack.a, 0)
+    b = bodies_at(contacts, pack.b, 0)
+    pack.one, pack.mixed, pack.two = normal_masses(constraint, a, b)
+    pack.along = tangent_mass(constraint, a, b)
+
+
+@jit.kernel
+def fill(contacts: Contacts, pack: arrays.Record, lane: Lane) -> None:
+    """Copy the numbers of the constraints of a pack into it."""
+    nx, ny, arm_a, arm_b = fields_0(lane, contacts.constraints, pack.constraint)
+    width, shear_arm_a, shear_arm_b, gap_one = fields_4(lane, contacts.constraints, pack.constraint)
+    gap_two, normal_one, normal_two, shear = fields_8(lane, contacts.constraints, pack.constraint)
+    bend, shear_bend, _, _ = fields_12(lane, contacts.constraints, pack.constraint)
+    store(lane, pack.bend, bend)
+    store(lane, pack.shear_bend, shear_bend)
+    store(lane, pack.nx, nx)
+    store(lane, pack.ny, ny)
+    store(lane, pack.arm_a, arm_a)
+    store(lane, pack.arm_b, arm_b)
+    store(lane, pack.width, width)
+    store(lane, pack.shear_arm_a, shear_arm_a)
+    store(lane, pack.shear_arm_b, shear_arm_b)
+    store(lane, pack.gap_one, gap_one)
+    store(lane, pack.gap_two, gap_two)
+    store(lane, pack.normal_one, normal_one)
+    store(lane, pack.normal_two, normal_two)
+    store(lane, pack.shear, shear)
+
+
+@jit.kernel
+def unpack_all(contacts: Contacts, begin: int, end: int) -> None:
+    """Bring the impulses of some packs back to their constraints."""
+    for m in range(begin, end):
+        pack = contacts.packs[m]
+        for lane in range(pack.count):
+            constraint = contacts.constraints[pack.constraint[lane]]
+            constraint.normal_one = pack.normal_one[lane]
+            constraint.normal_two = pack.normal_two[lane]
+            constraint.shear = pack.shear[lane]
+
+
+@jit.kernel
+def total(lane: Lane, x: Lanes, count: int) -> float:
+    """Return the sum of the first `count` lanes, at least two, or the number of a single one."""
+    if lane is not None:
+        return x
+    one, two, three, four = split(x)
+    return (one + two) + ((three if count > 2 else 0.0) + (four if count > 3 else 0.0))
+
+
+@jit.kernel
+def highest(x: Lanes) -> float:
+    """Return the largest number."""
+    one, two, three, four = split(x)
+    return max(one, two, three, four)
