@@ -45,12 +45,9 @@ class Members:
         if missing:
             raise InvalidInputError(f"{self.source}: not the table of a sweep: no column {' and '.join(missing)}")
         if not self.has_ended.any():
-            raise InvalidInputError(f"{self.source}: none of the {self.count} cases has finished; nothing to compare")
-
-    @property
-    def count(self) -> int:
-        """The number of all members."""
-        return len(self.table)
+            raise InvalidInputError(
+                f"{self.source}: none of the {len(self.table)} cases has finished; nothing to compare"
+            )
 
     @property
     def has_ended(self) -> "NDArray[np.bool_]":

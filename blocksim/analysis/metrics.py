@@ -117,7 +117,7 @@ def repeat_passes_all(counts: list[int]) -> facts.Interval | float | None:
 
 
 def _find_inside(evidence: facts.Evidence) -> facts.Findings:
-    total = evidence.members.count
+    total = len(evidence.members.table)
     rows: list[facts.Row] = []
     ranged = []  # repeats of those whose limits are those of the repeats, and no tolerance about them
     for pair in evidence.pairs:
@@ -134,7 +134,7 @@ def _find_inside(evidence: facts.Evidence) -> facts.Findings:
 
 
 def _find_predicted(evidence: facts.Evidence) -> facts.Findings:
-    total = evidence.members.count
+    total = len(evidence.members.table)
     rows: list[facts.Row] = []
     for pair in (pair for pair in evidence.lengths if pair.scatters):
         half = compare.prediction_half_width(pair.measured.s, pair.measured.n)
@@ -490,7 +490,7 @@ def judge(
     return Judgement(
         sweep=members.source,
         source=table.source,
-        members=members.count,
+        members=len(members.table),
         inside_all=int(evidence.inside.sum()),
         failures=members.failures,
         settings=settings,

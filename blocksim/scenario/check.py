@@ -233,7 +233,7 @@ def _sweep(data: overrides.Data, folder: Path) -> Iterator[mistakes.Mistake]:
         message = f"{len(sweep)} keys are too many; at most {MAX_VARIED} can be varied"
         yield mistakes.Mistake(("sweep",), message, at="key")
         return
-    trial = _trial(data, folder)
+    trial = trial_of(data, folder)
     mode = {"mode": sweep["mode"]} if sweep.get("mode") in MODES else {}
     for key, values in sweep.items():
         try:
@@ -270,12 +270,7 @@ def variation_fault(key: str) -> str:
     return f"{first} cannot be varied" if first in UNVARIED else ""
 
 
-def mistakes_of_value(data: overrides.Data, folder: Path, key: str, value: object) -> list[mistakes.Mistake]:
-    """List the mistakes in one value of one key by itself, in data that may have a sweep."""
-    return [*_trial(data, folder)(overrides.parse_key(key), value, ("sweep", key))]
-
-
-def _trial(data: overrides.Data, folder: Path) -> Trial:
+def trial_of(data: overrides.Data, folder: Path) -> Trial:
     """Return what finds the mistakes that setting one value adds to data, without its sweep and experiment."""
     bare = {key: entry for key, entry in data.items() if key not in ("sweep", "experiment")}
     _, before = _validated(bare, folder)

@@ -30,11 +30,6 @@ class Law(NamedTuple):
         return self.exponent == 1.0
 
     @property
-    def unit(self) -> str:
-        """Return the unit of K."""
-        return "N/m" if self.is_linear else f"N/m^{self.exponent:g}"
-
-    @property
     def damping_share(self) -> float:
         """Return the damping ratio over that of the linear law, for the same restitution: ((n + 1)/(2 n))^(1/2).
 

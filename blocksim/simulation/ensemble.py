@@ -165,6 +165,7 @@ def run_in_batches(
 
 
 def _run_all(scenarios: Iterable[Scenario], threads: int, most: int, *, peaks: bool) -> Iterator[list[EnsembleEnd]]:
+    """Yield the ends of one batch after the other, each in the order of its scenarios."""
     with ThreadPoolExecutor(threads) as pool:
         for batch in _batches(scenarios, most):
             for kernels in dict.fromkeys(map(schemes.kernels_of, batch)):

@@ -281,18 +281,14 @@ class ProbeChannel:
         return kept == self.count_until(last_step)
 
 
+@dataclass(frozen=True, eq=False)
 class Probes:
     """All probes of a run."""
 
-    def __init__(
-        self,
-        probes: Sequence[ProbeChannel],
-        support: observables.MovingSupport,
-        time_step: float,
-        parts: Sequence[tuple[System, int]] = (),
-    ) -> None:
-        """Take the probes, the motion of the support, the step (s), further systems and the number of their parts."""
-        self.all, self.support, self.time_step, self.parts = tuple(probes), support, time_step, tuple(parts)
+    all: Sequence[ProbeChannel]
+    support: observables.MovingSupport  # its motion
+    time_step: float  # s
+    parts: Sequence[tuple[System, int]] = ()  # further systems and the number of their parts
 
     def next_step(self, done: int) -> int:
         """Return the next step at which any probe is sampled after `done` steps."""
@@ -300,10 +296,11 @@ class Probes:
 
     def sample(self, scene: "AnyScene") -> None:
         """Add a sample of the present state to all probes that are due."""
-        if self.all:
-            moment = Snapshot(scene, self.support, self.parts)
-            for probe in self.all:
-                probe.sample(moment)
+        if not self.all:
+            return
+        moment = Snapshot(scene, self.support, self.parts)
+        for probe in self.all:
+            probe.sample(moment)
 
     def series(self) -> dict[str, ProbeSeries]:
         """Return the samples that are held by the names of their probes."""

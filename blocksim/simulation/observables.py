@@ -222,11 +222,6 @@ class Observable:
     in_rows: bool = True  # in rows of sweeps and of other studies
     in_tables: bool = True  # as a column of sweep.csv
 
-    @property
-    def label(self) -> str:
-        """The title along an axis, with its unit; the name where there is no title."""
-        return f"{self.title}{f' ({self.unit})' if self.unit else ''}" if self.title else self.name
-
     def text(self, value: float, number: Callable[[float], str]) -> str:
         """Return a value with its unit, for people."""
         unit = {"deg": "°", "": ""}.get(self.unit, f" {self.unit}")
@@ -351,10 +346,12 @@ class Watch:
         self._note_first(scenes, way, turn, times, threshold=1.0 - ROUND_OFF)
 
     def _carry(self, scenes: list[int], motion: Floats, times: Sequence[float]) -> None:
-        if any(self.supports[m].moves for m in scenes):
-            ways = np.array([self.supports[m].way(time) for m, time in zip(scenes, times, strict=True)])
-            is_there = ~np.isnan(motion[:, 3:4])
-            self.carried[scenes] = np.where(is_there, ways[:, :, None], self.carried[scenes])
+        """Note how far supports that move have carried the blocks that are there."""
+        if not any(self.supports[m].moves for m in scenes):
+            return
+        ways = np.array([self.supports[m].way(time) for m, time in zip(scenes, times, strict=True)])
+        is_there = ~np.isnan(motion[:, 3:4])
+        self.carried[scenes] = np.where(is_there, ways[:, :, None], self.carried[scenes])
 
     def _note_first(
         self, scenes: list[int], way: Floats, turn: Floats, times: Sequence[float], threshold: float = 1.0

@@ -83,8 +83,9 @@ class Summary(BaseModel, frozen=True):
 
 def read_summary(path: Path) -> Summary:
     """Return what a run.json holds. Raises InputMissingError or InvalidInputError."""
+    content = input_files.read_limited(path, MOST_BYTES)
     try:
-        return Summary.model_validate_json(input_files.read_limited(path, MOST_BYTES))
+        return Summary.model_validate_json(content)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))

@@ -261,9 +261,9 @@ def csv_text(columns: Columns) -> str:
 
 def read_table(path: Path) -> Columns:
     """Return a final table from its file. Raises InputMissingError or InvalidInputError."""
+    content = read_limited(path, MOST_BYTES)
     try:
-        text = read_limited(path, MOST_BYTES).decode()
-        return _columns_of(line for line in csv.reader(io.StringIO(text, newline="")) if line)
+        return _columns_of(line for line in csv.reader(io.StringIO(content.decode(), newline="")) if line)
     except (ValueError, csv.Error) as error:
         raise InvalidInputError(f"{path}: not a final table: {error}") from error
 

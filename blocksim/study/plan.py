@@ -18,7 +18,7 @@ from blocksim.errors import BlocksimError, InvalidInputError, Problem, ScenarioE
 from blocksim.extras import load_module
 from blocksim.options import Option
 from blocksim.scenario import Document, Scenario, Sweep, overrides, scenario_hash, units
-from blocksim.scenario.check import MAX_VARIED, mistakes_of_value, variation_fault
+from blocksim.scenario.check import MAX_VARIED, trial_of, variation_fault
 from blocksim.scenario.input_files import NUMBER, TableCell, raise_problems, read_table
 from blocksim.scenario.mistakes import Mistake
 from blocksim.scenario.models.motion import TABLED
@@ -140,14 +140,16 @@ def refuse_wrong_values(document: Document, columns: Iterable[CaseColumn]) -> No
     Tried are the first different values, and the ends of all numbers.
     """
     problems: list[Problem] = []
+    tried = trial_of(document.data, document.folder)
     for column in columns:
+        path = overrides.parse_key(column.key)
         places = {value: index for index, value in reversed(list(enumerate(column.values)))}
         numbers = [(cell.number(), index) for index, cell in enumerate(column.cells) if NUMBER.fullmatch(cell.text)]
         ends = [min(numbers)[1], max(numbers)[1]] if numbers else []
         findings = [
             (index, finding)
             for index in dict.fromkeys((*sorted(places.values())[:MOST_TRIED], *ends))
-            for finding in mistakes_of_value(document.data, document.folder, column.key, column.values[index])
+            for finding in tried(path, column.values[index], ("sweep", column.key))
         ]
         of_key = next((column.head.problem(one.message) for _, one in findings if one.at == "key"), None)
         problems += [of_key] if of_key else [column.cells[index].problem(one.message) for index, one in findings]
@@ -383,8 +385,9 @@ def refuse_wrong_draws(document: Document, sweep: Sweep, design: Design) -> None
         if not isinstance(values, Normal):
             continue
         drawn = [float(str(value).removesuffix(" rad")) for value in design.columns[key]]
+        tried = trial_of(document.data, document.folder)
         for end in (min(drawn), max(drawn)):
-            wrong = mistakes_of_value(document.data, document.folder, key, toml_number(end, angle=values.angle))
+            wrong = tried(overrides.parse_key(key), toml_number(end, angle=values.angle), ("sweep", key))
             for message in dict.fromkeys(one.message for one in wrong):  # one number may set two keys
                 text = f"drawn: {message}; cut the distribution with from and to"
                 findings.append(Mistake(("sweep", key), text))

@@ -285,6 +285,7 @@ def body_records(layouts: Sequence[Layout]) -> arrays.Records:
 
 
 def _fill_blocks(records: NDArray[np.record], layouts: Sequence[Layout]) -> None:
+    """Write pose, velocity, size, mass and contact class of all blocks into their records."""
     placed = [body for layout in layouts for body in layout.placed]
 
     def column(values: Iterable[float]) -> NDArray[np.float64]:

@@ -185,6 +185,7 @@ def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
     Rigid contacts have no springs in shear and no dashpots; their stiffness is that of their softest blocks.
     """
     scenario, classes, placed = layout.scenario, layout.classes, layout.placed
+    law = laws.LAWS[scenario.contact.law]
     has_rigid = scenario.time.has_rigid_contacts
     blocks = [one.material for one in classes if not one.is_ground]
     names = [GROUND]
@@ -214,7 +215,7 @@ def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:
                     normal_damping_ratio=None if has_rigid else float(row.normal_damping),
                     shear_damping_ratio=None if has_rigid else float(row.shear_damping),
                     normal_stiffness=normal_stiffness,
-                    stiffness_unit=laws.LAWS[scenario.contact.law].unit,
+                    stiffness_unit="N/m" if law.is_linear else f"N/m^{law.exponent:g}",
                     shear_stiffness_ratio=None if has_rigid else float(row.shear_ratio),
                     rules=rules,
                 )

@@ -23,7 +23,7 @@ def table() -> pd.DataFrame:
 
 def test_members_that_did_not_finish_are_named_and_have_no_values() -> None:
     members = Members(table(), "sweep.csv")
-    assert (members.count, members.has_ended.tolist()) == (3, [True, False, False])
+    assert (len(members.table), members.has_ended.tolist()) == (3, [True, False, False])
     assert members.failures == (Failure(2, "b", "failed", "too deep"), Failure(3, "", "invalid", ""))
     assert np.array_equal(members.values("left.wing", "x"), [1.0, np.nan, np.nan], equal_nan=True)
 

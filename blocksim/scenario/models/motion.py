@@ -430,6 +430,7 @@ def _second_name(line: Line) -> tuple[str, bool]:
 
 
 def _check_count(count: int) -> None:
+    """Raise MotionTableError for fewer samples than a motion has, or too many."""
     if not LEAST_ROWS <= count <= MAX_ROWS:
         raise MotionTableError(f"{count} samples; {LEAST_ROWS} to {MAX_ROWS} are allowed")
 

@@ -64,13 +64,13 @@ def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
 
 def _write(path: Path, heads: Sequence[str], times: Floats, tables: Iterable[Iterable[tuple[Any, ...]]]) -> None:
     """Write a table of rows at each of the times (s); what is not finite is an empty cell."""
+    timed = ((time, row) for time, rows in zip(times.tolist(), tables, strict=True) for row in rows)
     with files.atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(heads)
-        for time, rows in zip(times.tolist(), tables, strict=True):
-            for row in rows:
-                cells = ("" if isinstance(one, float) and not math.isfinite(one) else one for one in row)
-                writer.writerow([time, *cells])
+        for time, row in timed:
+            cells = ("" if isinstance(one, float) and not math.isfinite(one) else one for one in row)
+            writer.writerow([time, *cells])
 
 
 UNFIT_FOR_LAYERS = re.compile(r"[<>/\\\":;?*|=']")

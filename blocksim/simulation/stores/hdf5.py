@@ -12,13 +12,13 @@ import os
 import struct
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter, itemgetter
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import h5py
 import numpy as np
@@ -380,7 +380,7 @@ APART = 10.0  # times what the last flush took: a tenth of a run at most
 RESERVE = 1 << 18  # bytes
 
 
-class FrameFile:
+class FrameFile(AbstractContextManager["FrameFile"]):
     """Writes frames as they come; use as a context manager."""
 
     def __init__(self, path: Path, recorder: instruments.Recorder, scenario_toml: str, ledger: Sequence[str]) -> None:
@@ -518,10 +518,6 @@ class FrameFile:
             self.is_broken = True
             number = getattr(error, "errno", None)
             raise OutputError(f"{self.path}: cannot be written: {os.strerror(number) if number else error}") from error
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
