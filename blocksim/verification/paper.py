@@ -143,7 +143,7 @@ def properties_table(printed: Mapping[str, float], scenario: Scenario) -> str:
         (label, f"{printed[name] * factor:.4g}", f"{used[name] * factor:.4g}", unit)
         for name, (label, unit, factor) in PRINTED.items()
     ]
-    return _table(("property", "printed", f"`{scenario.name}`", "unit"), rows)
+    return markdown(("property", "printed", f"`{scenario.name}`", "unit"), rows)
 
 
 def edges_table(edges: ExperimentTable, runs: Sequence[results.Result]) -> str:
@@ -154,7 +154,7 @@ def edges_table(edges: ExperimentTable, runs: Sequence[results.Result]) -> str:
             places = [run.columns[f"{quantity}_mm"][list(run.columns["block"]).index(block)] for run in runs]
             texts = (*_repeats(edges, block, quantity), *(number_text(place, 2) for place in places))
             rows.append((f"{quantity}, block {block}", *texts))
-    return _table(("mm", *map(str, edges.replicates), "mean", *(f"`{run.name}`" for run in runs)), rows)
+    return markdown(("mm", *map(str, edges.replicates), "mean", *(f"`{run.name}`" for run in runs)), rows)
 
 
 def centres_table(centres: ExperimentTable, runs: Sequence[results.Result]) -> str:
@@ -184,13 +184,8 @@ def centres_table(centres: ExperimentTable, runs: Sequence[results.Result]) -> s
     names = [f"`{run.name}`" for run in runs]
     heads = ("mm", *map(str, centres.replicates), "mean", "the paper's simulation", *names)
     said = "✓ inside the range of the six repeats, ✗ outside."
-    turned = _table(("block", "measured, all repeats", *names), rotations)
-    return f"{_table(heads, places)}\n\n{said}\n\n{turned}"
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table; the minus sign of numbers is a proper one."""
-    return markdown(heads, [[f"−{cell[1:]}" if cell.startswith("-") else cell for cell in row] for row in rows])
+    turned = markdown(("block", "measured, all repeats", *names), rotations)
+    return f"{markdown(heads, places)}\n\n{said}\n\n{turned}"
 
 
 def _repeats(table: ExperimentTable, block: str, quantity: str) -> list[str]:
@@ -266,7 +261,7 @@ def write_paper(folder: Path, scenarios: Path, settings: Mapping[str, object] | 
             "The second form of Eq. 10 as printed gives the remaining rise, largest at the impact and zero at the "
             f"apex; the height is h_p of Eq. 12 less that. Largest difference: {height.largest:.3g} mm."
         ),
-        _table(
+        markdown(
             ("impact p", "h_p by Eq. 12, mm", "simulated, mm", "t_p by Eq. 12, ms", "simulated, ms"),
             [(str(number), *(f"{value:.3f}" for value in values)) for number, *values in bounces(bounce)],
         ),

@@ -48,8 +48,9 @@ def rows_of(stored: Stored, head: str, case: Case) -> list[Row]:
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table as Markdown."""
-    head, *lines = (f"| {' | '.join(cells)} |" for cells in (heads, *rows))
+    """Return a table as Markdown; the minus sign of numbers is a proper one."""
+    proper = ([f"−{cell[1:]}" if cell.startswith("-") else cell for cell in row] for row in rows)
+    head, *lines = (f"| {' | '.join(cells)} |" for cells in (heads, *proper))
     return "\n".join([head, f"|{' --- |' * len(heads)}", *lines])
 
 

@@ -42,6 +42,7 @@ class Simulation:
         """Find the first contacts and remember the energy."""
         self.scene = scene
         self.status = REACHED
+        self.step = float(scene.world.controls[0].step)  # s
         self.to_step(0)
         self.start_energy = balance.start_energy(self.scene)  # J, of all that it holds and has lost: constant
 
@@ -61,11 +62,6 @@ class Simulation:
         count = int(self.world.clock[0].pair_count)
         is_active = np.arange(self.world.contacts.shape[1]) < self.world.pairs.active[:count, np.newaxis]
         return self.world.contacts[:count][is_active]
-
-    @property
-    def step(self) -> float:
-        """Length of a step (s)."""
-        return float(self.world.controls[0].step)
 
     @property
     def steps(self) -> int:
