@@ -70,12 +70,13 @@ def _trial_lines() -> Callable[[calibrate_plan.Trial, calibrate_plan.Trial, int]
     is_due = progress.pace(TOLD_SECONDS, 0.0)
 
     def tell(trial: calibrate_plan.Trial, best: calibrate_plan.Trial, trials: int) -> None:
-        if is_due() or trial is best or trial.number == trials:
-            values = ", ".join(f"{'.'.join(key.split('.')[-2:])} {value}" for key, value in trial.values.items())
-            told = f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
-            if best.score.inside:
-                told = f"{trial.score.share_inside:.0%} inside (best {best.score.share_inside:.0%})"
-            output.note(f"{trial.number}/{trials}: {told}: {values}")
+        if not (is_due() or trial is best or trial.number == trials):
+            return
+        values = ", ".join(f"{'.'.join(key.split('.')[-2:])} {value}" for key, value in trial.values.items())
+        told = f"nothing inside, {trial.score.miss:.3f} off (best {best.score.miss:.3f} of 0 to 1)"
+        if best.score.inside:
+            told = f"{trial.score.share_inside:.0%} inside (best {best.score.share_inside:.0%})"
+        output.note(f"{trial.number}/{trials}: {told}: {values}")
 
     return tell
 

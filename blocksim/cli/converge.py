@@ -90,7 +90,7 @@ def _table(result: converge.Convergence, study: converge.RefinementStudy) -> lis
         others = (level.change_mm, 4), (level.order, 1), (level.seconds, 2)
         return (value, *places, *(output.number(*one) for one in others))
 
-    heads = [f"{_short(result.blocks[block])}: x mm" for block in chosen]
+    heads = [f"{style.shorten(result.blocks[block], LONGEST_NAME)}: x mm" for block in chosen]
     lines = output.table_lines(("value", *heads, "change mm", "order", "seconds"), map(cells, study.levels))
     if 0 < len(chosen) < len(result.blocks):
         lines.append(
@@ -99,16 +99,12 @@ def _table(result: converge.Convergence, study: converge.RefinementStudy) -> lis
     return lines
 
 
-def _short(name: str) -> str:
-    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + "…"
-
-
 def _verdict(study: converge.RefinementStudy) -> list[str]:
     """Return the verdict in words, with the levels between which blocks end in another place or on another side."""
     flips = []
     for before, level in pairwise(study.levels):
         if level.flipped:
-            named = list_names(list(map(_short, level.flipped)), MOST_BLOCKS)
+            named = list_names([style.shorten(name, LONGEST_NAME) for name in level.flipped], MOST_BLOCKS)
             blocks = "block" if len(level.flipped) == 1 else "blocks"
             flips.append(f"outcome differs between {before.value:g} and {level.value:g}: {blocks} {named}")
     match study.verdict:

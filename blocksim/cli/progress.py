@@ -54,11 +54,10 @@ def run_progress(*, quiet: bool) -> "Iterator[Callable[[Where], None]]":
         is_time = pace(PLAIN_SECONDS)
 
         def show_line(where: "Where") -> None:
-            if is_time():
-                note(
-                    f"{where.time:.3f} of at most {where.end:g} s simulated, {where.steps} steps, "
-                    f"relative energy error {where.relative_residual:.0e}"
-                )
+            if not is_time():
+                return
+            done = f"{where.time:.3f} of at most {where.end:g} s simulated, {where.steps} steps"
+            note(f"{done}, relative energy error {where.relative_residual:.0e}")
 
         yield show_line
         return
@@ -172,10 +171,8 @@ def case_progress(heads: "Iterable[Head]", *, quiet: bool) -> "Iterator[Callable
 
 def cell_text(value: object) -> str:
     """Return a cell of the table for people."""
-    match value:
-        case bool():
-            return "yes" if value else "no"
-        case float():
-            return f"{value:.6g}" if math.isfinite(value) else "–"
-        case _:
-            return str(value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}" if math.isfinite(value) else "–"
+    return str(value)

@@ -224,16 +224,16 @@ def note_timings(path: Path, executor: str, batch: Batch) -> None:
 
     Raises OutputError.
     """
+    share = f"{batch.seconds / max(len(batch.tasks), 1):.6f}"
+    lines = [(task.name, executor, share, rows.as_cell(batch.host)) for task in batch.tasks]
     try:
         with path.open("a+b") as file:
             size, text = file.seek(0, os.SEEK_END), io.StringIO()
             if size:  # a last line that was torn by a kill must not take the next one with it
                 file.seek(size - 1)
                 text.write("" if file.read() == NEWLINE else "\n")
-            writer = csv.writer(text, lineterminator="\n")
-            writer.writerows([] if size else [("case", "executor", "seconds", "host")])
-            share = f"{batch.seconds / max(len(batch.tasks), 1):.6f}"
-            writer.writerows((task.name, executor, share, rows.as_cell(batch.host)) for task in batch.tasks)
+            heads = [] if size else [("case", "executor", "seconds", "host")]
+            csv.writer(text, lineterminator="\n").writerows([*heads, *lines])
             file.write(text.getvalue().encode())
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror}") from error

@@ -75,13 +75,13 @@ def report_on(
 
 def _compared(run: parts.PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:
     """Return the comparison of a finished run, or why there is none though there is a measurement."""
+    named = None if run.scenario is None or run.scenario.experiment is None else run.scenario.experiment.table
+    table = experiment or named
+    if table is None or run.final is None:
+        return None, ()
+    if run.status != rows.FINISHED:
+        return None, ("only a finished run is compared with the measurement",)
     try:
-        named = None if run.scenario is None or run.scenario.experiment is None else run.scenario.experiment.table
-        table = experiment or named
-        if table is None or run.final is None:
-            return None, ()
-        if run.status != rows.FINISHED:
-            return None, ("only a finished run is compared with the measurement",)
         return _shown(compare_final(run.final, load_table(table))), ()
     except BlocksimError as error:
         if experiment is not None:

@@ -198,7 +198,8 @@ class Ranges:
 
 def check_experiment(scenario: Scenario) -> None:
     """Check that the table that a scenario names goes with the blocks: better now than after the run."""
-    if scenario.experiment is not None:
-        names = [body.name for body in place_bodies(scenario)]
-        unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))
-        compare.compare_final({"block": names, **unknown}, experiment.load_table(scenario.experiment.table))
+    if scenario.experiment is None:
+        return
+    names = [body.name for body in place_bodies(scenario)]
+    unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))
+    compare.compare_final({"block": names, **unknown}, experiment.load_table(scenario.experiment.table))

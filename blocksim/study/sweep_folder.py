@@ -232,13 +232,12 @@ def copy_tables(folder: Path, document: Document, vary: Mapping[str, object], *,
     They keep their names, in a folder of their own; those outside the folder of the scenario stay where they are.
     Raises OutputExistsError where another file is in the way, and OutputError.
     """
-    for key, values in vary.items():
-        for value in values if overrides.parse_key(key)[-1] == "table" and isinstance(values, tuple) else ():
-            path = Path(str(value))
-            if path.is_absolute() or ".." in path.parts or not (document.folder / path).is_file():
-                continue
-            copy, content = folder / VARIED / path, content_of(document.folder / path)
-            if copy.exists() and not overwrite and copy.read_bytes() != content:
-                raise OutputExistsError(f"{copy}: is not the table of this sweep; --overwrite replaces it")
-            files.make_folder(copy.parent)
-            files.write_bytes(copy, content)
+    tables = [values for key, values in vary.items() if overrides.parse_key(key)[-1] == "table"]
+    for path in (Path(str(value)) for values in tables if isinstance(values, tuple) for value in values):
+        if path.is_absolute() or ".." in path.parts or not (document.folder / path).is_file():
+            continue
+        copy, content = folder / VARIED / path, content_of(document.folder / path)
+        if copy.exists() and not overwrite and copy.read_bytes() != content:
+            raise OutputExistsError(f"{copy}: is not the table of this sweep; --overwrite replaces it")
+        files.make_folder(copy.parent)
+        files.write_bytes(copy, content)

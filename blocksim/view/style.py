@@ -301,11 +301,12 @@ class PageOptions:
 
     def __post_init__(self) -> None:
         """Raise ValueError for more than MOST_PIXELS."""
-        if isinstance(self.size, PageSize):
-            dots = self.dpi or DOTS_PER_INCH
-            width, height = self.size.inches(dots)
-            if width * height * dots**2 > MOST_PIXELS:
-                raise ValueError(f"--size and --dpi make more than {MOST_PIXELS / 1e6:.0f} million pixels")
+        if not isinstance(self.size, PageSize):
+            return
+        dots = self.dpi or DOTS_PER_INCH
+        width, height = self.size.inches(dots)
+        if width * height * dots**2 > MOST_PIXELS:
+            raise ValueError(f"--size and --dpi make more than {MOST_PIXELS / 1e6:.0f} million pixels")
 
     @property
     def paper(self) -> Paper:

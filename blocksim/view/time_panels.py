@@ -206,9 +206,6 @@ def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
         label = f"{quantity} ({unit})" if unit else quantity
         return TimePanel(label, lines, note, level=0.0, legend="" if len(lines) > 1 else None)
 
-    def columns(*names: str) -> dict[str, Floats]:
-        return {name: probe[name] for name in names}
-
     if not len(probe):
         return []
     if probe.kind == instruments.JOINT:
@@ -220,13 +217,14 @@ def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
         return [panel("energy", unit, factor, energies)] if energies else []
     if probe.kind == instruments.POINT:
         moves = any(not np.array_equal(probe[one], probe[f"relative_{one}"]) for one in ("dx", "dy"))
-        places, velocities = (columns(*(f"{'relative_' * moves}{one}{axis}" for axis in "xy")) for one in "dv")
+        names = [[f"{'relative_' * moves}{one}{axis}" for axis in "xy"] for one in "dv"]
+        places, velocities = ({name: probe[name] for name in pair} for pair in names)
         return [
             panel("displacement", "mm", MILLIMETRES, places),
             panel("velocity", "mm/s", MILLIMETRES, velocities),
             panel("rotation", "°", 1.0, {"rotation": np.degrees(probe["rotation"])}),
         ]
-    forces = columns("fx", "fy")
+    forces = {name: probe[name] for name in ("fx", "fy")}
     largest = float(np.nanmax(np.abs([*forces.values()]), initial=0.0))
     usual = max(float(np.percentile(np.abs(values), PERCENT)) for values in forces.values())  # hardly exceeded
     is_cut = usual > 0.0 and largest > MOST_USUAL * usual
@@ -239,9 +237,9 @@ def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
         room = 0.08 * (high - low)
         note = f"{force.note}\nlargest: {factor * largest:.3g} {unit}"
         force = replace(force, note=note, limits=(factor * (low - room), factor * (high + room)))
-    mobilised = columns("mobilised")
-    is_known = np.isfinite(probe["mobilised"]).any()
-    return [force, *([panel("share of friction", "", 1.0, mobilised)] if is_known else [])]
+    mobilised = probe["mobilised"]
+    is_known = np.isfinite(mobilised).any()
+    return [force, *([panel("share of friction", "", 1.0, {"mobilised": mobilised})] if is_known else [])]
 
 
 BETWEEN = 4

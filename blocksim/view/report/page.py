@@ -94,12 +94,9 @@ def labels(subjects: Sequence[Subject]) -> dict[str, str]:
 
 def _leaves(node: object, path: KeyPath = ()) -> Iterator[tuple[str, object]]:
     """Yield dotted keys and values below a node."""
-    if isinstance(node, Mapping):
-        for key, entry in node.items():
-            if path or key not in UNTOLD:
-                yield from _leaves(entry, (*path, str(key)))
-    elif isinstance(node, list | tuple):
-        for index, entry in enumerate(node):
-            yield from _leaves(entry, (*path, index))
-    else:
+    if not isinstance(node, Mapping | list | tuple):
         yield format_key(path), node
+        return
+    for key, entry in node.items() if isinstance(node, Mapping) else enumerate(node):
+        if path or key not in UNTOLD:
+            yield from _leaves(entry, (*path, key))

@@ -436,7 +436,8 @@ def _columns(table: CaseTable, blocks: Sequence[str]) -> list[dict[str, Any]]:
     roles = {"varied": table.keys, "case": (CASE,), "outcome": table.results, "block": ends}
     order = [CASE, *table.keys, *table.results, *ends]
     role = {name: kind for kind, names in roles.items() for name in names}
-    labels = {one.name: {"label": one.label} for one in observables.OBSERVABLES.values() if one.title}
+    known = (one for one in observables.OBSERVABLES.values() if one.title)
+    labels = {one.name: {"label": one.title + (f" ({one.unit})" if one.unit else "")} for one in known}
     return [
         {
             "name": name,

@@ -74,6 +74,7 @@ def manners_of(sweep: data.SweepData) -> Classes:
 
 
 def _with_shares(names: Sequence[str], numbers: run_data.Floats) -> tuple[str, ...]:
+    """Return the names of classes, each with the share of the cases that have its number."""
     return tuple(f"{name}: {data.percent(float((numbers == number).mean()))}" for number, name in enumerate(names))
 
 
