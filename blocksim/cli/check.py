@@ -9,7 +9,17 @@ from typing import Annotated
 
 from blocksim.cli import command_line, output, prepare
 from blocksim.options import Option
-from blocksim.scenario import PlacedBody, Scenario, check, events, motion, resolution, scenario_to_toml, units
+from blocksim.scenario import (
+    PlacedBody,
+    Scenario,
+    check,
+    events,
+    motion,
+    placement,
+    resolution,
+    scenario_to_toml,
+    units,
+)
 from blocksim.scenario.models import loads, timeline
 from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study.rows import check_experiment
@@ -31,6 +41,8 @@ LEAST_ROOM = 24
 HEAD = 11  # columns: width of the names on the left
 FAR_APART = 10.0  # steps of blocks and of systems beside them that are told with a cure
 HARD_SPACE = "\N{NO-BREAK SPACE}"
+USUAL_SPEED = 0.6  # m/s, the root of gravity times a side of some centimetres, for which defaults are chosen
+UNSCALED = ("rest_speed", "rest_hold", "velocity_tolerance", "restitution_threshold", "transition_speed")
 MILLI = 1e3
 MICRO = 1e6
 PREFIXES = ((1e6, "M"), (1e3, "k"))
@@ -80,6 +92,7 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         yield f"sag        {sag}: numerical, proportional to step squared"
         if rigid.warning:
             yield f"warning: {rigid.warning}"
+    yield from _unscaled(scenario, description.bodies)
     until_rest = ", less if it stops at rest" if scenario.time.stop_at_rest else ""
     yield f"solving    at most about {output.duration(description.seconds)} on one core{until_rest}"
     program = free_memory.readable(memory.PROCESS_BYTES)
@@ -114,6 +127,24 @@ def _limits(limits: describe.StepLimits | None) -> list[str]:
     more = f"{max(ratio, 1.0 / ratio):.0f} times as many steps as without them"
     cure = f"contact.stiffness_scale = {limits.scale:.1g} makes both equal"
     return [f"           {steps}", f"warning: because of the {who} {more}:", f"         {cure}"]
+
+
+def _unscaled(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
+    """Yield which defaults of speeds and times the scenario leaves, where its blocks are far from centimetres."""
+    speed = math.sqrt(scenario.gravity * placement.smallest_width(body for body in placed if not body.fixed))
+    if not 0.0 < speed < math.inf or 1.0 / FAR_APART < speed / USUAL_SPEED < FAR_APART:
+        return
+    tables = {"time": scenario.time}
+    tables |= {f"friction.{name}": pair for name, pair in scenario.friction if pair.kinetic < pair.static}
+    left = [
+        f"{name}.{key}"
+        for name, table in tables.items()
+        for key in UNSCALED
+        if key in type(table).model_fields and key not in table.model_fields_set
+    ]
+    if left:
+        why = f"made for blocks of centimetres; here √(gravity · least side) is {output.number(speed)} m/s"
+        yield from _some("defaults", [f"of {', '.join(left)} are {why}"])
 
 
 def _use_of_particles(scenario: Scenario) -> str:

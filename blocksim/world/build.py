@@ -31,9 +31,10 @@ MOST_BYTES = 1 << 26  # of a stack of more than one scene
 MOST_LARGE = 64  # bodies that are checked one by one, outside the grid
 LARGE_RATIO = 4.0  # over the smallest body; nothing is large below that
 SURFACE = "surface"  # the model without particles
-CHECK_INTERVAL = 1e-4  # s of simulated time between checks of rest, overlap and finiteness
-CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long, at most for
-LONGEST_CHECK = 1e-3  # s
+CHECKS = 500  # of rest, overlap and finiteness, in the time that rest must last
+CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long,
+FEWEST_CHECKS = 50  # in that time at least
+LONGEST_HOLD = 5.0  # ends of the run, as which a longer time that rest must last counts, and none
 LEAST_PAIRS = 16
 LEAST_CELLS = 16
 PAIRS_PER_BODY = 3
@@ -390,8 +391,9 @@ def run_controls(parts: Parts, strides: Sequence[Stride]) -> arrays.Records:
         scenario, contact, time = layout.scenario, layout.scenario.contact, layout.scenario.time
         motion_x, motion_y = (0.0, 0.0) if scenario.motion is None else motion.motion_direction(scenario)
         kernel, smoothing_length = KERNEL_CODES[contact.kernel], contact.resolved_smoothing_length
-        few = round(min(CHEAP_CHECKS, LONGEST_CHECK / step))  # of a quotient that may be infinite
-        every = max(1, few, round(min(MOST_STEPS, CHECK_INTERVAL / step)))
+        hold = min(time.rest_hold or math.inf, LONGEST_HOLD * time.end)
+        few = round(min(CHEAP_CHECKS, hold / FEWEST_CHECKS / step))  # of a quotient that may be infinite
+        every = max(1, few, round(min(MOST_STEPS, hold / CHECKS / step)))
         rest_checks = max(1, math.ceil(min(time.rest_hold / (every * step), MOST_STEPS))) if time.stop_at_rest else 0
         row = {
             "step": step,

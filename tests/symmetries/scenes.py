@@ -118,8 +118,7 @@ def scaled(stack: Stack, length: float, scheme: str) -> Simulation:
 
     Froude's similarity: with the same densities, masses go with length^3, times and speeds with its root, and stiffness
     (N/m) with its square, which is a modulus of elasticity that goes with length. Everything in a scenario that is a
-    length, a speed or a time is scaled. Looks at rest and overlap, every 0.1 ms, end steps of the fast kind, which
-    round otherwise; here they come after the same number of steps.
+    length, a speed or a time is scaled.
     """
     time = np.sqrt(length)
     friction = [
@@ -129,26 +128,27 @@ def scaled(stack: Stack, length: float, scheme: str) -> Simulation:
     stepping = {"step": RIGID_STEP * time, "velocity_tolerance": 1e-9 * time, "restitution_threshold": 0.01 * time}
     material = {"density": 2700.0, "young_modulus": 69e9 * SCALE * length, "poisson_ratio": 0.3}
     sizes = [{name: body[name] * length for name in (*SIZES, "length")} for body in stack.bodies]
-    scene = build_scene(
-        scenario_from_mapping(
-            {
-                "schema": 1,
-                "name": "scaled",
-                "materials": {"any": material},
-                "blocks": {f"block{i}": {**size, "material": "any"} for i, size in enumerate(sizes)},
-                "bodies": [
-                    {"block": f"block{i}", "x": body["x"] * length, "y": body["y"] * length}
-                    for i, body in enumerate(stack.bodies)
-                ],
-                "friction": dict(zip(("block_block", "block_ground"), friction, strict=True)),
-                "contact": {"restitution": stack.restitution},
-                "time": {
-                    "end": time,
-                    "stop_at_rest": False,
-                    **({"scheme": RIGID, **stepping} if scheme == RIGID else {}),
-                },
-            }
+    return Simulation(
+        build_scene(
+            scenario_from_mapping(
+                {
+                    "schema": 1,
+                    "name": "scaled",
+                    "materials": {"any": material},
+                    "blocks": {f"block{i}": {**size, "material": "any"} for i, size in enumerate(sizes)},
+                    "bodies": [
+                        {"block": f"block{i}", "x": body["x"] * length, "y": body["y"] * length}
+                        for i, body in enumerate(stack.bodies)
+                    ],
+                    "friction": dict(zip(("block_block", "block_ground"), friction, strict=True)),
+                    "contact": {"restitution": stack.restitution},
+                    "time": {
+                        "end": time,
+                        "stop_at_rest": False,
+                        "rest_hold": 0.05 * time,
+                        **({"scheme": RIGID, **stepping} if scheme == RIGID else {}),
+                    },
+                }
+            )
         )
     )
-    scene.world.controls[0].check_every = 100
-    return Simulation(scene)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -28,6 +28,9 @@ from tests.symmetries.scenes import (
     stacks,
     start,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 MIRROR = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])  # x, y, angle, vx, vy, spin
 SCHEMES = pytest.mark.parametrize("scheme", [EXPLICIT, RIGID])
@@ -170,3 +173,83 @@ def test_blocks_of_a_tenth_of_a_millimetre_and_of_a_kilometre_move_as_those_of_a
     for size in (1e-4, 1e3):
         for one, two in zip(metre, states(size), strict=True):
             np.testing.assert_allclose(two, one, atol=1e-9)
+
+
+def loose_wall(size: float) -> list[dict[str, object]]:
+    """Return three courses of three blocks, none of which touches another as yet or falls at the same time."""
+    return [
+        {
+            "block": "block",
+            "x": size * (1.02 * i + 0.45 * (j % 2) + 0.003 * i * j),
+            "y": size * (0.5 * (j + 0.5) + 1e-3 * (j + 1) * (1.0 + 0.13 * i + 0.29 * j)),
+        }
+        for j in range(3)
+        for i in range(3)
+    ]
+
+
+def leaning_column(size: float) -> list[dict[str, object]]:
+    """Return three hexagons above one another, each beyond the middle of the one below."""
+    return [{"block": "block", "x": i * 0.65 * size, "y": (np.sqrt(3.0) + 1e-4) * size * (i + 0.5)} for i in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("place", "scheme", "contact", "restitution", "steps"),
+    [
+        pytest.param(loose_wall, EXPLICIT, {}, 0.2, 1000, id="wall"),
+        pytest.param(loose_wall, EXPLICIT, {"law": "hertz-mindlin", "contact_radius": 0.05}, 0.2, 3000, id="hertz"),
+        pytest.param(loose_wall, EXPLICIT, {"model": "particles", "particle_spacing": 0.05}, 0.2, 400, id="particles"),
+        pytest.param(
+            loose_wall,
+            EXPLICIT,
+            {"model": "kernel", "particle_spacing": 0.1, "smoothing_length": 0.15},
+            0.2,
+            400,
+            id="kernel",
+        ),
+        pytest.param(leaning_column, EXPLICIT, {}, 0.2, 3000, id="hexagons"),
+        pytest.param(loose_wall, RIGID, {}, 0.2, 100, id="rigid wall"),
+        pytest.param(loose_wall, RIGID, {}, 0.6, 30, id="rigid wall with rebounds"),
+        pytest.param(leaning_column, RIGID, {}, 0.6, 100, id="rigid hexagons"),
+    ],
+)
+def test_no_size_of_blocks_is_special(
+    place: Callable[[float], list[dict[str, object]]],
+    scheme: str,
+    contact: dict[str, Any],
+    restitution: float,
+    steps: int,
+) -> None:
+    """From 0.1 mm to 1 km, the last block thrown; stiffness, speeds and times as Froude's similarity has them."""
+
+    def states(size: float) -> Any:
+        time = float(np.sqrt(size))
+        friction = {"static": 0.4, "kinetic": 0.3, "transition_speed": 5e-3 * time}
+        rigid = {"step": 2e-3 * time, "velocity_tolerance": 1e-9 * time, "restitution_threshold": 0.01 * time}
+        corners = [[size * np.cos(k * np.pi / 3), size * np.sin(k * np.pi / 3)] for k in range(6)]
+        is_wall = place is loose_wall
+        shape = (
+            {"width": size, "height": 0.5 * size, "length": size} if is_wall else {"outline": corners, "depth": size}
+        )
+        bodies = place(size)
+        bodies[-1] |= {"velocity": [time, 0.0], "spin": 0.3 / time}
+        lengths = {key: size * value if isinstance(value, float) else value for key, value in contact.items()}
+        rest = {"rest_speed": 1e-4 * time, "rest_hold": 0.05 * time}
+        tables = {
+            "schema": 1,
+            "name": "scaled",
+            "materials": {"any": {"density": 2700.0, "young_modulus": 69e6 * size, "poisson_ratio": 0.3}},
+            "blocks": {"block": {**shape, "material": "any"}},
+            "bodies": bodies,
+            "friction": {"block_block": friction, "block_ground": friction},
+            "contact": {"restitution": restitution, **lengths},
+            "time": {"end": 10.0 * time, **rest, **({"scheme": RIGID, **rigid} if scheme == RIGID else {})},
+        }
+        run = Simulation(build_scene(scenario_from_mapping(tables)))
+        units = np.array([size, size, 1.0, size / time, size / time, 1.0 / time])
+        return run.to_step(steps).state() / units
+
+    decimetre = states(0.1)
+    assert np.ptp(decimetre[:, 3]) > 0.3  # the thrown block moves on, others do not
+    for size in (1e-4, 1e-2, 10.0, 1e3):
+        np.testing.assert_allclose(states(size), decimetre, atol=1e-9)
