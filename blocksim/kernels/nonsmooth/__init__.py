@@ -1,15 +1,17 @@
 """The second stepping scheme: rigid blocks, impulses, small implicit substeps.
 
 Contact laws are Newton's restitution and Coulomb's friction, both as impulses; nothing is as stiff as the blocks, so
-that steps are 0.1 to 1 ms long. A step of length dt is
+that steps are 0.1 to 1 ms long. A step of length dt is, in the order of step.py,
 
     neighbours is the list of pairs still good? else make it and its colours anew            neighbours.py
-    cut        does an impact come first? then a shorter part, where that may be            cuts.py
     manifolds  the contact manifold of every pair, kept for the whole step                  narrow_phase.py
                which faces meet, and where they do                                          references.py, manifold.py
-    substeps   each of length h: kick, warm start, position pass, drift, velocity pass      passes.py, motion.py
+    cut        does an impact come first? then a shorter interval, where that may be        cuts.py
+    pack       constraints that are near, four in the lanes of registers                    packs.py
+    substeps   each of length h: kick, warm start, position pass, drift, velocity pass      motion.py, passes.py
                the shear impulse within the cone of friction                                cone.py
-    finish     poses and velocities back to the bodies                                      motion.py
+               impacts that follow from one another                                         impacts.py
+    finish     impulses back to the constraints, poses and velocities to the bodies; check  motion.py, energy.py
 
 For every contact point with the unit normal n (from body b to body a), gap s, approach J v = n (v_a - v_b) at the
 point and A = J M^-1 J^T, one impulse lambda >= 0 acts along n.

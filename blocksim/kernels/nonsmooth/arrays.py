@@ -144,6 +144,7 @@ TALLY = record_type("impacts friction to_support")  # J: what normal and shear i
 
 FAR = tolerances.FAR  # m or m/s: of points that are not there, or do not count
 AWAY, OPEN, TOUCHING = range(3)  # no point within the margin; a gap at all points; a point that touches or pressed
+NEITHER, LOW, HIGH = range(3)  # sides of the last solution of a group: too little energy, or too much; impacts.py
 NOT_STRUCK, STRUCK, STRUCK_AT_REST, FORGOTTEN = range(4)  # the last two pressed before the impact too
 COLOURS = 64  # the last one is for pairs that found no other; one thread goes through it
 TALLY_PACKS = 4  # packs that share a tally; threads take whole ones

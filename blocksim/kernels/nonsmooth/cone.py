@@ -14,11 +14,10 @@ Impulses of two contact points, exactly.
 from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.friction import friction_coefficient
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.simd import Lane, Lanes, branch, four, greater, is_all, load, select, split
+from blocksim.kernels.common.simd import Lane, Lanes, branch, four, greater, load, select, split
 from blocksim.kernels.common.tolerances import STRONG
 from blocksim.kernels.nonsmooth.arrays import Contacts
-from blocksim.kernels.nonsmooth.packs import Bodies, bodies_at, constraints_of, material_of, normal_masses
-from blocksim.kernels.nonsmooth.slip import Constraints
+from blocksim.kernels.nonsmooth.packs import Link, material_of, normal_masses
 
 
 @kernel
@@ -62,48 +61,22 @@ def within(needed: Lanes, limit: Lanes) -> Lanes:
 
 
 @kernel
-def coupling(pack: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
+def coupling(pack: Record, lane: Lane, link: Link) -> Lanes:
     """Return the change of a normal impulse over that which it brings by sliding friction, of the worse point (-)."""
-    coupled_a = a.inverse_inertia * constraint.shear_arm_a
-    coupled_b = b.inverse_inertia * constraint.shear_arm_b
-    by_one = coupled_a * constraint.arm_a + coupled_b * constraint.arm_b
-    by_two = by_one - (coupled_a + coupled_b) * constraint.width
-    one, _, two = normal_masses(constraint, a, b)
+    its, a, b = link
+    coupled_a = a.inverse_inertia * its.shear_arm_a
+    coupled_b = b.inverse_inertia * its.shear_arm_b
+    by_one = coupled_a * its.arm_a + coupled_b * its.arm_b
+    by_two = by_one - (coupled_a + coupled_b) * its.width
+    one, _, two = normal_masses(link)
     return load(lane, pack.friction) * greater(abs(by_one) / one, abs(by_two) / two)
 
 
-@kernel
-def is_coupled(contacts: Contacts, pack: Record, lane: Lane) -> bool:
-    """Return True if the coupling of a constraint of a pack is strong."""
-    a = bodies_at(contacts, pack.a, lane)
-    b = bodies_at(contacts, pack.b, lane)
-    return not is_all(coupling(pack, lane, constraints_of(pack, lane), a, b) <= STRONG)
-
-
-@kernel
-def shear_within(
-    pack: Record, lane: Lane, constraint: Constraints, a: Bodies, b: Bodies, old: Lanes, needed: Lanes, limit: Lanes
-) -> Lanes:
-    """Return the shear impulses (N s) nearest to those needed that the limits allow, or a share of the way there."""
-    if pack.is_coupled:
-        return approached(pack, lane, constraint, a, b, old, needed, limit)
-    return within(needed, limit)
-
-
 @rare_kernel
-def approached(
-    pack: Record,
-    lane: Lane,
-    constraint: Constraints,
-    a: Bodies,
-    b: Bodies,
-    old: Lanes,
-    needed: Lanes,
-    limit: Lanes,
-) -> Lanes:
+def approached(pack: Record, lane: Lane, link: Link, old: Lanes, needed: Lanes, limit: Lanes) -> Lanes:
     """Return shear impulses (N s) as `within` does, of bodies that slide a share of the way there from the old ones."""
     shear = within(needed, limit)
-    factor = coupling(pack, lane, constraint, a, b)
+    factor = coupling(pack, lane, link)
     return select((factor > STRONG) & (abs(needed) > limit), old + (shear - old) / (1.0 + factor), shear)
 
 

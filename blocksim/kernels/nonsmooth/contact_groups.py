@@ -5,7 +5,7 @@ Fixed bodies join no group, as no impulse moves them: two blocks on one table ar
 
 from blocksim.kernels.common import arrays, jit
 from blocksim.kernels.common.tolerances import IMPACT_ROUND_OFF
-from blocksim.kernels.nonsmooth.arrays import FAR, Contacts
+from blocksim.kernels.nonsmooth.arrays import FAR, HIGH, Contacts
 
 
 @jit.rare_kernel
@@ -18,14 +18,6 @@ def root_of(bodies: arrays.Records, i: int) -> int:
 
 
 @jit.rare_kernel
-def join(bodies: arrays.Records, i: int, j: int) -> None:
-    """Make one group of two."""
-    i = root_of(bodies, i)
-    j = root_of(bodies, j)
-    bodies[max(i, j)].root = min(i, j)
-
-
-@jit.rare_kernel
 def of_constraint(contacts: Contacts, pack: arrays.Record, lane: int) -> arrays.Record:
     """Return the record of a free body of a constraint."""
     a = pack.a[lane]
@@ -33,36 +25,26 @@ def of_constraint(contacts: Contacts, pack: arrays.Record, lane: int) -> arrays.
 
 
 @jit.rare_kernel
-def join_touching(contacts: Contacts, pack: arrays.Record) -> None:
-    """Join the free bodies of the constraints of a pack with a point that counts."""
-    states = contacts.states
-    for lane in range(pack.count):
-        a, b = pack.a[lane], pack.b[lane]
-        are_free = states[a].inverse_mass > 0.0 and states[b].inverse_mass > 0.0
-        if are_free and max(pack.target_one[lane], pack.target_two[lane]) > -FAR:
-            join(contacts.impacts, a, b)
-
-
-@jit.rare_kernel
-def mark_rebounds(contacts: Contacts, pack: arrays.Record) -> None:
-    """Mark the groups of the constraints of a pack with a point that rebounds."""
-    bodies = contacts.impacts
-    for lane in range(pack.count):
-        if max(pack.target_one[lane], pack.target_two[lane]) > 0.0:
-            bodies[root_of(bodies, of_constraint(contacts, pack, lane).root)].is_hit = 1
-
-
-@jit.rare_kernel
 def find_contact_groups(contacts: Contacts) -> None:
     """Join the bodies of all constraints with a point that counts, and mark the groups in which anything rebounds."""
-    bodies = contacts.impacts
+    states, bodies = contacts.states, contacts.impacts
+    count = contacts.stepping[0].pack_count
     for i in range(bodies.size):
         bodies[i].root = i
         bodies[i].is_hit = 0
-    for m in range(contacts.stepping[0].pack_count):
-        join_touching(contacts, contacts.packs[m])
-    for m in range(contacts.stepping[0].pack_count):
-        mark_rebounds(contacts, contacts.packs[m])
+    for m in range(count):
+        pack = contacts.packs[m]
+        for lane in range(pack.count):
+            a, b = pack.a[lane], pack.b[lane]
+            are_free = states[a].inverse_mass > 0.0 and states[b].inverse_mass > 0.0
+            if are_free and max(pack.target_one[lane], pack.target_two[lane]) > -FAR:
+                one, other = root_of(bodies, a), root_of(bodies, b)
+                bodies[max(one, other)].root = min(one, other)
+    for m in range(count):
+        pack = contacts.packs[m]
+        for lane in range(pack.count):
+            if max(pack.target_one[lane], pack.target_two[lane]) > 0.0:
+                bodies[root_of(bodies, of_constraint(contacts, pack, lane).root)].is_hit = 1
     for i in range(bodies.size):
         bodies[i].root = root_of(bodies, i)
         bodies[i].is_hit = bodies[bodies[i].root].is_hit
@@ -123,6 +105,7 @@ def weigh(contacts: Contacts) -> bool:
     bodies = contacts.impacts
     for body in bodies:
         body.then = body.now = 0.0
+        body.side = HIGH
     for i in range(bodies.size):
         body = bodies[i]
         if body.is_hit and states[i].inverse_mass > 0.0:

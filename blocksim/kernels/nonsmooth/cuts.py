@@ -16,10 +16,17 @@ and are shifted with its length: by gravity in flight, by their own change where
 
 import math
 
-from blocksim.kernels.common.arrays import Record, Records
+from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.tolerances import FINE, MOST_CUTS, MOST_RESTRAINT
-from blocksim.kernels.nonsmooth import arrays, begin, slip
+from blocksim.kernels.nonsmooth import arrays, slip
+
+
+@kernel
+def is_start(scene: arrays.Nonsmooth) -> bool:
+    """Return True if velocities are those of time zero, not half a substep before."""
+    stepping = scene.contacts.stepping[0]
+    return scene.world.clock[0].steps == 0 and stepping.cuts == 0 and stepping.is_settled == 0
 
 
 @kernel
@@ -29,7 +36,7 @@ def begin_of_interval(scene: arrays.Nonsmooth) -> float:
 
 
 @kernel
-def is_cut(scene: arrays.Nonsmooth) -> bool:
+def is_continued(scene: arrays.Nonsmooth) -> bool:
     """Return True if the step goes on after the current interval."""
     stepping = scene.contacts.stepping[0]
     return stepping.length < scene.world.controls[0].step - stepping.gone
@@ -38,54 +45,17 @@ def is_cut(scene: arrays.Nonsmooth) -> bool:
 @kernel
 def end_of_interval(scene: arrays.Nonsmooth) -> float:
     """Return the time (s) at which the current interval ends; a step ends at a multiple of its length."""
-    if is_cut(scene):
+    if is_continued(scene):
         return begin_of_interval(scene) + scene.contacts.stepping[0].length
     return (scene.world.clock[0].steps + 1) * scene.world.controls[0].step
 
 
-@kernel
-def begin_step(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> None:
-    """Begin a step with an interval as long as it is.
-
-    Where there are no `impact_lanes` no impact follows from another, and the compiler leaves cuts out altogether.
-    """
-    if impact_lanes is None:
-        return
-    stepping = scene.contacts.stepping[0]
-    if stepping.has_cuts:
-        stepping.cuts = 0
-        stepping.gone = 0.0
-        stepping.last_substep = stepping.substep
-        set_length(scene, scene.world.controls[0].step)
-
-
-@kernel
-def is_continued(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> bool:
-    """Begin the next interval of a step that was cut; return False where none is. `impact_lanes` as in begin_step."""
-    if impact_lanes is None:
-        return False
-    if is_cut(scene):
-        begin_next_interval(scene)
-        return True
-    return False
-
-
-@kernel
-def is_shortened(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> bool:
-    """Cut the current interval where an impact comes; return False if none does. `impact_lanes` as in begin_step."""
-    if impact_lanes is None:
-        return False
-    if scene.contacts.stepping[0].has_cuts:
-        return cut(scene)
-    return False
-
-
 @rare_kernel
-def begin_next_interval(scene: arrays.Nonsmooth) -> None:
-    """Continue a step that was cut, with an interval as long as what is left of it."""
+def begin_interval(scene: arrays.Nonsmooth, is_first: bool) -> None:
+    """Begin the first interval of a step, or continue one that was cut; it is as long as what is left of the step."""
     stepping = scene.contacts.stepping[0]
-    stepping.cuts += 1
-    stepping.gone += stepping.length
+    stepping.cuts = 0 if is_first else stepping.cuts + 1
+    stepping.gone = 0.0 if is_first else stepping.gone + stepping.length
     stepping.last_substep = stepping.substep
     set_length(scene, scene.world.controls[0].step - stepping.gone)
 
@@ -139,7 +109,7 @@ def shift_velocities(scene: arrays.Nonsmooth, h: float) -> None:
     controls = scene.world.controls[0]
     stepping = scene.contacts.stepping[0]
     old = stepping.substep
-    behind = 0.0 if begin.is_start(scene) else 0.5
+    behind = 0.0 if is_start(scene) else 0.5
     mark_pressed(scene)
     for i in range(scene.world.bodies.size - 1):
         state = scene.contacts.states[i]
@@ -197,7 +167,7 @@ def kinetic_ahead(vx: float, vy: float, time: float, controls: Record) -> float:
 def cut(scene: arrays.Nonsmooth) -> bool:
     """Cut the current interval, which ends the step, before or after the next impact; return True if it was cut."""
     stepping = scene.contacts.stepping[0]
-    if is_cut(scene) or stepping.cuts >= MOST_CUTS:
+    if is_continued(scene) or stepping.cuts >= MOST_CUTS:
         return False
     fine = FINE * scene.world.controls[0].step
     time = time_to_impact(scene)

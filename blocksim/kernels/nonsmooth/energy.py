@@ -1,4 +1,4 @@
-"""Energy ledger of the non-smooth scheme.
+"""Energy ledger of the non-smooth scheme, and the checks that end a run.
 
 Impulses are tallied when they are final: what those along the normals take is lost in impacts, those along the tangents
 in friction. A drift moves bodies by velocities that have the position pass in them, which are gone afterwards: what the
@@ -10,10 +10,12 @@ Loads that kick by h a add their impulse m h a times the mean of the velocities 
 from (J + m h (g + a)) times that mean, the change of K(v). So their work needs no place, nor the position pass.
 """
 
-from blocksim.kernels.common import arrays, energy, integrate, jit
+import math
+
+from blocksim.kernels.common import arrays, energy, integrate, jit, loads, supports
 from blocksim.kernels.common.tolerances import MIDDLE
 from blocksim.kernels.nonsmooth.arrays import AWAY, TOUCHING, Nonsmooth
-from blocksim.kernels.nonsmooth.begin import is_start
+from blocksim.kernels.nonsmooth.cuts import is_start
 
 NONSMOOTH_LEDGER = ("kinetic", "potential", "impacts", "friction", "correction", "to_support", "to_loads", "events")
 
@@ -112,6 +114,47 @@ def has_excessive_overlap(scene: Nonsmooth) -> bool:
             if overlap > (given if given > 0.0 else MIDDLE * side):
                 return True
     return False
+
+
+@jit.kernel
+def check(scene: Nonsmooth) -> int:
+    """Check that the run may continue: finite, not at rest for the hold time."""
+    world = scene.world
+    controls = world.controls[0]
+    clock = world.clock[0]
+    integrate.renew_angles(world.bodies)
+    ledger = world.ledger[0]
+    ledger.travel_work += controls.check_every * controls.step * energy.weights_power(world)
+    ledger.largest_kinetic = max(ledger.largest_kinetic, integrate.kinetic_energy(world))
+    fastest = integrate.fastest_point(world.bodies)
+    if math.isinf(fastest):
+        return arrays.NOT_FINITE
+    if has_excessive_overlap(scene):
+        return arrays.OVERLAP_LIMIT
+    rests = fastest < controls.rest_speed and is_supported(scene) and supports.is_support_at_rest(world)
+    rests = rests and loads.are_loads_steady(world)
+    clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
+    return arrays.AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else arrays.REACHED
+
+
+@jit.kernel
+def is_supported(scene: Nonsmooth) -> bool:
+    """Return True if every free body has a contact that presses, where there is gravity."""
+    world = scene.world
+    controls = world.controls[0]
+    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0 and controls.push == 0.0:
+        return True
+    scene.used[:] = 0
+    contacts = scene.contacts
+    for r in range(contacts.stepping[0].constraint_count):
+        constraint = contacts.constraints[r]
+        if constraint.normal_one > 0.0 or constraint.normal_two > 0.0:
+            scene.used[constraint.a] = 1
+            scene.used[constraint.b] = 1
+    for i in range(world.bodies.size - 1):
+        if world.bodies[i].inverse_mass > 0.0 and scene.used[i] == 0:
+            return False
+    return True
 
 
 @jit.entry_kernel

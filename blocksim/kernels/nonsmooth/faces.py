@@ -131,12 +131,6 @@ def least_half(a: Block, b: Block) -> Lanes:
 
 
 @jit.kernel
-def face_count(hulls: AnyHulls) -> int:
-    """Return the number of faces of a body."""
-    return RECTANGLE if hulls is None else hulls.size
-
-
-@jit.kernel
 def normal_at(hulls: Hulls, k: int, lane: Lane) -> tuple[Lanes, Lanes, Lanes, Lanes]:
     """Return normal, distance and middle (m) of face k of bodies."""
     one, two, three, last = hulls.places

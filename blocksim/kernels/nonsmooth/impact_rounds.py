@@ -4,7 +4,7 @@ import math
 
 from blocksim.kernels.common.arrays import Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.simd import WIDTH, Lane, Lanes, Mask, fields_0, greater, lesser, load, select, store
+from blocksim.kernels.common.simd import WIDTH, Lane, Lanes, Mask, greater, lesser, load, select, store
 from blocksim.kernels.common.tolerances import UPRIGHT
 from blocksim.kernels.nonsmooth import arrays, contact_groups, packs, passes, slip
 
@@ -27,11 +27,13 @@ def keep_held(contacts: arrays.Contacts, begin: int, end: int) -> None:
 
 
 @rare_kernel
-def hold(contacts: arrays.Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+def hold(scene: arrays.Nonsmooth, begin: int, end: int, share: float) -> None:
     """Let constraints of some packs press that did so before an impact, in the first substep after it.
 
-    At the start of a run, with a gravity (gx, gy), all those press that are not upright: nothing is known of them yet.
+    At the start of a run, with `share` 1, else 0, all those press that are not upright: nothing is known of them yet.
     """
+    contacts = scene.contacts
+    gx, gy = share * scene.world.controls[0].gravity_x, share * scene.world.controls[0].gravity_y
     least = UPRIGHT * math.hypot(gx, gy)
     for m in range(begin, end):
         pack = contacts.packs[m]
@@ -45,8 +47,11 @@ def hold(contacts: arrays.Contacts, begin: int, end: int, gx: float, gy: float) 
 
 
 @rare_kernel
-def set_aside(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Keep what the velocity pass has found for some packs, and leave all constraints out of those to come."""
+def begin_rounds(contacts: arrays.Contacts, begin: int, end: int) -> None:
+    """Keep what the velocity pass has found for some packs, and leave all constraints out of those to come.
+
+    Of groups that are hit the impulses of all rounds are summed up from zero; others in the packs are not aimed at.
+    """
     for m in range(begin, end):
         pack = contacts.packs[m]
         lanes = contacts.impact_lanes[m]
@@ -62,20 +67,14 @@ def set_aside(contacts: arrays.Contacts, begin: int, end: int) -> None:
         for lane in range(pack.count):
             if contact_groups.of_constraint(contacts, pack, lane).is_hit:
                 lanes.is_hit = 1
-        forget_hits(contacts, pack, lanes)
+        for lane in range(WIDTH if lanes.is_hit else 0):
+            if contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1)).is_hit:
+                lanes.normal_one[lane] = lanes.normal_two[lane] = lanes.shear[lane] = 0.0
+            else:
+                lanes.target_one[lane] = lanes.target_two[lane] = -arrays.FAR
         store(None, pack.target_one, none)
         store(None, pack.target_two, none)
         clear(pack)
-
-
-@rare_kernel
-def forget_hits(contacts: arrays.Contacts, pack: Record, lanes: Record) -> None:
-    """Begin to sum up the impulses of constraints of groups that are hit; leave out others of their pack."""
-    for lane in range(WIDTH if lanes.is_hit else 0):
-        if contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1)).is_hit:
-            lanes.normal_one[lane] = lanes.normal_two[lane] = lanes.shear[lane] = 0.0
-        else:
-            lanes.target_one[lane] = lanes.target_two[lane] = -arrays.FAR
 
 
 @rare_kernel
@@ -107,24 +106,24 @@ def aim_pack(contacts: arrays.Contacts, m: int, lane: Lane, is_first: bool) -> L
     stepping = contacts.stepping[0]
     pack = contacts.packs[m]
     lanes = contacts.impact_lanes[m]
-    constraint = packs.constraints_of(pack, lane)
-    a = packs.bodies_at(contacts, pack.a, lane)
-    b = packs.bodies_at(contacts, pack.b, lane)
-    u = slip.slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
+    link = packs.link_of(contacts, pack, lane)
+    u = packs.slip_now(link)
     e = load(lane, pack.restitution)
     bend = stepping.bend_share * load(lane, pack.bend)
-    pull = passes.pulls(constraint, a, b, stepping)
+    pull = passes.pulls(link, stepping)
     old_one = load(lane, lanes.target_one)
     old_two = load(lane, lanes.target_two)
     last_one = old_one if is_first else -e * u.one - 0.5 * pull
     last_two = old_two if is_first else -e * u.two - 0.5 * pull
     after_one = least_after(u.one, last_one, pull, e)
     after_two = least_after(u.two, last_two, pull, e)
-    held = slip.presses(load(lane, lanes.held), a.inverse_mass + b.inverse_mass, stepping)
+    held = slip.presses(load(lane, lanes.held), link.a.inverse_mass + link.b.inverse_mass, stepping)
     t_one, hit_one = aim_point(u.one, load(lane, pack.start_one), old_one, after_one, bend, held, stepping)
     t_two, hit_two = aim_point(u.two, load(lane, pack.start_two), old_two, after_two, bend, held, stepping)
     store(lane, pack.target_one, t_one)
     store(lane, pack.target_two, t_two)
+    store(lane, lanes.all_one, t_one)
+    store(lane, lanes.all_two, t_two)
     rise_one = load(lane, lanes.rise_one)
     rise_two = load(lane, lanes.rise_two)
     more_one = select(pull < 0.0, last_one + e * u.one, 0.0)
@@ -175,27 +174,23 @@ def aim_rest_of(contacts: arrays.Contacts, m: int, lane: Lane) -> None:
     stepping = contacts.stepping[0]
     pack = contacts.packs[m]
     lanes = contacts.impact_lanes[m]
-    constraint = packs.constraints_of(pack, lane)
-    a = packs.bodies_at(contacts, pack.a, lane)
-    b = packs.bodies_at(contacts, pack.b, lane)
-    gap_one, gap_two = passes.gaps(pack, lane, constraint, a, b, stepping.next_bend_time)
-    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, pack.a)
-    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, pack.b)
-    u = slip.slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
+    link = packs.link_of(contacts, pack, lane)
+    gap_one, gap_two = passes.gaps(pack, lane, link, stepping.next_bend_time)
+    u = packs.slip_before(contacts, pack, lane, link.its)
     bend = stepping.bend_share * load(lane, pack.bend)
-    are_free = lesser(a.inverse_mass, b.inverse_mass) > 0.0
-    held = slip.presses(load(lane, lanes.held), a.inverse_mass + b.inverse_mass, stepping)
+    are_free = lesser(link.a.inverse_mass, link.b.inverse_mass) > 0.0
+    held = slip.presses(load(lane, lanes.held), link.a.inverse_mass + link.b.inverse_mass, stepping)
     none = 0.0 * bend - arrays.FAR
     rise_one = select(are_free, select(held, load(lane, lanes.rise_one), none), load(lane, lanes.rise_one))
     rise_two = select(are_free, select(held, load(lane, lanes.rise_two), none), load(lane, lanes.rise_two))
-    one = kept(u.one, rise_one, bend, gap_one, stepping)
-    two = kept(u.two, rise_two, bend, gap_two, stepping)
+    one = rest_target(u.one, rise_one, bend, gap_one, stepping)
+    two = rest_target(u.two, rise_two, bend, gap_two, stepping)
     store(lane, pack.target_one, select(load(lane, lanes.target_one) > -arrays.FAR, one, -arrays.FAR))
     store(lane, pack.target_two, select(load(lane, lanes.target_two) > -arrays.FAR, two, -arrays.FAR))
 
 
 @rare_kernel
-def kept(u: Lanes, rise: Lanes, bend: Lanes, gap: Lanes, stepping: Record) -> Lanes:
+def rest_target(u: Lanes, rise: Lanes, bend: Lanes, gap: Lanes, stepping: Record) -> Lanes:
     """Return what a point has to reach at least (m/s) in the velocity pass after all impacts, u after the last one."""
     least = -greater(gap, 0.0) * stepping.open_bias
     return select((rise > -arrays.FAR) & (u > 0.0), greater(u + rise, 0.0) + bend, least)

@@ -43,7 +43,7 @@ import math
 from blocksim.kernels.common.arrays import TEAM_SIZE, Integers, Record, Records
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import rare_kernel
-from blocksim.kernels.common.simd import WIDTH, load, store
+from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.common.tolerances import (
     IMPACT_ROUND_OFF,
     LEAST_TOLERANCE,
@@ -52,9 +52,8 @@ from blocksim.kernels.common.tolerances import (
     MOST_TRIES,
     TOLERANCE_SHARE,
 )
-from blocksim.kernels.nonsmooth import arrays, contact_groups, impact_rounds, motion, passes, sweeps
-
-NEITHER, LOW, HIGH = range(3)  # what the last solution of a group is kept as: that with too little or too much energy
+from blocksim.kernels.nonsmooth import arrays, contact_groups, impact_rounds, motion, passes
+from blocksim.kernels.nonsmooth.arrays import HIGH, LOW, NEITHER
 
 
 @rare_kernel
@@ -73,20 +72,6 @@ def begin_search(contacts: arrays.Contacts) -> None:
 
 
 @rare_kernel
-def keep_all(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Keep the targets of a round and the impulses with all rebounds."""
-    for m in range(begin, end):
-        lanes = contacts.impact_lanes[m]
-        if lanes.is_hit:
-            pack = contacts.packs[m]
-            store(None, lanes.all_one, load(None, pack.target_one))
-            store(None, lanes.all_two, load(None, pack.target_two))
-            store(None, lanes.after_one, load(None, pack.normal_one))
-            store(None, lanes.after_two, load(None, pack.normal_two))
-            store(None, lanes.after_shear, load(None, pack.shear))
-
-
-@rare_kernel
 def aim_share(contacts: arrays.Contacts, begin: int, end: int) -> None:
     """Begin a round again with the share of its rebounds that is to be tried; leave out groups that are done."""
     for m in range(begin, end):
@@ -96,12 +81,12 @@ def aim_share(contacts: arrays.Contacts, begin: int, end: int) -> None:
             impact_rounds.clear(pack)
             for lane in range(WIDTH):
                 body = contact_groups.of_constraint(contacts, pack, min(lane, pack.count - 1))
-                pack.target_one[lane] = part_of_target(lanes.all_one[lane], body)
-                pack.target_two[lane] = part_of_target(lanes.all_two[lane], body)
+                pack.target_one[lane] = target_of(lanes.all_one[lane], body)
+                pack.target_two[lane] = target_of(lanes.all_two[lane], body)
 
 
 @rare_kernel
-def part_of_target(target: float, body: Record) -> float:
+def target_of(target: float, body: Record) -> float:
     """Return what a point has to reach (m/s) with the share of its rebound that is to be tried."""
     if not body.is_open:
         return -arrays.FAR
@@ -312,39 +297,23 @@ def note(contacts: arrays.Contacts, first: int, last: int) -> None:
 
 
 @rare_kernel
-def undo(contacts: arrays.Contacts, first: int, last: int) -> None:
-    """Keep the velocities after a round, and go back to its start."""
-    for i in range(first, last):
-        body = contacts.impacts[i]
-        if body.is_hit:
-            state = contacts.states[i]
-            body.after_vx, state.vx = state.vx, body.vx
-            body.after_vy, state.vy = state.vy, body.vy
-            body.after_spin, state.spin = state.spin, body.spin
-
-
-@rare_kernel
-def resume(contacts: arrays.Contacts, first: int, last: int, gx: float, gy: float) -> None:
-    """Let the substep of the bodies of groups that were hit begin after the last impact, with gravity (m/s)."""
-    for i in range(first, last):
-        if contacts.impacts[i].is_hit:
-            state = contacts.states[i]
-            before = contacts.before[i]
-            before.vx = state.vx
-            before.vy = state.vy
-            before.spin = state.spin
-            state.vx += gx
-            state.vy += gy
-
-
-@rare_kernel
-def restrain(
+def solve_round(
     contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], packs: tuple[int, int]
 ) -> None:
-    """Leave groups that have gained energy in a round that share of their rebounds with which they do not."""
+    """Solve one round that has been aimed.
+
+    Groups that gain energy in it are left that share of their rebounds with which they do not.
+    """
     stepping = contacts.stepping[0]
-    keep_all(contacts, packs[0], packs[1])
-    undo(contacts, bodies[0], bodies[1])
+    passes.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(stepping))
+    barrier(team)
+    if k == 0:
+        stepping.has_gain = contact_groups.weigh(contacts)
+    barrier(team)
+    if not stepping.has_gain:
+        return
+    keep_constraints(contacts, packs[0], packs[1])
+    keep_bodies(contacts, bodies[0], bodies[1])
     barrier(team)
     if k == 0:
         begin_search(contacts)
@@ -352,7 +321,7 @@ def restrain(
     for number in range(MOST_TRIES):
         aim_share(contacts, packs[0], packs[1])
         barrier(team)
-        sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(stepping))
+        passes.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(stepping))
         barrier(team)
         if k == 0:
             stepping.has_gain = judge(contacts, number == MOST_TRIES - 1)
@@ -364,21 +333,7 @@ def restrain(
             break
     settle_constraints(contacts, packs[0], packs[1])
     settle_bodies(contacts, bodies[0], bodies[1])
-
-
-@rare_kernel
-def go_round(
-    contacts: arrays.Contacts, team: Integers, k: int, bodies: tuple[int, int], packs: tuple[int, int]
-) -> None:
-    """Solve one round that has been aimed."""
-    sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, tolerance_of(contacts.stepping[0]))
     barrier(team)
-    if k == 0:
-        contacts.stepping[0].has_gain = contact_groups.weigh(contacts)
-    barrier(team)
-    if contacts.stepping[0].has_gain:
-        restrain(contacts, team, k, bodies, packs)
-        barrier(team)
 
 
 @rare_kernel
@@ -390,28 +345,26 @@ def follow_impacts(
     `bodies` are those of thread k, `share` is that of a kick of gravity in this substep, `pushes` are of loads.
     """
     stepping = contacts.stepping[0]
-    packs = sweeps.range_of_thread(0, stepping.pack_count, k, team[TEAM_SIZE])
+    packs = passes.range_of_thread(0, stepping.pack_count, k, team[TEAM_SIZE])
     if k == 0:
         contact_groups.find_contact_groups(contacts)
     barrier(team)
     rewind(contacts, bodies[0], bodies[1])
-    impact_rounds.set_aside(contacts, packs[0], packs[1])
+    impact_rounds.begin_rounds(contacts, packs[0], packs[1])
     barrier(team)
     for number in range(MOST_ROUNDS):
         note(contacts, bodies[0], bodies[1] + (k == team[TEAM_SIZE] - 1))  # the ground, which may move, is the last
         hits = impact_rounds.aim_round(contacts, packs[0], packs[1], number == 0)
-        if sweeps.agree(contacts, team, k, number, hits) == 0.0:
+        if passes.agree(contacts, team, k, number, hits) == 0.0:
             break
-        go_round(contacts, team, k, bodies, packs)
+        solve_round(contacts, team, k, bodies, packs)
         lacks = 2.0 * stepping.lag  # once before the round, once after it
         impact_rounds.tally_round(contacts, packs[0], packs[1], lacks * stepping.fall_x, lacks * stepping.fall_y)
         barrier(team)
-    resume(contacts, bodies[0], bodies[1], share * stepping.fall_x, share * stepping.fall_y)
-    if pushes.size > 1:
-        motion.kick_again(contacts, pushes, bodies[0], bodies[1], share)
+    motion.kick_again(contacts, pushes, bodies[0], bodies[1], share)
     barrier(team)
     impact_rounds.aim_rest(contacts, packs[0], packs[1])
     barrier(team)
-    sweeps.velocity_pass(contacts, team, k, passes.VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
+    passes.velocity_pass(contacts, team, k, passes.VELOCITY, min(tolerance_of(stepping), stepping.tolerance))
     impact_rounds.bring_back(contacts, packs[0], packs[1], False)
     barrier(team)

@@ -7,6 +7,12 @@ velocities before and after it. What the kick brings a body is its impulse times
 after the substep, contacts included; so their work adds up exactly, see energy.py.
 
 Prescribed motion: of the supports (the ground, its pieces, walls, fixed bodies) and of driven bodies.
+
+Contacts are not known at the start of a run, so that velocities are those of time zero, and the first substep has half
+a kick of gravity. Of a scene that has settled they are: what holds the blocks are impulses of a whole substep, which
+half a kick would not balance. There velocities go back by half of what gravity, loads and these impulses do in a
+substep: those of blocks at rest by nothing, that of a block that was held and is let go by half a kick. The first
+substep is one like all others then.
 """
 
 from blocksim.kernels.common import jit, loads, shapes, supports
@@ -15,56 +21,109 @@ from blocksim.kernels.common.tolerances import IN_FLIGHT
 from blocksim.kernels.nonsmooth import arrays, cuts
 
 
-@jit.kernel
-def kick(state: Record, before: Record, share: float, hx: float, hy: float) -> None:
-    """Begin the first substep of a step: remember the velocity, add a share of that of gravity (m/s)."""
-    before.vx = state.vx
-    before.vy = state.vy
-    before.spin = state.spin
-    before.lifted -= state.vx * hx + state.vy * hy
-    state.vx += share * hx
-    state.vy += share * hy
+@jit.rare_kernel
+def load_states(scene: arrays.Nonsmooth) -> None:
+    """Bring velocities and inverse masses of all bodies into their states: at the start of a run."""
+    controls = scene.world.controls[0]
+    stepping = scene.contacts.stepping[0]
+    h = stepping.substep
+    for i in range(scene.world.bodies.size):
+        body = scene.world.bodies[i]
+        state = scene.contacts.states[i]
+        state.vx = body.vx
+        state.vy = body.vy
+        state.spin = body.spin
+        state.inverse_mass = body.inverse_mass
+        state.inverse_inertia = body.inverse_inertia
+        state.dx = state.dy = state.turned = 0.0
+    if stepping.is_settled and scene.world.clock[0].steps == 0:
+        go_back(scene)
+    for i in range(scene.world.bodies.size):
+        state = scene.contacts.states[i]
+        scene.contacts.before[i].lifted = h * (controls.gravity_x * state.vx + controls.gravity_y * state.vy)
+
+
+@jit.rare_kernel
+def go_back(scene: arrays.Nonsmooth) -> None:
+    """Take half of what gravity, loads and the impulses of a whole substep do to velocities from them."""
+    world = scene.world
+    controls = world.controls[0]
+    contacts = scene.contacts
+    half = 0.5 * contacts.stepping[0].substep
+    count = world.bodies.size - 1
+    if world.loads.size > 0:
+        loads.accelerations(world, contacts.states, scene.pushes, 0, count, 0.0)
+    for i in range(count):
+        state = contacts.states[i]
+        if state.inverse_mass > 0.0:
+            state.vx -= half * controls.gravity_x
+            state.vy -= half * controls.gravity_y
+            if world.loads.size > 0:
+                state.vx -= half * scene.pushes[i].ax
+                state.vy -= half * scene.pushes[i].ay
+                state.spin -= half * scene.pushes[i].rate
+    for r in range(contacts.stepping[0].constraint_count):
+        constraint = contacts.constraints[r]
+        if constraint.reach != arrays.AWAY:
+            push_back(constraint, contacts.states[constraint.a], 1.0, constraint.arm_a, constraint.shear_arm_a)
+            push_back(constraint, contacts.states[constraint.b], -1.0, constraint.arm_b, constraint.shear_arm_b)
+
+
+@jit.rare_kernel
+def push_back(constraint: Record, state: Record, sign: float, arm: float, shear_arm: float) -> None:
+    """Take half of what the impulses of a constraint do to a body, with its arms (m), from its velocity."""
+    share = -0.5 * sign
+    normal = constraint.normal_one + constraint.normal_two
+    state.vx += share * state.inverse_mass * (constraint.nx * normal - constraint.ny * constraint.shear)
+    state.vy += share * state.inverse_mass * (constraint.ny * normal + constraint.nx * constraint.shear)
+    state.spin += (
+        share
+        * state.inverse_inertia
+        * (arm * normal - constraint.width * constraint.normal_two + shear_arm * constraint.shear)
+    )
 
 
 @jit.kernel
-def kick_warm(state: Record, before: Record, last: float, hx: float, hy: float) -> None:
-    """Begin another substep: remember the velocity, add that of gravity (m/s) and of the last impulses.
+def kick(states: Records, before: Records, first: int, last: int, share: float, hx: float, hy: float) -> None:
+    """Begin the first substep of free bodies from `first` to before `last`, with a share of a kick of gravity (m/s).
+
+    What velocities are before it is kept in `before`.
+    """
+    for i in range(first, last):
+        if states[i].inverse_mass > 0.0:
+            state, then = states[i], before[i]
+            then.vx = state.vx
+            then.vy = state.vy
+            then.spin = state.spin
+            then.lifted -= state.vx * hx + state.vy * hy
+            state.vx += share * hx
+            state.vy += share * hy
+
+
+@jit.kernel
+def kick_warm(states: Records, before: Records, first: int, last: int, share: float, hx: float, hy: float) -> None:
+    """Begin another substep of these bodies, with a kick of gravity (m/s) and the last impulses.
 
     Manifolds do not change within a step, so that all impulses of the last substep together have changed a velocity by
-    what it gained beyond gravity, of which there was a share `last` of a kick.
+    what it gained beyond gravity, of which there was a `share` of a kick.
     """
-    vx = state.vx
-    vy = state.vy
-    spin = state.spin
-    before.lifted -= vx * hx + vy * hy
-    state.vx += vx - (before.vx - (1.0 - last) * hx)
-    state.vy += vy - (before.vy - (1.0 - last) * hy)
-    state.spin += spin - before.spin
-    before.vx = vx
-    before.vy = vy
-    before.spin = spin
-
-
-@jit.kernel
-def kick_all(states: Records, before: Records, first: int, last: int, share: float, hx: float, hy: float) -> None:
-    """Kick the free bodies from `first` to before `last`."""
     for i in range(first, last):
         if states[i].inverse_mass > 0.0:
-            kick(states[i], before[i], share, hx, hy)
+            state, then = states[i], before[i]
+            vx = state.vx
+            vy = state.vy
+            spin = state.spin
+            then.lifted -= vx * hx + vy * hy
+            state.vx += vx - (then.vx - (1.0 - share) * hx)
+            state.vy += vy - (then.vy - (1.0 - share) * hy)
+            state.spin += spin - then.spin
+            then.vx = vx
+            then.vy = vy
+            then.spin = spin
 
 
 @jit.kernel
-def kick_all_warm(
-    states: Records, before: Records, first: int, last: int, last_share: float, hx: float, hy: float
-) -> None:
-    """Kick the free bodies from `first` to before `last` and warm-start them."""
-    for i in range(first, last):
-        if states[i].inverse_mass > 0.0:
-            kick_warm(states[i], before[i], last_share, hx, hy)
-
-
-@jit.kernel
-def drift_all(states: Records, first: int, last: int, h: float) -> None:
+def drift(states: Records, first: int, last: int, h: float) -> None:
     """Move the bodies from `first` to before `last` for h (s)."""
     for i in range(first, last):
         state = states[i]
@@ -100,9 +159,7 @@ def place(body: Record, state: Record, before: Record, share: float, kick: tuple
     body.y += state.dy
     body.angle += state.turned
     body.cos, body.sin = shapes.turn(body.cos, body.sin, state.turned)
-    state.dx = 0.0
-    state.dy = 0.0
-    state.turned = 0.0
+    state.dx = state.dy = state.turned = 0.0
 
 
 @jit.kernel
@@ -157,14 +214,25 @@ def kick_by_loads(scene: arrays.Nonsmooth, number: int, first: int, last: int, s
 
 @jit.rare_kernel
 def kick_again(contacts: arrays.Contacts, pushes: Records, first: int, last: int, share: float) -> None:
-    """Add the kick of loads to bodies of groups that were hit, whose substep begins after the last impact."""
-    kick = share * contacts.stepping[0].substep
+    """Let the substep of the bodies of groups that were hit begin after the last impact, with a share of a kick.
+
+    It is one of gravity and, where there are any, of loads (`pushes`).
+    """
+    stepping = contacts.stepping[0]
+    gx, gy, kick = share * stepping.fall_x, share * stepping.fall_y, share * stepping.substep
     for i in range(first, last):
-        if contacts.impacts[i].is_hit and contacts.states[i].inverse_mass > 0.0:
+        if contacts.impacts[i].is_hit:
             state = contacts.states[i]
-            state.vx += kick * pushes[i].ax
-            state.vy += kick * pushes[i].ay
-            state.spin += kick * pushes[i].rate
+            before = contacts.before[i]
+            before.vx = state.vx
+            before.vy = state.vy
+            before.spin = state.spin
+            state.vx += gx
+            state.vy += gy
+            if pushes.size > 1 and state.inverse_mass > 0.0:
+                state.vx += kick * pushes[i].ax
+                state.vy += kick * pushes[i].ay
+                state.spin += kick * pushes[i].rate
 
 
 @jit.rare_kernel
@@ -200,25 +268,16 @@ def drive(scene: arrays.Nonsmooth, number: int) -> None:
     stepping.support_vx = controls.motion_x * rate
     stepping.support_vy = controls.motion_y * rate
     for one in world.moved:
-        if supports.is_driven(one):
-            drive_own(scene, one, begin)
-            continue
         state = scene.contacts.states[one.body]
         before = scene.contacts.before[one.body]
-        state.vx = before.vx = stepping.support_vx
-        state.vy = before.vy = stepping.support_vy
-
-
-@jit.rare_kernel
-def drive_own(scene: arrays.Nonsmooth, one: Record, begin: float) -> None:
-    """Give a driven body its velocity in the substep that begins at a time (s)."""
-    h = scene.contacts.stepping[0].substep
-    state = scene.contacts.states[one.body]
-    before = scene.contacts.before[one.body]
-    way = supports.way_over(scene.world, one, begin, h)
-    state.vx = before.vx = way.x / h
-    state.vy = before.vy = way.y / h
-    state.spin = before.spin = way.angle / h
+        if supports.is_driven(one):
+            way = supports.way_over(world, one, begin, h)
+            state.vx = before.vx = way.x / h
+            state.vy = before.vy = way.y / h
+            state.spin = before.spin = way.angle / h
+        else:
+            state.vx = before.vx = stepping.support_vx
+            state.vy = before.vy = stepping.support_vy
 
 
 @jit.rare_kernel
@@ -234,30 +293,15 @@ def place_supports(scene: arrays.Nonsmooth) -> None:
     stepping.support_x = controls.motion_x * moved
     stepping.support_y = controls.motion_y * moved
     for one in world.moved:
-        if supports.is_driven(one):
-            place_driven(scene, one, now)
-            continue
         body = world.bodies[one.body]
         state = scene.contacts.states[one.body]
-        body.x = one.x + stepping.support_x
-        body.y = one.y + stepping.support_y
+        if supports.is_driven(one):
+            supports.follow_pieces(world, one, now)
+            supports.put(body, supports.pose_at(world, one, now))
+            body.spin = state.spin
+        else:
+            body.x = one.x + stepping.support_x
+            body.y = one.y + stepping.support_y
         body.vx = state.vx
         body.vy = state.vy
-        state.dx = 0.0
-        state.dy = 0.0
-
-
-@jit.rare_kernel
-def place_driven(scene: arrays.Nonsmooth, one: Record, time: float) -> None:
-    """End a step of one driven body, at a time (s)."""
-    world = scene.world
-    body = world.bodies[one.body]
-    state = scene.contacts.states[one.body]
-    supports.follow_pieces(world, one, time)
-    supports.put(body, supports.pose_at(world, one, time))
-    body.vx = state.vx
-    body.vy = state.vy
-    body.spin = state.spin
-    state.dx = 0.0
-    state.dy = 0.0
-    state.turned = 0.0
+        state.dx = state.dy = state.turned = 0.0

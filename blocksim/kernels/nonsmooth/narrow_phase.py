@@ -27,7 +27,7 @@ from blocksim.kernels.common.simd import (
     write_fields_8,
 )
 from blocksim.kernels.common.tolerances import TURNED
-from blocksim.kernels.nonsmooth import arrays, faces, manifold, references, segments, slip
+from blocksim.kernels.nonsmooth import arrays, faces, manifold, references, slip
 
 NOT_THERE = 0.5 * arrays.FAR  # m: what is FAR changes a little as bodies move
 OF_B = 32  # added to the number of a corner of body b, which counts from 1
@@ -218,11 +218,11 @@ def collide_one(lists: Lists, r: int, ahead: float, corners: Any) -> None:
     constraint = lists.constraints[r]
     one, two = lists.bodies[constraint.a], lists.bodies[constraint.b]
     if constraint.b == lists.bodies.size - 1:
-        found = segments.manifold_on_level(a, hulls_a, b, margin)
+        found = manifold.manifold_on_level(a, hulls_a, b, margin)
     elif one.faces < ALL:
-        found = segments.manifold_on_segment(b, hulls_b, a, one.corners, False, margin)
+        found = manifold.manifold_on_segment(b, hulls_b, a, one.corners, False, margin)
     elif two.faces < ALL:
-        found = segments.manifold_on_segment(a, hulls_a, b, two.corners, True, margin)
+        found = manifold.manifold_on_segment(a, hulls_a, b, two.corners, True, margin)
     else:
         reference = references.reference_of(a, hulls_a, b, hulls_b, margin, 0)
         if reference.best.gap > margin:

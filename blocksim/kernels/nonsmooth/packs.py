@@ -21,7 +21,7 @@ from blocksim.kernels.common.simd import (
     store,
 )
 from blocksim.kernels.nonsmooth.arrays import COLOURS, OPEN, TOUCHING, Contacts
-from blocksim.kernels.nonsmooth.slip import Constraints
+from blocksim.kernels.nonsmooth.slip import Constraints, Slip, slip_of
 
 LONELY = 2  # constraints: so many that are left make two packs of one, which are solved faster than one of two
 
@@ -39,10 +39,26 @@ class Bodies(NamedTuple):
     turned: Lanes
 
 
+class Link(NamedTuple):
+    """The constraints of a pack, or one of them, and the bodies on both sides."""
+
+    its: Constraints
+    a: Bodies
+    b: Bodies
+
+
 @jit.kernel
-def constraints_of(pack: arrays.Record, lane: Lane) -> Constraints:
-    """Return the constraints of a pack."""
-    return Constraints(
+def bodies_at(contacts: Contacts, places: arrays.Integers, lane: Lane) -> Bodies:
+    """Return the bodies at the places of a pack."""
+    vx, vy, spin, inverse_mass = fields_0(lane, contacts.states, places)
+    inverse_inertia, dx, dy, turned = fields_4(lane, contacts.states, places)
+    return Bodies(vx, vy, spin, inverse_mass, inverse_inertia, dx, dy, turned)
+
+
+@jit.kernel
+def link_of(contacts: Contacts, pack: arrays.Record, lane: Lane) -> Link:
+    """Return the constraints of a pack with their bodies as they are now."""
+    constraints = Constraints(
         load(lane, pack.nx),
         load(lane, pack.ny),
         load(lane, pack.arm_a),
@@ -51,36 +67,46 @@ def constraints_of(pack: arrays.Record, lane: Lane) -> Constraints:
         load(lane, pack.shear_arm_a),
         load(lane, pack.shear_arm_b),
     )
+    return Link(constraints, bodies_at(contacts, pack.a, lane), bodies_at(contacts, pack.b, lane))
 
 
 @jit.kernel
-def bodies_at(contacts: Contacts, places: arrays.Integers, lane: Lane) -> Bodies:
-    """Return the bodies of a pack."""
-    vx, vy, spin, inverse_mass = fields_0(lane, contacts.states, places)
-    inverse_inertia, dx, dy, turned = fields_4(lane, contacts.states, places)
-    return Bodies(vx, vy, spin, inverse_mass, inverse_inertia, dx, dy, turned)
+def slip_now(link: Link) -> Slip:
+    """Return the velocities at the points."""
+    a, b = link.a, link.b
+    return slip_of(link.its, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
 
 
 @jit.kernel
-def normal_masses(constraint: Constraints, a: Bodies, b: Bodies) -> tuple[Lanes, Lanes, Lanes]:
+def slip_before(contacts: Contacts, pack: arrays.Record, lane: Lane, its: Constraints) -> Slip:
+    """Return the velocities at the points when the substep began."""
+    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, pack.a)
+    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, pack.b)
+    return slip_of(its, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
+
+
+@jit.kernel
+def normal_masses(link: Link) -> tuple[Lanes, Lanes, Lanes]:
     """Return A (1/kg) of the two normals: of one, mixed, of two."""
+    its, a, b = link
     together = a.inverse_mass + b.inverse_mass
-    two_a = constraint.arm_a - constraint.width
-    two_b = constraint.arm_b - constraint.width
-    turned_a = a.inverse_inertia * constraint.arm_a
-    turned_b = b.inverse_inertia * constraint.arm_b
-    one = together + turned_a * constraint.arm_a + turned_b * constraint.arm_b
+    two_a = its.arm_a - its.width
+    two_b = its.arm_b - its.width
+    turned_a = a.inverse_inertia * its.arm_a
+    turned_b = b.inverse_inertia * its.arm_b
+    one = together + turned_a * its.arm_a + turned_b * its.arm_b
     mixed = together + turned_a * two_a + turned_b * two_b
     two = together + a.inverse_inertia * two_a * two_a + b.inverse_inertia * two_b * two_b
     return one, mixed, two
 
 
 @jit.kernel
-def tangent_mass(constraint: Constraints, a: Bodies, b: Bodies) -> Lanes:
+def tangent_mass(link: Link) -> Lanes:
     """Return A (1/kg) along the tangent."""
-    coupled_a = a.inverse_inertia * constraint.shear_arm_a
-    coupled_b = b.inverse_inertia * constraint.shear_arm_b
-    return a.inverse_mass + b.inverse_mass + coupled_a * constraint.shear_arm_a + coupled_b * constraint.shear_arm_b
+    its, a, b = link
+    coupled_a = a.inverse_inertia * its.shear_arm_a
+    coupled_b = b.inverse_inertia * its.shear_arm_b
+    return a.inverse_mass + b.inverse_mass + coupled_a * its.shear_arm_a + coupled_b * its.shear_arm_b
 
 
 @jit.kernel
@@ -154,18 +180,10 @@ def pack_all(contacts: Contacts, begin: int, end: int) -> None:
             pack.restitution[lane] = material.restitution
             if material.static_friction != material.kinetic_friction:
                 pack.are_simple = 0
-        if pack.count == 1:
-            keep_masses(contacts, pack)
-
-
-@jit.kernel
-def keep_masses(contacts: Contacts, pack: arrays.Record) -> None:
-    """Keep A of a pack of one, the same for all substeps of a step."""
-    constraint = constraints_of(pack, 0)
-    a = bodies_at(contacts, pack.a, 0)
-    b = bodies_at(contacts, pack.b, 0)
-    pack.one, pack.mixed, pack.two = normal_masses(constraint, a, b)
-    pack.along = tangent_mass(constraint, a, b)
+        if pack.count == 1:  # A is the same for all substeps of a step
+            link = link_of(contacts, pack, 0)
+            pack.one, pack.mixed, pack.two = normal_masses(link)
+            pack.along = tangent_mass(link)
 
 
 @jit.kernel

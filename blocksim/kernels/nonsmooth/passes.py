@@ -1,16 +1,20 @@
 """What a substep does to the constraints, four at a time: warm start, position pass, velocity pass, tallies.
 
+A sweep goes through all packs, colour after colour. Those of one colour share no free body: threads divide them.
+
 Formulas: __init__.py. Velocities are read, changed by all impulses of a constraint and written back. Bodies that are
 fixed are never written to, so that constraints of one colour share nothing that changes.
 
 Few blocks wait for one constraint after the other, so sums are put together such that what needs no velocity is there
 when the velocities of the constraint before come.
-
-What the velocity pass has to reach at the points of constraints: rebounds, and no approach elsewhere.
 """
 
-from blocksim.kernels.common.arrays import Record, Records
-from blocksim.kernels.common.jit import kernel
+import math
+from typing import Any
+
+from blocksim.kernels.common.arrays import TEAM_SIZE, Integers, Record, Records
+from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.simd import (
     Lane,
     Lanes,
@@ -23,31 +27,32 @@ from blocksim.kernels.common.simd import (
     load,
     root,
     select,
+    spread,
     store,
     write_fields_0,
 )
+from blocksim.kernels.common.tolerances import LATE, STRONG
 from blocksim.kernels.nonsmooth import arrays, cone, packs
-from blocksim.kernels.nonsmooth.slip import Constraints, Slip, presses, slip_of
+from blocksim.kernels.nonsmooth.slip import presses, slip_of
 
 
 @kernel
-def gaps(
-    pack: Record, lane: Lane, constraint: Constraints, a: packs.Bodies, b: packs.Bodies, bend_time: float
-) -> tuple[Lanes, Lanes]:
+def gaps(pack: Record, lane: Lane, link: packs.Link, bend_time: float) -> tuple[Lanes, Lanes]:
     """Return both gaps (m) as they are now; `bend_time` (s) is that of slip.py now."""
-    slip = slip_of(constraint, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
+    a, b = link.a, link.b
+    slip = slip_of(link.its, a.dx - b.dx, a.dy - b.dy, a.turned, b.turned)
     bent = bend_time * load(lane, pack.bend)
     return load(lane, pack.gap_one) + slip.one + bent, load(lane, pack.gap_two) + slip.two + bent
 
 
 @kernel
-def pulls(constraint: Constraints, a: packs.Bodies, b: packs.Bodies, stepping: Record) -> Lanes:
+def pulls(link: packs.Link, stepping: Record) -> Lanes:
     """Return by how much gravity changes J v of constraints in a substep (m/s) as long as nothing touches.
 
     So do loads that act on all bodies. Those on single ones are left out: a rebound is off by their share of a kick.
     """
-    free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
-    return free * (constraint.nx * stepping.pull_x + constraint.ny * stepping.pull_y)
+    free = select(link.a.inverse_mass > 0.0, 1.0, 0.0) - select(link.b.inverse_mass > 0.0, 1.0, 0.0)
+    return free * (link.its.nx * stepping.pull_x + link.its.ny * stepping.pull_y)
 
 
 @kernel
@@ -78,12 +83,10 @@ def target(impulse: Lanes, inverse_mass: Lanes, gap: Lanes, least: Lanes, steppi
 
 
 @kernel
-def aim(
-    contacts: arrays.Contacts, pack: Record, lane: Lane, constraint: Constraints, a: packs.Bodies, b: packs.Bodies
-) -> tuple[Lanes, Lanes]:
-    """Set what the velocity pass has to reach at the points of constraints."""
+def aim(contacts: arrays.Contacts, pack: Record, lane: Lane, link: packs.Link) -> tuple[Lanes, Lanes]:
+    """Set what the velocity pass has to reach at the points of constraints: rebounds, and no approach elsewhere."""
     stepping = contacts.stepping[0]
-    gap_one, gap_two = gaps(pack, lane, constraint, a, b, stepping.next_bend_time)
+    gap_one, gap_two = gaps(pack, lane, link, stepping.next_bend_time)
     normal_one = load(lane, pack.normal_one)
     normal_two = load(lane, pack.normal_two)
     if is_all((lesser(gap_one, gap_two) > stepping.touch_gap) & (greater(normal_one, normal_two) <= 0.0)):
@@ -91,97 +94,46 @@ def aim(
         store(lane, pack.target_one, none)
         store(lane, pack.target_two, none)
         return none, none
-    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, pack.a)
-    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, pack.b)
-    u = slip_of(constraint, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
-    inverse_mass = a.inverse_mass + b.inverse_mass
+    u = packs.slip_before(contacts, pack, lane, link.its)
+    inverse_mass = link.a.inverse_mass + link.b.inverse_mass
     least_one = -branch(gap_one > 0.0, gap_one, 0.0) * stepping.open_bias
     least_two = -branch(gap_two > 0.0, gap_two, 0.0) * stepping.open_bias
     t_one = target(normal_one, inverse_mass, gap_one, least_one, stepping)
     t_two = target(normal_two, inverse_mass, gap_two, least_two, stepping)
     if not is_all((lesser(u.one, u.two) >= -stepping.threshold) | (greater(t_one, t_two) <= -arrays.FAR)):
-        t_one, t_two = with_rebounds(contacts, pack, lane, constraint, a, b, u, t_one, t_two)
+        restitution = load(lane, pack.restitution)
+        pull = pulls(link, stepping)
+        after_one = rebound(u.one, load(lane, pack.start_one), pull, restitution, stepping)
+        after_two = rebound(u.two, load(lane, pack.start_two), pull, restitution, stepping)
+        rebounds = restitution > (-1.0 if stepping.has_cuts else 0.0)  # then it is an impact without any rebound too
+        t_one = select(rebounds & (u.one < -stepping.threshold) & (t_one > -arrays.FAR), after_one, t_one)
+        t_two = select(rebounds & (u.two < -stepping.threshold) & (t_two > -arrays.FAR), after_two, t_two)
+        if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):
+            stepping.has_rebounds = 1
     store(lane, pack.target_one, t_one)
     store(lane, pack.target_two, t_two)
     return t_one, t_two
 
 
 @kernel
-def with_rebounds(
-    contacts: arrays.Contacts,
-    pack: Record,
-    lane: Lane,
-    constraint: Constraints,
-    a: packs.Bodies,
-    b: packs.Bodies,
-    u: Slip,
-    t_one: Lanes,
-    t_two: Lanes,
-) -> tuple[Lanes, Lanes]:
-    """Return the targets (m/s) of constraints with those of points that rebound, which approach with u."""
-    stepping = contacts.stepping[0]
-    restitution = load(lane, pack.restitution)
-    pull = pulls(constraint, a, b, stepping)
-    after_one = rebound(u.one, load(lane, pack.start_one), pull, restitution, stepping)
-    after_two = rebound(u.two, load(lane, pack.start_two), pull, restitution, stepping)
-    rebounds = restitution > (-1.0 if stepping.has_cuts else 0.0)  # then it is an impact without any rebound too
-    t_one = select(rebounds & (u.one < -stepping.threshold) & (t_one > -arrays.FAR), after_one, t_one)
-    t_two = select(rebounds & (u.two < -stepping.threshold) & (t_two > -arrays.FAR), after_two, t_two)
-    if stepping.is_guarded and not is_all(greater(t_one, t_two) <= 0.0):
-        stepping.has_rebounds = 1
-    return t_one, t_two
-
-
-@kernel
 def push(
-    contacts: arrays.Contacts,
-    pack: Record,
-    lane: Lane,
-    constraint: Constraints,
-    a: packs.Bodies,
-    b: packs.Bodies,
-    normal: Lanes,
-    second: Lanes,
+    contacts: arrays.Contacts, pack: Record, lane: Lane, link: packs.Link, normal: Lanes, second: Lanes, shear: Any
 ) -> None:
-    """Change the velocities of the bodies by a normal impulse (N s) in all, of which `second` at point two."""
-    turn = constraint.width * second
-    turn_a = constraint.arm_a * normal - turn
-    turn_b = constraint.arm_b * normal - turn
-    shove(contacts, pack, lane, a, b, (constraint.nx * normal, constraint.ny * normal, turn_a, turn_b))
+    """Change the velocities of the bodies by impulses (N s), along the normal in all, of which `second` at point two.
 
-
-@kernel
-def push_and_drag(
-    contacts: arrays.Contacts,
-    pack: Record,
-    lane: Lane,
-    constraint: Constraints,
-    a: packs.Bodies,
-    b: packs.Bodies,
-    normal: Lanes,
-    second: Lanes,
-    shear: Lanes,
-) -> None:
-    """Change the velocities of the bodies by normal impulses, as push does, and by one along the tangent (N s)."""
-    px = constraint.nx * normal - constraint.ny * shear
-    py = constraint.ny * normal + constraint.nx * shear
-    turn = constraint.width * second
-    turn_a = constraint.arm_a * normal - turn + constraint.shear_arm_a * shear
-    turn_b = constraint.arm_b * normal - turn + constraint.shear_arm_b * shear
-    shove(contacts, pack, lane, a, b, (px, py, turn_a, turn_b))
-
-
-@kernel
-def shove(
-    contacts: arrays.Contacts,
-    pack: Record,
-    lane: Lane,
-    a: packs.Bodies,
-    b: packs.Bodies,
-    impulse: tuple[Lanes, Lanes, Lanes, Lanes],
-) -> None:
-    """Change the velocities of the bodies by an impulse: along x and y (N s), its moments about both (N m s)."""
-    px, py, turn_a, turn_b = impulse
+    And along the tangent by `shear`, None for none.
+    """
+    its, a, b = link
+    px = its.nx * normal
+    py = its.ny * normal
+    turn = its.width * second
+    turn_a = its.arm_a * normal - turn
+    turn_b = its.arm_b * normal - turn
+    if shear is not None:
+        px = px - its.ny * shear
+        py = py + its.nx * shear
+        turn_a = turn_a + its.shear_arm_a * shear
+        turn_b = turn_b + its.shear_arm_b * shear
     vx = a.vx + a.inverse_mass * px
     vy = a.vy + a.inverse_mass * py
     spin = a.spin + a.inverse_inertia * turn_a
@@ -193,23 +145,21 @@ def shove(
 
 
 @kernel
-def masses(
-    pack: Record, lane: Lane, constraint: Constraints, a: packs.Bodies, b: packs.Bodies
-) -> tuple[Lanes, Lanes, Lanes]:
+def masses(pack: Record, lane: Lane, link: packs.Link) -> tuple[Lanes, Lanes, Lanes]:
     """Return A (1/kg) of the two normals: of one, mixed, of two.
 
     Of four constraints it is computed again each time, which is cheaper than to load it, of one it is kept.
     """
     if lane is None:
-        return packs.normal_masses(constraint, a, b)
+        return packs.normal_masses(link)
     return pack.one, pack.mixed, pack.two
 
 
 @kernel
-def shear_mass(pack: Record, lane: Lane, constraint: Constraints, a: packs.Bodies, b: packs.Bodies) -> Lanes:
+def shear_mass(pack: Record, lane: Lane, link: packs.Link) -> Lanes:
     """Return A (1/kg) along the tangent; kept as in masses."""
     if lane is None:
-        return packs.tangent_mass(constraint, a, b)
+        return packs.tangent_mass(link)
     return pack.along
 
 
@@ -219,25 +169,19 @@ def warm_pack(contacts: arrays.Contacts, pack: Record, lane: Lane) -> None:
     second = load(lane, pack.normal_two)
     normal = load(lane, pack.normal_one) + second
     if not is_all(normal <= 0.0):
-        a = packs.bodies_at(contacts, pack.a, lane)
-        b = packs.bodies_at(contacts, pack.b, lane)
-        push_and_drag(
-            contacts, pack, lane, packs.constraints_of(pack, lane), a, b, normal, second, load(lane, pack.shear)
-        )
+        push(contacts, pack, lane, packs.link_of(contacts, pack, lane), normal, second, load(lane, pack.shear))
 
 
 @kernel
 def position_pack(contacts: arrays.Contacts, pack: Record, lane: Lane) -> None:
     """Solve both normals of constraints with soft contacts and gaps that may just close."""
     stepping = contacts.stepping[0]
-    constraint = packs.constraints_of(pack, lane)
-    a = packs.bodies_at(contacts, pack.a, lane)
-    b = packs.bodies_at(contacts, pack.b, lane)
-    gap_one, gap_two = gaps(pack, lane, constraint, a, b, stepping.bend_time)
+    link = packs.link_of(contacts, pack, lane)
+    gap_one, gap_two = gaps(pack, lane, link, stepping.bend_time)
     store(lane, pack.start_one, gap_one)
     store(lane, pack.start_two, gap_two)
-    slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    one, mixed, two = masses(pack, lane, constraint, a, b)
+    slip = packs.slip_now(link)
+    one, mixed, two = masses(pack, lane, link)
     old_one = load(lane, pack.normal_one)
     old_two = load(lane, pack.normal_two)
     is_open_one = gap_one > stepping.touch_gap
@@ -255,25 +199,21 @@ def position_pack(contacts: arrays.Contacts, pack: Record, lane: Lane) -> None:
     store(lane, pack.normal_one, new_one)
     store(lane, pack.normal_two, new_two)
     second = new_two - old_two
-    push(contacts, pack, lane, constraint, a, b, new_one - old_one + second, second)
+    push(contacts, pack, lane, link, new_one - old_one + second, second, None)
 
 
 @kernel
-def reach(
-    contacts: arrays.Contacts,
-    pack: Record,
-    lane: Lane,
-    constraint: Constraints,
-    a: packs.Bodies,
-    b: packs.Bodies,
-    t_one: Lanes,
-    t_two: Lanes,
-) -> Lanes:
+def velocity_pack(contacts: arrays.Contacts, pack: Record, lane: Lane, is_first: bool) -> Lanes:
     """Solve both normals without softness, then friction; return the largest changes of velocity (m/s)."""
+    link = packs.link_of(contacts, pack, lane)
+    if is_first:
+        t_one, t_two = aim(contacts, pack, lane, link)
+    else:
+        t_one, t_two = load(lane, pack.target_one), load(lane, pack.target_two)
     if is_all((greater(t_one, t_two) <= -arrays.FAR) & (abs(load(lane, pack.shear)) <= 0.0)):
         return 0.0 * t_one  # no normal impulse, so no friction either
-    slip = slip_of(constraint, a.vx - b.vx, a.vy - b.vy, a.spin, b.spin)
-    one, mixed, two = masses(pack, lane, constraint, a, b)
+    slip = packs.slip_now(link)
+    one, mixed, two = masses(pack, lane, link)
     old_one = load(lane, pack.normal_one)
     old_two = load(lane, pack.normal_two)
     old_shear = load(lane, pack.shear)
@@ -288,18 +228,22 @@ def reach(
     d_two = new_two - old_two
     normal = d_one + d_two
     # slip along the tangent after the normal impulses
-    coupled_a = a.inverse_inertia * constraint.shear_arm_a
-    coupled_b = b.inverse_inertia * constraint.shear_arm_b
-    by_normal = coupled_a * constraint.arm_a + coupled_b * constraint.arm_b
-    by_width = (coupled_a + coupled_b) * constraint.width
+    its, a, b = link
+    coupled_a = a.inverse_inertia * its.shear_arm_a
+    coupled_b = b.inverse_inertia * its.shear_arm_b
+    by_normal = coupled_a * its.arm_a + coupled_b * its.arm_b
+    by_width = (coupled_a + coupled_b) * its.width
     rate = (slip.shear + share * load(lane, pack.shear_bend)) + (by_normal * normal - by_width * d_two)
-    mass = shear_mass(pack, lane, constraint, a, b)
+    mass = shear_mass(pack, lane, link)
     needed = old_shear - rate * (1.0 / mass)
     limit = cone.shear_limits(contacts, pack, lane, new_one + new_two, abs(needed), mass)
-    shear = cone.shear_within(pack, lane, constraint, a, b, old_shear, needed, limit)
+    if pack.is_coupled:
+        shear = cone.approached(pack, lane, link, old_shear, needed, limit)
+    else:
+        shear = cone.within(needed, limit)
     store(lane, pack.shear, shear)
     d_shear = shear - old_shear
-    push_and_drag(contacts, pack, lane, constraint, a, b, normal, d_two, d_shear)
+    push(contacts, pack, lane, link, normal, d_two, d_shear)
     return (a.inverse_mass + b.inverse_mass) * greater(greater(abs(d_one), abs(d_two)), abs(d_shear))
 
 
@@ -315,33 +259,21 @@ def solve_pack(contacts: arrays.Contacts, pack: Record, lane: Lane, task: int) -
     if task == POSITION:
         position_pack(contacts, pack, lane)
         return four(lane, 0.0, 0.0, 0.0, 0.0)
-    constraint = packs.constraints_of(pack, lane)
-    a = packs.bodies_at(contacts, pack.a, lane)
-    b = packs.bodies_at(contacts, pack.b, lane)
-    if task == FIRST_VELOCITY:
-        t_one, t_two = aim(contacts, pack, lane, constraint, a, b)
-    else:
-        t_one, t_two = load(lane, pack.target_one), load(lane, pack.target_two)
-    return reach(contacts, pack, lane, constraint, a, b, t_one, t_two)
+    return velocity_pack(contacts, pack, lane, task == FIRST_VELOCITY)
 
 
 @kernel
-def given_to(
-    constraint: Constraints, a: packs.Bodies, b: packs.Bodies, normal_one: Lanes, normal_two: Lanes, shear: Lanes
-) -> Lanes:
+def given_to(link: packs.Link, normal_one: Lanes, normal_two: Lanes, shear: Lanes) -> Lanes:
     """Return the work (J) of the impulses on body a, did it move as the fixed body of its constraint does."""
+    its, a, b = link
     is_b = a.inverse_mass > 0.0
     vx = select(is_b, b.vx, a.vx)
     vy = select(is_b, b.vy, a.vy)
     spin = select(is_b, b.spin, a.spin)
     normal = normal_one + normal_two
-    moment = select(is_b, constraint.arm_b, constraint.arm_a) * normal - constraint.width * normal_two
-    moment = moment + select(is_b, constraint.shear_arm_b, constraint.shear_arm_a) * shear
-    return (
-        normal * (constraint.nx * vx + constraint.ny * vy)
-        + shear * (constraint.nx * vy - constraint.ny * vx)
-        + spin * moment
-    )
+    moment = select(is_b, its.arm_b, its.arm_a) * normal - its.width * normal_two
+    moment = moment + select(is_b, its.shear_arm_b, its.shear_arm_a) * shear
+    return normal * (its.nx * vx + its.ny * vy) + shear * (its.nx * vy - its.ny * vx) + spin * moment
 
 
 @kernel
@@ -361,10 +293,9 @@ def taken_by(
     normal_two = load(lane, pack.normal_two)
     if is_all(normal_one + normal_two <= 0.0):
         return 0.0 * normal_one, 0.0 * normal_one, 0.0 * normal_one
-    constraint = packs.constraints_of(pack, lane)
+    link = packs.link_of(contacts, pack, lane)
     shear = load(lane, pack.shear)
-    a = packs.bodies_at(contacts, pack.a, lane)
-    b = packs.bodies_at(contacts, pack.b, lane)
+    _, a, b = link
     vx_a, vy_a, spin_a, _ = fields_0(lane, then, pack.a)
     vx_b, vy_b, spin_b, _ = fields_0(lane, then, pack.b)
     free = select(a.inverse_mass > 0.0, 1.0, 0.0) - select(b.inverse_mass > 0.0, 1.0, 0.0)
@@ -373,9 +304,9 @@ def taken_by(
     if gx != 0.0 or gy != 0.0:  # only in the first substep of a run
         vx = vx + free * gx
         vy = vy + free * gy
-    slip = slip_of(constraint, vx, vy, a.spin + spin_a, b.spin + spin_b)
+    slip = slip_of(link.its, vx, vy, a.spin + spin_a, b.spin + spin_b)
     if contacts.stepping[0].is_shaken:
-        given = free * given_to(constraint, a, b, normal_one, normal_two, shear)
+        given = free * given_to(link, normal_one, normal_two, shear)
     else:
         given = 0.0 * shear
     return slip.one * normal_one + slip.two * normal_two, slip.shear * shear, -given
@@ -391,3 +322,104 @@ def tally_pack(contacts: arrays.Contacts, then: Records, m: int, lane: Lane, gx:
     tally.friction -= 0.5 * packs.total(lane, shears, pack.count)
     if contacts.stepping[0].is_shaken:
         tally.to_support += packs.total(lane, gifts, pack.count)
+
+
+@kernel
+def range_of_thread(begin: int, end: int, k: int, size: int) -> tuple[int, int]:
+    """Return where the range of thread k begins and ends: whole tallies, so that no two threads write to one."""
+    if size == 1:
+        return begin, end
+    most = arrays.TALLY_PACKS
+    blocks = (end - begin + most - 1) // most
+    return min(end, begin + blocks * k // size * most), min(end, begin + blocks * (k + 1) // size * most)
+
+
+@kernel
+def go_through(contacts: arrays.Contacts, task: int, begin: int, end: int) -> float:
+    """Do one task of py for some packs; return the largest change of velocity (m/s) of a velocity pass."""
+    largest = spread(0.0)
+    single = 0.0
+    for m in range(begin, end):
+        pack = contacts.packs[m]
+        if pack.count == 1:
+            single = greater(solve_pack(contacts, pack, 0, task), single)
+        else:
+            largest = greater(solve_pack(contacts, pack, None, task), largest)
+    return max(single, packs.highest(largest))
+
+
+@kernel
+def tally_constraints(contacts: arrays.Contacts, begin: int, end: int, gx: float, gy: float) -> None:
+    """Tally the constraints of some packs; (gx, gy), m/s, is what velocities lack of gravity."""
+    for m in range(begin, end):
+        pack = contacts.packs[m]
+        if pack.count == 1:
+            tally_pack(contacts, contacts.before, m, 0, gx, gy)
+        else:
+            tally_pack(contacts, contacts.before, m, None, gx, gy)
+
+
+@kernel
+def sweep(contacts: arrays.Contacts, task: int, team: Integers, k: int) -> float:
+    """Do one task for all packs, colour after colour; return the largest change of velocity (m/s) of thread k.
+
+    For one thread colours are one sequence of packs, the same.
+    """
+    largest = 0.0
+    size = team[TEAM_SIZE]
+    for colour in range(1 if size == 1 else contacts.stepping[0].colours):
+        begin = 0 if size == 1 else contacts.ends[colour]
+        end = contacts.stepping[0].pack_count if size == 1 else contacts.ends[colour + 1]
+        if begin < end:
+            first, last = range_of_thread(begin, end, k, 1 if colour == arrays.COLOURS - 1 else size)
+            if colour < arrays.COLOURS - 1 or k == 0:
+                largest = max(largest, go_through(contacts, task, first, last))
+            barrier(team)
+    return largest
+
+
+@kernel
+def agree(contacts: arrays.Contacts, team: Integers, k: int, number: int, largest: float) -> float:
+    """Return the largest of what all threads have found; `number` distinguishes one question from the next."""
+    size = team[TEAM_SIZE]
+    if size == 1:
+        return largest
+    slot = number % 2
+    contacts.residuals[slot, 8 * k] = largest
+    barrier(team)
+    for other in range(size):
+        largest = max(largest, contacts.residuals[slot, 8 * other])
+    return largest
+
+
+@rare_kernel
+def hold_back(contacts: arrays.Contacts, team: Integers, k: int, is_late: bool) -> None:
+    """Let friction that couples strongly go a share of the way from now on, or all of it again; see cone.py."""
+    first, last = range_of_thread(0, contacts.stepping[0].pack_count, k, team[TEAM_SIZE])
+    for m in range(first, last):
+        pack = contacts.packs[m]
+        if pack.count == 1:
+            pack.is_coupled = is_late and not is_all(cone.coupling(pack, 0, packs.link_of(contacts, pack, 0)) <= STRONG)
+        else:
+            pack.is_coupled = is_late and not is_all(
+                cone.coupling(pack, None, packs.link_of(contacts, pack, None)) <= STRONG
+            )
+    barrier(team)
+
+
+@kernel
+def velocity_pass(contacts: arrays.Contacts, team: Integers, k: int, task: int, tolerance: float) -> None:
+    """Sweep until no impulse changes a velocity by more than the tolerance (m/s), or as often as allowed."""
+    stepping = contacts.stepping[0]
+    largest = math.inf
+    sweeps = 0
+    while largest > tolerance and sweeps < stepping.velocity_sweeps:
+        if sweeps == LATE:
+            hold_back(contacts, team, k, True)
+        sweeps += 1
+        largest = agree(contacts, team, k, sweeps, sweep(contacts, task, team, k))
+        task = VELOCITY
+    if sweeps > LATE:
+        hold_back(contacts, team, k, False)
+    if k == 0:
+        stepping.sweeps += sweeps

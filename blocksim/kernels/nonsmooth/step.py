@@ -1,25 +1,12 @@
-"""The time loop of the non-smooth scheme between two outputs, in one compiled call for every thread.
+"""A step of the non-smooth scheme, and the loop over steps between two outputs: one compiled call for every thread.
 
-One substep of all bodies and constraints, shared by threads.
+Threads go through the same stages, each with its own bodies and constraints; they meet at barriers, and what is the
+same for all is done by the first one between two of them.
 """
 
-import math
-
-from blocksim.kernels.common import integrate, jit, loads, supports
-from blocksim.kernels.common.arrays import (
-    AT_REST,
-    NOT_FINITE,
-    OVERLAP_LIMIT,
-    PAIRS_FULL,
-    REACHED,
-    STATUS,
-    TEAM_SIZE,
-    Floats,
-    Integers,
-    Records,
-)
+from blocksim.kernels.common import integrate, jit, supports
+from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED, STATUS, TEAM_SIZE, Floats, Integers, Records
 from blocksim.kernels.common.barrier import barrier
-from blocksim.kernels.common.energy import weights_power
 from blocksim.kernels.common.members import Watched, frame_to_watch, member as world_of, of_member, watch
 from blocksim.kernels.nonsmooth import (
     arrays,
@@ -33,15 +20,100 @@ from blocksim.kernels.nonsmooth import (
     packs,
     passes,
     slip,
-    sweeps,
 )
-from blocksim.kernels.nonsmooth.begin import is_start, load_states
+
+UNDER_WAY = -1  # beside the status codes: the step goes on with another interval
 
 
 @jit.kernel
-def kick_share(number: int, is_first_step: bool) -> float:
+def take_step(scene: arrays.Nonsmooth, k: int, impact_lanes: Records | None) -> int:
+    """Take one step as thread k; return the status code.
+
+    A step has one interval, unless it is cut at impacts. Where there are no `impact_lanes`, no impact follows from
+    another, and the compiler leaves out what is about that.
+    """
+    contacts, team = scene.contacts, scene.world.team
+    stepping = contacts.stepping[0]
+    size = team[TEAM_SIZE]
+    if impact_lanes is not None:
+        first, last = passes.range_of_thread(0, stepping.constraint_count, k, size)
+        impact_rounds.forget_struck(contacts, first, last)
+    barrier(team)
+    if k == 0:
+        team[STATUS] = begin_step(scene, impact_lanes)
+    barrier(team)
+    while team[STATUS] == UNDER_WAY:
+        first, last = passes.range_of_thread(0, stepping.constraint_count, k, size)
+        if impact_lanes is not None and stepping.cuts > 0:
+            impact_rounds.forget_struck(contacts, first, last)
+        narrow_phase.find_manifolds(scene, first, last)
+        barrier(team)
+        if k == 0:
+            team[STATUS] = gather(scene, impact_lanes)
+        barrier(team)
+        if team[STATUS] == UNDER_WAY:
+            continue
+        first, last = passes.range_of_thread(0, stepping.pack_count, k, size)
+        packs.pack_all(contacts, first, last)
+        is_first = cuts.is_start(scene)
+        for number in range(stepping.substeps):
+            substep(scene, k, number, is_first, impact_lanes)
+        packs.unpack_all(contacts, first, last)
+        first, last = bodies_of_thread(contacts, k, size)
+        motion.place_all(scene, first, last, kick_share(stepping.substeps - 1, is_first))
+        barrier(team)
+        if k == 0:
+            team[STATUS] = end_interval(scene, impact_lanes)
+        barrier(team)
+    return team[STATUS]
+
+
+@jit.kernel
+def substep(scene: arrays.Nonsmooth, k: int, number: int, is_first: bool, impact_lanes: Records | None) -> None:
+    """Go through substep `number` of an interval as thread k, of the first one of a run or not; as in take_step."""
+    contacts, team = scene.contacts, scene.world.team
+    stepping = contacts.stepping[0]
+    has_loads = scene.world.loads.size > 0
+    share = kick_share(number, is_first)
+    first, last = bodies_of_thread(contacts, k, team[TEAM_SIZE])
+    begin, end = passes.range_of_thread(0, stepping.pack_count, k, team[TEAM_SIZE])
+    if k == 0:
+        prepare(scene, number, share)
+    if impact_lanes is not None:
+        impact_rounds.keep_held(contacts, begin, end)
+        if number == 0 and (is_first or stepping.has_forgotten):
+            impact_rounds.hold(scene, begin, end, 1.0 if is_first else 0.0)
+    hx = stepping.substep * scene.world.controls[0].gravity_x
+    hy = stepping.substep * scene.world.controls[0].gravity_y
+    last_share = kick_share(number - 1, is_first) if number > 0 else 0.0
+    if number == 0:
+        motion.kick(contacts.states, contacts.before, first, last, share, hx, hy)
+    else:
+        motion.kick_warm(contacts.states, contacts.before, first, last, last_share, hx, hy)
+    if has_loads:
+        motion.kick_by_loads(scene, number, first, last, share, last_share)
+    barrier(team)
+    if number == 0:
+        passes.sweep(contacts, passes.WARM, team, k)
+    passes.sweep(contacts, passes.POSITION, team, k)
+    motion.drift(contacts.states, first, last + (k == team[TEAM_SIZE] - 1), stepping.substep)  # the ground is the last
+    barrier(team)
+    passes.velocity_pass(contacts, team, k, passes.FIRST_VELOCITY, stepping.tolerance)
+    if impact_lanes is not None and stepping.has_rebounds:
+        barrier(team)
+        impacts.follow_impacts(contacts, team, k, (first, last), share, scene.pushes)
+    if has_loads:
+        motion.tally_loads(scene, first, last, share)
+    passes.tally_constraints(contacts, begin, end, (share - 1.0) * stepping.fall_x, (share - 1.0) * stepping.fall_y)
+    if impact_lanes is not None and number == stepping.substeps - 1 and stepping.has_rebounds:
+        impact_rounds.bring_back(contacts, begin, end, True)
+    barrier(team)
+
+
+@jit.kernel
+def kick_share(number: int, is_first: bool) -> float:
     """Return the share of a whole kick of gravity in substep `number` of a step; the first of a run has half of one."""
-    return 0.5 if is_first_step and number == 0 else 1.0
+    return 0.5 if is_first and number == 0 else 1.0
 
 
 @jit.kernel
@@ -54,6 +126,25 @@ def bodies_of_thread(contacts: arrays.Contacts, k: int, size: int) -> tuple[int,
 
 
 @jit.kernel
+def begin_step(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> int:
+    """Bring the list of neighbours up to date, and begin a step with one interval; return UNDER_WAY or PAIRS_FULL."""
+    if not neighbours.update_pairs(scene):
+        return PAIRS_FULL
+    if impact_lanes is not None and scene.contacts.stepping[0].has_cuts:
+        cuts.begin_interval(scene, True)
+    return UNDER_WAY
+
+
+@jit.kernel
+def gather(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> int:
+    """Make packs of the constraints that are near; where an impact comes first, shorten the interval: UNDER_WAY."""
+    if impact_lanes is not None and scene.contacts.stepping[0].has_cuts and cuts.cut(scene):
+        return UNDER_WAY
+    packs.gather(scene.contacts, scene.begins)
+    return REACHED
+
+
+@jit.kernel
 def prepare(scene: arrays.Nonsmooth, number: int, share: float) -> None:
     """Set what is the same for all bodies and constraints in substep `number`, with that share of a kick of gravity."""
     controls = scene.world.controls[0]
@@ -62,10 +153,8 @@ def prepare(scene: arrays.Nonsmooth, number: int, share: float) -> None:
     if stepping.is_shaken:
         motion.drive(scene, number)
     slip.follow_curvature(stepping, number)
-    stepping.fall_x = stepping.substep * controls.gravity_x
-    stepping.fall_y = stepping.substep * controls.gravity_y
-    stepping.pull_x = stepping.fall_x
-    stepping.pull_y = stepping.fall_y
+    stepping.fall_x = stepping.pull_x = stepping.substep * controls.gravity_x
+    stepping.fall_y = stepping.pull_y = stepping.substep * controls.gravity_y
     if scene.world.loads.size > 0:
         time = scene.world.clock[0].steps * controls.step + number * stepping.substep
         ax, ay = motion.pull_of_loads(scene.world, time)
@@ -76,239 +165,30 @@ def prepare(scene: arrays.Nonsmooth, number: int, share: float) -> None:
 
 
 @jit.kernel
-def start(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
-    """Kick the bodies of thread k with gravity and loads, and begin with the impulses of the last substep."""
-    contacts = scene.contacts
-    team = scene.world.team
-    h = contacts.stepping[0].substep
-    hx = h * scene.world.controls[0].gravity_x
-    hy = h * scene.world.controls[0].gravity_y
-    share = kick_share(number, is_first_step)
-    first, last = bodies_of_thread(contacts, k, team[TEAM_SIZE])
-    if number == 0:
-        motion.kick_all(contacts.states, contacts.before, first, last, share, hx, hy)
-        if scene.world.loads.size > 0:
-            motion.kick_by_loads(scene, number, first, last, share, 0.0)
-        barrier(team)
-        sweeps.sweep(contacts, passes.WARM, team, k)
-    else:
-        last_share = kick_share(number - 1, is_first_step)
-        motion.kick_all_warm(contacts.states, contacts.before, first, last, last_share, hx, hy)
-        if scene.world.loads.size > 0:
-            motion.kick_by_loads(scene, number, first, last, share, last_share)
-        barrier(team)
-
-
-@jit.kernel
-def tally(scene: arrays.Nonsmooth, k: int, share: float) -> tuple[int, int]:
-    """Tally bodies and constraints of thread k, whose packs are returned, in a substep with that share of a kick."""
-    contacts = scene.contacts
-    stepping = contacts.stepping[0]
-    team = scene.world.team
-    if scene.world.loads.size > 0:
-        first, last = bodies_of_thread(contacts, k, team[TEAM_SIZE])
-        motion.tally_loads(scene, first, last, share)
-    first, last = sweeps.range_of_thread(0, stepping.pack_count, k, team[TEAM_SIZE])
-    sweeps.tally_constraints(contacts, first, last, (share - 1.0) * stepping.fall_x, (share - 1.0) * stepping.fall_y)
-    return first, last
-
-
-@jit.kernel
-def note_what_presses(
-    scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool, impact_lanes: Records | None
-) -> None:
-    """Note what presses before substep `number` as thread k; `impact_lanes` as in go_through_impacts."""
-    if impact_lanes is None:
-        return
-    contacts = scene.contacts
-    first, last = sweeps.range_of_thread(0, contacts.stepping[0].pack_count, k, scene.world.team[TEAM_SIZE])
-    impact_rounds.keep_held(contacts, first, last)
-    if number == 0 and (is_first_step or contacts.stepping[0].has_forgotten):
-        controls = scene.world.controls[0]
-        share = 1.0 if is_first_step else 0.0
-        impact_rounds.hold(contacts, first, last, share * controls.gravity_x, share * controls.gravity_y)
-
-
-@jit.kernel
-def go_through_impacts(
-    scene: arrays.Nonsmooth, k: int, bodies: tuple[int, int], share: float, impact_lanes: Records | None
-) -> None:
-    """Let impacts of a substep follow from one another as thread k; see follow_impacts.
-
-    Where there are no `impact_lanes` nothing rebounds that much, and the compiler leaves this out altogether.
-    """
-    if impact_lanes is None:
-        return
-    if scene.contacts.stepping[0].has_rebounds:
-        barrier(scene.world.team)
-        impacts.follow_impacts(scene.contacts, scene.world.team, k, bodies, share, scene.pushes)
-
-
-@jit.kernel
-def report_impacts(contacts: arrays.Contacts, first: int, last: int, impact_lanes: Records | None) -> None:
-    """Give some packs the impulses of impacts at the end of a step; `impact_lanes` as in go_through_impacts."""
-    if impact_lanes is None:
-        return
-    if contacts.stepping[0].has_rebounds:
-        impact_rounds.bring_back(contacts, first, last, True)
-
-
-@jit.kernel
-def substep(scene: arrays.Nonsmooth, k: int, number: int, is_first_step: bool) -> None:
-    """Go through substep `number` of a step as thread k; the first one of a run has half a kick of gravity."""
-    contacts = scene.contacts
-    team = scene.world.team
-    stepping = contacts.stepping[0]
-    share = kick_share(number, is_first_step)
-    first, last = bodies_of_thread(contacts, k, team[TEAM_SIZE])
-    if k == 0:
-        prepare(scene, number, share)
-    note_what_presses(scene, k, number, is_first_step, contacts.impact_lanes)
-    start(scene, k, number, is_first_step)
-    sweeps.sweep(contacts, passes.POSITION, team, k)
-    ground = last + (k == team[TEAM_SIZE] - 1)  # which may move, is the last
-    motion.drift_all(contacts.states, first, ground, stepping.substep)
-    barrier(team)
-    sweeps.velocity_pass(contacts, team, k, passes.FIRST_VELOCITY, stepping.tolerance)
-    go_through_impacts(scene, k, (first, last), share, contacts.impact_lanes)
-    first, last = tally(scene, k, share)
-    if number == stepping.substeps - 1:
-        report_impacts(contacts, first, last, contacts.impact_lanes)
-    barrier(team)
-
-
-NEIGHBOURS, GATHER, CHECK = range(3)  # what one thread does for all
-UNDER_WAY = -1  # beside the status codes: the step goes on
-
-
-@jit.kernel
-def is_supported(scene: arrays.Nonsmooth) -> bool:
-    """Return True if every free body has a contact that presses, where there is gravity."""
-    world = scene.world
-    controls = world.controls[0]
-    if controls.gravity_x == 0.0 and controls.gravity_y == 0.0 and controls.push == 0.0:
-        return True
-    scene.used[:] = 0
-    contacts = scene.contacts
-    for r in range(contacts.stepping[0].constraint_count):
-        constraint = contacts.constraints[r]
-        if constraint.normal_one > 0.0 or constraint.normal_two > 0.0:
-            scene.used[constraint.a] = 1
-            scene.used[constraint.b] = 1
-    for i in range(world.bodies.size - 1):
-        if world.bodies[i].inverse_mass > 0.0 and scene.used[i] == 0:
-            return False
-    return True
-
-
-@jit.kernel
-def check(scene: arrays.Nonsmooth) -> int:
-    """Check that the run may continue: finite, not at rest for the hold time."""
-    world = scene.world
-    controls = world.controls[0]
-    clock = world.clock[0]
-    integrate.renew_angles(world.bodies)
-    ledger = world.ledger[0]
-    ledger.travel_work += controls.check_every * controls.step * weights_power(world)
-    ledger.largest_kinetic = max(ledger.largest_kinetic, integrate.kinetic_energy(world))
-    fastest = integrate.fastest_point(world.bodies)
-    if math.isinf(fastest):
-        return NOT_FINITE
-    if energy.has_excessive_overlap(scene):
-        return OVERLAP_LIMIT
-    rests = fastest < controls.rest_speed and is_supported(scene) and supports.is_support_at_rest(world)
-    rests = rests and loads.are_loads_steady(world)
-    clock.checks_at_rest = clock.checks_at_rest + 1 if rests else 0
-    return AT_REST if 0 < controls.rest_checks <= clock.checks_at_rest else REACHED
-
-
-@jit.kernel
-def end_interval(scene: arrays.Nonsmooth) -> int:
-    """End an interval of a step for all; return UNDER_WAY, or the status of a step that has come to its end."""
+def end_interval(scene: arrays.Nonsmooth, impact_lanes: Records | None) -> int:
+    """End an interval; return UNDER_WAY where another follows, else the status of a step that has come to its end."""
     clock = scene.world.clock[0]
     scene.contacts.stepping[0].has_forgotten = 0
     if supports.has_motion(scene.world.controls[0]):
         motion.place_supports(scene)
-    if cuts.is_continued(scene, scene.contacts.impact_lanes):
+    if impact_lanes is not None and cuts.is_continued(scene):
+        cuts.begin_interval(scene, False)
         return UNDER_WAY
     clock.steps += 1
-    return check(scene) if clock.steps % scene.world.controls[0].check_every == 0 else REACHED
+    return energy.check(scene) if clock.steps % scene.world.controls[0].check_every == 0 else REACHED
 
 
-@jit.kernel
-def supervise(scene: arrays.Nonsmooth, k: int, task: int) -> int:
-    """Let the first thread do a task for all while the others wait; return the status code that all follow."""
-    team = scene.world.team
-    barrier(team)
-    if k == 0:
-        team[STATUS] = REACHED
-        if task == NEIGHBOURS:
-            if neighbours.update_pairs(scene):
-                cuts.begin_step(scene, scene.contacts.impact_lanes)
-            else:
-                team[STATUS] = PAIRS_FULL
-        elif task == GATHER:
-            if cuts.is_shortened(scene, scene.contacts.impact_lanes):
-                team[STATUS] = UNDER_WAY
-            else:
-                packs.gather(scene.contacts, scene.begins)
-        else:
-            team[STATUS] = end_interval(scene)
-    barrier(team)
-    return team[STATUS]
-
-
-@jit.kernel
-def do_step(scene: arrays.Nonsmooth, k: int) -> int:
-    """Take one step as thread k, in as many intervals as it takes; return the status code."""
-    contacts = scene.contacts
-    if contacts.stepping[0].is_guarded:
-        first, last = sweeps.range_of_thread(0, contacts.stepping[0].constraint_count, k, scene.world.team[TEAM_SIZE])
-        impact_rounds.forget_struck(contacts, first, last)
-    status = supervise(scene, k, NEIGHBOURS)
-    if status != REACHED:
-        return status
-    status = UNDER_WAY
-    while status == UNDER_WAY:
-        status = take_interval(scene, k)
-    return status
-
-
-@jit.kernel
-def take_interval(scene: arrays.Nonsmooth, k: int) -> int:
-    """Take one interval of a step as thread k, or find that it must be shorter; return UNDER_WAY or the status code."""
-    world = scene.world
-    contacts = scene.contacts
-    size = world.team[TEAM_SIZE]
-    first, last = sweeps.range_of_thread(0, contacts.stepping[0].constraint_count, k, size)
-    if contacts.stepping[0].cuts > 0:
-        impact_rounds.forget_struck(contacts, first, last)
-    narrow_phase.find_manifolds(scene, first, last)
-    if supervise(scene, k, GATHER) == UNDER_WAY:
-        return UNDER_WAY
-    begin, end = sweeps.range_of_thread(0, contacts.stepping[0].pack_count, k, size)
-    packs.pack_all(contacts, begin, end)
-    count = contacts.stepping[0].substeps
-    is_first = is_start(scene)
-    for number in range(count):
-        substep(scene, k, number, is_first)
-    packs.unpack_all(contacts, begin, end)
-    first, last = bodies_of_thread(contacts, k, size)
-    motion.place_all(scene, first, last, kick_share(count - 1, is_first))
-    return supervise(scene, k, CHECK)
-
-
-@jit.kernel
+@jit.rare_kernel
 def advance_thread(scene: arrays.Nonsmooth, last_step: int, k: int) -> int:
     """Be thread k of those that step a world until `last_step`, or until something ends the run."""
     if k == 0 and scene.world.clock[0].is_started == 0:
-        load_states(scene)
+        motion.load_states(scene)
         integrate.renew_angles(scene.world.bodies)
         scene.world.clock[0].is_started = 1
     barrier(scene.world.team)
     status = REACHED
     while status == REACHED and scene.world.clock[0].steps < last_step:
-        status = do_step(scene, k)
+        status = take_step(scene, k, scene.contacts.impact_lanes)
     barrier(scene.world.team)
     return status
 
@@ -356,13 +236,6 @@ def member(scenes: arrays.Nonsmooth, m: int) -> arrays.Nonsmooth:
     )
 
 
-@jit.rare_kernel
-def advance_member(scene: arrays.Nonsmooth, last_step: int) -> int:
-    """Step one member; see advance."""
-    scene.world.team[TEAM_SIZE] = 1
-    return advance_thread(scene, last_step, 0)
-
-
 @jit.entry_kernel
 def advance_nonsmooth_members(
     scenes: arrays.Nonsmooth, members: Integers, last_steps: Integers, starts: Floats, codes: Integers, watched: Watched
@@ -373,12 +246,13 @@ def advance_nonsmooth_members(
     """
     for m in members:
         scene = member(scenes, m)
-        codes[m] = advance_member(scene, 0)
+        scene.world.team[TEAM_SIZE] = 1
+        codes[m] = advance_thread(scene, 0, 0)
         energy.measure_nonsmooth(scene, starts[m])
         clock = scene.world.clock[0]
         while codes[m] == REACHED and clock.steps < last_steps[m]:
             frame = frame_to_watch(watched, m, clock.steps)
             stop = min(frame, last_steps[m]) if frame > 0 else last_steps[m]
-            codes[m] = advance_member(scene, stop)
+            codes[m] = advance_thread(scene, stop, 0)
             if clock.steps == frame:
                 watch(scene.world.bodies, watched, m, frame)

@@ -12,7 +12,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import TEAM_SIZE
 from blocksim.kernels.common.integrate import renew_rotations
-from blocksim.kernels.nonsmooth.begin import load_states
+from blocksim.kernels.nonsmooth.motion import load_states
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
 from blocksim.kernels.nonsmooth.packs import gather, pack_all
@@ -106,7 +106,7 @@ def collided(scene: Nonsmooth) -> Nonsmooth:
 def after_substep(blocks: Sequence[Block], *, is_first: bool = False, **values: Any) -> Nonsmooth:
     """Return blocks after the first substep of a step; the impulses are in the packs, velocities in the states."""
     scene = collided(posed(blocks, **values))
-    substep(scene, 0, 0, is_first)
+    substep(scene, 0, 0, is_first, scene.contacts.impact_lanes)
     return scene
 
 

@@ -92,7 +92,7 @@ def test_constraints_of_one_pack_have_the_restitution_and_friction_of_their_own_
     materials["restitution"] = np.where(on_ground, 0.125, 0.5)
     scene = collided(scene)
     assert members(scene) == [[0, 1, 2, 3]]
-    substep(scene, 0, 0, False)
+    substep(scene, 0, 0, False, scene.contacts.impact_lanes)
     found = velocities(scene.contacts.states)[[0, 1, 3, 5]]
     assert found[:, 1] == pytest.approx([0.125, 0.125, 0.5, 0.5], abs=1e-9)
     assert found[:, 0] == pytest.approx([3.0 - 0.5 * 1.125] * 2 + [3.0 - 0.25 * 1.5] * 2, abs=1e-9)

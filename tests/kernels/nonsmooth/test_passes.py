@@ -11,10 +11,9 @@ from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.nonsmooth.cone import shear_limit
-from blocksim.kernels.nonsmooth.motion import kick_all
-from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, WARM
+from blocksim.kernels.nonsmooth.motion import kick
+from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, WARM, sweep
 from blocksim.kernels.nonsmooth.step import substep
-from blocksim.kernels.nonsmooth.sweeps import sweep
 from blocksim.world.sag import soft_contact
 from tests.kernels.nonsmooth.references import Dense, dense, least_change
 from tests.kernels.nonsmooth.scenes import Block, after_substep, collided, pile, posed, velocities
@@ -138,7 +137,7 @@ def test_velocities_change_by_gravity_and_by_the_impulses_that_are_kept(
     scene = collided(posed(blocks, velocity_sweeps=2, substeps=4, step=4 * H))
     before = velocities(scene.contacts.states)
     for number in range(4):
-        substep(scene, 0, number, is_first)
+        substep(scene, 0, number, is_first, scene.contacts.impact_lanes)
         expected = before.ravel() + dense(scene).pushed()
         share = 0.5 if is_first and number == 0 else 1.0
         expected[1:-3:3] -= share * G * H
@@ -149,10 +148,10 @@ def test_velocities_change_by_gravity_and_by_the_impulses_that_are_kept(
 
 def test_second_substep_begins_with_the_impulses_of_the_first(size: tuple[int, int]) -> None:
     scene = collided(posed(pile(np.random.default_rng(3), *size), substeps=2, step=2 * H))
-    substep(scene, 0, 0, False)
+    substep(scene, 0, 0, False, scene.contacts.impact_lanes)
     pushed = dense(scene).pushed()
     start = velocities(scene.contacts.states)
-    kick_all(scene.contacts.states, scene.contacts.before, 0, len(start) - 1, 1.0, 0.0, -G * H)
+    kick(scene.contacts.states, scene.contacts.before, 0, len(start) - 1, 1.0, 0.0, -G * H)
     sweep(scene.contacts, WARM, scene.world.team, 0)
     expected = start.ravel() + pushed
     expected[1:-3:3] -= G * H
@@ -226,7 +225,7 @@ def test_block_that_slides_off_a_block_takes_from_it_what_it_gives(friction: flo
     scene = posed(blocks, friction=friction, gravity=0.0, **EXACT)
     before = velocities(scene.contacts.states)
     scene = collided(scene)
-    substep(scene, 0, 0, False)
+    substep(scene, 0, 0, False, scene.contacts.impact_lanes)
     after = velocities(scene.contacts.states)
     bodies: Any = scene.world.bodies[:2]
     gained = (after - before)[:2]
@@ -246,7 +245,7 @@ def test_tallies_have_what_impulses_take_from_blocks_that_meet_without_gravity()
         return float(0.5 * (bodies.mass * (vx**2 + vy**2) + bodies.inertia * spin**2).sum())
 
     before = kinetic()
-    substep(scene, 0, 0, False)
+    substep(scene, 0, 0, False, scene.contacts.impact_lanes)
     tallies = scene.contacts.tallies
     taken = float(tallies.impacts.sum() + tallies.friction.sum())
     assert before - kinetic() == pytest.approx(taken, rel=1e-12)

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.nonsmooth.arrays import TALLY_PACKS
-from blocksim.kernels.nonsmooth.passes import VELOCITY
+from blocksim.kernels.nonsmooth.passes import VELOCITY, range_of_thread, velocity_pass
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, kick_share
-from blocksim.kernels.nonsmooth.sweeps import range_of_thread, velocity_pass
 from tests.kernels.nonsmooth.scenes import Block, after_substep, pile, posed, velocities
 
 if TYPE_CHECKING:
