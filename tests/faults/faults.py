@@ -5,14 +5,18 @@ module is imported, in a process of its own. A kernel is interpreted while it ha
 compiling it again would take a minute.
 """
 
+import re
 import tomllib
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 KERNELS = "blocksim/kernels/"
+TOLERANCES = "blocksim/kernels/common/tolerances.py"
+ENTRY = re.compile(r"((?:^# .+\n)+)^([A-Z_]+) = (\S.*?)  # ([a-z-]+) \| (.+)$", re.MULTILINE)
 
 
 class Verdict(StrEnum):
@@ -61,3 +65,52 @@ def faults_in(folder: Path) -> list[Fault]:
     """Return all faults of a folder, file after file."""
     tables = [tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.toml"))]
     return [Fault(**{**one, "tests": tuple(one["tests"])}) for table in tables for one in table["fault"]]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A number of the table of tolerances."""
+
+    name: str
+    value: str
+    comment: str
+    kind: str
+    relative_to: str
+
+    @property
+    def noticed(self) -> dict[str, str]:
+        """The test that notices where the number is ten times as large, "x10", or a tenth, "/10"."""
+        found = re.findall(r"((?:x10|/10)(?: and /10)?): (test_\w+)", self.comment)
+        return {way: test for ways, test in found for way in ways.split(" and ")}
+
+
+def tolerances() -> list[Entry]:
+    """Return the entries of the table of tolerances, in order."""
+    found = ENTRY.findall((ROOT / TOLERANCES).read_text(encoding="utf-8"))
+    return [Entry(name, value, comment.replace("\n# ", " "), *rest) for comment, name, value, *rest in found]
+
+
+@cache
+def places_of_tests() -> dict[str, list[str]]:
+    """Return the files of all tests by name."""
+    places: dict[str, list[str]] = {}
+    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+        for name in re.findall(r"^def (test_\w+)\(", path.read_text(encoding="utf-8"), re.MULTILINE):
+            places.setdefault(name, []).append(path.relative_to(ROOT).as_posix())
+    return places
+
+
+def faults_of_tolerances() -> list[Fault]:
+    """Return a fault for each tolerance and way for which the table names the test that notices."""
+    faults = []
+    for entry in tolerances():
+        is_count = entry.value.isdecimal()
+        changed = {
+            "x10": f"10 * {entry.value}",
+            "/10": f"max({entry.value} // 10, 1)" if is_count else f"{entry.value} / 10",
+        }
+        for way, test in entry.noticed.items():
+            tests = tuple(f"{place}::{test}" for place in places_of_tests()[test])
+            old, new = (f"\n{entry.name} = {value}  # " for value in (entry.value, changed[way]))
+            faults.append(Fault(f"{entry.name} {way}", TOLERANCES, old, new, tests))
+    return faults

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 
 from tests.faults.examine import examine, run_tests
-from tests.faults.faults import HERE, Fault, Finding, Verdict, faults_in
+from tests.faults.faults import HERE, Fault, Finding, Verdict, faults_in, faults_of_tolerances
 
 # What tests import, other than blocksim: processes are forked from one that has it already, so that a fault costs a
 # second and not four.
@@ -64,7 +64,8 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--only", default="", help="words in the name, the file or a test of a fault")
     parser.add_argument("--tests-passed", action="store_true", help="make test and make test-nojit have just passed")
     asked = parser.parse_args(arguments)
-    faults = [fault for fault in faults_in(HERE) if asked.only in " ".join([fault.file, fault.name, *fault.tests])]
+    every = [*faults_in(HERE), *faults_of_tolerances()]
+    faults = [fault for fault in every if asked.only in " ".join([fault.file, fault.name, *fault.tests])]
     with pool(asked.jobs) as workers:
         examined = [] if asked.tests_passed else [fault for fault in faults if not fault.is_stale]
         failing = fail_without_fault(workers, examined)

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 import pytest
 
 from tests.faults import run
-from tests.faults.faults import HERE, ROOT, Fault, Finding, Verdict, faults_in
+from tests.faults.faults import HERE, ROOT, Fault, Finding, Verdict, faults_in, faults_of_tolerances
 
-FAULTS = faults_in(HERE)
+FAULTS = [*faults_in(HERE), *faults_of_tolerances()]
 EXAMPLE = Fault("a name", "blocksim/errors.py", "USAGE = 2", "USAGE = 3", ("tests/test_locked.py",))
 
 

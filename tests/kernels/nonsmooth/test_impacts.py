@@ -81,6 +81,13 @@ def test_row_of_blocks_apart_passes_a_blow_on(
     assert run.bodies.vx == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0], abs=within)
 
 
+def test_long_row_passes_a_blow_on(single: Callable[..., Simulation]) -> None:
+    blocks: list[dict[str, Any]] = [{"x": i * WIDTH, "y": 0.2} for i in range(20)]
+    blocks[0] |= {"x": -1.3e-4, "velocity": [1.0, 0.0]}
+    run = single(blocks, restitution=1.0, gravity=0.0, friction=0.0).to_step(4)
+    assert run.bodies.vx == pytest.approx([*[0.0] * 19, 1.0], abs=0.02)
+
+
 @pytest.mark.parametrize(("restitution", "substeps"), [(0.45, 8), (0.5, 8), (0.51, 4), (0.9, 4)])
 def test_row_of_blocks_apart_loses_at_every_blow_what_newton_says(
     single: Callable[..., Simulation], restitution: float, substeps: int
