@@ -131,6 +131,8 @@ def save_figure(figure: "Figure", path: Path) -> None:
 def figure_bytes(figure: "Figure", suffix: str) -> bytes:
     """Return the figure in the format of a suffix, one of those that are written."""
     buffer = BytesIO()
+    for side in (side for axes in figure.axes for side in (axes.xaxis, axes.yaxis) if not side.get_label_text()):
+        side.set_label_coords(0.0, 0.0)  # else all numbers are measured for the place of a name that is not there
     with silence_missing_glyphs():
         figure.savefig(buffer, format=suffix[1:], metadata=METADATA[suffix])
     return buffer.getvalue()
