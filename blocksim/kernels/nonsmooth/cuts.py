@@ -84,21 +84,6 @@ def set_length(scene: arrays.Nonsmooth, length: float) -> None:
 
 
 @rare_kernel
-def mark_pressed(scene: arrays.Nonsmooth) -> None:
-    """Mark the bodies with a contact that presses, not only in an impact."""
-    scene.used[:] = 0
-    states = scene.contacts.states
-    stepping = scene.contacts.stepping[0]
-    for r in range(stepping.constraint_count):
-        constraint = scene.contacts.constraints[r]
-        inverse_mass = states[constraint.a].inverse_mass + states[constraint.b].inverse_mass
-        impulse = constraint.normal_one + constraint.normal_two
-        if slip.presses(impulse, inverse_mass, stepping) and not constraint.is_struck:
-            scene.used[constraint.a] = 1
-            scene.used[constraint.b] = 1
-
-
-@rare_kernel
 def shift_velocities(scene: arrays.Nonsmooth, h: float) -> None:
     """Bring velocities from half of the last substep behind to half of the next, h (s), by what the last one changed.
 
@@ -110,7 +95,14 @@ def shift_velocities(scene: arrays.Nonsmooth, h: float) -> None:
     stepping = scene.contacts.stepping[0]
     old = stepping.substep
     behind = 0.0 if is_start(scene) else 0.5
-    mark_pressed(scene)
+    scene.used[:] = 0  # bodies with a contact that presses, not only in an impact
+    states = scene.contacts.states
+    for r in range(stepping.constraint_count):
+        constraint = scene.contacts.constraints[r]
+        inverse_mass = states[constraint.a].inverse_mass + states[constraint.b].inverse_mass
+        impulse = constraint.normal_one + constraint.normal_two
+        if slip.presses(impulse, inverse_mass, stepping) and not constraint.is_struck:
+            scene.used[constraint.a] = scene.used[constraint.b] = 1
     for i in range(scene.world.bodies.size - 1):
         state = scene.contacts.states[i]
         if state.inverse_mass > 0.0:

@@ -21,19 +21,6 @@ NONSMOOTH_LEDGER = ("kinetic", "potential", "impacts", "friction", "correction",
 
 
 @jit.rare_kernel
-def tallied(tallies: arrays.Records) -> tuple[float, float, float]:
-    """Return what has gone (J) into impacts, friction and supports, summed over all tallies in order."""
-    impacts = 0.0
-    friction = 0.0
-    to_support = 0.0
-    for tally in tallies:
-        impacts += tally.impacts
-        friction += tally.friction
-        to_support += tally.to_support
-    return impacts, friction, to_support
-
-
-@jit.rare_kernel
 def correction(scene: Nonsmooth) -> float:
     """Return the work (J) of the weights on the displacements of the position passes.
 
@@ -162,7 +149,11 @@ def measure_nonsmooth(scene: Nonsmooth, row: arrays.Floats) -> None:
     """Write one row of the ledger: energies (J) as in `NONSMOOTH_LEDGER`, contacts, largest overlap (m)."""
     row[0] = integrate.kinetic_energy(scene.world)
     row[1] = energy.potential_energy(scene.world)
-    row[2], row[3], row[5] = tallied(scene.contacts.tallies)
+    row[2] = row[3] = row[5] = 0.0
+    for tally in scene.contacts.tallies:
+        row[2] += tally.impacts
+        row[3] += tally.friction
+        row[5] += tally.to_support
     row[4] = correction(scene)
     row[6] = given_to_loads(scene)
     row[7] = scene.world.ledger[0].events

@@ -97,13 +97,33 @@ def target_of(target: float, body: Record) -> float:
 def judge(contacts: arrays.Contacts, is_last: bool) -> bool:
     """Decide as what the solutions just found are to be kept, and what is to be tried next; return whether anything is.
 
-    Contact groups that are done have in `share` where they are between their two solutions.
+    A solution replaces the one on the same side of the energy that a group had. Groups that are done have in `share`
+    where they are between their two solutions.
     """
+    states = contacts.states
     bodies = contacts.impacts
-    weigh_again(contacts)
+    for body in bodies:
+        if body.is_open:
+            body.now = 0.0
     for i in range(bodies.size):
-        if bodies[i].root == i:
-            close_in(bodies[i])
+        if bodies[i].is_open and states[i].inverse_mass > 0.0:
+            energy = contact_groups.energy(contacts, states[i], states[i].vx, states[i].vy, states[i].spin)
+            bodies[bodies[i].root].now += energy
+    contact_groups.count_work(contacts)
+    for i in range(bodies.size):
+        root = bodies[i]
+        if root.root != i:
+            continue
+        last = root.side
+        if not root.is_open:
+            root.side = NEITHER
+            continue
+        root.side = LOW if root.share <= 0.0 or root.now <= root.then else HIGH
+        root.stale = 0.5 * root.stale if root.side == last else 1.0
+        if root.side == LOW:
+            root.low, root.least = root.share, root.now
+        else:
+            root.high, root.most = root.share, root.now
     find_between(contacts)
     is_any = False
     for i in range(bodies.size):
@@ -115,37 +135,6 @@ def judge(contacts: arrays.Contacts, is_last: bool) -> bool:
         body.share = bodies[body.root].share
         body.is_open = bodies[body.root].is_open
     return is_any
-
-
-@rare_kernel
-def weigh_again(contacts: arrays.Contacts) -> None:
-    """Sum up the energies of all groups that are not done."""
-    states = contacts.states
-    bodies = contacts.impacts
-    for body in bodies:
-        if body.is_open:
-            body.now = 0.0
-    for i in range(bodies.size):
-        if bodies[i].is_open and states[i].inverse_mass > 0.0:
-            bodies[bodies[i].root].now += contact_groups.energy(
-                contacts, states[i], states[i].vx, states[i].vy, states[i].spin
-            )
-    contact_groups.count_work(contacts)
-
-
-@rare_kernel
-def close_in(root: Record) -> None:
-    """Let the solution just found replace the one on the same side of the energy that a group had."""
-    last = root.side
-    if not root.is_open:
-        root.side = NEITHER
-        return
-    root.side = LOW if root.share <= 0.0 or root.now <= root.then else HIGH
-    root.stale = 0.5 * root.stale if root.side == last else 1.0
-    if root.side == LOW:
-        root.low, root.least = root.share, root.now
-    else:
-        root.high, root.most = root.share, root.now
 
 
 @rare_kernel
@@ -200,9 +189,9 @@ def share_of(room: float, gain: float, between: float) -> float:
 
 
 @rare_kernel
-def keep_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Keep the impulses just found, on the side that their group is on."""
-    for m in range(begin, end):
+def keep_solution(contacts: arrays.Contacts, bodies: tuple[int, int], packs: tuple[int, int]) -> None:
+    """Keep impulses and velocities just found, on the side of their group, and go back to the start of the round."""
+    for m in range(packs[0], packs[1]):
         lanes = contacts.impact_lanes[m]
         if lanes.is_hit:
             pack = contacts.packs[m]
@@ -216,12 +205,7 @@ def keep_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
                     lanes.after_one[lane] = pack.normal_one[lane]
                     lanes.after_two[lane] = pack.normal_two[lane]
                     lanes.after_shear[lane] = pack.shear[lane]
-
-
-@rare_kernel
-def keep_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
-    """Keep the velocities just found, on the side that their group is on, and go back to the start of the round."""
-    for i in range(first, last):
+    for i in range(bodies[0], bodies[1]):
         body = contacts.impacts[i]
         state = contacts.states[i]
         if body.side == LOW:
@@ -233,9 +217,9 @@ def keep_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
 
 
 @rare_kernel
-def settle_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
-    """Give constraints the impulses that their group ends up with."""
-    for m in range(begin, end):
+def settle(contacts: arrays.Contacts, bodies: tuple[int, int], packs: tuple[int, int]) -> None:
+    """Give constraints the impulses, and bodies the velocities, that their group ends up with."""
+    for m in range(packs[0], packs[1]):
         lanes = contacts.impact_lanes[m]
         if lanes.is_hit:
             pack = contacts.packs[m]
@@ -244,12 +228,7 @@ def settle_constraints(contacts: arrays.Contacts, begin: int, end: int) -> None:
                 pack.normal_one[lane] = between(lanes.low_one[lane], lanes.after_one[lane], s)
                 pack.normal_two[lane] = between(lanes.low_two[lane], lanes.after_two[lane], s)
                 pack.shear[lane] = between(lanes.low_shear[lane], lanes.after_shear[lane], s)
-
-
-@rare_kernel
-def settle_bodies(contacts: arrays.Contacts, first: int, last: int) -> None:
-    """Give bodies the velocities that their group ends up with."""
-    for i in range(first, last):
+    for i in range(bodies[0], bodies[1]):
         body = contacts.impacts[i]
         if body.is_hit:
             state = contacts.states[i]
@@ -312,8 +291,7 @@ def solve_round(
     barrier(team)
     if not stepping.has_gain:
         return
-    keep_constraints(contacts, packs[0], packs[1])
-    keep_bodies(contacts, bodies[0], bodies[1])
+    keep_solution(contacts, bodies, packs)
     barrier(team)
     if k == 0:
         begin_search(contacts)
@@ -326,13 +304,11 @@ def solve_round(
         if k == 0:
             stepping.has_gain = judge(contacts, number == MOST_TRIES - 1)
         barrier(team)
-        keep_constraints(contacts, packs[0], packs[1])
-        keep_bodies(contacts, bodies[0], bodies[1])
+        keep_solution(contacts, bodies, packs)
         barrier(team)
         if not stepping.has_gain:
             break
-    settle_constraints(contacts, packs[0], packs[1])
-    settle_bodies(contacts, bodies[0], bodies[1])
+    settle(contacts, bodies, packs)
     barrier(team)
 
 
