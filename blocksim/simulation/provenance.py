@@ -61,7 +61,7 @@ def state_hash(scene: "AnyScene") -> str:
 
 def environment() -> dict[str, str]:
     """Return versions, machine and command; `cpu` and `cpu_features` are what machine code is compiled for."""
-    from numba.core.registry import cpu_target  # noqa: PLC0415 - which reading a folder does not need
+    from blocksim.kernels.common.compiler import cpu_target  # noqa: PLC0415 - which reading a folder does not need
 
     # by these numba names the files of what it has compiled
     _, cpu, features = cpu_target.target_context.codegen().magic_tuple()

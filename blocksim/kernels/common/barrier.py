@@ -8,11 +8,11 @@ import platform
 import sys
 from typing import Any
 
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
 from blocksim.kernels.common import arrays, jit
+from blocksim.kernels.common.compiler import ir
 
 WORD_BYTES = 8
 SPINS = 100  # examines the number of meetings, some 2 us, before the core is offered to others

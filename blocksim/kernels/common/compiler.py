@@ -1,45 +1,118 @@
-"""How a kernel that only kernels call is compiled: to what callers inline, and no further.
+"""How kernels are compiled, and all private parts of numba and llvmlite that this takes; no other module uses any.
 
 numba makes machine code of every function, though that of an inner one is never run: its callers link its LLVM code
 into their own and optimise all of it again, once for every level of calls. Here an inner function is simplified alone,
 linked into its callers and kept as LLVM code; only what Python calls becomes machine code, optimised in full. That
 halves the processor time of a first run, and changes no bit: no pass may reorder arithmetic.
 
-This uses private parts of numba, so pyproject.toml names the versions that it was tried with.
+Shortcuts through numba while many kernels are compiled: the same code, in less time. Most of the time numba and
+llvmlite compute what they have computed before: how an operator acts on two numbers, the hash of a type with hundreds
+of fields, the size of a structure. And names of functions spell out the types of all arguments, 20 kB each for a scene,
+in every module that calls them: here they have a digest of that.
 
-Shortcuts through numba while many kernels are compiled: the same code, in less time.
+Each part is taken by `private`, which says so where the installed numba lacks it:
 
-Most of the time numba and llvmlite compute what they have computed before: how an operator acts on two numbers, the
-hash of a type with hundreds of fields, the size of a structure. And names of functions spell out the types of all
-arguments, 20 kB each for a scene, in every module that calls them: here they have a digest of that.
-
-This uses private parts of numba, so pyproject.toml names the versions that it was tried with.
+| part | for |
+| --- | --- |
+| numba.core.codegen JITCodeLibrary | base of a library that is kept as LLVM code, without machine code |
+| numba.core.compiler Compiler | base of the compilers of inner functions |
+| numba.core.compiler CompileResult | a compiled function from what was kept of it, and back |
+| numba.core.compiler_machinery PassManager | the list of passes of kernels |
+| numba.core.untyped_passes, numba.core.typed_passes | the passes themselves |
+| numba.core.caching FunctionCache | base of the cache with checksums (jit.py) |
+| numba.core.registry CPUDispatcher | base of the dispatcher that compiles an inner function once (jit.py) |
+| numba.core.registry cpu_target | processor and features that machine code is made for |
+| numba.core.serialize dumps | compiled functions as bytes (jit.py) |
+| numba.np.linalg, numba.np.arraymath ensure_blas | not called as array functions are imported: it takes scipy.linalg |
+| numba.core.cgutils | tuples and declarations in generated code (simd/code.py) |
+| numba.core.typing.templates AbstractTemplate, infer_global, signature | types of functions of lanes (simd/code.py) |
+| numba.core.event install_timer | shortcut: no timer for every level of calls |
+| numba.core.funcdesc default_mangler | shortcut: short names of functions |
+| numba.core.itanium_mangler mangle | the short names themselves |
+| numba.core.types.abstract Type | shortcut: hashes of types, each once |
+| numba.core.types.functions BaseFunction | shortcut: calls of operators and functions resolved, each once |
+| numba.core.base BaseContext | shortcut: sizes of structures, each once |
+| numba.core.targetconfig TargetConfig, ConfigStack | shortcut: sets of options compared by their values |
+| llvmlite.binding | LLVM code read back; shortcut: triple and name of the processor, each once |
+| llvmlite.ir | instructions of lanes and barriers (simd/code.py, barrier.py) |
 """
 
 import contextlib
 import functools
 import gc
 import hashlib
+import importlib
 from collections.abc import Callable, Iterator
+from importlib import metadata
 from typing import Any
 
-from llvmlite import binding
-from numba.core import (
-    base,
-    codegen,
-    compiler,
-    event,
-    funcdesc,
-    itanium_mangler,
-    targetconfig,
-    typed_passes,
-    untyped_passes,
-)
-from numba.core.compiler_machinery import PassManager
-from numba.core.types import abstract, functions
+VERSIONS = " ".join(f"{name} {metadata.version(name)}" for name in ("numba", "llvmlite", "numpy"))
 
-mangling: Any = itanium_mangler  # these come without type hints
-options: Any = targetconfig.ConfigStack
+
+def private(module: str, name: str = "", *members: str) -> Any:
+    """Return a module of numba or llvmlite, or what it calls `name`, which has to have some `members`.
+
+    Raises ImportError that names what is missing, and the versions that blocksim was tried with.
+    """
+    whole = missing = f"{module}.{name}".rstrip(".")
+    try:
+        part: Any = importlib.import_module(module)
+        part = getattr(part, name) if name else part
+        for one in members:
+            missing = f"{whole}.{one}"
+            getattr(part, one)
+    except (ImportError, AttributeError) as error:
+        tried = "the numba that blocksim names"
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            tried = next((one for one in metadata.requires("blocksim") or () if one.startswith("numba")), tried)
+        message = f"{missing} is missing from {VERSIONS}, and blocksim compiles kernels with it; install {tried}"
+        raise ImportError(message) from error
+    return part
+
+
+LIBRARY = "codegen get_pointer_to_function serialize_using_object_code _ensure_finalized _optimize_final_module "
+LIBRARY += "_finalize_final_module _finalize_dynamic_globals _verify_declare_only_symbols _get_module_for_linking"
+CodeLibrary: Any = private("numba.core.codegen", "JITCodeLibrary", *LIBRARY.split())
+Compiler: Any = private("numba.core.compiler", "Compiler", "define_pipelines")
+CompileResult: Any = private("numba.core.compiler", "CompileResult", "_rebuild", "_reduce")
+PassManager = private("numba.core.compiler_machinery", "PassManager", "add_pass", "finalize")
+untyped_passes = private("numba.core.untyped_passes")
+typed_passes = private("numba.core.typed_passes")
+FunctionCache: Any = private("numba.core.caching", "FunctionCache", "_index_key", "load_overload", "save_overload")
+CPUDispatcher: Any = private("numba.core.registry", "CPUDispatcher", "get_call_template")
+cpu_target = private("numba.core.registry", "cpu_target", "target_context")
+dumps = private("numba.core.serialize", "dumps")
+cgutils = private("numba.core.cgutils", "", "get_or_insert_function", "unpack_tuple")
+AbstractTemplate: Any = private("numba.core.typing.templates", "AbstractTemplate")
+infer_global = private("numba.core.typing.templates", "infer_global")
+signature = private("numba.core.typing.templates", "signature")
+event = private("numba.core.event", "", "install_timer")
+funcdesc = private("numba.core.funcdesc", "", "default_mangler")
+mangle = private("numba.core.itanium_mangler", "mangle")
+Type = private("numba.core.types.abstract", "Type", "__hash__")
+BaseFunction = private("numba.core.types.functions", "BaseFunction", "get_call_type")
+BaseContext = private("numba.core.base", "BaseContext", "get_abi_sizeof")
+TargetConfig = private("numba.core.targetconfig", "TargetConfig", "values")
+ConfigStack = private("numba.core.targetconfig", "ConfigStack", "top_or_none")
+binding = private("llvmlite.binding", "", "parse_bitcode", "get_process_triple", "get_host_cpu_name")
+ir = private("llvmlite.ir")
+
+
+@functools.cache
+def import_array_functions() -> None:
+    """Have numba import its array functions without scipy.linalg, which takes a tenth of a short run.
+
+    They import it only to see that there is a BLAS; whoever compiles a function that calls one has it imported then.
+    """
+    linalg = private("numba.np.linalg", "", "ensure_blas")
+    ensure_blas = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        array_functions = private("numba.np.arraymath", "", "ensure_blas")
+    finally:
+        linalg.ensure_blas = ensure_blas
+    array_functions.ensure_blas = ensure_blas
+
 
 NAME_DIGITS = 24
 
@@ -48,7 +121,7 @@ def _short_name(name: str, kinds: Any, *, abi_tags: Any = (), uid: Any = None) -
     """Return the name of a compiled function, with a digest of the types of its arguments."""
     spelled = ",".join(str(kind) for kind in kinds)
     digest = hashlib.sha256(spelled.encode()).hexdigest()[:NAME_DIGITS]
-    return str(mangling.mangle(name, (f"t{digest}",), abi_tags=abi_tags, uid=uid))
+    return str(mangle(name, (f"t{digest}",), abi_tags=abi_tags, uid=uid))
 
 
 def _known_hashes(original: Callable[[Any], int]) -> Callable[[Any], int]:
@@ -71,7 +144,7 @@ def _known_calls(original: Callable[..., Any]) -> Callable[..., Any]:
     def resolved(function: Any, context: Any, args: Any, kws: Any) -> Any:
         if kws:
             return original(function, context, args, kws)
-        key = (id(function), id(context), tuple(args), options.top_or_none())
+        key = (id(function), id(context), tuple(args), ConfigStack.top_or_none())
         found = known.get(key)
         if found is None:
             found = known[key] = (original(function, context, args, kws), function, context)
@@ -101,18 +174,14 @@ def _same_flags(one: Any, other: Any) -> Any:
 
 
 def _replacements() -> list[tuple[Any, str, Any]]:
-    calls: Any = functions.BaseFunction
-    kinds: Any = abstract.Type
-    context: Any = base.BaseContext
-    flags: Any = targetconfig.TargetConfig
     return [
         (event, "install_timer", lambda *_: contextlib.nullcontext()),  # else one more for every level of calls
         (funcdesc, "default_mangler", _short_name),
-        (kinds, "__hash__", _known_hashes(kinds.__hash__)),
-        (calls, "get_call_type", _known_calls(calls.get_call_type)),
-        (context, "get_abi_sizeof", _known_sizes(context.get_abi_sizeof)),
-        (flags, "__eq__", _same_flags),
-        (flags, "__hash__", lambda _: 0),  # there are but a few
+        (Type, "__hash__", _known_hashes(Type.__hash__)),
+        (BaseFunction, "get_call_type", _known_calls(BaseFunction.get_call_type)),
+        (BaseContext, "get_abi_sizeof", _known_sizes(BaseContext.get_abi_sizeof)),
+        (TargetConfig, "__eq__", _same_flags),
+        (TargetConfig, "__hash__", lambda _: 0),  # there are but a few
         (binding, "get_process_triple", functools.cache(binding.get_process_triple)),
         (binding, "get_host_cpu_name", functools.cache(binding.get_host_cpu_name)),
     ]
@@ -127,11 +196,6 @@ def shortcuts() -> Iterator[None]:
             setattr(owner, name, other)
         yield
 
-
-CodeLibrary: Any = codegen.JITCodeLibrary  # these come without type hints
-Compiler: Any = compiler.Compiler
-CompileResult: Any = compiler.CompileResult
-Manager: Any = PassManager
 
 PASSES: tuple[Any, ...] = (
     untyped_passes.TranslateByteCode,
@@ -233,7 +297,7 @@ class LeanCompiler(InnerCompiler):
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes that are left."""
-        passes = Manager("kernel")
+        passes = PassManager("kernel")
         for one in PASSES:
             passes.add_pass(one, one.name())
         passes.finalize()

@@ -20,7 +20,6 @@ Systems without owners, such as Windows, keep a user's cache in a folder of that
 import contextlib
 import functools
 import hashlib
-import importlib
 import logging
 import multiprocessing
 import os
@@ -32,15 +31,19 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
-import llvmlite
 import numba
-import numpy as np
 from numba import config as numba_config, types as numba_types
-from numba.core import serialize
-from numba.core.caching import FunctionCache
-from numba.core.registry import CPUDispatcher
 
-from blocksim.kernels.common.compiler import InnerCompiler, LeanCompiler, rebuilt
+from blocksim.kernels.common.compiler import (
+    VERSIONS,
+    CPUDispatcher,
+    FunctionCache,
+    InnerCompiler,
+    LeanCompiler,
+    dumps,
+    import_array_functions,
+    rebuilt,
+)
 
 HAS_OWNERS = hasattr(os, "getuid")
 UNMAPPED = 65534  # owner of what lies outside a container, whoever that is there
@@ -92,10 +95,8 @@ DIGEST_BYTES = hashlib.sha256().digest_size
 NAME_DIGITS = 16
 SUFFIX = ".nbc"
 
-dumps: Any = serialize.dumps  # comes without type hints
 
-
-class KernelCache(FunctionCache):
+class KernelCache(FunctionCache):  # type: ignore[misc]  # Any
     """What numba asks for compiled versions of one function, and gives them to."""
 
     def __init__(self, function: Callable[..., object], folder: Path, stamp: object) -> None:
@@ -121,7 +122,7 @@ class KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled version for a signature, None where there is none that is whole."""
-        _import_array_functions()
+        import_array_functions()
         target_context.refresh()
         key = self._key(sig, target_context.codegen())
         content = _read(self._path(key))
@@ -147,22 +148,6 @@ class KernelCache(FunctionCache):
     def _path(self, key: tuple[object, ...]) -> Path:
         digest = hashlib.sha256(repr(key).encode()).hexdigest()[:NAME_DIGITS]
         return self.folder / f"{self.name}.{digest}{SUFFIX}"
-
-
-@functools.cache
-def _import_array_functions() -> None:
-    """Have numba import its array functions without scipy.linalg, which takes a tenth of a short run.
-
-    They import it only to see that there is a BLAS; whoever compiles a function that calls one has it imported then.
-    """
-    linalg: Any = importlib.import_module("numba.np.linalg")
-    ensure_blas = linalg.ensure_blas
-    linalg.ensure_blas = lambda: None
-    try:
-        array_functions: Any = importlib.import_module("numba.np.arraymath")
-    finally:
-        linalg.ensure_blas = ensure_blas
-    array_functions.ensure_blas = ensure_blas
 
 
 def _sources(sig: Any) -> Iterator[tuple[str, int, int]]:
@@ -246,8 +231,7 @@ KERNEL_FOLDER = Path(__file__).resolve().parents[1]
 
 def source_hash(folder: Path = KERNEL_FOLDER) -> str:
     """Return a hash of every Python source below `folder`, with the versions of what compiles it."""
-    versions = f"numba {numba.__version__} llvmlite {llvmlite.__version__} numpy {np.__version__}"
-    digest = hashlib.sha256(versions.encode())
+    digest = hashlib.sha256(VERSIONS.encode())
     for path in sorted(folder.rglob("*.py")):
         digest.update(path.relative_to(folder).as_posix().encode())
         digest.update(path.read_bytes())
@@ -353,7 +337,7 @@ def plain_type(one: Any) -> Any:
     return types.int64 if is_short else one
 
 
-class _Inner(CPUDispatcher):
+class _Inner(CPUDispatcher):  # type: ignore[misc]  # Any
     """A function compiled once for all kernels that call it; their machine code has it, and it has none of its own.
 
     numba would compile it again for every constant, and every width of integer, that it is called with: nearly half of

@@ -7,12 +7,10 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model
 
+from blocksim.kernels.common.compiler import AbstractTemplate, cgutils, infer_global, ir, signature
 from blocksim.kernels.common.simd import functions
 
 DOUBLE = ir.DoubleType()
@@ -70,7 +68,7 @@ def _spread(builder: Any, value: Any) -> Any:
 def _declare(function: Callable[..., Any], answer: Callable[[tuple[Any, ...]], Any]) -> None:
     """Tell the compiler what a function returns for arguments of some types, or None where it takes no such."""
 
-    class Template(AbstractTemplate):
+    class Template(AbstractTemplate):  # type: ignore[misc]  # Any
         def generic(self, given: Any, _: Any) -> Any:
             result = answer(given)
             return None if result is None else signature(result, *given)
