@@ -42,7 +42,7 @@ HEAD = 11  # columns: width of the names on the left
 FAR_APART = 10.0  # steps of blocks and of systems beside them that are told with a cure
 HARD_SPACE = "\N{NO-BREAK SPACE}"
 USUAL_SPEED = 0.6  # m/s, the root of gravity times a side of some centimetres, for which defaults are chosen
-UNSCALED = ("rest_speed", "rest_hold", "velocity_tolerance", "restitution_threshold", "transition_speed")
+UNSCALED = ("step", "rest_speed", "rest_hold", "velocity_tolerance", "restitution_threshold", "transition_speed")
 MILLI = 1e3
 MICRO = 1e6
 PREFIXES = ((1e6, "M"), (1e3, "k"))
@@ -139,7 +139,7 @@ def _unscaled(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]
     left = [
         f"{name}.{key}"
         for name, table in tables.items()
-        for key in UNSCALED
+        for key in UNSCALED[int(scenario.time.has_springs) :]  # their step scales
         if key in type(table).model_fields and key not in table.model_fields_set
     ]
     if left:

@@ -231,7 +231,9 @@ def test_a_step_that_one_side_makes_ten_times_shorter_is_told_with_its_cure(bloc
     assert max(map(len, told.splitlines())) <= 80
 
 
-@pytest.mark.parametrize(("scheme", "keys"), [("explicit", []), ("nonsmooth", ["time.restitution_threshold"])])
+@pytest.mark.parametrize(
+    ("scheme", "keys"), [("explicit", []), ("nonsmooth", ["time.step", "time.restitution_threshold"])]
+)
 @pytest.mark.parametrize("size", [1e-4, 1e3])
 def test_speeds_left_at_defaults_are_told_where_blocks_are_not_of_centimetres(
     blocksim: Command, size: float, scheme: str, keys: list[str]
@@ -241,8 +243,9 @@ def test_speeds_left_at_defaults_are_told_where_blocks_are_not_of_centimetres(
     for key in ("blocks.brick.width", "blocks.brick.height", "blocks.brick.length", "bodies.0.y"):
         line += ["--set", f"{key}={size}"]
     told = " ".join(blocksim(*line).out.split("\n\n")[0].split())
-    assert all(key in told for key in ["defaults of time.rest_speed", *keys])
-    given = {"rest_speed": 1, "rest_hold": 1, "velocity_tolerance": 1, "restitution_threshold": 1}
+    assert all(key in told for key in ["time.rest_speed", *keys])
+    assert ("time.step" in told) == ("time.step" in keys)
+    given = {"rest_speed": 1, "rest_hold": 1, "velocity_tolerance": 1, "restitution_threshold": 1, "step": 1e-4}
     for key, value in given.items() if scheme == "nonsmooth" else list(given.items())[:2]:
         line += ["--set", f"time.{key}={value}"]
     assert "defaults" not in blocksim(*line).out.split("\n\n")[0]
