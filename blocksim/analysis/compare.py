@@ -11,8 +11,8 @@ The rules, in the order in which they are tried:
 
 The verdict comes with the numbers of a validation after ASME V&V 20: the error E = S - D, the
 standard uncertainty of the measured mean u_D = sqrt(s^2/n + reading^2), and the half-width of the 95 %
-prediction interval for the next test, t_(n-1, 0.975) s sqrt(1 + 1/n). No quantile needs scipy: its import takes
-longer than a comparison.
+prediction interval for the next test, t_(n-1, 0.975) s sqrt(1 + 1/n). Quantiles of Student's t need no scipy: every run
+that is compared asks for them.
 
 Limits of a probability from k of n, after Clopper and Pearson (Biometrika 26, 1934), hold at least the stated
 confidence whatever the probability is. Each is the probability at which k, or more (fewer), of n has just the remaining
@@ -23,13 +23,12 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from html import escape
-from itertools import count as count_from
-from math import copysign, exp, inf, isfinite, lgamma, log, log1p, nan, sqrt
-from sys import float_info
+from math import cos, inf, isfinite, nan, pi, sin, sqrt, tan
 from typing import TYPE_CHECKING, Any
 
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Statistics, quote_names
 from blocksim.errors import InvalidInputError
+from blocksim.extras import load_module
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -38,23 +37,32 @@ if TYPE_CHECKING:
 
 
 CONFIDENCE = 0.95
-ROUND_OFF = 1e-15
+BISECTIONS = 100  # each halves the bracket; 100 exhaust double precision
 
 
 def quantile(probability: float, degrees: int) -> float:
     """Return t with P(T <= t) = `probability`, for `degrees` >= 1 and 0 < `probability` < 1.
 
-    P(|T| > t) is I_y(degrees / 2, 1 / 2) with y = degrees / (degrees + t^2); the smaller of y and 1 - y is sought.
-    Raises ValueError outside these limits.
+    P(|T| <= sqrt(degrees) tan(theta)) is the finite series of Abramowitz & Stegun, 26.7.3 and 26.7.4: odd powers of
+    cos(theta) for odd degrees of freedom, even powers for even ones. It is inverted by bisection in theta, which is
+    bounded. Raises ValueError outside these limits.
     """
     if degrees < 1 or not 0.0 < probability < 1.0:
         raise ValueError("needs at least one degree of freedom and a probability between 0 and 1")
-    share, half = abs(2.0 * probability - 1.0), 0.5 * degrees
-    if 2.0 * share < 1.0:
-        least = beta_quantile(share, 0.5, half)
-        return copysign(sqrt(degrees * least / (1.0 - least)), probability - 0.5)
-    least = beta_quantile(1.0 - share, half, 0.5)
-    return copysign(sqrt(degrees * (1.0 - least) / least), probability - 0.5)
+    is_odd = degrees % 2 == 1
+    low, high = 0.0, pi / 2
+    for _ in range(BISECTIONS):
+        theta = 0.5 * (low + high)
+        total = term = cos(theta) if is_odd else 1.0
+        for index in range(3 if is_odd else 2, degrees - 1, 2):
+            term *= cos(theta) ** 2 * (index - 1) / index
+            total += term
+        part = sin(theta) * total
+        if is_odd:
+            part = 2.0 * theta / pi if degrees == 1 else 2.0 / pi * (theta + part)
+        low, high = (theta, high) if part < abs(2.0 * probability - 1.0) else (low, theta)
+    size = sqrt(degrees) * tan(low)
+    return size if probability >= 0.5 else -size  # noqa: PLR2004 - the median
 
 
 def interval(count: int, total: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -67,35 +75,7 @@ def lower_bound(count: int, total: int, tail: float = 1.0 - CONFIDENCE) -> float
     """Return the one-sided lower limit p, P(at least `count` of `total`; p) = `tail`: tail^(1/n) where all n agree."""
     if count == 0:
         return 0.0
-    return beta_quantile(tail, count, total - count + 1)
-
-
-def beta_share(x: float, a: float, b: float) -> float:
-    """Return the share I_x(a, b) of a beta distribution below `x` in [0, 1]; `a` and `b` are positive.
-
-    Its continued fraction (DLMF 8.17.22) is evaluated after Lentz.
-    """
-    is_beyond = x > (a + 1.0) / (a + b + 2.0)  # where it converges slowly
-    a, b, x = (b, a, 1.0 - x) if is_beyond else (a, b, x)
-    x = max(x, float_info.min)
-    fraction, c, d = 1.0, 1.0, 0.0
-    for n in count_from(1):
-        m, odd = divmod(n, 2)
-        term = x * (-(a + m) * (a + b + m) if odd else m * (b - m)) / ((a + n - 1) * (a + n))
-        c, d = 1.0 + term / c, 1.0 / (1.0 + term * d)
-        fraction *= c * d
-        if not abs(c * d - 1.0) > ROUND_OFF:
-            break
-    share = exp(lgamma(a + b) - lgamma(a) - lgamma(b) + a * log(x) + b * log1p(-x)) / (a * fraction)
-    return 1.0 - share if is_beyond else share
-
-
-def beta_quantile(share: float, a: float, b: float) -> float:
-    """Return the value with this share of a beta distribution below it, by bisection to the last digit."""
-    low, high = 0.0, 1.0
-    while low < (middle := 0.5 * (low + high)) < high:
-        low, high = (middle, high) if beta_share(middle, a, b) < share else (low, middle)
-    return low
+    return float(load_module("scipy.special", "judging a sweep").betaincinv(count, total - count + 1, tail))
 
 
 ROTATION_TOLERANCE = 5.0  # deg, either side of the measured mean

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from blocksim.analysis import compare, evidence as facts
 from blocksim.analysis.experiment import ExperimentTable
 from blocksim.errors import InvalidInputError
+from blocksim.extras import load_module
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -314,10 +315,9 @@ def hotelling(repeats: facts.Floats, members: facts.Floats) -> Hotelling | None:
     if rest <= 0.0:
         return None
     scale = degrees * p / rest
-    beyond = compare.beta_quantile(1.0 - compare.CONFIDENCE, 0.5 * rest, 0.5 * p)  # rest / (rest + p F)
-    critical = scale * rest / p * (1.0 - beyond) / beyond
-    p_value = compare.beta_share(rest / (rest + p * squared / scale), 0.5 * rest, 0.5 * p)
-    return Hotelling(squared, squared / scale, float(p), rest, critical, p_value)
+    special = load_module("scipy.special", "judging a sweep")
+    critical = scale * float(special.fdtri(p, rest, compare.CONFIDENCE))
+    return Hotelling(squared, squared / scale, float(p), rest, critical, float(special.fdtrc(p, rest, squared / scale)))
 
 
 def _covariance_of_mean(sample: facts.Floats) -> facts.Floats:
@@ -477,7 +477,7 @@ def judge(
 ) -> Judgement:
     """Judge the members of a sweep by all metrics.
 
-    Raises InvalidInputError where members lack a measured block or quantity.
+    Raises InvalidInputError where members lack a measured block or quantity, UnavailableError without scipy.
     """
     settings = settings or Settings()
     table.refuse_unknown(members.blocks, "the sweep")

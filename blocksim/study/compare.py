@@ -60,7 +60,7 @@ def compare_sweep(
     """Judge the cases of a sweep by its table and an experiment's; by default that of the scenario.
 
     Raises InputMissingError without any experiment, InvalidInputError for tables that cannot be used or do not go with
-    each other.
+    each other, UnavailableError without scipy.
     """
     result = sweep if isinstance(sweep, manifest.SweepResult) else manifest.read_sweep(Path(sweep))
     plan = result.folder / sweep_folder.PLAN

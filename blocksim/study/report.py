@@ -8,7 +8,7 @@ from blocksim import __version__
 from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.analysis.metrics import Judgement
-from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
+from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import input_files, load_stored
 from blocksim.simulation import files
 from blocksim.study import answer, compare, manifest, pictures, rows, run_folder, sweep_folder
@@ -117,7 +117,7 @@ def _sweep(key: str, place: Path, experiment: Path | None, most: int) -> tuple[l
         if experiment is not None or (scenario is not None and scenario.experiment is not None):
             judged = _shown(compare.compare_sweep(place, experiment))
     except BlocksimError as error:
-        if experiment is not None:
+        if experiment is not None and not isinstance(error, UnavailableError):
             raise
         problems.append(str(error))
     try:

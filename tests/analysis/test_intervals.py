@@ -5,7 +5,7 @@ from math import comb
 import pytest
 from scipy import stats
 
-from blocksim.analysis.compare import beta_quantile, beta_share, interval, lower_bound, quantile
+from blocksim.analysis.compare import interval, lower_bound, quantile
 
 
 def at_least(count: int, total: int, p: float) -> float:
@@ -50,15 +50,3 @@ def test_quantile_without_meaning_is_refused(probability: float, degrees: int) -
 def test_large_numbers_agree_with_scipy() -> None:
     expected = stats.binomtest(9_700, 10_000).proportion_ci(method="exact")
     assert interval(9_700, 10_000) == pytest.approx((expected.low, expected.high), abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("a", "b"), [(0.15, 2.0), (0.5, 3.0), (1.0, 1.0), (2.65, 1.0), (40.0, 0.5), (5e3, 1.5), (3e5, 7e5)]
-)
-def test_shares_and_quantiles_of_beta_distributions_agree_with_scipy(a: float, b: float) -> None:
-    for share in (1e-3, 0.05, 0.5, 0.975):
-        x = float(stats.beta.ppf(share, a, b))
-        assert beta_quantile(share, a, b) == pytest.approx(x, rel=1e-9)
-        assert beta_share(x, a, b) == pytest.approx(share, rel=1e-8)
-    assert beta_share(1.0, a, b) == 1.0
-    assert beta_share(0.0, a, b) == pytest.approx(0.0, abs=1e-40)

@@ -2,6 +2,7 @@
 
 import functools
 import json
+import sys
 from math import nan
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from blocksim.analysis.experiment import load_table
 from blocksim.analysis.metrics import METRICS, Judgement, Settings, judge
-from blocksim.errors import InvalidInputError
+from blocksim.errors import InvalidInputError, UnavailableError
 from tests.analysis.metrics.conftest import members_of, table_of
 
 PAPER = load_table(Path(__file__).parents[2] / "scenarios" / "experiments" / "three_blocks.csv")
@@ -79,3 +80,9 @@ def test_one_member_and_one_repeat_are_enough_for_an_answer() -> None:
     found = judge(members_of({("1", "x"): [1.0], ("1", "rotation"): [0.0]}), table_of({("1", "x"): [1.2]}))
     assert found.inside
     assert found.findings["joint"].rows == ()
+
+
+def test_missing_scipy_is_reported_with_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.special", None)
+    with pytest.raises(UnavailableError, match=r"blocksim\[study\]"):
+        judged.__wrapped__()

@@ -11,6 +11,7 @@ from tests.golden import Golden
 
 FIT = "calibrate slide.toml --experiment measured.csv --fit friction.block_ground=0.2:0.5"
 SCATTER = "--scatter 'bodies.0.velocity.0=0.5 m/s+-0.01 m/s'"
+JUDGED = "compare swept --experiment measured.csv"
 MORRIS = "sensitivity scenarios/slide.toml --vary friction.block_ground=0.3:0.4"
 LINES = [line for line in Path(__file__).with_name("mistakes.txt").read_text().splitlines() if line and line[0] != "#"]
 
@@ -62,6 +63,7 @@ NEEDED = {
     "ffmpeg of animate": ("imageio_ffmpeg", "animate run --out film.mp4"),
     "optuna of calibrate": ("optuna", f"{FIT} {SCATTER}"),
     "scipy of calibrate": ("scipy.stats", f"{FIT} {SCATTER}"),
+    "scipy of compare": ("scipy.special", JUDGED),
     "SALib of sensitivity": ("SALib", MORRIS),
     "SALib of sensitivity by Sobol": ("SALib", f"{MORRIS} --method sobol"),
 }
