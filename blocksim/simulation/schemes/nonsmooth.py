@@ -47,30 +47,30 @@ def _points(scene: arrays.Nonsmooth, manifolds: Any, which: str, along: float) -
 
 
 def renew(scene: arrays.Nonsmooth, old: Records) -> bool:
-    """Bring lines and rows of contacts up to date with bodies that an event has changed; `old` are these before.
+    """Bring states and constraints up to date with bodies that an event has changed; `old` are these before.
 
     All velocities begin anew half a substep back, as those at the start of a run do: what was held falls from now on.
     The correction in the ledger stays what it is.
     """
-    bodies, lines, before = scene.world.bodies, scene.contacts.states, scene.contacts.before
+    bodies, states, before = scene.world.bodies, scene.contacts.states, scene.contacts.before
     controls, h = scene.world.controls[0], float(scene.contacts.stepping[0].substep)
     hx, hy = h * float(controls.gravity_x), h * float(controls.gravity_y)
     was_free, is_free = old["inverse_mass"] > 0.0, bodies["inverse_mass"] > 0.0
     shown = old["vx"] ** 2 + old["vy"] ** 2
-    ahead = (lines["vx"] + 0.5 * hx) ** 2 + (lines["vy"] + 0.5 * hy) ** 2
-    kept = np.where(was_free, before["lifted"] - lines["vx"] * hx - lines["vy"] * hy + 0.5 * (ahead - shown), 0.0)
+    ahead = (states["vx"] + 0.5 * hx) ** 2 + (states["vy"] + 0.5 * hy) ** 2
+    kept = np.where(was_free, before["lifted"] - states["vx"] * hx - states["vy"] * hy + 0.5 * (ahead - shown), 0.0)
     for name in ("inverse_mass", "inverse_inertia", "spin"):
-        lines[name] = bodies[name]
-    lines["vx"] = bodies["vx"] - np.where(is_free, 0.5 * hx, 0.0)
-    lines["vy"] = bodies["vy"] - np.where(is_free, 0.5 * hy, 0.0)
-    before["lifted"] = np.where(is_free, kept + lines["vx"] * hx + lines["vy"] * hy, before["lifted"])
+        states[name] = bodies[name]
+    states["vx"] = bodies["vx"] - np.where(is_free, 0.5 * hx, 0.0)
+    states["vy"] = bodies["vy"] - np.where(is_free, 0.5 * hy, 0.0)
+    before["lifted"] = np.where(is_free, kept + states["vx"] * hx + states["vy"] * hy, before["lifted"])
     for name in RATES:
-        before[name] = lines[name]
-    rows = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
-    is_gone = (bodies["is_moved"][rows["a"]] == REMOVED) | (bodies["is_moved"][rows["b"]] == REMOVED)
+        before[name] = states[name]
+    listed = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
+    is_gone = (bodies["is_moved"][listed["a"]] == REMOVED) | (bodies["is_moved"][listed["b"]] == REMOVED)
     for name in ("normal_one", "normal_two", "shear"):
-        rows[name][is_gone] = 0.0
-    rows["reach"][is_gone] = arrays.AWAY
+        listed[name][is_gone] = 0.0
+    listed["reach"][is_gone] = arrays.AWAY
     return False
 
 
