@@ -70,7 +70,7 @@ def take_step(scene: arrays.Nonsmooth, k: int, impact_lanes: Records | None) -> 
 
 @jit.kernel
 def substep(scene: arrays.Nonsmooth, k: int, number: int, is_first: bool, impact_lanes: Records | None) -> None:
-    """Go through substep `number` of an interval as thread k, of the first one of a run or not; as in take_step."""
+    """Go through substep `number` of an interval as thread k; `is_first` of the first interval of a run."""
     contacts, team = scene.contacts, scene.world.team
     stepping = contacts.stepping[0]
     has_loads = scene.world.loads.size > 0
