@@ -19,8 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.common import arrays
-from blocksim.kernels.common.tolerances import CONE_TOLERANCE
+from blocksim.kernels.common import arrays, tolerances
 from blocksim.kernels.explicit.models.particles import PER_PARTICLE
 from blocksim.scenario import PlacedBody, PlacedSegment, Scenario, place_bodies, place_segments, placement
 from blocksim.world.excitation import Drives, LoadArrays, drive_records, load_arrays
@@ -69,7 +68,7 @@ def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]
         corners = ((-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y))
         for (x, y), (nx, ny) in zip(corners, NORMALS, strict=True):
             side = (half_y, half_x) if nx == 0.0 else (half_x, half_y)
-            rows.append((x, y, nx, ny, *side, 0.0, 1.0, 0.0, 0.0, CONE_TOLERANCE))
+            rows.append((x, y, nx, ny, *side, 0.0, 1.0, 0.0, 0.0, tolerances.CONE_TOLERANCE))
     table = arrays.zeros(len(rows), arrays.CORNER)
     for name, column in zip(FIELDS, zip(*rows, strict=True), strict=True):
         table[name] = column
@@ -110,7 +109,7 @@ def cone_of(corners: Corners) -> float:
     """
     edges = [math.atan2(y - last_y, x - last_x) for (last_x, last_y), (x, y) in pairwise((*corners, corners[0]))]
     turns = [(after - before) % (2.0 * math.pi) for before, after in zip((edges[-1], *edges), edges, strict=False)]
-    return min(CONE_TOLERANCE, math.sin(0.5 * min(turns)), math.sin(0.5 * (math.pi - max(turns))))
+    return min(tolerances.CONE_TOLERANCE, math.sin(0.5 * min(turns)), math.sin(0.5 * (math.pi - max(turns))))
 
 
 def place_particles(bodies: arrays.Records, model: str, spacing: float) -> arrays.Records:
@@ -297,6 +296,7 @@ def _fill_blocks(records: NDArray[np.record], layouts: Sequence[Layout]) -> None
     records["sin"] = column(math.sin(body.angle) for body in placed)
     records["half_x"] = 0.5 * column(body.size_x for body in placed)
     records["half_y"] = 0.5 * column(body.size_y for body in placed)
+    records["inner_radius"] = np.minimum(records["half_x"], records["half_y"])
     records["radius"] = 0.5 * column(math.hypot(body.size_x, body.size_y) for body in placed)
     is_free = ~np.array([body.fixed for body in placed], bool).reshape(records.shape)
     for name in ("mass", "inertia"):

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError
-from blocksim.kernels.common import arrays
+from blocksim.kernels.common import arrays, tolerances
 from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
-from blocksim.kernels.common.tolerances import TRAVELLED
 from blocksim.kernels.explicit import models
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import PlacedBody, Scenario, laws, motion
@@ -164,7 +163,9 @@ def _divided(layouts: Sequence[Layout], bodies: arrays.Records) -> Iterator[tupl
     contact, has_springs = layouts[0].scenario.contact, layouts[0].scenario.time.has_springs
     particles: list[arrays.Records] = []
     if contact.model == SURFACE or not has_springs:
-        slots = [arrays.SLOTS if one.shapes is None else 2 * max(arrays.HALF, *one.shapes.sizes) for one in layouts]
+        slots = [
+            arrays.SLOTS if one.shapes is None else max(arrays.SLOTS, 2 * max(one.shapes.sizes)) for one in layouts
+        ]
     else:
         spacings = [layout.scenario.contact.particle_spacing for layout in layouts]
         particles = [place_particles(one, contact.model, space) for one, space in zip(bodies, spacings, strict=True)]
@@ -277,7 +278,7 @@ def _assemble(parts: Parts, strides: Sequence[Stride]) -> arrays.World:
     else:
         contacts = arrays.zeros((members, parts.slots), arrays.PARTICLE_CONTACT)
     controls = run_controls(parts, strides)
-    reach = np.maximum(controls["skin"], TRAVELLED * controls["skin"] + controls["approach"])
+    reach = np.maximum(controls["skin"], tolerances.TRAVELLED * controls["skin"] + controls["approach"])
     controls["cell_width"] = 2.0 * controls["cell_radius"] + reach
     return assemble_world(parts, controls, first_capacity(bodies), parts.slots, contacts)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import MOTION_PIECE, PAIRS_FULL, TEAM_SIZE, World, zeros
+from blocksim.kernels.common.integrate import place_all_corners
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.step import advance, advance_in_team
 from blocksim.verification.scene import HEIGHT, scenario_of
@@ -181,6 +182,7 @@ SCENES: dict[str, tuple[Callable[[], World], int]] = {  # and steps
 
 def listed(world: World) -> World:
     """Return a world whose pairs are listed, before anything has moved."""
+    place_all_corners(world.bodies)  # as advance does before anything else
     while not rebuild_pairs(world):
         world = with_more_room(world)
     return world

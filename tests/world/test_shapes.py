@@ -10,7 +10,7 @@ import pytest
 
 from blocksim.kernels.common.arrays import ALL, OUTLINE
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE
-from blocksim.kernels.explicit.outlines import MOST_CORNERS, UPPER
+from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER
 from blocksim.scenario import Scenario, scenario_from_mapping
 from blocksim.scenario.geometry import MOST, centre_outline, least_width, regular
 from blocksim.world.bodies import body_records, cone_of, corner_rows, layout_of

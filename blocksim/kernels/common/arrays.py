@@ -7,7 +7,7 @@ contact slot lies together in memory, and a compiled function that takes a recor
 `n` bodies plus one record for the ground, the last: it never moves and has no inverse mass. `p` candidate pairs
 (capacity) with `s` contact slots each; what a slot stands for is the contact model's own affair:
 
-    surface    s = 8; slots 0-3 are the corners of body `a` against body `b`, slots 4-7 the corners of `b` against `a`.
+    surface    slots from 0 are the corners of body `a` against body `b`, slots from 16 those of `b` against `a`.
                Corners count counter-clockwise from the lower left one of the unrotated rectangle; faces are 0: +x,
                1: +y, 2: -x, 3: -y of the body that is touched
     kernel     particles of `a` against `b`, then particles of `b` against `a`; the face of a contact is always 0
@@ -26,9 +26,9 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Records = np.recarray[Any, np.dtype[np.record]]
 Record = Any  # one element of Records: a pointer in compiled code, numpy.record without the compiler
+Corners = Records | None  # (q,) CORNER; None, a type of its own in compiled code, where all blocks are rectangles
 
-SLOTS = 8  # of a pair in the surface model
-HALF = SLOTS // 2  # slots of each body's corners
+SLOTS = 8  # that may touch, of a pair of rectangles in the surface model
 CONTACTS = 2  # of a pair in the surface model, see models/surface.py
 GROUP = 16  # bodies whose pairs share one record of the ledger
 CACHE_LINE = 64  # bytes
@@ -99,7 +99,7 @@ BODY = on_own_lines(
             "k_xx k_xy k_yy "  # N/m: stiffness of all contacts along their normals; see inertia.py
             "k_x k_y "  # N: the same times the lever arms of the normals
             "least_width "  # m: of a polygon, between two parallel lines; zero for rectangles
-            "inner_radius",  # m: from the centroid to the nearest face; with corners in the table
+            "inner_radius",  # m: from the centroid of a block to its nearest face
             indices="first_particle particle_count "  # its part of the particles
             "first_corner",  # its part of the corners, also of rectangles and ground beside polygons; else zero
             small="row_x row_y "  # intervals between particles on the faces along x and along y
@@ -142,7 +142,7 @@ PAIR = record_type(
     flags="bearing "  # PLANE, ENDS or APART: what its contacts are; see bearing.py
     "is_coming "  # flag: about to touch
     "is_sliver "  # flag: its overlap is about as deep as long; see slivers.py
-    "axis "  # along which the two were apart when last looked at; 0, 1: x, y of body b, 2, 3: of body a
+    "axis "  # along which the two were apart when last looked at: a face of body b, from 16 on one of body a
     "is_between "  # flag: its bodies are of two shares
     "normal_left shear_left "  # steps until the dashpots along normals and tangents are made again
     "sticking "  # bits of the points that have a dashpot along the tangent

@@ -17,8 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.common import arrays, jit, shapes
-from blocksim.kernels.common.tolerances import FAR_OUT, FARTHEST_CELL
+from blocksim.kernels.common import arrays, jit, shapes, tolerances
 
 
 class CellGrid(NamedTuple):
@@ -35,7 +34,7 @@ class CellGrid(NamedTuple):
 @jit.kernel
 def cell_along(place: float, begin: float, size: float) -> int:
     """Return how many cells of a size (m) lie between a beginning and a place."""
-    return int(min(max(np.floor((place - begin) / size), -FARTHEST_CELL), FARTHEST_CELL))
+    return int(min(max(np.floor((place - begin) / size), -tolerances.FARTHEST_CELL), tolerances.FARTHEST_CELL))
 
 
 @jit.kernel
@@ -89,7 +88,7 @@ def bulk_along(places: arrays.Records, is_x: bool, low: float, high: float) -> t
     for i in range(places.size):
         place = places[i].x if is_x else places[i].y
         if math.isfinite(place):
-            away += FAR_OUT * abs(min(max(place, low), high) - middle) / places.size
+            away += tolerances.FAR_OUT * abs(min(max(place, low), high) - middle) / places.size
     return max(low, middle - away), max(low, min(high, middle + away))
 
 
@@ -101,8 +100,8 @@ def lay_cells(places: arrays.Records, size: float, count: float, is_endless: boo
     many, they lie over the bulk or are larger. With w and h the sides and s at least w/n, h/n and (w h/n)^(1/2) there
     are no more than (w/s + 1)(h/s + 1), at most 3 n + 1, cells, however thin or wide the box is.
     """
-    left, right = ends_along(places, True, FARTHEST_CELL * size)
-    bottom, top = ends_along(places, False, FARTHEST_CELL * size)
+    left, right = ends_along(places, True, tolerances.FARTHEST_CELL * size)
+    bottom, top = ends_along(places, False, tolerances.FARTHEST_CELL * size)
     if is_endless:
         columns = rows = 1
         while columns * size < right - left + size and 2.0 * columns <= 3.0 * count:

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.common import arrays, jit
-from blocksim.kernels.common.tolerances import END_RATIO, SMALL_TURN
+from blocksim.kernels.common import arrays, jit, tolerances
 
 
 @jit.kernel
@@ -22,7 +21,7 @@ def turn(cos: float, sin: float, angle: float) -> tuple[float, float]:
     fraction of the cost of the library functions. Length and angle drift by round-off only; both are renewed at the
     checks.
     """
-    if abs(angle) < SMALL_TURN:
+    if abs(angle) < tolerances.SMALL_TURN:
         square = angle * angle
         cos_turn = 1.0 - square * (0.5 - square * (1.0 / 24.0))
         sin_turn = angle * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0)))
@@ -80,7 +79,7 @@ def to_world(body: arrays.Record, px: float, py: float) -> tuple[float, float]:
 def slab_depth(px: float, py: float, slab: arrays.Record) -> float:
     """Return how deep (m) a point, given in the frame of a slab of ground, lies below its upper face; zero outside."""
     depth = slab.half_y - py
-    return depth if 0.0 < depth <= END_RATIO * (slab.half_x - abs(px)) else 0.0
+    return depth if 0.0 < depth <= tolerances.END_RATIO * (slab.half_x - abs(px)) else 0.0
 
 
 @jit.kernel

@@ -23,20 +23,13 @@ It is measured where dashpots are due.
 
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import ALL, Record, Records, World
+from blocksim.kernels.common import tolerances
+from blocksim.kernels.common.arrays import ALL, Corners, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.tolerances import (
-    CONE_TOLERANCE,
-    FLAT,
-    LEAST_SHARE,
-    MISSED_STIFFNESS,
-    OPERATOR_LIFE,
-    SAME_FACE,
-)
-from blocksim.kernels.explicit import damping, outlines
+from blocksim.kernels.explicit import damping, sides
 from blocksim.kernels.explicit.laws import LINEAR
 
-FLAT_SHARE = FLAT / CONE_TOLERANCE  # the same of the cone, where that of polygons is narrower
+FLAT_SHARE = tolerances.FLAT / tolerances.CONE_TOLERANCE  # the same of the cone, where that of polygons is narrower
 
 
 class Bearing(NamedTuple):
@@ -68,25 +61,11 @@ def are_blocks(a: Record, b: Record) -> bool:
 
 
 @kernel
-def tilt_of(a: Record, b: Record) -> tuple[float, float]:
-    """Return the sine of the angle between the most nearly parallel faces, and its change with the angle of a."""
-    c = a.cos * b.cos + a.sin * b.sin
-    s = a.sin * b.cos - a.cos * b.sin
-    if abs(s) < abs(c):
-        return abs(s), c if s > 0.0 else -c
-    return abs(c), -s if c > 0.0 else s
-
-
-@kernel
-def bearing_of(part: float, slide: float, a: Record, b: Record) -> Bearing:
-    """Return the share of a corner whose interval is `part` of a face and changes with the slip by `slide` (1/m)."""
-    sine, rate = tilt_of(a, b)
-    return bearing_at(sine, rate, part, slide, FLAT, CONE_TOLERANCE)
-
-
-@kernel
 def bearing_at(sine: float, rate: float, part: float, slide: float, flat: float, cone: float) -> Bearing:
-    """Return the same at a tilt and its change with the angle of a, whose effect lasts from `flat` to `cone`."""
+    """Return the share of a corner whose interval is `part` of a face and changes with the slip by `slide` (1/m).
+
+    `sine` is that of the tilt, `rate` its change with the angle of a; its effect lasts from `flat` to `cone`.
+    """
     if sine <= flat:
         return Bearing(part, slide, 0.0)
     if sine >= cone:
@@ -95,27 +74,6 @@ def bearing_at(sine: float, rate: float, part: float, slide: float, flat: float,
     up = q * q * (3.0 - 2.0 * q)
     steepness = 6.0 * q * (1.0 - q) / (cone - flat)
     return Bearing(part + (1.0 - part) * up, slide * (1.0 - up), (1.0 - part) * steepness * rate)
-
-
-@kernel
-def is_flat(a: Record, b: Record) -> bool:
-    """Return True if two faces of a and b are parallel."""
-    return tilt_of(a, b)[0] <= FLAT
-
-
-@kernel
-def face_across(body: Record, nx: float, ny: float, side: float) -> tuple[float, float, float]:
-    """Return the middle of a face from the centre of its body and half of it, along the tangent, and its half length.
-
-    The face is the one whose outward normal is nearest to `side` = +-1 times (nx, ny).
-    """
-    along_x = nx * body.cos + ny * body.sin
-    along_y = ny * body.cos - nx * body.sin
-    if abs(along_x) > abs(along_y):
-        out = side if along_x > 0.0 else -side
-        return -out * body.half_x * along_y, body.half_y * abs(along_x), body.half_y
-    out = side if along_y > 0.0 else -side
-    return out * body.half_y * along_x, body.half_x * abs(along_y), body.half_x
 
 
 @kernel
@@ -132,16 +90,6 @@ def face_per_length(a: Record, b: Record, half_a: float, half_b: float) -> float
     return 0.5 / max(half_a, half_b)
 
 
-@rare_kernel
-def interval_of(a: Record, b: Record, nx: float, ny: float) -> Interval:
-    """Return the interval of the two faces of a and b that look at each other along the normal (nx, ny), b to a."""
-    middle_a, reach_a, half_a = face_across(a, nx, ny, -1.0)
-    middle_b, reach_b, half_b = face_across(b, nx, ny, 1.0)
-    middle_a += nx * (a.y - b.y) - ny * (a.x - b.x)
-    cosine = reach_a / half_a * (reach_b / half_b)
-    return overlap_of(middle_a, reach_a, middle_b, reach_b, face_per_length(a, b, half_a, half_b), cosine)
-
-
 @kernel
 def overlap_of(
     middle_a: float, reach_a: float, middle_b: float, reach_b: float, per_length: float, cosine: float
@@ -155,15 +103,6 @@ def overlap_of(
     return Interval(left, right, slide, per_length, cosine)
 
 
-@rare_kernel
-def bearing_of_interval(found: Interval, a: Record, b: Record) -> Bearing:
-    """Return the share of a corner at an end of an interval, whether or not there is a contact at the other end."""
-    part = (found.right - found.left) * found.per_length / found.cosine
-    if part > 1.0 or part < LEAST_SHARE:
-        return bearing_of(min(max(part, LEAST_SHARE), 1.0), 0.0, a, b)
-    return bearing_of(part, found.slide * found.per_length / found.cosine, a, b)
-
-
 @kernel
 def stiffness_between(pair: Record, x: float, y: float, nx: float, ny: float) -> float:
     """Return the stiffness of the two ends of an interval, given the vector (m) from one to the other and their normal.
@@ -174,27 +113,28 @@ def stiffness_between(pair: Record, x: float, y: float, nx: float, ny: float) ->
 
 
 class Facing(NamedTuple):
-    """How the faces of two bodies look at each other along a normal, where there are polygons."""
+    """How the faces of two bodies look at each other along a normal."""
 
     interval: Interval
     sine: float  # of the angle between them
     rate: float  # its change with the angle of a
-    cone: float  # sine from which on they are not parallel
+    flat: float  # sine up to which they are parallel
+    cone: float  # sine from which on they are not
 
 
 @kernel
-def seen_along(body: Record, side: Record, nx: float, ny: float) -> tuple[float, float, float, float]:
+def seen_along(body: Record, side: sides.Side, nx: float, ny: float) -> tuple[float, float, float, float]:
     """Return the normal of a face in world axes, its middle (m) along the tangent and its cosine to (nx, ny)."""
-    mx, my = outlines.into_world(body, side.nx, side.ny)
-    x, y = outlines.into_world(body, side.x - side.half * side.ny, side.y + side.half * side.nx)
+    mx, my = sides.into_world(body, side.nx, side.ny)
+    x, y = sides.into_world(body, side.x - side.half * side.ny, side.y + side.half * side.nx)
     return mx, my, nx * y - ny * x, abs(mx * nx + my * ny)
 
 
 @rare_kernel
-def facing_of(a: Record, b: Record, nx: float, ny: float, table: Records) -> Facing:
+def facing_of(a: Record, b: Record, nx: float, ny: float, table: Corners) -> Facing:
     """Return how the faces of a and b look at each other along the normal (nx, ny), b to a."""
-    one = outlines.corner_of(a, table, outlines.side_along(a, table, -nx, -ny))
-    two = outlines.corner_of(b, table, outlines.side_along(b, table, nx, ny))
+    one = sides.corner_of(a, table, sides.side_along(a, table, -nx, -ny))
+    two = sides.corner_of(b, table, sides.side_along(b, table, nx, ny))
     ax, ay, middle_a, cos_a = seen_along(a, one, nx, ny)
     bx, by, middle_b, cos_b = seen_along(b, two, nx, ny)
     middle_a += nx * (a.y - b.y) - ny * (a.x - b.x)
@@ -203,25 +143,22 @@ def facing_of(a: Record, b: Record, nx: float, ny: float, table: Records) -> Fac
     sine = ax * by - ay * bx  # of the angle from the face of b to that of a
     cosine = -ax * bx - ay * by
     rate = cosine if sine > 0.0 else -cosine
-    return Facing(interval, abs(sine) if cosine > 0.0 else 1.0, rate, outlines.cone_of(a, b, table))
+    cone = sides.cone_of(a, b, table)
+    flat = min(tolerances.FLAT, FLAT_SHARE * cone)
+    return Facing(interval, abs(sine) if cosine > 0.0 else 1.0, rate, flat, cone)
 
 
 @rare_kernel
 def bearing_of_facing(facing: Facing) -> Bearing:
-    """Return the share of a corner at an end of the interval of two faces, as bearing_of_interval."""
+    """Return the share of a corner at an end of the interval of two faces, with or without a contact at the other."""
     found = facing.interval
-    flat = flat_of(facing)
     part = found.per_length * (found.right - found.left) / found.cosine
-    if part > 1.0 or part < LEAST_SHARE:
-        return bearing_at(facing.sine, facing.rate, min(max(part, LEAST_SHARE), 1.0), 0.0, flat, facing.cone)
+    if part > 1.0 or part < tolerances.LEAST_SHARE:
+        return bearing_at(
+            facing.sine, facing.rate, min(max(part, tolerances.LEAST_SHARE), 1.0), 0.0, facing.flat, facing.cone
+        )
     slide = found.slide * found.per_length / found.cosine
-    return bearing_at(facing.sine, facing.rate, part, slide, flat, facing.cone)
-
-
-@kernel
-def flat_of(facing: Facing) -> float:
-    """Return the sine up to which two faces are parallel."""
-    return min(FLAT, FLAT_SHARE * facing.cone)
+    return bearing_at(facing.sine, facing.rate, part, slide, facing.flat, facing.cone)
 
 
 @rare_kernel
@@ -233,15 +170,16 @@ def keep_bearing(pair: Record, bearing: Bearing, stiffness: float) -> None:
 
 
 @kernel
-def measure_soon(pair: Record, slip: float, turned: float, exponent: float, corners: Records | None) -> None:
+def measure_soon(pair: Record, slip: float, turned: float, exponent: float, table: Corners) -> None:
     """Have the stiffness of a pair measured in the next step where it changes fast.
 
-    It does between polygons, as on slivers, and with laws other than the linear one, whose steps are longer. `slip` (m)
-    and `turned` (rad) are how far a has moved ahead of b, and turned, in the last drift.
+    It does between polygons, as on slivers, and with laws other than the linear one, whose steps are longer.
+
+    `slip` (m) and `turned` (rad) are how far a has moved ahead of b, and turned, in the last drift.
     """
-    if corners is not None or exponent != LINEAR:
+    if sides.has_polygons(table) or exponent != LINEAR:
         change = abs(pair.slide * slip + pair.turn * turned)
-        if OPERATOR_LIFE * change > MISSED_STIFFNESS * pair.stiffness:
+        if tolerances.OPERATOR_LIFE * change > tolerances.MISSED_STIFFNESS * pair.stiffness:
             damping.renew_dashpots(pair)
 
 
@@ -265,30 +203,27 @@ def measure(world: World, p: int, count: int, stiffness: float) -> None:
 
 
 @kernel
-def bearing_along(
-    a: Record, b: Record, nx: float, ny: float, corners: Records | None
-) -> tuple[Interval, Bearing, bool]:
+def bearing_along(a: Record, b: Record, nx: float, ny: float, table: Corners) -> tuple[Interval, Bearing, bool]:
     """Return the interval of two blocks along a normal, what its ends bear, and whether the faces are parallel."""
-    if corners is None:
-        found = interval_of(a, b, nx, ny)
-        return found, bearing_of_interval(found, a, b), is_flat(a, b)
-    facing = facing_of(a, b, nx, ny, corners)
-    return facing.interval, bearing_of_facing(facing), facing.sine <= flat_of(facing)
+    facing = facing_of(a, b, nx, ny, table)
+    return facing.interval, bearing_of_facing(facing), facing.sine <= facing.flat
 
 
 @rare_kernel
 def measure_faces(
-    pair: Record, a: Record, b: Record, one: Record, two: Record, stiffness: float, corners: Records | None
+    pair: Record, a: Record, b: Record, one: Record, two: Record, stiffness: float, table: Corners
 ) -> None:
     """Measure the stiffness of the contacts of two blocks, `one` and `two` (or both the same).
 
     Two on different faces, as where a corner lies in a corner, both have that of the deeper one.
     """
     deeper = one if one.depth >= two.depth else two
-    found, bearing, flat = bearing_along(a, b, deeper.nx, deeper.ny, corners)
+    found, bearing, flat = bearing_along(a, b, deeper.nx, deeper.ny, table)
     keep_bearing(pair, bearing, stiffness)
     is_two = one.slot != two.slot
-    is_ends = not is_two or (one.nx * two.nx + one.ny * two.ny > SAME_FACE and flat and bearing.share > LEAST_SHARE)
+    is_ends = not is_two or (
+        one.nx * two.nx + one.ny * two.ny > tolerances.SAME_FACE and flat and bearing.share > tolerances.LEAST_SHARE
+    )
     pair.bearing = ENDS if is_ends else APART
     if is_two and is_ends and bearing.slide != 0.0:
         pair.slide = stiffness * found.slide * found.per_length

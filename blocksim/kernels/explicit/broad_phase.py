@@ -6,20 +6,19 @@ come since it was made is looked at again before any can have come too far.
 
 import math
 
-from blocksim.kernels.common import arrays, energy, jit, neighbours, supports
-from blocksim.kernels.common.tolerances import MOST_UNSEEN, MOST_UNSEEN_DRIVEN, SPEED_GROWTH, TRAVELLED, WAY_SHARE
+from blocksim.kernels.common import arrays, energy, jit, neighbours, supports, tolerances
 from blocksim.kernels.explicit.depth import overlap_limit
 from blocksim.kernels.explicit.models import near_slots
 
 MOST_SLOTS = 32  # of corners of a pair
 NEW_PAIR = arrays.zeros(1, arrays.PAIR)
-PAIR_SHARE = 0.5 * TRAVELLED  # of the skin, that a body may move; the rest covers what was not foreseen
+PAIR_SHARE = 0.5 * tolerances.TRAVELLED  # of the skin, that a body may move; the rest covers what was not foreseen
 
 
 @jit.rare_kernel
 def list_reach(controls: arrays.Record) -> float:
     """Return up to which gap (m) two bodies are listed: they may move by 0.8 of the skin, and be on approach then."""
-    return max(controls.skin, TRAVELLED * controls.skin + controls.approach)
+    return max(controls.skin, tolerances.TRAVELLED * controls.skin + controls.approach)
 
 
 @jit.rare_kernel
@@ -55,7 +54,7 @@ def carry_history(world: arrays.World, count: int) -> int:
     q = kept = used = 0
     for p in range(count):
         a, b = world.spare_pairs[p].a, world.spare_pairs[p].b
-        near = near_slots(world, a, b, reach, world.spare_candidates[used])
+        near = near_slots(world, a, b, reach, world.spare_candidates[used], world.particles)
         if near == 0:
             continue
         while q < old_count and (pairs[q].a < a or (pairs[q].a == a and pairs[q].b < b)):
@@ -113,8 +112,8 @@ def unseen_steps(world: arrays.World, farthest: float, fastest: float) -> int:
     if left <= 0.0:
         return 0
     gravity = math.sqrt(controls.gravity_x**2 + controls.gravity_y**2) + controls.push
-    most = MOST_UNSEEN_DRIVEN if supports.has_motion(controls) else MOST_UNSEEN
-    drift = controls.step * (SPEED_GROWTH * fastest + math.sqrt(2.0 * gravity * left))
+    most = tolerances.MOST_UNSEEN_DRIVEN if supports.has_motion(controls) else tolerances.MOST_UNSEEN
+    drift = controls.step * (tolerances.SPEED_GROWTH * fastest + math.sqrt(2.0 * gravity * left))
     return most if left > drift * most else int(left / drift)
 
 
@@ -134,14 +133,14 @@ def update_pairs(world: arrays.World) -> int:
     fastest = 0.0
     for i in range(world.bodies.size):
         body = world.bodies[i]
-        way = min(way, WAY_SHARE * energy.smallest_side(body))
+        way = min(way, tolerances.WAY_SHARE * energy.smallest_side(body))
         fastest = max(fastest, neighbours.top_speed(body, 0.0, 0.0))
         if body.y > -math.inf:  # else the half-plane, out of reach
             farthest = max(farthest, neighbours.travel(body, 0.0, 0.0))
     if math.isfinite(fastest) and 2.0 * controls.step * fastest > way:
         return arrays.TOO_FAST
     if not math.isfinite(fastest + farthest):  # the next check ends the run
-        clock.next_update = clock.steps + MOST_UNSEEN
+        clock.next_update = clock.steps + tolerances.MOST_UNSEEN
         return arrays.REACHED
     steps = unseen_steps(world, farthest, fastest) if clock.rebuilds > 0 else 0
     if steps == 0:

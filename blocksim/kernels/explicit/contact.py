@@ -7,7 +7,7 @@ continue as they were, which is what nearly all pairs do at nearly all steps.
 from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.tolerances import IMPACT_STEPS
-from blocksim.kernels.explicit import bearing, damping, depth, history, kinematics, slivers
+from blocksim.kernels.explicit import bearing, damping, depth, history, kinematics, sides, slivers
 from blocksim.kernels.explicit.forces import NOTHING, Touch, forces_of, forces_of_many
 from blocksim.kernels.explicit.models import SURFACE, contact_points
 from blocksim.kernels.explicit.partition import keep
@@ -95,7 +95,9 @@ def pair_forces(world: World, p: int, step: float) -> None:
     keep(action, NOTHING, False)
     action.broken = 0.0
     action.is_changed = 1
-    count = slivers.points_of_sliver(world, p, contact_points(world, p), world.corners)
+    count = contact_points(world, p)
+    if sides.has_polygons(world.corners):
+        count = slivers.points_of_sliver(world, p, count)
     action.is_too_deep = depth.is_too_deep(world, p, count)
     model = world.controls[0].model
     action.asks = count != pair.active and model == SURFACE

@@ -8,17 +8,16 @@ shapes. No step takes a block far into another (world/step.py, broad_phase.py), 
 found.
 """
 
-from blocksim.kernels.common import arrays, energy, jit, shapes
-from blocksim.kernels.common.tolerances import MIDDLE, OVERLAP_SHARE, ROWS_APART
+from blocksim.kernels.common import arrays, energy, jit, tolerances
+from blocksim.kernels.explicit import sides
 from blocksim.kernels.explicit.models import KERNEL, SURFACE
-from blocksim.kernels.explicit.outlines import deepest_overlap
 
 
 @jit.rare_kernel
 def overlap_limit(a: arrays.Record, b: arrays.Record, given: float) -> float:
     """Return how far (m) two bodies may overlap; `given` (m) is zero where nothing was asked for."""
     side = min(energy.smallest_side(a), energy.smallest_side(b))
-    return min(given, MIDDLE * side) if given > 0.0 else OVERLAP_SHARE * side
+    return min(given, tolerances.MIDDLE * side) if given > 0.0 else tolerances.OVERLAP_SHARE * side
 
 
 @jit.rare_kernel
@@ -29,15 +28,7 @@ def penetration(world: arrays.World, pair: arrays.Record) -> float:
     is_ground = pair.b == world.bodies.size - 1
     if not is_ground and b.faces < arrays.ALL and b.cos * (a.y - b.y) - b.sin * (a.x - b.x) < b.half_y:
         return 0.0
-    return overlap_of(a, b, is_ground, world.corners)
-
-
-@jit.kernel
-def overlap_of(a: arrays.Record, b: arrays.Record, is_ground: bool, corners: arrays.Records | None) -> float:
-    """Return how deep (m) two bodies overlap; less than zero where they do not."""
-    if corners is not None:
-        return deepest_overlap(a, b, is_ground, corners)
-    return b.y - shapes.ground_gap(a) if is_ground else -shapes.separation(a, b)
+    return -sides.widest_gap(a, b, is_ground, world.corners)[1]
 
 
 @jit.rare_kernel
@@ -46,10 +37,9 @@ def reach_of_contacts(world: arrays.World, pair: arrays.Record) -> float:
     controls = world.controls[0]
     if controls.model == SURFACE:
         return pair.limit
-    reach = controls.support if controls.model == KERNEL else ROWS_APART * controls.particle_size
-    return min(
-        reach, MIDDLE * min(energy.smallest_side(world.bodies[pair.a]), energy.smallest_side(world.bodies[pair.b]))
-    )
+    reach = controls.support if controls.model == KERNEL else tolerances.ROWS_APART * controls.particle_size
+    side = min(energy.smallest_side(world.bodies[pair.a]), energy.smallest_side(world.bodies[pair.b]))
+    return min(reach, tolerances.MIDDLE * side)
 
 
 @jit.rare_kernel

@@ -12,7 +12,7 @@ in registers; with more, as between particles, they follow from the three relati
 
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import NORMAL, SHEAR, Record, Records, World
+from blocksim.kernels.common.arrays import NORMAL, SHEAR, Corners, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.tolerances import OPERATOR_LIFE, STEADY, STEADY_STEPS
 from blocksim.kernels.explicit import bearing, damping, friction, history, inertia, kinematics, laws
@@ -229,7 +229,7 @@ def forces_of(
     shared: float,
     exponent: float,
     lasts: bool,
-    corners: Records | None,
+    table: Corners,
     particles: Records | None,
 ) -> Effect:
     """Return what a pair with one or two contacts does; of one `two` means nothing.
@@ -295,7 +295,7 @@ def forces_of(
         torque -= laws.stored_energy(exponent, pair.turn, one.depth)
         torque -= laws.stored_energy(exponent, pair.turn, two.depth) if is_two else 0.0
     dashpot += keep(first, one, grip_1, shear_1, k_1, old_1, exponent)
-    bearing.measure_soon(pair, one.slip, step * (touch.a.spin - touch.b.spin), exponent, corners)
+    bearing.measure_soon(pair, one.slip, step * (touch.a.spin - touch.b.spin), exponent, table)
     return Effect(fx, fy, torque - (dx * fy - dy * fx), torque, 0.5 * dashpot, rubbed)
 
 

@@ -11,7 +11,7 @@ from blocksim.kernels.common.arrays import Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.tolerances import SAME_FACE
 from blocksim.kernels.explicit import broad_phase, damping, kinematics, laws
-from blocksim.kernels.explicit.models import SURFACE, place_of, slot_normal, surface
+from blocksim.kernels.explicit.models import SURFACE, place_of, surface
 
 
 @kernel
@@ -68,7 +68,7 @@ def take_over(world: World, p: int, i: int, count: int) -> None:
     for j in range(count):
         old = world.before[j]
         if old.slot != TAKEN:
-            nx, ny = slot_normal(world, pair, old.slot, old.face)
+            nx, ny = surface.slot_normal(world, pair, old.slot, old.face)
             if nx * point.nx + ny * point.ny > SAME_FACE:
                 contact = world.contacts[p, i]
                 world.contacts[p, i] = old

@@ -27,13 +27,12 @@ before they are searched for again.
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import ALL, HALF, SHEAR, Record, Records, World
+from blocksim.kernels.common.arrays import ALL, SHEAR, Corners, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.shapes import corner_offset, ground_gap
 from blocksim.kernels.common.tolerances import APPROACH, LEAST_GYRATION, MOST_PERIOD, SHARE_PERIOD, SUM_PERIOD
-from blocksim.kernels.explicit import outlines, separation
+from blocksim.kernels.explicit import sides
 from blocksim.kernels.explicit.bearing import are_blocks, bearing_along
-from blocksim.kernels.explicit.models import SURFACE, slot_normal, slot_place
+from blocksim.kernels.explicit.models import SURFACE, surface
 
 APPROACH_STEPS = APPROACH * SHARE_PERIOD  # two bodies that may touch within so many steps count as touching
 NEVER = 2**62
@@ -84,39 +83,11 @@ def closing_bound(a: Record, b: Record, nx: float, ny: float) -> float:
     return turning - nx * (a.vx - b.vx) - ny * (a.vy - b.vy)
 
 
-@kernel
-def way_apart(pair: Record, a: Record, b: Record, dx: float, dy: float) -> tuple[float, float]:
-    """Return the normal, from b to a, along which two bodies were found apart."""
-    body = b if pair.axis < 2 else a
-    is_x = pair.axis == 0 or pair.axis == 2
-    nx = body.cos if is_x else -body.sin
-    ny = body.sin if is_x else body.cos
-    return (nx, ny) if nx * dx + ny * dy >= 0.0 else (-nx, -ny)
-
-
-@kernel
-def way_of(pair: Record, a: Record, b: Record, is_ground: bool, corners: Records | None) -> tuple[float, float]:
-    """Return the same for bodies of any shape, `corners` being those of the scene."""
-    if corners is None:
-        return way_apart(pair, a, b, a.x - b.x, a.y - b.y)
-    return outlines.way_over(pair, a, b, is_ground, corners)
-
-
-@kernel
-def gap_of(pair: Record, a: Record, b: Record, is_ground: bool, corners: Records | None) -> float:
-    """Return the gap (m) of two bodies along the axis along which they were found apart."""
-    if corners is None:
-        return separation.gap_along(pair.axis, a, b, a.x - b.x, a.y - b.y)
-    return outlines.gap_on(pair.axis, a, b, is_ground, corners)
-
-
 @rare_kernel
-def steps_apart(
-    pair: Record, a: Record, b: Record, is_ground: bool, controls: Record, corners: Records | None
-) -> float:
+def steps_apart(pair: Record, a: Record, b: Record, is_ground: bool, controls: Record, table: Corners) -> float:
     """Return after how many steps two bodies apart may touch at the earliest; infinity where they are not near."""
-    gap = gap_of(pair, a, b, is_ground, corners)
-    nx, ny = way_of(pair, a, b, is_ground, corners)
+    gap = sides.gap_on(pair.axis, a, b, is_ground, table)
+    nx, ny = sides.way_over(pair, a, b, is_ground, table)
     closing = closing_bound(a, b, nx, ny)
     is_near = 0.0 <= gap < controls.approach
     return gap / (controls.step * closing) if is_near and closing > 0.0 else math.inf
@@ -136,24 +107,16 @@ def mean_velocity(bodies: Records) -> tuple[float, float]:
     return (vx / count, vy / count) if count > 0 else (0.0, 0.0)
 
 
-@kernel
-def height_of(body: Record, corners: Records | None) -> float:
-    """Return the height (m) of the lowest corner of a body over y = 0."""
-    if corners is None:
-        return ground_gap(body)
-    return outlines.lowest_corner(body, corners)
-
-
 @rare_kernel
-def steps_to_ground(body: Record, ground: Record, controls: Record, corners: Records | None) -> float:
+def steps_to_ground(body: Record, ground: Record, controls: Record, table: Corners) -> float:
     """Return after how many steps a body that is not near the half-plane may touch it at the earliest."""
-    gap = height_of(body, corners) - ground.y
+    gap = sides.gap_on(0, body, ground, True, table)
     closing = ground.vy - body.vy + body.radius * abs(body.spin)
     return gap / (controls.step * closing) if gap >= controls.approach and closing > 0.0 else math.inf
 
 
 @rare_kernel
-def steps_to_approach(bodies: Records, controls: Record, corners: Records | None) -> float:
+def steps_to_approach(bodies: Records, controls: Record, table: Corners) -> float:
     """Return after how many steps two bodies that are not near may touch at the earliest.
 
     Speeds are those against the mean of the free bodies: blocks that fly together have the same sums in any frame.
@@ -166,7 +129,7 @@ def steps_to_approach(bodies: Records, controls: Record, corners: Records | None
         body = bodies[i]
         fastest = max(fastest, math.sqrt((body.vx - vx) ** 2 + (body.vy - vy) ** 2) + body.radius * abs(body.spin))
         if body.inverse_mass > 0.0:
-            soonest = min(soonest, steps_to_ground(body, ground, controls, corners))
+            soonest = min(soonest, steps_to_ground(body, ground, controls, table))
     return min(soonest, 0.5 * controls.approach / (controls.step * fastest)) if fastest > 0.0 else soonest
 
 
@@ -197,25 +160,9 @@ def add_touching(world: World, p: int) -> None:
     b = world.bodies[pair.b]
     for k in range(pair.active):
         contact = world.contacts[p, k]
-        nx, ny = slot_normal(world, pair, contact.slot, contact.face)
-        x, y = slot_place(world, pair, contact.slot)
+        nx, ny = surface.slot_normal(world, pair, contact.slot, contact.face)
+        x, y = surface.slot_place(world, pair, contact.slot)
         add_spring(a, b, pair.stiffness, x - b.x, y - b.y, nx, ny)
-
-
-@kernel
-def corners_of(block: Record, corners: Records | None) -> int:
-    """Return how many corners a block has."""
-    if corners is None:
-        return HALF
-    return outlines.number_of_corners(block)
-
-
-@kernel
-def corner_from(block: Record, number: int, corners: Records | None) -> tuple[float, float]:
-    """Return the vector (m) from the centre of a block to one of its corners, in world axes."""
-    if corners is None:
-        return corner_offset(block, number)
-    return outlines.corner_vector(block, corners, number)
 
 
 @rare_kernel
@@ -227,12 +174,12 @@ def add_coming_corners(
     ny: float,
     reach: float,
     stiffness: float,
-    corners: Records | None,
+    table: Corners,
 ) -> None:
     """Add the corners of a block within a reach (m) above the ground or a piece of it; (nx, ny) is its normal."""
     below = 0.0 if is_ground else base.half_y
-    for corner in range(corners_of(block, corners)):
-        x, y = corner_from(block, corner, corners)
+    for corner in range(sides.number_of_corners(block, table)):
+        x, y = sides.corner_vector(block, table, corner)
         x += block.x - base.x
         y += block.y - base.y
         is_over = is_ground or abs(nx * y - ny * x) <= base.half_x
@@ -247,7 +194,7 @@ def add_coming(world: World, p: int, stiffness: float, step: float) -> None:
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
     is_ground = pair.b == world.bodies.size - 1
-    nx, ny = way_of(pair, a, b, is_ground, world.corners)
+    nx, ny = sides.way_over(pair, a, b, is_ground, world.corners)
     if is_ground or b.faces < ALL:
         reach = 2.0 * APPROACH_STEPS * step * closing_bound(a, b, nx, ny)
         add_coming_corners(a, b, is_ground, nx, ny, reach, stiffness, world.corners)

@@ -6,8 +6,7 @@ is then v + w x r with one v and one w for all points of the pair. A `Point` is 
 
 from typing import NamedTuple
 
-from blocksim.kernels.common import arrays, jit
-from blocksim.kernels.common.tolerances import CLOSING_ROUND_OFF, ONSET_STEPS
+from blocksim.kernels.common import arrays, jit, tolerances
 from blocksim.kernels.explicit.laws import LINEAR, dashpot_weight
 
 
@@ -106,7 +105,7 @@ def arms(point: Point, dx: float, dy: float, direction: int) -> tuple[float, flo
 @jit.rare_kernel
 def has_just_begun(place: arrays.Record) -> bool:
     """Return True if a point came into contact within the last drift: it is no deeper than it closed, to round-off."""
-    return place.closing > 0.0 and place.depth <= place.closing * (1.0 + CLOSING_ROUND_OFF)
+    return place.closing > 0.0 and place.depth <= place.closing * (1.0 + tolerances.CLOSING_ROUND_OFF)
 
 
 @jit.rare_kernel
@@ -118,10 +117,11 @@ def weigh_first_step(place: arrays.Record, exponent: float) -> None:
     drift drew the shear spring for s dt only. A contact that comes deeper than it closed was there before under another
     corner: it keeps the full weight.
     """
-    if has_just_begun(place):
-        share = min(place.depth / place.closing, 1.0)
-        place.weight = dashpot_weight(exponent, 0.0, share + 0.5, share)
-        place.drawn = share
+    if not has_just_begun(place):
+        return
+    share = min(place.depth / place.closing, 1.0)
+    place.weight = dashpot_weight(exponent, 0.0, share + 0.5, share)
+    place.drawn = share
 
 
 @jit.kernel
@@ -130,7 +130,7 @@ def weight_of(point: Point, exponent: float) -> float:
 
     Hertz: it goes with the fourth root of time, and one value for each step would leave an error of order dt^(5/4).
     """
-    if exponent == LINEAR or point.weight != 1.0 or not 0.0 < point.depth < ONSET_STEPS * point.closing:
+    if exponent == LINEAR or point.weight != 1.0 or not 0.0 < point.depth < tolerances.ONSET_STEPS * point.closing:
         return point.weight
     at = point.depth / point.closing
     return dashpot_weight(exponent, max(at - 0.5, 0.0), at + 0.5, at)

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.kernels.common.arrays import Record, Records
+from blocksim.kernels.common.arrays import Corners, Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.tolerances import FLAT, SLIVER, TILTED
-from blocksim.kernels.explicit import bearing, outlines
+from blocksim.kernels.explicit import bearing, sides
 
 
 class Jet(NamedTuple):
@@ -95,17 +95,17 @@ class Axis(NamedTuple):
 
 
 @rare_kernel
-def axis_of(of_b: bool, face: int, a: Record, b: Record, table: Records, least: float = math.inf) -> Axis:
+def axis_of(of_b: bool, face: int, a: Record, b: Record, table: Corners, least: float = math.inf) -> Axis:
     """Return the axis of a face of b, or of a; of one that cannot be less deep than `least` (m) no corner is sought."""
     body, other = (b, a) if of_b else (a, b)
-    nx, ny = outlines.side_normal(body, table, face)
+    nx, ny = sides.side_normal(body, table, face)
     best = -math.inf
     number = 0
-    reach = outlines.corner_of(body, table, face).distance + nx * (body.x - other.x) + ny * (body.y - other.y)
+    reach = sides.corner_of(body, table, face).distance + nx * (body.x - other.x) + ny * (body.y - other.y)
     if reach + other.inner_radius > least:
         return Axis(of_b, face, number, math.inf)
-    for k in range(outlines.number_of_corners(other)):
-        x, y = outlines.corner_vector(other, table, k)
+    for k in range(sides.number_of_corners(other, table)):
+        x, y = sides.corner_vector(other, table, k)
         depth = reach - (nx * x + ny * y)
         if depth > best:
             best = depth
@@ -114,25 +114,25 @@ def axis_of(of_b: bool, face: int, a: Record, b: Record, table: Records, least: 
 
 
 @rare_kernel
-def face_across(axis: Axis, a: Record, b: Record, table: Records) -> int:
+def face_across(axis: Axis, a: Record, b: Record, table: Corners) -> int:
     """Return the face of the other body that looks at that of an axis, or -1 where none is within the cone."""
     body, other = (b, a) if axis.of_b else (a, b)
-    nx, ny = outlines.side_normal(body, table, axis.face)
-    found: Any = np.int64(outlines.side_along(other, table, -nx, -ny))
-    mx, my = outlines.side_normal(other, table, found)
-    within = nx * mx + ny * my < 0.0 and abs(nx * my - ny * mx) < outlines.cone_of(a, b, table)
+    nx, ny = sides.side_normal(body, table, axis.face)
+    found: Any = np.int64(sides.side_along(other, table, -nx, -ny))
+    mx, my = sides.side_normal(other, table, found)
+    within = nx * mx + ny * my < 0.0 and abs(nx * my - ny * mx) < sides.cone_of(a, b, table)
     return found if within else -1
 
 
 @rare_kernel
-def nearest_axis(a: Record, b: Record, table: Records) -> Axis:
+def nearest_axis(a: Record, b: Record, table: Corners) -> Axis:
     """Return the axis of least depth; those of b come first."""
     best = axis_of(True, 0, a, b, table)
-    for k in range(1, outlines.number_of_corners(b)):
+    for k in range(1, sides.number_of_corners(b, table)):
         axis = axis_of(True, k, a, b, table, best.depth)
         if axis.depth < best.depth:
             best = axis
-    for k in range(outlines.number_of_corners(a)):
+    for k in range(sides.number_of_corners(a, table)):
         axis = axis_of(False, k, a, b, table, best.depth)
         if axis.depth < best.depth:
             best = axis
@@ -140,13 +140,13 @@ def nearest_axis(a: Record, b: Record, table: Records) -> Axis:
 
 
 @rare_kernel
-def next_axis(nearest: Axis, across: int, a: Record, b: Record, table: Records) -> Axis:
+def next_axis(nearest: Axis, across: int, a: Record, b: Record, table: Corners) -> Axis:
     """Return the axis of least depth but the nearest one, whose face looks at the face `across`."""
     best = nearest
     least = math.inf
-    for m in range(outlines.number_of_corners(b) + outlines.number_of_corners(a)):
-        of_b = m < outlines.number_of_corners(b)
-        face = m if of_b else m - outlines.number_of_corners(b)
+    for m in range(sides.number_of_corners(b, table) + sides.number_of_corners(a, table)):
+        of_b = m < sides.number_of_corners(b, table)
+        face = m if of_b else m - sides.number_of_corners(b, table)
         if face != (nearest.face if of_b == nearest.of_b else across):
             axis = axis_of(of_b, face, a, b, table, least)
             if axis.depth < least:
@@ -156,15 +156,15 @@ def next_axis(nearest: Axis, across: int, a: Record, b: Record, table: Records) 
 
 
 @rare_kernel
-def tilt_between(of_a: int, of_b: int, a: Record, b: Record, table: Records) -> Jet:
+def tilt_between(of_a: int, of_b: int, a: Record, b: Record, table: Corners) -> Jet:
     """Return the sine of the angle between a face of a and one of b."""
-    ax, ay = outlines.side_normal(a, table, of_a)
-    bx, by = outlines.side_normal(b, table, of_b)
+    ax, ay = sides.side_normal(a, table, of_a)
+    bx, by = sides.side_normal(b, table, of_b)
     return absolute(Jet(ax * by - ay * bx, 0.0, 0.0, -ax * bx - ay * by))
 
 
 @rare_kernel
-def tilt_of(axis: Axis, across: int, a: Record, b: Record, table: Records) -> Jet:
+def tilt_of(axis: Axis, across: int, a: Record, b: Record, table: Corners) -> Jet:
     """Return the sine of the angle between the face of an axis and the one across."""
     if axis.of_b:
         return tilt_between(across, axis.face, a, b, table)
@@ -184,16 +184,16 @@ def least_ratio(cone: float) -> float:
 
 
 @rare_kernel
-def is_short(nearest: Axis, across: int, a: Record, b: Record, table: Records) -> bool:
+def is_short(nearest: Axis, across: int, a: Record, b: Record, table: Corners) -> bool:
     """Return True if another axis is about as deep as the nearest one; of parallel faces both are one."""
-    cone = outlines.cone_of(a, b, table)
+    cone = sides.cone_of(a, b, table)
     if across >= 0 and tilt_of(nearest, across, a, b, table).value > flat_within(cone):
         return nearest.depth > least_ratio(cone) * next_axis(nearest, -1, a, b, table).depth
     return nearest.depth > SLIVER * next_axis(nearest, across, a, b, table).depth
 
 
 @rare_kernel
-def is_sliver(a: Record, b: Record, table: Records) -> bool:
+def is_sliver(a: Record, b: Record, table: Corners) -> bool:
     """Return True if two bodies overlap by a sliver."""
     if not bearing.are_blocks(a, b):
         return False
@@ -206,12 +206,12 @@ def meets_along(
     owner: Record,
     number: int,
     touched: Record,
-    side: Record,
+    side: sides.Side,
     nx: float,
     ny: float,
     along: float,
     depth: float,
-    table: Records,
+    table: Corners,
 ) -> bool:
     """Return True if two bodies, of which a corner touches a face, certainly overlap by no sliver; see is_sliver.
 
@@ -223,10 +223,10 @@ def meets_along(
     least c L/2 - D from the other one: less deep no other axis can be. The nearest one, f or g, is at most D deep, so
     there is no sliver where D <= SLIVER (c L/2 - D). Another SLIVER D is more than 1 - cos, up to s^2 of G, can change.
     """
-    ahead = outlines.corner_of(owner, table, number)
-    back = outlines.corner_of(owner, table, outlines.number_before(owner, number))
-    ax, ay = outlines.into_world(owner, ahead.nx, ahead.ny)
-    bx, by = outlines.into_world(owner, back.nx, back.ny)
+    ahead = sides.corner_of(owner, table, number)
+    back = sides.corner_of(owner, table, sides.number_before(owner, table, number))
+    ax, ay = sides.into_world(owner, ahead.nx, ahead.ny)
+    bx, by = sides.into_world(owner, back.nx, back.ny)
     cos_ahead = nx * ax + ny * ay
     cos_back = nx * bx + ny * by
     is_ahead = cos_ahead < cos_back  # that face goes to the end of f where `along` is least

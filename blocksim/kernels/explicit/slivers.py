@@ -44,31 +44,13 @@ that nothing jumps as they pass.
 import math
 from typing import NamedTuple
 
-from blocksim.kernels.common.arrays import Record, Records, World
-from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.tolerances import (
-    ALIKE,
-    AS_NEAR,
-    FALLS,
-    LEAST_FORCE,
-    LEAST_SHARE,
-    NEGLIGIBLE,
-    ONE_END,
-    SLIVER,
-    TILTED,
-)
+from blocksim.kernels.common import tolerances
+from blocksim.kernels.common.arrays import Corners, Record, World
+from blocksim.kernels.common.jit import rare_kernel
+from blocksim.kernels.explicit import sides
 from blocksim.kernels.explicit.bearing import are_blocks, face_per_length
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.laws import stored_energy
-from blocksim.kernels.explicit.outlines import (
-    MOST_CORNERS,
-    cone_of,
-    corner_of,
-    corner_vector,
-    next_number,
-    number_of_corners,
-    side_normal,
-)
 from blocksim.kernels.explicit.sliver_axes import (
     CONSTANT_ONE,
     Axis,
@@ -98,26 +80,26 @@ class Across(NamedTuple):
 
 
 @rare_kernel
-def depth_behind(of_b: bool, face: int, corner: int, a: Record, b: Record, table: Records) -> Jet:
+def depth_behind(of_b: bool, face: int, corner: int, a: Record, b: Record, table: Corners) -> Jet:
     """Return how deep (m) a corner of the other body lies behind a face of b, or of a."""
     body, other = (b, a) if of_b else (a, b)
-    nx, ny = side_normal(body, table, face)
-    rx, ry = corner_vector(other, table, corner)
+    nx, ny = sides.side_normal(body, table, face)
+    rx, ry = sides.corner_vector(other, table, corner)
     qx, qy = other.x - body.x + rx, other.y - body.y + ry
-    depth = corner_of(body, table, face).distance - (nx * qx + ny * qy)
+    depth = sides.corner_of(body, table, face).distance - (nx * qx + ny * qy)
     if of_b:
         return Jet(depth, -nx, -ny, nx * ry - ny * rx)
     return Jet(depth, nx, ny, ny * qx - nx * qy)
 
 
 @rare_kernel
-def place_along(of_b: bool, face: int, corner: int, a: Record, b: Record, table: Records) -> Jet:
+def place_along(of_b: bool, face: int, corner: int, a: Record, b: Record, table: Corners) -> Jet:
     """Return the place (m) of a corner of the other body along a face of b, or of a, from where that begins."""
     body, other = (b, a) if of_b else (a, b)
-    nx, ny = side_normal(body, table, face)
-    rx, ry = corner_vector(other, table, corner)
+    nx, ny = sides.side_normal(body, table, face)
+    rx, ry = sides.corner_vector(other, table, corner)
     qx, qy = other.x - body.x + rx, other.y - body.y + ry
-    side = corner_of(body, table, face)
+    side = sides.corner_of(body, table, face)
     along = nx * qy - ny * qx - (side.middle - side.half)
     if of_b:
         return Jet(along, -ny, nx, nx * rx + ny * ry)
@@ -144,16 +126,16 @@ def blended(one: Jet, two: Jet, ahead: Jet, width: Jet) -> Jet:
 
 
 @rare_kernel
-def across_from(axis: Axis, across: int, deep: Jet, wide: Jet, a: Record, b: Record, table: Records) -> Across:
+def across_from(axis: Axis, across: int, deep: Jet, wide: Jet, a: Record, b: Record, table: Corners) -> Across:
     """Return the interval of the face of an axis and the face `across`.
 
     Where two corners are nearer than `deep` (m) at the deeper end, or `wide` (m) at the other one, it ends a little
     farther in, and where it is shorter than `wide` it is a little longer, so that its length changes smoothly.
     """
     body, other = (b, a) if axis.of_b else (a, b)
-    whole = 2.0 * corner_of(body, table, axis.face).half
+    whole = 2.0 * sides.corner_of(body, table, axis.face).half
     # corners follow one another counter-clockwise: the face across leads back
-    first, last = next_number(other, across), across
+    first, last = sides.next_number(other, table, across), across
     begin = place_along(axis.of_b, axis.face, first, a, b, table)
     place = place_along(axis.of_b, axis.face, last, a, b, table)
     end = mapped(place, whole - place.value, -1.0)  # how far before the end of the face
@@ -164,7 +146,7 @@ def across_from(axis: Axis, across: int, deep: Jet, wide: Jet, a: Record, b: Rec
     length = plus(length, rounding(ahead, wide), -1.0)
     length = plus(length, rounding(deeper, deep), -1.0)
     inner = depth_behind(axis.of_b, axis.face, first if is_last else last, a, b, table)
-    own = axis.face if is_last else next_number(body, axis.face)
+    own = axis.face if is_last else sides.next_number(body, table, axis.face)
     outer = depth_behind(not axis.of_b, across, own, a, b, table)
     shallow = blended(inner, outer, ahead, wide)
     deepest = depth_behind(axis.of_b, axis.face, axis.corner, a, b, table)
@@ -175,32 +157,32 @@ def across_from(axis: Axis, across: int, deep: Jet, wide: Jet, a: Record, b: Rec
 
 
 @rare_kernel
-def share_of(axis: Axis, across: int, length: Jet, tilt: Jet, up: Jet, a: Record, b: Record, table: Records) -> Jet:
+def share_of(axis: Axis, across: int, length: Jet, tilt: Jet, up: Jet, a: Record, b: Record, table: Corners) -> Jet:
     """Return the share S of bearing.py of two faces whose interval has some length (m)."""
     of_a, of_b = (across, axis.face) if axis.of_b else (axis.face, across)
-    per_length = face_per_length(a, b, corner_of(a, table, of_a).half, corner_of(b, table, of_b).half)
+    per_length = face_per_length(a, b, sides.corner_of(a, table, of_a).half, sides.corner_of(b, table, of_b).half)
     along = quotient(length, cosine_of(tilt))  # the face across is seen shorter
     part = mapped(along, per_length * along.value, per_length)
-    if part.value < LEAST_SHARE or part.value > 1.0:
-        part = Jet(min(max(part.value, LEAST_SHARE), 1.0), 0.0, 0.0, 0.0)
+    if part.value < tolerances.LEAST_SHARE or part.value > 1.0:
+        part = Jet(min(max(part.value, tolerances.LEAST_SHARE), 1.0), 0.0, 0.0, 0.0)
     return plus(part, product(plus(CONSTANT_ONE, part, -1.0), up), 1.0)
 
 
 @rare_kernel
 def energy_of_faces(
-    axis: Axis, across: int, shallow: Jet, long: Jet, power: float, a: Record, b: Record, table: Records
+    axis: Axis, across: int, shallow: Jet, long: Jet, power: float, a: Record, b: Record, table: Corners
 ) -> Jet:
     """Return s D^power on the axis of a face that has one across; `shallow` is 1 - v.
 
     `long` is zero where the overlap is so short that corners at both ends are blended. Where faces are tilted those at
     the deeper end always are: near there the two axes are about equally deep, and the pair has the potential.
     """
-    flat = flat_within(cone_of(a, b, table))
+    flat = flat_within(sides.cone_of(a, b, table))
     tilt = tilt_of(axis, across, a, b, table)
-    up = stepped(tilt, flat, cone_of(a, b, table))
+    up = stepped(tilt, flat, sides.cone_of(a, b, table))
     parallel = plus(CONSTANT_ONE, stepped(tilt, flat, 2.0 * flat), -1.0)
     depth = depth_behind(axis.of_b, axis.face, axis.corner, a, b, table)
-    reach = mapped(depth, ONE_END * depth.value, ONE_END)
+    reach = mapped(depth, tolerances.ONE_END * depth.value, tolerances.ONE_END)
     wide = product(plus(CONSTANT_ONE, long, -1.0), reach)
     deep = product(plus(CONSTANT_ONE, product(parallel, long), -1.0), reach)
     found = across_from(axis, across, deep, wide, a, b, table)
@@ -220,7 +202,7 @@ class Nearness(NamedTuple):
 
 
 @rare_kernel
-def axis_depth(axis: Axis, a: Record, b: Record, table: Records) -> Jet:
+def axis_depth(axis: Axis, a: Record, b: Record, table: Corners) -> Jet:
     """Return the depth (m) of an axis."""
     return depth_behind(axis.of_b, axis.face, axis.corner, a, b, table)
 
@@ -242,9 +224,9 @@ def nearer_of(depth: Jet, other: Jet, tilt: Jet, flat: float, is_first: bool) ->
 
 
 @rare_kernel
-def two_of(axis: Axis, second: Axis, a: Record, b: Record, table: Records) -> tuple[Jet, Jet]:
+def two_of(axis: Axis, second: Axis, a: Record, b: Record, table: Corners) -> tuple[Jet, Jet]:
     """Return `up` of the top of two faces that look at each other, and how far the first is the nearer one."""
-    cone = cone_of(a, b, table)
+    cone = sides.cone_of(a, b, table)
     flat = flat_within(cone)
     tilt = tilt_of(axis, second.face, a, b, table)
     depth, other = axis_depth(axis, a, b, table), axis_depth(second, a, b, table)
@@ -265,7 +247,7 @@ def farther(one: Jet, two: Jet, low: float, high: float) -> Jet:
 
 @rare_kernel
 def with_other(
-    near: Nearness, depth: Jet, other: Axis, tilted: float, a: Record, b: Record, table: Records
+    near: Nearness, depth: Jet, other: Axis, tilted: float, a: Record, b: Record, table: Corners
 ) -> Nearness:
     """Return what another axis, and the face across from it, make of an axis of some depth (m); see nearness_of.
 
@@ -273,18 +255,18 @@ def with_other(
     """
     across = face_across(other, a, b, table)
     beside = axis_depth(other, a, b, table)
-    weight = stepped(quotient(beside, depth), SLIVER, 1.0)
+    weight = stepped(quotient(beside, depth), tolerances.SLIVER, 1.0)
     shallow = farther(depth, beside, tilted, 2.0 * tilted)
-    long = farther(depth, beside, SLIVER, 2.0 * SLIVER)
+    long = farther(depth, beside, tolerances.SLIVER, 2.0 * tolerances.SLIVER)
     if across >= 0:
         second = axis_of(not other.of_b, across, a, b, table)
         if second.depth < other.depth or (second.depth == other.depth and not other.of_b):
             return near
         up, nearer = two_of(other, second, a, b, table)
         behind = axis_depth(second, a, b, table)
-        weight_2 = stepped(quotient(behind, depth), SLIVER, 1.0)
+        weight_2 = stepped(quotient(behind, depth), tolerances.SLIVER, 1.0)
         shallow_2 = farther(depth, behind, tilted, 2.0 * tilted)
-        long_2 = farther(depth, behind, SLIVER, 2.0 * SLIVER)
+        long_2 = farther(depth, behind, tolerances.SLIVER, 2.0 * tolerances.SLIVER)
         weight = between(product(weight, weight_2), between(weight, weight_2, nearer), up)
         shallow = between(product(shallow, shallow_2), between(shallow, shallow_2, nearer), up)
         long = between(product(long, long_2), between(long, long_2, nearer), up)
@@ -292,15 +274,15 @@ def with_other(
 
 
 @rare_kernel
-def nearness_of(axis: Axis, across: int, a: Record, b: Record, table: Records) -> Nearness:
+def nearness_of(axis: Axis, across: int, a: Record, b: Record, table: Corners) -> Nearness:
     """Return what the other axes make of one; `across` is the face across, or -1."""
     depth = axis_depth(axis, a, b, table)
-    tilted = TILTED * cone_of(a, b, table)
-    near = Nearness(powered(depth, -FALLS), CONSTANT_ONE, CONSTANT_ONE)
-    farthest = depth.value / min(SLIVER, tilted)
-    for m in range(number_of_corners(b) + number_of_corners(a)):
-        of_b = m < number_of_corners(b)
-        face = m if of_b else m - number_of_corners(b)
+    tilted = tolerances.TILTED * sides.cone_of(a, b, table)
+    near = Nearness(powered(depth, -tolerances.FALLS), CONSTANT_ONE, CONSTANT_ONE)
+    farthest = depth.value / min(tolerances.SLIVER, tilted)
+    for m in range(sides.number_of_corners(b, table) + sides.number_of_corners(a, table)):
+        of_b = m < sides.number_of_corners(b, table)
+        face = m if of_b else m - sides.number_of_corners(b, table)
         if face != (axis.face if of_b == axis.of_b else across):
             other = axis_of(of_b, face, a, b, table, farthest)
             if other.depth < farthest:
@@ -309,7 +291,7 @@ def nearness_of(axis: Axis, across: int, a: Record, b: Record, table: Records) -
 
 
 @rare_kernel
-def energy_along(axis: Axis, power: float, a: Record, b: Record, table: Records) -> tuple[Jet, Jet]:
+def energy_along(axis: Axis, power: float, a: Record, b: Record, table: Corners) -> tuple[Jet, Jet]:
     """Return the weight of an axis times s D^power, and that weight."""
     across = face_across(axis, a, b, table)
     depth = axis_depth(axis, a, b, table)
@@ -323,20 +305,20 @@ def energy_along(axis: Axis, power: float, a: Record, b: Record, table: Records)
         return count, count
     near = nearness_of(axis, across, a, b, table)
     weight = product(
-        count, product(near.weight, stepped(quotient(axis_depth(second, a, b, table), depth), SLIVER, 1.0))
+        count, product(near.weight, stepped(quotient(axis_depth(second, a, b, table), depth), tolerances.SLIVER, 1.0))
     )
     return product(weight, energy_of_faces(axis, across, near.shallow, near.long, power, a, b, table)), weight
 
 
 @rare_kernel
-def mean_energy(nearest: Axis, power: float, a: Record, b: Record, table: Records) -> Jet:
+def mean_energy(nearest: Axis, power: float, a: Record, b: Record, table: Corners) -> Jet:
     """Return the mean of s D^power over all axes; see the top. `power` is that of the overlap in the energy."""
     total = Jet(0.0, 0.0, 0.0, 0.0)
     weights = Jet(0.0, 0.0, 0.0, 0.0)
-    farthest = AS_NEAR * nearest.depth / SLIVER
-    for m in range(number_of_corners(b) + number_of_corners(a)):
-        of_b = m < number_of_corners(b)
-        axis = axis_of(of_b, m if of_b else m - number_of_corners(b), a, b, table, farthest)
+    farthest = tolerances.AS_NEAR * nearest.depth / tolerances.SLIVER
+    for m in range(sides.number_of_corners(b, table) + sides.number_of_corners(a, table)):
+        of_b = m < sides.number_of_corners(b, table)
+        axis = axis_of(of_b, m if of_b else m - sides.number_of_corners(b, table), a, b, table, farthest)
         if axis.depth < farthest:
             energy, weight = energy_along(axis, power, a, b, table)
             total = plus(total, energy, 1.0)
@@ -345,19 +327,13 @@ def mean_energy(nearest: Axis, power: float, a: Record, b: Record, table: Record
 
 
 @rare_kernel
-def slot_of(nearest: Axis) -> int:
-    """Return the slot of the deepest corner along an axis."""
-    return nearest.corner if nearest.of_b else MOST_CORNERS + nearest.corner
-
-
-@rare_kernel
-def place_nearest(point: Record, nearest: Axis, a: Record, b: Record, table: Records) -> None:
+def place_nearest(point: Record, nearest: Axis, a: Record, b: Record, table: Corners) -> None:
     """Make a point that of the deepest corner on the nearest face."""
     owner, touched = (a, b) if nearest.of_b else (b, a)
-    nx, ny = side_normal(touched, table, nearest.face)
-    rx, ry = corner_vector(owner, table, nearest.corner)
+    nx, ny = sides.side_normal(touched, table, nearest.face)
+    rx, ry = sides.corner_vector(owner, table, nearest.corner)
     sign = 1.0 if nearest.of_b else -1.0
-    point.slot = slot_of(nearest)
+    point.slot = nearest.corner if nearest.of_b else sides.MOST_CORNERS + nearest.corner
     point.face = nearest.face
     point.x = owner.x + rx
     point.y = owner.y + ry
@@ -368,7 +344,7 @@ def place_nearest(point: Record, nearest: Axis, a: Record, b: Record, table: Rec
 
 
 @rare_kernel
-def place_sliver(world: World, p: int, nearest: Axis, table: Records) -> None:
+def place_sliver(world: World, p: int, nearest: Axis, table: Corners) -> None:
     """Make the deepest corner on the nearest face the only contact point of a pair, with the spring of the potential.
 
     Its stiffness, and how that changes by sliding and tilting, is noted in the point until the stiffness is measured.
@@ -385,7 +361,7 @@ def place_sliver(world: World, p: int, nearest: Axis, table: Records) -> None:
     place_nearest(point, nearest, a, b, table)
     along = -(potential.x * point.ny - potential.y * point.nx)
     plain = potential.value / (whole * nearest.depth)
-    force = max(-(potential.x * point.nx + potential.y * point.ny), LEAST_FORCE * plain)
+    force = max(-(potential.x * point.nx + potential.y * point.ny), tolerances.LEAST_FORCE * plain)
     arm_x, arm_y = point.x - a.x, point.y - a.y
     couple = (arm_x * point.ny - arm_y * point.nx) * force - (arm_x * point.nx + arm_y * point.ny) * along
     couple += potential.turn
@@ -395,17 +371,10 @@ def place_sliver(world: World, p: int, nearest: Axis, table: Records) -> None:
     point.rate = couple / stored_energy(exponent, 1.0, point.depth)
 
 
-@kernel
-def points_of_sliver(world: World, p: int, count: int, table: Records | None) -> int:
-    """Put the one contact point of a sliver in the place of the `count` that were found; return how many there are."""
-    if table is None:
-        return count
-    return find_sliver(world, p, count, table)
-
-
 @rare_kernel
-def find_sliver(world: World, p: int, count: int, table: Records) -> int:
-    """As points_of_sliver, of polygons."""
+def points_of_sliver(world: World, p: int, count: int) -> int:
+    """Put the one contact point of a sliver in the place of the `count` that were found; return how many there are."""
+    table = world.corners
     pair = world.pairs[p]
     a = world.bodies[pair.a]
     b = world.bodies[pair.b]
@@ -428,7 +397,8 @@ def find_sliver(world: World, p: int, count: int, table: Records) -> int:
         return 1
     if across < 0:
         point = world.points[0]
-        if count != 1 or point.slot != slot_of(nearest) or point.face != nearest.face:
+        slot = nearest.corner if nearest.of_b else sides.MOST_CORNERS + nearest.corner
+        if count != 1 or point.slot != slot or point.face != nearest.face:
             pair.duplicates = 0
             place_nearest(point, nearest, a, b, table)
         return 1
@@ -437,7 +407,7 @@ def find_sliver(world: World, p: int, count: int, table: Records) -> int:
 
 @rare_kernel
 def has_both_ends(
-    world: World, count: int, nearest: Axis, across: int, limit: float, a: Record, b: Record, table: Records
+    world: World, count: int, nearest: Axis, across: int, limit: float, a: Record, b: Record, table: Corners
 ) -> bool:
     """Return True if `count` points are both ends of the interval of two faces: they hold as much as these.
 
@@ -450,4 +420,4 @@ def has_both_ends(
     found = 0.0
     for i in range(count):
         found += stored_energy(exponent, 1.0, world.points[i].depth)
-    return abs(found - whole) <= ALIKE * whole + stored_energy(exponent, 1.0, NEGLIGIBLE * limit)
+    return abs(found - whole) <= tolerances.ALIKE * whole + stored_energy(exponent, 1.0, tolerances.NEGLIGIBLE * limit)

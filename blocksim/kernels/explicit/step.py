@@ -28,7 +28,7 @@ def forces_between(world: arrays.World, share: arrays.Record, step: float) -> No
     """Evaluate a thread's part of the pairs between shares after a drift of `step` (s), and keep what they do."""
     for m in range(share.first_task, share.last_task):
         p = world.between[m].pair
-        kind, effect = persistent_forces(world, p, step, world.particles, world.corners)
+        kind, effect = persistent_forces(world, p, step, world.particles)
         if kind == CHANGED:
             contact.pair_forces(world, p, step)
             note(share, world.action[0])
@@ -70,7 +70,7 @@ def forces_of_group(world: arrays.World, share: arrays.Record, end: int, step: f
         else:
             a = world.bodies[pair.a]
             b = world.bodies[pair.b]
-            kind, effect = persistent_forces(world, p, step, world.particles, world.corners)
+            kind, effect = persistent_forces(world, p, step, world.particles)
             if kind == TOUCHING:
                 add_to_first(a, effect.fx, effect.fy, effect.torque_a)
                 add_to_second(b, effect.fx, effect.fy, effect.torque_b)
@@ -201,14 +201,6 @@ def note_depth(clock: arrays.Record, share: arrays.Record) -> None:
 
 
 @jit.kernel
-def note_step(clock: arrays.Record, share: arrays.Record) -> None:
-    """Note what all threads have to know of the step of a share; most steps have nothing, and call nothing."""
-    if share.is_too_deep or share.asks:
-        note_depth(clock, share)
-        inertia.note_contacts(clock, share)
-
-
-@jit.kernel
 def has_ended(clock: arrays.Record, steps: int) -> bool:
     """Return True if the last step of a run that failed is among so many steps."""
     return 0 < clock.ends_at <= steps
@@ -318,7 +310,9 @@ def advance_thread(
         if team is not None:
             exchange_forces(world, k, step)
         forces_within(world, share, step, goes_on)
-        note_step(clock, share)
+        if share.is_too_deep or share.asks:  # most steps have nothing to tell, and call nothing
+            note_depth(clock, share)
+            inertia.note_contacts(clock, share)
         barrier(world.team)
         if not goes_on and not end_steps(world, k, step, systems):
             break

@@ -17,9 +17,8 @@ beyond an end is its neighbour's affair. The half-plane, the last of all bodies,
 
 import math
 
-from blocksim.kernels.common import arrays, jit, neighbours, supports, systems
+from blocksim.kernels.common import arrays, jit, neighbours, supports, systems, tolerances
 from blocksim.kernels.common.barrier import barrier
-from blocksim.kernels.common.tolerances import AT_TOUCH
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.soil.arrays import GROUP, Soils
 from blocksim.kernels.soil.neighbours import grid_of
@@ -348,7 +347,7 @@ def preload(soils: Soils, world: arrays.World) -> None:
         distance, nx, ny = from_body(body, touch.body == world.bodies.size - 1, point.x, point.y, radius)
         pressure = -(state.sxx * nx * nx + 2.0 * state.sxy * nx * ny + state.syy * ny * ny)
         pressure -= radius * soils.kinds[state.kind].density * min(gravity_x * nx + gravity_y * ny, 0.0)
-        if abs(distance - radius) < AT_TOUCH * radius and state.syy < 0.0 and pressure > 0.0:
+        if abs(distance - radius) < tolerances.AT_TOUCH * radius and state.syy < 0.0 and pressure > 0.0:
             stiffness = soils.interactions[state.kind, body.contact_class].normal_stiffness
             touch.normal_force = pressure * soils.kinds[state.kind].volume / (2.0 * radius)
             touch.depth = touch.normal_force / stiffness

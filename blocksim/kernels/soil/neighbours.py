@@ -11,9 +11,8 @@ but the order of sums, and follows from the state alone, so that it is the same 
 
 import math
 
-from blocksim.kernels.common import arrays, jit, neighbours
+from blocksim.kernels.common import arrays, jit, neighbours, tolerances
 from blocksim.kernels.common.simd import fields_0, is_all, spread
-from blocksim.kernels.common.tolerances import CLUSTER_CELL
 from blocksim.kernels.soil.arrays import CLUSTER, GROUP, Soils
 
 
@@ -39,7 +38,7 @@ def grid_of(soils: Soils) -> neighbours.CellGrid:
 def sort_particles(soils: Soils) -> None:
     """Lay cells as large as clusters ought to be over the particles, and bring these into their order."""
     controls, points = soils.controls[0], soils.points
-    grid = neighbours.lay_cells(points, CLUSTER_CELL * math.sqrt(controls.area), 0.5 * points.size, False)
+    grid = neighbours.lay_cells(points, tolerances.CLUSTER_CELL * math.sqrt(controls.area), 0.5 * points.size, False)
     controls.left, controls.bottom, controls.cell = grid.x, grid.y, grid.size
     controls.columns, controls.rows = grid.columns, grid.rows
     controls.least_x, controls.most_x = neighbours.ends_along(points, True, math.inf)

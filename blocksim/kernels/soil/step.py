@@ -34,7 +34,7 @@ that approach one another. Both are odd in the particles bit by bit: momentum ch
 
 import math
 
-from blocksim.kernels.common import jit, systems
+from blocksim.kernels.common import jit, systems, tolerances
 from blocksim.kernels.common.arrays import Integers, Record, Records, World
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.simd import (
@@ -49,7 +49,6 @@ from blocksim.kernels.common.simd import (
     spread,
     write_fields_4,
 )
-from blocksim.kernels.common.tolerances import LEAST_SPREAD, SOFTENING
 from blocksim.kernels.soil import arrays, contact, neighbours, stress
 from blocksim.kernels.sph.functions import wendland_fading, wendland_steepness
 
@@ -90,7 +89,7 @@ def correction(
         xy = xy + f * dx * dy
         yy = yy + f * dy * dy
     least = 0.5 * (xx + yy) - root(0.25 * (xx - yy) * (xx - yy) + xy * xy)
-    are_few = least < LEAST_SPREAD
+    are_few = least < tolerances.LEAST_SPREAD
     determinant = select(are_few, 1.0, xx * yy - xy * xy)
     return (
         select(are_few, 1.0, yy / determinant),
@@ -115,7 +114,7 @@ def forces_on(
     That is, by volume; `near` are the neighbours of the four.
     """
     points, controls = soils.points, soils.controls[0]
-    inverse, soft = 1.0 / controls.reach, SOFTENING * controls.smoothing * controls.smoothing
+    inverse, soft = 1.0 / controls.reach, tolerances.SOFTENING * controls.smoothing * controls.smoothing
     is_uniform = controls.is_uniform != 0
     i, j, k, m = places
     impedance = four(

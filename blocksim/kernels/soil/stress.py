@@ -42,8 +42,7 @@ That is for rows that stand against an upright or level face as the lattice of a
 
 import math
 
-from blocksim.kernels.common import arrays, jit
-from blocksim.kernels.common.tolerances import DECAY, OUT_OF_LINE
+from blocksim.kernels.common import arrays, jit, tolerances
 from blocksim.kernels.soil.arrays import Soils
 from blocksim.kernels.soil.contact import from_body, is_near
 
@@ -168,7 +167,7 @@ def share_of_row(row: float) -> float:
     """Return the stress of a row beside a face, counted from 1, over that inside; 1 beyond those that differ."""
     if row > ROWS:
         return 1.0
-    return 1.0 - 2.0 * (-DECAY) ** int(row) / (1.0 + DECAY * DECAY)
+    return 1.0 - 2.0 * (-tolerances.DECAY) ** int(row) / (1.0 + tolerances.DECAY * tolerances.DECAY)
 
 
 @jit.kernel
@@ -176,8 +175,8 @@ def part_of_kernel(row: float) -> float:
     """Return which part of sum V f d (x) d across a face a row beside it has, counted from 1."""
     if row > 2.0:
         return 1.0
-    squared = (1.0 + DECAY) ** 2
-    return 0.5 if row < 2.0 else 0.5 + 0.5 * (1.0 + DECAY * DECAY) / squared  # 1/2 + a_1, of a_1 + a_2 = 1/2
+    decay = tolerances.DECAY
+    return 0.5 if row < 2.0 else 0.5 + 0.5 * (1.0 + decay * decay) / (1.0 + decay) ** 2  # 1/2 + a_1, of a_1 + a_2 = 1/2
 
 
 @jit.kernel
@@ -192,11 +191,11 @@ def row_beside(body: arrays.Record, is_ground: bool, x: float, y: float, spacing
     if not is_near(body, is_ground, x, y, ROWS * spacing):
         return 0.0, 0.0, 1.0
     distance, nx, ny = from_body(body, is_ground, x, y, 0.5 * spacing)
-    if math.isinf(distance) or min(abs(nx), abs(ny)) > OUT_OF_LINE:
+    if math.isinf(distance) or min(abs(nx), abs(ny)) > tolerances.OUT_OF_LINE:
         return 0.0, nx, ny
     row = distance / spacing + 0.5
     nearest = math.floor(row + 0.5)
-    return (nearest if nearest >= 1.0 and abs(row - nearest) < OUT_OF_LINE else 0.0), nx, ny
+    return (nearest if nearest >= 1.0 and abs(row - nearest) < tolerances.OUT_OF_LINE else 0.0), nx, ny
 
 
 @jit.rare_kernel

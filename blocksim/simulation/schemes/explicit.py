@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blocksim.kernels.common import arrays, systems
-from blocksim.kernels.common.tolerances import MIDDLE, ROWS_APART
-from blocksim.kernels.explicit import energy, models, outlines, step
+from blocksim.kernels.common import arrays, systems, tolerances
+from blocksim.kernels.explicit import energy, models, sides, step
 from blocksim.scenario.overlap import penetration
 from blocksim.simulation import schemes, trajectory
 from blocksim.world import build
@@ -49,15 +48,14 @@ def _places(world: arrays.World, contacts: Any, a: Indices, b: Indices) -> list[
     """Return place (m) and normal of contacts: those of particles keep them, corners are found again as kernels do."""
     if "nx" in (contacts.dtype.names or ()):
         return [contacts[name] for name in ("x", "y", "nx", "ny")]
-    half = arrays.HALF if world.corners is None else outlines.MOST_CORNERS  # slots of the corners of a, then those of b
-    is_of_a = contacts["slot"] < half
+    is_of_a = contacts["slot"] < sides.MOST_CORNERS
     owner, touched = world.bodies[np.where(is_of_a, a, b)], world.bodies[np.where(is_of_a, b, a)]
-    number, face = contacts["slot"] % half, contacts["face"]
+    number, face = contacts["slot"] % sides.MOST_CORNERS, contacts["face"]
     cosine, sine = touched["cos"], touched["sin"]
     if world.corners is None:
         px, py = np.choose(number, SIDES_X) * owner["half_x"], np.choose(number, SIDES_Y) * owner["half_y"]
-        # faces 0: +x, 1: +y, 2: -x, 3: -y
-        nx, ny = np.choose(face, [cosine, -sine, -cosine, sine]), np.choose(face, [sine, cosine, -sine, -cosine])
+        # faces 0: -y, 1: +x, 2: +y, 3: -x
+        nx, ny = np.choose(face, [sine, cosine, -sine, -cosine]), np.choose(face, [-cosine, sine, cosine, -sine])
     else:
         corner, edge = world.corners[owner["first_corner"] + number], world.corners[touched["first_corner"] + face]
         px, py = corner["x"], corner["y"]
@@ -107,7 +105,7 @@ def overlaps_of_springs(scene: Any) -> schemes.Overlaps:
     lost = np.where(is_pressed, 0.0, np.where(pairs["b"] == world.bodies.size - 1, below, inside))
     limit = pairs["limit"]
     if world.controls[0].model != models.SURFACE:
-        middle = MIDDLE * schemes.smallest_sides(world, pairs["a"], pairs["b"])
+        middle = tolerances.MIDDLE * schemes.smallest_sides(world, pairs["a"], pairs["b"])
         limit = np.where(is_pressed, limit, np.minimum(_reach(world), middle))
     return schemes.Overlaps(pairs["a"], pairs["b"], np.maximum(deepest, lost), limit)
 
@@ -115,7 +113,8 @@ def overlaps_of_springs(scene: Any) -> schemes.Overlaps:
 def _reach(world: arrays.World) -> float:
     """Return how deep (m) the particles of boundaries may lie in one another; see blocksim.kernels.explicit.depth."""
     controls = world.controls[0]
-    return float(controls.support if controls.model == models.KERNEL else ROWS_APART * controls.particle_size)
+    rows = tolerances.ROWS_APART * controls.particle_size
+    return float(controls.support if controls.model == models.KERNEL else rows)
 
 
 def particle_depth_warning(scene: Any, overlaps: schemes.Overlaps) -> str:
@@ -123,7 +122,8 @@ def particle_depth_warning(scene: Any, overlaps: schemes.Overlaps) -> str:
     model, reach = scene.world.controls[0].model, _reach(scene.world)
     if model == models.SURFACE or overlaps.limit[np.nanargmax(overlaps.depth / overlaps.limit)] != reach:
         return ""
-    what = "the reach of the kernel" if model == models.KERNEL else f"{ROWS_APART:g} contact.particle_spacing"
+    rows = f"{tolerances.ROWS_APART:g} contact.particle_spacing"
+    what = "the reach of the kernel" if model == models.KERNEL else rows
     return f"an overlap exceeds {what}, {1e3 * reach:.3g} mm, beyond which particles lose one another"
 
 

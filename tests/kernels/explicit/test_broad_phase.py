@@ -12,6 +12,7 @@ import pytest
 from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED, SLOTS
 from blocksim.kernels.common.integrate import place_all_corners
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
+from blocksim.kernels.explicit.sides import MOST_CORNERS
 from blocksim.kernels.explicit.step import advance
 from blocksim.world.build import empty_lists, with_more_room
 from tests.kernels.crews import bits, listed
@@ -63,7 +64,7 @@ def pairs_by_brute_force(world: World, within: Callable[[Record, Record], float]
         is_free = bodies[i].inverse_mass or bodies[j].inverse_mass
         if is_free and within(bodies[i], bodies[j]) <= reach:
             of_b = near_corners(bodies[j], bodies[i], reach)
-            found[i, j] = near_corners(bodies[i], bodies[j], reach) + [k + SLOTS // 2 for k in of_b]
+            found[i, j] = near_corners(bodies[i], bodies[j], reach) + [k + MOST_CORNERS for k in of_b]
     for i in range(COUNT):
         if bodies[i].inverse_mass:
             found[i, COUNT] = [k for k in range(4) if corners(bodies[i])[k, 1] <= reach]

@@ -45,6 +45,6 @@ def test_corner_that_leaves_the_ground_fast_is_not_held(pose: Pose, speed: float
     pair_forces(world, 0, 0.0)
     assert (world.pairs[0].active, world.action[0].fy > 0.0) == (1, True)
     world.bodies[0].vy = speed
-    kind, effect = persistent_forces(world, 0, STEP, world.particles, world.corners)
+    kind, effect = persistent_forces(world, 0, STEP, world.particles)
     assert (kind, effect.fy) == (TOUCHING, 0.0)
     assert world.contacts[0, 0].normal_force == 0.0

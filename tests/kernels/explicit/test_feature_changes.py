@@ -11,8 +11,8 @@ import pytest
 from blocksim.kernels.common.tolerances import FLAT
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import renew_dashpots
-from blocksim.kernels.explicit.models.outlines import near_slots
-from blocksim.kernels.explicit.outlines import cone_of
+from blocksim.kernels.explicit.models.surface import near_slots
+from blocksim.kernels.explicit.sides import cone_of
 from blocksim.kernels.explicit.sliver_axes import nearest_axis
 from blocksim.verification.scene import CaseScene
 
@@ -60,7 +60,7 @@ class Pair:
         self.put(place)
         self.pair.active = self.pair.is_sliver = self.pair.duplicates = 0
         renew_dashpots(self.pair)
-        self.pair.near = near_slots(self.world, 0, 1, RADIUS, self.world.candidates[0], self.world.corners)
+        self.pair.near = near_slots(self.world, 0, 1, RADIUS, self.world.candidates[0])
         pair_forces(self.world, 0, 0.0)
         action = self.world.action[0]
         return np.array([action.fx, action.fy, action.torque_a / RADIUS])

@@ -91,7 +91,7 @@ def test_pairs_between_shares_touch_no_body_and_no_tally_until_they_are_added(mo
     assert (bits(world.bodies), bits(world.ledger)) == (bodies, ledger)
     assert config.DISABLE_JIT or world.between.touches.sum() > 3
     for action in world.between[: world.shares[2].last_between]:
-        kind, effect = persistent_forces(apart, action.pair, step_of(world), apart.particles, apart.corners)
+        kind, effect = persistent_forces(apart, action.pair, step_of(world), apart.particles)
         if kind == CHANGED:
             pair_forces(apart, action.pair, step_of(world))
         else:
@@ -109,7 +109,7 @@ def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_tally(movi
     count = int(world.clock[0].pair_count)
     tallies = zeros(count, LEDGER)
     for p, pair in enumerate(apart.pairs[:count]):
-        kind, effect = persistent_forces(apart, p, step, apart.particles, apart.corners)
+        kind, effect = persistent_forces(apart, p, step, apart.particles)
         if kind == CHANGED:
             changed_forces(apart, p, step, tallies[p])
         else:

@@ -10,7 +10,8 @@ import pytest
 from blocksim.kernels.common.arrays import ACTION, zeros
 from blocksim.kernels.explicit.history import TAKEN, change_contacts
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point
-from blocksim.kernels.explicit.models.surface import face_normal, slot_normal, was_touching
+from blocksim.kernels.explicit.models.surface import slot_normal, was_touching
+from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, World
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 REMEMBERED = ("spring", "depth", "normal_force", "shear_force")
 STEP = 1e-6
-UPPER, RIGHT, LOWER = 1, 0, 3  # faces
+RIGHT, LOWER = 1, 0  # faces
 Contact = tuple[int, int]  # corner and face
 
 
@@ -28,10 +29,12 @@ def test_normal_of_a_contact_points_from_b_to_a_whoever_owns_the_corner(pose: Po
     blocks, ground = world.pairs[:2]
     assert [(pair.a, pair.b) for pair in (blocks, ground)] == [(0, 1), (0, 2)]
     for face in range(4):
-        angle = face * np.pi / 2
+        angle = (face - 1) * np.pi / 2
         assert slot_normal(world, blocks, 1, face) == pytest.approx((np.cos(angle - 0.1), np.sin(angle - 0.1)))
-        assert slot_normal(world, blocks, 5, face) == pytest.approx((-np.cos(angle + 0.2), -np.sin(angle + 0.2)))
-    assert slot_normal(world, ground, 2, 1) == (0.0, 1.0)
+        assert slot_normal(world, blocks, MOST_CORNERS + 1, face) == pytest.approx(
+            (-np.cos(angle + 0.2), -np.sin(angle + 0.2))
+        )
+    assert slot_normal(world, ground, 2, UPPER) == (0.0, 1.0)
 
 
 def stacked(pose: Pose, *before: Contact) -> World:
@@ -54,8 +57,8 @@ def find(world: World, *now: Contact, closing: float = 0.0) -> Record:
     a.vy = -closing
     for point, (slot, face) in zip(world.points, now, strict=False):
         point.slot, point.face, point.depth = slot, face, 1e-6
-        own, other, sign = (a, b, 1.0) if slot < 4 else (b, a, -1.0)
-        normal = face_normal(face, other)
+        own, other, sign = (a, b, 1.0) if slot < MOST_CORNERS else (b, a, -1.0)
+        normal = side_normal(other, None, face)
         point.x, point.y = own.x, other.y  # anywhere
         point.nx, point.ny = sign * normal[0], sign * normal[1]
         resolve_point(point, a, b, STEP)
@@ -81,7 +84,7 @@ def held(world: World, *which: int) -> float:
 
 
 ONE, TWO, OTHER = (0, UPPER), (1, UPPER), (0, RIGHT)
-OF_B = (6, LOWER)
+OF_B, ALSO_OF_B = (MOST_CORNERS + 2, LOWER), (MOST_CORNERS + 3, LOWER)
 
 
 @pytest.mark.parametrize(
@@ -117,7 +120,7 @@ def test_contact_continues_only_with_the_same_corner_on_the_same_face(
         ([TWO], [OF_B], [1], []),  # under another corner, of the other block
         ([ONE, TWO], [ONE, OF_B], [1, 2], []),
         ([ONE, TWO], [TWO, OF_B], [2, 1], []),
-        ([ONE, TWO], [OF_B, (7, LOWER)], [1, 2], []),
+        ([ONE, TWO], [OF_B, ALSO_OF_B], [1, 2], []),
         ([OTHER], [OF_B], [0], [1]),  # their normals do not agree
         ([OTHER, TWO], [ONE, TWO], [0, 2], [1]),  # the corner itself has changed its face
         ([OTHER, TWO], [ONE], [0], [1, 2]),

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import cos, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, strategies as st
+from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.tolerances import CONE_TOLERANCE
 from blocksim.kernels.explicit.kinematics import Point, relative_motion, resolve_point
 from blocksim.kernels.explicit.models import contact_points
-from blocksim.kernels.explicit.models.surface import corner_signs, face_normal, opens
-from blocksim.kernels.explicit.persistent_forces import admits, face_frame, follow
+from blocksim.kernels.explicit.persistent_forces import follow
 from blocksim.verification.scene import HEIGHT
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import World
-    from tests.kernels.conftest import MakeBody, Pose
+    from tests.kernels.conftest import Pose
 
 STEP = 1e-6
 SEEDS = st.integers(0, 10_000)
-angles = st.floats(-4.0, 4.0)
 
 
 def moving(pose: Pose, seed: int, angle: float, shift: float) -> World:
@@ -52,7 +49,7 @@ def contacts_of(world: World) -> tuple[list[bool], list[Point]]:
     )
     dx, dy = a.x - b.x, a.y - b.y
     motion = relative_motion(a, b, dx, dy, 0.5 * STEP)
-    found = [follow(contact, a, b, dx, dy, motion, STEP, True) for contact in world.contacts[0, :count]]
+    found = [follow(contact, a, b, dx, dy, motion, STEP, True, 0, None) for contact in world.contacts[0, :count]]
     return [goes_on for goes_on, _ in found], [one for _, one in found]
 
 
@@ -69,29 +66,3 @@ def test_spots_are_the_points_of_the_general_way(pose: Pose, angle: float, seed:
         assert [one.nx, one.ny] == pytest.approx([point.nx, point.ny], abs=1e-15)
         assert [one.closing, one.slip] == pytest.approx([point.closing, point.slipping], abs=1e-20)
         assert [one.closing_rate, one.slip_rate] == pytest.approx([point.closing_rate, point.slip_rate], abs=1e-14)
-
-
-@given(angle=angles, face=st.integers(0, 3), along=st.floats(-0.01, 0.01), above=st.floats(-0.01, 0.01))
-def test_frame_of_a_face_measures_from_the_centre(
-    make_body: MakeBody, angle: float, face: int, along: float, above: float
-) -> None:
-    body = make_body(angle=angle)
-    nx, ny, half, half_length = face_frame(body, face)
-    assert (nx, ny) == pytest.approx(face_normal(face, body))
-    assert {half, half_length} == {body.half_x, body.half_y}
-    assert half == (body.half_y if face % 2 else body.half_x)
-    x, y = (half + above) * nx - along * ny, (half + above) * ny + along * nx
-    local = np.array([body.cos * x + body.sin * y, body.cos * y - body.sin * x])
-    outward = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)][face])
-    assert outward @ local == pytest.approx(half + above, abs=1e-15)
-
-
-@given(corner=st.integers(0, 3), face=st.integers(0, 3), one=angles, two=angles)
-def test_corner_can_touch_a_face_as_the_narrow_phase_says(
-    make_body: MakeBody, corner: int, face: int, one: float, two: float
-) -> None:
-    owner, touched = make_body(angle=one), make_body(angle=two)
-    (sx, sy), (nx, ny) = corner_signs(corner), face_normal(face, touched)
-    along = [sign * (nx * cos(turn) + ny * sin(turn)) for sign, turn in ((sx, one), (sy, one + pi / 2))]
-    assume(min(abs(part - CONE_TOLERANCE) for part in along) > 1e-12)
-    assert admits(owner, corner, nx, ny) == opens(face, sx, sy, cos(one - two), sin(one - two))

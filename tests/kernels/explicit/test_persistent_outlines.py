@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.explicit.outlines import into_world, next_number, number_before
 from blocksim.kernels.explicit.persistent_forces import is_nearer_than_beside, stays_on
+from blocksim.kernels.explicit.sides import into_world, next_number, number_before
 from blocksim.kernels.explicit.sliver_axes import is_sliver, meets_along
 from blocksim.verification.scene import CaseScene
 
@@ -61,7 +61,7 @@ def test_corner_that_the_face_beside_cannot_take_stays_on_its_face(
         x = (side.distance - depth) * side.nx - along * side.ny
         y = (side.distance - depth) * side.ny + along * side.nx
         put(owner, number, touched, x, y, table)
-        beside = next_number(touched, face) if is_last else number_before(touched, face)
+        beside = next_number(touched, table, face) if is_last else number_before(touched, table, face)
         way = 10.0 ** random.uniform(-8.0, -2.0)
         if is_nearer_than_beside(owner, number, touched, face, beside, x, y, depth, way, end, table):
             told += 1
@@ -82,7 +82,7 @@ def test_two_faces_that_meet_along_an_interval_are_no_sliver(one: list[list[floa
         meets: Any = table[owner.first_corner + own]
         turn = random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-9.0, -2.0)
         turn_to(owner, np.arctan2(-side.ny, -side.nx) - np.arctan2(meets.ny, meets.nx) + turn)
-        number = own if random.random() < 0.5 else next_number(owner, own)
+        number = own if random.random() < 0.5 else next_number(owner, table, own)
         depth, end = 10.0 ** random.uniform(-4.0, -1.0), random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-5.0, 0.0)
         along = random.choice([-1.0, 1.0]) * (side.half - end)
         place = along + side.middle

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import HALF, NORMAL, SHEAR
+from blocksim.kernels.common.arrays import NORMAL, SHEAR
 from blocksim.kernels.common.integrate import start_all
 from blocksim.kernels.common.tolerances import IMPACT_STEPS
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import BOTH
 from blocksim.kernels.explicit.forces import NOTHING
-from blocksim.kernels.explicit.outlines import MOST_CORNERS
 from blocksim.kernels.explicit.partition import add_kept, keep
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, UNTOUCHED, persistent_forces
+from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation
@@ -50,7 +50,7 @@ def take_generally(world: World, p: int, step: float) -> None:
 
 def take_steadily(world: World, p: int, step: float) -> bool:
     """Evaluate a pair in the steady way and add what it does; return whether that goes."""
-    kind, effect = persistent_forces(world, p, step, world.particles, world.corners)
+    kind, effect = persistent_forces(world, p, step, world.particles)
     if kind != CHANGED:
         keep(world.action[0], effect, kind == TOUCHING)
         dashpot, friction = add_kept(world, world.pairs[p], world.action[0], world.ledger[0])
@@ -77,8 +77,7 @@ def evaluate(world: World) -> tuple[Tally, World, World]:
         if pair.active or before:
             steady, general = steady + is_steady, general + (not is_steady)
             if is_steady:
-                of_b = HALF if world.corners is None else MOST_CORNERS
-                kinds.add(tuple((quick.contacts["slot"][p, : pair.active] >= of_b).tolist()))
+                kinds.add(tuple((quick.contacts["slot"][p, : pair.active] >= MOST_CORNERS).tolist()))
     return Tally(steady, general, frozenset(kinds)), quick, slow
 
 
@@ -307,13 +306,13 @@ def on_block(pose: Pose, shift: float, **tables: object) -> World:
 def assert_changed(world: World) -> None:
     """Assert that the pair is left to contact.py, as it was."""
     before = copy.deepcopy(world)
-    assert persistent_forces(world, 0, STEP, world.particles, world.corners) == (CHANGED, NOTHING)
+    assert persistent_forces(world, 0, STEP, world.particles) == (CHANGED, NOTHING)
     assert is_untouched(world, before)
 
 
 def test_contacts_that_continue_are_steady(pose: Pose) -> None:
     for world in (on_ground(pose), on_block(pose, 0.003)):
-        assert persistent_forces(world, 0, STEP, world.particles, world.corners)[0] == TOUCHING
+        assert persistent_forces(world, 0, STEP, world.particles)[0] == TOUCHING
 
 
 @pytest.mark.parametrize("up", [1.1e-6, 1.0])
@@ -341,7 +340,7 @@ def test_corner_of_a_polygon_beyond_the_end_of_its_face_is_not_steady(
     world = start([below, above], change=press).world  # their faces are 20 mm long
     assert world.pairs[0].active == 2
     world.bodies[1].x += shift
-    kind, _ = persistent_forces(world, 0, 0.0, world.particles, world.corners)
+    kind, _ = persistent_forces(world, 0, 0.0, world.particles)
     assert kind == (CHANGED if changes else TOUCHING)
 
 
@@ -353,7 +352,7 @@ def test_corner_that_begins_is_not_steady(pose: Pose, down: float, changes: bool
     world.bodies[0].y += down - 1.5e-6 if changes else 0.0
     if changes:
         assert_changed(world)
-    assert persistent_forces(world, 0, STEP, world.particles, world.corners)[0] == (CHANGED if changes else TOUCHING)
+    assert persistent_forces(world, 0, STEP, world.particles)[0] == (CHANGED if changes else TOUCHING)
 
 
 @pytest.mark.parametrize(("steps", "changes"), [(0.9 * IMPACT_STEPS, True), (1.2 * IMPACT_STEPS, False)])
@@ -370,13 +369,14 @@ def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(
     assert rebuild_pairs(world)
     pair_forces(world, 0, 0.0)
     assert world.contacts[0, 0].slot == 0
-    assert world.contacts[0, 0].face == 1
-    kind, _ = persistent_forces(world, 0, beside / (steps * speed), world.particles, world.corners)
+    assert world.contacts[0, 0].face == UPPER
+    kind, _ = persistent_forces(world, 0, beside / (steps * speed), world.particles)
     assert kind == (CHANGED if changes else TOUCHING)
 
 
-def test_other_models_and_straight_ground_are_never_steady(pose: Pose) -> None:
-    assert_changed(on_ground(pose, ground={"profile": [[-1.0, 0.0], [1.0, 0.0]]}))
+def test_pairs_of_other_models_are_never_steady(pose: Pose) -> None:
+    straight = on_ground(pose, ground={"profile": [[-1.0, 0.0], [1.0, 0.0]]})
+    assert persistent_forces(straight, 0, STEP, straight.particles)[0] == TOUCHING
     for model in ("kernel", "particles"):
         world = pose((0.0, 0.5 * HEIGHT - 5e-4, 0.0), contact={"model": model})
         pair_forces(world, 0, 0.0)
@@ -387,7 +387,7 @@ def test_other_models_and_straight_ground_are_never_steady(pose: Pose) -> None:
 def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are(pose: Pose) -> None:
     aligned = on_block(pose, 0.0)
     assert aligned.pairs[0].duplicates != 0
-    assert persistent_forces(aligned, 0, STEP, aligned.particles, aligned.corners)[0] == TOUCHING
+    assert persistent_forces(aligned, 0, STEP, aligned.particles)[0] == TOUCHING
     oblique = pose((0.0, 0.0, pi / 4), (0.0, 1.0, 0.0))
     a, b = oblique.bodies[:2]
     a.x, a.y = b.half_x - 1e-7, 1.0 + b.half_y - 1e-6 + 0.5 * (WIDTH + HEIGHT) * sin(pi / 4)
@@ -402,7 +402,7 @@ def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are(pose: Pos
 @pytest.mark.parametrize("sliding", [0, 1])
 def test_contact_that_slides_beside_one_that_sticks_has_no_dashpot(pose: Pose, sliding: int) -> None:
     quick = on_block(pose, 0.003)
-    assert persistent_forces(quick, 0, STEP, quick.particles, quick.corners)[0] == TOUCHING
+    assert persistent_forces(quick, 0, STEP, quick.particles)[0] == TOUCHING
     assert quick.pairs[0].sticking == BOTH
     assert quick.pairs[0].shear_left > 0
     quick.contacts[0, sliding].spring = 1e-3
@@ -420,13 +420,13 @@ def steps_left(world: World) -> list[int]:
 
 def test_dashpots_are_made_anew_where_the_number_of_neighbours_has_changed(pose: Pose) -> None:
     world = on_block(pose, 0.003)
-    persistent_forces(world, 0, STEP, world.particles, world.corners)
+    persistent_forces(world, 0, STEP, world.particles)
     left = steps_left(world)
     assert min(left) > 2
-    persistent_forces(world, 0, STEP, world.particles, world.corners)
+    persistent_forces(world, 0, STEP, world.particles)
     assert steps_left(world) == [n - 1 for n in left]
     world.bodies[1].sums_changed = 1
-    persistent_forces(world, 0, STEP, world.particles, world.corners)
+    persistent_forces(world, 0, STEP, world.particles)
     assert steps_left(world) == left
 
 
@@ -434,7 +434,7 @@ def test_steady_pair_adds_to_no_body_and_to_no_tally_itself(pose: Pose) -> None:
     for world in (on_ground(pose), on_block(pose, 0.003)):
         world.bodies[0].vx = 20.0  # it slides
         bodies, ledger = world.bodies.copy(), world.ledger.copy()
-        kind, effect = persistent_forces(world, 0, STEP, world.particles, world.corners)
+        kind, effect = persistent_forces(world, 0, STEP, world.particles)
         assert kind == TOUCHING
         assert effect.fy > 0.0
         assert effect.friction != 0.0
@@ -447,6 +447,6 @@ def test_pair_without_contacts_that_stays_apart_does_nothing(pose: Pose, up: flo
     world = pose((0.003, 1.0 + HEIGHT + up, 0.0), (0.0, 1.0, 0.0))
     before = copy.deepcopy(world)
     for _ in range(2):  # along another axis than at first
-        assert persistent_forces(world, 0, STEP, world.particles, world.corners) == (UNTOUCHED, NOTHING)
+        assert persistent_forces(world, 0, STEP, world.particles) == (UNTOUCHED, NOTHING)
     world.pairs.axis = before.pairs.axis  # along which they were found to be apart
     assert is_untouched(world, before)

@@ -15,6 +15,7 @@ from blocksim.kernels.common import energy, neighbours
 from blocksim.kernels.common.arrays import AHEAD, NO_FACE, NORMAL, REACHED, TOO_FAST
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.common.shapes import slab_depth
+from blocksim.kernels.common.tolerances import CONE_TOLERANCE, FLAT
 from blocksim.kernels.explicit import (
     bearing,
     broad_phase,
@@ -24,12 +25,12 @@ from blocksim.kernels.explicit import (
     forces,
     inertia,
     kinematics,
-    outlines as polygons,
+    sides as shapes,
     sliver_axes,
     slivers,
 )
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR
-from blocksim.kernels.explicit.models import PARTICLES, SURFACE, outlines, surface
+from blocksim.kernels.explicit.models import PARTICLES, SURFACE, surface
 from blocksim.kernels.explicit.sliver_axes import Jet
 
 pytestmark = pytest.mark.skipif(not config.DISABLE_JIT, reason="calls kernels without records")
@@ -56,8 +57,8 @@ def test_point_in_the_end_of_a_slab_touches_it_where_it_is_not_much_deeper_than_
 
 @sides(("tilt", "is_parallel"), [(0.0034, True), (0.03, False)])
 def test_faces_share_the_stiffness_by_length_while_they_are_parallel(tilt: float, is_parallel: bool) -> None:
-    turned = record(cos=math.cos(tilt), sin=math.sin(tilt))
-    assert (bearing.bearing_of(0.3, 0.0, turned, SQUARE).share == 0.3) == is_parallel
+    found = bearing.bearing_at(math.sin(tilt), 1.0, 0.3, 0.0, FLAT, CONE_TOLERANCE)
+    assert (found.share == 0.3) == is_parallel
 
 
 @sides(("change", "is_renewed"), [(0.003, False), (0.03, True)])
@@ -70,20 +71,21 @@ def test_stiffness_that_changes_fast_is_measured_at_once(change: float, is_renew
 @sides(("turn", "is_same"), [(0.2, True), (1.2, False)])
 def test_corners_are_one_end_where_their_faces_look_the_same_way(turn: float, is_same: bool) -> None:
     one = record(nx=0.0, ny=1.0, slot=0)
-    two = record(nx=math.sin(turn), ny=math.cos(turn), slot=4)
-    assert surface.same_end(one, two, SQUARE, SQUARE) == is_same
+    two = record(nx=math.sin(turn), ny=math.cos(turn), slot=shapes.MOST_CORNERS)
+    assert surface.is_same_end(one, two, SQUARE, SQUARE, None) == is_same
 
 
 @sides(("apart", "is_one"), [(2.7, True), (24.0, False)])
 def test_corners_meet_in_one_place_where_they_are_nearer_than_some_overlaps(apart: float, is_one: bool) -> None:
     one, two = record(x=0.0, y=0.0, depth=1.0), record(x=apart, y=0.0, depth=0.5)
-    assert surface.coincide(one, two) == is_one
+    assert surface.do_meet(one, two, CONE_TOLERANCE) == is_one
 
 
 @sides(("below", "is_beside"), [(0.034, True), (0.3, False)])
 def test_second_face_counts_where_the_corner_is_not_far_below_it(below: float, is_beside: bool) -> None:
-    found = surface.face_below_corner(0.99, 1.0 - below * SQUARE.radius, SQUARE, -1.0, -1.0, 1.0, 0.0)
-    assert found[0] == 0
+    corner = surface.Corner(0.99, 1.0 - below * SQUARE.radius, 1.0, 0.0, 0.0, 1.0, 2.0, 2.0)
+    found = surface.side_below(corner, SQUARE, None, CONE_TOLERANCE)
+    assert found[0] == 1
     assert math.isfinite(found[2]) == is_beside
 
 
@@ -180,8 +182,8 @@ def test_pair_whose_overlaps_on_two_axes_are_alike_is_a_sliver(
     monkeypatch: pytest.MonkeyPatch, share: float, is_short: bool
 ) -> None:
     monkeypatch.setattr(sliver_axes, "next_axis", lambda *_: record(depth=1.0))
-    monkeypatch.setattr(polygons, "cone_of", lambda *_: 0.2)
-    assert sliver_axes.is_short(record(depth=share), -1, None, None, None) == is_short  # type: ignore[arg-type]
+    monkeypatch.setattr(shapes, "cone_of", lambda *_: 0.2)
+    assert sliver_axes.is_short(record(depth=share), -1, None, None, None) == is_short
 
 
 def test_second_of_two_tilted_ends_counts_less_before_faces_are_no_longer_parallel() -> None:
@@ -198,7 +200,7 @@ def test_points_are_both_ends_of_an_interval_where_they_hold_as_much(
     monkeypatch.setattr(slivers, "across_from", lambda *_: record(other=record(value=deep)))
     world = record(controls=[record(exponent=LINEAR)], points=[record(depth=deep * math.sqrt(1.0 + excess))] * 2)
     nearest: Any = record(depth=deep)
-    assert slivers.has_both_ends(world, 2, nearest, 0, limit, None, None, None) == are_both  # type: ignore[arg-type]
+    assert slivers.has_both_ends(world, 2, nearest, 0, limit, None, None, None) == are_both
 
 
 def test_force_of_a_sliver_along_its_normal_is_a_tenth_of_that_of_a_spring_at_least(
@@ -212,7 +214,7 @@ def test_force_of_a_sliver_along_its_normal_is_a_tenth_of_that_of_a_spring_at_le
     world = record(
         controls=[record(exponent=LINEAR)], points=[point], pairs=[record(a=0, b=0)], bodies=[body], interactions=table
     )
-    slivers.place_sliver(world, 0, record(depth=1.0), None)  # type: ignore[arg-type]
+    slivers.place_sliver(world, 0, record(depth=1.0), None)
     assert 3.0 < point.depth < 30.0
 
 
@@ -226,18 +228,19 @@ def test_corners_of_a_sliver_are_one_end_where_they_are_nearer_than_about_its_ov
         return record(other=Jet(0.0, 0.0, 0.0, 0.0), length=None)
 
     one, none = Jet(1.0, 0.0, 0.0, 0.0), Jet(0.0, 0.0, 0.0, 0.0)
-    for name, value in {"cone_of": 0.2, "tilt_of": none, "depth_behind": one, "share_of": one}.items():
+    monkeypatch.setattr(shapes, "cone_of", lambda *_: 0.2)
+    for name, value in {"tilt_of": none, "depth_behind": one, "share_of": one}.items():
         monkeypatch.setattr(slivers, name, lambda *_, value=value: value)
     monkeypatch.setattr(slivers, "across_from", across_from)
     axis: Any = record(of_b=True, face=0, corner=0)
-    slivers.energy_of_faces(axis, 0, one, none, 2.0, None, None, None)  # type: ignore[arg-type]
+    slivers.energy_of_faces(axis, 0, one, none, 2.0, None, None, None)
     assert 0.15 < widths[0] < 1.5
 
 
 def test_axes_of_a_sliver_weigh_by_about_the_square_of_their_overlaps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(slivers, "number_of_corners", lambda _: 0)
+    monkeypatch.setattr(shapes, "number_of_corners", lambda *_: 0)
     monkeypatch.setattr(slivers, "axis_depth", lambda *_: Jet(2.0, 0.0, 0.0, 0.0))
-    monkeypatch.setattr(slivers, "cone_of", lambda *_: 0.2)
+    monkeypatch.setattr(shapes, "cone_of", lambda *_: 0.2)
     found = slivers.nearness_of(None, 0, None, None, None)  # type: ignore[arg-type]
     assert 0.1 < found.weight.value < 0.6
 
@@ -245,7 +248,7 @@ def test_axes_of_a_sliver_weigh_by_about_the_square_of_their_overlaps(monkeypatc
 def test_no_axis_of_a_sliver_is_left_out_that_weighs_something(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond the overlap over SLIVER its weight is zero, but two faces that look at each other have one."""
     reaches: list[float] = []
-    monkeypatch.setattr(slivers, "number_of_corners", lambda _: 1)
+    monkeypatch.setattr(shapes, "number_of_corners", lambda *_: 1)
     monkeypatch.setattr(slivers, "quotient", lambda *_: None)
 
     def axis_of(*given: Any) -> Any:
@@ -253,7 +256,7 @@ def test_no_axis_of_a_sliver_is_left_out_that_weighs_something(monkeypatch: pyte
         return record(depth=math.inf)
 
     monkeypatch.setattr(slivers, "axis_of", axis_of)
-    slivers.mean_energy(record(depth=1.0), 2.0, None, None, None)  # type: ignore[arg-type]
+    slivers.mean_energy(record(depth=1.0), 2.0, None, None, None)
     assert 10.0 < reaches[0] < 100.0
 
 
@@ -262,10 +265,10 @@ def test_corner_lies_under_the_sharp_end_of_a_face_where_it_is_not_deep(
     monkeypatch: pytest.MonkeyPatch, deep: float, is_under: bool
 ) -> None:
     for name in ("can_touch", "leads_in", "is_behind_others"):
-        monkeypatch.setattr(outlines, name, lambda *_: True)
+        monkeypatch.setattr(surface, name, lambda *_: True)
     faces = [record(nx=1.0, ny=0.0, distance=0.0), *[record(nx=-0.6, ny=0.8, distance=0.0)] * 2]
-    monkeypatch.setattr(polygons, "number_of_corners", lambda _: 3)
-    monkeypatch.setattr(polygons, "corner_of", lambda _body, _table, k: faces[k])
+    monkeypatch.setattr(shapes, "number_of_corners", lambda *_: 3)
+    monkeypatch.setattr(shapes, "corner_of", lambda _body, _table, k: faces[k])
     corner: Any = record(x=0.0, y=-deep / 0.8)
-    found = outlines.side_over_end(corner, 0, -0.1 * deep, record(radius=1.0), None, 0.2)  # type: ignore[arg-type]
+    found = surface.side_over_end(corner, 0, -0.1 * deep, record(radius=1.0), None, 0.2)
     assert (found[0] != NO_FACE) == is_under

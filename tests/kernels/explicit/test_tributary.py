@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import SUPPORT
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE, FLAT, LEAST_SHARE
-from blocksim.kernels.explicit.bearing import bearing_along, interval_of
+from blocksim.kernels.explicit.bearing import bearing_along
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.verification.scene import HEIGHT, WIDTH
 
@@ -25,7 +25,7 @@ UP = (0.0, 1.0)
 @pytest.mark.parametrize(("shift", "slide"), [(0.01, 1.0), (-0.01, -1.0), (0.0, 0.0)])
 def test_interval_is_what_of_two_faces_lies_opposite(make_body: MakeBody, shift: float, slide: float) -> None:
     a, b = make_body(x=0.1 + shift, y=1.0 + HEIGHT), make_body(x=0.1, y=1.0)
-    found = interval_of(a, b, *UP)
+    found = bearing_along(a, b, *UP, None)[0]
     assert found.right - found.left == pytest.approx(WIDTH - abs(shift))
     assert found.per_length == pytest.approx(1.0 / WIDTH)
     assert found.slide == slide  # a goes along the tangent, to the left
@@ -40,7 +40,7 @@ def test_share_refers_to_the_face_of_the_free_body_and_of_two_to_the_longer(
     for name, body in (("a", a), ("b", b)):
         if name == fixed:
             body.is_moved = SUPPORT
-    assert interval_of(a, b, *UP).per_length == pytest.approx(1.0 / length)
+    assert bearing_along(a, b, *UP, None)[0].per_length == pytest.approx(1.0 / length)
 
 
 @given(sine=st.floats(-0.3, 0.3), shift=st.floats(-0.031, 0.031))

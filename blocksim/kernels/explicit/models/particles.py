@@ -80,12 +80,6 @@ def is_particle_near(owner: arrays.Record, particle: arrays.Record, touched: arr
 
 
 @jit.rare_kernel
-def particle_height(body: arrays.Record, particle: arrays.Record) -> float:
-    """Return the height (m) of a particle over y = 0."""
-    return body.y + body.sin * particle.x + body.cos * particle.y
-
-
-@jit.rare_kernel
 def near_particles(world: arrays.World, a: int, b: int, reach: float, out: arrays.Integers) -> int:
     """Write the particles of body a that are within reach (m) of body b into `out` and return how many there are."""
     one = world.bodies[a]
@@ -95,7 +89,7 @@ def near_particles(world: arrays.World, a: int, b: int, reach: float, out: array
     for k in range(one.particle_count):
         particle = world.particles[one.first_particle + k]
         if is_ground:
-            near = particle_height(one, particle) <= two.y + reach
+            near = shapes.to_world(one, particle.x, particle.y)[1] <= two.y + reach
         else:
             near = is_particle_near(one, particle, two, reach)
         if near:

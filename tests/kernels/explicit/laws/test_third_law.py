@@ -53,7 +53,7 @@ def is_steady(world):
     copied = deepcopy(world)
     pairs = [p for p in range(copied.clock[0].pair_count) if copied.pairs[p].active]
     step = float(copied.controls[0].step)
-    found = [persistent_forces(copied, p, step, copied.particles, copied.corners)[0] for p in pairs]
+    found = [persistent_forces(copied, p, step, copied.particles)[0] for p in pairs]
     return all(one == TOUCHING for one in found)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import pytest
 
+from blocksim.kernels.common.shapes import place_corners
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
@@ -85,6 +86,7 @@ def touch() -> Touch:
         upper.x = shift
         upper.y = 0.0 if below is None else HEIGHT
         upper.y += abs(upper.sin) * upper.half_x + upper.cos * upper.half_y - depth
+        place_corners(upper)
         assert rebuild_pairs(world)
         assert world.clock[0].pair_count <= 1
         count = contact_points(world, 0) if world.clock[0].pair_count else 0

@@ -14,7 +14,6 @@ from blocksim.kernels.explicit.models.particles import (
     first_within,
     is_particle_near,
     last_within,
-    particle_height,
     row_direction,
     row_intervals,
     seen_from_row,
@@ -95,4 +94,3 @@ def test_particle_is_near_when_it_lies_in_the_grown_rectangle(x: float, y: float
         beyond = max(abs(px) - touched.half_x, abs(py) - touched.half_y)
         if abs(beyond - reach) > 1e-12:
             assert is_particle_near(owner, particle, touched, reach) == (beyond < reach)
-        assert particle_height(owner, particle) == pytest.approx(py, abs=1e-15)

@@ -11,8 +11,8 @@ import pytest
 from blocksim.kernels.common.tolerances import HAND_OVER
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import renew_dashpots
-from blocksim.kernels.explicit.models.outlines import near_slots
-from blocksim.kernels.explicit.outlines import cone_of
+from blocksim.kernels.explicit.models.surface import near_slots
+from blocksim.kernels.explicit.sides import cone_of
 from blocksim.kernels.explicit.sliver_axes import flat_within
 from blocksim.verification.scene import CaseScene
 
@@ -77,7 +77,7 @@ def forces_along(ways: NDArray[np.float64], law: str, tilt: float) -> NDArray[np
         a.x, a.y, a.angle = way * DEEP - high * sine, 1.0 + 2.0 * high - DEEP, turn + sine
         a.cos, a.sin = cos(a.angle), sin(a.angle)
         renew_dashpots(pair)
-        pair.near = near_slots(world, 0, 1, RADIUS, world.candidates[0], world.corners)
+        pair.near = near_slots(world, 0, 1, RADIUS, world.candidates[0])
         pair_forces(world, 0, 0.0)
         action = world.action[0]
         forces.append([action.fx, action.fy, action.torque_a / RADIUS])

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.explicit.models.outlines import near_slots
-from blocksim.kernels.explicit.outlines import MOST_CORNERS
+from blocksim.kernels.explicit.models.surface import near_slots
+from blocksim.kernels.explicit.sides import MOST_CORNERS
 from blocksim.scenario.laws import LAWS
 from blocksim.verification.scene import CaseScene
 
@@ -202,7 +202,7 @@ def test_only_corners_near_the_other_body_are_candidates() -> None:
     ]
     world: Any = CaseScene(bodies, gravity=0.0).start().scene
     found = np.zeros(2 * MOST_CORNERS, dtype=np.int64)
-    count = near_slots(world, 0, 1, 1.1e-3, found, world.corners)
+    count = near_slots(world, 0, 1, 1.1e-3, found)
     assert found[:count].tolist() == [MOST_CORNERS]
 
 

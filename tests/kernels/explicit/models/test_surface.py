@@ -9,33 +9,33 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from blocksim.kernels.common.arrays import CONTACT, CONTACTS, HALF, PAIR, POINT, SLOTS, zeros
+from blocksim.kernels.common.arrays import CONTACT, CONTACTS, PAIR, POINT, SLOTS, zeros
 from blocksim.kernels.common.shapes import ground_gap, separation
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.models.surface import (
     block_points,
-    corner_signs,
+    corner_seen,
     corners_near,
-    corners_near_ground,
-    face_below_corner,
-    face_normal,
+    face_met,
     find_points,
     ground_points,
-    keep_deepest,
     near_slots,
 )
+from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, corner_of, side_normal
 from tests.kernels.rectangles import corners, in_frame
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record
     from tests.kernels.conftest import MakeBody, Pose
 
-ALL = np.arange(SLOTS)
+OF_B = MOST_CORNERS  # slots from there on
+ALL = np.array([*range(4), *range(OF_B, OF_B + 4)])
+RIGHT = 1  # a face
 W, H = 0.032, 0.025
 
 
-def corner_of(body: Record, corner: int) -> np.ndarray:
+def place_of(body: Record, corner: int) -> np.ndarray:
     return np.asarray(corners(body)[corner])
 
 
@@ -44,25 +44,23 @@ def points_and_duplicates(a: Record, b: Record, touching: tuple[int, ...] = ()) 
     points, contacts, pair = zeros(SLOTS, POINT), zeros(CONTACTS, CONTACT), zeros(1, PAIR)[0]
     contacts.slot[: len(touching)] = touching
     pair.near, pair.active = SLOTS, len(touching)
-    pair.duplicates = 0xFF  # of the step before
-    count = block_points(a, b, pair, ALL, contacts, points)
-    return list(points[:count]), [k for k in range(16) if (pair.duplicates >> k) & 1]
+    pair.duplicates = 0xFFFFFFFF  # of the step before
+    count = block_points(a, b, pair, ALL, contacts, points, None)
+    return list(points[:count]), [k for k in range(32) if (int(pair.duplicates) >> k) & 1]
 
 
 def points_between(a: Record, b: Record) -> list[Any]:
     return points_and_duplicates(a, b)[0]
 
 
-def test_corners_count_counter_clockwise_from_the_lower_left() -> None:
-    assert [corner_signs(k) for k in range(4)] == [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-
-
-def test_faces_count_from_plus_x_counter_clockwise(make_body: MakeBody) -> None:
+def test_corners_and_faces_count_counter_clockwise_from_the_lower_left_and_from_below(make_body: MakeBody) -> None:
     body = make_body(angle=0.3)
-    for face in range(4):
-        assert face_normal(face, body) == pytest.approx(
-            (np.cos(0.3 + face * np.pi / 2), np.sin(0.3 + face * np.pi / 2)), abs=1e-15
-        )
+    for k in range(4):
+        side = corner_of(body, None, k)
+        assert (np.sign(side.x), np.sign(side.y)) == ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))[k]
+        assert (side.distance, side.half) == ((H / 2, W / 2), (W / 2, H / 2))[k % 2]
+        turned = 0.3 + (k - 1) * np.pi / 2
+        assert side_normal(body, None, k) == pytest.approx((np.cos(turned), np.sin(turned)), abs=1e-15)
 
 
 @given(x=st.floats(-0.035, 0.035), y=st.floats(-0.03, 0.03), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))
@@ -72,16 +70,16 @@ def test_every_contact_point_is_a_corner_inside_the_other_block(
     a, b = make_body(x, y, one), make_body(0.0, 0.0, two, width=0.02)
     found = points_between(a, b)
     for point in found:
-        owner, touched = (a, b) if point.slot < 4 else (b, a)
-        corner = corner_of(owner, point.slot % 4)
+        owner, touched = (a, b) if point.slot < OF_B else (b, a)
+        corner = place_of(owner, point.slot % OF_B)
         assert [point.x, point.y] == pytest.approx(corner, abs=1e-15)
         local = in_frame(corner, touched)
-        outward = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)][point.face])
+        outward = np.array([(0, -1), (1, 0), (0, 1), (-1, 0)][point.face])
         half = abs(outward @ (touched.half_x, touched.half_y))
         assert point.depth == pytest.approx(half - outward @ local, abs=1e-15)
         assert point.depth > 0.0
-        sign = 1.0 if point.slot < 4 else -1.0  # from b to a
-        assert [point.nx, point.ny] == pytest.approx(sign * np.array(face_normal(point.face, touched)))
+        sign = 1.0 if point.slot < OF_B else -1.0  # from b to a
+        assert [point.nx, point.ny] == pytest.approx(sign * np.array(side_normal(touched, None, point.face)))
     assert len({point.slot for point in found}) == len(found)
     assert not found or separation(a, b) < 0.0
 
@@ -106,30 +104,38 @@ def test_stacked_blocks_touch_at_the_top_and_not_at_the_sides(make_body: MakeBod
     assert abs(found[0].x - found[1].x) == pytest.approx(W - abs(shift))
 
 
+def face_of(make_body: MakeBody, x: float, y: float, corner: int) -> tuple[int, float]:
+    """Return the face of a block, and the overlap, that a corner of one which is not turned touches at a place."""
+    owner, touched = make_body(), make_body()
+    own = place_of(owner, corner)
+    owner.x, owner.y = x - own[0], y - own[1]
+    face, depth, _ = face_met(corner_seen(owner, corner, touched, None), touched, None, CONE_TOLERANCE)
+    return face, depth
+
+
 def test_corner_touches_only_faces_within_its_normal_cone(make_body: MakeBody) -> None:
-    touched = make_body()
     tiny = 1e-9
-    # a lower left corner near the upper right one, nearer to the side than to the top
-    face, depth, *_ = face_below_corner(W / 2 - tiny, H / 2 - 2 * tiny, touched, 1.0, -1.0, 1.0, 0.0)
-    assert face == 1
+    # a lower right corner near the upper right one, nearer to the side than to the top
+    face, depth = face_of(make_body, W / 2 - tiny, H / 2 - 2 * tiny, 1)
+    assert face == UPPER
     assert depth == pytest.approx(2 * tiny, rel=1e-6)
     # its mirror image at the upper left
-    face, depth, *_ = face_below_corner(-W / 2 + tiny, H / 2 - 2 * tiny, touched, -1.0, -1.0, 1.0, 0.0)
-    assert face == 1
+    face, depth = face_of(make_body, -W / 2 + tiny, H / 2 - 2 * tiny, 0)
+    assert face == UPPER
     assert depth == pytest.approx(2 * tiny, rel=1e-6)
     # a lower left corner at the upper right one may touch either: the nearest counts
-    assert face_below_corner(W / 2 - tiny, H / 2 - 2 * tiny, touched, -1.0, -1.0, 1.0, 0.0)[0] == 0
-    assert face_below_corner(W / 2 - 2 * tiny, H / 2 - tiny, touched, -1.0, -1.0, 1.0, 0.0)[0] == 1
+    assert face_of(make_body, W / 2 - tiny, H / 2 - 2 * tiny, 0)[0] == RIGHT
+    assert face_of(make_body, W / 2 - 2 * tiny, H / 2 - tiny, 0)[0] == UPPER
 
 
 def test_upper_corner_never_touches_the_top_of_another_block(make_body: MakeBody) -> None:
     assert CONE_TOLERANCE < 1.0
-    assert face_below_corner(0.0, H / 2 - 1e-6, make_body(), -1.0, 1.0, 1.0, 0.0)[0] != 1
+    assert face_of(make_body, 0.0, H / 2 - 1e-6, 3)[0] != UPPER
 
 
 def test_aligned_blocks_keep_the_corner_that_was_in_contact(make_body: MakeBody) -> None:
     a, b = make_body(0.0, H - 1e-6), make_body()
-    for touching, duplicates in (((), [6, 7]), ((0, 1), [6, 7]), ((6, 7), [0, 1]), ((1, 7), [0, 6])):
+    for touching, duplicates in (((), [18, 19]), ((0, 1), [18, 19]), ((18, 19), [0, 1]), ((1, 19), [0, 18])):
         points, found = points_and_duplicates(a, b, touching)
         assert sorted(point.slot for point in points) == list(touching or (0, 1))
         assert found == duplicates
@@ -137,7 +143,7 @@ def test_aligned_blocks_keep_the_corner_that_was_in_contact(make_body: MakeBody)
 
 def test_corners_that_meet_no_other_have_no_duplicates(make_body: MakeBody) -> None:
     points, duplicates = points_and_duplicates(make_body(0.003, H - 1e-6), make_body())
-    assert [point.slot for point in points] == [0, 6]
+    assert [point.slot for point in points] == [0, 18]
     assert duplicates == []
 
 
@@ -152,23 +158,13 @@ def test_aligned_blocks_keep_the_deeper_corner_without_history(make_body: MakeBo
 @given(y=st.floats(-0.01, 0.03), angle=st.floats(-7.0, 7.0))
 def test_corners_below_the_ground_touch_it(make_body: MakeBody, y: float, angle: float) -> None:
     body, points = make_body(0.4, y, angle), zeros(SLOTS, POINT)
-    count = ground_points(body, 4, ALL, 0.0, points)
-    heights = [corner_of(body, k)[1] for k in range(4)]
+    count = ground_points(body, 4, ALL, 0.0, points, None)
+    heights = [place_of(body, k)[1] for k in range(4)]
     assert [point.slot for point in points[:count]] == [k for k in range(4) if heights[k] < 0.0]
     for point in points[:count]:
         assert point.depth == pytest.approx(-heights[point.slot])
         assert (point.nx, point.ny) == (0.0, 1.0)
     assert (count > 0) == (ground_gap(body) < 0.0) or abs(ground_gap(body)) < 1e-15
-
-
-@given(depths=st.lists(st.floats(0.0, 1e-3), max_size=SLOTS, unique=True))
-def test_points_of_least_overlap_go_where_there_is_no_room_for_them(depths: list[float]) -> None:
-    points: Any = zeros(SLOTS + 1, POINT)
-    points.depth[: len(depths)], points.slot = depths, range(SLOTS + 1)
-    count = keep_deepest(points, len(depths))
-    deepest = sorted(range(len(depths)), key=lambda k: depths[k])[-CONTACTS:]
-    assert points.slot[:count].tolist() == sorted(deepest)  # still in the order of their slots
-    assert points.depth[:count].tolist() == [depths[k] for k in sorted(deepest)]
 
 
 @pytest.mark.parametrize(
@@ -185,7 +181,7 @@ def test_block_deep_under_ground_has_its_two_deepest_points_and_no_room_is_overr
     pair_forces(world, 0, 1e-6)
     assert world.pairs[0].active == CONTACTS
     assert world.contacts[0].slot.tolist() == slots
-    heights = [corner_of(world.bodies[0], k)[1] for k in slots]
+    heights = [place_of(world.bodies[0], k)[1] for k in slots]
     assert world.contacts[0].depth == pytest.approx(-np.array(heights))
     assert world.contacts[1].tobytes() == beside.tobytes()
     assert not world.contacts["normal_force"][2:].any()
@@ -210,36 +206,32 @@ def test_corner_is_near_when_it_lies_in_the_grown_rectangle(
     a, b = make_body(x, y, one), make_body(0.0, 0.0, two)
     expected = []
     for corner in range(4):
-        local = np.abs(in_frame(corner_of(a, corner), b))
+        local = np.abs(in_frame(place_of(a, corner), b))
         beyond = float(max(local[0] - b.half_x, local[1] - b.half_y))
         assume(abs(beyond - 0.01) > 1e-12)
         if beyond <= 0.01:
             expected.append(corner)
     slots = np.full(SLOTS, 99)
     slots[0] = 7  # there already
-    for first in (0, HALF):
-        count = corners_near(a, b, 0.01, first, slots, 1)
+    for first in (0, OF_B):
+        count = corners_near(a, b, 0.01, first, slots, 1, None)
         assert slots[:count].tolist() == [7] + [first + corner for corner in expected]
         assert (slots[count:] == 99).all()  # there is no room for more
 
 
 @given(y=st.floats(-0.02, 0.06), angle=st.floats(-4.0, 4.0))
-def test_corner_is_near_the_ground_when_it_is_below_the_height(make_body: MakeBody, y: float, angle: float) -> None:
-    body, slots = make_body(0.3, y, angle), np.full(SLOTS, 99)
-    heights = [corner_of(body, k)[1] for k in range(4)]
+def test_corner_is_near_the_ground_when_it_is_below_the_height(pose: Pose, y: float, angle: float) -> None:
+    world, slots = pose((0.3, y, angle)), np.full(SLOTS, 99)
+    heights = [place_of(world.bodies[0], k)[1] for k in range(4)]
     assume(min(abs(height - 0.02) for height in heights) > 1e-12)
-    count = corners_near_ground(body, 0.02, slots)
+    count = near_slots(world, 0, 1, 0.02, slots)
     assert slots[:count].tolist() == [k for k in range(4) if heights[k] <= 0.02]
 
 
-def test_candidates_of_a_pair_are_corners_of_the_first_and_then_of_the_second_that_can_touch(pose: Pose) -> None:
+def test_candidates_of_a_pair_are_corners_of_the_first_and_then_of_the_second(pose: Pose) -> None:
     world, slots = pose((0.0, 1.0 + H, 0.0), (0.0, 1.0, 0.0)), np.full(SLOTS, 99)
     count = near_slots(world, 0, 1, 1e-3, slots)
-    assert slots[:count].tolist() == [0, 1, 6, 7]
-    world.bodies[0].corners = 0b1110  # its lower left one lies within other bodies
-    world.bodies[1].corners = 0b0111
-    count = near_slots(world, 0, 1, 1e-3, slots)
-    assert slots[:count].tolist() == [1, 6]
+    assert slots[:count].tolist() == [0, 1, OF_B + 2, OF_B + 3]
 
 
 def test_corner_a_quarter_turn_apart_touches_the_side_it_came_through(make_body: MakeBody) -> None:
@@ -254,7 +246,7 @@ def test_corner_passing_a_corner_is_one_contact_of_continuous_depth(make_body: M
     depths = []
     for shift in np.linspace(-3e-6, 1.2e-6, 85):  # a stands on its lower corner, which leaves b over its edge
         a = make_body(0.0, 0.0, radians(45.0))
-        lowest = min((corner_of(a, k) for k in range(4)), key=lambda corner: float(corner[1]))
+        lowest = min((place_of(a, k) for k in range(4)), key=lambda corner: float(corner[1]))
         a.x, a.y = W / 2 + shift - lowest[0], H / 2 - 1e-6 - lowest[1]
         found = points_between(a, b)
         assert len(found) <= 1
