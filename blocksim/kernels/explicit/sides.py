@@ -72,19 +72,10 @@ def side_of_rectangle(body: Record, number: int) -> Side:
     is_level = number & 1 == 0
     out = 1.0 if number == 1 or number == UPPER else -1.0
     distance, half = (body.half_y, body.half_x) if is_level else (body.half_x, body.half_y)
-    return Side(
-        0.0 if is_level else out,
-        out if is_level else 0.0,
-        distance,
-        0.0,
-        half,
-        out * body.half_x,
-        body.half_y if number >= UPPER else -body.half_y,
-        min(1.0, 2.0 * distance / half),
-        2.0 * distance,
-        0.0,
-        CONE_TOLERANCE,
-    )
+    nx, ny = (0.0, out) if is_level else (out, 0.0)
+    x, y = out * body.half_x, body.half_y if number >= UPPER else -body.half_y
+    clear = min(1.0, 2.0 * distance / half)
+    return Side(nx, ny, distance, 0.0, half, x, y, clear, 2.0 * distance, 0.0, CONE_TOLERANCE)
 
 
 @kernel
@@ -95,17 +86,7 @@ def corner_of(body: Record, table: Corners, number: int) -> Side:
     first: Any = np.int64(body.first_corner)  # compiled code makes floats of signed and unsigned ones together
     one = table[first + number]
     return Side(
-        one.nx,
-        one.ny,
-        one.distance,
-        one.middle,
-        one.half,
-        one.x,
-        one.y,
-        one.clear,
-        one.far,
-        one.sharp,
-        one.cone,
+        one.nx, one.ny, one.distance, one.middle, one.half, one.x, one.y, one.clear, one.far, one.sharp, one.cone
     )
 
 

@@ -8,25 +8,9 @@ are: bodies that meet half a step too deep would be taken for neighbours side by
 
 from typing import Any, NamedTuple
 
-from blocksim.kernels.common import jit
+from blocksim.kernels.common import jit, simd, tolerances
 from blocksim.kernels.common.arrays import ALL, OUTLINE, Record, Records
-from blocksim.kernels.common.simd import (
-    WIDTH,
-    Lane,
-    Lanes,
-    fields_0,
-    fields_4,
-    fields_8,
-    fields_16,
-    is_all,
-    lesser,
-    select,
-    split,
-    write_fields_0,
-    write_fields_4,
-    write_fields_8,
-)
-from blocksim.kernels.common.tolerances import TURNED
+from blocksim.kernels.common.simd import Lane, Lanes
 from blocksim.kernels.nonsmooth import arrays, faces, manifold, references, slip
 
 NOT_THERE = 0.5 * arrays.FAR  # m: what is FAR changes a little as bodies move
@@ -67,13 +51,13 @@ def pairs_at(lists: Lists, places: Places, ahead: float, corners: Any, lane: Lan
     )
     at_a = (one.a, two.a, three.a, last.a)
     at_b = (one.b, two.b, three.b, last.b)
-    vx_a, vy_a, spin_a, inverse_a = fields_0(lane, states, at_a)
-    vx_b, vy_b, spin_b, inverse_b = fields_0(lane, states, at_b)
+    vx_a, vy_a, spin_a, inverse_a = simd.fields_0(lane, states, at_a)
+    vx_b, vy_b, spin_b, inverse_b = simd.fields_0(lane, states, at_b)
     inverse_mass = inverse_a + inverse_b
-    _, normal_one, normal_two, _ = fields_8(lane, constraints, places)
+    _, normal_one, normal_two, _ = simd.fields_8(lane, constraints, places)
     are_pressed = slip.presses(normal_one + normal_two, inverse_mass, stepping)
-    times = select(are_pressed, ahead, 0.0)
-    half = select(are_pressed, 0.5 * stepping.substep, 0.0)
+    times = simd.select(are_pressed, ahead, 0.0)
+    half = simd.select(are_pressed, 0.5 * stepping.substep, 0.0)
     return Pairs(
         block_at(bodies, at_a, vx_a, vy_a, spin_a, times, lane),
         block_at(bodies, at_b, vx_b, vy_b, spin_b, times, lane),
@@ -89,9 +73,9 @@ def block_at(
     bodies: Records, places: Places, vx: Lanes, vy: Lanes, spin: Lanes, ahead: Lanes, lane: Lane
 ) -> faces.Block:
     """Return blocks as they will be a time `ahead` (s)."""
-    x, y, _, cos = fields_0(lane, bodies, places)
-    sin, _, _, _ = fields_4(lane, bodies, places)
-    _, _, half_x, half_y = fields_16(lane, bodies, places)
+    x, y, _, cos = simd.fields_0(lane, bodies, places)
+    sin, _, _, _ = simd.fields_4(lane, bodies, places)
+    _, _, half_x, half_y = simd.fields_16(lane, bodies, places)
     return faces.block_ahead(faces.Block(x, y, cos, sin, half_x, half_y), vx, vy, spin, ahead)
 
 
@@ -109,16 +93,16 @@ def follow_corners(
     is_of_b, best = found.is_of_b, found.best
     next_number = best.number + 1.0
     next_against = best.against + 1.0
-    next_number = select(next_number < select(is_of_b, hulls_b.count, hulls_a.count), next_number, 0.0)
-    next_against = select(next_against < select(is_of_b, hulls_a.count, hulls_b.count), next_against, 0.0)
-    own = select(is_of_b, 1.0 * OF_B, 0.0)  # of the body with the face
+    next_number = simd.select(next_number < simd.select(is_of_b, hulls_b.count, hulls_a.count), next_number, 0.0)
+    next_against = simd.select(next_against < simd.select(is_of_b, hulls_a.count, hulls_b.count), next_against, 0.0)
+    own = simd.select(is_of_b, 1.0 * OF_B, 0.0)  # of the body with the face
     others = 1.0 * OF_B - own
-    left = select(found.is_left, others + best.against, own + next_number)
-    right = select(found.is_right, others + next_against, own + best.number)
-    ones = split(1.0 + select(is_of_b, right, left))
-    twos = split(1.0 + select(is_of_b, left, right))
-    are_near = split(select(found.is_near, 1.0, 0.0))
-    for k in range(WIDTH if lane is None else 1):
+    left = simd.select(found.is_left, others + best.against, own + next_number)
+    right = simd.select(found.is_right, others + next_against, own + best.number)
+    ones = simd.split(1.0 + simd.select(is_of_b, right, left))
+    twos = simd.split(1.0 + simd.select(is_of_b, left, right))
+    are_near = simd.split(simd.select(found.is_near, 1.0, 0.0))
+    for k in range(simd.WIDTH if lane is None else 1):
         if are_near[k] > 0.0:
             constraint = constraints[places[k]]
             one, two = int(ones[k]), int(twos[k])
@@ -148,34 +132,36 @@ def write(lists: Lists, places: Places, found: manifold.Manifold, pairs: Pairs, 
     rates = slip.slip_of(its, motion.vx, motion.vy, motion.spin_a, motion.spin_b)
     gap_one = points.gap_one - motion.ahead * rates.one
     gap_two = points.gap_two - motion.ahead * rates.two
-    nx, ny, _, _ = fields_0(lane, constraints, places)
-    _, normal_one, normal_two, shear = fields_8(lane, constraints, places)
-    are_kept = found.is_near & (its.nx * nx + its.ny * ny >= TURNED)
-    normal = select(are_kept, normal_one + normal_two, 0.0)
-    normal_one = select(are_kept, normal_one, 0.0)
-    normal_two = select(are_kept, normal_two, 0.0)
+    nx, ny, _, _ = simd.fields_0(lane, constraints, places)
+    _, normal_one, normal_two, shear = simd.fields_8(lane, constraints, places)
+    are_kept = found.is_near & (its.nx * nx + its.ny * ny >= tolerances.TURNED)
+    normal = simd.select(are_kept, normal_one + normal_two, 0.0)
+    normal_one = simd.select(are_kept, normal_one, 0.0)
+    normal_two = simd.select(are_kept, normal_two, 0.0)
     is_only_one = gap_two > NOT_THERE
     is_only_two = gap_one > NOT_THERE
-    normal_one = select(is_only_one, normal, select(is_only_two, 0.0, normal_one))
-    normal_two = select(is_only_two, normal, select(is_only_one, 0.0, normal_two))
-    shear = select(are_kept, shear, 0.0)
+    normal_one = simd.select(is_only_one, normal, simd.select(is_only_two, 0.0, normal_one))
+    normal_two = simd.select(is_only_two, normal, simd.select(is_only_one, 0.0, normal_two))
+    shear = simd.select(are_kept, shear, 0.0)
     are_all = abs(its.width) >= 0.0
-    write_fields_0(lane, constraints, places, are_all, (its.nx, its.ny, its.arm_a, its.arm_b))
-    write_fields_4(lane, constraints, places, are_all, (its.width, its.shear_arm_a, its.shear_arm_b, gap_one))
-    write_fields_8(lane, constraints, places, are_all, (gap_two, normal_one, normal_two, shear))
+    simd.write_fields_0(lane, constraints, places, are_all, (its.nx, its.ny, its.arm_a, its.arm_b))
+    simd.write_fields_4(lane, constraints, places, are_all, (its.width, its.shear_arm_a, its.shear_arm_b, gap_one))
+    simd.write_fields_8(lane, constraints, places, are_all, (gap_two, normal_one, normal_two, shear))
     bend = slip.bend_of(its, motion, points.is_of_b, normal_two > normal_one)
     is_pressed = slip.presses(normal_one + normal_two, pairs.inverse_mass, stepping)
-    is_touching = (lesser(gap_one, gap_two) <= stepping.touch_gap) | is_pressed
-    reach = select(found.is_near, select(is_touching, 1.0 * arrays.TOUCHING, 1.0 * arrays.OPEN), 1.0 * arrays.AWAY)
+    is_touching = (simd.lesser(gap_one, gap_two) <= stepping.touch_gap) | is_pressed
+    reach = simd.select(
+        found.is_near, simd.select(is_touching, 1.0 * arrays.TOUCHING, 1.0 * arrays.OPEN), 1.0 * arrays.AWAY
+    )
     one, two, three, last = (
         constraints[places[0]],
         constraints[places[1]],
         constraints[places[2]],
         constraints[places[3]],
     )
-    one.bend, two.bend, three.bend, last.bend = split(bend.normal)
-    one.shear_bend, two.shear_bend, three.shear_bend, last.shear_bend = split(bend.shear)
-    one.reach, two.reach, three.reach, last.reach = split(reach)
+    one.bend, two.bend, three.bend, last.bend = simd.split(bend.normal)
+    one.shear_bend, two.shear_bend, three.shear_bend, last.shear_bend = simd.split(bend.shear)
+    one.reach, two.reach, three.reach, last.reach = simd.split(reach)
 
 
 @jit.kernel
@@ -197,7 +183,7 @@ def collide_four(lists: Lists, places: Places, ahead: float, corners: Any) -> No
     pairs = pairs_at(lists, places, ahead, corners, None)
     a, hulls_a, b, hulls_b = pairs.a, pairs.hulls_a, pairs.b, pairs.hulls_b
     reference = references.reference_of(a, hulls_a, b, hulls_b, margin, None)
-    if is_all(reference.best.gap > margin):
+    if simd.is_all(reference.best.gap > margin):
         write_none(lists.constraints, places)
         return
     found = manifold.manifold_on(reference, a, b, margin)
@@ -240,7 +226,7 @@ def find_some(lists: Lists, begin: int, end: int, ahead: float, corners: Any) ->
     """Find the manifolds of those of some constraints that have a polygon, or of those that have none."""
     are_polygons = corners is not None
     one, two, three, count = 0, 0, 0, 0  # places of blocks that wait for a fourth pair
-    for r in range(begin, end + WIDTH - 1):
+    for r in range(begin, end + simd.WIDTH - 1):
         place = r
         if r < end:
             constraint = lists.constraints[r]
@@ -248,7 +234,7 @@ def find_some(lists: Lists, begin: int, end: int, ahead: float, corners: Any) ->
             if (faces_a == OUTLINE or faces_b == OUTLINE) != are_polygons:
                 continue
             if constraint.b != lists.bodies.size - 1 and faces_a >= ALL and faces_b >= ALL:
-                if count == WIDTH - 1:
+                if count == simd.WIDTH - 1:
                     collide_four(lists, (one, two, three, r), ahead, corners)
                     count = 0
                 else:

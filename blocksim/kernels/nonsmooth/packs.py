@@ -7,19 +7,7 @@ left out.
 
 from typing import NamedTuple
 
-from blocksim.kernels.common import arrays, jit
-from blocksim.kernels.common.simd import (
-    WIDTH,
-    Lane,
-    Lanes,
-    fields_0,
-    fields_4,
-    fields_8,
-    fields_12,
-    load,
-    split,
-    store,
-)
+from blocksim.kernels.common import arrays, jit, simd
 from blocksim.kernels.nonsmooth.arrays import COLOURS, OPEN, TOUCHING, Contacts
 from blocksim.kernels.nonsmooth.slip import Constraints, Slip, slip_of
 
@@ -29,14 +17,14 @@ LONELY = 2  # constraints: so many that are left make two packs of one, which ar
 class Bodies(NamedTuple):
     """Four bodies, fields as in STATE."""
 
-    vx: Lanes
-    vy: Lanes
-    spin: Lanes
-    inverse_mass: Lanes
-    inverse_inertia: Lanes
-    dx: Lanes
-    dy: Lanes
-    turned: Lanes
+    vx: simd.Lanes
+    vy: simd.Lanes
+    spin: simd.Lanes
+    inverse_mass: simd.Lanes
+    inverse_inertia: simd.Lanes
+    dx: simd.Lanes
+    dy: simd.Lanes
+    turned: simd.Lanes
 
 
 class Link(NamedTuple):
@@ -48,24 +36,24 @@ class Link(NamedTuple):
 
 
 @jit.kernel
-def bodies_at(contacts: Contacts, places: arrays.Integers, lane: Lane) -> Bodies:
+def bodies_at(contacts: Contacts, places: arrays.Integers, lane: simd.Lane) -> Bodies:
     """Return the bodies at the places of a pack."""
-    vx, vy, spin, inverse_mass = fields_0(lane, contacts.states, places)
-    inverse_inertia, dx, dy, turned = fields_4(lane, contacts.states, places)
+    vx, vy, spin, inverse_mass = simd.fields_0(lane, contacts.states, places)
+    inverse_inertia, dx, dy, turned = simd.fields_4(lane, contacts.states, places)
     return Bodies(vx, vy, spin, inverse_mass, inverse_inertia, dx, dy, turned)
 
 
 @jit.kernel
-def link_of(contacts: Contacts, pack: arrays.Record, lane: Lane) -> Link:
+def link_of(contacts: Contacts, pack: arrays.Record, lane: simd.Lane) -> Link:
     """Return the constraints of a pack with their bodies as they are now."""
     constraints = Constraints(
-        load(lane, pack.nx),
-        load(lane, pack.ny),
-        load(lane, pack.arm_a),
-        load(lane, pack.arm_b),
-        load(lane, pack.width),
-        load(lane, pack.shear_arm_a),
-        load(lane, pack.shear_arm_b),
+        simd.load(lane, pack.nx),
+        simd.load(lane, pack.ny),
+        simd.load(lane, pack.arm_a),
+        simd.load(lane, pack.arm_b),
+        simd.load(lane, pack.width),
+        simd.load(lane, pack.shear_arm_a),
+        simd.load(lane, pack.shear_arm_b),
     )
     return Link(constraints, bodies_at(contacts, pack.a, lane), bodies_at(contacts, pack.b, lane))
 
@@ -78,15 +66,15 @@ def slip_now(link: Link) -> Slip:
 
 
 @jit.kernel
-def slip_before(contacts: Contacts, pack: arrays.Record, lane: Lane, its: Constraints) -> Slip:
+def slip_before(contacts: Contacts, pack: arrays.Record, lane: simd.Lane, its: Constraints) -> Slip:
     """Return the velocities at the points when the substep began."""
-    vx_a, vy_a, spin_a, _ = fields_0(lane, contacts.before, pack.a)
-    vx_b, vy_b, spin_b, _ = fields_0(lane, contacts.before, pack.b)
+    vx_a, vy_a, spin_a, _ = simd.fields_0(lane, contacts.before, pack.a)
+    vx_b, vy_b, spin_b, _ = simd.fields_0(lane, contacts.before, pack.b)
     return slip_of(its, vx_a - vx_b, vy_a - vy_b, spin_a, spin_b)
 
 
 @jit.kernel
-def normal_masses(link: Link) -> tuple[Lanes, Lanes, Lanes]:
+def normal_masses(link: Link) -> tuple[simd.Lanes, simd.Lanes, simd.Lanes]:
     """Return A (1/kg) of the two normals: of one, mixed, of two."""
     its, a, b = link
     together = a.inverse_mass + b.inverse_mass
@@ -101,7 +89,7 @@ def normal_masses(link: Link) -> tuple[Lanes, Lanes, Lanes]:
 
 
 @jit.kernel
-def tangent_mass(link: Link) -> Lanes:
+def tangent_mass(link: Link) -> simd.Lanes:
     """Return A (1/kg) along the tangent."""
     its, a, b = link
     coupled_a = a.inverse_inertia * its.shear_arm_a
@@ -127,7 +115,7 @@ def gather(contacts: Contacts, begins: arrays.Integers) -> None:
     number = 0
     for colour in range(stepping.colours):
         contacts.ends[colour] = number
-        most = 1 if colour == COLOURS - 1 else WIDTH
+        most = 1 if colour == COLOURS - 1 else simd.WIDTH
         lane = 0
         for reach in (TOUCHING, OPEN):
             for r in range(begins[colour], begins[colour + 1]):
@@ -156,7 +144,7 @@ def gather(contacts: Contacts, begins: arrays.Integers) -> None:
 def close(pack: arrays.Record, count: int) -> None:
     """Fill a pack of `count` constraints up with the last one."""
     pack.count = count
-    for lane in range(count, WIDTH):
+    for lane in range(count, simd.WIDTH):
         pack.constraint[lane] = pack.constraint[count - 1]
 
 
@@ -171,7 +159,7 @@ def pack_all(contacts: Contacts, begin: int, end: int) -> None:
             fill(contacts, pack, None)
         pack.are_simple = 1
         pack.is_coupled = 0
-        for lane in range(1 if pack.count == 1 else WIDTH):
+        for lane in range(1 if pack.count == 1 else simd.WIDTH):
             constraint = contacts.constraints[pack.constraint[lane]]
             pack.a[lane] = constraint.a
             pack.b[lane] = constraint.b
@@ -187,26 +175,26 @@ def pack_all(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @jit.kernel
-def fill(contacts: Contacts, pack: arrays.Record, lane: Lane) -> None:
+def fill(contacts: Contacts, pack: arrays.Record, lane: simd.Lane) -> None:
     """Copy the numbers of the constraints of a pack into it."""
-    nx, ny, arm_a, arm_b = fields_0(lane, contacts.constraints, pack.constraint)
-    width, shear_arm_a, shear_arm_b, gap_one = fields_4(lane, contacts.constraints, pack.constraint)
-    gap_two, normal_one, normal_two, shear = fields_8(lane, contacts.constraints, pack.constraint)
-    bend, shear_bend, _, _ = fields_12(lane, contacts.constraints, pack.constraint)
-    store(lane, pack.bend, bend)
-    store(lane, pack.shear_bend, shear_bend)
-    store(lane, pack.nx, nx)
-    store(lane, pack.ny, ny)
-    store(lane, pack.arm_a, arm_a)
-    store(lane, pack.arm_b, arm_b)
-    store(lane, pack.width, width)
-    store(lane, pack.shear_arm_a, shear_arm_a)
-    store(lane, pack.shear_arm_b, shear_arm_b)
-    store(lane, pack.gap_one, gap_one)
-    store(lane, pack.gap_two, gap_two)
-    store(lane, pack.normal_one, normal_one)
-    store(lane, pack.normal_two, normal_two)
-    store(lane, pack.shear, shear)
+    nx, ny, arm_a, arm_b = simd.fields_0(lane, contacts.constraints, pack.constraint)
+    width, shear_arm_a, shear_arm_b, gap_one = simd.fields_4(lane, contacts.constraints, pack.constraint)
+    gap_two, normal_one, normal_two, shear = simd.fields_8(lane, contacts.constraints, pack.constraint)
+    bend, shear_bend, _, _ = simd.fields_12(lane, contacts.constraints, pack.constraint)
+    simd.store(lane, pack.bend, bend)
+    simd.store(lane, pack.shear_bend, shear_bend)
+    simd.store(lane, pack.nx, nx)
+    simd.store(lane, pack.ny, ny)
+    simd.store(lane, pack.arm_a, arm_a)
+    simd.store(lane, pack.arm_b, arm_b)
+    simd.store(lane, pack.width, width)
+    simd.store(lane, pack.shear_arm_a, shear_arm_a)
+    simd.store(lane, pack.shear_arm_b, shear_arm_b)
+    simd.store(lane, pack.gap_one, gap_one)
+    simd.store(lane, pack.gap_two, gap_two)
+    simd.store(lane, pack.normal_one, normal_one)
+    simd.store(lane, pack.normal_two, normal_two)
+    simd.store(lane, pack.shear, shear)
 
 
 @jit.kernel
@@ -222,16 +210,16 @@ def unpack_all(contacts: Contacts, begin: int, end: int) -> None:
 
 
 @jit.kernel
-def total(lane: Lane, x: Lanes, count: int) -> float:
+def total(lane: simd.Lane, x: simd.Lanes, count: int) -> float:
     """Return the sum of the first `count` lanes, at least two, or the number of a single one."""
     if lane is not None:
         return x
-    one, two, three, four = split(x)
+    one, two, three, four = simd.split(x)
     return (one + two) + ((three if count > 2 else 0.0) + (four if count > 3 else 0.0))
 
 
 @jit.kernel
-def highest(x: Lanes) -> float:
+def highest(x: simd.Lanes) -> float:
     """Return the largest number."""
-    one, two, three, four = split(x)
+    one, two, three, four = simd.split(x)
     return max(one, two, three, four)

@@ -95,19 +95,13 @@ def is_same_end(of_a: Record, of_b: Record, a: Record, b: Record, table: Corners
 
 
 @rare_kernel
-def place_on(point: Record, touched: Record, table: Corners) -> tuple[float, float]:
-    """Return where a point is along the face it touches, from the middle of that (m), and half of its length (m)."""
+def way_beyond(point: Record, a: Record, b: Record, table: Corners) -> float:
+    """Return how far (m) the corner of a point is beyond the end of its face, less what it may be."""
+    touched = b if point.slot < sides.MOST_CORNERS else a
     face: Any = np.int64(point.face)
     side = sides.corner_of(touched, table, face)
     x, y = sides.into_frame(touched, point.x - touched.x, point.y - touched.y)
-    return side.nx * y - side.ny * x - side.middle, side.half
-
-
-@rare_kernel
-def way_beyond(point: Record, a: Record, b: Record, table: Corners) -> float:
-    """Return how far (m) the corner of a point is beyond the end of its face, less what it may be."""
-    along, half = place_on(point, b if point.slot < sides.MOST_CORNERS else a, table)
-    return abs(along) - half - tolerances.HAND_OVER * point.depth
+    return abs(side.nx * y - side.ny * x - side.middle) - side.half - tolerances.HAND_OVER * point.depth
 
 
 @rare_kernel
