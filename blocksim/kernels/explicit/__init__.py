@@ -1,14 +1,17 @@
-"""The explicit scheme: springs, dashpots and Coulomb friction at contacts, stepped by leap-frog.
+"""The explicit scheme: springs, dashpots and Coulomb friction at contacts, stepped by velocity Verlet.
 
 Contacts push with forces that depend on overlaps and velocities, so that steps have to be a small part of the period of
 the stiffest contact. A step of length dt is
 
     neighbours    is the list of pairs still good? else make it anew              broad_phase.py
     start         half a kick by the forces of the step before, drift             common/integrate.py
-    narrow phase  the points where two bodies touch, by a contact model           models/, persistent_forces.py
-    forces        a contact law, friction with history, dashpots of a pair        step.py, contact.py, laws.py
+    contacts      of pairs that go on touching: followed                          persistent_forces.py
+                  of others: searched by a contact model; slivers of polygons     contact.py, models/, slivers.py
+    forces        a law, shares of faces, dashpots, friction                      forces.py and what it imports
     finish        half a kick by the new forces                                   common/integrate.py
-    checks        at fixed step numbers: finite, at rest, overlaps, ledger        step.py, energy.py
+    checks        at fixed step numbers: finite, at rest, ledger                  step.py, energy.py
 
+step.py goes through it: where something is due between two steps, `begin_steps` makes lists, kicks and drifts;
+elsewhere `finish_group` does the last half kick of a step and at once the start of the next one, with a body at hand.
 Threads share the bodies out (partition.py) and meet twice a step. Copies of a scene advance by the same code (step.py).
 """

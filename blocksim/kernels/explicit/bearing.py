@@ -174,7 +174,6 @@ def measure_soon(pair: Record, slip: float, turned: float, exponent: float, tabl
     """Have the stiffness of a pair measured in the next step where it changes fast.
 
     It does between polygons, as on slivers, and with laws other than the linear one, whose steps are longer.
-
     `slip` (m) and `turned` (rad) are how far a has moved ahead of b, and turned, in the last drift.
     """
     if sides.has_polygons(table) or exponent != LINEAR:

@@ -33,8 +33,8 @@ def shared_step(a: Record, b: Record, step: float) -> float:
     """Return the step (s) for the dashpots' own-force correction, longer where other pairs act on the same body.
 
     The correction knows this pair's change of force only. With p pairs that act alike on one body the others' part is
-    missing; counting the own part p/2 times keeps the recurrence stable (world/step.py says how far) and changes
-    nothing up to p = 2.
+    missing; counting the own part p/2 times keeps the recurrence stable (blocksim/world/README.md says how far) and
+    changes nothing up to p = 2.
     """
     most = 2
     if a.inverse_mass > 0.0:

@@ -1,4 +1,4 @@
-"""Dashpots of one pair of bodies, as a matrix over its contact points; here for one point and for two.
+"""Dashpots of one pair of bodies, as a matrix over its contact points.
 
 One dashpot a point would damp a flat landing (two points) differently from a corner (one point). With A the inverse
 mass that the points see, k their stiffnesses and B = k^(1/2) A k^(1/2), the damping matrix

@@ -1,4 +1,4 @@
-"""Energy ledger: what the scene holds now. Losses are tallied where the forces are applied (contact.py)."""
+"""Energy ledger: what the scene holds now. Losses are tallied where forces are added up (step.py, history.py)."""
 
 from blocksim.kernels.common import arrays, energy, integrate, jit
 from blocksim.kernels.explicit import history, laws

@@ -1,7 +1,7 @@
 """Coulomb friction with a static and a kinetic coefficient.
 
-`draw_spring` clips the shear spring of a contact, `clip_to_cone` spring and dashpot together. forces.py calls both, and
-soil/contact.py for particles of soil.
+`draw_spring` clips the shear spring of a contact, `clip_to_cone` spring and dashpot together, for contacts of bodies
+(forces.py) and of particles of soil (soil/contact.py). Where stiffness stays or contacts last others draw it, as below.
 """
 
 import math

@@ -85,8 +85,10 @@ def closing_bound(a: Record, b: Record, nx: float, ny: float) -> float:
 
 @rare_kernel
 def steps_apart(pair: Record, a: Record, b: Record, is_ground: bool, controls: Record, table: Corners) -> float:
-    """Return after how many steps two bodies apart may touch at the earliest; infinity where they are not near."""
-    gap = sides.gap_on(pair.axis, a, b, is_ground, table)
+    """Return after how many steps two bodies apart may touch, along their widest gap now; infinity if not near."""
+    if sides.gap_on(pair.axis, a, b, is_ground, table) >= controls.approach:
+        return math.inf
+    pair.axis, gap = sides.widest_gap(a, b, is_ground, table)
     nx, ny = sides.way_over(pair, a, b, is_ground, table)
     closing = closing_bound(a, b, nx, ny)
     is_near = 0.0 <= gap < controls.approach

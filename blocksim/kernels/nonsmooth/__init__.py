@@ -4,7 +4,7 @@ Contact laws are Newton's restitution and Coulomb's friction, both as impulses; 
 that steps are 0.1 to 1 ms long. A step of length dt is, in the order of step.py,
 
     neighbours is the list of pairs still good? else make it and its colours anew            neighbours.py
-    manifolds  the contact manifold of every pair, kept for the whole step                  narrow_phase.py
+    manifolds  the contact manifold of every pair, kept for the interval                    narrow_phase.py
                which faces meet, and where they do                                          references.py, manifold.py
     cut        does an impact come first? then a shorter interval, where that may be        cuts.py
     pack       constraints that are near, four in the lanes of registers                    packs.py
@@ -31,7 +31,7 @@ J v - t >= 0, with the target t = -e u where the approach u before the substep w
 gravity does meanwhile: passes.rebound), and -max(s, 0) / h elsewhere. What the position pass adds to velocities moves
 bodies, but is gone after the velocity pass.
 
-Impacts of bodies that touch one another go in rounds instead (in crowds only where restitution is high; see
+Impacts that follow from one another go in rounds instead (in crowds only where restitution is high; see
 world/nonsmooth.py), and create no energy:
 impacts.py, contact_groups.py, impact_rounds.py.
 

@@ -1,6 +1,6 @@
 """What happens to bodies one by one: kick and warm start, drift, poses.
 
-Loads in the substeps: like gravity, but body by body. In scenes without loads nothing of this is called.
+Loads in the substeps: like gravity, but body by body. Without loads `kick_by_loads` and its like are not called.
 
 A kick over a substep is that of the loads as they are when it begins, at the places then: halfway between the
 velocities before and after it. What the kick brings a body is its impulse times the mean of the velocities before and

@@ -336,7 +336,7 @@ def range_of_thread(begin: int, end: int, k: int, size: int) -> tuple[int, int]:
 
 @kernel
 def go_through(contacts: arrays.Contacts, task: int, begin: int, end: int) -> float:
-    """Do one task of py for some packs; return the largest change of velocity (m/s) of a velocity pass."""
+    """Do a task of passes.py for some packs; return the largest change of velocity (m/s) of a velocity pass."""
     largest = spread(0.0)
     single = 0.0
     for m in range(begin, end):

@@ -5,9 +5,9 @@ A model is one file with
     find_points(world, p)              fill world.points with the contact points of pair p, return how many there are
     near_slots(world, a, b, reach, out)   write the slots of a pair that may come into contact, return how many
 
-one code here and one branch in each dispatcher below. How many slots a pair needs is said in world/bodies.py. Where an
-ended contact was is derived again for corners and kept in the slot for particles
-(`place_of`). All models share laws, friction, dashpots, history and the energy ledger.
+one code here and one branch in each dispatcher below. How many slots a pair needs is said in world/bodies.py and
+build.py. Where an ended contact was is derived again for corners and kept in the slot for particles (`place_of`). All
+models share laws, friction, dashpots, history and the energy ledger.
 """
 
 from blocksim.kernels.common.arrays import Integers, Record, Records, World
