@@ -148,7 +148,7 @@ def silence_missing_glyphs() -> Iterator[None]:
 
 def shorten(text: str, letters: int) -> str:
     """Return a name in one line, no wider than this many letters; signs that are no letters become boxes."""
-    line = "".join(sign if sign.isprintable() else "\N{WHITE SQUARE}" for sign in text)
+    line = "".join(sign if sign.isprintable() or sign == "\N{NO-BREAK SPACE}" else "\N{WHITE SQUARE}" for sign in text)
     ends = list(accumulate(1 + (east_asian_width(sign) in "WF") for sign in line))
     if not ends or ends[-1] <= letters:
         return line

@@ -50,6 +50,23 @@ def test_numbers_that_look_like_another_unit_are_warned_of(settings: dict[str, A
     assert [text.removesuffix("; add the intended unit") for text in found] == expected
 
 
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        ({"outline": [[0, 0], [90, 0], [0, 120]], "depth": 1}, ["blocks.brick.outline is 150 m across"]),
+        ({"outline": [[0, 0], [1, 0], [0, 1]], "depth": 100}, ["blocks.brick.depth = 100 m"]),
+        ({"sides": 6, "radius": 40, "depth": 1}, ["blocks.brick.radius = 40 m"]),
+        ({"sides": 6, "radius": "0.1 m", "depth": "100 mm"}, []),
+    ],
+)
+def test_sizes_of_polygons_that_look_like_another_unit_are_warned_of(
+    shape: dict[str, object], expected: list[str]
+) -> None:
+    given = {"blocks.brick": {**shape, "material": "aluminium"}, "bodies.0.y": 500}
+    found = implausible_values(Document.read(APART).with_values(given).build())
+    assert [text.removesuffix("; add the intended unit") for text in found] == expected
+
+
 @pytest.mark.parametrize(("unit", "warned"), [({}, True), ({"unit": "1 mm"}, False)])
 def test_a_drawing_in_mm_that_is_read_in_m_is_warned_of(tmp_path: Path, unit: dict[str, str], *, warned: bool) -> None:
     squares = [[[0, 25 * i], [50, 25 * i], [50, 25 + 25 * i], [0, 25 + 25 * i]] for i in range(3)]

@@ -58,6 +58,7 @@ def test_long_names_are_cut(name: str, shown: str) -> None:
 
 def test_signs_that_are_no_letters_become_boxes_and_wide_ones_count_twice() -> None:
     assert shorten("a\nb\u202e", 12) == "a□b□"
+    assert shorten("3\N{NO-BREAK SPACE}mm", 12) == "3\N{NO-BREAK SPACE}mm"
     assert shorten("\N{GRINNING FACE}" * 9, 12) == "\N{GRINNING FACE}" * 5 + "…"
 
 
