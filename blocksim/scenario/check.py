@@ -143,7 +143,14 @@ def implausible_values(scenario: Scenario) -> list[str]:
             warnings.append(f"{key}.{given} makes {material.density:.4g} kg/m^3; add the intended unit")
         if material.young_modulus < SOFTEST:
             warnings.append(f"{key}.young_modulus = {material.young_modulus:.4g} Pa; add the intended unit")
-    warnings += _large_blocks(scenario)
+    for name, block in scenario.blocks.items():
+        sizes = {side: getattr(block, side) or 0.0 for side in ("width", "height", "length")}
+        sizes |= {"depth": block.given_depth or 0.0, "radius": 2.0 * (block.radius or 0.0)}
+        sizes["outline"] = dist(*geometry.box_of(block.outline or [(0.0, 0.0)]))
+        for side, size in sizes.items():
+            if size > LONGEST:
+                key = overrides.format_key(("blocks", name, side))
+                warnings.append(f"{key} makes {size:.4g} m; add the intended unit")
     for number, structure in enumerate(scenario.structures):
         if isinstance(structure, polygons.Polygons):
             size = median(dist(*geometry.box_of(one.outline)) for one in structure.cells_given)
@@ -162,17 +169,6 @@ def implausible_values(scenario: Scenario) -> list[str]:
                     f"{1e3 * count * soil.spacing:.4g} of {1e3 * extent:.4g} mm of the {way}; {fits:.4g} mm fills all"
                 )
     return warnings
-
-
-def _large_blocks(scenario: Scenario) -> Iterator[str]:
-    """Find sizes of blocks that look like ones in millimetres."""
-    for name, block in scenario.blocks.items():
-        sizes = {"width": block.width, "height": block.height, "length": block.length, "depth": block.given_depth}
-        for side, size in (*sizes.items(), ("radius", block.radius)):
-            if size is not None and size > (0.5 * LONGEST if side == "radius" else LONGEST):
-                yield f"{overrides.format_key(('blocks', name, side))} = {size:.4g} m; add the intended unit"
-        if block.outline is not None and (size := dist(*geometry.box_of(block.outline))) > LONGEST:
-            yield f"{overrides.format_key(('blocks', name, 'outline'))} is {size:.4g} m across; add the intended unit"
 
 
 def _friction_angles(scenario: Scenario) -> Iterator[str]:

@@ -39,7 +39,7 @@ def test_friction_angle_without_its_unit_is_warned_of(settings: dict[str, Any], 
         ({"materials.aluminium": {"density": 2.4}}, ["materials.aluminium.density makes 2.4 kg/m^3"]),
         ({"materials.aluminium.unit_weight": 26.7}, ["materials.aluminium.unit_weight makes 2.722 kg/m^3"]),
         ({"materials.aluminium.young_modulus": 69}, ["materials.aluminium.young_modulus = 69 Pa"]),
-        ({"blocks.brick.width": 600}, ["blocks.brick.width = 600 m"]),
+        ({"blocks.brick.width": 600}, ["blocks.brick.width makes 600 m"]),
         ({"materials.aluminium.young_modulus": "0.1 MPa", "blocks.brick.width": "2 m"}, []),
     ],
 )
@@ -53,9 +53,9 @@ def test_numbers_that_look_like_another_unit_are_warned_of(settings: dict[str, A
 @pytest.mark.parametrize(
     ("shape", "expected"),
     [
-        ({"outline": [[0, 0], [90, 0], [0, 120]], "depth": 1}, ["blocks.brick.outline is 150 m across"]),
-        ({"outline": [[0, 0], [1, 0], [0, 1]], "depth": 100}, ["blocks.brick.depth = 100 m"]),
-        ({"sides": 6, "radius": 40, "depth": 1}, ["blocks.brick.radius = 40 m"]),
+        ({"outline": [[0, 0], [90, 0], [0, 120]], "depth": 1}, ["blocks.brick.outline makes 150 m"]),
+        ({"outline": [[0, 0], [1, 0], [0, 1]], "depth": 100}, ["blocks.brick.depth makes 100 m"]),
+        ({"sides": 6, "radius": 40, "depth": 1}, ["blocks.brick.radius makes 80 m"]),
         ({"sides": 6, "radius": "0.1 m", "depth": "100 mm"}, []),
     ],
 )
