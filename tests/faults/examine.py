@@ -16,7 +16,7 @@ from tests.faults.faults import ROOT, Fault, Finding, Verdict
 
 HOOK = Path(__file__).parent / "hook"
 PRELOADED_IS_FINE = "ignore::pytest.PytestAssertRewriteWarning"  # hypothesis was imported before the fork
-OPTIONS = ("-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--rootdir", str(ROOT), "-W", PRELOADED_IS_FINE)
+OPTIONS = ("-q", "-n", "0", "-p", "no:cacheprovider", "--rootdir", str(ROOT), "-W", PRELOADED_IS_FINE)
 PATIENCE = 200.0  # s of processor time: a fault may let a loop never end
 PRINTED = 3000  # characters
 
@@ -59,8 +59,13 @@ def _put_in(fault: Fault) -> None:
     __import__("sitecustomize")
 
 
-def run_tests(tests: tuple[str, ...], *plugins: object, interpreted: bool) -> tuple[int, str]:
-    """Run tests in this process, which nothing of blocksim has been imported into; return its exit code and words."""
+def run_tests(
+    tests: tuple[str, ...], *plugins: object, interpreted: bool, first_only: bool = True, patience: float = PATIENCE
+) -> tuple[int, str]:
+    """Run tests in this process, which nothing of blocksim has been imported into; return its exit code and words.
+
+    The first that fails is the last, unless all are asked for; `patience` is in s of processor time.
+    """
     os.environ["NUMBA_DISABLE_JIT"] = str(int(interpreted))
     numba.config.DISABLE_JIT = int(interpreted)  # type: ignore[attr-defined]  # numba was imported long ago
     os.chdir(ROOT)
@@ -68,9 +73,9 @@ def run_tests(tests: tuple[str, ...], *plugins: object, interpreted: bool) -> tu
     signal.signal(signal.SIGPROF, _give_up)
     with tempfile.TemporaryFile("w+", encoding="utf-8") as file:
         with redirect_stdout(file), redirect_stderr(file):
-            signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+            signal.setitimer(signal.ITIMER_PROF, patience)
             try:
-                code = int(pytest.main([*OPTIONS, *tests], plugins=[*plugins]))
+                code = int(pytest.main([*OPTIONS, *(["-x"] if first_only else []), *tests], plugins=[*plugins]))
             except TimeoutError as error:  # while no test ran
                 return pytest.ExitCode.INTERNAL_ERROR, str(error)
             finally:
@@ -80,4 +85,4 @@ def run_tests(tests: tuple[str, ...], *plugins: object, interpreted: bool) -> tu
 
 
 def _give_up(*_: object) -> None:
-    raise TimeoutError(f"no end after {PATIENCE:g} s")
+    raise TimeoutError("no end within the processor time")

@@ -53,7 +53,8 @@ def summary(findings: Iterable[Finding]) -> str:
     return "\n\n".join([*broken, f"{len(findings)} faults: " + ", ".join(f"{counts[one]} {one}" for one in Verdict)])
 
 
-def _say(text: str) -> None:
+def say(text: str) -> None:
+    """Print a line at once."""
     print(text, flush=True)  # noqa: T201 - this is the answer
 
 
@@ -70,13 +71,13 @@ def main(arguments: Sequence[str]) -> int:
         examined = [] if asked.tests_passed else [fault for fault in faults if not fault.is_stale]
         failing = fail_without_fault(workers, examined)
         if failing:
-            _say("\n".join([*failing, "these tests fail without any fault; mend them first"]))
+            say("\n".join([*failing, "these tests fail without any fault; mend them first"]))
             return 1
         findings = []
         for finding in workers.map(examine, faults):
-            _say(told(finding))
+            say(told(finding))
             findings.append(finding)
-    _say(summary(findings))
+    say(summary(findings))
     return 0 if all(finding.verdict is Verdict.CAUGHT for finding in findings) else 1
 
 
