@@ -37,7 +37,7 @@ def examine(fault: Fault) -> Finding:
     """Return what the named tests say about a fault."""
     if fault.is_stale:
         return Finding(fault, Verdict.STALE)
-    _put_in(fault)
+    put_in(fault)
     failed = Failed()
     code, printed = run_tests(fault.tests, failed, interpreted=fault.is_interpreted)
     seconds = time.process_time()
@@ -48,7 +48,7 @@ def examine(fault: Fault) -> Finding:
     return Finding(fault, Verdict.CAUGHT, failed.names[-1], seconds)
 
 
-def _put_in(fault: Fault) -> None:
+def put_in(fault: Fault) -> None:
     """Have the fault imported by this process, and by those that its tests start."""
     told = {"file": fault.file, "text": fault.text, "replacement": fault.replacement}
     os.environ["BLOCKSIM_FAULT"] = json.dumps(told)

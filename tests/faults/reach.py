@@ -16,6 +16,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 import coverage
 import pytest
@@ -27,6 +28,7 @@ from tests.faults.run import pool, say
 FOLDER = ROOT / "results" / "reach"
 INTERPRETED = "tests/kernels/"
 LEFT_OUT = ("tests/faults/", "tests/plan/", "tests/browser/", "tests/fuzz/")
+T = TypeVar("T")
 Reach = dict[str, dict[str, list[int]]]  # lines by file by test; those of an import under the name of the test file
 
 
@@ -73,7 +75,7 @@ def measure(test_file: str) -> str:
     with tempfile.NamedTemporaryFile("w", dir=place.parent, delete=False, encoding="utf-8") as file:
         json.dump(reach, file, separators=(",", ":"))
     Path(file.name).replace(place)
-    return f"{test_file}: {len(reach)} tests" + "".join(f"\n    fails: {one}" for one in sorted(contexts.failed))
+    return f"{test_file}: {len(reach)} tests" + f", {len(contexts.failed)} do not pass or are skipped"
 
 
 def kept_at(test_file: str) -> Path:
@@ -108,7 +110,7 @@ def nearest(file: str, line: int) -> list[str]:
     return sorted(found, key=lambda one: (f"tests/{room}/" not in one, size(one), one))
 
 
-def part_of(every: Sequence[str], part: str) -> Sequence[str]:
+def part_of(every: Sequence[T], part: str) -> Sequence[T]:
     """Return one part of a list: "2/4" is the second of four."""
     index, count = map(int, part.split("/"))
     return every[index - 1 :: count]
