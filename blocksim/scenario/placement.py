@@ -63,10 +63,8 @@ class PlacedBody(NamedTuple):
     @property
     def corners(self) -> geometry.Corners:
         """Corners in m along the body's own axes about its centroid, counter-clockwise; of a rectangle too."""
-        if self.outline:
-            return self.outline
         x, y = 0.5 * self.size_x, 0.5 * self.size_y
-        return (-x, -y), (x, -y), (x, y), (-x, y)
+        return self.outline or ((-x, -y), (x, -y), (x, y), (-x, y))
 
     @property
     def least_width(self) -> float:

@@ -56,12 +56,8 @@ class EndLoad(NamedTuple):
 def box_of(body: PlacedBody) -> Box:
     """Return the bounding box of a block."""
     c, s = math.cos(body.angle), math.sin(body.angle)
-    if body.outline:
-        (left, bottom), (right, top) = geometry.box_of([(c * x - s * y, s * x + c * y) for x, y in body.outline])
-        return Box(body.x + left, body.x + right, body.y + bottom, body.y + top)
-    c, s = abs(c), abs(s)
-    half_x, half_y = 0.5 * (c * body.size_x + s * body.size_y), 0.5 * (s * body.size_x + c * body.size_y)
-    return Box(body.x - half_x, body.x + half_x, body.y - half_y, body.y + half_y)
+    (left, bottom), (right, top) = geometry.box_of([(c * x - s * y, s * x + c * y) for x, y in body.corners])
+    return Box(body.x + left, body.x + right, body.y + bottom, body.y + top)
 
 
 def loads_at_rest(placed: Sequence[PlacedBody], gravity: float) -> list[EndLoad]:

@@ -131,7 +131,7 @@ class Block(Table):
         if self.along == self.upright:
             others = " or ".join(q.toml(side) for side in SIDES if side != self.upright)
             raise q.invalid(f"{q.toml(self.upright)} already stands upright; {others} can lie along x", "along")
-        for number, message in geometry.faults(self.outline) if self.outline is not None else ():
+        for number, message in geometry.faults(self.outline or ()) if shape == "outline" else ():
             raise q.invalid(message, "outline", *(() if number is None else (number,)))
         for _, message in geometry.faults(self.polygon) if self.sides is not None and self.radius is not None else ():
             raise q.invalid(message, "radius")
