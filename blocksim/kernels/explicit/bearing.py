@@ -112,6 +112,12 @@ def stiffness_between(pair: Record, x: float, y: float, nx: float, ny: float) ->
     return abs(pair.slide * (y * nx - x * ny)) if pair.slide != 0.0 else pair.stiffness
 
 
+@kernel
+def flat_within(cone: float) -> float:
+    """Return the sine up to which faces are parallel."""
+    return min(tolerances.FLAT, FLAT_SHARE * cone)
+
+
 class Facing(NamedTuple):
     """How the faces of two bodies look at each other along a normal."""
 
@@ -144,8 +150,7 @@ def facing_of(a: Record, b: Record, nx: float, ny: float, table: Corners) -> Fac
     cosine = -ax * bx - ay * by
     rate = cosine if sine > 0.0 else -cosine
     cone = sides.cone_of(a, b, table)
-    flat = min(tolerances.FLAT, FLAT_SHARE * cone)
-    return Facing(interval, abs(sine) if cosine > 0.0 else 1.0, rate, flat, cone)
+    return Facing(interval, abs(sine) if cosine > 0.0 else 1.0, rate, flat_within(cone), cone)
 
 
 @rare_kernel

@@ -18,13 +18,13 @@ import numpy as np
 from blocksim.kernels.common.arrays import NO_FACE, NORMAL, SHEAR, Corners, Record, Records, World
 from blocksim.kernels.common.jit import kernel, rare_kernel
 from blocksim.kernels.common.tolerances import DEEPEST_END, END_RATIO, HAND_OVER, IMPACT_STEPS, SLIVER
-from blocksim.kernels.explicit import damping, kinematics, laws, sides
+from blocksim.kernels.explicit import bearing, damping, kinematics, laws, sides
 from blocksim.kernels.explicit.bearing import APART, PLANE, are_blocks, bearing_along, keep_bearing, stiffness_between
 from blocksim.kernels.explicit.contact import has_new_neighbours
 from blocksim.kernels.explicit.forces import NOTHING, Effect, Touch, forces_of
 from blocksim.kernels.explicit.models import SURFACE
 from blocksim.kernels.explicit.models.surface import can_touch, corner_seen, face_met, has_inner
-from blocksim.kernels.explicit.sliver_axes import flat_within, is_sliver, least_ratio, meets_along
+from blocksim.kernels.explicit.sliver_axes import is_sliver, least_ratio, meets_along
 
 FRONT_BITS = 4  # of PAIR.fronts for each of the first candidates, enough for the faces of a block
 FRONT = (1 << FRONT_BITS) - 1
@@ -173,7 +173,7 @@ def ends_in_sliver(contact: Record, a: Record, b: Record, found: kinematics.Poin
     along = y * nx - x * ny - side.middle
     end = side.half - abs(along)
     cone = sides.cone_of(a, b, table)
-    least = least_ratio(cone) * end * min(side.clear, flat_within(cone))
+    least = least_ratio(cone) * end * min(side.clear, bearing.flat_within(cone))
     if found.depth * (1.0 + SLIVER) <= least:
         return False
     number = slot if is_own else slot - sides.MOST_CORNERS
@@ -256,7 +256,7 @@ def has_crossed(world: World, p: int, a: Record, b: Record, table: Corners) -> b
     ahead = abs(side.nx * corner.ahead_x + side.ny * corner.ahead_y)
     back = abs(side.nx * corner.back_x + side.ny * corner.back_y)
     cone = sides.cone_of(a, b, table)
-    return min(ahead, back) > (flat_within(cone) if world.pairs[p].normal_left == 0 else cone)
+    return min(ahead, back) > (bearing.flat_within(cone) if world.pairs[p].normal_left == 0 else cone)
 
 
 CHANGED, UNTOUCHED, TOUCHING = range(3)
@@ -320,9 +320,7 @@ def has_changed(world: World, p: int, a: Record, b: Record, table: Corners) -> b
     Has the dashpots rebuilt where the number of pairs on a body has changed.
     """
     pair = world.pairs[p]
-    if pair.is_sliver != 0:
-        return True
-    if pair.duplicates != 0 and has_crossed(world, p, a, b, table):
+    if pair.is_sliver != 0 or (pair.duplicates != 0 and has_crossed(world, p, a, b, table)):
         return True
     if pair.idle > 0 and begins_contact(world, p, a, b, table):
         return True

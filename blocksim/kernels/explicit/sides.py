@@ -93,8 +93,6 @@ def corner_of(body: Record, table: Corners, number: int) -> Side:
 @kernel
 def cone_of(a: Record, b: Record, table: Corners) -> float:
     """Return the sine of the angle up to which faces of two bodies count as parallel; see world/bodies.py."""
-    if table is None:
-        return CONE_TOLERANCE
     cone: float = min(corner_of(a, table, 0).cone, corner_of(b, table, 0).cone)
     return cone
 
@@ -178,9 +176,8 @@ def face_before(body: Record, table: Corners, x: float, y: float, last: int, roo
 @kernel
 def gap_over(number: int, body: Record, other: Record, table: Corners) -> float:
     """Return the gap (m) between a face of a body and another body; from zero on they do not touch."""
-    side = corner_of(body, table, number)
-    nx, ny = into_world(body, side.nx, side.ny)
-    away = nx * (other.x - body.x) + ny * (other.y - body.y) - side.distance
+    nx, ny = side_normal(body, table, number)
+    away = nx * (other.x - body.x) + ny * (other.y - body.y) - corner_of(body, table, number).distance
     return away + reach_along(other, table, nx, ny)
 
 

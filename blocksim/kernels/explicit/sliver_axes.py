@@ -15,7 +15,7 @@ import numpy as np
 
 from blocksim.kernels.common.arrays import Corners, Record
 from blocksim.kernels.common.jit import kernel, rare_kernel
-from blocksim.kernels.common.tolerances import FLAT, SLIVER, TILTED
+from blocksim.kernels.common.tolerances import SLIVER, TILTED
 from blocksim.kernels.explicit import bearing, sides
 
 
@@ -171,12 +171,6 @@ def tilt_of(axis: Axis, across: int, a: Record, b: Record, table: Corners) -> Je
     return tilt_between(axis.face, across, a, b, table)
 
 
-@rare_kernel
-def flat_within(cone: float) -> float:
-    """Return the sine up to which faces are parallel."""
-    return min(FLAT, bearing.FLAT_SHARE * cone)
-
-
 @kernel
 def least_ratio(cone: float) -> float:
     """Return the overlap over the next one from where on tilted faces may have this potential."""
@@ -187,7 +181,7 @@ def least_ratio(cone: float) -> float:
 def is_short(nearest: Axis, across: int, a: Record, b: Record, table: Corners) -> bool:
     """Return True if another axis is about as deep as the nearest one; of parallel faces both are one."""
     cone = sides.cone_of(a, b, table)
-    if across >= 0 and tilt_of(nearest, across, a, b, table).value > flat_within(cone):
+    if across >= 0 and tilt_of(nearest, across, a, b, table).value > bearing.flat_within(cone):
         return nearest.depth > least_ratio(cone) * next_axis(nearest, -1, a, b, table).depth
     return nearest.depth > SLIVER * next_axis(nearest, across, a, b, table).depth
 
@@ -231,7 +225,7 @@ def meets_along(
     cos_back = nx * bx + ny * by
     is_ahead = cos_ahead < cos_back  # that face goes to the end of f where `along` is least
     sine = abs(nx * ay - ny * ax) if is_ahead else abs(nx * by - ny * bx)
-    if min(cos_ahead, cos_back) > 0.0 or sine > 0.5 * min(FLAT, bearing.FLAT_SHARE * min(side.cone, ahead.cone)):
+    if min(cos_ahead, cos_back) > 0.0 or sine > 0.5 * bearing.flat_within(min(side.cone, ahead.cone)):
         return False
     place = along if is_ahead else -along
     length = 2.0 * (ahead.half if is_ahead else back.half)

@@ -48,7 +48,7 @@ from blocksim.kernels.common import tolerances
 from blocksim.kernels.common.arrays import Corners, Record, World
 from blocksim.kernels.common.jit import rare_kernel
 from blocksim.kernels.explicit import sides
-from blocksim.kernels.explicit.bearing import are_blocks, face_per_length
+from blocksim.kernels.explicit.bearing import are_blocks, face_per_length, flat_within
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.laws import stored_energy
 from blocksim.kernels.explicit.sliver_axes import (
@@ -59,7 +59,6 @@ from blocksim.kernels.explicit.sliver_axes import (
     axis_of,
     cosine_of,
     face_across,
-    flat_within,
     is_short,
     mapped,
     nearest_axis,

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.tolerances import HAND_OVER
+from blocksim.kernels.explicit.bearing import flat_within
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import renew_dashpots
 from blocksim.kernels.explicit.models.surface import near_slots
 from blocksim.kernels.explicit.sides import cone_of
-from blocksim.kernels.explicit.sliver_axes import flat_within
 from blocksim.verification.scene import CaseScene
 
 if TYPE_CHECKING:
