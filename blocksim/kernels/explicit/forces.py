@@ -56,7 +56,6 @@ class Grip(NamedTuple):
     limit: float  # N, Coulomb's, or any bound between that and the force of the spring
     slides: bool
     friction: float  # J, lost
-    before: float  # m, overlap in the step before
 
 
 @kernel
@@ -65,24 +64,20 @@ def grip_of(
     point: kinematics.Point,
     values: Record,
     force: float,
-    k: float,
-    old: float,
-    exponent: float,
+    spring: laws.Spring,
+    old: laws.Spring,
     lasts: bool,
 ) -> Grip:
     """Return how a contact holds, given spring and dashpot force (N) along its normal; `contact` is what it was.
 
-    `k` and `old` are its stiffness now and in the step before (N/m^n); `lasts` says that they are the same, and the
-    slope of the force with them.
+    `spring` and `old` are that along its normal now and in the step before; `lasts` says that the slope is the same.
     """
     normal = max(force, 0.0)
-    before = contact.depth
-    stiffness = values.shear_ratio * laws.tangent_stiffness(exponent, k, point.depth)
-    last = values.shear_ratio * laws.tangent_stiffness(exponent, old, before)
+    stiffness, last = values.shear_ratio * spring.slope, values.shear_ratio * old.slope
     drawn, limit, slides, rubbed = friction.draw_lasting_spring(
         values, stiffness, last, contact.spring, point.slip, point.drawn, normal, point.slip_rate, lasts
     )
-    return Grip(normal, drawn, stiffness, last, stiffness * drawn, limit, slides, rubbed, before)
+    return Grip(normal, drawn, stiffness, last, stiffness * drawn, limit, slides, rubbed)
 
 
 @kernel
@@ -98,11 +93,10 @@ def shear_of(point: kinematics.Point, values: Record, grip: Grip, force: float) 
 
 @kernel
 def keep(
-    contact: Record, point: kinematics.Point, grip: Grip, shear: float, k: float, old: float, exponent: float
+    contact: Record, point: kinematics.Point, grip: Grip, shear: float, spring: laws.Spring, old: laws.Spring
 ) -> float:
     """Write what a contact remembers; return what dashpots, cone and not pulling took in the last drift (2 J)."""
-    normal = contact.normal_force - laws.elastic_force(exponent, old, grip.before)
-    normal += grip.normal - laws.elastic_force(exponent, k, point.depth)
+    normal = contact.normal_force - old.force + (grip.normal - spring.force)
     along = contact.shear_force - grip.last * contact.spring + (shear - grip.elastic)
     contact.spring = grip.drawn
     contact.depth = point.depth
@@ -113,14 +107,15 @@ def keep(
 
 @kernel
 def wrench_of(
-    pair: Record, point: kinematics.Point, normal: float, shear: float, exponent: float
+    pair: Record, point: kinematics.Point, normal: float, shear: float, exponent: float, grown: float
 ) -> tuple[float, float, float]:
     """Return the force (N) of a contact on body a and its torque (N m) about the centre of b.
 
     `shear` (N) is the resistance to slip of a ahead of b, along the tangent (-ny, nx). To it comes what a change of the
-    stiffness by sliding does (bearing.py); what one by turning does is a couple, which is not in here.
+    stiffness by sliding does (bearing.py); what one by turning does is a couple, which is not in here. `grown` is the
+    growth (m^(n-1)) of the spring.
     """
-    along = shear + laws.stored_energy(exponent, pair.slide, point.depth)
+    along = shear + laws.energy_of(exponent, pair.slide, point.depth, grown)
     fx = point.nx * normal + point.ny * along
     fy = point.ny * normal - point.nx * along
     return fx, fy, point.x * fy - point.y * fx
@@ -248,23 +243,23 @@ def forces_of(
         k_2 = two.share * history.stiffness_of_pair(pair, values, particles)
         old_1 = history.stiffness_before(first, before, values, particles)
         old_2 = history.stiffness_before(second, before, values, particles)
-    force_1 = laws.elastic_force(exponent, k_1, one.depth)
-    force_2 = laws.elastic_force(exponent, k_2, two.depth) if is_two else 0.0
+    spring_1, was_1 = laws.spring_at(exponent, k_1, one.depth), laws.spring_at(exponent, old_1, first.depth)
+    spring_2 = laws.spring_at(exponent, k_2, two.depth) if is_two else spring_1
+    was_2 = laws.spring_at(exponent, old_2, second.depth) if is_two else was_1
+    force_1, force_2 = spring_1.force, spring_2.force if is_two else 0.0
     is_steady = lasts or exponent == laws.LINEAR or (is_kept(first, one) and (not is_two or is_kept(second, two)))
     if lasts or values.normal_damping > 0.0:
         if lasts:
             pair.normal_left -= 1
         else:
-            slope_1 = laws.tangent_stiffness(exponent, k_1, one.depth)
-            slope_2 = laws.tangent_stiffness(exponent, k_2, two.depth)
-            pattern = damping.BOTH if is_two else 1
-            renew_operator(touch, one, two, is_two, NORMAL, pattern, slope_1, slope_2, shared, exponent, is_steady)
+            k_1, k_2, pattern = spring_1.slope, spring_2.slope, damping.BOTH if is_two else 1
+            renew_operator(touch, one, two, is_two, NORMAL, pattern, k_1, k_2, shared, exponent, is_steady)
         before_2 = second.normal_force if is_two else 0.0
         force_1, force_2 = damping.damp(
             touch.normals, is_two, force_1, force_2, first.normal_force, before_2, one.closing_rate, two.closing_rate
         )
-    grip_1 = grip_of(first, one, values, force_1, k_1, old_1, exponent, lasts)
-    grip_2 = grip_of(second, two, values, force_2, k_2, old_2, exponent, lasts) if is_two else grip_1
+    grip_1 = grip_of(first, one, values, force_1, spring_1, was_1, lasts)
+    grip_2 = grip_of(second, two, values, force_2, spring_2, was_2, lasts) if is_two else grip_1
     sticking = (0 if grip_1.slides else 1) + (2 if is_two and not grip_2.slides else 0)
     free_1, free_2 = grip_1.elastic, grip_2.elastic
     if sticking == 0:
@@ -282,19 +277,19 @@ def forces_of(
             touch.tangents, is_two, free_1, free_2, first.shear_force, before_2, one.slip_rate, two.slip_rate
         )
     shear_1 = shear_of(one, values, grip_1, free_1)
-    fx, fy, torque = wrench_of(pair, one, grip_1.normal, shear_1, exponent)
+    fx, fy, torque = wrench_of(pair, one, grip_1.normal, shear_1, exponent, spring_1.growth)
     dashpot, rubbed = 0.0, grip_1.friction
     if is_two:
         shear_2 = shear_of(two, values, grip_2, free_2)
-        fx_2, fy_2, torque_2 = wrench_of(pair, two, grip_2.normal, shear_2, exponent)
+        fx_2, fy_2, torque_2 = wrench_of(pair, two, grip_2.normal, shear_2, exponent, spring_2.growth)
         fx, fy, torque = fx + fx_2, fy + fy_2, torque + torque_2
-        dashpot, rubbed = keep(second, two, grip_2, shear_2, k_2, old_2, exponent), rubbed + grip_2.friction
+        dashpot, rubbed = keep(second, two, grip_2, shear_2, spring_2, was_2), rubbed + grip_2.friction
     elif grip_1.normal > 0.0:
         damping.note_slip(pair, grip_1.slides or shear_1 != free_1, shear_1)
     if not (lasts and is_two):  # two that last are ends of parallel faces: no turn changes their stiffness
-        torque -= laws.stored_energy(exponent, pair.turn, one.depth)
-        torque -= laws.stored_energy(exponent, pair.turn, two.depth) if is_two else 0.0
-    dashpot += keep(first, one, grip_1, shear_1, k_1, old_1, exponent)
+        torque -= laws.energy_of(exponent, pair.turn, one.depth, spring_1.growth)
+        torque -= laws.energy_of(exponent, pair.turn, two.depth, spring_2.growth) if is_two else 0.0
+    dashpot += keep(first, one, grip_1, shear_1, spring_1, was_1)
     bearing.measure_soon(pair, one.slip, step * (touch.a.spin - touch.b.spin), exponent, table)
     return Effect(fx, fy, torque - (dx * fy - dy * fx), torque, 0.5 * dashpot, rubbed)
 
@@ -307,7 +302,8 @@ def forces_of_many(world: World, p: int, count: int, before: float, step: float,
     b = world.bodies[pair.b]
     values = world.interactions[a.contact_class, b.contact_class]
     exponent = world.controls[0].exponent
-    k = history.stiffness_of_pair(pair, values, world.particles)
+    particles = world.particles
+    k = history.stiffness_of_pair(pair, values, particles)
     for i in range(count):
         place = world.points[i]
         place.force = laws.elastic_force(exponent, place.share * k, place.depth)
@@ -318,10 +314,13 @@ def forces_of_many(world: World, p: int, count: int, before: float, step: float,
     for i in range(count):
         place = world.points[i]
         contact = world.contacts[p, i]
-        old = history.stiffness_before(contact, before, values, world.particles)
         place.push = place.force
         point = kinematics.point_of(place, b)
-        grip = grip_of(contact, point, values, place.push, place.share * k, old, exponent, False)
+        spring = laws.spring_at(exponent, place.share * k, place.depth)
+        was = laws.spring_at(
+            exponent, history.stiffness_before(contact, before, values, world.particles), contact.depth
+        )
+        grip = grip_of(contact, point, values, place.push, spring, was, False)
         place.force = grip.elastic
         place.stiffness = 0.0 if grip.slides else grip.stiffness
         place.before = contact.shear_force
@@ -331,13 +330,16 @@ def forces_of_many(world: World, p: int, count: int, before: float, step: float,
     for i in range(count):
         place = world.points[i]
         contact = world.contacts[p, i]
-        old = history.stiffness_before(contact, before, values, world.particles)
         point = kinematics.point_of(place, b)
-        grip = grip_of(contact, point, values, place.push, place.share * k, old, exponent, False)
+        spring = laws.spring_at(exponent, place.share * k, place.depth)
+        was = laws.spring_at(
+            exponent, history.stiffness_before(contact, before, values, world.particles), contact.depth
+        )
+        grip = grip_of(contact, point, values, place.push, spring, was, False)
         shear = shear_of(point, values, grip, place.force)
-        more_x, more_y, turn = wrench_of(pair, point, grip.normal, shear, exponent)
+        more_x, more_y, turn = wrench_of(pair, point, grip.normal, shear, exponent, spring.growth)
         fx, fy, torque = fx + more_x, fy + more_y, torque + turn
-        dashpot += keep(contact, point, grip, shear, place.share * k, old, exponent)
+        dashpot += keep(contact, point, grip, shear, spring, was)
         rubbed += grip.friction
     torque_a = torque - ((a.x - b.x) * fy - (a.y - b.y) * fx)
     return Effect(fx, fy, torque_a, torque, 0.5 * dashpot, rubbed)

@@ -169,14 +169,7 @@ def add_touching(world: World, p: int) -> None:
 
 @rare_kernel
 def add_coming_corners(
-    block: Record,
-    base: Record,
-    is_ground: bool,
-    nx: float,
-    ny: float,
-    reach: float,
-    stiffness: float,
-    table: Corners,
+    block: Record, base: Record, is_ground: bool, nx: float, ny: float, reach: float, stiffness: float, table: Corners
 ) -> None:
     """Add the corners of a block within a reach (m) above the ground or a piece of it; (nx, ny) is its normal."""
     below = 0.0 if is_ground else base.half_y

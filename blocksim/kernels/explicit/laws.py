@@ -4,6 +4,7 @@ What happens to the shear spring while the overlap changes is written in kernels
 """
 
 import math
+from typing import NamedTuple
 
 from blocksim.kernels.common.jit import kernel
 
@@ -18,22 +19,43 @@ def growth(exponent: float, depth: float) -> float:
     return math.sqrt(depth) if exponent == HERTZ_MINDLIN else depth ** (exponent - 1.0)
 
 
+class Spring(NamedTuple):
+    """The normal spring of a contact at some overlap."""
+
+    force: float  # N
+    slope: float  # N/m, of the force
+    growth: float  # m^(n-1), d^(n-1)
+
+
+@kernel
+def spring_at(exponent: float, stiffness: float, depth: float) -> Spring:
+    """Return the normal spring at an overlap (m), with one power for all that follows from it."""
+    grown = growth(exponent, depth)
+    return Spring(stiffness * depth * grown, exponent * stiffness * grown, grown)
+
+
 @kernel
 def elastic_force(exponent: float, stiffness: float, depth: float) -> float:
     """Return the normal spring force (N) at an overlap (m): K d^n."""
-    return stiffness * depth * growth(exponent, depth)
+    return spring_at(exponent, stiffness, depth).force
 
 
 @kernel
 def tangent_stiffness(exponent: float, stiffness: float, depth: float) -> float:
     """Return the slope of the normal spring force (N/m) at an overlap (m): n K d^(n-1)."""
-    return exponent * stiffness * growth(exponent, depth)
+    return spring_at(exponent, stiffness, depth).slope
 
 
 @kernel
 def stored_energy(exponent: float, stiffness: float, depth: float) -> float:
     """Return the energy (J) stored in the normal spring at an overlap (m): K d^(n+1)/(n+1)."""
-    return stiffness * depth * depth * growth(exponent, depth) / (exponent + 1.0)
+    return energy_of(exponent, stiffness, depth, growth(exponent, depth))
+
+
+@kernel
+def energy_of(exponent: float, stiffness: float, depth: float, grown: float) -> float:
+    """As stored_energy, given d^(n-1) (m^(n-1)) as well."""
+    return stiffness * depth * depth * (grown / (exponent + 1.0))
 
 
 @kernel

@@ -110,22 +110,16 @@ def keep(action: Record, effect: Effect, touches: bool) -> None:
 
 
 @rare_kernel
-def ask_for_sums(world: World, pair: Record) -> None:
-    """Have the sums of the bodies of a pair recomputed, of the second one only where it is of the share."""
-    world.bodies[pair.a].is_asked = 1
-    if not pair.is_between:
-        world.bodies[pair.b].is_asked = 1
-
-
-@rare_kernel
 def add_kept(world: World, pair: Record, action: Record, tally: Record) -> tuple[float, float]:
     """Add what a pair does to the totals of its bodies; to those of the second one only where it is of the share.
 
     Losses of changed contacts are tallied at once, others are returned (J, to dashpots and friction): which, must
     not depend on who evaluates a pair, since a sum in another order has other bits.
     """
-    if action.asks:
-        ask_for_sums(world, pair)
+    if action.asks:  # for sums made anew
+        world.bodies[pair.a].is_asked = 1
+        if not pair.is_between:
+            world.bodies[pair.b].is_asked = 1
     if action.touches:
         add_to_first(world.bodies[pair.a], action.fx, action.fy, action.torque_a)
         if not pair.is_between:

@@ -319,7 +319,7 @@ def advance_thread(
     return close_call(world, k)
 
 
-@jit.kernel
+@jit.rare_kernel
 def advance_single(world: arrays.World, last_step: int) -> int:
     """Step a world with one thread; see advance."""
     world.team[arrays.TEAM_SIZE] = 1
@@ -365,12 +365,6 @@ def advance_coupled_in_team(scene: Coupled, last_step: int, k: int) -> int:
     return advance_thread(scene.world, last_step, k, scene.world.team, scene.systems)
 
 
-@jit.rare_kernel
-def advance_member(world: arrays.World, last_step: int) -> int:
-    """Step one member; see advance."""
-    return advance_single(world, last_step)
-
-
 @jit.entry_kernel
 def advance_members(
     worlds: arrays.World,
@@ -389,13 +383,13 @@ def advance_members(
     """
     for m in members:
         world = member(worlds, m)
-        codes[m] = advance_member(world, 0)
+        codes[m] = advance_single(world, 0)
         if codes[m] != arrays.PAIRS_FULL:
             measure(world, starts[m])
         clock = world.clock[0]
         while codes[m] == arrays.REACHED and clock.steps < last_steps[m]:
             frame = frame_to_watch(watched, m, clock.steps)
             stop = min(frame, last_steps[m]) if frame > 0 else last_steps[m]
-            codes[m] = advance_member(world, stop)
+            codes[m] = advance_single(world, stop)
             if clock.steps == frame:
                 watch(world.bodies, watched, m, frame)

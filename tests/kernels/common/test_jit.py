@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 PACKAGE = Path(jit.__file__).parents[2]
 SCENARIO = Path(__file__).parents[3] / "scenarios" / "three_blocks.toml"
 
-# a kernel of forces.py, which knows the law in laws.py by an import only
+# a kernel of history.py, which knows the law in laws.py by an import only
 PUSH = """
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.arrays import CONTACT, INTERACTION, zeros
-from blocksim.kernels.explicit.forces import grip_of
-from blocksim.kernels.explicit.kinematics import Point
+from blocksim.kernels.explicit.history import shear_stiffness_before
 
-point = Point(0.0, 0.0, 0.0, 1.0, 2e-6, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+contact = zeros(1, CONTACT)[0]
+contact.depth = 2e-6
 values = zeros(1, INTERACTION)[0]
 values.shear_ratio = 1.0
-grip = grip_of(zeros(1, CONTACT)[0], point, values, 0.0, 1e9, 1e9, 1.0, True)
-stats = grip_of.for_python.stats
+stiffness = shear_stiffness_before(contact, 1e9, values, 1.0)
+stats = shear_stiffness_before.for_python.stats
 hits, misses = (sum(counts.values()) for counts in (stats.cache_hits, stats.cache_misses))
-print(2e-6 * grip.stiffness, hits, misses, jit.cache_folder())
+print(2e-6 * stiffness, hits, misses, jit.cache_folder())
 """
 
 COLLAPSE = """
@@ -100,7 +100,7 @@ def test_second_process_takes_kernels_from_the_cache_until_a_law_in_another_file
     assert first[3].startswith(str(tmp_path / "cache"))
     assert float(first[0]) == float(second[0]) == pytest.approx(2e3)
     law = copied_kernels / "blocksim" / "kernels" / "explicit" / "laws.py"
-    law.write_text(law.read_text().replace("return exponent * stiffness", "return 3.0 * exponent * stiffness"))
+    law.write_text(law.read_text().replace("exponent * stiffness *", "3.0 * exponent * stiffness *"))
     assert float(run()[0]) == pytest.approx(6e3)
 
 

@@ -11,7 +11,7 @@ from blocksim.kernels.common.arrays import CONTACT, INTERACTION, zeros
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.forces import grip_of, keep
 from blocksim.kernels.explicit.kinematics import Point
-from blocksim.kernels.explicit.laws import LINEAR
+from blocksim.kernels.explicit.laws import LINEAR, spring_at
 from blocksim.kernels.explicit.persistent_forces import TOUCHING, persistent_forces
 from blocksim.verification.scene import HEIGHT, WIDTH
 
@@ -25,8 +25,9 @@ def pushed(force: float, closing: float) -> tuple[float, float]:
     """Return the force that is left of spring (5 N) and dashpot, and what has been lost (J); none was before."""
     point = Point(0.0, 0.0, 0.0, 1.0, 1e-6, closing, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
     contact, values = zeros(1, CONTACT)[0], zeros(1, INTERACTION)[0]
-    grip = grip_of(contact, point, values, force, 5e6, 5e6, LINEAR, True)
-    lost = 0.5 * keep(contact, point, grip, 0.0, 5e6, 5e6, LINEAR)
+    spring, before = spring_at(LINEAR, 5e6, 1e-6), spring_at(LINEAR, 5e6, 0.0)
+    grip = grip_of(contact, point, values, force, spring, before, True)
+    lost = 0.5 * keep(contact, point, grip, 0.0, spring, before)
     assert contact.normal_force == grip.normal
     return grip.normal, lost
 

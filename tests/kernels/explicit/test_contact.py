@@ -15,7 +15,7 @@ from blocksim.kernels.explicit.contact import has_new_neighbours, pair_forces, s
 from blocksim.kernels.explicit.damping import BOTH, damp
 from blocksim.kernels.explicit.forces import Touch, grip_of, renew_operator, shear_of
 from blocksim.kernels.explicit.kinematics import point_of, resolve_point
-from blocksim.kernels.explicit.laws import LINEAR
+from blocksim.kernels.explicit.laws import LINEAR, spring_at
 from blocksim.kernels.explicit.models import KERNEL, PARTICLES, SURFACE
 from tests.kernels.conftest import dashpots_by_definition, delassus
 
@@ -223,8 +223,8 @@ def test_point_slides_where_its_spring_alone_exceeds_the_limit(pose: Pose) -> No
     values, contact, b = world.interactions[1, 1], world.contacts[0, 0], world.bodies[1]
     world.points[0].slipping = 1e-9
     point = point_of(world.points[0], b)
-    stiffness = float(values.shear_ratio) * K
-    sticks, slides = (grip_of(contact, point, values, force, K, K, LINEAR, True) for force in (100.0, 1e-3))
+    stiffness, spring = float(values.shear_ratio) * K, spring_at(LINEAR, K, 1e-6)
+    sticks, slides = (grip_of(contact, point, values, force, spring, spring, True) for force in (100.0, 1e-3))
     assert [sticks.slides, slides.slides] == [False, True]
     assert [sticks.elastic, slides.elastic] == pytest.approx([stiffness * 1e-9, slides.limit])
     assert shear_of(point, values, slides, 1e9) == slides.elastic
