@@ -270,12 +270,9 @@ def _finite(frames: Frames) -> Indices:
 
 
 def _corners_of(track: Track) -> NDArray[np.int64]:
-    """Return how many corners each element has."""
-    outlines = track.present.elements.outlines
-    if outlines is None:
-        count = track.system.outlines(track, np.zeros(1, dtype=np.intp)).shape[2]
-        return np.full(len(track.names), count, dtype=np.int64)
-    return np.asarray(1 + (outlines[:, 1:] != outlines[:, :-1]).any(axis=-1).sum(axis=1), dtype=np.int64)
+    """Return how many corners each element has, in a table with the last one of some repeated."""
+    corners = track.system.outlines(track, np.zeros(1, dtype=np.intp))[0]
+    return np.asarray(1 + (corners[:, 1:] != corners[:, :-1]).any(axis=-1).sum(axis=1), dtype=np.int64)
 
 
 def _cell_data(track: Track, name: str, some: Indices) -> Floats:
