@@ -61,6 +61,13 @@ def test_tables(blocksim: Command, golden: Golden, line: str) -> None:
     golden(f"exit code {answer.code}\n{answer.out}{answer.err}")
 
 
+@pytest.mark.usefixtures("place")
+def test_one_run_outside_is_enough_whatever_comes_after(blocksim: Command) -> None:
+    shutil.copytree("run", "inside")
+    shutil.copy("wide.csv", "inside/experiment.csv")
+    assert [blocksim("compare", *runs.split()).code for runs in ("inside", "run inside", "inside run")] == [0, 1, 1]
+
+
 def test_json_is_a_list_with_an_entry_a_run(blocksim: Command, finished: Path) -> None:
     answer = blocksim("compare", finished, finished, "--json")
     data = json.loads(answer.out)

@@ -39,6 +39,14 @@ def test_cost_grows_with_cases_and_steps(blocksim: Command) -> None:
     assert 1.9 < seconds("--vary", "time.end=4") / one < 2.1
 
 
+def test_twice_the_cores_take_half_the_time(blocksim: Command) -> None:
+    def solving(jobs: int) -> str:
+        return blocksim(*PLAN, "--jobs", jobs, "--vary", "time.end=2,4").out.splitlines()[1]
+
+    assert solving(1).endswith(" on 1 core")
+    assert solving(1).removesuffix(" on 1 core") != solving(8).removesuffix(" on 8 cores")
+
+
 def test_models_of_particles_cost_what_was_measured(blocksim: Command) -> None:
     # measured for three blocks with 164 particles each, over the exact faces: kernel 30, particles 20
     def seconds(model: str) -> float:

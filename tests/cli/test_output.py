@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.cli.output import note, number, print_json, table_lines
+from blocksim.cli.output import answer, duration, note, number, print_json, table_lines
 from blocksim.cli.prepare import announce_compilation
 from blocksim.simulation import schemes
 
@@ -57,3 +57,15 @@ def test_compiled_solver_that_cannot_be_kept_is_reported(
     announce_compilation("surface", quiet=False)
     told = capsys.readouterr().err.splitlines()
     assert told[-1].startswith("/disk/blocksim/0123: the compiled solver cannot be stored there; free some space")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(119.0, "119.0 s"), (150.0, "2.5 min"), (9000.0, "2.5 h"), (216000.0, "2.5 days")]
+)
+def test_duration_has_the_largest_unit_of_which_there_are_two(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_answer_does_not_steer_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    answer("a\x1b[2Jb")
+    assert capsys.readouterr().out == "a\ufffd[2Jb\n"

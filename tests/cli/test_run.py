@@ -5,9 +5,11 @@ import os
 import re
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from blocksim.cli.run import _answer_lines
 from blocksim.simulation.files import folder_lock
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
@@ -167,6 +169,18 @@ def test_largest_movement_outcome_and_first_mover_are_reported(blocksim: Command
     assert "(block block)\nfirst to move: block block at 0.001 s" in answer.err  # 0.5 m/s past a hundredth of 25 mm
     movement = json.loads(Path("slid/run.json").read_text())["movement"]
     assert (movement["outcome"], movement["first_mover"]) == ("slid", "block")
+
+
+def test_block_that_is_fast_at_the_end_is_told(blocksim: Command) -> None:
+    answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--set", "time.end=0.02")
+    assert "not at rest: block block at 0." in answer.err
+
+
+def test_long_table_tells_how_many_blocks_it_leaves_out() -> None:
+    columns: dict[str, list[object]] = {"block": [*map(str, range(41))]}
+    columns |= dict.fromkeys(("x_mm", "y_mm", "rotation_deg"), [0.0] * 41)
+    lines = _answer_lines(SimpleNamespace(experiment=None, columns=columns, endings={}))  # type: ignore[arg-type]
+    assert (len(lines), lines[-1]) == (2 + 10 + 1, "... and 31 more blocks in final.csv")
 
 
 def test_frames_closer_than_a_step_are_warned_of(blocksim: Command) -> None:
