@@ -50,3 +50,10 @@ def test_contacts_get_a_file_beside_where_they_are_stored(blocksim: Command, tmp
         assert answer.code == 0
         assert told in answer.err
         assert f"file: all_contacts.vtkhdf ({told.partition('(')[2]}{len(rows)} contacts)" in answer.err
+
+
+def test_file_of_the_run_is_not_overwritten(blocksim: Command, copied: Path) -> None:
+    before = (copied / "final.csv").read_bytes()
+    answer = blocksim("export", copied, "--out", copied / "final.csv", "--overwrite")
+    assert (answer.code, "belongs to the run" in answer.err) == (73, True)
+    assert (copied / "final.csv").read_bytes() == before

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from blocksim.cli import progress
-from blocksim.cli.progress import case_progress, count_progress
+from blocksim.cli.progress import case_progress, cell_text, count_progress
 from blocksim.study.rows import Head
 from tests.cli.conftest import Command
 
@@ -49,3 +49,17 @@ def test_animate_counts_its_pictures_on_a_terminal(blocksim: Command, finished: 
     answer = blocksim("animate", finished, "--speed", "1", "--fps", "10", "--width", "240")
     assert answer.code == 0
     assert " frames" in terminal.getvalue()
+
+
+def test_many_cases_are_told_with_their_pace_their_failures_and_the_time_left(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = iter([0.0, 100.0, 100.0, 101.0])
+    monkeypatch.setattr("blocksim.cli.progress.time.monotonic", lambda: next(now, 101.0))
+    with case_progress([Head("gravity")], quiet=False) as on_row:
+        on_row(10, 1000, {"status": "failed", "gravity": 9.81})
+    assert capsys.readouterr().err == "10/1000 cases, 1 failed, 0.01 a second, 99000 s left\n"
+
+
+def test_cells_are_told_in_words() -> None:
+    assert [cell_text(one) for one in (True, False, 0.1, float("nan"), "slid")] == ["yes", "no", "0.1", "–", "slid"]

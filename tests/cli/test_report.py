@@ -34,7 +34,7 @@ def test_report_of_a_run_is_written_and_told(blocksim: Command, tmp_path: Path) 
     write_run(tmp_path / "run")
     answer = blocksim("report", "run")
     assert (answer.code, answer.out) == (0, "")
-    assert answer.err.startswith("report: report.html (")
+    assert answer.err.startswith(f"report: report.html ({Path('report.html').stat().st_size / 1e6:.1f} MB)")
     text = REPORT.read_text(encoding="utf-8")
     for part in ("Comparison with the measurement", "Energy ledger (J)", "Resolved scenario", "Provenance", "Keys"):
         assert part in text

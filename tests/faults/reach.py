@@ -12,7 +12,7 @@ import json
 import os
 import sys
 import tempfile
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -102,12 +102,19 @@ def size(test: str) -> int:
 def nearest(file: str, line: int) -> list[str]:
     """Return the tests that reach a line, those of its room first, and of them those that reach least.
 
-    A line that runs at import is reached by the tests that reach another line of its file.
+    A function that has reached it with one parameter comes again after all others have. A line that runs at import is
+    reached by the tests that reach another line of its file.
     """
     tests = [one for one in reach() if "::" in one and file in reach()[one]]
-    room = file.split("/")[1]
+    room = f"tests/{file.split('/')[1]}/"
     found = [one for one in tests if line in reach()[one][file]] or tests
-    return sorted(found, key=lambda one: (f"tests/{room}/" not in one, size(one), one))
+    rounds: Counter[str] = Counter()
+    ranked = []
+    for test in sorted(found, key=lambda one: (size(one), one)):
+        function = test.partition("[")[0]
+        ranked.append((room not in test, rounds[function], size(test), test))
+        rounds[function] += 1
+    return [test for *_, test in sorted(ranked)]
 
 
 def part_of(every: Sequence[T], part: str) -> Sequence[T]:

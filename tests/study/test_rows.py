@@ -11,7 +11,7 @@ from blocksim.analysis.experiment import load_table
 from blocksim.scenario import Document
 from blocksim.study.pictures import read_sweep_data
 from blocksim.study.plan import Values, with_sweep
-from blocksim.study.rows import Head, Ranges, heads_of
+from blocksim.study.rows import Head, Range, Ranges, heads_of
 from blocksim.study.sweep import sweep
 from blocksim.study.verify import verify_sweep
 from tests.study.conftest import SCENARIOS
@@ -103,3 +103,8 @@ def test_block_without_a_position_is_not_inside(tmp_path: Path, value: float | N
     assert ranges.hold({"1.x_mm": 16.2})
     assert not ranges.hold({"1.x_mm": value})
     assert not ranges.hold({})
+
+
+def test_both_ends_of_a_measured_range_are_inside() -> None:
+    measured = Range("1", "x_mm", 1.0, 2.0)
+    assert [measured.holds(value) for value in (0.9, 1.0, 2.0, 2.1)] == [False, True, True, False]

@@ -20,6 +20,10 @@ ONE = Input("gravity", "", np.array([3.0, 1.0, 2.0]))
         (made_up((GRAVITY, RESTITUTION)), {f"contact.restitution = {e}": [1.0, 5.0, 9.81] for e in (0.1, 0.5)}),
         (made_up((GRAVITY, RESTITUTION), "list"), {"": [1.0, 1.0, 5.0, 5.0, 9.81, 9.81]}),  # go together
         (made_up((ONE,), failed=1), {"": [1.0, 2.0]}),
+        (
+            made_up((GRAVITY, RESTITUTION), failed=1),
+            {"contact.restitution = 0.1": [1.0, 5.0], "contact.restitution = 0.5": [1.0, 5.0, 9.81]},
+        ),
     ],
 )
 def test_each_value_of_a_second_key_has_a_series_in_the_order_of_the_first(

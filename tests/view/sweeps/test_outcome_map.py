@@ -30,6 +30,12 @@ def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
     assert [axis.is_log for axis in found.axes] == [False, True]
 
 
+def test_case_that_failed_has_a_class_of_its_own() -> None:
+    found = classes_of(made_up(grid(), failed=1))
+    assert found.numbers[0] == found.numbers.max() == len(found.labels) - 1
+    assert found.labels[-1].startswith("failed")
+
+
 def test_cells_that_were_not_run_stay_empty() -> None:
     friction, scale = grid()
     cut = tuple(Input(one.key, one.unit, one.values[:-1]) for one in (friction, scale))
