@@ -194,7 +194,7 @@ def main(arguments: Sequence[str]) -> int:
         for done in as_completed(waiting):
             line = done.result()
             say(line)
-            MATRIX.write_text("\n".join(sorted([*_kept(), line])) + "\n", encoding="utf-8")
+            MATRIX.write_text("\n".join(sorted({*_kept(), line})) + "\n", encoding="utf-8")
     return 1 if any(one.endswith("not looked at") for one in _kept()) else 0
 
 

@@ -1,5 +1,6 @@
 """The picture of a fragility study: its axis, and that counts without a curve can be drawn."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,13 @@ def test_counts_are_drawn_with_a_curve_and_without(tmp_path: Path, *, with_curve
     text = (tmp_path / "one.svg").read_text()
     assert text == (tmp_path / "two.svg").read_text()
     assert ("lognormal curve" in text) == with_curve
+
+
+def test_probability_goes_to_one_where_few_samples_fail(tmp_path: Path) -> None:
+    found = made_up(with_curve=False)
+    few = replace(found, share=0.1 * found.share, low=0.0 * found.low, high=0.1 + 0.1 * found.share)
+    draw_fragility(few, tmp_path / "few.svg", "A study")
+    assert "<!-- 1.0 -->" in (tmp_path / "few.svg").read_text()
 
 
 def test_a_page_without_room_is_refused(tmp_path: Path) -> None:
