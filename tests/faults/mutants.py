@@ -103,14 +103,12 @@ def nodes(tree: ast.AST, *, inside: bool = False) -> Iterator[ast.AST]:
     """Yield the nodes of all functions; no annotations, no text, and nothing that runs at import."""
     for name, field in ast.iter_fields(tree):
         for child in field if isinstance(field, list) else [field]:
-            if name in {"annotation", "returns", "decorator_list"} or not isinstance(child, ast.AST):
+            if not isinstance(child, ast.AST) or isinstance(child, ast.JoinedStr):
                 continue
-            if isinstance(child, ast.JoinedStr):
-                continue
-            if inside:
-                yield child
-            within = isinstance(tree, ast.FunctionDef) and name == "body"
-            yield from nodes(child, inside=inside or within)
+            if name not in {"annotation", "returns", "decorator_list"}:
+                if inside:
+                    yield child
+                yield from nodes(child, inside=inside or (isinstance(tree, ast.FunctionDef) and name == "body"))
 
 
 def mutants_of(path: Path) -> list[Mutant]:

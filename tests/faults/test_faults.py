@@ -13,6 +13,7 @@ import pytest
 
 from tests.faults import run
 from tests.faults.faults import HERE, ROOT, Fault, Finding, Verdict, faults_in, faults_of_tolerances
+from tests.faults.mutants import sample
 
 FAULTS = [*faults_in(HERE), *faults_of_tolerances()]
 EXAMPLE = Fault("a name", "blocksim/errors.py", "USAGE = 2", "USAGE = 3", ("tests/test_locked.py",))
@@ -36,6 +37,15 @@ def test_faults_have_names_of_their_own_and_tests_that_there_are() -> None:
         for test in fault.tests:
             path, _, name = test.partition("::")
             assert f"def {name.partition('[')[0]}(" in (ROOT / path).read_text(encoding="utf-8"), test
+
+
+def test_mutants_are_other_sources_that_python_can_read() -> None:
+    for mutant in sample(30, 1):
+        fault = mutant.as_fault()
+        source = (ROOT / fault.file).read_text(encoding="utf-8")
+        changed = ast.parse(source.replace(fault.text, fault.replacement))
+        assert not fault.is_stale
+        assert ast.dump(changed) != ast.dump(ast.parse(source)), fault.name
 
 
 def test_fault_is_in_the_module_and_not_on_the_disk() -> None:
