@@ -6,6 +6,7 @@ from pydantic_core import PydanticCustomError
 
 from blocksim.scenario.geometry import edge_distance
 from blocksim.scenario.models.base import OneOf, Whole
+from blocksim.scenario.models.timeline import NewVelocity
 
 
 @pytest.mark.parametrize("value", [True, 1.0, "2", 0, 6])
@@ -24,3 +25,8 @@ def test_word_is_one_of_those_that_are_available(value: object) -> None:
 def test_distance_from_an_edge_is_that_from_its_end_beyond_it() -> None:
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     assert edge_distance(np.array([[3.0, 0.5], [0.5, 0.25], [4.0, 5.0]]), square) == pytest.approx([2.0, 0.25, 5.0])
+
+
+@pytest.mark.parametrize("key", ["vx", "vy", "spin"])
+def test_velocity_of_an_event_may_be_one_component_alone(key: str) -> None:
+    assert getattr(NewVelocity.model_validate({"body": "1", key: 0.5}), key) == 0.5
