@@ -55,15 +55,10 @@ def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str,
     if body.fixed:
         yield Mistake((*path, "body"), f"body {toml(load.body)} is fixed; a load has no effect on it")
     elif isinstance(load, Force):
-        half = (0.5 * body.size_x, 0.5 * body.size_y)
-        if body.outline:
-            is_inside = geometry.holds(body.outline, load.point, 0.5 * STRIP * body.least_width)
-        else:
-            is_inside = all(abs(at) <= side * (1.0 + STRIP) for at, side in zip(load.point, half, strict=True))
-        if not is_inside:
-            size = f"{1e3 * body.size_x:g} x {1e3 * body.size_y:g} mm"
-            about = f"an outline in a box of {size}" if body.outline else f"{size} about its centre"
-            yield Mistake((*path, "point"), f"the point lies outside of body {toml(load.body)}, {about}")
+        if not geometry.holds(body.corners, load.point, 0.5 * STRIP * body.least_width):
+            (left, bottom), (right, top) = ((1e3 * x, 1e3 * y) for x, y in geometry.box_of(body.corners))
+            extent = f"which extends from ({left:g}, {bottom:g}) to ({right:g}, {top:g}) mm along its own axes"
+            yield Mistake((*path, "point"), f"the point lies outside of body {toml(load.body)}, {extent}")
     elif isinstance(load, Pressure) and face_of(body, load.face) is None:
         message = f"the outline of body {toml(load.body)} has no face whose normal points exactly that way"
         yield Mistake((*path, "face"), message)

@@ -96,10 +96,8 @@ def member_ends(
     steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
     time_steps: list[float] = world.controls["step"][:, 0].tolist()
     seconds = [float(steps[m, 0]) * time_steps[m] for m in range(count)]
-    sides = np.array([(one.size_x, one.size_y, one.angle) for one in bodies]).reshape(count, -1, 3).swapaxes(1, 2)
-    corners = blocks.outlines_of(bodies)  # (m, b, k, 2); None where all are rectangles
-    corners = None if corners is None else corners.reshape(count, -1, *corners.shape[1:])
-    tables = trajectory.final_values(motion, sides, corners).tolist()
+    angles, corners = np.array([one.angle for one in bodies]).reshape(count, -1), blocks.corners_of(bodies)
+    tables = trajectory.final_values(motion, corners.reshape(*angles.shape, *corners.shape[1:]), angles).tolist()
     support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
     in_rows = [name for name, one in OBSERVABLES.items() if one.in_rows]
     observables = observe(watch.ends(motion, support, seconds, turned), in_rows)

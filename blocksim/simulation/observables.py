@@ -112,12 +112,9 @@ class BlockLengths(NamedTuple):
     def of(cls, placed: Sequence[Sequence[PlacedBody]]) -> "BlockLengths":
         """Return those of scenes with the same number of blocks."""
         bodies = [body for scene in placed for body in scene]
-        sides = np.array([(body.size_x, body.size_y) for body in bodies], dtype=np.float64).reshape(-1, 2)
         is_free = np.array([not body.fixed or body.freed for body in bodies], dtype=np.bool_)
-        shortest, reach = sides.min(axis=1), 0.5 * np.hypot(*sides.T)
-        for number, body in enumerate(bodies):
-            if body.outline:
-                shortest[number], reach[number] = body.least_width, body.radius
+        shortest = np.array([body.least_width for body in bodies], dtype=np.float64)
+        reach = np.array([body.radius for body in bodies], dtype=np.float64)
         count = len(placed)
         return cls(shortest.reshape(count, -1), reach.reshape(count, -1), is_free.reshape(count, -1))
 

@@ -5,6 +5,7 @@ import io
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.scenario.input_files import MEGABYTE, read_limited
-from blocksim.world.systems.blocks import BLOCKS, boxes_around
+from blocksim.world.systems.blocks import BLOCKS, boxes_around, local_corners
 from blocksim.world.systems.system import Elements, SystemInScene, Track
 
 if TYPE_CHECKING:
@@ -114,6 +115,11 @@ class Frames:
     others: tuple[Track, ...] = ()  # systems beside the blocks
     outlines: Floats | None = None  # (b, k, 2) m, corners along the body's own axes, where any is no rectangle
 
+    @cached_property
+    def corners(self) -> Floats:
+        """Corners of every block along its own axes, (b, k, 2) m, counter-clockwise, the last one of some repeated."""
+        return local_corners(self.size_x, self.size_y, self.outlines)
+
     @property
     def tracks(self) -> tuple[Track, ...]:
         """Every system over time, blocks first."""
@@ -200,31 +206,23 @@ def final_columns(frames: Frames) -> Columns:
     bottom and top are the extents of the turned block.
     """
     motion = np.stack([one[-1] for one in (frames.x, frames.y, frames.angle, frames.vx, frames.vy, frames.spin)])
-    shapes = np.stack([frames.size_x, frames.size_y, frames.start_angle])
-    values = final_values(motion, shapes, frames.outlines)
+    values = final_values(motion, frames.corners, frames.start_angle)
     return dict(zip(COLUMNS, (list(frames.names), *values.tolist()), strict=True))
 
 
-def final_values(motion: Floats, shapes: Floats, outlines: Floats | None = None) -> Floats:
+def final_values(motion: Floats, corners: Floats, start_angle: Floats) -> Floats:
     """Return the numbers (..., 10, b) of the tables of states, columns as in `COLUMNS`.
 
-    `motion` (..., 6, b) holds x, y, angle and their rates, `shapes` (..., 3, b) sides along the body's own axes and the
-    angle at the start, all SI. `outlines` (..., b, k, 2) are corners along these axes, where any is no rectangle.
+    `motion` (..., 6, b) holds x, y, angle and their rates, `corners` (..., b, k, 2) are along the body's own axes, and
+    `start_angle` (..., b) is the angle of these at the start, all SI.
     """
     x, y, angle, vx, vy, spin = (motion[..., k, :] for k in range(6))
-    size_x, size_y, start_angle = (shapes[..., k, :] for k in range(3))
     # of one state at a time: what is computed together may decide on the last digit
     cos, sin = (
         np.reshape([turn(one) for one in angle.reshape(-1, max(x.shape[-1], 1))], x.shape) for turn in (np.cos, np.sin)
     )
-    if outlines is None:
-        cos, sin = np.abs(cos), np.abs(sin)
-        half_width = 0.5 * (cos * size_x + sin * size_y)
-        half_height = 0.5 * (sin * size_x + cos * size_y)
-        extents = [x - half_width, x + half_width, y - half_height, y + half_height]
-    else:
-        low, high = boxes_around(outlines, x, y, angle)
-        extents = [low[..., 0], high[..., 0], low[..., 1], high[..., 1]]
+    low, high = boxes_around(corners, x, y, cos, sin)
+    extents = [low[..., 0], high[..., 0], low[..., 1], high[..., 1]]
     values = (
         MILLI * x,
         MILLI * y,

@@ -14,7 +14,7 @@ from blocksim.scenario.models.loads import AnyLoad, OnBody, Stretch, stretches_o
 from blocksim.scenario.motion import MotionPieces, displacement_and_velocity, motion_direction, motion_pieces
 from blocksim.simulation.results import EventRecord
 from blocksim.simulation.trajectory import Frames
-from blocksim.world.systems.blocks import boxes_around, least_widths, local_corners, radii
+from blocksim.world.systems.blocks import boxes_around
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -43,7 +43,13 @@ class ActingLoad(NamedTuple):
 
 def shortest_sides(frames: Frames) -> Floats:
     """Return the smaller sides (m) of blocks, of polygons their least widths, (b,)."""
-    return least_widths(frames.size_x, frames.size_y, frames.outlines)
+    corners = frames.corners
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.hypot(edges[..., 0], edges[..., 1])
+    is_edge = lengths > 0.0
+    normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None]
+    heights = np.einsum("bec,bkc->bek", normals, corners)
+    return np.asarray(np.where(is_edge, np.ptp(heights, axis=2), np.inf).min(axis=1))
 
 
 BEYOND_REACH = 1e34
@@ -76,7 +82,7 @@ def path_lengths(frames: Frames, chosen: Indices, carried: Floats | None = None)
     along x and y (m) at the chosen frames, (len(chosen), 2): only the way relative to the support counts. The elements
     of every system beside the blocks count as much as all blocks, with their mean way.
     """
-    radius = radii(frames.size_x, frames.size_y, frames.outlines)
+    radius = np.hypot(frames.corners[..., 0], frames.corners[..., 1]).max(axis=1)
     places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
     if carried is not None:
         places -= carried[:, None]
@@ -357,5 +363,5 @@ def _reached(frames: Frames, chosen: Indices, support: Support) -> Floats:
     below = np.stack([x, support.height(x - offsets[..., 0]) + offsets[..., 1]], axis=-1)
     centres, below = rotate_points(centres, support.tilt), rotate_points(below, support.tilt)
     angle = frames.angle[chosen] + support.tilt
-    outlines = local_corners(frames.size_x, frames.size_y, frames.outlines)
-    return np.concatenate([*boxes_around(outlines, centres[..., 0], centres[..., 1], angle), below])
+    boxes = boxes_around(frames.corners, centres[..., 0], centres[..., 1], np.cos(angle), np.sin(angle))
+    return np.concatenate([*boxes, below])

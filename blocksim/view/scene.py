@@ -10,7 +10,7 @@ import numpy as np
 from blocksim.scenario import PlacedSegment, placement
 from blocksim.simulation.trajectory import Frames
 from blocksim.view import paints, run_data, style
-from blocksim.world.systems.blocks import are_removed, local_corners, placed_points
+from blocksim.world.systems.blocks import are_removed, placed_points
 
 GROUND_THICKNESS = 5.0  # points, below the lowest ground
 RULER_EDGE = 10.0  # points; no number is nearer to the edge of a panel
@@ -257,10 +257,8 @@ class MeasuredRange:
 
 def corners(frames: Frames, frame: int) -> run_data.Floats:
     """Return the corners (mm) of every block in one frame, (b, k, 2), counter-clockwise, the last one repeated."""
-    local = local_corners(frames.size_x, frames.size_y, frames.outlines)
-    return np.asarray(
-        run_data.MILLIMETRES * placed_points(local, frames.x[frame], frames.y[frame], frames.angle[frame])
-    )
+    places = placed_points(frames.corners, frames.x[frame], frames.y[frame], frames.angle[frame])
+    return np.asarray(run_data.MILLIMETRES * places)
 
 
 def readable_scale(frames: Frames) -> float:
@@ -416,7 +414,7 @@ def upper_sides(frames: Frames) -> run_data.Floats:
 
     It is a share of the width inside the edge whose normal points up most, and all others.
     """
-    outlines = local_corners(frames.size_x, frames.size_y, frames.outlines)
+    outlines = frames.corners
     inset = 0.5 * (1.0 - EDGE_INSET) * run_data.shortest_sides(frames)
     edges = np.roll(outlines, -1, axis=1) - outlines
     lengths = np.hypot(edges[..., 0], edges[..., 1])

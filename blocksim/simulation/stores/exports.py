@@ -20,7 +20,7 @@ from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.structures.polygons import DXF, DXF_APPLICATION, DXF_INTEGER, DXF_TEXT
 from blocksim.simulation import files, instruments
 from blocksim.simulation.trajectory import BODIES, UNITS, Contacts, Frames, forces_on_a, join_contacts
-from blocksim.world.systems.blocks import BLOCKS, are_removed, distinct, local_corners, placed_points, supports_track
+from blocksim.world.systems.blocks import BLOCKS, are_removed, distinct, placed_points, supports_track
 from blocksim.world.systems.system import Floats, Track
 
 FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
@@ -135,11 +135,10 @@ def _last_blocks(frames: Frames, scenario: Scenario) -> Iterator[tuple[Floats, P
     if not frames.names:
         raise InvalidInputError("no block to export")
     last = int(np.flatnonzero(somewhere)[-1])
-    local = local_corners(frames.size_x, frames.size_y, frames.outlines)
-    places = placed_points(local, frames.x[last], frames.y[last], frames.angle[last])
+    places = placed_points(frames.corners, frames.x[last], frames.y[last], frames.angle[last])
     for number, body in enumerate(place_bodies(scenario)):
         if not are_removed(frames.vx[last, number]):
-            corners = places[number, : len(distinct(local[number]))]
+            corners = places[number, : len(distinct(frames.corners[number]))]
             yield corners, body, float(frames.rotation[last, number])
 
 

@@ -59,44 +59,26 @@ def distinct(corners: system.Floats) -> system.Floats:
 
 
 def boxes_around(
-    outlines: system.Floats, x: system.Floats, y: system.Floats, angle: system.Floats
+    corners: system.Floats, x: system.Floats, y: system.Floats, cosine: system.Floats, sine: system.Floats
 ) -> tuple[system.Floats, system.Floats]:
-    """Return the lower left and upper right corners (m, (..., b, 2)) of the boxes around turned polygons."""
-    cosine, sine = np.cos(angle), np.sin(angle)
+    """Return the lower left and upper right corners (m, (..., b, 2)) of the boxes around turned blocks.
+
+    `corners` (m, (..., b, k, 2)) are along the blocks' own axes, about centres x, y (m).
+    """
     low, high = np.full((*x.shape, 2), np.inf), np.full((*x.shape, 2), -np.inf)
-    for u, v in np.moveaxis(outlines, (-2, -1), (0, 1)):  # corner by corner, as all of many frames take much memory
-        corner = np.stack([x + cosine * u - sine * v, y + sine * u + cosine * v], axis=-1)
+    for u, v in np.moveaxis(corners, (-2, -1), (0, 1)):  # corner by corner, as all of many frames take much memory
+        corner = np.stack([x + (cosine * u - sine * v), y + (sine * u + cosine * v)], axis=-1)
         np.minimum(low, corner, out=low)
         np.maximum(high, corner, out=high)
     return low, high
 
 
-def least_widths(size_x: system.Floats, size_y: system.Floats, outlines: system.Floats | None) -> system.Floats:
-    """Return the smaller sides (m) of blocks, of polygons the least distance of parallel lines around them, (b,)."""
-    if outlines is None:
-        return np.minimum(size_x, size_y)
-    edges = np.roll(outlines, -1, axis=1) - outlines
-    lengths = np.hypot(edges[..., 0], edges[..., 1])
-    is_edge = lengths > 0.0
-    normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None]
-    heights = np.einsum("bec,bkc->bek", normals, outlines)
-    return np.asarray(np.where(is_edge, np.ptp(heights, axis=2), np.inf).min(axis=1))
-
-
-def radii(size_x: system.Floats, size_y: system.Floats, outlines: system.Floats | None) -> system.Floats:
-    """Return the distances (m) of the farthest corners of blocks from their centroids, (b,)."""
-    if outlines is None:
-        return np.asarray(0.5 * np.hypot(size_x, size_y))
-    return np.asarray(np.hypot(outlines[..., 0], outlines[..., 1]).max(axis=1))
-
-
-def outlines_of(placed: Sequence[PlacedBody]) -> system.Floats | None:
-    """Return the corners (m, (b, k, 2)) of blocks as `local_corners` takes them; None where all are rectangles."""
-    if not any(body.outline for body in placed):
-        return None
-    most = max(len(body.corners) for body in placed)
-    full = [(*body.corners, *body.corners[-1:] * (most - len(body.corners))) for body in placed]
-    return np.array(full, dtype=np.float64)
+def corners_of(placed: Sequence[PlacedBody]) -> system.Floats:
+    """Return the corners (m, (b, k, 2)) of blocks along their own axes, the last one of some repeated."""
+    blocks = [body.corners for body in placed]
+    most = max(map(len, blocks), default=0)
+    full = [(*corners, *corners[-1:] * (most - len(corners))) for corners in blocks]
+    return np.array(full, dtype=np.float64).reshape(len(blocks), most, 2)
 
 
 def motion_of(bodies: Any) -> system.Floats:
@@ -148,7 +130,8 @@ def block_system(placed: Sequence[PlacedBody]) -> system.SystemInScene:
     constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
     start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
     names = tuple(body.name for body in placed)
-    return system.SystemInScene(BLOCKS, system.Elements(names, constants, start, outlines_of(placed)))
+    outlines = corners_of(placed) if any(body.outline for body in placed) else None
+    return system.SystemInScene(BLOCKS, system.Elements(names, constants, start, outlines))
 
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks
