@@ -302,13 +302,8 @@ def draw_tornado(
         style.save_figure(figure, path)
 
 
-def order_of(values: run_data.Floats) -> list[int]:
-    """Return the numbers of the keys to draw, the largest index first."""
-    return [int(key) for key in np.argsort(-np.abs(values), kind="stable")[:MOST_KEYS]]
-
-
 def _draw_bars(axes: "style.Axes", panel: Bars, font: float) -> None:
-    order = order_of(panel.values)
+    order = np.argsort(-np.abs(panel.values), kind="stable")[:MOST_KEYS].tolist()  # the largest index first
     places = np.arange(len(order))[::-1]
     intervals = np.nan_to_num(panel.half_widths[order])
     whisker = {"ecolor": style.INK, "elinewidth": style.LINE_WIDTH, "capsize": 1.5}
