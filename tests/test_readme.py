@@ -19,6 +19,7 @@ PAGES = [
     *sorted((ROOT / "blocksim").rglob("*.md")),
     ROOT / "scenarios/README.md",
     ROOT / "results/README.md",
+    ROOT / "tests/README.md",
 ]
 # Phrases that readers stumbled over, as quoted by them; pages, help, templates and messages have better ones.
 STUMBLING = (

@@ -60,6 +60,14 @@ def test_an_outline_that_does_not_fit_is_told(corners: list[list[float]], told: 
     assert told in problem
 
 
+def test_ground_that_rises_between_the_corners_of_a_soil_is_told_as_ground_and_not_as_a_wall() -> None:
+    step = {"profile": [[-1.5, 0.0], [0.034, 0.0], [0.035, 0.02]]}
+    heap = {**OUTLINE, "outline": [[0.0, 0.0], [0.06, 0.03], [0.06, 0.1], [0.0, 0.1]]}
+    told = problems(data_of(heap, ground=step, walls=[{"from": [0.9, 0.1], "to": [0.9, 0.02]}]))
+    assert told, "the edge from the left runs through the step"
+    assert all("meets the ground near x = " in one for one in told), told
+
+
 SLOPE = {**column(0.3, 0.1, 0.005), "kind": "slope", "angle": "45 deg"}
 
 
