@@ -331,8 +331,8 @@ def _overlaps(
     if scenario.ground.profile is None:
         bottom = overlap.Outlines.of(bodies).bottom
         for index in np.flatnonzero(bottom < -placement.TOLERANCE)[:MAX_MISTAKES]:
-            depth = _mm(-float(bottom[index]))
-            yield Mistake(origins[index], f"body {bodies[index].name} reaches {depth} below the ground (y = 0)")
+            depth = f"{_mm(-float(bottom[index]))} below the ground (y = 0)"
+            yield Mistake(origins[index], f"body {bodies[index].name} reaches {depth}; raise it")
     else:
         depths: dict[int, float] = {}
         for index, _, sunk in overlap.overlapping_pairs(bodies, placement.profile_segments(scenario)):

@@ -37,7 +37,7 @@ def placed(block: str, x: float, y: float, angle: float = 0.0) -> PlacedBody:
 def test_a_hexagon_stands_on_its_lowest_side_and_not_deeper() -> None:
     assert told([{"block": "hexagon", "x": 0, "y": HIGH}]) == []
     ((path, message),) = told([{"block": "hexagon", "x": 0, "y": HIGH - 0.002}])
-    assert (path, message) == (("bodies", 0), "body 1 reaches 2 mm below the ground (y = 0)")
+    assert (path, message) == (("bodies", 0), "body 1 reaches 2 mm below the ground (y = 0); raise it")
 
 
 def test_wedges_may_fill_the_box_of_one_another_but_not_overlap() -> None:
