@@ -16,6 +16,7 @@ BROKEN = {
     "decimal comma": HEADER + "1,x,mm,1,71,69\n",
     "cell missing": HEADER + "1,x,mm,16\n",
     "open quote": HEADER + '"1,x,mm,1,16\n',
+    "open quote in the header": '"' + HEADER + GOOD,
     "mistyped column": "block,quantity,units,replicate,value\n" + GOOD,
     "two mistyped columns": "block,quantities,unit,repeat,value\n" + GOOD,
     "mistyped column beside mistakes in its rows": "block,quantity,units,replicate,value\n1,x,kg,1,16\n1,x,mm,2,wide\n",

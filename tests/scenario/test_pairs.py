@@ -133,6 +133,13 @@ def test_setting_the_kinetic_friction_of_a_pair_keeps_the_static_one(
     assert (friction.static, friction.kinetic) == expected
 
 
+def test_a_pair_that_is_set_in_the_other_order_stays_one_pair() -> None:
+    given = scenario_data() | {"pairs": {"oak": {"steel": {"restitution": 0.1}}}}
+    document = Document.from_mapping(given).with_values({"pairs.steel.oak.restitution": 0.3})
+    assert document.build().pairs["oak"].keys() == {"steel"}
+    assert resolve_pair(document.build(), "steel", "oak", ground=False).restitution == 0.3
+
+
 def test_the_friction_of_a_new_pair_of_blocks_starts_from_the_default() -> None:
     document = Document.from_mapping(scenario_data()).with_values({"pairs.oak.steel.friction.kinetic": 0.1})
     friction = resolve_pair(document.build(), "oak", "steel", ground=False).friction

@@ -69,6 +69,12 @@ def test_loads_that_cannot_be_are_refused_with_their_place(case: str) -> None:
         scenario(load)
 
 
+def test_pressure_on_a_face_below_another_body_is_refused() -> None:
+    above = [{"block": "b", "x": 0, "y": 0.5}, {"block": "b", "x": 0.2, "y": 1.5}]
+    with pytest.raises(ScenarioError, match=r'loads\.0\.face: .* covered by body "2"'):
+        scenario_from_mapping(data_with({**WATER, "face": "top", "water_level": 2}, bodies=above))
+
+
 def test_two_loads_that_turn_gravity_are_refused() -> None:
     turn = {"kind": "gravity", "to": "5 deg", "rate": "1 deg/s"}
     with pytest.raises(ScenarioError, match=r"loads\.1: gravity turns already"):

@@ -65,6 +65,11 @@ def test_an_arch_by_its_span_has_that_clear_width() -> None:
     assert built(kind="arch", span=4, thickness=0.5, embrace="120 deg", count=9, abutments=False)[0].y < ring[0].y
 
 
+def test_shear_velocity_grows_with_height_to_its_value_at_the_top() -> None:
+    drums = built(kind="column", count=4, height=4, width=1.2, bottom=0.0, shear_velocity=2.0)
+    assert [body.vx for body in drums] == pytest.approx([2.0 * body.y / 4.0 for body in drums])
+
+
 def test_drums_taper_on_straight_sides() -> None:
     drums = built(kind="column", count=4, height=4, width=1.2, top_width=0.8, left=2)
     points = np.concatenate([corners(body) for body in drums])
