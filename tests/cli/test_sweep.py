@@ -34,6 +34,7 @@ def test_grid_from_the_command_line(blocksim: Command) -> None:
     assert all(0.2 < float(row["turn_deg"]) < 0.39 for row in rows())
     assert lines[0].startswith("block_block.kinetic  block_ground.kinetic  inside   2.x_mm   3.x_mm")
     assert "not shown: 2 columns, 5 constant columns\n" in answer.err
+    assert "0% of 4 cases are inside all measured ranges\n" in answer.err
     assert max(map(len, lines)) <= 80
     assert "4/4 finished: block_block.kinetic = 0.3, block_ground.kinetic = 0.3" in answer.err
     assert answer.err.splitlines()[-1] == "table: out/sweep.csv"
@@ -141,7 +142,9 @@ def test_shards_are_merged_and_missing_ones_named(blocksim: Command) -> None:
     assert (early.code, early.out) == (65, "")
     assert "2 of 5 cases are missing" in early.err
     assert "--shard 1/2: 2 of 2 missing" in early.err
-    assert blocksim("sweep", "--merge", "out", "--allow-missing").code == 0
+    merged = blocksim("sweep", "--merge", "out", "--allow-missing")
+    assert merged.code == 0
+    assert "2 cases have not been run; rerun the command to finish\n" in merged.err
     assert len(rows()) == 3
     assert blocksim(*RIGID, *vary, "--shard", "1/2").code == 0
     assert blocksim("sweep", "--merge", "out").code == 0

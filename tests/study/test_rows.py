@@ -11,7 +11,7 @@ from blocksim.analysis.experiment import load_table
 from blocksim.scenario import Document
 from blocksim.study.pictures import read_sweep_data
 from blocksim.study.plan import Values, with_sweep
-from blocksim.study.rows import Head, Range, Ranges, heads_of
+from blocksim.study.rows import Head, Range, Ranges, as_cell, heads_of
 from blocksim.study.sweep import sweep
 from blocksim.study.verify import verify_sweep
 from tests.study.conftest import SCENARIOS
@@ -108,3 +108,10 @@ def test_block_without_a_position_is_not_inside(tmp_path: Path, value: float | N
 def test_both_ends_of_a_measured_range_are_inside() -> None:
     measured = Range("1", "x_mm", 1.0, 2.0)
     assert [measured.holds(value) for value in (0.9, 1.0, 2.0, 2.1)] == [False, True, True, False]
+
+
+def test_text_that_a_spreadsheet_would_compute_is_marked_and_quantities_are_not() -> None:
+    for formula in ('=HYPERLINK("a")', "+cmd", "-a", "@SUM(A1)", "\t=1", "\r=1"):
+        assert as_cell(formula) == f"'{formula}"
+    for plain in ("-5 deg", "+3", "-1e-3", "stone", "", 2.0, None):
+        assert as_cell(plain) is plain
