@@ -31,6 +31,7 @@ def test_grid_from_the_command_line(blocksim: Command) -> None:
     lines = answer.out.splitlines()
     assert "4 stands; largest displacement 0.20 mm, rotation 0.38°" in answer.err  # after a hundredth of a second
     assert {row["outcome"] for row in rows()} == {"stands"}
+    assert "first to move" not in answer.err
     assert all(0.2 < float(row["turn_deg"]) < 0.39 for row in rows())
     assert lines[0].startswith("block_block.kinetic  block_ground.kinetic  inside   2.x_mm   3.x_mm")
     assert "not shown: 2 columns, 5 constant columns\n" in answer.err
