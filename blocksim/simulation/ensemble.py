@@ -96,7 +96,8 @@ def member_ends(
     steps: NDArray[np.int64] = world.clock["steps"].copy()  # (m, 1)
     time_steps: list[float] = world.controls["step"][:, 0].tolist()
     seconds = [float(steps[m, 0]) * time_steps[m] for m in range(count)]
-    angles, corners = np.array([one.angle for one in bodies]).reshape(count, -1), blocks.corners_of(bodies)
+    size_x, size_y, angles = np.array([(one.size_x, one.size_y, one.angle) for one in bodies]).reshape(-1, 3).T
+    corners, angles = blocks.local_corners(size_x, size_y, blocks.outlines_of(bodies)), angles.reshape(count, -1)
     tables = trajectory.final_values(motion, corners.reshape(*angles.shape, *corners.shape[1:]), angles).tolist()
     support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
     in_rows = [name for name, one in OBSERVABLES.items() if one.in_rows]

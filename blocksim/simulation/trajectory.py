@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.scenario.input_files import MEGABYTE, read_limited
-from blocksim.world.systems.blocks import BLOCKS, boxes_around, local_corners
+from blocksim.world.systems.blocks import BLOCKS, boxes_around, local_corners, outward_normals
 from blocksim.world.systems.system import Elements, SystemInScene, Track
 
 if TYPE_CHECKING:
@@ -119,6 +119,13 @@ class Frames:
     def corners(self) -> Floats:
         """Corners of every block along its own axes, (b, k, 2) m, counter-clockwise, the last one of some repeated."""
         return local_corners(self.size_x, self.size_y, self.outlines)
+
+    @cached_property
+    def least_widths(self) -> Floats:
+        """Least distances of parallel lines around every block, of a rectangle its smaller side, (b,) m."""
+        normals, is_edge = outward_normals(self.corners)
+        heights = np.einsum("bec,bkc->bek", normals, self.corners)
+        return np.asarray(np.where(is_edge, np.ptp(heights, axis=2), np.inf).min(axis=1))
 
     @property
     def tracks(self) -> tuple[Track, ...]:

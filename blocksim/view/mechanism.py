@@ -48,7 +48,7 @@ def _at_the_start(frames: Frames, frame: int, support: run_data.Support) -> dict
     pressed = next((found for found in range(frame + 1) if len(contacts.at(found))), None)
     if pressed is None:
         return {}
-    share = paints.displacements(frames, support)[: frame + 1] / run_data.shortest_sides(frames)
+    share = paints.displacements(frames, support)[: frame + 1] / frames.least_widths
     moved = np.column_stack([share > MOVED_SHARE, np.zeros(frame + 1, dtype=bool)])  # the last is the support, SUPPORT
     has_moved = np.maximum.accumulate(moved, axis=0)
     found: dict[Pair, tuple[int, Rows]] = {}
@@ -73,7 +73,7 @@ def _by_pair(rows: Rows) -> dict[Pair, Rows]:
 def _joint(frames: Frames, times: tuple[int, int], support: run_data.Support, then: Rows, now: Rows) -> JointMotion:
     """Judge a joint by its points at the beginning and in the frame that is drawn."""
     pair = int(then["body_a"][0]), int(then["body_b"][0])
-    least = MOVED_SHARE * min(float(run_data.shortest_sides(frames)[body]) for body in pair if body != SUPPORT)
+    least = MOVED_SHARE * min(float(frames.least_widths[body]) for body in pair if body != SUPPORT)
     early = _followed(frames, times, support, then)
     # how far apart on both bodies in the first frame the points were where they touch in the second
     slip = _followed(frames, times[::-1], support, now).slip
@@ -152,7 +152,7 @@ class BracketRun:
         drawable = run_data.drawable_frames(self.frames)
         if not self.is_mechanism:
             return int(drawable[-1])
-        shortest = run_data.shortest_sides(self.frames)
+        shortest = self.frames.least_widths
         seen = (paints.displacements(self.frames, self.support)[drawable] > VISIBLE * shortest).any(axis=1)
         return int(drawable[int(np.argmax(seen))] if seen.any() else drawable[-1])
 

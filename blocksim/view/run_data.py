@@ -41,17 +41,6 @@ class ActingLoad(NamedTuple):
         return np.where(times < self.end, values[piece] + rates[piece] * (times - starts[piece]), 0.0)
 
 
-def shortest_sides(frames: Frames) -> Floats:
-    """Return the smaller sides (m) of blocks, of polygons their least widths, (b,)."""
-    corners = frames.corners
-    edges = np.roll(corners, -1, axis=1) - corners
-    lengths = np.hypot(edges[..., 0], edges[..., 1])
-    is_edge = lengths > 0.0
-    normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None]
-    heights = np.einsum("bec,bkc->bek", normals, corners)
-    return np.asarray(np.where(is_edge, np.ptp(heights, axis=2), np.inf).min(axis=1))
-
-
 BEYOND_REACH = 1e34
 """Metres or radians: ten thousand times the largest simulated value, and finite as 32-bit millimetres."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from blocksim.scenario import PlacedSegment, placement
 from blocksim.simulation.trajectory import Frames
 from blocksim.view import paints, run_data, style
-from blocksim.world.systems.blocks import are_removed, placed_points
+from blocksim.world.systems.blocks import are_removed, outward_normals, placed_points
 
 GROUND_THICKNESS = 5.0  # points, below the lowest ground
 RULER_EDGE = 10.0  # points; no number is nearer to the edge of a panel
@@ -264,7 +264,7 @@ def corners(frames: Frames, frame: int) -> run_data.Floats:
 def readable_scale(frames: Frames) -> float:
     """Return the least scale (points a mm) at which the name of every block fits into it."""
     wide, tall = (letter * style.SMALLEST_FONT / room for letter, room in zip(style.LETTER, NAME_ROOM, strict=True))
-    sizes = run_data.MILLIMETRES * run_data.shortest_sides(frames)
+    sizes = run_data.MILLIMETRES * frames.least_widths
     lengths = np.array([len(name) for name in frames.names])
     return float((np.maximum(wide * lengths, tall) / sizes).max(initial=0.0))
 
@@ -347,7 +347,7 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
     held, free = fixed & there, ~fixed & there
     own = [style.GROUND_COLOUR if held else fill for held, fill in zip(fixed, paint.fills(frame), strict=True)]
     outlines = corners(frames, frame)
-    smallest = run_data.MILLIMETRES * canvas.points_per_mm * float(run_data.shortest_sides(frames).min(initial=np.inf))
+    smallest = run_data.MILLIMETRES * canvas.points_per_mm * float(frames.least_widths.min(initial=np.inf))
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     edge: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
     hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
@@ -392,7 +392,7 @@ def _draw_names(canvas: Canvas, frames: Frames, frame: int, chosen: run_data.Fla
     """
     from matplotlib.patheffects import withStroke
 
-    sizes = run_data.MILLIMETRES * canvas.points_per_mm * run_data.shortest_sides(frames)
+    sizes = run_data.MILLIMETRES * canvas.points_per_mm * frames.least_widths
     fonts = {
         int(index): style.fitting_font(frames.names[index], (NAME_ROOM[0] * sizes[index], NAME_ROOM[1] * sizes[index]))
         for index in np.flatnonzero(chosen)
@@ -415,11 +415,8 @@ def upper_sides(frames: Frames) -> run_data.Floats:
     It is a share of the width inside the edge whose normal points up most, and all others.
     """
     outlines = frames.corners
-    inset = 0.5 * (1.0 - EDGE_INSET) * run_data.shortest_sides(frames)
-    edges = np.roll(outlines, -1, axis=1) - outlines
-    lengths = np.hypot(edges[..., 0], edges[..., 1])
-    is_edge = lengths > 0.0
-    normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None]
+    inset = 0.5 * (1.0 - EDGE_INSET) * frames.least_widths
+    normals, is_edge = outward_normals(outlines)
     depth = np.einsum("bec,bec->be", normals, outlines) - inset[:, None]
     blocks = np.arange(len(outlines))
     upper = np.argmax(np.where(is_edge, normals[..., 1], -np.inf), axis=1)

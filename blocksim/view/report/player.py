@@ -189,7 +189,7 @@ def pack_frames(frames: trajectory.Frames, most_bytes: int = MOST_BYTES) -> Pack
         outlines = {
             "corners": [[to_numbers(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
             "upper": [[to_numbers(end) for end in upper] for upper in uppers],
-            "width": to_numbers(MILLIMETRES * run_data.shortest_sides(frames)[first]),
+            "width": to_numbers(MILLIMETRES * frames.least_widths[first]),
             "which": which.ravel().tolist(),
         }
     data = {

@@ -73,12 +73,21 @@ def boxes_around(
     return low, high
 
 
-def corners_of(placed: Sequence[PlacedBody]) -> system.Floats:
-    """Return the corners (m, (b, k, 2)) of blocks along their own axes, the last one of some repeated."""
-    blocks = [body.corners for body in placed]
-    most = max(map(len, blocks), default=0)
-    full = [(*corners, *corners[-1:] * (most - len(corners))) for corners in blocks]
-    return np.array(full, dtype=np.float64).reshape(len(blocks), most, 2)
+def outward_normals(corners: system.Floats) -> tuple[system.Floats, Any]:
+    """Return the unit normals (b, k, 2) of the edges that begin at corners (m, (b, k, 2)), and which have a length."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.hypot(edges[..., 0], edges[..., 1])
+    is_edge = lengths > 0.0
+    return np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None], is_edge
+
+
+def outlines_of(placed: Sequence[PlacedBody]) -> system.Floats | None:
+    """Return the corners (m, (b, k, 2)) of blocks as `local_corners` takes them; None where all are rectangles."""
+    if not any(body.outline for body in placed):
+        return None
+    most = max(len(body.corners) for body in placed)
+    full = [(*body.corners, *body.corners[-1:] * (most - len(body.corners))) for body in placed]
+    return np.array(full, dtype=np.float64)
 
 
 def motion_of(bodies: Any) -> system.Floats:
@@ -130,8 +139,7 @@ def block_system(placed: Sequence[PlacedBody]) -> system.SystemInScene:
     constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
     start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
     names = tuple(body.name for body in placed)
-    outlines = corners_of(placed) if any(body.outline for body in placed) else None
-    return system.SystemInScene(BLOCKS, system.Elements(names, constants, start, outlines))
+    return system.SystemInScene(BLOCKS, system.Elements(names, constants, start, outlines_of(placed)))
 
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks
