@@ -152,7 +152,7 @@ def line_of(sort: str, place: str, fault: Fault, tests: tuple[str, ...], *, firs
     )
     if failed.names or code not in {pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED}:
         functions = dict.fromkeys(one.partition("[")[0].removeprefix("tests/") for one in failed.names)
-        last = (printed.strip().splitlines() or [""])[-1]
+        last = (printed.replace(f"{ROOT}/", "").strip().splitlines() or [""])[-1]
         verdict, by = "caught", " ".join(functions) or f"at import: {last}"
     return "\t".join([sort, place, fault.name, verdict, " ".join(by.split())])
 
