@@ -18,7 +18,7 @@ from blocksim.simulation.schemes import build_scene
 from blocksim.study.limit import limit_curve
 from blocksim.verification.arches import COCCHETTI_RIZZI, HEAD, VOUSSOIRS, least_thickness
 from blocksim.verification.scene import Simulation
-from tests.kernels.nonsmooth.scenes import Block, posed
+from tests.kernels.scenes import Block, posed
 from tests.simulation.conftest import SCENARIOS
 
 if TYPE_CHECKING:

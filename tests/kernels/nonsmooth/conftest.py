@@ -10,7 +10,7 @@ import pytest
 from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import CaseScene, Simulation
-from tests.kernels.nonsmooth.scenes import ENDLESS, RIGID, rigid
+from tests.kernels.scenes import ENDLESS, RIGID, rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

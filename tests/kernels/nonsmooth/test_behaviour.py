@@ -1,9 +1,10 @@
-"""What the non-smooth scheme has to get right: ../shared/design/nonsmooth.md, "Measured", and closed forms."""
+"""Blocks in motion with rigid contacts: closed forms, energy, cuts of steps, supports, edges of the ground."""
 
 from __future__ import annotations
 
 import math
 import threading
+from math import radians
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,18 +12,23 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from blocksim.bench.harness import pushed_wall, three_blocks
-from blocksim.kernels.common.arrays import AT_REST, REACHED, TEAM_SIZE
+from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED, TEAM_SIZE
 from blocksim.kernels.common.members import Watched
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.cone import solve_two
+from blocksim.kernels.nonsmooth.cuts import set_length
 from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
 from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team, advance_nonsmooth_members
-from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
 from blocksim.world.build import build_stacks, only_stack
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
-from tests.kernels.nonsmooth.scenes import rigid
+from tests.kernels.scenes import rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+
+    from blocksim.scenario import Scenario
+
 
 G = 9.81
 ON_GROUND = HEIGHT / 2
@@ -47,16 +53,6 @@ def test_slide_ends_where_coulomb_says(single: Callable[..., Any], substeps: int
     run = single([{"x": 0.0, "y": ON_GROUND, "velocity": [1.0, 0.0]}], substeps=substeps).to_time(0.5)
     assert run.bodies.x[0] == pytest.approx(1.0 / (2 * 0.38 * G), abs=1e-5)
     assert abs(run.bodies.vx[0]) < 1e-12
-
-
-def test_drop_rebounds_as_newton_says_to_first_order(single: Callable[..., Any]) -> None:
-    errors = []
-    for step in (1e-3, 2.5e-4):
-        run = single([{"y": ON_GROUND + 0.05}], restitution=0.5, step=step, substeps=1)
-        heights = [float(run.to_step(k).bodies.y[0]) for k in range(round(0.11 / step), round(0.2 / step))]
-        errors.append(0.0125 - (max(heights) - ON_GROUND))
-    assert abs(errors[0]) < 0.05 * 0.0125
-    assert abs(errors[1]) < 0.3 * abs(errors[0])
 
 
 def pendulum(start: float, time: float) -> tuple[float, float, float]:
@@ -92,16 +88,6 @@ def test_turning_about_an_edge_is_of_second_order(single: Callable[..., Any]) ->
     assert error(1e-3, 4)[:2].max() < 2e-6
 
 
-@pytest.mark.usefixtures("compiler")
-@pytest.mark.parametrize(("degrees", "slides"), [(-0.5, False), (0.5, True)])
-def test_slope_holds_below_the_friction_angle_only(single: Callable[..., Any], degrees: float, slides: bool) -> None:
-    slope = math.atan(0.38) + math.radians(degrees)
-    run = single([{"y": ON_GROUND}], tilt=slope, restitution=0.0).to_time(0.5)
-    before = float(run.bodies.x[0])
-    moved = abs(float(run.to_time(2.0).bodies.x[0]) - before)
-    assert moved > 1e-3 if slides else moved < 1e-12
-
-
 def test_static_friction_holds_what_kinetic_friction_does_not_stop(single: Callable[..., Any]) -> None:
     slope = math.radians(20.0)
     friction = {"static": 0.45, "kinetic": 0.2, "transition_speed": 0.001}
@@ -112,45 +98,6 @@ def test_static_friction_holds_what_kinetic_friction_does_not_stop(single: Calla
     slides = single(pushed, tilt=slope, restitution=0.0, ground_friction=friction, velocity_tolerance=1e-5).to_time(0.5)
     expected = 0.3 + 0.5 * G * (math.sin(slope) - 0.2 * math.cos(slope))
     assert abs(slides.bodies.vx[0]) == pytest.approx(expected, rel=0.01)
-
-
-def test_stack_stands_still_and_sags_as_its_stiffness_says(single: Callable[..., Any]) -> None:
-    blocks = [{"y": (i + 0.5) * HEIGHT} for i in range(10)]
-    sags = []
-    for substeps in (1, 4):
-        run = single(blocks, restitution=0.0, substeps=substeps).to_time(2.5)
-        then = run.state()
-        run.to_time(3.0)
-        assert abs(run.state()[:, :3] - then[:, :3]).max() < 1e-13
-        sags.append(9.5 * HEIGHT - float(run.bodies.y[9]))
-    assert sags[0] == pytest.approx(16.0 * sags[1], rel=1e-4)  # h^2
-    # springs in series, one below each block with the weight above it: F A / w^2, A shared by two points of a face
-    assert sags[1] == pytest.approx(142e-6, rel=0.01)
-
-
-def test_three_blocks_end_where_the_prototype_had_them(begin: Callable[..., Any]) -> None:
-    run = begin(three_blocks({"restitution": 0.0}), substeps=1, velocity_sweeps=1).to_time(2.0)
-    assert run.status == AT_REST
-    assert 1e3 * run.bodies.x[:2] == pytest.approx([16.0, 67.03], abs=0.15)
-    assert 1e3 * run.bodies.x[2] == pytest.approx(128.78, abs=0.25)
-    run = begin(three_blocks({"restitution": 0.2}), substeps=1, step=2e-4, velocity_tolerance=1e-3).to_time(2.0)
-    assert 1e3 * run.bodies.x[1:] == pytest.approx([68.55, 132.8], abs=0.15)
-
-
-@pytest.mark.parametrize(("step", "within"), [(1e-3, 0.3e-3), (1e-4, 0.03e-3)])
-def test_toppling_before_the_first_impact(begin: Callable[..., Any], step: float, within: float) -> None:
-    run = begin(three_blocks({"restitution": 0.0}), substeps=1, step=step).to_time(0.2)
-    assert run.bodies.x[1:] == pytest.approx([64.446e-3, 116.650e-3], abs=within)
-    assert run.bodies.y[1:] == pytest.approx([32.025e-3, 48.972e-3], abs=within)
-
-
-@pytest.mark.usefixtures("compiler")
-@pytest.mark.parametrize("restitution", [0.0, 0.2, 0.9])
-@pytest.mark.parametrize("substeps", [1, 4])
-def test_energy_adds_up_to_round_off(begin: Callable[..., Any], restitution: float, substeps: int) -> None:
-    run = begin(three_blocks({"restitution": restitution}), substeps=substeps)
-    for time in (0.05, 0.2, 0.3, 0.6):
-        assert run.to_time(time).residual() < 1e-12
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.9, 1.0])
@@ -178,13 +125,6 @@ def test_edges_of_pieces_of_ground(begin: Callable[..., Any]) -> None:
     # as the explicit scheme has it: turned about the edge of a step
     assert run.bodies.x[0] == pytest.approx(12.285e-3, abs=1e-4)
     assert math.degrees(run.bodies.angle[0]) == pytest.approx(-47.69, abs=0.3)
-
-
-def test_flush_joints_do_not_stop_a_block(single: Callable[..., Any]) -> None:
-    base = [{"x": i * WIDTH, "y": ON_GROUND, "fixed": True} for i in range(3)]
-    block = {"x": 0.0, "y": 3 * ON_GROUND, "velocity": [0.5, 0.0]}
-    run = single([*base, block], restitution=0.0).to_time(0.5)
-    assert run.bodies.x[3] == pytest.approx(0.5**2 / (2 * 0.31 * G), abs=5e-5)
 
 
 @pytest.mark.parametrize(("restitution", "steps"), [(0.1, 200), (0.9, 30)])
@@ -225,3 +165,147 @@ def test_members_of_an_ensemble_have_the_same_bits(begin: Callable[..., Any]) ->
     for m in range(2):
         assert codes[m] == alone[m].status
         assert np.array_equal(scenes.world.bodies[m].x, alone[m].world.bodies.x)
+
+
+def test_flight_is_a_parabola_in_position_and_velocity(single: Callable[..., Simulation]) -> None:
+    run = single([{"y": 2.0, "velocity": [1.5, 2.5], "spin": 30.0, "angle": 0.4}]).to_time(0.2)
+    body = run.bodies[0]
+    found = [body.x, body.y, body.vx, body.vy, body.angle, body.spin]
+    expected = [0.3, 2.5 - 0.5 * G * 0.04, 1.5, 2.5 - G * 0.2, 6.4, 30.0]
+    assert found == pytest.approx(expected, abs=1e-12)
+    assert run.residual() < 1e-13
+
+
+def test_ledger_holds_on_a_slope(single: Callable[..., Simulation]) -> None:
+    run = single([{"y": ON_GROUND + 0.01, "angle": 0.2}], tilt=radians(35.0)).to_time(0.5)
+    assert run.residual() < 1e-12
+
+
+def test_overlap_beyond_the_limit_stops_the_run(single: Callable[..., Simulation]) -> None:
+    values: Any = {"restitution": 0.0, "contact": {"max_overlap": 1e-6}}
+    assert single([{"y": ON_GROUND}], **values).to_time(0.5).status == OVERLAP_LIMIT
+    values["contact"] = {"max_overlap": 2e-6}
+    assert single([{"y": ON_GROUND}], **values).to_time(0.5).status == 0
+
+
+@pytest.mark.parametrize("name", ["y", "vy", "spin"])
+def test_state_that_is_not_finite_stops_the_run(single: Callable[..., Simulation], name: str) -> None:
+    run = single([{"y": 0.1}]).to_step(3)
+    run.world.bodies[name][0] = np.nan
+    run.scene.contacts.states.vy[0] = np.nan
+    assert run.to_step(10).status == NOT_FINITE
+
+
+SMOOTH: dict[str, Any] = {"friction": 0.0, "ground_friction": 0.0}
+HOPPING = {"x": 1.0, "y": ON_GROUND + 2e-3, "velocity": [0.0, -0.3]}  # at most every 30 ms
+
+
+def cut_steps(run: Simulation, count: int) -> int:
+    """Go on for some steps; return how many of them were cut."""
+    stepping = run.scene.contacts.stepping[0]
+    return sum(int(run.to_step(run.steps + 1) is run and stepping.cuts > 0) for _ in range(count))
+
+
+@pytest.mark.parametrize("start", [0.5e-4, 1.0e-4, 1.7e-4, 2.9e-4])
+def test_impact_happens_at_its_time_to_a_64th_of_a_step(single: Callable[..., Simulation], start: float) -> None:
+    run = single([{"y": ON_GROUND + start, "velocity": [0.0, -1.0]}], restitution=0.8, gravity=0.0, **SMOOTH)
+    run.to_time(3e-3)
+    assert run.bodies.y[0] == pytest.approx(ON_GROUND + 0.8 * (run.time - start), abs=run.step / 64.0)
+
+
+def test_flight_is_a_parabola_though_steps_are_cut(single: Callable[..., Simulation]) -> None:
+    run = single([{"y": 1.0, "velocity": [1.0, 2.0], "spin": 3.0}, HOPPING], restitution=0.9)
+    assert cut_steps(run, 200) > 2
+    t = run.time
+    exact = [t, 1.0 + 2.0 * t - 0.5 * G * t * t, 3.0 * t, 1.0, 2.0 - G * t, 3.0]
+    assert run.state()[0] == pytest.approx(exact, abs=1e-9)
+
+
+def test_velocity_of_a_block_that_rolls_does_not_depend_on_lengths_that_are_not_taken() -> None:
+    found = []
+    for lengths in ((0.3,), (0.7, 0.3), (0.1, 0.9, 0.3)):
+        tilted = {"y": 0.5 * (np.sin(0.1) * WIDTH + np.cos(0.1) * HEIGHT), "angle": 0.1}
+        run = CaseScene(
+            [tilted], restitution=0.0, ground_friction=5.0, time={"scheme": "nonsmooth", "end": 1.0}
+        ).start()
+        run.to_step(30)
+        assert isinstance(run.scene, Nonsmooth)
+        for share in lengths:
+            set_length(run.scene, share * run.step)
+        state = run.scene.contacts.states[0]
+        found.append((float(state.vx), float(state.vy), float(state.spin)))
+    assert abs(found[0][2]) > 0.1
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+    assert found[2] == pytest.approx(found[0], rel=1e-12)
+
+
+def test_steps_of_crowds_and_of_weak_rebounds_of_more_than_two_are_not_cut(single: Callable[..., Simulation]) -> None:
+    crowd = [{**HOPPING, "x": 0.1 * k} for k in range(13)]
+    assert cut_steps(single(crowd, restitution=0.9), 40) == 0
+    assert cut_steps(single(crowd[:3], restitution=0.5), 400) == 0
+    assert cut_steps(single(crowd[:2], restitution=0.5), 400) > 0
+    assert cut_steps(single(crowd[:1], restitution=0.9), 400) > 0
+
+
+FREQUENCY = 2.0  # 1/s
+RAMP = 0.5  # s
+LYING = {"y": HEIGHT / 2}
+
+
+def shaken(acceleration: float, *bodies: dict[str, Any], direction: str = "0 deg", **tables: Any) -> Any:
+    """Return blocks on a table with this greatest acceleration (m/s2)."""
+    amplitude = acceleration / (2.0 * np.pi * FREQUENCY) ** 2
+    motion = {"kind": "harmonic", "amplitude": amplitude, "frequency": FREQUENCY, "ramp": RAMP, "direction": direction}
+    more = {"friction": {"block_block": 0.31, "block_ground": 0.38}, "contact": {"restitution": 0.0}}
+    return scenario_of(bodies or [LYING], motion=motion, **{**more, "time": {"stop_at_rest": False}, **tables})
+
+
+def table(run: Simulation) -> float:
+    """Return how far (m) the support has gone along x."""
+    return float(run.world.bodies.x[-1])
+
+
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_block_rides_along_below_the_friction_limit(begin: Callable[..., Simulation], substeps: int, pace: int) -> None:
+    run = begin(shaken(0.9 * 0.38 * G), substeps=substeps, velocity_tolerance=1e-9).to_time(1.3 / pace)
+    assert abs(table(run)) > (0.005 if pace == 1 else 1e-5)
+    # drifts know the friction of the substep before: they lag by acceleration times substep squared, and add up to that
+    assert run.bodies.x[0] == pytest.approx(table(run), abs=0.38 * G * (1e-3 / substeps) ** 2)
+    assert run.bodies.vx[0] == pytest.approx(float(run.world.bodies.vx[-1]), abs=1e-6)
+    assert run.residual() < 1e-12
+
+
+def test_run_is_not_over_while_the_table_waits(begin: Callable[..., Simulation]) -> None:
+    motion = {"kind": "harmonic", "amplitude": 0.001, "frequency": 5.0, "start": 0.4, "duration": 0.6}
+    scenario = scenario_of([LYING], motion=motion, time={"stop_at_rest": True, "end": 2.0})
+    run = begin(scenario).to_time(2.0)
+    assert 1.0 < run.time < 1.2
+
+
+def test_table_faster_than_the_reach_of_the_list_keeps_its_contacts(begin: Callable[..., Simulation]) -> None:
+    shove = shaken(0.3 * G, LYING, {"x": 0.1, "y": HEIGHT / 2})
+    run = begin(shove, velocity_tolerance=1e-9)
+    stepping = run.scene.contacts.stepping[0]
+    stepping.least_reach, stepping.most_reach = 5e-5, 1.5e-4
+    run.to_time(1.2)
+    assert run.bodies.x == pytest.approx([table(run), 0.1 + table(run)], abs=1e-5)
+
+
+def bare(bodies: list[Mapping[str, object]], **tables: Any) -> Scenario:
+    friction = {"block_block": 0.4, "block_ground": 0.4}
+    return scenario_of(bodies, **{"contact": {"restitution": 0.0}, "friction": friction, **tables})
+
+
+def test_blocks_stand_on_and_beside_a_step_without_moving(begin: Callable[..., Simulation]) -> None:
+    """The one beside it reaches far below the upper piece, the one on it far behind the riser."""
+    step = {"profile": [[-0.3, 0.0], [0.0, 0.0], [0.0, 0.006], [0.3, 0.006]]}
+    beside = {"x": -WIDTH / 2, "y": HEIGHT / 2, "velocity": [0.1, 0.0]}  # pushed against both
+    run = begin(bare([beside, {"x": WIDTH / 2, "y": 0.006 + HEIGHT / 2}], ground=step)).to_time(0.05)
+    assert run.bodies.x[:2] == pytest.approx([-WIDTH / 2, WIDTH / 2], abs=5e-5)
+    assert run.bodies.y[:2] == pytest.approx([HEIGHT / 2, 0.006 + HEIGHT / 2], abs=5e-5)
+
+
+def test_block_that_meets_the_end_of_a_wall_stops_there(begin: Callable[..., Simulation]) -> None:
+    shelf = [{"from": [0.0, 0.02], "to": [0.1, 0.02]}]
+    run = begin(bare([{"x": -0.03, "y": 0.02, "velocity": [1.0, 0.0]}], walls=shelf, gravity=0.0)).to_time(0.03)
+    assert run.bodies.x[0] == pytest.approx(-WIDTH / 2, abs=1e-5)

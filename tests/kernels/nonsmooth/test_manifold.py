@@ -1,22 +1,38 @@
-"""Contact manifolds of two blocks, against polygons clipped another way, and what all of them have in common."""
+"""Contact manifolds: against polygons clipped another way, faces and edges piece by piece, and how gaps bend."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import zeros
-from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, TOUCHING
+from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, STEPPING, TOUCHING
+from blocksim.kernels.nonsmooth.faces import (
+    Block as Seen,
+    Edge,
+    Face,
+    block_ahead,
+    clip,
+    face_on,
+    in_frame,
+    side_numbered,
+    side_opposite,
+)
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
-from tests.kernels.nonsmooth.references import apart, brought_near, meet, meeting, places_of
-from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, posed
+from blocksim.kernels.nonsmooth.slip import Constraints, Motion, bend_of, bend_time, follow_curvature, slip_of
+from tests.kernels.references import apart, brought_near, corners, meet, meeting, places_of, sides
+from tests.kernels.scenes import Block, listed, listed_constraints, posed
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from blocksim.kernels.common.arrays import Record
     from tests.kernels.conftest import MakeBody
+
 
 MARGIN = 2e-3  # m
 EXAMPLES = 250
@@ -62,59 +78,6 @@ def test_manifold_is_what_two_clipped_polygons_have(pairs: list[tuple[Record, Re
     assert min(found.count(reach) for reach in (AWAY, OPEN, TOUCHING)) > len(pairs) // 10
 
 
-def test_blocks_pushed_apart_by_the_deepest_point_just_touch(
-    make_body: MakeBody, pairs: list[tuple[Record, Record]]
-) -> None:
-    touching = 0
-    for a, b in pairs:
-        constraint = row_of(a, b)
-        if constraint.reach != TOUCHING:
-            continue
-        depth = -min(constraint.gap_one, constraint.gap_two)
-        assert depth == pytest.approx(-apart(a, b), abs=1e-12)
-        moved = make_body(
-            a.x + depth * constraint.nx, a.y + depth * constraint.ny, a.angle, width=2 * a.half_x, height=2 * a.half_y
-        )
-        assert apart(moved, b) == pytest.approx(0.0, abs=1e-12)
-        touching += 1
-    assert touching > len(pairs) // 10
-
-
-def test_bodies_swapped_have_the_same_points_and_the_opposite_normal(pairs: list[tuple[Record, Record]]) -> None:
-    for a, b in pairs:
-        one, two = row_of(a, b), row_of(b, a)
-        assert one.reach == two.reach
-        if one.reach != AWAY:
-            assert (one.nx, one.ny) == (-two.nx, -two.ny)
-            assert (one.gap_one, one.gap_two) == (two.gap_two, two.gap_one)
-            assert places_of(one, a, of_a=True) == pytest.approx(places_of(two, a, of_a=False)[::-1], abs=1e-15)
-
-
-def mirrored(body: Record, make_body: MakeBody) -> Record:
-    return make_body(-body.x, body.y, -body.angle, width=2 * body.half_x, height=2 * body.half_y)
-
-
-def test_mirror_image_has_the_mirrored_points(make_body: MakeBody, pairs: list[tuple[Record, Record]]) -> None:
-    for a, b in pairs:
-        constraint, image = row_of(a, b), row_of(mirrored(a, make_body), mirrored(b, make_body))
-        assert constraint.reach == image.reach
-        if constraint.reach != AWAY:
-            assert (-constraint.nx, constraint.ny) == pytest.approx((image.nx, image.ny), abs=1e-15)
-            assert (constraint.gap_one, constraint.gap_two) == pytest.approx((image.gap_two, image.gap_one), abs=1e-15)
-            expected = (places_of(constraint, a, of_a=True) * (-1.0, 1.0))[::-1]
-            assert places_of(image, mirrored(a, make_body), of_a=True) == pytest.approx(expected, abs=1e-15)
-
-
-@pytest.mark.parametrize("quarter", range(4))
-def test_faces_that_lie_flat_on_one_another_have_the_ends_of_their_overlap(make_body: MakeBody, quarter: int) -> None:
-    """Whichever faces they are: the upper block is turned by right angles."""
-    upper = make_body(0.01, 0.0125 + 0.016 + 1e-4, quarter * math.pi / 2, width=0.032, height=0.032)
-    constraint = row_of(upper, make_body(0.0, 0.0, width=0.032, height=0.025))
-    assert (constraint.nx, constraint.ny) == pytest.approx((0.0, 1.0), abs=1e-15)
-    assert (constraint.gap_one, constraint.gap_two) == pytest.approx((1e-4, 1e-4), abs=1e-15)
-    assert sorted(places_of(constraint, upper, of_a=True)[:, 0].tolist()) == pytest.approx([-0.006, 0.016], abs=1e-12)
-
-
 @pytest.mark.parametrize(("sunk", "way"), [(5e-6, -1.0), (5e-6, 1.0), (5e-5, 1.0)])
 def test_block_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next(
     make_body: MakeBody, sunk: float, way: float
@@ -124,12 +87,6 @@ def test_block_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next(
     constraint = row_of(slider, make_body())
     assert (constraint.nx, constraint.ny) == (0.0, 1.0)
     assert min(constraint.gap_one, constraint.gap_two) == pytest.approx(-sunk, abs=1e-15)
-
-
-def test_block_that_stands_beside_another_is_held_by_its_side(make_body: MakeBody) -> None:
-    constraint = row_of(make_body(0.032 - 1e-5, 0.02), make_body())
-    assert (constraint.nx, constraint.ny) == (1.0, 0.0)
-    assert (constraint.gap_one, constraint.gap_two) == pytest.approx((-1e-5, -1e-5), abs=1e-15)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -217,3 +174,207 @@ def test_contact_that_presses_has_the_normal_and_arms_of_the_middle_of_the_step(
     assert constraint.gap_one == pytest.approx(expected.gap_one - time * rate, abs=1e-7)
     assert constraint.gap_two == pytest.approx(expected.gap_two - time * (rate - constraint.width * 17.0), abs=1e-7)
     assert bool(constraint.bend != 0.0) is pressed
+
+
+angles = st.floats(-4.0, 4.0)
+places = st.floats(-0.05, 0.05)
+
+
+@given(angle=angles, way=angles)
+def test_face_opposite_a_direction_looks_most_against_it(make_body: MakeBody, angle: float, way: float) -> None:
+    body = make_body(0.1, -0.3, angle, width=0.03, height=0.02)
+    block = Seen(body.x, body.y, body.cos, body.sin, body.half_x, body.half_y)
+    side, _ = side_opposite(math.cos(way), math.sin(way), block, None, 0)
+    face = face_on(block, side)
+    (number,) = [k for k in range(4) if side_numbered(block, None, k) == side]
+    assert face.nx * math.cos(way) + face.ny * math.sin(way) <= -math.sqrt(0.5) + 1e-12
+    turned = angle + number * math.pi / 2
+    assert (face.nx, face.ny) == pytest.approx((math.cos(turned), math.sin(turned)), abs=1e-12)
+    assert (face.distance, face.right) == ((0.015, 0.01) if number in {0, 2} else (0.01, 0.015))
+    assert face.left == -face.right
+
+
+@given(angle=angles, right=places, above=places)
+def test_frame_of_a_face_counts_to_the_right_and_from_the_face_on(angle: float, right: float, above: float) -> None:
+    """Seen from inside the body, looking out, the right is at hand where the normal has turned clockwise."""
+    n = np.array([math.cos(angle), math.sin(angle)])
+    face = Face(float(n[0]), float(n[1]), 0.2, 0.1, 0.015, -0.01, 0.01)
+    x, y = (0.2, 0.1) + (0.015 + above) * n + right * np.array([n[1], -n[0]])
+    assert in_frame(face, float(x), float(y)) == pytest.approx((right, above), abs=1e-15)
+
+
+@given(left=places, width=st.floats(1e-4, 0.1), gap=places, rise=places, half=st.floats(0.005, 0.05), middle=places)
+def test_clipped_edge_stays_on_its_line_and_over_the_face(
+    left: float, width: float, gap: float, rise: float, half: float, middle: float
+) -> None:
+    face = Face(0.0, 1.0, 0.0, 0.0, 0.0, middle - half, middle + half)
+    whole = Edge(left, gap, left + width, gap + rise, False, False)
+    cut = clip(whole, face)
+    if left >= face.right or left + width <= face.left:
+        assert cut.left >= cut.right or math.isclose(cut.left, cut.right)
+        return
+    assert (cut.left, cut.right) == (max(left, face.left), min(left + width, face.right))
+    for place, height in ((cut.left, cut.left_gap), (cut.right, cut.right_gap)):
+        assert height == pytest.approx(gap + rise * (place - left) / width, abs=1e-12)
+    # ends of the face can touch
+    assert (bool(cut.is_left), bool(cut.is_right)) == (left < face.left, left + width > face.right)
+
+
+def test_block_ahead_turns_to_third_order_in_the_angle() -> None:
+    block = Seen(0.1, 0.2, math.cos(0.4), math.sin(0.4), 0.016, 0.0125)
+    errors = []
+    for ahead in (2e-3, 1e-3):
+        moved = block_ahead(block, 0.5, -0.7, 30.0, ahead)
+        assert (moved.x, moved.y) == pytest.approx((0.1 + 0.5 * ahead, 0.2 - 0.7 * ahead), abs=1e-15)
+        angle = 0.4 + 30.0 * ahead
+        errors.append(math.hypot(moved.cos - math.cos(angle), moved.sin - math.sin(angle)))
+    assert 0.0 < errors[1] < 0.13 * errors[0] < 0.13 * 0.06**3
+
+
+def on_ground(body: Record, ground: Record, margin: float) -> Record:
+    return meet(body, ground, margin, is_ground=True)
+
+
+@given(angle=angles, height=st.floats(-2e-3, 2e-3), level=places)
+def test_ground_is_met_by_all_corners_within_the_margin(
+    make_body: MakeBody, angle: float, height: float, level: float
+) -> None:
+    margin = 1.5e-3
+    body, ground = make_body(0.3, 0.0, angle), make_body(7.0, level, mass=1.0)
+    body.y = level + height - corners(body)[:, 1].min()
+    near = [corner for corner in corners(body).tolist() if corner[1] - level <= margin]
+    near.sort(reverse=True)  # along the tangent of an upward normal, which points to the left
+    constraint = on_ground(body, ground, margin)
+    assert bool(constraint.reach == AWAY) is (not near)
+    if not near:
+        return
+    assert (constraint.nx, constraint.ny) == (0.0, 1.0)
+    gaps = np.array([constraint.gap_one, constraint.gap_two])
+    assert gaps[gaps < FAR] == pytest.approx([y - level for _, y in near], abs=1e-12)
+    found = places_of(constraint, body, of_a=True)[gaps < FAR]
+    assert found == pytest.approx(np.array([(x, level) for x, _ in near]), abs=1e-12)
+
+
+FAR_OFF = 4e-3
+TIME = 1e-4  # s: of finite differences
+MOVING = 40
+
+
+class Moving(NamedTuple):
+    """Two blocks of which a corner of one is near a face of the other, and how they move."""
+
+    a: Record
+    b: Record
+    va: NDArray[np.float64]
+    vb: NDArray[np.float64]
+    constraint: Record
+    is_of_b: bool
+    corner: int  # of the one
+    side: int  # of the other
+
+    @property
+    def constraints(self) -> Constraints:
+        """The constraint as lanes have it."""
+        return Constraints(*(float(self.constraint[name]) for name in Constraints._fields))
+
+    @property
+    def motion(self) -> Motion:
+        """How they move; half a substep is a second."""
+        vx, vy, _ = self.va - self.vb
+        return Motion(float(vx), float(vy), float(self.va[2]), float(self.vb[2]), 0.0, 1.0)
+
+
+def moved(body: Record, velocity: NDArray[np.float64], time: float, make_body: MakeBody) -> Record:
+    x, y, angle = np.array([body.x, body.y, body.angle]) + time * velocity
+    return make_body(x, y, angle, width=2 * body.half_x, height=2 * body.half_y)
+
+
+@pytest.fixture(scope="module")
+def examples(make_body: MakeBody) -> list[Moving]:
+    """Return blocks that touch with one corner, half of them with a corner of body a."""
+    random = np.random.default_rng(1)
+    found: list[Moving] = []
+    while len(found) < MOVING:
+        b = make_body(0.2, 0.1, random.uniform(-3.0, 3.0), width=0.05, height=0.03)
+        angle, way, gap = b.angle + random.uniform(0.2, 1.3), random.uniform(-3.0, 3.0), random.uniform(-2e-4, 2e-4)
+        a = brought_near(make_body, b, np.array([0.02, 0.03]), angle, way, gap)
+        known = meeting(a, b, FAR_OFF)
+        constraint = meet(a, b, FAR_OFF)
+        if known.is_of_b == (len(found) % 2 == 0) and max(constraint.gap_one, constraint.gap_two) >= FAR:
+            other, of, sign = (a, b, 1.0) if known.is_of_b else (b, a, -1.0)
+            ways = np.abs(corners(other) - known.places[0]).sum(axis=1)
+            side = int(np.argmax([one.normal @ known.normal * sign for one in sides(of)]))
+            if ways.min() < 1e-3:  # no end of the reference face
+                va, vb = random.normal(size=(2, 3)) * (1.0, 1.0, 20.0)
+                found.append(Moving(a, b, va, vb, constraint, known.is_of_b, int(ways.argmin()), side))
+    return found
+
+
+def followed(one: Moving, make_body: MakeBody) -> list[float]:
+    """Return the gap of the corner that touches (m) a short time before, now and a short time later."""
+    gaps = []
+    for k in (-1, 0, 1):
+        a, b = moved(one.a, one.va, k * TIME, make_body), moved(one.b, one.vb, k * TIME, make_body)
+        other, of = (a, b) if one.is_of_b else (b, a)
+        side = sides(of)[one.side]
+        gaps.append(float((corners(other)[one.corner] - side.begin) @ side.normal))
+    return gaps
+
+
+def test_gaps_change_as_the_points_move_and_bend_as_blocks_turn(examples: list[Moving], make_body: MakeBody) -> None:
+    for one in examples:
+        before, now, after = followed(one, make_body)
+        slip = slip_of(one.constraints, *one.motion[:2], one.motion.spin_a, one.motion.spin_b)
+        is_first = one.constraint.gap_one < FAR
+        assert now == pytest.approx(min(one.constraint.gap_one, one.constraint.gap_two), abs=1e-12)
+        rate = slip.one if is_first else slip.two
+        assert (after - before) / (2.0 * TIME) == pytest.approx(rate, abs=1e-4)
+        bend = bend_of(one.constraints, one.motion, one.is_of_b, not is_first)
+        # the corner is taken for the point of the face below it; they are one where contacts press
+        within = 0.02 + abs(now) * (abs(one.va[2]) + abs(one.vb[2])) ** 2
+        assert (after - 2.0 * now + before) / TIME**2 == pytest.approx(bend.normal, abs=within)
+
+
+def test_slip_is_that_of_the_places_on_both_bodies(examples: list[Moving]) -> None:
+    for one in examples:
+        n, t = np.array([one.constraint.nx, one.constraint.ny]), np.array([-one.constraint.ny, one.constraint.nx])
+        expected = []
+        for place in places_of(one.constraint, one.a, of_a=True):
+            va, vb = (
+                v[:2] + v[2] * np.array([body.y - place[1], place[0] - body.x])
+                for body, v in ((one.a, one.va), (one.b, one.vb))
+            )
+            expected.append(va - vb)
+        slip = slip_of(one.constraints, *one.motion[:2], one.motion.spin_a, one.motion.spin_b)
+        assert (slip.one, slip.two) == pytest.approx([u @ n for u in expected], abs=1e-12)
+        assert slip.shear == pytest.approx(expected[0] @ t, abs=1e-12)
+        assert expected[1] @ t == pytest.approx(expected[0] @ t, abs=1e-12)
+
+
+def test_point_that_sticks_is_drawn_to_both_centres(examples: list[Moving]) -> None:
+    for one in examples:
+        t = np.array([-one.constraint.ny, one.constraint.nx])
+        for is_two in (False, True):
+            place = places_of(one.constraint, one.a, of_a=True)[int(is_two)]
+            drawn = [-(w**2) * (place - (body.x, body.y)) for body, w in ((one.a, one.va[2]), (one.b, one.vb[2]))]
+            bend = bend_of(one.constraints, one.motion, one.is_of_b, is_two)
+            assert bend.shear == pytest.approx((drawn[0] - drawn[1]) @ t, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 4])
+def test_bends_add_up_to_a_parabola_about_the_middle_of_the_manifold(substeps: int) -> None:
+    h, curvature = 1e-3, 7.0
+    stepping = zeros(1, STEPPING)[0]
+    stepping.substep, stepping.substeps = h, substeps
+    middle, bend = (substeps - 1) * h / 2, curvature * h / 2
+
+    def off(time: float) -> float:
+        return 0.5 * curvature * (time - middle) ** 2
+
+    assert bend * bend_time(stepping, 0) == pytest.approx(off(0.0), abs=1e-15)
+    for number in range(substeps):
+        follow_curvature(stepping, number)
+        gained = h * stepping.bend_share * bend
+        assert bend * stepping.bend_time == pytest.approx(off(number * h), abs=1e-15)
+        assert bend * stepping.next_bend_time == pytest.approx(off((number + 1) * h), abs=1e-15)
+        assert gained == pytest.approx(off((number + 1) * h) - off(number * h), abs=1e-15)

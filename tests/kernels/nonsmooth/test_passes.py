@@ -1,4 +1,4 @@
-"""What a substep solves, against dense matrices: complementarity, Coulomb's cone, momentum, least change of energy."""
+"""What a substep solves: complementarity, Coulomb's cone, momentum, restitution; kicks and drifts of single bodies."""
 
 from __future__ import annotations
 
@@ -10,18 +10,27 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import INTERACTION, zeros
+from blocksim.kernels.common.tolerances import LATE
+from blocksim.kernels.nonsmooth.arrays import BEFORE, FAR, STATE, TALLY_PACKS
 from blocksim.kernels.nonsmooth.cone import shear_limit
-from blocksim.kernels.nonsmooth.motion import kick
-from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, WARM, sweep
-from blocksim.kernels.nonsmooth.step import substep
+from blocksim.kernels.nonsmooth.motion import drift, is_in_flight, kick, kick_warm, place
+from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY, range_of_thread, sweep, velocity_pass
+from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
 from blocksim.world.sag import soft_contact
-from tests.kernels.nonsmooth.references import Dense, dense, least_change
-from tests.kernels.nonsmooth.scenes import Block, after_substep, collided, pile, posed, velocities
+from tests.kernels.references import Dense, dense, least_change
+from tests.kernels.scenes import Block, after_substep, collided, pile, posed, velocities
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.random import Generator
     from numpy.typing import NDArray
 
+    from blocksim.kernels.common.arrays import Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+    from blocksim.verification.scene import Simulation
+    from tests.kernels.conftest import MakeBody
+
 
 G = 9.81
 H = 1e-3  # s, a substep
@@ -36,46 +45,10 @@ def size(pace: int) -> tuple[int, int]:
     return (4, 3) if pace == 1 else (2, 2)
 
 
-def unpushed(scene: Nonsmooth) -> NDArray[np.float64]:
-    """Return the velocities that a whole kick of gravity alone would leave."""
-    found = velocities(scene.contacts.before)
-    found[scene.contacts.states.inverse_mass > 0.0, 1] -= G * H
-    return found.ravel()
-
-
 def slips(scene: Nonsmooth, all_of: Dense) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the velocities at the points along their normals, and those of constraints along their tangents (m/s)."""
     now = velocities(scene.contacts.states).ravel()
     return all_of.normals @ now, all_of.tangents @ now
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_impulses_without_friction_change_the_energy_least(seed: int, size: tuple[int, int]) -> None:
-    """Velocities that satisfy all contacts and differ least from those without: there is one such set only."""
-    scene = after_substep(pile(np.random.default_rng(seed), *size), **SMOOTH, **EXACT)
-    all_of, free = dense(scene), unpushed(scene)
-    least = all_of.targets[all_of.counts]
-    expected = least_change(free, all_of.normals[all_of.counts], least, all_of.inverse_mass)
-    assert velocities(scene.contacts.states).ravel() == pytest.approx(expected, abs=ROUND_OFF)
-    assert np.abs(expected - free).max() > 0.1
-    assert np.all(all_of.shears == 0.0)
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("friction", [0.0, 0.3, 1.0])
-def test_impulses_push_only_where_blocks_do_not_part(seed: int, friction: float, size: tuple[int, int]) -> None:
-    blocks = pile(np.random.default_rng(seed), *size)
-    scene = after_substep(blocks, friction=friction, ground_friction=friction, **EXACT)
-    all_of = dense(scene)
-    rates, _ = slips(scene, all_of)
-    rest = (rates - all_of.targets)[all_of.counts]
-    impulses = all_of.impulses[all_of.counts]
-    mass = 1.0 / float(all_of.inverse_mass[0])
-    assert all_of.impulses.min() >= 0.0
-    assert np.all(all_of.impulses[~all_of.counts] == 0.0)
-    assert rest.min() > -ROUND_OFF
-    assert np.minimum(impulses / mass, rest).max() < ROUND_OFF
-    assert np.any(impulses > 0.0)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -146,20 +119,6 @@ def test_velocities_change_by_gravity_and_by_the_impulses_that_are_kept(
     assert np.all(before[-1] == 0.0)
 
 
-def test_second_substep_begins_with_the_impulses_of_the_first(size: tuple[int, int]) -> None:
-    scene = collided(posed(pile(np.random.default_rng(3), *size), substeps=2, step=2 * H))
-    substep(scene, 0, 0, False, scene.contacts.impact_lanes)
-    pushed = dense(scene).pushed()
-    start = velocities(scene.contacts.states)
-    kick(scene.contacts.states, scene.contacts.before, 0, len(start) - 1, 1.0, 0.0, -G * H)
-    sweep(scene.contacts, WARM, scene.world.team, 0)
-    expected = start.ravel() + pushed
-    expected[1:-3:3] -= G * H
-    warm = velocities(scene.contacts.states).ravel()
-    assert warm == pytest.approx(expected, abs=1e-13)
-    assert np.abs(pushed).max() > 0.1
-
-
 def soft_row(gap: float, rate: float, tilt: float = 1e-4) -> tuple[Nonsmooth, Dense]:
     """Return one block over the ground after the position pass, at rest before."""
     lowest = math.sin(tilt) * 0.016 + math.cos(tilt) * 0.0125
@@ -195,13 +154,6 @@ def test_round_off_of_a_gap_does_not_choose_between_the_rules() -> None:
     for scene in scenes:
         sweep(scene.contacts, FIRST_VELOCITY, scene.world.team, 0)
     assert [dense(scene).impulses.min() > 0.0 for scene in scenes] == [True, True]
-
-
-def test_gap_that_stays_open_and_parts_that_leave_are_not_pulled() -> None:
-    for gap, rate in ((3e-4, 0.0), (-1e-6, 1.0)):
-        scene, all_of = soft_row(gap, rate)
-        assert np.all(all_of.impulses == 0.0)
-        assert velocities(scene.contacts.states)[0].tolist() == [0.0, rate, 0.0]
 
 
 @given(static=st.floats(0.0, 1.0), less=st.floats(0.0, 1.0), normal=st.floats(1e-3, 2.0), needed=st.floats(0.0, 3.0))
@@ -254,3 +206,225 @@ def test_tallies_have_what_impulses_take_from_blocks_that_meet_without_gravity()
     _, slip = slips(scene, all_of)
     then = all_of.tangents @ velocities(scene.contacts.before).ravel()
     assert float(tallies.friction.sum()) == pytest.approx(float(-0.5 * all_of.shears @ (slip + then)), rel=1e-9)
+
+
+HALF = 0.0125  # m, of a height
+SLIPPERY: dict[str, Any] = {"friction": 0.0, "ground_friction": 0.0, "substeps": 1, "velocity_tolerance": 1e-11}
+RESTITUTIONS = [0.0, 0.2, 0.5, 0.8, 1.0]
+
+
+def lowest(angle: float) -> float:
+    """Return how far (m) the lowest corner is below the centre."""
+    return math.sin(abs(angle)) * 0.016 + math.cos(angle) * HALF
+
+
+@pytest.mark.parametrize("restitution", RESTITUTIONS)
+@pytest.mark.parametrize("angle", [0.0, 0.3, -1.0])
+@pytest.mark.parametrize("others", [0, 2])  # impacts of one or two blocks go in rounds, weak ones of three do not
+def test_impact_reverses_the_approach_of_the_point_by_its_restitution(
+    restitution: float, angle: float, others: int
+) -> None:
+    """Without gravity exactly: flat, or on a corner, in the plane of the ground or that of a fixed block."""
+    far = [Block(3.0 + k, 3.0) for k in range(others)]
+    for floor in ([], [Block(0.0, -HALF + 0.5, width=0.2, fixed=True)]):
+        level = 0.5 if floor else 0.0
+        block = Block(0.004, level + lowest(angle) + 1e-5, angle, 0.3, -0.9, 4.0 * (angle != 0.0))
+        scene = after_substep([block, *floor, *far], restitution=restitution, gravity=0.0, **SLIPPERY)
+        all_of = dense(scene)
+        after = all_of.normals @ velocities(scene.contacts.states).ravel()
+        before = all_of.normals @ velocities(scene.contacts.before).ravel()
+        if restitution > (0.5 if far else 0.0):  # in rounds: their velocities before are no longer kept
+            rest = [[0.0] * 3] * (1 + len(floor) + len(far))
+            before = all_of.normals @ np.array([[0.3, -0.9, block.spin], *rest]).ravel()
+        is_met = all_of.gaps < FAR / 2
+        assert after[is_met] == pytest.approx(-restitution * before[is_met], abs=1e-9)
+        assert before[is_met].max() < -0.5
+
+
+@pytest.mark.parametrize(("rate", "rebounds"), [(0.019, False), (0.021, True)])
+def test_slower_impacts_than_the_threshold_do_not_rebound(rate: float, rebounds: bool) -> None:
+    block = Block(0.0, HALF - 1e-7, vy=-rate)
+    scene = after_substep([block], restitution=0.5, gravity=0.0, restitution_threshold=0.02, **SLIPPERY)
+    assert velocities(scene.contacts.states)[0, 1] == pytest.approx(0.5 * rate if rebounds else 0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_gap_that_does_not_close_in_the_substep_takes_nothing_from_an_approach(restitution: float) -> None:
+    block = Block(0.0, HALF + 1.1e-3, vy=-1.0)
+    scene = after_substep([block], restitution=restitution, gravity=0.0, **SLIPPERY)
+    assert velocities(scene.contacts.states)[0].tolist() == [0.0, -1.0, 0.0]
+
+
+@pytest.mark.parametrize("others", [0, 2])  # in rounds, and not
+def test_point_that_parts_beside_one_that_meets_is_not_made_to_rebound(others: int) -> None:
+    """A heel comes down while the toe is lifted, out of an overlap: the blow takes from that, and nothing gives."""
+    block = Block(0.0, HALF - 1e-3, vx=0.2, vy=-0.25, spin=-45.0)
+    far = [Block(3.0 + k, 3.0) for k in range(others)]
+    scene = after_substep([block, *far], restitution=0.4, gravity=0.0, **SLIPPERY)
+    all_of = dense(scene)
+    before = all_of.normals @ np.array([block.vx, block.vy, block.spin, *[0.0] * 3 * (1 + others)])
+    after = all_of.normals @ velocities(scene.contacts.states).ravel()
+    heel, toe = np.argmin(before), np.argmax(before)
+    assert before[toe] > 0.3
+    assert after[heel] == pytest.approx(-0.4 * before[heel], abs=1e-9)
+    assert all_of.impulses[toe] == 0.0
+    assert velocities(scene.contacts.states)[0, 0] == pytest.approx(0.2, abs=1e-12)
+
+
+def test_point_that_is_still_open_beside_one_in_touch_is_not_slowed_down() -> None:
+    """A block turns about one corner; the other will meet the ground in the next substep, and not in this one."""
+    angle, x = 0.02, 0.016 * math.cos(0.02) - HALF * math.sin(0.02)
+    spin = -angle / (1.5 * H)
+    block = Block(0.0, lowest(angle) - 1e-9, angle, lowest(angle) * -spin, x * spin, spin)
+    scene = after_substep([block], restitution=0.0, gravity=0.0, **SLIPPERY)
+    assert dense(scene).gaps.max() < FAR / 2  # both are looked at
+    assert velocities(scene.contacts.states)[0].tolist() == pytest.approx([block.vx, block.vy, spin], abs=1e-6)
+
+
+@pytest.mark.parametrize("restitution", [0.4, 0.9])
+def test_blocks_that_meet_side_by_side_in_flight_fall_on(single: Callable[..., Simulation], restitution: float) -> None:
+    blocks = [{"x": -0.02, "y": 1.0, "velocity": [1.0, 0.0]}, {"x": 0.02, "y": 1.0, "velocity": [-1.0, 0.0]}]
+    run = single(blocks, restitution=restitution, friction=0.0).to_step(20)
+    assert run.bodies.y == pytest.approx([1.0 - 0.5 * G * 0.02**2] * 2, abs=1e-9)
+    assert run.bodies.vx == pytest.approx([-restitution, restitution], abs=1e-6)
+
+
+FEW = 250  # sweeps, of 1000 that are allowed and that it took where they swung
+TALL = ((0.0, 0.0), (0.02, 0.0), (0.01, 0.05))  # m, a triangle
+SETTING: dict[str, Any] = {
+    "velocity_tolerance": 1e-9,
+    "velocity_sweeps": 1000,
+    "substeps": 1,
+    "restitution": 0.0,
+    "gravity": 0.0,
+}
+
+
+def on_a_corner(random: Generator, outline: tuple[tuple[float, float], ...]) -> Block:
+    """Return a body of 20 x 60 mm, or with an outline, with its lowest corner on the ground and any motion."""
+    angle = random.uniform(0.1, 1.4) * random.choice([-1.0, 1.0])
+    corners = np.array(outline or [(-0.01, -0.03), (0.01, -0.03), (0.01, 0.03), (-0.01, 0.03)])
+    corners = corners - corners.mean(axis=0)
+    heights = math.sin(angle) * corners[:, 0] + math.cos(angle) * corners[:, 1]
+    vx, vy, spin = random.normal(size=3) * (3.0, 0.3, 15.0)
+    return Block(0.0, -heights.min() - 1e-9, angle, vx, vy, spin, width=0.02, height=0.06, outline=outline)
+
+
+def solved(body: Block, friction: float) -> tuple[Nonsmooth, bool]:
+    """Return a scene of a body after a substep, and whether its sweeps were late."""
+    scene = after_substep([body], friction=friction, ground_friction=friction, **SETTING)
+    return scene, bool(scene.contacts.stepping[0].sweeps > LATE)
+
+
+@pytest.mark.parametrize("outline", [(), TALL], ids=["rectangle", "triangle"])
+@pytest.mark.parametrize("friction", [1.6, 4.0])
+def test_sweeps_end_and_obey_coulomb_where_friction_couples_strongly(
+    outline: tuple[tuple[float, float], ...], friction: float
+) -> None:
+    random = np.random.default_rng(5)
+    sliding = 0
+    for _ in range(60):
+        scene, is_late = solved(on_a_corner(random, outline), friction)
+        if not scene.contacts.stepping[0].pack_count:
+            continue
+        assert scene.contacts.stepping[0].sweeps < FEW
+        all_of = dense(scene)
+        now = velocities(scene.contacts.states).ravel()
+        counts = all_of.counts
+        normal, shear, slip = all_of.impulses.sum(), float(all_of.shears[0]), float((all_of.tangents @ now)[0])
+        rates = (all_of.normals @ now - all_of.targets)[counts]
+        assert all_of.impulses.min() >= 0.0
+        assert rates.min(initial=0.0) > -1e-7
+        assert abs(shear) <= friction * normal + 1e-9
+        if normal > 0.0 and abs(slip) > 1e-6:
+            sliding += is_late
+            assert shear == pytest.approx(-math.copysign(friction * normal, slip), abs=1e-8)
+    assert sliding > 4
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 5])
+@pytest.mark.parametrize("count", [0, 1, 3, 4, 7, 23, 64])
+def test_threads_divide_packs_in_whole_tallies_and_leave_none_out(size: int, count: int) -> None:
+    begin, end = 8, 8 + count
+    ranges = [range_of_thread(begin, end, k, size) for k in range(size)]
+    assert [m for first, last in ranges for m in range(first, last)] == list(range(begin, end))
+    assert all((first - begin) % TALLY_PACKS == 0 for first, last in ranges if first < last)
+    scene = posed([Block(0.1 * i, 1.0) for i in range(7)])
+    assert [i for k in range(size) for i in range(*bodies_of_thread(scene.contacts, k, size))] == list(range(7))
+
+
+def test_velocity_pass_ends_at_its_tolerance_or_after_its_sweeps() -> None:
+    blocks = pile(np.random.default_rng(0), 2, 2)
+    sweeps = {}
+    for tolerance in (0.1, 1e-3, 1e-6):
+        scene = after_substep(blocks, velocity_tolerance=tolerance)
+        sweeps[tolerance] = int(scene.contacts.stepping[0].sweeps)
+        before = velocities(scene.contacts.states)
+        velocity_pass(scene.contacts, scene.world.team, 0, VELOCITY, 1e3)  # one more sweep
+        assert (
+            np.abs(velocities(scene.contacts.states) - before)[:, :2].max() <= 4.0 * tolerance
+        )  # constraints of a body
+        assert scene.contacts.stepping[0].sweeps == sweeps[tolerance] + 1
+    assert sweeps[0.1] < sweeps[1e-3] < sweeps[1e-6]
+    assert after_substep(blocks, velocity_tolerance=1e-6, velocity_sweeps=3).contacts.stepping[0].sweeps == 3
+
+
+KICK = (0.5 * H, -9.0 * H)
+
+
+def kicked(vx: float, vy: float, spin: float, share: float) -> tuple[Records, Records]:
+    """Return the state of a free body after a share of a kick, and what is kept from before the substep."""
+    states, before = zeros(1, STATE), zeros(1, BEFORE)
+    one = states[0]
+    one.vx, one.vy, one.spin, one.inverse_mass, one.inverse_inertia = vx, vy, spin, 10.0, 1e4
+    kick(states, before, 0, 1, share, *KICK)
+    return states, before
+
+
+@pytest.mark.parametrize("last", [0.5, 1.0])
+def test_warm_kick_gives_again_what_impulses_gave_and_one_whole_kick(last: float) -> None:
+    states, kept = kicked(1.0, -2.0, 3.0, last)
+    one, before = states[0], kept[0]
+    pushed = np.array([0.1, 0.4, -5.0])
+    one.vx, one.vy, one.spin = np.array([one.vx, one.vy, one.spin]) + pushed
+    now = np.array([one.vx, one.vy, one.spin])
+    kick_warm(states, kept, 0, 1, last, *KICK)
+    assert [one.vx, one.vy, one.spin] == pytest.approx(now + pushed + (*KICK, 0.0), abs=1e-14)
+    assert [before.vx, before.vy, before.spin] == now.tolist()
+
+
+def test_drift_moves_by_velocity_times_time() -> None:
+    states = zeros(3, STATE)
+    states.vx, states.vy, states.spin = (1.0, 2.0, 3.0), (-1.0, 0.5, 4.0), (10.0, 20.0, 30.0)
+    for _ in range(2):
+        drift(states, 1, 3, H)
+    assert states.dx.tolist() == pytest.approx([0.0, 4e-3, 6e-3])
+    assert states.dy.tolist() == pytest.approx([0.0, 1e-3, 8e-3])
+    assert states.turned.tolist() == pytest.approx([0.0, 0.04, 0.06])
+
+
+@pytest.mark.parametrize("turned", [1e-4, -0.3])
+@pytest.mark.parametrize("is_touching", [False, True])
+def test_step_ends_with_the_pose_that_the_drifts_add_up_to(
+    make_body: MakeBody, turned: float, is_touching: bool
+) -> None:
+    """Velocities of bodies in flight are brought up by half a kick; a support holds against that."""
+    body = make_body(0.2, 0.1, 0.6)
+    (one,), (before,) = kicked(1.0, -2.0, 3.0, 1.0)
+    one.vy += 0.1 * is_touching
+    one.dx, one.dy, one.turned = 0.01, -0.02, turned
+    velocity = np.array([one.vx, one.vy, one.spin])
+    place(body, one, before, 1.0, (*KICK, 0.0))
+    assert (body.x, body.y, body.angle) == pytest.approx((0.21, 0.08, 0.6 + turned), abs=1e-15)
+    assert (body.cos, body.sin) == pytest.approx((math.cos(body.angle), math.sin(body.angle)), abs=1e-14)
+    brought = np.array([0.0, 0.0, 0.0]) if is_touching else np.array([*KICK, 0.0]) / 2
+    assert [body.vx, body.vy, body.spin] == pytest.approx(velocity + brought, abs=1e-15)
+    assert (one.dx, one.dy, one.turned) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("extra", "flies"), [(0.0, True), (1e-7, False), (-1e-7, False)])
+def test_body_is_in_flight_where_gravity_alone_has_changed_its_velocity(extra: float, flies: bool) -> None:
+    for name in ("vx", "vy"):
+        (one,), (before,) = kicked(1.0, -2.0, 3.0, 1.0)
+        one[name] += extra
+        assert bool(is_in_flight(one, before, *KICK)) is flies

@@ -11,9 +11,19 @@ import pytest
 from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, TOUCHING
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.verification.scene import HEIGHT, WIDTH
-from tests.kernels.nonsmooth import references
-from tests.kernels.nonsmooth.polygons import HEXAGON, depth_below, random_outline, rectangle, turned
-from tests.kernels.nonsmooth.scenes import Block, listed, listed_constraints, place, posed
+from tests.kernels import references
+from tests.kernels.scenes import (
+    HEXAGON,
+    Block,
+    depth_below,
+    listed,
+    listed_constraints,
+    place,
+    posed,
+    random_outline,
+    rectangle,
+    turned,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -172,16 +182,6 @@ def test_polygon_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_nex
         if constraint.reach != AWAY:
             assert (constraint.nx, constraint.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
     assert constraints[0, 2].reach == TOUCHING
-
-
-def test_honeycomb_cells_meet_at_whole_faces() -> None:
-    """Their corners coincide with those of the next faces, which face one another as well."""
-    below = depth_below(HEXAGON)
-    blocks = [Block(0.0, 2.0, outline=HEXAGON), Block(0.0, 2.0 + 2.0 * below - 1e-6, outline=HEXAGON)]
-    (constraint,) = [constraint for constraint in manifolds(posed(blocks), blocks) if constraint.b == 1]
-    assert (constraint.nx, constraint.ny) == pytest.approx((0.0, -1.0), abs=1e-12)
-    assert constraint.width == pytest.approx(0.02, rel=1e-9)
-    assert (constraint.gap_one, constraint.gap_two) == pytest.approx((-1e-6, -1e-6), abs=1e-12)
 
 
 @pytest.mark.parametrize("ground", ["half-plane", "piece", "block"])

@@ -1,4 +1,4 @@
-"""What the kernels of rigid contacts have to find, worked out in NumPy another way: geometry, and dense matrices."""
+"""What kernels have to find, worked out in NumPy another way: geometry, and dense matrices of rigid contacts."""
 
 from __future__ import annotations
 
@@ -47,10 +47,32 @@ class Meeting(NamedTuple):
     is_of_b: bool
 
 
+def turning(angle: float) -> Vector:
+    """Return the matrix that points of a body as rows are multiplied with, from its frame to the world."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, s], [-s, c]])
+
+
 def corners(body: Record) -> Vector:
     """Return the corners (4, 2) of a body, counter-clockwise, from its angle."""
-    c, s = np.cos(body.angle), np.sin(body.angle)
-    return np.asarray(SIGNS * (body.half_x, body.half_y) @ np.array([[c, s], [-s, c]]) + (body.x, body.y))
+    return np.asarray(SIGNS * (body.half_x, body.half_y) @ turning(body.angle) + (body.x, body.y))
+
+
+def in_frame(points: Vector, body: Record) -> Vector:
+    """Return points (n, 2) as the frame of a body has them."""
+    return np.asarray((points - (body.x, body.y)) @ turning(body.angle).T)
+
+
+def distances(points: Vector, body: Record) -> Vector:
+    """Return the distances (m) of points to a rectangle, zero inside."""
+    outside = np.maximum(np.abs(in_frame(points, body)) - (body.half_x, body.half_y), 0.0)
+    return np.asarray(np.hypot(outside[:, 0], outside[:, 1]))
+
+
+def gap_along(angle: float, one: Record, two: Record) -> float:
+    """Return the gap (m) between the projections of the corners of two bodies on one direction (rad)."""
+    a, b = (corners(body) @ (np.cos(angle), np.sin(angle)) for body in (one, two))
+    return float(max(b.min() - a.max(), a.min() - b.max()))
 
 
 def sides(body: Record) -> list[Side]:

@@ -1,4 +1,4 @@
-"""Scenarios with rigid contacts, from those with springs, and single steps of blocks in any poses.
+"""Scenes of the tests of kernels: single steps of blocks in any poses with rigid contacts, and outlines.
 
 SI units, angles in rad.
 """
@@ -6,6 +6,7 @@ SI units, angles in rad.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, pi, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,10 +18,12 @@ from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
 from blocksim.kernels.nonsmooth.packs import gather, pack_all
 from blocksim.kernels.nonsmooth.step import substep
+from blocksim.scenario.geometry import centre_outline, regular
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene
 from blocksim.world.nonsmooth import with_more_constraints
+from tests.kernels.references import turning
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,10 +33,14 @@ if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
     from blocksim.scenario import Scenario
+    from blocksim.scenario.geometry import Corners
 
 STEP = 1e-3  # s, unless a test says otherwise
 ENDLESS = 1e3  # s: tests step as far as they want
 RIGID = {"scheme": "nonsmooth"}
+RADIUS = 0.02
+HEXAGON = regular(6, RADIUS)
+TRIANGLE = centre_outline([(0.0, 0.0), (0.04, 0.0), (0.012, 0.03)])  # its centroid is not over the middle of its base
 NAMES = ("x", "y", "angle", "vx", "vy", "spin")
 
 
@@ -140,3 +147,28 @@ def pile(random: np.random.Generator, columns: int, rows: int, rate: float = 0.3
         for j in range(rows)
         for i in range(columns)
     ]
+
+
+def rectangle(width: float = WIDTH, height: float = HEIGHT) -> Corners:
+    """Return the outline of a rectangle."""
+    return centre_outline([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
+
+
+def turned(outline: Corners, angle: float) -> NDArray[np.float64]:
+    """Return the corners (n, 2) of an outline turned by an angle (rad)."""
+    return np.asarray(np.array(outline) @ turning(angle))
+
+
+def depth_below(outline: Corners, angle: float = 0.0) -> float:
+    """Return how far (m) a polygon reaches below its centroid."""
+    return -float(turned(outline, angle)[:, 1].min())
+
+
+def random_outline(random: Any, size: float = RADIUS) -> Corners:
+    """Return a convex polygon of 3 to 9 corners, some of them sharp, at random."""
+    while True:
+        angles = np.sort(random.uniform(0.0, 2.0 * pi, int(random.integers(3, 10))))
+        steps = np.diff([*angles, angles[0] + 2.0 * pi])
+        if steps.min() > 0.15 and steps.max() < 2.8:
+            stretch = random.uniform(0.4, 1.0)
+            return centre_outline([(size * cos(one), stretch * size * sin(one)) for one in angles.tolist()])
