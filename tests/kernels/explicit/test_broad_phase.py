@@ -11,7 +11,6 @@ import pytest
 
 from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED, SLOTS
 from blocksim.kernels.common.integrate import place_all_corners
-from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.sides import MOST_CORNERS
 from blocksim.kernels.explicit.step import advance
 from blocksim.world.build import empty_lists, with_more_room
@@ -87,20 +86,6 @@ def test_list_misses_no_corner_within_reach_and_has_none_beyond(start: Start, se
     assert {pair: allowed.get(pair) for pair in found} == found
 
 
-def test_candidates_that_wait_are_those_that_are_neither_in_contact_nor_a_duplicate(start: Start) -> None:
-    # two blocks of the same width exactly on top of one another, a third one beside them, just out of touch
-    bodies = [{"y": 0.0125}, {"y": 0.0375}, {"x": 0.0321, "y": 0.0125}]
-    world = start(bodies, contact={"stiffness_scale": 1e-4}).to_time(5e-3).world
-    counted: dict[tuple[int, int], tuple[int, ...]] = {}
-    for _ in range(2):
-        pairs = world.pairs[: world.clock[0].pair_count]
-        counted |= {(int(pair.a), int(pair.b)): (int(pair.near), int(pair.active), int(pair.idle)) for pair in pairs}
-        assert rebuild_pairs(world)
-    assert counted[0, 1] == (4, 2, 0)  # two corners of each lie in the other: two are duplicates
-    assert counted[0, 2] == (4, 0, 4)
-    assert counted[0, 3] == counted[2, 3] == (2, 2, 0)
-
-
 def unstarted(start: Start) -> World:
     """Return twelve blocks about to fall on one another, before their first step."""
     kept: list[World] = []
@@ -151,26 +136,3 @@ def test_run_continued_with_more_room_has_the_same_bits(start: Start, pace: int)
     for name in ("pairs", "contacts", "operators"):
         assert bits(getattr(roomy, name)[:count]) == bits(getattr(grown, name)[:count]), name
     assert (roomy.candidates[:count] == grown.candidates[:count]).all()
-
-
-def test_more_room_in_the_middle_of_a_run_changes_no_bit(start: Start, pace: int) -> None:
-    straight, _ = run(unstarted(start), 800 // pace)
-    halfway, _ = run(unstarted(start), 500 // pace)
-    widened, _ = run(with_more_room(halfway), 800 // pace)
-    assert bits(straight.bodies) == bits(widened.bodies)
-
-
-def test_history_of_a_pair_is_carried_over_and_that_of_a_lost_pair_is_gone(start: Start) -> None:
-    scene = start([{"y": 0.0125}, {"x": 0.05, "y": 0.0125}], tilt=-0.2, contact={"stiffness_scale": 1e-4}).to_time(0.01)
-    world = scene.world
-    held = world.contacts[1].copy()
-    assert world.clock[0].pair_count == 2
-    assert np.abs(held.spring).min() > 0.0
-    world.bodies[0].y += 1.0
-    assert rebuild_pairs(world)
-    assert world.clock[0].pair_count == 1
-    assert scene.contact_records.tobytes() == held.tobytes()
-    world.bodies[0].y -= 1.0
-    assert rebuild_pairs(world)
-    assert world.pairs.active[:2].tolist() == [0, 2]
-    assert scene.contact_records.tobytes() == held.tobytes()

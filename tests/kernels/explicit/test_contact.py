@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import cos, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from tests.conftest import PaperBlock, Start
     from tests.kernels.conftest import MakeBody, Pose
 
-SLOPE = 0.2
 SOFT = {"stiffness_scale": 1e-4}  # a hundredth of the steps
 
 
@@ -41,13 +39,6 @@ def test_pairs_of_a_fixed_body_do_not_count(make_body: MakeBody) -> None:
     a, ground = make_body(), make_body()
     ground.inverse_mass, ground.pairs_before, a.pairs_before = 0.0, 100, 1
     assert shared_step(a, ground, 1e-6) == shared_step(ground, a, 1e-6) == 1e-6
-
-
-def test_pairs_in_contact_are_counted_for_every_body(start: Start, paper_block: PaperBlock) -> None:
-    height = paper_block.height
-    brick = {"x": 0.5 * 0.033, "y": 1.5 * height}
-    wall = start([{"y": 0.5 * height}, {"x": 0.033, "y": 0.5 * height}, brick], contact=SOFT).to_time(1e-2)
-    assert wall.bodies.pairs_before.tolist() == [2, 2, 2]
 
 
 @pytest.mark.parametrize(
@@ -68,18 +59,6 @@ def test_dashpots_are_void_where_others_bear_a_body_now_and_corners_know_how_sti
         assert has_new_neighbours(a, b, model) == bool(of_a or of_b)
 
 
-def test_sticking_block_pulls_its_shear_springs_against_the_slope(start: Start, paper_block: PaperBlock) -> None:
-    rest = start([{"y": paper_block.height / 2}], tilt=-SLOPE, contact=SOFT).to_time(0.05)
-    touching = rest.contact_records
-    assert touching.slot.tolist() == [0, 1]
-    weight = paper_block.mass * 9.81
-    assert touching.normal_force.sum() == pytest.approx(weight * cos(SLOPE), rel=1e-3)
-    assert abs(touching.shear_force.sum()) == pytest.approx(weight * sin(SLOPE), rel=1e-3)
-    assert touching.normal_force[1] > touching.normal_force[0]  # it leans downhill, towards +x
-    lever = weight * sin(SLOPE) * paper_block.height / 2
-    assert np.diff(touching.normal_force)[0] * paper_block.width / 2 == pytest.approx(lever, rel=1e-3)
-
-
 def test_sliding_block_has_its_springs_at_the_cone(start: Start, paper_block: PaperBlock) -> None:
     slide = start([{"y": paper_block.height / 2, "velocity": [-0.5, 0.0]}], contact=SOFT).to_time(0.02)
     world, touching = slide.world, slide.contact_records
@@ -90,31 +69,6 @@ def test_sliding_block_has_its_springs_at_the_cone(start: Start, paper_block: Pa
     assert world.ledger[0].friction == pytest.approx(
         0.38 * paper_block.mass * 9.81 * abs(float(slide.bodies[0].x)), rel=1e-2
     )
-
-
-def test_kinetic_friction_slows_a_sliding_block_and_static_friction_holds_it(
-    start: Start, paper_block: PaperBlock
-) -> None:
-    def give_kinetic_friction(world: object) -> None:
-        world.interactions.kinetic_friction[...] = 0.19  # type: ignore[attr-defined]
-
-    sliding = {"y": paper_block.height / 2, "velocity": [0.5, 0.0]}
-    slide = start([sliding], contact=SOFT, change=give_kinetic_friction).to_time(0.1)
-    assert slide.bodies[0].vx == pytest.approx(0.5 - 0.19 * 9.81 * slide.time, rel=1e-3)
-    lying = {"y": paper_block.height / 2}
-    rest = start([lying], tilt=-0.35, restitution=0.0, contact=SOFT, change=give_kinetic_friction).to_time(0.1)
-    assert abs(rest.bodies[0].vx) < 1e-6  # tan 0.35 = 0.365: between kinetic and static
-
-
-def test_contact_never_pulls_while_it_ends(start: Start, paper_block: PaperBlock) -> None:
-    impact = start([{"y": paper_block.height / 2 + 1e-7, "velocity": [0.0, -1.0]}], restitution=0.1, gravity=0.0)
-    forces = [impact.to_step(step).contact_records.normal_force.copy() for step in range(1, 300)]
-    assert min(force.min(initial=0.0) for force in forces) == 0.0
-    assert any(force.size and force.max() == 0.0 for force in forces)  # in contact, and clipped
-    assert max(force.max(initial=0.0) for force in forces) > 1e3
-    assert impact.contacts == 0
-    speed_change = np.sum(np.concatenate(forces)) * impact.step / paper_block.mass
-    assert speed_change == pytest.approx(float(impact.bodies[0].vy) + 1.0, rel=1e-9)
 
 
 STEP, K = 2e-7, 1e8
@@ -211,13 +165,6 @@ def test_operator_of_contacts_that_are_not_steady_keeps_its_masses_only(pose: Po
     assert lives(world)[NORMAL] == OPERATOR_LIFE - 1
 
 
-def test_operator_of_a_step_without_length_is_not_kept(pose: Pose) -> None:
-    world = two_points(pose, 1, NORMAL)
-    renew(world, 2, NORMAL, BOTH, step=0.0)
-    assert lives(world)[NORMAL] == 0
-    assert world.operators[0, NORMAL].e_one > 0.0
-
-
 def test_point_slides_where_its_spring_alone_exceeds_the_limit(pose: Pose) -> None:
     world = two_points(pose, 1, SHEAR)
     values, contact, b = world.interactions[1, 1], world.contacts[0, 0], world.bodies[1]
@@ -251,33 +198,6 @@ def standing(pose: Pose) -> World:
     world = pose((0.003, 1.025 - 1e-6, 0.0), (0.0, 1.0, 0.0))
     world.bodies[0].vx = 20.0
     return world
-
-
-def test_pair_writes_what_it_does_and_adds_to_no_body_and_to_no_tally(pose: Pose) -> None:
-    world = standing(pose)
-    bodies, ledger, action = world.bodies.tobytes(), world.ledger.tobytes(), world.action[0]
-    pair_forces(world, 0, STEP)
-    assert (world.bodies.tobytes(), world.ledger.tobytes()) == (bodies, ledger)
-    a, contacts = world.bodies[0], world.contacts[0]
-    pushes, pulls = float(contacts.normal_force.sum()), float(contacts.shear_force.sum())
-    assert (action.touches, action.is_changed) == (1, 1)
-    # besides, what the interval below the block lacks pushes along the face
-    stored = 0.5 * float(world.interactions[1, 1].normal_stiffness) * float((contacts.depth**2).sum())
-    assert (action.fy, action.fx) == pytest.approx((pushes, pulls + stored / 0.032))
-    assert action.fx < 0.0 < action.fy
-    assert action.friction > 0.0
-    # both torques are of the same forces, about centres that are apart
-    shift_x, shift_y = float(a.x - world.bodies[1].x), float(a.y - world.bodies[1].y)
-    assert action.torque_b - action.torque_a == pytest.approx(shift_x * action.fy - shift_y * action.fx)
-
-
-def test_nothing_is_left_of_what_another_pair_has_done(pose: Pose) -> None:
-    once, after = standing(pose), standing(pose)
-    for name in ("fx", "fy", "torque_a", "torque_b", "dashpot", "friction", "broken"):
-        after.action[name] = 7.0
-    for world in (once, after):
-        pair_forces(world, 0, STEP)
-    assert after.action.tobytes() == once.action.tobytes()
 
 
 def test_pair_whose_contacts_have_ended_does_nothing_but_lose_what_they_held(pose: Pose) -> None:

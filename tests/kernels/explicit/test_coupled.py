@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import NORMAL, POINT, SHEAR, zeros
-from blocksim.kernels.explicit.damping import SIZE, add_coupled_dashpots, fill_mobility, fill_row
+from blocksim.kernels.explicit.damping import SIZE, add_coupled_dashpots
 from blocksim.kernels.explicit.kinematics import resolve_point
 from tests.kernels.conftest import dashpots_by_definition, delassus
 
@@ -47,19 +47,6 @@ def added(points: Records, a: Record, b: Record, direction: int, ratio: float) -
     return np.asarray(points.force - before)
 
 
-@pytest.mark.parametrize("direction", [NORMAL, SHEAR])
-@given(seed=SEEDS)
-def test_rows_and_mobility_give_the_inverse_masses_that_points_see(
-    make_body: MakeBody, direction: int, seed: int
-) -> None:
-    a, b, points = scene(make_body, seed, 5, parallel=False)
-    mobility, rows = np.zeros((SIZE, SIZE)), np.zeros((5, SIZE))
-    fill_mobility(a, b, mobility)
-    for point, row in zip(points, rows, strict=True):
-        fill_row(point, a, direction, row)
-    assert rows @ mobility @ rows.T == pytest.approx(delassus(points, a, b, direction), rel=1e-10, abs=1e-9)
-
-
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize("direction", [NORMAL, SHEAR])
 @given(seed=SEEDS, n=st.integers(3, 40), ratio=st.sampled_from([0.1, 1.0, 5.0]))
@@ -72,33 +59,3 @@ def test_any_number_of_points_follows_the_definition(
     expected = dashpots_by_definition(points, delassus(points, a, b, direction), ratio, STEP)
     forces = added(points, a, b, direction, ratio)
     assert forces == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
-
-
-@given(seed=SEEDS)
-def test_points_that_slide_have_no_dashpot(make_body: MakeBody, seed: int) -> None:
-    a, b, points = scene(make_body, seed, 6, parallel=True)
-    points.rate = points.slip_rate
-    points.stiffness[[1, 4]] = 0.0
-    forces = added(points, a, b, SHEAR, 0.7)
-    assert not forces[[1, 4]].any()
-    assert forces[[0, 2, 3, 5]].all()
-
-
-@given(seed=SEEDS)
-def test_more_particles_on_a_face_damp_it_just_as_much(make_body: MakeBody, seed: int) -> None:
-    """Resultant force and torque of a face in rigid approach depend on its stiffness, not on the number of points."""
-    random = np.random.default_rng(seed)
-    a, b = make_body(0.0, 0.0125), make_body(0.0, -0.1, mass=1.0)
-    a.vy, a.spin = random.normal(size=2)
-    wrenches = []
-    for n in (8, 64):
-        points = zeros(n, POINT)
-        points.ny = 1.0
-        points.x = 0.016 * (2.0 * np.arange(n) + 1.0 - n) / n
-        points.stiffness = 1e8 / n
-        for point in points:
-            resolve_point(point, a, b, STEP)
-        points.rate = points.closing_rate
-        forces = added(points, a, b, NORMAL, 0.5)
-        wrenches.append((forces.sum(), (forces * points.x).sum()))
-    assert wrenches[0] == pytest.approx(wrenches[1], rel=0.02)

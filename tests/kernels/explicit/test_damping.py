@@ -20,7 +20,6 @@ from blocksim.kernels.explicit.damping import (
     renew_dashpots,
 )
 from blocksim.verification.scene import HEIGHT, WIDTH
-from tests.kernels.conftest import dashpots_by_definition
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, Records
@@ -79,10 +78,6 @@ def damping_matrix(points: Records, masses: np.ndarray, ratio: float) -> np.ndar
     return np.array(columns).T
 
 
-def added(points: Records, masses: np.ndarray, ratio: float, pattern: int) -> np.ndarray:
-    return np.asarray(damped(points, operator_of(points, masses, ratio, pattern)) - points.force)
-
-
 @pytest.mark.parametrize("stiffness", [(K,), (K, K), (K, 0.2 * K)])
 @given(seed=SEEDS, ratio=st.sampled_from([0.05, 0.3, 0.9]))
 def test_every_mode_of_a_pair_has_the_asked_damping_ratio(
@@ -105,53 +100,6 @@ def test_dashpots_never_feed_energy(parallel: bool, alike: bool, seed: int) -> N
     damping = damping_matrix(points, inverse_masses(2, seed, parallel=parallel), 0.7)
     assert damping == pytest.approx(damping.T, rel=1e-9, abs=1e-9 * np.abs(damping).max())
     assert np.linalg.eigvalsh(damping).min() > -1e-9 * np.abs(damping).max()
-
-
-@given(seed=SEEDS, ratio=st.sampled_from([0.1, 1.0, 5.0]), weight=st.sampled_from([0.6, 1.0, 1.4]))
-def test_one_point_gets_the_dashpot_of_its_own_mass(ratio: float, weight: float, seed: int) -> None:
-    masses = inverse_masses(1, seed)
-    points = contact_points(1, seed, weight=weight)
-    expected = dashpots_by_definition(points, masses, ratio, STEP)
-    assert added(points, masses, ratio, 1) == pytest.approx(expected, rel=1e-9)
-
-
-@pytest.mark.parametrize("parallel", [False, True])
-@given(
-    case=st.sampled_from(
-        [((K, K), (1.0, 1.0)), ((K, K), (0.7, 0.7)), ((K, K), (0.6, 1.3)), ((K, 0.1 * K), (1.0, 0.7))]
-    ),
-    seed=SEEDS,
-    ratio=st.sampled_from([0.1, 1.0, 5.0]),
-)
-def test_two_points_follow_the_definition(
-    parallel: bool, case: tuple[tuple[float, ...], tuple[float, ...]], ratio: float, seed: int
-) -> None:
-    stiffness, weights = case
-    masses = inverse_masses(2, seed, parallel=parallel) + (0.0 if parallel else 2.0) * np.eye(2)
-    points = contact_points(2, seed, stiffness=stiffness)
-    points.weight = weights
-    expected = dashpots_by_definition(points, masses, ratio, STEP)
-    size = np.abs(expected).max()
-    assert added(points, masses, ratio, BOTH) == pytest.approx(expected, rel=1e-7, abs=1e-9 * size)
-
-
-@pytest.mark.parametrize("sticking", [1, 2])
-@given(seed=SEEDS)
-def test_sliding_point_beside_a_sticking_one_has_no_dashpot(sticking: int, seed: int) -> None:
-    masses = inverse_masses(2, seed) + 2.0 * np.eye(2)
-    points = contact_points(2, seed)
-    points.stiffness[2 - sticking] = 0.0
-    expected = dashpots_by_definition(points, masses, 0.7, STEP)
-    forces = added(points, masses, 0.7, sticking)
-    assert forces[2 - sticking] == 0.0
-    assert forces == pytest.approx(expected, rel=1e-9)
-
-
-@pytest.mark.parametrize("half", [0.5 * STEP, 0.0])
-def test_operator_keeps_half_a_step_times_its_masses(half: float) -> None:
-    operator = zeros(1, OPERATOR)[0]
-    keep_masses(operator, half, 3.0, 1.0, 2.0)
-    assert [operator.h_one, operator.h_mixed, operator.h_two] == [3.0 * half, half, 2.0 * half]
 
 
 @pytest.mark.parametrize("direction", [NORMAL, SHEAR])

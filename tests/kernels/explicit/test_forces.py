@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import GROUP, LEDGER, zeros
-from blocksim.kernels.common.integrate import finish_step, start_all, start_step
+from blocksim.kernels.common.integrate import finish_step, start_all
 from blocksim.kernels.common.jit import config
-from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.partition import add_from_before, add_kept, keep, partition
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
-from blocksim.kernels.explicit.step import advance, changed_forces, finish_group, forces_between, forces_within
+from blocksim.kernels.explicit.step import advance, changed_forces, forces_between, forces_within
 from blocksim.world.build import with_threads
 from tests.kernels.crews import SCENES, advanced, assert_same_bits, bits
 
@@ -81,27 +80,6 @@ def test_forces_of_several_shares_have_the_bits_of_one(
     assert_same_bits(one, several)
 
 
-def test_pairs_between_shares_touch_no_body_and_no_tally_until_they_are_added(moving: Callable[[str], World]) -> None:
-    world = moving("wall")
-    partition(world, 3)
-    bodies, ledger = bits(world.bodies), bits(world.ledger)
-    apart = copy.deepcopy(world)
-    for share in world.shares[:3]:
-        forces_between(world, share, step_of(world))
-    assert (bits(world.bodies), bits(world.ledger)) == (bodies, ledger)
-    assert config.DISABLE_JIT or world.between.touches.sum() > 3
-    for action in world.between[: world.shares[2].last_between]:
-        kind, effect = persistent_forces(apart, action.pair, step_of(world), apart.particles)
-        if kind == CHANGED:
-            pair_forces(apart, action.pair, step_of(world))
-        else:
-            keep(apart.action[0], effect, kind == TOUCHING)
-            apart.action[0].broken = action.broken  # means nothing where contacts continue
-        expected = bits(apart.action)
-        found = {name: action[name].tobytes() for name in expected}
-        assert found | {"pair": b""} == expected | {"pair": b""}
-
-
 def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_tally(moving: Callable[[str], World]) -> None:
     world, apart = moving("wall"), moving("wall")
     before, step = world.ledger.copy(), step_of(world)
@@ -126,32 +104,3 @@ def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_tally(movi
     for body in apart.bodies[:-1]:
         finish_step(body, apart.controls[0], step)
     assert bits(world.bodies) == bits(apart.bodies)
-
-
-@pytest.mark.parametrize("goes_on", [False, True])
-def test_bodies_of_a_group_and_no_others_finish_their_step_and_start_the_next_where_the_run_continues(
-    moving: Callable[[str], World], *, goes_on: bool
-) -> None:
-    world = moving("wall")
-    world.bodies.fx, world.bodies.torque = 3.0, 0.1
-    expected, step = copy.deepcopy(world.bodies), step_of(world)
-    finish_group(world, 5, 9, step, goes_on)
-    for body in expected[5:9]:
-        finish_step(body, world.controls[0], step)
-        if goes_on:
-            start_step(body, step)
-    assert bits(world.bodies) == bits(expected)
-    assert world.bodies["fx"][4:10].tolist() == [3.0, 0.0, 0.0, 0.0, 0.0, 3.0]
-
-
-def test_share_without_bodies_evaluates_nothing(moving: Callable[[str], World]) -> None:
-    world = moving("wall")
-    partition(world, MOST)
-    share = world.shares[1]
-    share.last_body, share.last_pair, share.last_task = share.first_body, share.first_pair, share.first_task
-    share.last_between = share.first_between
-    before = copy.deepcopy(world)
-    forces_between(world, share, step_of(world))
-    forces_within(world, share, step_of(world), True)
-    for name in ("bodies", "pairs", "contacts", "operators", "ledger", "between"):
-        assert np.array_equal(getattr(world, name), getattr(before, name)), name

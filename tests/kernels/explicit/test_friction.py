@@ -132,31 +132,6 @@ def test_shear_spring_never_gives_back_more_than_was_put_in(
         assert abs(contact.force) <= limit * (1.0 + 1e-12)
 
 
-@laws
-@given(path=paths)
-def test_closed_path_of_overlap_and_slip_costs_energy(law: int, path: list[tuple[float, float]]) -> None:
-    """There and back again, in overlap and in slip, in steps so small that their size does not matter."""
-    contact = Dragged(law, 0.5)
-    legs = [(share * DEEPEST, slip * contact.reach(DEEPEST)) for share, slip in path]
-    legs += [(depth, -slip) for depth, slip in reversed(legs)]
-    depth = legs[0][0]
-    contact.drag(depth, 0.0)
-    for end, slip in legs:
-        for n in range(1, 21):
-            contact.drag(depth + (end - depth) * n / 20, slip / 20)
-        depth = end
-    assert contact.work >= contact.stored - 1e-20
-
-
-@given(path=paths)
-def test_linear_spring_that_sticks_gives_everything_back(path: list[tuple[float, float]]) -> None:
-    contact = Dragged(LINEAR, 1e6)
-    for share, slip in path:
-        lost = contact.drag(share * DEEPEST, slip * DEEPEST)
-        assert abs(lost) < 1e-15 * STIFFNESS * (len(path) * DEEPEST) ** 2
-    assert contact.work == pytest.approx(contact.stored, abs=1e-12 * STIFFNESS * DEEPEST**2)
-
-
 @given(first=st.floats(0.05, 1.0), second=st.floats(0.05, 1.0), slip=st.floats(-1.0, 1.0))
 def test_growing_overlap_keeps_the_hertzian_shear_force_and_falling_overlap_lowers_it(
     first: float, second: float, slip: float
@@ -167,15 +142,6 @@ def test_growing_overlap_keeps_the_hertzian_shear_force_and_falling_overlap_lowe
     contact.drag(second * DEEPEST, 0.0)
     kept = min(1.0, sqrt(second / first))  # the stiffness goes with the root of the overlap
     assert contact.force == pytest.approx(kept * force, rel=1e-12)
-
-
-@laws
-@given(slip=st.floats(-20.0, 20.0), drawn=st.floats(0.0, 1.0))
-def test_first_drift_draws_the_spring_for_its_part_in_contact(law: int, slip: float, drawn: float) -> None:
-    contact = Dragged(law, 1e6)
-    lost = contact.drag(DEEPEST, slip * DEEPEST, drawn)
-    assert contact.spring == pytest.approx(drawn * slip * DEEPEST)
-    assert lost >= 0.0
 
 
 @laws

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import ACTION, zeros
-from blocksim.kernels.explicit.history import TAKEN, change_contacts
+from blocksim.kernels.explicit.history import change_contacts
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point
-from blocksim.kernels.explicit.models.surface import slot_normal, was_touching
+from blocksim.kernels.explicit.models.surface import slot_normal
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, World
-    from tests.conftest import PaperBlock, Start
     from tests.kernels.conftest import Pose
 
 REMEMBERED = ("spring", "depth", "normal_force", "shear_force")
@@ -156,49 +155,3 @@ def test_ended_contact_tallies_half_the_work_of_its_last_step(pose: Pose) -> Non
     dashpots = 50.0 - float(values.normal_stiffness) * 1e-6, 5.0 - stiffness * 1e-7
     assert lost.dashpot == pytest.approx(0.5 * (dashpots[0] * closing + dashpots[1] * slip))
     assert lost.broken == pytest.approx(0.5 * stiffness * 1e-7 * (1e-7 + slip))
-
-
-def test_corner_was_in_contact_on_whichever_face(pose: Pose) -> None:
-    old = stacked(pose, OTHER, TWO).contacts[0]
-    assert [was_touching(slot, old, 2) for slot in range(8)] == [True, True] + [False] * 6
-    assert not was_touching(1, old, 1)
-    old.slot = TAKEN
-    assert not was_touching(0, old, 2)
-
-
-def test_broken_contact_tallies_its_shear_springs_and_forgets_everything(start: Start, paper_block: PaperBlock) -> None:
-    soft = {"stiffness_scale": 1e-4}
-    scene = start([{"y": paper_block.height / 2}], tilt=-0.2, contact=soft).to_time(0.05)
-    springs = scene.contact_records.spring.copy()
-    stiffness = float(scene.world.interactions[1, 0].normal_stiffness * scene.world.interactions[1, 0].shear_ratio)
-    assert np.abs(springs).min() > 0.0
-    assert springs.size == 2
-    scene.world.bodies[0].y += 1e-4
-    scene.to_step(scene.steps + 1)
-    assert scene.contacts == 0
-    assert scene.contact_records.size == 0
-    assert scene.world.ledger[0].broken == pytest.approx(0.5 * stiffness * float((springs**2).sum()), rel=1e-2)
-    assert (scene.world.pairs[0].normal_left, scene.world.pairs[0].shear_left) == (0, 0)
-    scene.world.bodies[0].y -= 1e-4
-    touching = scene.to_step(scene.steps + 1).contact_records
-    assert touching.size == 2
-    assert np.abs(touching.spring).max() < 0.01 * np.abs(springs).min()
-
-
-def test_friction_continues_where_corners_pass_one_another(start: Start, paper_block: PaperBlock) -> None:
-    # a block slides over another of the same width: where they are aligned, the corner of the one takes the place
-    # of the corner of the other at both ends
-    below = {"y": 0.5 * paper_block.height, "fixed": True}
-    above = {"x": -2e-4, "y": 1.5 * paper_block.height, "velocity": [0.2, 0.0]}
-    slide = start([below, above], friction=0.31).to_time(5e-4)
-    weight = paper_block.mass * 9.81
-    owners = set()
-    while slide.bodies[1].x < 1e-4:
-        slide.to_step(slide.steps + 1)
-        assert slide.contacts == 2
-        owners.add(tuple(sorted(slide.contact_records.slot.tolist())))
-        assert abs(slide.contact_records.shear_force.sum()) == pytest.approx(0.31 * weight, rel=0.05)
-    assert len(owners) == 2
-    assert slide.bodies[1].vx == pytest.approx(0.2 - 0.31 * 9.81 * slide.time, rel=1e-3)
-    assert slide.residual() < 1e-6
-    assert slide.world.ledger[0].broken < 1e-6 * slide.world.ledger[0].friction

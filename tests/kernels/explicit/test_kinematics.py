@@ -93,11 +93,3 @@ def test_first_step_weighs_the_dashpot_by_the_time_in_contact(depth: float, weig
     weigh_first_step(point, LINEAR)
     assert point.weight == pytest.approx(weight)
     assert point.drawn == pytest.approx(depth / 1e-6)
-
-
-def test_point_deeper_than_it_closed_keeps_its_full_weight() -> None:
-    point = zeros(1, POINT)[0]
-    point.weight = point.drawn = 1.0
-    point.closing, point.depth = 1e-6, 1.1e-6
-    weigh_first_step(point, LINEAR)
-    assert (point.weight, point.drawn) == (1.0, 1.0)

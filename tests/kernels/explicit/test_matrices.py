@@ -6,11 +6,7 @@ from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.tolerances import DASHPOT_RANK
 from blocksim.kernels.explicit.damping import (
-    cholesky,
-    inverse_root,
     inverse_three_halves,
-    multiply,
-    multiply_transposed,
     solve_in_place,
 )
 
@@ -45,31 +41,8 @@ def test_power_of_three_agrees_with_eigenvalues(seed: int, rank: int) -> None:
     assert by_jacobi(matrix) == pytest.approx(power(matrix, -1.5), abs=1e-12)
 
 
-@given(seed=SEEDS)
-def test_lower_triangle_times_its_transpose_is_the_matrix(seed: int) -> None:
-    matrix, lower = positive(3, 3, seed), np.zeros((3, 3))
-    cholesky(matrix, lower)
-    assert lower @ lower.T == pytest.approx(matrix, rel=1e-12)
-    assert not np.triu(lower, 1).any()
-
-
-@given(seed=SEEDS)
-def test_products_agree_with_numpy(seed: int) -> None:
-    left, right = np.random.default_rng(seed).normal(size=(2, 3, 3))
-    out = np.zeros((3, 3))
-    multiply(left, right, out)
-    assert out == pytest.approx(left @ right, abs=1e-14)
-    multiply_transposed(left, right, out)
-    assert out == pytest.approx(left.T @ right, abs=1e-14)
-
-
 def test_zero_matrix_has_the_root_zero_not_infinity() -> None:
     assert not by_jacobi(np.zeros((3, 3))).any()
-
-
-def test_eigenvalues_below_the_rank_tolerance_count_as_zero() -> None:
-    assert inverse_root(0.9 * DASHPOT_RANK, 1.0) == 0.0
-    assert inverse_root(1.1 * DASHPOT_RANK, 1.0) == pytest.approx((1.1 * DASHPOT_RANK) ** -0.5)
 
 
 @given(n=st.integers(1, 8), seed=SEEDS)

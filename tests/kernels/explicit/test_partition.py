@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import ACTION, BODY, GROUP, LEDGER, zeros
+from blocksim.kernels.common.arrays import ACTION, GROUP, LEDGER, zeros
 from blocksim.kernels.explicit.forces import Effect
 from blocksim.kernels.explicit.partition import (
-    add_from_before,
     add_kept,
-    add_to_first,
-    add_to_second,
     keep,
     pairs_before,
     partition,
@@ -125,31 +121,6 @@ def test_tasks_cover_the_pairs_between_shares_once_and_evenly(world: World, size
     assert lengths.max() - lengths.min() <= 1
 
 
-def test_worlds_have_pairs_between_shares_and_bodies_that_do_not_count(worlds: dict[str, World]) -> None:
-    """Else there would be nothing to look at in the tests above."""
-    between = {}
-    for name, world in worlds.items():
-        partition(world, 3)
-        between[name] = int(pairs_of(world).is_between.sum())
-    assert between["many rows"] > 20
-    assert between["among moving supports"] > between["among fixed blocks"] > 5
-    assert between["on hills"] > 0
-    assert between["no pairs"] == between["one block"] == between["as many as a group"] == 0
-    still = worlds["among fixed blocks"]
-    owner = np.searchsorted(still.shares.last_body[:3], np.arange(still.bodies.size), side="right")
-    assert any(owner[pair.a] != owner[pair.b] and not pair.is_between for pair in pairs_of(still))
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_pairs_are_divided_evenly_but_for_parts_of_groups(worlds: dict[str, World], size: int) -> None:
-    world = worlds["many rows"]
-    partition(world, size)
-    shares: Any = world.shares[:size]
-    most = int(np.bincount(pairs_of(world).a).max())
-    counts = shares.last_pair.astype(int) - shares.first_pair
-    assert np.abs(counts - world.clock[0].pair_count / size).max() <= GROUP * most + 1
-
-
 def test_number_of_pairs_before_a_body_is_that_of_smaller_first_bodies(world: World) -> None:
     first = pairs_of(world).a
     for body in range(world.bodies.size + 1):
@@ -158,17 +129,6 @@ def test_number_of_pairs_before_a_body_is_that_of_smaller_first_bodies(world: Wo
 
 def totals(body: Record) -> list[float]:
     return [float(body.fx), float(body.fy), float(body.torque), int(body.pairs_now)]
-
-
-@pytest.mark.parametrize("counts", [0, 1])
-def test_pair_pushes_its_bodies_apart_where_forces_on_them_matter(counts: int) -> None:
-    one, two = zeros(2, BODY)
-    one.counts = two.counts = counts
-    for _ in range(2):
-        add_to_first(one, 1.0, 2.0, 3.0)
-        add_to_second(two, 1.0, 2.0, 3.0)
-    assert totals(one) == [2.0 * counts, 4.0 * counts, 6.0 * counts, 2 * counts]
-    assert totals(two) == [-2.0 * counts, -4.0 * counts, -6.0 * counts, 2 * counts]
 
 
 EFFECT = Effect(fx=1.0, fy=2.0, torque_a=3.0, torque_b=4.0, dashpot=5.0, friction=6.0)
@@ -202,21 +162,3 @@ def test_losses_of_changed_contacts_are_tallied_at_once_even_where_nothing_touch
     assert add_kept(world, world.pairs[0], action, tally) == (0.0, 0.0)
     assert (tally.dashpot, tally.friction, tally.broken) == (15.0, 26.0, 37.0)
     assert totals(world.bodies[0]) == totals(world.bodies[1]) == [0.0, 0.0, 0.0, 0]
-
-
-@pytest.mark.parametrize("size", [2, 3])
-def test_share_adds_from_before_only_what_touches_its_own_bodies(worlds: dict[str, World], size: int) -> None:
-    world = copy.deepcopy(worlds["among moving supports"])
-    partition(world, size)
-    count = int(pairs_of(world).is_between.sum())
-    between: Any = world.between[:count]
-    between.fx, between.fy, between.torque_a, between.torque_b = 2.0 ** np.arange(count), 1.0, 7.0, 3.0
-    between.touches = np.arange(count) % 3 > 0
-    second = pairs_of(world).b[between.pair]
-    for share in world.shares[:size]:
-        world.bodies.fx = world.bodies.fy = world.bodies.torque = 0.0
-        world.bodies.pairs_now = 0
-        add_from_before(world, share)
-        for i, body in enumerate(world.bodies):
-            own = (second == i) & (between.touches == 1) & (share.first_body <= i < share.last_body)
-            assert totals(body) == [-between.fx[own].sum(), -own.sum(), -3.0 * own.sum(), own.sum()]

@@ -17,7 +17,7 @@ from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.damping import BOTH
 from blocksim.kernels.explicit.forces import NOTHING
 from blocksim.kernels.explicit.partition import add_kept, keep
-from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, UNTOUCHED, persistent_forces
+from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.schemes import build_scene
@@ -258,27 +258,6 @@ def test_steady_polygons_on_pieces_of_ground_have_the_forces_of_the_general_way(
     assert seen > 20 // pace
 
 
-def test_situations_have_one_and_two_contacts_and_corners_of_either_body(start: Start, pace: int) -> None:
-    kinds: set[tuple[bool, ...]] = set()
-    for situation in ("impact of a's corner", "impact of b's corner", "rest", "narrow on wide", "wide on narrow"):
-        bodies, values = SITUATIONS[situation]
-        scene = start(bodies, **values).to_step(60 // pace)
-        kinds |= evaluate(scene.world)[0].kinds
-    assert kinds == {(False,), (True,), (False, False), (False, True), (True, True)}
-
-
-@pytest.mark.parametrize("situation", ["rest", "rest on a slope", "sliding", "sliding on a slope", "wall of three"])
-def test_nearly_all_pairs_of_a_lasting_scene_are_steady(start: Start, situation: str, pace: int) -> None:
-    bodies, values = SITUATIONS[situation]
-    scene = start(bodies, contact={"stiffness_scale": 1e-3}, **values).to_step(600 // pace)
-    steady = general = 0
-    for _ in range(100 // pace):
-        tally, _, _ = evaluate(scene.to_step(scene.steps + 1).world)
-        steady, general = steady + tally.steady, general + tally.general
-    assert steady >= 100 // pace
-    assert general <= 0.02 * steady
-
-
 def is_untouched(world: World, before: World) -> bool:
     """Return True if nothing has changed that lasts, nor the work space of contact.py."""
     return all(
@@ -310,23 +289,11 @@ def assert_changed(world: World) -> None:
     assert is_untouched(world, before)
 
 
-def test_contacts_that_continue_are_steady(pose: Pose) -> None:
-    for world in (on_ground(pose), on_block(pose, 0.003)):
-        assert persistent_forces(world, 0, STEP, world.particles)[0] == TOUCHING
-
-
 @pytest.mark.parametrize("up", [1.1e-6, 1.0])
 def test_contact_that_ends_is_not_steady(pose: Pose, up: float) -> None:
     for world in (on_ground(pose), on_block(pose, 0.003)):
         world.bodies[0].y += up
         assert_changed(world)
-
-
-@pytest.mark.parametrize("shift", [0.003 - WIDTH, WIDTH + 1e-4])
-def test_corner_beyond_the_end_of_its_face_is_not_steady(pose: Pose, shift: float) -> None:
-    world = on_block(pose, 0.003)
-    world.bodies[0].x = shift
-    assert_changed(world)
 
 
 @pytest.mark.parametrize(("shift", "changes"), [(0.0, False), (0.016, False), (0.0171, True)])
@@ -428,25 +395,3 @@ def test_dashpots_are_made_anew_where_the_number_of_neighbours_has_changed(pose:
     world.bodies[1].sums_changed = 1
     persistent_forces(world, 0, STEP, world.particles)
     assert steps_left(world) == left
-
-
-def test_steady_pair_adds_to_no_body_and_to_no_tally_itself(pose: Pose) -> None:
-    for world in (on_ground(pose), on_block(pose, 0.003)):
-        world.bodies[0].vx = 20.0  # it slides
-        bodies, ledger = world.bodies.copy(), world.ledger.copy()
-        kind, effect = persistent_forces(world, 0, STEP, world.particles)
-        assert kind == TOUCHING
-        assert effect.fy > 0.0
-        assert effect.friction != 0.0
-        assert np.array_equal(world.bodies, bodies)
-        assert np.array_equal(world.ledger, ledger)
-
-
-@pytest.mark.parametrize("up", [1e-5, 1e-3, 3e-3])
-def test_pair_without_contacts_that_stays_apart_does_nothing(pose: Pose, up: float) -> None:
-    world = pose((0.003, 1.0 + HEIGHT + up, 0.0), (0.0, 1.0, 0.0))
-    before = copy.deepcopy(world)
-    for _ in range(2):  # along another axis than at first
-        assert persistent_forces(world, 0, STEP, world.particles) == (UNTOUCHED, NOTHING)
-    world.pairs.axis = before.pairs.axis  # along which they were found to be apart
-    assert is_untouched(world, before)

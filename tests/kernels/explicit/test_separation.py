@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,34 +13,15 @@ from blocksim.kernels.common.shapes import separation
 from blocksim.kernels.explicit.broad_phase import idle_candidates
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED, begins_contact, persistent_forces
-from blocksim.kernels.explicit.sides import MOST_CORNERS, gap_on, widest_gap
+from blocksim.kernels.explicit.sides import MOST_CORNERS
 from blocksim.verification.scene import HEIGHT, WIDTH
-from tests.kernels import rectangles
 
 if TYPE_CHECKING:
-    from tests.kernels.conftest import MakeBody, Pose
+    from tests.kernels.conftest import Pose
 
 STEP = 1e-6
 places = st.floats(-0.05, 0.05)
 angles = st.floats(-4.0, 4.0)
-
-
-@given(x=places, y=places, one=angles, two=angles)
-def test_gaps_along_the_faces_are_those_of_the_projections(
-    make_body: MakeBody, x: float, y: float, one: float, two: float
-) -> None:
-    a, b = make_body(0.3 + x, y, one), make_body(0.3, 0.0, two, width=0.02, height=0.04)
-    axes = [*range(4), *range(MOST_CORNERS, MOST_CORNERS + 4)]
-    gaps = [gap_on(axis, a, b, False, None) for axis in axes]
-    turns = [-pi / 2, 0.0, pi / 2, pi]  # of the faces, from below
-    expected = [rectangles.gap_along(two + turn, a, b) for turn in turns]
-    expected += [rectangles.gap_along(one + turn, a, b) for turn in turns]
-    # of two opposite faces that which looks at the other body; rectangles.gap_along has the same for both
-    assert [max(gaps[k], gaps[k + 2]) for k in (0, 1, 4, 5)] == pytest.approx(
-        [expected[k] for k in (0, 1, 4, 5)], abs=1e-15
-    )
-    axis, widest = widest_gap(a, b, False, None)
-    assert gaps[axes.index(axis)] == widest == max(gaps) == pytest.approx(separation(a, b), abs=1e-15)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2, 3, 16, 17, 18, 19])

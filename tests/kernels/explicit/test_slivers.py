@@ -64,13 +64,6 @@ def test_elastic_impact_on_a_sliver_keeps_its_energy(name: str, law: str) -> Non
     assert run.mechanical == pytest.approx(before, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", SLIVERS)
-def test_ledger_closes_where_impacts_on_slivers_are_damped_and_rub(name: str) -> None:
-    run, _ = struck(name, restitution=0.5, friction=0.3)
-    assert run.world.ledger.dashpot.sum() > 0.0
-    assert run.residual() < 1e-3
-
-
 # shapes, and the power of the overlap in the energy of the law
 PAIRS = {
     "hexagons": (HEXAGON, HEXAGON, 2.0),

@@ -78,8 +78,3 @@ def test_force_does_not_jump_while_a_block_tilts_onto_its_corner(pose: Pose, ang
     before, after = (pushed(pose, 0.01, angle * (1.0 + sign * 1e-7)) for sign in (-1.0, 1.0))
     assert before[1] > 0.0
     assert after == pytest.approx(before, abs=1e-4 * before[1])
-
-
-def test_corner_that_slides_off_a_face_has_no_force_left(pose: Pose) -> None:
-    inside, edge = pushed(pose, 0.008, 0.0), pushed(pose, 0.016 - 1e-8, 0.0)
-    assert edge[1] < 1e-5 * inside[1]

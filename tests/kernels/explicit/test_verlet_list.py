@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from math import inf, nan, pi, sqrt
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import MOTION_PIECE, PAIRS_FULL, REACHED, World, zeros
+from blocksim.kernels.common.arrays import MOTION_PIECE, REACHED, World, zeros
 from blocksim.kernels.common.neighbours import travel
 from blocksim.kernels.common.shapes import separation
 from blocksim.kernels.common.tolerances import MOST_UNSEEN, MOST_UNSEEN_DRIVEN
 from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, unseen_steps, update_pairs
 from blocksim.verification.scene import Simulation, scenario_of
-from blocksim.world.build import build_world, empty_lists
+from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,26 +55,6 @@ def test_no_falling_body_comes_beyond_its_share_unseen(world: World, share: floa
     assert share * reach + fastest * time + 0.5 * G * time**2 <= reach
 
 
-@given(share=shares, fastest=speeds)
-def test_looks_are_as_seldom_as_a_body_that_becomes_four_times_as_fast_allows(
-    world: World, share: float, fastest: float
-) -> None:
-    left = (1.0 - share) * PAIR_SHARE * float(world.controls[0].skin)
-    speed = 4.0 * fastest + sqrt(2.0 * G * left)
-    exact = left / (speed * float(world.controls[0].step))
-    assert unseen_steps(world, PAIR_SHARE * float(world.controls[0].skin) - left, fastest) == pytest.approx(
-        min(MOST_UNSEEN, exact), abs=1.0
-    )
-
-
-@pytest.mark.parametrize("beyond", [1.0, 1.5, 1e6])
-@pytest.mark.parametrize("fastest", [0.0, 1.0])
-def test_body_that_has_come_its_share_or_farther_is_looked_at_at_once(
-    world: World, beyond: float, fastest: float
-) -> None:
-    assert unseen_steps(world, beyond * PAIR_SHARE * float(world.controls[0].skin), fastest) == 0
-
-
 def test_moving_support_is_looked_at_more_often() -> None:
     world = build_world(scenario_of([{"y": 1.0}], contact=SOFT))
     assert unseen_steps(world, 0.0, 0.0) > MOST_UNSEEN_DRIVEN
@@ -92,41 +72,6 @@ def test_list_that_reaches_far_enough_is_kept_and_one_that_does_not_is_made_anew
         assert world.clock[0].rebuilds == rebuilds
         assert world.clock[0].next_update > world.clock[0].steps
     assert world.bodies[0].list_x == world.bodies[0].x
-
-
-def test_body_that_spins_where_it_stands_is_seen(start: Start) -> None:
-    scene = start([{"y": 1.0, "spin": 40.0}], gravity=0.0, contact=SOFT).to_time(0.02)
-    turned = float(scene.bodies[0].radius) * 40.0 * scene.time / (PAIR_SHARE * float(scene.world.controls[0].skin))
-    assert turned > 5.0
-    assert scene.world.clock[0].rebuilds >= turned
-
-
-def test_look_that_finds_no_room_changes_nothing(start: Start) -> None:
-    scene = start([{"y": 0.0125}, {"x": 0.033, "y": 0.0125}], contact=SOFT)
-    world = scene.world._replace(**empty_lists(1, 8, scene.world.before))
-    world.bodies[0].list_x += 1.0
-    clock = world.clock.tobytes()
-    assert update_pairs(world) == PAIRS_FULL
-    assert world.clock.tobytes() == clock
-    assert world.bodies[0].list_x == world.bodies[0].x + 1.0
-
-
-@pytest.mark.parametrize("name", ["x", "y", "angle", "vx", "spin"])
-@pytest.mark.parametrize("value", [nan, inf])
-def test_state_that_is_not_finite_is_left_to_the_next_check(start: Start, name: str, value: float) -> None:
-    world = start([{"y": 1.0}], contact=SOFT).world
-    world.bodies[0][name] = value
-    assert update_pairs(world) == REACHED
-    assert world.clock[0].rebuilds == 1
-    assert 10 < world.clock[0].next_update <= MOST_UNSEEN
-
-
-def test_half_plane_out_of_reach_does_not_count() -> None:
-    hill = {"profile": [[-1.0, 0.0], [0.0, 0.1], [1.0, 0.0]]}
-    scene = Simulation(build_world(scenario_of([{"y": 0.2}], contact=SOFT, ground=hill)))
-    assert np.isinf(scene.world.bodies[-1].y)
-    assert scene.world.clock[0].next_update > 10
-    assert scene.to_step(2).world.clock[0].rebuilds == 1
 
 
 def crash() -> World:

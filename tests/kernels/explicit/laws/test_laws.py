@@ -24,13 +24,3 @@ def test_stiffness_is_the_slope_of_the_force(law: str, depth: float) -> None:
     exponent, h = LAWS[law].exponent, 1e-3 * depth
     slope = (elastic_force(exponent, K, depth + h) - elastic_force(exponent, K, depth - h)) / (2.0 * h)
     assert tangent_stiffness(exponent, K, depth) == pytest.approx(slope, rel=1e-6)
-
-
-def test_linear_force_is_stiffness_times_overlap() -> None:
-    assert elastic_force(LAWS["linear"].exponent, 2e6, 3e-6) == pytest.approx(6.0)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_contact_without_overlap_holds_nothing(law: str) -> None:
-    assert elastic_force(LAWS[law].exponent, K, 0.0) == 0.0
-    assert stored_energy(LAWS[law].exponent, K, 0.0) == 0.0

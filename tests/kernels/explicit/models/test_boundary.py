@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import cos, sin
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
@@ -47,22 +46,6 @@ def test_particles_of_a_row_lie_where_the_row_says(model: str) -> None:
             assert [particles[k].nx, particles[k].ny] == [dy, -dx]
             k += 1
     assert k == particles.size
-
-
-@pytest.mark.parametrize("model", MODELS)
-@given(x=st.floats(-0.03, 0.03), y=st.floats(-0.03, 0.03), row=st.integers(0, ROWS - 1))
-def test_place_seen_from_a_row_keeps_its_distances(model: str, x: float, y: float, row: int) -> None:
-    body, particles = body_and_particles_of[model]
-    along, above, spacing = seen_from_row(body, MODELS[model], row, x, y)
-    own = [k for k, p in enumerate(particles) if [p.nx, p.ny] == [row_direction(row)[1], -row_direction(row)[0]]]
-    for j in (0, len(own) // 2):
-        particle = particles[own[j]]
-        assert np.hypot(along - j * spacing, above) == pytest.approx(
-            np.hypot(x - particle.x, y - particle.y), abs=1e-15
-        )
-    half = body.half_x if row % 2 else body.half_y
-    outward = x * row_direction(row)[1] - y * row_direction(row)[0]
-    assert above == pytest.approx(outward - (half - MODELS[model]), abs=1e-15)
 
 
 body_and_particles_of = {model: body_and_particles(model) for model in MODELS}

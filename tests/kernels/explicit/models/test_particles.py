@@ -49,16 +49,6 @@ def test_two_discs_touch_while_their_centres_are_nearer_than_the_diameter(
 
 
 @pytest.mark.parametrize("below", [None, WIDE])
-def test_discs_face_to_face_touch_one_by_one_and_push_straight_up(touch: Touch, below: float | None) -> None:
-    # centres lie on odd halves of a spacing in an even number of intervals
-    shift = 0.5 * SPACING if below is None else 0.0
-    found = touch("particles", below=below, shift=shift, depth=1e-6)
-    assert len(found.points) == COUNT
-    assert found.normals == pytest.approx(np.tile([0.0, 1.0], (COUNT, 1)), abs=1e-12)
-    assert found.points.depth == pytest.approx(np.full(COUNT, 1e-6))
-
-
-@pytest.mark.parametrize("below", [None, WIDE])
 def test_interlocked_discs_touch_two_each_at_thirty_degrees(touch: Touch, below: float | None) -> None:
     shift = 0.0 if below is None else 0.5 * SPACING
     assert not touch("particles", below=below, shift=shift, depth=RAISED - 1e-7).points.size
@@ -67,21 +57,6 @@ def test_interlocked_discs_touch_two_each_at_thirty_degrees(touch: Touch, below:
     slopes = np.degrees(np.arcsin(np.abs(found.points.nx)))
     assert slopes == pytest.approx(np.full(2 * COUNT, 30.0), abs=0.02)
     assert found.wrench()[0] == pytest.approx(0.0, abs=1e-18)
-
-
-@given(shift=st.floats(-WIDTH, WIDTH), depth=st.floats(1e-6, 3e-4), periods=st.integers(-40, 40))
-def test_ground_repeats_itself_after_a_spacing(touch: Touch, shift: float, depth: float, periods: int) -> None:
-    one, other = (
-        touch("particles", below=None, shift=place, depth=depth) for place in (shift, shift + periods * SPACING)
-    )
-    assert other.wrench() == pytest.approx(one.wrench(), abs=1e-9 * SPACING)
-
-
-@given(shift=st.floats(-0.4 * SPACING, 0.4 * SPACING))
-def test_slope_leads_down_into_the_nearest_valley(touch: Touch, shift: float) -> None:
-    force = touch("particles", below=None, shift=shift, depth=RAISED + 1e-5).wrench()
-    assert force[1] > 0.0
-    assert force[0] * shift <= 0.0 or abs(force[0]) < 1e-12 * force[1]
 
 
 @given(

@@ -51,28 +51,6 @@ def test_block_sliding_along_a_flat_face_feels_no_bump(
     assert found.points.share[is_own].sum() == pytest.approx(1.0, rel=1e-12)  # half of a face, wherever it stands
 
 
-@given(shift=st.floats(-0.9 * WIDTH, 0.9 * WIDTH), depth=DEPTHS)
-def test_stacked_blocks_push_straight_up_and_only_where_both_are(touch: Touch, shift: float, depth: float) -> None:
-    found = touch("kernel", shift=shift, depth=depth)
-    assert np.abs(found.normals[:, 0]).max() < 1e-12
-    assert np.abs(found.points.x).max() < WIDTH / 2 + 1e-15
-    assert np.abs(found.points.x - shift).max() < WIDTH / 2 + 1e-15
-
-
-@pytest.mark.parametrize("depth", [1e-9, 1e-7, 1e-5, 1e-4])
-@pytest.mark.parametrize("spacing", SPACINGS)
-def test_aligned_stack_has_vertical_normals_only(touch: Touch, depth: float, spacing: float) -> None:
-    found = touch("kernel", depth=depth, spacing=spacing)
-    assert len(found.points) == 2 * (round(WIDTH / spacing) + 1)
-    assert found.normals == pytest.approx(np.tile([0.0, 1.0], (len(found.points), 1)), abs=1e-12)
-
-
-@pytest.mark.parametrize("spacing", SPACINGS)
-def test_block_beyond_an_edge_is_not_carried(touch: Touch, spacing: float) -> None:
-    assert touch("kernel", shift=WIDTH - 1e-4, spacing=spacing).points.size > 0
-    assert touch("kernel", shift=WIDTH + 1e-9, spacing=spacing).points.size == 0
-
-
 @given(angle=st.floats(0.15, 0.7), shift=st.floats(-0.5 * WIDTH, 0.5 * WIDTH), depth=DEPTHS)
 def test_corner_on_a_flat_face_touches_it_to_its_true_depth(
     touch: Touch, angle: float, shift: float, depth: float
@@ -83,10 +61,3 @@ def test_corner_on_a_flat_face_touches_it_to_its_true_depth(
     assert own.depth == pytest.approx(depth, rel=1e-6, abs=1e-16)
     assert np.abs(own.nx).max() < 1e-12
     assert own.share.min() > 0.0
-
-
-@given(angle=st.floats(0.0, 0.6), shift=st.floats(-0.9 * WIDTH, 0.9 * WIDTH), depth=DEPTHS)
-def test_mirrored_blocks_have_mirrored_forces(touch: Touch, angle: float, shift: float, depth: float) -> None:
-    one = touch("kernel", angle=angle, shift=shift, depth=depth)
-    other = touch("kernel", angle=-angle, shift=-shift, depth=depth)
-    assert other.wrench() * (-1.0, 1.0, -1.0) == pytest.approx(one.wrench(), abs=1e-9 * depth)

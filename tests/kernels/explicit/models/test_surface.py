@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import radians
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from blocksim.kernels.explicit.models.surface import (
     face_met,
     find_points,
     ground_points,
-    near_slots,
 )
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, corner_of, side_normal
 from tests.kernels.rectangles import corners, in_frame
@@ -128,31 +126,12 @@ def test_corner_touches_only_faces_within_its_normal_cone(make_body: MakeBody) -
     assert face_of(make_body, W / 2 - 2 * tiny, H / 2 - tiny, 0)[0] == UPPER
 
 
-def test_upper_corner_never_touches_the_top_of_another_block(make_body: MakeBody) -> None:
-    assert CONE_TOLERANCE < 1.0
-    assert face_of(make_body, 0.0, H / 2 - 1e-6, 3)[0] != UPPER
-
-
 def test_aligned_blocks_keep_the_corner_that_was_in_contact(make_body: MakeBody) -> None:
     a, b = make_body(0.0, H - 1e-6), make_body()
     for touching, duplicates in (((), [18, 19]), ((0, 1), [18, 19]), ((18, 19), [0, 1]), ((1, 19), [0, 18])):
         points, found = points_and_duplicates(a, b, touching)
         assert sorted(point.slot for point in points) == list(touching or (0, 1))
         assert found == duplicates
-
-
-def test_corners_that_meet_no_other_have_no_duplicates(make_body: MakeBody) -> None:
-    points, duplicates = points_and_duplicates(make_body(0.003, H - 1e-6), make_body())
-    assert [point.slot for point in points] == [0, 18]
-    assert duplicates == []
-
-
-def test_aligned_blocks_keep_the_deeper_corner_without_history(make_body: MakeBody) -> None:
-    a, b = make_body(0.0, H - 1e-6, 1e-6), make_body()
-    found = points_between(a, b)
-    assert len(found) == 2
-    every = {point.slot: point.depth for point in found}
-    assert max(every.values()) == pytest.approx(1e-6 + 0.016e-6, rel=1e-3)
 
 
 @given(y=st.floats(-0.01, 0.03), angle=st.floats(-7.0, 7.0))
@@ -187,18 +166,6 @@ def test_block_deep_under_ground_has_its_two_deepest_points_and_no_room_is_overr
     assert not world.contacts["normal_force"][2:].any()
 
 
-@given(x=st.floats(-0.02, 0.02), y=st.floats(-0.02, 0.02), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))
-def test_two_blocks_in_one_place_have_two_points_at_most(
-    pose: Pose, x: float, y: float, one: float, two: float
-) -> None:
-    world = pose((x, 1.0 + y, one), (0.0, 1.0, two))
-    count = find_points(world, 0)
-    assert count <= CONTACTS
-    pair_forces(world, 0, 1e-6)
-    assert world.pairs[0].active == count
-    assert not world.contacts["normal_force"][1:].any()
-
-
 @given(x=st.floats(-0.06, 0.06), y=st.floats(-0.06, 0.06), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))
 def test_corner_is_near_when_it_lies_in_the_grown_rectangle(
     make_body: MakeBody, x: float, y: float, one: float, two: float
@@ -217,40 +184,3 @@ def test_corner_is_near_when_it_lies_in_the_grown_rectangle(
         count = corners_near(a, b, 0.01, first, slots, 1, None)
         assert slots[:count].tolist() == [7] + [first + corner for corner in expected]
         assert (slots[count:] == 99).all()  # there is no room for more
-
-
-@given(y=st.floats(-0.02, 0.06), angle=st.floats(-4.0, 4.0))
-def test_corner_is_near_the_ground_when_it_is_below_the_height(pose: Pose, y: float, angle: float) -> None:
-    world, slots = pose((0.3, y, angle)), np.full(SLOTS, 99)
-    heights = [place_of(world.bodies[0], k)[1] for k in range(4)]
-    assume(min(abs(height - 0.02) for height in heights) > 1e-12)
-    count = near_slots(world, 0, 1, 0.02, slots)
-    assert slots[:count].tolist() == [k for k in range(4) if heights[k] <= 0.02]
-
-
-def test_candidates_of_a_pair_are_corners_of_the_first_and_then_of_the_second(pose: Pose) -> None:
-    world, slots = pose((0.0, 1.0 + H, 0.0), (0.0, 1.0, 0.0)), np.full(SLOTS, 99)
-    count = near_slots(world, 0, 1, 1e-3, slots)
-    assert slots[:count].tolist() == [0, 1, OF_B + 2, OF_B + 3]
-
-
-def test_corner_a_quarter_turn_apart_touches_the_side_it_came_through(make_body: MakeBody) -> None:
-    a = make_body(W / 2 + H / 2 - 1e-6, 0.0, radians(90.0))
-    found = points_between(a, make_body())
-    assert {(round(point.nx), round(point.ny)) for point in found} == {(1, 0)}
-    assert [point.depth for point in found] == pytest.approx([1e-6, 1e-6], rel=1e-6)
-
-
-def test_corner_passing_a_corner_is_one_contact_of_continuous_depth(make_body: MakeBody) -> None:
-    b = make_body()
-    depths = []
-    for shift in np.linspace(-3e-6, 1.2e-6, 85):  # a stands on its lower corner, which leaves b over its edge
-        a = make_body(0.0, 0.0, radians(45.0))
-        lowest = min((place_of(a, k) for k in range(4)), key=lambda corner: float(corner[1]))
-        a.x, a.y = W / 2 + shift - lowest[0], H / 2 - 1e-6 - lowest[1]
-        found = points_between(a, b)
-        assert len(found) <= 1
-        depths.append(float(found[0].depth) if found else 0.0)
-    assert depths[0] == pytest.approx(1e-6, rel=1e-6)
-    assert depths[-1] == 0.0
-    assert np.abs(np.diff(depths)).max() < 0.06e-6
