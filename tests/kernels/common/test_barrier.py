@@ -29,7 +29,6 @@ from blocksim.world.build import empty_lists, with_more_room
 from tests.kernels.crews import (
     SCENES,
     advanced,
-    alone,
     assert_same_bits,
     bits,
     contacts_between,
@@ -93,16 +92,6 @@ def by_one() -> ByOne:
     return make
 
 
-@pytest.mark.parametrize(("size", "begin"), [(2, 0.7), (MANY, 0.95)])
-@pytest.mark.parametrize("scene", SCENES)
-def test_any_number_of_threads_gives_the_bits_of_one(by_one: ByOne, scene: str, size: int, begin: float) -> None:
-    steps = SCENES[scene][1]
-    world, status = advanced(by_one(scene, begin), steps, size)
-    assert status == REACHED
-    assert world.clock[0].rebuilds > 1
-    assert_same_bits(world, by_one(scene))
-
-
 @pytest.mark.parametrize("scene", SCENES)
 def test_three_threads_give_the_bits_of_one_while_contacts_between_their_shares_begin_and_end(
     by_one: ByOne, scene: str
@@ -137,16 +126,6 @@ def test_number_of_threads_may_change_from_call_to_call(by_one: ByOne) -> None:
     worlds = crew(copy.deepcopy(by_one("wall", 0.5)), 4)
     for size, share in ((2, 0.6), (4, 0.65), (1, 0.8), (3, 0.9), (2, 1.0)):
         assert together(worlds[:size], round(share * SCENES["wall"][1])) == REACHED
-    assert_same_bits(worlds[0], by_one("wall"))
-
-
-@pytest.mark.parametrize("size", [2, 4])
-def test_one_thread_continues_alone_with_a_world_that_a_team_has_left(by_one: ByOne, size: int) -> None:
-    worlds, steps = crew(copy.deepcopy(by_one("wall", 0.8)), size), SCENES["wall"][1]
-    together(worlds, round(0.9 * steps))
-    assert worlds[0].pairs.is_between.any()
-    assert alone(worlds[0], steps) == REACHED
-    assert not worlds[0].pairs.is_between[: worlds[0].clock[0].pair_count].any()
     assert_same_bits(worlds[0], by_one("wall"))
 
 
@@ -208,19 +187,3 @@ def test_list_that_runs_full_on_the_way_is_given_room_and_the_team_continues(by_
         grown += 1
     assert grown > 3
     assert_same_bits(worlds[0], by_one("wall", 0.2))
-
-
-@pytest.mark.parametrize("scene", ["wall with Hertz law", "on hills"])
-def test_losses_of_pairs_between_shares_are_in_the_tallies_of_their_first_bodies(by_one: ByOne, scene: str) -> None:
-    """The totals alone would not tell: tally by tally, time after time."""
-    steps = SCENES[scene][1]
-    one, team = copy.deepcopy(by_one(scene, 0.5)), crew(copy.deepcopy(by_one(scene, 0.5)), 3)
-    before = one.ledger.copy()
-    for last in range(steps // 2 + 1, steps, 13):
-        alone(one, last)
-        together(team, last)
-        for name in ("dashpot", "friction", "broken"):
-            assert team[0].ledger[name].tobytes() == one.ledger[name].tobytes(), (name, last)
-    for name, least in (("dashpot", 3), ("friction", 3), ("broken", 2)):
-        assert (one.ledger[name] != before[name]).sum() >= least, name
-    assert len(contacts_between(team[0])) > 3

@@ -95,14 +95,6 @@ def test_file_that_others_may_write_is_not_executed(kept: Path, others: str, cap
     ]
 
 
-def test_file_that_cannot_be_read_is_no_obstacle(kept: Path) -> None:
-    double()(1.5)
-    (file,) = files(kept)
-    file.unlink()
-    file.mkdir()
-    assert double()(1.5) == 3.0
-
-
 def test_code_of_another_version_is_not_executed(kept: Path) -> None:
     one: Any = double()
     one(1.5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import cos, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,6 @@ import pytest
 from blocksim.kernels.common.arrays import BODY, CONTROLS, zeros
 from blocksim.kernels.common.integrate import (
     finish_step,
-    kinetic_energy,
     place_all_corners,
     renew_rotations,
     start_all,
@@ -20,8 +19,7 @@ from blocksim.kernels.common.integrate import (
 from blocksim.kernels.common.shapes import place_corners
 
 if TYPE_CHECKING:
-    from blocksim.kernels.common.arrays import Record, Records, World
-    from tests.conftest import PaperBlock, Start
+    from blocksim.kernels.common.arrays import Record, Records
 
 STEP = 1e-3
 
@@ -113,18 +111,6 @@ def test_step_starts_for_those_bodies_that_are_asked_for_and_never_for_the_groun
     assert (bodies.tobytes() == random_bodies(1).tobytes()) == (started == 0)
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.1, -1.3, 2.7])
-def test_step_changes_no_bit_of_a_body_that_stays(angle: float) -> None:
-    """Other threads look at fixed bodies while the thread of their share starts the next step."""
-    bodies = bodies_of(inverse_mass=0.0, inverse_inertia=0.0, x=0.1, y=0.7, angle=angle, half_x=0.3, half_y=0.2)
-    renew_rotations(bodies)
-    before = bodies.tobytes()
-    for _ in range(100):
-        start_step(bodies[0], STEP)
-        finish_step(bodies[0], controls_with_gravity(), STEP)
-    assert bodies.tobytes() == before
-
-
 def test_change_of_the_number_of_pairs_is_flagged_for_free_bodies_only() -> None:
     bodies: Any = zeros(4, BODY)
     bodies.inverse_mass = (1.0, 1.0, 0.0, 0.0)
@@ -152,38 +138,3 @@ def test_ways_to_the_corners_follow_every_turn() -> None:
             place_corners(body)
         assert corner_ways(bodies)[:5].all()
         assert corner_ways(bodies).tobytes() == corner_ways(expected).tobytes()  # the ground has none
-
-
-def test_renewed_rotations_are_those_of_the_angles() -> None:
-    bodies = bodies_of(angle=100.0)
-    renew_rotations(bodies)
-    assert [bodies[0].cos, bodies[0].sin] == [cos(100.0), sin(100.0)]
-
-
-def test_kinetic_energy_is_that_of_translation_and_spin(start: Start, paper_block: PaperBlock) -> None:
-    scene = start([{"y": 1.0, "velocity": [3.0, 4.0], "spin": 7.0}, {"x": 1.0, "y": 1.0}])
-    expected = 0.5 * paper_block.mass * 25.0 + 0.5 * paper_block.inertia * 49.0
-    assert kinetic_energy(scene.world) == pytest.approx(expected, rel=1e-12)
-
-
-def oscillation_error(start: Start, block: PaperBlock, safety: float) -> float:
-    """Return the largest error, in static overlaps, of a block that oscillates undamped without lifting off."""
-    frequency = sqrt(2.0 * block.point_stiffness / block.mass)
-    sag = 9.81 / frequency**2
-
-    def press(world: World) -> None:
-        world.bodies[0].y = block.height / 2 - 1.5 * sag
-
-    scene = start([{"y": block.height / 2}], restitution=1.0, time={"safety": safety}, change=press)
-    worst = 0.0
-    while scene.time * frequency < 20.0:
-        scene.to_step(scene.steps + 1)
-        expected = block.height / 2 - sag - 0.5 * sag * np.cos(frequency * scene.time)
-        worst = max(worst, abs(float(scene.bodies[0].y) - expected) / sag)
-    return worst
-
-
-def test_oscillation_on_contact_springs_converges_with_second_order(start: Start, paper_block: PaperBlock) -> None:
-    errors = [oscillation_error(start, paper_block, safety) for safety in (0.1, 0.05, 0.025)]
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert orders == pytest.approx([2.0, 2.0], abs=0.1)

@@ -303,8 +303,3 @@ def test_kernel_is_compiled_once_whatever_integers_it_is_called_with(monkeypatch
     pair.a, pair.near, pair.axis = 4_000_000_000, 60_000, 200
     assert add_up(pair) == 2 * (3 + 4_000_000_000 + 60_000 + 200)
     assert [str(one) for (one,) in twice.overloads] == ["int64"]  # type: ignore[attr-defined]
-
-
-def test_numbers_of_other_kinds_are_passed_as_they_are() -> None:
-    for kind in (jit.types.float64, jit.types.boolean, jit.types.uint64, jit.types.none, jit.types.unicode_type):
-        assert jit.plain_type(kind) == kind

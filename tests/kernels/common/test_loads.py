@@ -177,13 +177,6 @@ def test_water_below_a_face_does_nothing_and_above_it_presses_as_its_mean_depth_
     assert torque == pytest.approx(10e3 * HEIGHT**3 * DEPTH / 12.0, rel=1e-12)  # unit weight times I of the face
 
 
-def test_water_halfway_up_a_face_presses_on_its_wet_part_alone() -> None:
-    wet = 0.3
-    fx, _, torque = water(1.0 - HEIGHT / 2 + wet)
-    assert fx == pytest.approx(10e3 * 0.5 * wet**2 * DEPTH, rel=1e-12)
-    assert torque == pytest.approx(fx * (HEIGHT / 2 - wet / 3.0), rel=1e-12)
-
-
 def test_water_on_a_turned_face_is_the_exact_integral_along_it() -> None:
     angle, level = 0.3, 1.05
     fx, fy, torque = water(level, angle=angle)

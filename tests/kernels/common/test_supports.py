@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import asin, cos, pi, sin, sqrt
+from math import cos, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 SOFT = 1e-4  # of the material's stiffness: milliseconds are some hundred steps
 FRICTION = 0.4
-G = 9.81
 LYING = {"y": HEIGHT / 2}
 
 
@@ -31,20 +30,6 @@ def pieces_of(*rows: tuple[float, ...]) -> Records:
         for k, value in enumerate(coefficients):
             piece[f"c{k}"] = value
     return pieces
-
-
-def cubics_through(
-    displacement_at: Callable[[float], float], velocity_at: Callable[[float], float], end: float, step: float
-) -> Records:
-    """Return Hermite pieces through a motion, `step` (s) long each."""
-    rows = []
-    for begin in np.arange(0.0, end, step):
-        u, w = displacement_at(begin), displacement_at(begin + step)
-        v, z = velocity_at(begin), velocity_at(begin + step)
-        rows.append(
-            (begin, u, v, (3.0 * (w - u) / step - 2.0 * v - z) / step, (v + z - 2.0 * (w - u) / step) / step**2)
-        )
-    return pieces_of(*rows)
 
 
 def on_support(
@@ -74,22 +59,6 @@ def on_support(
     return Simulation(world)
 
 
-def settled(pieces: Records, *, direction: float = 0.0, vy: float = 0.0) -> Simulation:
-    """Start a block that already carries its weight, so that it neither bounces nor sinks, and does not rebound."""
-
-    def settle(world: World) -> None:
-        block, stiffness = world.bodies[0], float(world.interactions[1, 0].normal_stiffness)
-        block.y -= float(block.mass) * G / (2.0 * stiffness)
-        block.vy = vy
-
-    return on_support([LYING], pieces, direction=direction, restitution=0.0, change=settle)
-
-
-def lag(scene: Simulation) -> float:
-    """Return how far (m) the ground is ahead of the block."""
-    return float(scene.world.bodies[-1].x - scene.bodies[0].x)
-
-
 @given(time=st.floats(0.0, 5.0), first=st.integers(0, 2))
 def test_piece_is_the_last_one_that_has_begun(time: float, first: int) -> None:
     pieces = pieces_of((0.0,), (1.0,), (2.5,), (4.0,))
@@ -105,97 +74,6 @@ def test_acceleration_is_the_second_difference_of_the_displacement(seed: int, ti
     assert acceleration(piece, time) == pytest.approx((after - 2.0 * here + before) / h**2, abs=1e-5)
 
 
-@pytest.mark.parametrize("share", [0.9, -0.5])
-def test_accelerated_ground_takes_the_block_along_below_the_friction_limit(share: float) -> None:
-    pull = share * FRICTION * G
-    scene = settled(pieces_of((0.0, 0.0, 0.0, 0.5 * pull))).to_time(0.03)
-    assert scene.bodies[0].vx == pytest.approx(pull * scene.time, rel=0.01)
-    assert lag(scene) == pytest.approx(0.0, abs=2e-3 * abs(float(scene.bodies[0].x)))
-    assert scene.residual() < 1e-3
-
-
-@pytest.mark.parametrize("share", [1.5, -4.0])
-def test_ground_accelerated_beyond_friction_leaves_the_block_behind(share: float) -> None:
-    pull = share * FRICTION * G
-    scene = settled(pieces_of((0.0, 0.0, 0.0, 0.5 * pull))).to_time(0.03)
-    carried = np.sign(share) * FRICTION * G
-    assert scene.bodies[0].vx == pytest.approx(carried * scene.time, rel=0.01)
-    slipped = 0.5 * (abs(pull) - FRICTION * G) * scene.time**2
-    weight = float(scene.bodies[0].mass) * G
-    assert scene.world.ledger[0].friction == pytest.approx(FRICTION * weight * slipped, rel=0.02)
-    assert scene.residual() < 1e-3
-
-
-def shaken(excess: float, omega: float) -> Simulation:
-    """Shake the ground, u = A (1 - cos wt), with `excess` times the acceleration that friction can follow."""
-    amplitude = excess * FRICTION * G / omega**2
-    motion = cubics_through(
-        lambda t: amplitude * (1.0 - cos(omega * t)), lambda t: amplitude * omega * sin(omega * t), 0.1, 2e-4
-    )
-    return settled(motion)
-
-
-def test_shaken_block_sticks_below_the_friction_limit_and_slips_above() -> None:
-    omega = 100.0
-    stuck, slipping = (shaken(excess, omega).to_time(0.05) for excess in (0.9, 2.0))
-    amplitude = FRICTION * G / omega**2
-    assert abs(lag(stuck)) < 0.01 * amplitude
-    assert abs(lag(slipping)) > 0.1 * amplitude
-    assert stuck.world.ledger[0].friction < 1e-3 * slipping.world.ledger[0].friction
-    assert max(stuck.residual(), slipping.residual()) < 1e-3
-
-
-def test_first_slip_ends_when_ground_and_block_are_equally_fast() -> None:
-    """The block gains mu g t; the ground, w A sin(wt), is faster until both meet."""
-    omega, excess = 100.0, 2.0
-    scene = shaken(excess, omega)
-    times = np.linspace(1e-4, pi / omega, 100_000)
-    gained = FRICTION * G * times
-    end = float(times[np.argmax(gained > excess * FRICTION * G / omega * np.sin(omega * times))])
-    for share in (0.3, 0.6, 0.95):
-        scene.to_time(share * end)
-        assert scene.bodies[0].vx == pytest.approx(FRICTION * G * scene.time, rel=0.01)
-        assert scene.bodies[0].x == pytest.approx(0.5 * FRICTION * G * scene.time**2, rel=0.02)
-    slipped = excess * FRICTION * G / omega**2 * (1.0 - cos(omega * end)) - 0.5 * FRICTION * G * end**2
-    scene.to_time(end)
-    assert lag(scene) == pytest.approx(slipped, rel=0.02)
-
-
-def heaved(excess: float, omega: float) -> Simulation:
-    """Move the ground up and down, u = A sin wt, with `excess` times the acceleration of gravity."""
-    amplitude = excess * G / omega**2
-    motion = cubics_through(
-        lambda t: amplitude * sin(omega * t), lambda t: amplitude * omega * cos(omega * t), 0.2, 2e-4
-    )
-    return settled(motion, direction=pi / 2, vy=amplitude * omega)
-
-
-def test_block_rides_on_heaving_ground_below_gravity_and_hops_above() -> None:
-    omega = 60.0
-    riding, hopping = heaved(0.9, omega), heaved(1.2, omega)
-    lost = [0, 0]
-    while riding.time < 2.0 * pi / omega:
-        for k, scene in enumerate((riding, hopping)):
-            scene.to_step(scene.steps + 10)
-            lost[k] += scene.contacts == 0
-    assert lost[0] == 0
-    assert lost[1] > 10
-    assert max(riding.residual(), hopping.residual()) < 1e-3
-
-
-def test_hop_begins_where_the_ground_falls_away_and_is_a_free_flight() -> None:
-    omega, excess = 60.0, 1.5
-    scene = heaved(excess, omega)
-    amplitude = excess * G / omega**2
-    begin = asin(1.0 / excess) / omega
-    scene.to_time(begin + 0.005)
-    assert scene.contacts == 0
-    since = scene.time - begin
-    height = amplitude / excess + amplitude * omega * cos(omega * begin) * since - 0.5 * G * since**2
-    assert scene.bodies[0].y - HEIGHT / 2 == pytest.approx(height, abs=0.01 * amplitude)
-    assert scene.residual() < 1e-3
-
-
 SCENES: list[tuple[list[dict[str, Any]], dict[str, Any]]] = [
     ([{"y": 0.03, "angle": 0.4, "velocity": [0.2, -0.5], "spin": 2.0}], {}),
     ([LYING, {"y": 1.5 * HEIGHT + 1e-4, "x": 0.004, "velocity": [0.3, 0.0]}], {}),
@@ -206,27 +84,6 @@ SCENES: list[tuple[list[dict[str, Any]], dict[str, Any]]] = [
     ),
     ([{"y": 0.03, "x": -0.01, "velocity": [0.6, 0.0]}], {"walls": [{"from": [0.012, 0.1], "to": [0.012, 0.0]}]}),
 ]
-
-
-@pytest.mark.parametrize(("bodies", "tables"), SCENES)
-def test_uniformly_moving_support_is_rest_seen_from_elsewhere(
-    bodies: list[dict[str, object]], tables: dict[str, Any]
-) -> None:
-    velocity = 1.7
-
-    def push(world: World) -> None:
-        world.bodies.vx[:-1] += velocity
-
-    resting = on_support(bodies, restitution=1.0, **tables)
-    moving = on_support(bodies, pieces_of((0.0, 0.0, velocity)), change=push, restitution=1.0, **tables)
-    free_flight = resting.state()[:, 3:5] - (0.0, 0.04 * G)
-    for time in (0.005, 0.02, 0.04):
-        resting.to_time(time)
-        moving.to_time(time)
-        seen = moving.state() - velocity * np.array([moving.time, 0.0, 0.0, 1.0, 0.0, 0.0])
-        assert seen == pytest.approx(resting.state(), abs=1e-9), time
-    assert np.abs(resting.state()[:, 3:5] - free_flight).max() > 0.1  # something has been hit
-    assert moving.residual() < 1e-3
 
 
 @pytest.mark.parametrize(("bodies", "tables"), SCENES)
@@ -312,13 +169,3 @@ def test_rest_is_not_found_before_the_support_has_stopped(last: tuple[float, ...
     scene = on_support([LYING], creeping, time=rest).to_time(0.06)
     assert scene.status == (AT_REST if len(last) == 1 else REACHED)
     assert scene.time > 0.02
-
-
-def test_supports_work_is_what_the_block_has_gained() -> None:
-    pull, rise = 2.0, 0.5
-    scene = settled(pieces_of((0.0, 0.0, 0.0, 0.5 * pull)), direction=pi / 2).to_time(0.05)
-    mass = float(scene.bodies[0].mass)
-    gone = rise * pull * scene.time**2
-    assert scene.world.ledger[0].to_support == pytest.approx(-mass * (G + pull) * gone, rel=0.01)
-    assert scene.kinetic == pytest.approx(mass * pull * gone, rel=0.01)
-    assert sqrt(2.0 * gone * pull) == pytest.approx(float(scene.bodies[0].vy), rel=0.01)

@@ -4,19 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import BODY, Records, zeros
-from blocksim.kernels.common.frame_times import next_frame
-from blocksim.kernels.common.members import Watched, frame_to_watch, step_of_next, watch
+from blocksim.kernels.common.members import Watched, frame_to_watch, watch
 from blocksim.simulation.instruments import POSITION
 
 THRESHOLD, REACH = 1e-3, 0.03  # m
-
-
-@given(st.integers(0, 10**9), st.floats(1.0, 1e6))
-def test_frames_are_those_that_a_recorder_keeps(done: int, period: float) -> None:
-    assert step_of_next(done, period) == next_frame(done, period)
 
 
 def watched(threshold: float = THRESHOLD, *, peaks: bool = True) -> Watched:
@@ -53,12 +46,6 @@ def test_first_frame_in_which_a_free_block_has_moved_is_kept(state: dict[str, fl
     assert seen.steps.tolist() == [0, 6 if moved else 0]
     if moved:
         assert np.array_equal(seen.places[1], [[state.get(name, 0.0)] * 2 for name in POSITION], equal_nan=True)
-
-
-def test_fixed_blocks_do_not_count() -> None:
-    seen = watched(threshold=math.inf)
-    watch(bodies(x=1.0), seen, 1, 6)
-    assert seen.steps.tolist() == [0, 0]
 
 
 def test_the_largest_rotation_is_followed_to_the_end_and_the_first_frame_of_a_move_kept() -> None:

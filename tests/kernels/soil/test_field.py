@@ -58,16 +58,6 @@ def test_lists_hold_all_that_are_near_to_any_particle_of_a_cluster_and_each_once
         assert sorted(listed.tolist()) == np.flatnonzero(wanted).tolist()
 
 
-def test_cells_stay_small_where_a_particle_has_flown_far_away(soils: Soils) -> None:
-    built: Any = build_scene(scene(column(0.04, 0.03, SPACING)))
-    built.world.team[TEAM_SIZE] = 1
-    soils.points["x"][3], soils.points["y"][-1] = 1e4, -1e6
-    soils.points["y"][5] = np.nan
-    renew_lists(soils, built.world, 0)
-    assert soils.controls.cell[0] < 4.0 * SPACING
-    test_lists_hold_all_that_are_near_to_any_particle_of_a_cluster_and_each_once(soils)
-
-
 def test_sorting_keeps_every_particle_whole(soils: Soils) -> None:
     assert sorted(soils.states["number"].tolist()) == list(range(soils.points.size))
     (alone,) = np.flatnonzero(soils.states["number"] == 7)

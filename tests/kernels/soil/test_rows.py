@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.tolerances import DECAY
-from blocksim.kernels.soil.stress import ROWS, part_of_kernel, share_of_row
+from blocksim.kernels.soil.stress import ROWS, share_of_row
 from blocksim.kernels.sph.functions import wendland_slope
 from blocksim.scenario import Scenario
-from blocksim.world.systems.soils import SMOOTHING, earth_pressure_at_rest
-from tests.soils import BLOCKS, DEPTH, FAR, LEFT, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, Soil, column, right, scene
+from blocksim.world.systems.soils import SMOOTHING
+from tests.soils import BLOCKS, FAR, LEFT, MATERIALS, SMOOTH_WALLS, Soil, column, right, scene
 
 SPACING = 0.005
 
@@ -35,12 +35,6 @@ def test_the_decay_from_row_to_row_is_that_of_the_kernel_on_its_lattice() -> Non
         lower = two / 2.0 * stress[i - 2] + one * stress[i - 1]
         assert one * stress[i + 1] + two / 2.0 * stress[i + 2] == pytest.approx(lower, rel=5e-4)
     assert one * stress[2] + two / 2.0 * (stress[3] + stress[1]) == pytest.approx(one * stress[0], rel=5e-4)
-
-
-def test_the_part_of_the_kernel_of_a_row_is_what_neighbours_give_it() -> None:
-    one, two = weight_of_row(1), weight_of_row(2)
-    parts = [part_of_kernel(float(row)) for row in (1, 2, 3)]
-    assert parts == pytest.approx([0.5, 0.5 + 0.5 * one / (one + two), 1.0], rel=1e-5)
 
 
 @pytest.mark.parametrize("wall", [None, 0.05])
@@ -83,19 +77,6 @@ def test_corrected_gradients_start_with_the_forces_across_all_faces_in_equilibri
     assert fx[~is_low].max() < 0.05  # 9 with the stress inside
     assert fy[~is_at_wall & ~is_high].max() < 0.1  # 17
     assert fy[is_at_wall & ~is_low & ~is_high].max() < 0.3  # what the yield surface leaves to the others
-
-
-@pytest.mark.parametrize(("cohesion", "lacking"), [(0.0, 0.2236), (1e3, 0.0)])
-def test_corrected_soil_at_rest_has_the_pressure_that_its_outer_columns_leave_to_it(
-    cohesion: float, lacking: float
-) -> None:
-    width = 0.06
-    scenario = corrected_column(width, cohesion=cohesion)
-    soil, at_rest = Soil(scenario), earth_pressure_at_rest(scenario.materials["rods"])
-    inside = 0.5 * at_rest * UNIT_WEIGHT * 0.1**2 * DEPTH
-    soil.to_time(0.05)
-    # the others carry what two outer columns lack: 1 - 0.8712 and 1 - 0.9052 of one at either wall
-    assert soil.mean_force_on(1, 0.1)[0] == pytest.approx(-inside * (1.0 + 2.0 * lacking * SPACING / width), rel=0.01)
 
 
 def test_corrected_soil_starts_within_the_yield_surface() -> None:

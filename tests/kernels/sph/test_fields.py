@@ -1,8 +1,12 @@
-"""The face for users: what it refuses, what it copies, and the example in its documentation."""
+"""The face for users: what it refuses, what it copies, and the examples in its documentation and in the README."""
 
 from __future__ import annotations
 
 import doctest
+import re
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,15 +89,6 @@ def test_particles_keep_what_they_were_made_of() -> None:
     assert particles.sources.positions.tolist() == GOOD["positions"]
 
 
-def test_shapes_and_single_numbers() -> None:
-    particles = Particles(**GOOD)
-    assert interpolate(particles, 1.0, np.empty((0, 2))).shape == (0,)
-    assert interpolate(particles, 1.0, [[0.0, 0.0]]).tolist() == interpolate(particles, [1, 1], [[0, 0]]).tolist()
-    assert gradient(particles, 1).shape == (2, 2)
-    transposed = np.array([[0.0, 0.1], [0.0, 0.0]]).T  # not contiguous
-    assert (gradient(Particles(**GOOD | {"positions": transposed}), 1.0) == gradient(particles, 1.0)).all()
-
-
 @pytest.mark.parametrize("h", [1e-30, 1e-5, 1e30])
 @pytest.mark.parametrize(("mass", "density"), [(1e-30, 1e30), (1e30, 1e-30), (1.0, 1.0)])
 def test_numbers_at_the_limits_overflow_nowhere(h: float, mass: float, density: float) -> None:
@@ -107,3 +102,19 @@ def test_numbers_at_the_limits_overflow_nowhere(h: float, mass: float, density: 
 def test_support_is_that_of_the_kernel() -> None:
     assert Particles(**GOOD).support_radius == pytest.approx(0.2)
     assert Particles(**GOOD, kernel="quintic-spline").support_radius == pytest.approx(0.3)
+
+
+ROOT = Path(__file__).parents[3]
+TEXT = (ROOT / "blocksim/kernels/README.md").read_text(encoding="utf-8")
+EXAMPLE = re.compile(
+    r"<!-- sph example -->\n```python\n(.*?)```\n\n```\n(.*?)```\n<!-- end of sph example -->", re.DOTALL
+)
+
+
+def test_example_prints_what_the_readme_says(tmp_path: Path) -> None:
+    found = EXAMPLE.search(TEXT)
+    assert found is not None
+    (tmp_path / "example.py").write_text(found.group(1), encoding="utf-8")
+    done = subprocess.run([sys.executable, "example.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == found.group(2)

@@ -1,11 +1,16 @@
-"""Distances of a disc's centre from the exact shapes of bodies."""
+"""A particle of soil beside bodies: distances from their exact shapes, and what presses at the start."""
+
+from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from blocksim.kernels.common.jit import config
+from blocksim.kernels.soil import contact
 from blocksim.kernels.soil.contact import from_body
 from blocksim.simulation.schemes import build_scene
 from tests.soils import LEFT, column, scene
@@ -58,3 +63,28 @@ def test_an_edge_of_a_profile_is_touched_once() -> None:
 def test_the_ground_is_a_half_plane() -> None:
     ground = bodies()[-1]
     assert from_body(ground, True, 5.0, 0.001, RADIUS) == pytest.approx((0.001, 0.0, 1.0))
+
+
+pytestmark = pytest.mark.skipif(not config.DISABLE_JIT, reason="calls kernels without records")
+record: Any = SimpleNamespace
+
+
+@pytest.mark.parametrize(("apart", "touches"), [(3e-4, True), (3e-3, False)])
+def test_particle_that_nearly_touches_a_body_at_the_start_is_pressed_against_it(
+    monkeypatch: pytest.MonkeyPatch, apart: float, touches: bool
+) -> None:
+    monkeypatch.setattr(contact, "from_body", lambda *_: (1.0 + apart, 0.0, 1.0))
+    touch = record(particle=0, body=0, normal_force=0.0)
+    ground: Any = record(contact_class=0)
+    table: Any = {(0, 0): record(normal_stiffness=1e9)}
+    soils = record(
+        controls=[record(radius=1.0, touch_count=1)],
+        touches=[touch],
+        points=[record(x=0.0, y=1.0)],
+        states=[record(kind=0, sxx=-1.0, sxy=0.0, syy=-1.0)],
+        kinds=[record(density=1.0, volume=1.0)],
+        interactions=table,
+    )
+    bodies = type("Rows", (list,), {"size": 1})([ground])
+    contact.preload(soils, record(controls=[record(gravity_x=0.0, gravity_y=-1.0)], bodies=bodies))
+    assert (touch.normal_force > 0.0) == touches
