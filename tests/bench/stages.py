@@ -45,7 +45,7 @@ STAGES = {
         "neighbours": "step.update_neighbours",
         "forces": "step.forces_of_group",
         "of these: pairs whose contacts change": "step.changed_forces",
-        "kick, drift": "step.finish_group",
+        "kick, drift": "step.move_group",
         "pieces and damping of bodies": "inertia.share_out",
         "check": "step.check",
     },

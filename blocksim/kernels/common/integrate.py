@@ -1,4 +1,4 @@
-"""Velocity Verlet: half a kick, a drift, forces, half a kick. Symplectic; position and velocity at the same times."""
+"""Velocity Verlet: kick, drift, forces, kick. Symplectic; position and velocity at the same times."""
 
 import math
 
@@ -6,15 +6,17 @@ from blocksim.kernels.common import arrays, jit, shapes
 
 
 @jit.kernel
-def start_step(body: arrays.Record, step: float) -> None:
-    """Advance the velocities of a body by half a step, then its position and rotation by a full one.
-
-    Uses the accelerations of the last force evaluation.
-    """
+def kick(body: arrays.Record, step: float) -> None:
+    """Advance the velocities of a body by half a step, with the accelerations of the last force evaluation."""
     half = 0.5 * step
     body.vx += half * body.ax
     body.vy += half * body.ay
     body.spin += half * body.spin_rate
+
+
+@jit.kernel
+def drift(body: arrays.Record, step: float) -> None:
+    """Advance position and rotation of a body by a step."""
     turned = step * body.spin
     body.x += step * body.vx
     body.y += step * body.vy
@@ -24,10 +26,11 @@ def start_step(body: arrays.Record, step: float) -> None:
 
 
 @jit.kernel
-def start_all(bodies: arrays.Records, first: int, last: int, step: float) -> None:
+def kick_and_drift(bodies: arrays.Records, first: int, last: int, step: float) -> None:
     """Start a step of the bodies from `first` to before `last`; the ground, the last of all, never moves by itself."""
     for i in range(first, min(last, bodies.size - 1)):
-        start_step(bodies[i], step)
+        kick(bodies[i], step)
+        drift(bodies[i], step)
 
 
 @jit.rare_kernel
@@ -54,19 +57,16 @@ def renew_rotations(bodies: arrays.Records) -> None:
 
 
 @jit.kernel
-def finish_step(body: arrays.Record, controls: arrays.Record, step: float) -> None:
-    """Turn gravity and contact totals of a body into accelerations, advance its velocities by half a step with them.
+def accelerate_and_kick(body: arrays.Record, controls: arrays.Record, step: float) -> None:
+    """Turn gravity and contact totals of a body into accelerations, kick with them, and clear the totals.
 
-    Clears the totals. Fixed bodies and the ground have no acceleration; their totals are the support's affair.
+    Fixed bodies and the ground have no acceleration; their totals are the support's affair.
     """
-    half = 0.5 * step
     if body.inverse_mass > 0.0:
         body.ax = controls.gravity_x + body.inverse_mass * body.fx
         body.ay = controls.gravity_y + body.inverse_mass * body.fy
         body.spin_rate = body.inverse_inertia * body.torque
-        body.vx += half * body.ax
-        body.vy += half * body.ay
-        body.spin += half * body.spin_rate
+        kick(body, step)
         body.pairs_changed = body.pairs_now != body.pairs_before
         body.sums_changed = 0
         body.pairs_before = body.pairs_now

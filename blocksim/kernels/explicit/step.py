@@ -46,12 +46,13 @@ def changed_forces(world: arrays.World, p: int, step: float, tally: arrays.Recor
 
 
 @jit.kernel
-def finish_group(world: arrays.World, first: int, end: int, step: float, goes_on: bool) -> None:
-    """Finish the step of the bodies from `first` to before `end`, and start their next one where the run continues."""
+def move_group(world: arrays.World, first: int, end: int, step: float, goes_on: bool) -> None:
+    """Kick the bodies from `first` to before `end` by their new forces, then into the next step if the run goes on."""
     for i in range(first, end):
-        integrate.finish_step(world.bodies[i], world.controls[0], step)
+        integrate.accelerate_and_kick(world.bodies[i], world.controls[0], step)
         if goes_on:
-            integrate.start_step(world.bodies[i], step)
+            integrate.kick(world.bodies[i], step)
+            integrate.drift(world.bodies[i], step)
 
 
 @jit.kernel
@@ -100,7 +101,7 @@ def forces_within(world: arrays.World, share: arrays.Record, step: float, goes_o
     while first < last_body:
         end = min(first + arrays.GROUP, last_body)
         forces_of_group(world, share, end, step, world.ledger[first // arrays.GROUP])
-        finish_group(world, first, end, step, goes_on)
+        move_group(world, first, end, step, goes_on)
         first = end
 
 
@@ -246,7 +247,7 @@ def begin_steps(world: arrays.World, k: int, step: float) -> bool:
         share.status = supervise(world, k, NEIGHBOURS, step, None)
         if share.status != arrays.REACHED:
             return False
-    integrate.start_all(world.bodies, share.first_body, share.last_body, step)
+    integrate.kick_and_drift(world.bodies, share.first_body, share.last_body, step)
     if world.loads.size > 0:
         loads.push_bodies(world, share.first_body, share.last_body, share.steps * world.controls[0].step + step, step)
     if supports.has_motion(world.controls[0]):

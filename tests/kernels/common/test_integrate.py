@@ -10,11 +10,12 @@ import pytest
 
 from blocksim.kernels.common.arrays import BODY, CONTROLS, zeros
 from blocksim.kernels.common.integrate import (
-    finish_step,
+    accelerate_and_kick,
+    drift,
+    kick,
+    kick_and_drift,
     place_all_corners,
     renew_rotations,
-    start_all,
-    start_step,
 )
 from blocksim.kernels.common.shapes import place_corners
 
@@ -44,13 +45,13 @@ def controls_with_gravity() -> Record:
 def finish_all(bodies: Records, step: float) -> None:
     """Finish the step of all bodies; nobody does it for the ground."""
     for body in bodies[:-1]:
-        finish_step(body, controls_with_gravity(), step)
+        accelerate_and_kick(body, controls_with_gravity(), step)
 
 
 def free_steps(bodies: Records, count: int) -> None:
     finish_all(bodies, 0.0)
     for _ in range(count):
-        start_all(bodies, 0, bodies.size, STEP)
+        kick_and_drift(bodies, 0, bodies.size, STEP)
         finish_all(bodies, STEP)
 
 
@@ -104,9 +105,10 @@ def test_step_starts_for_those_bodies_that_are_asked_for_and_never_for_the_groun
     first: int, last: int, started: int
 ) -> None:
     bodies, expected = random_bodies(1), random_bodies(1)
-    start_all(bodies, first, last, STEP)
+    kick_and_drift(bodies, first, last, STEP)
     for body in expected[first : first + started]:
-        start_step(body, STEP)
+        kick(body, STEP)
+        drift(body, STEP)
     assert bodies.tobytes() == expected.tobytes()
     assert (bodies.tobytes() == random_bodies(1).tobytes()) == (started == 0)
 
@@ -130,7 +132,7 @@ def corner_ways(bodies: Records) -> np.ndarray:
 
 
 def test_ways_to_the_corners_follow_every_turn() -> None:
-    for advance in (lambda bodies: start_all(bodies, 0, bodies.size, STEP), place_all_corners, renew_rotations):
+    for advance in (lambda bodies: kick_and_drift(bodies, 0, bodies.size, STEP), place_all_corners, renew_rotations):
         bodies = random_bodies(1)
         advance(bodies)
         expected = bodies.copy()

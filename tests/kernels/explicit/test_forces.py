@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import GROUP, LEDGER, zeros
-from blocksim.kernels.common.integrate import finish_step, start_all
+from blocksim.kernels.common.integrate import accelerate_and_kick, kick_and_drift
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.explicit.partition import add_from_before, add_kept, keep, partition
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
@@ -40,7 +40,7 @@ def moving() -> Callable[[str], World]:
                 world.bodies["vx"][: world.bodies.size // 2] += 0.2
             else:
                 world, _ = advanced(world, steps // 2, 1)
-            start_all(world.bodies, 0, world.bodies.size, float(world.controls[0].step))
+            kick_and_drift(world.bodies, 0, world.bodies.size, float(world.controls[0].step))
             made[scene] = with_threads(world, MOST)
         return copy.deepcopy(made[scene])
 
@@ -102,5 +102,5 @@ def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_tally(movi
         scale = 1e-12 * max(float(np.abs(before[name]).max()), float(np.abs(expected).max()))
         assert gained == pytest.approx(expected, abs=scale), name
     for body in apart.bodies[:-1]:
-        finish_step(body, apart.controls[0], step)
+        accelerate_and_kick(body, apart.controls[0], step)
     assert bits(world.bodies) == bits(apart.bodies)

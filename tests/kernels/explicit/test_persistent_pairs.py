@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR
-from blocksim.kernels.common.integrate import start_all
+from blocksim.kernels.common.integrate import kick_and_drift
 from blocksim.kernels.common.tolerances import IMPACT_STEPS
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
@@ -65,7 +65,7 @@ def evaluate(world: World) -> tuple[Tally, World, World]:
     quick, slow = copy.deepcopy(world), copy.deepcopy(world)
     steady, general, kinds = 0, 0, set()
     for copied in (quick, slow):
-        start_all(copied.bodies, 0, copied.bodies.size, step)
+        kick_and_drift(copied.bodies, 0, copied.bodies.size, step)
         for name in ("dashpot", "friction", "broken"):
             copied.ledger[name] = 0.0
     for p, pair in enumerate(quick.pairs[: world.clock[0].pair_count]):
