@@ -361,8 +361,7 @@ def empty_lists(capacity: int, slots: int, contacts: arrays.Records) -> dict[str
         "contacts": arrays.zeros((*pairs, most), contacts.dtype),
         "candidates": numbers((*pairs, slots), kind),
         "operators": arrays.zeros((*pairs, 2), arrays.OPERATOR),
-        "spare_pairs": arrays.zeros(pairs, arrays.PAIR),
-        "spare_candidates": numbers((*pairs, slots), kind),
+        "near_pairs": arrays.zeros(pairs, arrays.NEAR_PAIR),
     }
 
 

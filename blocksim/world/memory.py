@@ -9,13 +9,21 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.common.arrays import BODY, CONTACT, CONTACTS, OPERATOR, PAIR, PARTICLE_CONTACT, POINT
+from blocksim.kernels.common.arrays import (
+    BODY,
+    CONTACT,
+    CONTACTS,
+    NEAR_PAIR,
+    OPERATOR,
+    PAIR,
+    PARTICLE_CONTACT,
+    POINT,
+)
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth import arrays as rigid
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
 from blocksim.world.systems.system import SystemInScene
 
-LISTS = 2  # of candidate pairs: the present one and the one being built
 OPERATORS = 2  # of a pair: along the normal and along the tangent
 INDEX = np.dtype(np.uint32).itemsize
 VALUE = np.dtype(np.float64).itemsize
@@ -56,7 +64,7 @@ def scene_size(bodies: int, pairs: int, slots: int, *, has_particles: bool = Fal
         contacts, candidates = slots * PARTICLE_CONTACT.itemsize, slots * INDEX
     else:
         contacts, candidates = CONTACTS * CONTACT.itemsize, slots
-    pair = LISTS * (PAIR.itemsize + candidates) + OPERATORS * OPERATOR.itemsize + contacts
+    pair = PAIR.itemsize + NEAR_PAIR.itemsize + candidates + OPERATORS * OPERATOR.itemsize + contacts
     work = (slots + 1) * POINT.itemsize + contacts
     return Size(bodies, pairs, bodies * (BODY.itemsize + OBJECT_BYTES) + pairs * pair + work)
 

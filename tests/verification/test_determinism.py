@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # work space
 WORK_SPACE = {"points", "matrices", "before", "action", "starts", "order", "shares", "between", "team"}
-NOT_STATE = {*WORK_SPACE, "spare_pairs", "spare_candidates"}
+NOT_STATE = {*WORK_SPACE, "near_pairs"}
 END = 0.24  # s, after the first impacts
 
 

@@ -183,7 +183,7 @@ def test_more_room_keeps_what_there_is(model: str) -> None:
     world.ledger[0].friction = 11.0
     wider = with_more_room(world)
     used = world.pairs.size
-    assert wider.pairs.size == wider.spare_pairs.size == ceil(GROWTH * used)
+    assert wider.pairs.size == wider.near_pairs.size == ceil(GROWTH * used)
     for name in ("pairs", "contacts", "candidates", "operators"):
         old, new = getattr(world, name), getattr(wider, name)
         assert (new[:used] == old).all(), name
@@ -230,14 +230,13 @@ def test_more_room_than_there_is_memory_is_refused(monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("kind", [CONTACT, PARTICLE_CONTACT])
 def test_empty_lists_hold_no_contact(kind: np.dtype[np.void]) -> None:
     lists = empty_lists(5, 8, zeros(3, kind))
-    assert {name: lists[name].shape for name in ("contacts", "candidates", "spare_candidates", "operators")} == {
+    assert {name: lists[name].shape for name in ("contacts", "candidates", "operators")} == {
         "contacts": (5, 3),
         "candidates": (5, 8),
-        "spare_candidates": (5, 8),
         "operators": (5, 2),
     }
     assert lists["contacts"].dtype == kind
-    assert len(lists["pairs"]) == len(lists["spare_pairs"]) == 5
+    assert len(lists["pairs"]) == len(lists["near_pairs"]) == 5
     assert not lists["pairs"].active.any()
 
 

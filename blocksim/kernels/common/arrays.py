@@ -148,6 +148,12 @@ PAIR = record_type(
     "sticking "  # bits of the points that have a dashpot along the tangent
     "slides",  # which way its only contact slides: AHEAD, where a moves ahead of b along the tangent, BACK, or not: 0
 )
+NEAR_PAIR = record_type(
+    "",
+    indices="a b",  # bodies, sorted
+    small="slots",  # number of candidates
+    flags="axis touches",  # that of the pair in the list before; flag: it had contacts
+)
 CONTACT = record_type(
     "spring depth "  # m: shear spring, overlap
     "normal_force shear_force",  # N: pushing apart, resisting slip
@@ -273,8 +279,7 @@ class World(NamedTuple):
     particles: Any  # (q,) PARTICLE, body after body; None, a type of its own, for the surface model
     corners: Any  # (q,) CORNER, shape after shape; None, a type of its own, where all blocks are rectangles
     points: Records  # (s + 1,) POINT, work space of one pair; the last one for contacts that end
-    spare_pairs: Records  # (p,) PAIR, the list being built
-    spare_candidates: Any  # (p, s) as candidates
+    near_pairs: Records  # (p,) NEAR_PAIR, the list being built
     starts: Any  # (3 c + 3,) uint32: where cells of the grid, at most 3 c + 1, begin in the order; neighbours.py
     order: Any  # (n,) uint32: bodies cell by cell
     large: Any  # (l,) uint32: bodies too large for the grid, sorted

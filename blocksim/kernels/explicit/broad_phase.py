@@ -34,9 +34,10 @@ def idle_candidates(pair: arrays.Record) -> int:
 
 
 @jit.rare_kernel
-def move_contacts(world: arrays.World, source: int, target: int, count: int) -> None:
-    """Copy the first `count` contacts and the dashpots of one pair's place in the list to another's."""
-    for k in range(count):
+def move_pair(world: arrays.World, source: int, target: int) -> None:
+    """Copy a pair that touches, with its contacts and dashpots, from one place in the list to another."""
+    world.pairs[target] = world.pairs[source]
+    for k in range(world.pairs[source].active):
         world.contacts[target, k] = world.contacts[source, k]
     world.operators[target, arrays.NORMAL] = world.operators[source, arrays.NORMAL]
     world.operators[target, arrays.SHEAR] = world.operators[source, arrays.SHEAR]
@@ -46,52 +47,49 @@ def move_contacts(world: arrays.World, source: int, target: int, count: int) -> 
 def carry_history(world: arrays.World, count: int) -> int:
     """Make the pairs of the new list, those that touch as they were in the old one; return how many have slots.
 
-    Nothing of these changes, so that the motion does not depend on when lists are made. All contacts move to the front,
-    as there is no memory for two of them in a large scene: both lists are sorted, so the places keep their order.
+    Nothing of these changes, so that the motion does not depend on when lists are made. They move to the front first,
+    then each to its place, as there is no memory for two lists of a large scene: both are sorted, so none is overtaken.
     """
     pairs, reach = world.pairs, list_reach(world.controls[0])
     old_count = world.clock[0].pair_count
     q = kept = used = 0
     for p in range(count):
-        a, b = world.spare_pairs[p].a, world.spare_pairs[p].b
-        near = near_slots(world, a, b, reach, world.spare_candidates[used], world.particles)
-        if near == 0:
+        a, b = world.near_pairs[p].a, world.near_pairs[p].b
+        slots = near_slots(world, a, b, reach, world.candidates[used], world.particles)
+        if slots == 0:
             continue
         while q < old_count and (pairs[q].a < a or (pairs[q].a == a and pairs[q].b < b)):
             q += 1
-        pair = world.spare_pairs[used]
         is_old = q < old_count and pairs[q].a == a and pairs[q].b == b
-        if is_old and pairs[q].active > 0:
-            world.spare_pairs[used] = pairs[q]
-            move_contacts(world, q, kept, pair.active)
+        near = world.near_pairs[used]
+        near.a, near.b, near.slots = a, b, slots
+        near.axis = pairs[q].axis if is_old else 0
+        near.touches = is_old and pairs[q].active > 0
+        if near.touches:
+            move_pair(world, q, kept)
             kept += 1
-        else:
-            world.spare_pairs[used] = NEW_PAIR[0]
-            pair.a = a
-            pair.b = b
-            pair.axis = pairs[q].axis if is_old else 0
-            pair.limit = overlap_limit(world.bodies[a], world.bodies[b], world.controls[0].max_overlap)
-        pair.near = near
-        pair.idle = idle_candidates(pair)
         used += 1
     for p in range(used - 1, -1, -1):
-        if world.spare_pairs[p].active > 0:
+        near, pair = world.near_pairs[p], pairs[p]
+        if near.touches:
             kept -= 1
-            move_contacts(world, kept, p, world.spare_pairs[p].active)
+            move_pair(world, kept, p)
+        else:
+            pairs[p] = NEW_PAIR[0]
+            pair.a, pair.b, pair.axis = near.a, near.b, near.axis
+            pair.limit = overlap_limit(world.bodies[near.a], world.bodies[near.b], world.controls[0].max_overlap)
+        pair.near = near.slots
+        pair.idle = idle_candidates(pair)
     return used
 
 
 @jit.rare_kernel
 def rebuild_pairs(world: arrays.World) -> bool:
     """Rebuild the pair list; return False, with the old list untouched, where it does not fit."""
-    count = neighbours.list_pairs(world, world.spare_pairs, None, list_reach(world.controls[0]), True)
-    if count > world.spare_pairs.size:
+    count = neighbours.list_pairs(world, world.near_pairs, None, list_reach(world.controls[0]), True)
+    if count > world.near_pairs.size:
         return False
     count = carry_history(world, count)
-    for p in range(count):
-        world.pairs[p] = world.spare_pairs[p]
-        for k in range(world.pairs[p].near):
-            world.candidates[p, k] = world.spare_candidates[p, k]
     neighbours.note_places(world.bodies)
     for body in world.bodies:
         body.counts = body.inverse_mass > 0.0 or (body.is_moved != 0 and supports.has_motion(world.controls[0]))

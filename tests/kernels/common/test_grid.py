@@ -190,9 +190,9 @@ def test_every_pair_keeps_its_own_history_wherever_it_moves_in_the_list(
     fill_list(world, old, random)
     before = remembered(world, world.pairs, len(old))
     axes = {(int(pair.a), int(pair.b)): int(pair.axis) for pair in world.pairs[: len(old)]}
-    for spare, (a, b) in zip(world.spare_pairs, new, strict=False):
-        spare.a, spare.b = a, b
+    for near, (a, b) in zip(world.near_pairs, new, strict=False):
+        near.a, near.b = a, b
     assert carry_history(world, len(new)) == len(new)
-    after = remembered(world, world.spare_pairs, len(new))
+    after = remembered(world, world.pairs, len(new))
     assert after == {pair: history for pair, history in before.items() if pair in set(new)}
-    assert world.spare_pairs.axis[: len(new)].tolist() == [axes.get(pair, 0) for pair in new]
+    assert world.pairs.axis[: len(new)].tolist() == [axes.get(pair, 0) for pair in new]
