@@ -9,16 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.common.arrays import (
-    BODY,
-    CONTACT,
-    CONTACTS,
-    NEAR_PAIR,
-    OPERATOR,
-    PAIR,
-    PARTICLE_CONTACT,
-    POINT,
-)
+from blocksim.kernels.common import arrays
 from blocksim.kernels.common.simd import WIDTH
 from blocksim.kernels.nonsmooth import arrays as rigid
 from blocksim.world.free_memory import available_bytes, chunk_rows, readable
@@ -61,17 +52,19 @@ class Size(NamedTuple):
 def scene_size(bodies: int, pairs: int, slots: int, *, has_particles: bool = False) -> Size:
     """Return the size of a scene of the explicit scheme; `slots` of a pair can come into contact."""
     if has_particles:
-        contacts, candidates = slots * PARTICLE_CONTACT.itemsize, slots * INDEX
+        contacts, candidates = slots * arrays.PARTICLE_CONTACT.itemsize, slots * INDEX
     else:
-        contacts, candidates = CONTACTS * CONTACT.itemsize, slots
-    pair = PAIR.itemsize + NEAR_PAIR.itemsize + candidates + OPERATORS * OPERATOR.itemsize + contacts
-    work = (slots + 1) * POINT.itemsize + contacts
-    return Size(bodies, pairs, bodies * (BODY.itemsize + OBJECT_BYTES) + pairs * pair + work)
+        contacts, candidates = arrays.CONTACTS * arrays.CONTACT.itemsize, slots
+    pair = (
+        arrays.PAIR.itemsize + arrays.NEAR_PAIR.itemsize + candidates + OPERATORS * arrays.OPERATOR.itemsize + contacts
+    )
+    work = (slots + 1) * arrays.POINT.itemsize + contacts
+    return Size(bodies, pairs, bodies * (arrays.BODY.itemsize + OBJECT_BYTES) + pairs * pair + work)
 
 
 def rigid_size(bodies: int, pairs: int) -> Size:
     """Return the size of a scene of the non-smooth scheme."""
-    kinds = (BODY, rigid.STATE, rigid.BEFORE, rigid.IMPACT)
+    kinds = (arrays.BODY, rigid.STATE, rigid.BEFORE, rigid.IMPACT)
     body = sum(kind.itemsize for kind in kinds) + 3 * VALUE + OBJECT_BYTES
     pack = rigid.PACK.itemsize + rigid.IMPACT_LANES.itemsize
     pair = rigid.CONSTRAINT.itemsize + rigid.KEPT.itemsize + -(-pack // WIDTH)

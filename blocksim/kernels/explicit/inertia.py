@@ -96,20 +96,6 @@ def steps_apart(pair: Record, a: Record, b: Record, is_ground: bool, controls: R
 
 
 @rare_kernel
-def mean_velocity(bodies: Records) -> tuple[float, float]:
-    """Return the mean velocity (m/s) of the free bodies."""
-    vx = 0.0
-    vy = 0.0
-    count = 0
-    for i in range(bodies.size - 1):
-        if bodies[i].inverse_mass > 0.0:
-            vx += bodies[i].vx
-            vy += bodies[i].vy
-            count += 1
-    return (vx / count, vy / count) if count > 0 else (0.0, 0.0)
-
-
-@rare_kernel
 def steps_to_ground(body: Record, ground: Record, controls: Record, table: Corners) -> float:
     """Return after how many steps a body that is not near the half-plane may touch it at the earliest."""
     gap = sides.gap_on(0, body, ground, True, table)
@@ -123,7 +109,11 @@ def steps_to_approach(bodies: Records, controls: Record, table: Corners) -> floa
 
     Speeds are those against the mean of the free bodies: blocks that fly together have the same sums in any frame.
     """
-    vx, vy = mean_velocity(bodies)
+    vx, vy, count = 0.0, 0.0, 0
+    for i in range(bodies.size - 1):
+        if bodies[i].inverse_mass > 0.0:
+            vx, vy, count = vx + bodies[i].vx, vy + bodies[i].vy, count + 1
+    vx, vy = vx / max(count, 1), vy / max(count, 1)
     ground = bodies[bodies.size - 1]
     fastest = 0.0
     soonest = math.inf
