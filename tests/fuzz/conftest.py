@@ -5,23 +5,33 @@ from __future__ import annotations
 import re
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import pytest
-from hypothesis import settings
+from hypothesis import given, settings, strategies as st
 
 from tests.fuzz.child import MOST_BYTES, MOST_SECONDS, Child, Left
 from tests.fuzz.runs import Run, finished_run
+from tests.sizes import in_all
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 ROOT = Path(__file__).parents[2]
-settings.register_profile("long", settings.get_profile("ci"), max_examples=5000)
-QUICK = 25  # a taste: even a tenth of LONG is as much again, and more
-LONG = settings.get_profile("long")
+T = TypeVar("T")
+QUICK = 25  # a taste: even a tenth of a long test is as much again, and more
 PLACED = re.compile(r"^bad\.toml:\d+: ", re.MULTILINE)
 WHOLE = ("not a text file", "the file is empty", "nested too deeply", "larger than", "not valid TOML: ")
+
+
+def tries(many: int) -> pytest.MarkDecorator:
+    """Give a test the number of examples it is to try: a few, and `many` in a long one."""
+    return pytest.mark.parametrize("tried", [QUICK, pytest.param(in_all(many), marks=pytest.mark.long)], ids=str)
+
+
+def search(tried: int, examples: st.SearchStrategy[T], check: Callable[[T], None]) -> None:
+    """Check so many examples, the same ones every time."""
+    settings(max_examples=tried)(given(examples)(check))()
 
 
 def assert_harmless(left: Left, codes: set[int], usual: float = 0.0) -> None:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import strategies as st
 
-from tests.fuzz.conftest import LONG, QUICK, assert_harmless
+from tests.fuzz.conftest import assert_harmless, search, tries
 from tests.fuzz.mutations import BINARY, JSON, SCENARIO, TABLE, damaged
 from tests.fuzz.runs import FRAMES
-from tests.sizes import in_all
 
 if TYPE_CHECKING:
     from tests.fuzz.child import Child
@@ -50,27 +49,16 @@ def _damage(data: st.DataObject, run: Run) -> str:
     return place
 
 
-def _try(child: Child, run: Run, usual: dict[tuple[str, ...], float], data: st.DataObject) -> None:
-    place = _damage(data, run)
-    command = data.draw(st.sampled_from(OFTEN))
-    left = child.call(run.folder, *command, "bad")
-    assert_harmless(left, CODES, usual[command])
-    if left.code in {65, 66}:
-        assert f"bad/{place}" in left.err, left.err
-
-
-@settings(max_examples=QUICK)
-@given(data=st.data())
+@tries(500)
 def test_damaged_results_are_reported_in_a_line(
-    child: Child, run: Run, usual: dict[tuple[str, ...], float], data: st.DataObject
+    child: Child, run: Run, usual: dict[tuple[str, ...], float], tried: int
 ) -> None:
-    _try(child, run, usual, data)
+    def check(data: st.DataObject) -> None:
+        place = _damage(data, run)
+        command = data.draw(st.sampled_from(OFTEN))
+        left = child.call(run.folder, *command, "bad")
+        assert_harmless(left, CODES, usual[command])
+        if left.code in {65, 66}:
+            assert f"bad/{place}" in left.err, left.err
 
-
-@pytest.mark.long
-@settings(LONG, max_examples=in_all(500))
-@given(data=st.data())
-def test_five_hundred_damaged_results(
-    child: Child, run: Run, usual: dict[tuple[str, ...], float], data: st.DataObject
-) -> None:
-    _try(child, run, usual, data)
+    search(tried, st.data(), check)
