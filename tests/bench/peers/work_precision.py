@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 PANEL, LEAST = (3.6, 2.9), (1.9, 0.9)  # inches, of a panel, and on a page whose size was asked for
 LEFT, RIGHT, HEAD, FOOT, GAP = 0.62, 0.15, 0.32, 0.40, 0.72  # inches
 LEGEND_ROW, LEGEND_ENTRY = 0.17, 1.8  # inches: height of a row of the legend, width of an entry
-MOST_CURVES = 9  # for which a page is refused before anything is measured
 MARKERS = "os^D"
 DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)))
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")  # as in style, the well visible ones
@@ -68,12 +67,6 @@ def draw_work_precision(
             left = axes.get_position().x0 * float(figure.get_figwidth())
             style.write_legend(figure, handles, left, style.EDGE, ncols=columns)
         style.save_figure(figure, path)
-
-
-def refuse_small_page(panels: int, paper: Paper) -> None:
-    """Raise InvalidInputError where so many panels have no room for their curves."""
-    with _opened(panels, MOST_CURVES, None, paper):
-        pass
 
 
 @contextmanager
