@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from blocksim.kernels.common.arrays import BODY, zeros
-from blocksim.kernels.common.shapes import separation
+from blocksim.kernels.common.arrays import BODY, NORMAL, zeros
 from blocksim.kernels.nonsmooth import arrays
 from blocksim.kernels.nonsmooth.arrays import FAR
 from blocksim.kernels.nonsmooth.narrow_phase import Lists, collide_one
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.common.arrays import Record, Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-    from tests.kernels.conftest import MakeBody
 
     Vector = NDArray[np.float64]
 
@@ -133,18 +131,6 @@ def places_of(constraint: Record, body: Record, *, of_a: bool) -> Vector:
     return np.array([one, one + constraint.width * t])
 
 
-def brought_near(make_body: MakeBody, b: Record, sides_of_a: Vector, angle: float, way: float, gap: float) -> Record:
-    """Return a body with a gap (m) to b, negative for an overlap, in the direction `way` (rad) from it."""
-    near, far = 0.0, 0.1
-    while True:
-        distance = (near + far) / 2
-        place = b.x + distance * np.cos(way), b.y + distance * np.sin(way)
-        a = make_body(*place, angle, width=sides_of_a[0], height=sides_of_a[1])
-        if far - near < 1e-7:
-            return a
-        near, far = (near, distance) if separation(a, b) > gap else (distance, far)
-
-
 def meet(
     a: Record,
     b: Record,
@@ -250,3 +236,33 @@ def least_change(start: Vector, rows: Vector, least: Vector, inverse_mass: Vecto
     found, _ = nnls(matrix, wanted, maxiter=10000)
     rest = wanted - matrix @ found
     return np.asarray(start + np.sqrt(inverse_mass) * scale * -rest[:-1] / rest[-1])
+
+
+def dashpots_by_definition(points: Records, masses: Vector, ratio: float, step: float) -> Vector:
+    """Return the dashpot forces from d = C (u + dt/2 A (f_before - f_spring - d)), solved by numpy.
+
+    `masses` (1/kg) are the inverse ones that the points see of one another.
+    """
+    root, weighted = np.sqrt(points.stiffness), np.sqrt(points.stiffness * points.weight)
+    values, vectors = np.linalg.eigh(root[:, None] * masses * root)
+    powers = [value**-0.5 if value > 1e-4 * values.max() else 0.0 for value in values]
+    c = 2.0 * ratio * weighted[:, None] * ((vectors * powers) @ vectors.T) * weighted
+    free = points.rate + 0.5 * step * masses @ (points.before - points.force)
+    return np.asarray(np.linalg.solve(np.eye(points.size) + 0.5 * step * c @ masses, c @ free))
+
+
+def rates_of_points(points: Records, a: Record, b: Record, direction: int) -> Vector:
+    """Return the closing or slip rates of all points as rows of (v_a, w_a, v_b, w_b)."""
+    rows = []
+    for point in points:
+        ax = (-point.nx, -point.ny) if direction == NORMAL else (-point.ny, point.nx)
+        arms = [ax[1] * (point.x - body.x) - ax[0] * (point.y - body.y) for body in (a, b)]
+        rows.append([*ax, arms[0], -ax[0], -ax[1], -arms[1]])
+    return np.array(rows)
+
+
+def delassus(points: Records, a: Record, b: Record, direction: int) -> Vector:
+    """Return the inverse masses (1/kg) that points see of one another."""
+    masses = [a.inverse_mass] * 2 + [a.inverse_inertia] + [b.inverse_mass] * 2 + [b.inverse_inertia]
+    rows = rates_of_points(points, a, b, direction)
+    return np.asarray((rows * masses) @ rows.T)

@@ -1,18 +1,25 @@
-"""Scenes of the tests of kernels: single steps of blocks in any poses with rigid contacts, and outlines.
+"""Scenes of the tests of kernels: single bodies, blocks in any poses and in crowds, with contacts of either scheme.
 
 SI units, angles in rad.
 """
 
 from __future__ import annotations
 
+import copy
+import json
 from dataclasses import dataclass
-from math import cos, pi, sin
+from functools import cache
+from math import cos, hypot, pi, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from blocksim.kernels.common.arrays import TEAM_SIZE
-from blocksim.kernels.common.integrate import renew_rotations
+from blocksim.bench.harness import pushed_wall
+from blocksim.kernels.common.arrays import ALL, BODY, MOTION_PIECE, TEAM_SIZE, zeros
+from blocksim.kernels.common.integrate import place_all_corners, renew_rotations
+from blocksim.kernels.common.shapes import place_corners, separation
+from blocksim.kernels.explicit.broad_phase import rebuild_pairs
+from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.nonsmooth.motion import load_states
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.neighbours import update_pairs
@@ -21,16 +28,17 @@ from blocksim.kernels.nonsmooth.step import substep
 from blocksim.scenario.geometry import centre_outline, regular
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
-from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, scenario_of
+from blocksim.world.build import build_world, with_more_room
 from blocksim.world.nonsmooth import with_more_constraints
 from tests.kernels.references import turning
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from blocksim.kernels.common.arrays import Records
+    from blocksim.kernels.common.arrays import Record, Records, World
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
     from blocksim.scenario import Scenario
     from blocksim.scenario.geometry import Corners
@@ -42,6 +50,56 @@ RADIUS = 0.02
 HEXAGON = regular(6, RADIUS)
 TRIANGLE = centre_outline([(0.0, 0.0), (0.04, 0.0), (0.012, 0.03)])  # its centroid is not over the middle of its base
 NAMES = ("x", "y", "angle", "vx", "vy", "spin")
+
+
+def make_body(
+    x: float = 0.0,
+    y: float = 0.0,
+    angle: float = 0.0,
+    *,
+    width: float = WIDTH,
+    height: float = HEIGHT,
+    mass: float = 0.1,
+) -> Record:
+    """Make the record of one body at rest from its pose (m, rad), sides (m) and mass (kg)."""
+    body = zeros(1, BODY)[0]
+    body.x, body.y, body.angle = x, y, angle
+    body.cos, body.sin = cos(angle), sin(angle)
+    body.faces = body.corners = ALL
+    body.half_x, body.half_y, body.radius = width / 2, height / 2, hypot(width, height) / 2
+    body.mass, body.inertia = mass, mass * (width**2 + height**2) / 12
+    body.inverse_mass, body.inverse_inertia = 1.0 / body.mass, 1.0 / body.inertia
+    place_corners(body)
+    return body
+
+
+@cache
+def blocks_apart(count: int, tables: str) -> World:
+    """Return a world of blocks that do not touch, to be copied; `tables` of the scenario in JSON."""
+    apart: list[Mapping[str, object]] = [{"x": 0.1 * i, "y": 0.1} for i in range(count)]
+    return build_world(scenario_of(apart, **json.loads(tables)))
+
+
+def pose(*poses: tuple[float, float, float], **tables: object) -> World:
+    """Return the paper's blocks in any poses (m, m, rad), overlapping ones too; nothing has moved, pairs are listed."""
+    world = copy.deepcopy(blocks_apart(len(poses), json.dumps(tables)))
+    for body, (x, y, angle) in zip(world.bodies, poses, strict=False):
+        body.x, body.y, body.angle = x, y, angle
+    renew_rotations(world.bodies)
+    assert rebuild_pairs(world)
+    return world
+
+
+def brought_near(b: Record, sides_of_a: NDArray[np.float64], angle: float, way: float, gap: float) -> Record:
+    """Return a body with a gap (m) to b, negative for an overlap, in the direction `way` (rad) from it."""
+    near, far = 0.0, 0.1
+    while True:
+        distance = (near + far) / 2
+        place = b.x + distance * np.cos(way), b.y + distance * np.sin(way)
+        a = make_body(*place, angle, width=sides_of_a[0], height=sides_of_a[1])
+        if far - near < 1e-7:
+            return a
+        near, far = (near, distance) if separation(a, b) > gap else (distance, far)
 
 
 def rigid(scenario: Scenario, **stepping: Any) -> Scenario:
@@ -172,3 +230,138 @@ def random_outline(random: Any, size: float = RADIUS) -> Corners:
         if steps.min() > 0.15 and steps.max() < 2.8:
             stretch = random.uniform(0.4, 1.0)
             return centre_outline([(size * cos(one), stretch * size * sin(one)) for one in angles.tolist()])
+
+
+@dataclass(frozen=True)
+class Touching:
+    """A block on a fixed one, or on the ground, and the points between them; normals point towards the upper one."""
+
+    world: World
+    upper: Record  # the block above
+    points: Any  # (n,) POINT: a record array
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Normals (n, 2)."""
+        return np.stack([self.points.nx, self.points.ny], axis=1)
+
+    def wrench(self) -> np.ndarray:
+        """Return force along x and y and torque (m) about the upper block's centre for springs of one corner each."""
+        points = self.points
+        pushes = points.share * points.depth
+        arms = (points.x - self.upper.x) * points.ny - (points.y - self.upper.y) * points.nx
+        return np.array([(pushes * points.nx).sum(), (pushes * points.ny).sum(), (pushes * arms).sum()])
+
+
+@cache
+def world_of(model: str, spacing: float, width: float, below: float | None) -> World:
+    """Return the world of two blocks far apart; calls with the same arguments share it."""
+    ground = [] if below is None else [{"y": 0.5 * HEIGHT, "width": below, "fixed": True}]
+    bodies = [{"y": 0.5, "width": width}, *ground]
+    return build_world(scenario_of(bodies, contact={"model": model, "particle_spacing": spacing}))
+
+
+def touch(
+    model: str,
+    *,
+    shift: float = 0.0,
+    depth: float = 1e-6,
+    angle: float = 0.0,
+    spacing: float = 1e-3,
+    width: float = WIDTH,
+    below: float | None = WIDTH,
+) -> Touching:
+    """Let a block `width` wide touch the one `below`, or the ground (None); all in m but `angle` (rad)."""
+    world = world_of(model, spacing, width, below)
+    upper = world.bodies[0]
+    upper.angle, upper.cos, upper.sin = angle, cos(angle), sin(angle)
+    upper.x = shift
+    upper.y = 0.0 if below is None else HEIGHT
+    upper.y += abs(upper.sin) * upper.half_x + upper.cos * upper.half_y - depth
+    place_corners(upper)
+    assert rebuild_pairs(world)
+    assert world.clock[0].pair_count <= 1
+    count = contact_points(world, 0) if world.clock[0].pair_count else 0
+    return Touching(world, upper.copy(), world.points[:count].copy())
+
+
+SOFT = {"stiffness_scale": 1e-4, "max_overlap": 5e-3}  # a hundredth of the steps
+
+
+def rows(columns: int, count: int, **more: Any) -> list[dict[str, Any]]:
+    """Return blocks in rows that lie on one another, a few of them already moving."""
+    return [
+        {"x": 0.034 * i + 0.008 * row, "y": HEIGHT * (row + 0.5), "velocity": [0.3 * row + 0.1 * (i % 3), 0.0], **more}
+        for row in range(count)
+        for i in range(columns)
+    ]
+
+
+def shake(world: World) -> World:
+    """Return a world whose support moves to and fro once."""
+    pieces = zeros(3, MOTION_PIECE)
+    pieces.start = 0.0, 0.03, 0.06
+    pieces.c0, pieces.c1 = (0.0, 9e-3, 0.0), (0.3, -0.3, 0.0)
+    world.controls.motion_x = 1.0
+    return world._replace(motion=pieces)
+
+
+def soft_world(bodies: list[dict[str, Any]], **tables: Any) -> World:
+    contact: Mapping[str, object] = {"restitution": 0.2, **SOFT, **tables.pop("contact", {})}
+    friction = {"block_block": 0.31, "block_ground": 0.38}
+    time = {"stop_at_rest": False, **tables.pop("time", {})}
+    return build_world(scenario_of(bodies, contact=contact, friction=friction, time=time, **tables))
+
+
+def wall(**contact: object) -> World:
+    """Return a wall that falls to pieces: four groups of bodies, all of which touch others."""
+    return build_world(pushed_wall(8, 8, contact={**SOFT, **contact}))
+
+
+def among_fixed() -> World:
+    """Return rows of blocks between fixed ones, whose numbers are before, among and after theirs."""
+    fixed = [{"x": 0.034 * i - 0.002, "y": HEIGHT * 6.5 + 0.0016, "fixed": True, "angle": 0.1} for i in range(9)]
+    post = {"x": 0.034 * 9 + 0.01, "y": 0.5 * HEIGHT, "fixed": True}
+    blocks = rows(9, 6)
+    return soft_world([*fixed[:5], *blocks[:20], post, *blocks[20:], *fixed[5:]])
+
+
+def on_hills() -> World:
+    """Return blocks that fall onto hills: the pieces of ground are bodies of their own."""
+    profile = [[0.1 * i - 0.3, 0.02 * (i % 2)] for i in range(12)]
+    blocks = [
+        {
+            "x": 0.0375 * i + 0.004 * row,
+            "y": 0.04 + 0.033 * row,
+            "velocity": [0.2, -0.3 * row],
+            "angle": 0.2 * (i % 3 - 1),
+        }
+        for row in range(5)
+        for i in range(9)
+    ]
+    return soft_world(blocks, ground={"profile": profile})
+
+
+def with_particles(model: str) -> World:
+    """Return rows of blocks that touch at particles."""
+    return soft_world(rows(9, 6), contact={"model": model, "particle_spacing": 8e-3})
+
+
+SCENES: dict[str, tuple[Callable[[], World], int]] = {  # and steps
+    "wall": (wall, 4000),
+    "wall with Hertz law": (lambda: wall(law="hertz-mindlin"), 4000),
+    "among fixed blocks": (among_fixed, 4000),
+    "among moving supports": (lambda: shake(among_fixed()), 4000),
+    "on hills": (on_hills, 4000),
+    "on moving hills": (lambda: shake(on_hills()), 4000),
+    "discs": (lambda: with_particles("particles"), 600),
+    "kernel": (lambda: with_particles("kernel"), 600),
+}
+
+
+def with_pairs(world: World) -> World:
+    """Return a world whose pairs are listed, before anything has moved."""
+    place_all_corners(world.bodies)  # as advance does before anything else
+    while not rebuild_pairs(world):
+        world = with_more_room(world)
+    return world

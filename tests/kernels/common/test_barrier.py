@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from functools import cache
 from math import nan
 from typing import TYPE_CHECKING, Protocol
@@ -27,17 +26,15 @@ from blocksim.kernels.common.jit import entry_kernel
 from blocksim.verification.scene import HEIGHT
 from blocksim.world.build import empty_lists, with_more_room
 from tests.kernels.crews import (
-    SCENES,
     advanced,
     assert_same_bits,
     bits,
     contacts_between,
     crew,
     in_threads,
-    soft_world,
     together,
-    wall,
 )
+from tests.kernels.scenes import SCENES, soft_world, wall
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -120,13 +117,6 @@ def test_team_interrupted_anywhere_gives_the_bits_of_one_call(by_one: ByOne, sce
         assert together(worlds, last) == REACHED
         assert worlds[0].clock[0].steps == last
     assert_same_bits(worlds[0], by_one(scene, 0.2))
-
-
-def test_number_of_threads_may_change_from_call_to_call(by_one: ByOne) -> None:
-    worlds = crew(copy.deepcopy(by_one("wall", 0.5)), 4)
-    for size, share in ((2, 0.6), (4, 0.65), (1, 0.8), (3, 0.9), (2, 1.0)):
-        assert together(worlds[:size], round(share * SCENES["wall"][1])) == REACHED
-    assert_same_bits(worlds[0], by_one("wall"))
 
 
 def overlapping() -> World:

@@ -14,18 +14,16 @@ from blocksim.kernels.common.shapes import (
     corner_offset,
     ground_gap,
     place_corners,
-    relative_pose,
     separation,
     slab_depth,
-    to_world,
     turn,
 )
 from blocksim.kernels.common.tolerances import END_RATIO, SMALL_TURN
-from tests.kernels.rectangles import corners, distances, gap as largest_gap, turned
+from tests.kernels.references import apart as largest_gap, corners, distances, turning
+from tests.kernels.scenes import make_body
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record
-    from tests.kernels.conftest import MakeBody
 
 places = st.floats(-0.06, 0.06)
 sides = st.floats(1e-3, 0.05)
@@ -36,7 +34,7 @@ def points_of(body: Record, count: int = 15) -> np.ndarray:
     """Return a grid of points that fills a body."""
     u, v = np.meshgrid(np.linspace(-1.0, 1.0, count), np.linspace(-1.0, 1.0, count))
     local = np.stack([u.ravel() * body.half_x, v.ravel() * body.half_y], axis=1)
-    return np.asarray(local @ turned(body) + (body.x, body.y))
+    return np.asarray(local @ turning(body.angle) + (body.x, body.y))
 
 
 @pytest.mark.parametrize("by", [0.0, 1e-9, 1e-3, SMALL_TURN * (1 - 1e-9), SMALL_TURN, SMALL_TURN * (1 + 1e-9), -0.049])
@@ -46,7 +44,7 @@ def test_turn_agrees_with_the_library_on_both_sides_of_the_series(by: float) -> 
 
 @given(x=places, y=places, one=angles, two=angles, w=sides, h=sides)
 def test_separation_is_the_largest_gap_and_never_exceeds_the_distance(
-    make_body: MakeBody, *, x: float, y: float, one: float, two: float, w: float, h: float
+    *, x: float, y: float, one: float, two: float, w: float, h: float
 ) -> None:
     a = make_body(x, y, one)
     b = make_body(0.0, 0.01, two, width=w, height=h)
@@ -59,23 +57,13 @@ def test_separation_is_the_largest_gap_and_never_exceeds_the_distance(
 
 
 @given(y=places, angle=angles, w=sides, h=sides)
-def test_ground_gap_is_the_height_of_the_lowest_corner(
-    make_body: MakeBody, y: float, angle: float, w: float, h: float
-) -> None:
+def test_ground_gap_is_the_height_of_the_lowest_corner(y: float, angle: float, w: float, h: float) -> None:
     body = make_body(0.3, y, angle, width=w, height=h)
     assert ground_gap(body) == pytest.approx(corners(body)[:, 1].min(), abs=1e-15)
 
 
-@given(x=places, y=places, one=angles, two=angles)
-def test_relative_pose_leads_back_to_the_world(make_body: MakeBody, x: float, y: float, one: float, two: float) -> None:
-    a, b = make_body(x, y, one), make_body(0.02, -0.01, two)
-    px, py, c, s = relative_pose(a, b)
-    assert to_world(b, px, py) == pytest.approx((a.x, a.y), abs=1e-15)
-    assert (c, s) == pytest.approx((cos(one - two), sin(one - two)), abs=1e-14)
-
-
 @given(angle=angles, w=sides, h=sides)
-def test_ways_to_the_corners_lead_to_the_corners(make_body: MakeBody, angle: float, w: float, h: float) -> None:
+def test_ways_to_the_corners_lead_to_the_corners(angle: float, w: float, h: float) -> None:
     body = make_body(0.1, -0.2, 0.0, width=w, height=h)
     body.angle, body.cos, body.sin = angle, cos(angle), sin(angle)
     place_corners(body)

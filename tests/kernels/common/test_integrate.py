@@ -11,8 +11,6 @@ import pytest
 from blocksim.kernels.common.arrays import BODY, CONTROLS, zeros
 from blocksim.kernels.common.integrate import (
     accelerate_and_kick,
-    drift,
-    kick,
     kick_and_drift,
     place_all_corners,
     renew_rotations,
@@ -98,19 +96,6 @@ def random_bodies(seed: int) -> Records:
     bodies.cos, bodies.sin = np.cos(bodies.angle), np.sin(bodies.angle)
     bodies.pairs_now, bodies.pairs_before = random.integers(0, 3, (2, 7))
     return bodies
-
-
-@pytest.mark.parametrize(("first", "last", "started"), [(0, 7, 6), (0, 6, 6), (2, 4, 2), (4, 4, 0), (6, 7, 0)])
-def test_step_starts_for_those_bodies_that_are_asked_for_and_never_for_the_ground(
-    first: int, last: int, started: int
-) -> None:
-    bodies, expected = random_bodies(1), random_bodies(1)
-    kick_and_drift(bodies, first, last, STEP)
-    for body in expected[first : first + started]:
-        kick(body, STEP)
-        drift(body, STEP)
-    assert bodies.tobytes() == expected.tobytes()
-    assert (bodies.tobytes() == random_bodies(1).tobytes()) == (started == 0)
 
 
 def test_change_of_the_number_of_pairs_is_flagged_for_free_bodies_only() -> None:

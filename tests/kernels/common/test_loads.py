@@ -100,19 +100,6 @@ def test_a_force_at_a_point_is_the_force_at_the_centre_and_its_moment(scheme: st
     assert one["spin"] > 0.0
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_force_along_axes_of_the_body_turns_with_it_and_one_along_fixed_axes_does_not(scheme: str) -> None:
-    bodies = [{"block": "b", "x": 0.0, "y": HIGH, "angle": "90 deg"}]
-    force = {"kind": "force", "body": "1", "magnitude": "1 kN"}
-    turned, fixed = (
-        end_of(simulate(scenario_with({**force, "axes": axes}, scheme=scheme, bodies=bodies, gravity=0.0)))
-        for axes in ("body", "world")
-    )
-    speed = 1000.0 / MASS * turned["t"]
-    assert (turned["vx"], turned["vy"]) == pytest.approx((0.0, speed), abs=1e-12)
-    assert (fixed["vx"], fixed["vy"]) == pytest.approx((speed, 0.0), abs=1e-12)
-
-
 HISTORIES: dict[str, tuple[dict[str, Any], float]] = {  # and the integral of the factor over 0.1 s
     "ramp": ({"kind": "ramp", "start": 0.02, "end": 0.06, "from": 0.5, "to": 2.0}, 0.01 + 0.05 + 0.08),
     "steps": ({"kind": "steps", "times": [0.03, 0.05], "factors": [1.0, -2.0]}, 0.02 - 0.1),
@@ -131,33 +118,6 @@ def test_a_force_that_goes_with_time_brings_the_integral_of_its_history(scheme: 
     assert end["t"] == pytest.approx(0.1, rel=1e-12)
     assert end["vx"] == pytest.approx(2000.0 / MASS * integral, rel=1e-3)
     assert work_of_loads(result) == pytest.approx(0.5 * MASS * end["vx"] ** 2, rel=SECOND_ORDER)
-
-
-@pytest.mark.usefixtures("compiler")
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_uniform_horizontal_load_is_gravity_that_is_tilted_in_its_limit(scheme: str) -> None:
-    tilt, share = math.atan(0.2), math.hypot(1.0, 0.2)
-    lying = [{"block": "b", "x": 0.0, "y": HEIGHT / 2}]
-    rough = {"block_ground": 0.1}
-    time = {"end": 0.3, "stop_at_rest": False}
-    loaded = simulate(
-        scenario_with({"kind": "horizontal", "magnitude": -0.2}, scheme=scheme, bodies=lying, friction=rough, time=time)
-    )
-    tilted = simulate(
-        scenario_with(
-            scheme=scheme,
-            bodies=lying,
-            friction=rough,
-            time=time,
-            ground={"tilt": tilt and f"{tilt} rad"},
-            gravity=G * share,
-        )
-    )
-    one, two = end_of(loaded), end_of(tilted)
-    assert one["vx"] == pytest.approx(two["vx"], rel=2e-3)
-    assert one["x"] == pytest.approx(two["x"], rel=2e-3)
-    assert one["vx"] == pytest.approx(-(0.2 - 0.1) * G * one["t"], rel=0.02)
-    assert loaded.summary.energy_J.relative_residual < 1e-4
 
 
 def water(level: float, **pose: float) -> tuple[float, float, float]:

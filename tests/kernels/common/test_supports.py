@@ -113,24 +113,6 @@ def test_uniformly_accelerated_support_is_gravity_from_the_side(
     assert moving.residual() < 1e-3
 
 
-def test_bodies_on_the_support_return_to_where_they_were_to_the_last_bit() -> None:
-    there_and_back = pieces_of((0.0, 0.0, 0.3), (0.01, 0.003, -0.3), (0.02,))
-    wall = {"y": 0.1, "x": 0.2, "fixed": True, "angle": 0.3}
-    scene = on_support([LYING, wall], there_and_back, direction=0.7)
-    scene.to_time(0.01)
-    base: Any = scene.world.moved
-    moved: Any = scene.world.bodies[base.body]
-    assert (moved.is_moved == 1).all()
-    assert np.hypot(moved.x - base.x, moved.y - base.y) == pytest.approx(0.003, rel=1e-2)
-    scene.to_time(0.03)
-    fixed: Any = scene.world.bodies[scene.world.bodies.is_moved == 1]
-    assert fixed.x.tolist() == base.x.tolist() == [0.2, 0.0]
-    assert fixed.y.tolist() == base.y.tolist() == [0.1, 0.0]
-    assert not fixed.vx.any()
-    assert fixed.size == 2
-    assert scene.world.bodies[0].is_moved == 0
-
-
 def test_work_on_the_support_is_tallied_by_the_trapezoid_rule_and_its_totals_are_used_up() -> None:
     world = on_support([LYING, {"y": 0.1, "x": 0.2, "fixed": True}], pieces_of((0.0, 0.0, 0.3))).world
     wall, ground, step = world.bodies[1], world.bodies[2], 1e-3

@@ -1,27 +1,38 @@
-"""Candidate pairs against brute force, what pairs bring along from list to list, and lists that run full."""
+"""Lists of pairs: all that is near, looked at before anything leaves their reach; no contact begins unseen."""
 
 from __future__ import annotations
 
 import copy
 from itertools import combinations
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, strategies as st
 
-from blocksim.kernels.common.arrays import PAIRS_FULL, REACHED, SLOTS
-from blocksim.kernels.common.integrate import place_all_corners
+from blocksim.kernels.common.arrays import MOTION_PIECE, PAIRS_FULL, REACHED, SLOTS, World, zeros
+from blocksim.kernels.common.integrate import place_all_corners, renew_rotations
+from blocksim.kernels.common.neighbours import travel
+from blocksim.kernels.common.shapes import separation
+from blocksim.kernels.common.tolerances import MOST_UNSEEN
+from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, idle_candidates, unseen_steps, update_pairs
+from blocksim.kernels.explicit.models import contact_points
+from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED, begins_contact, persistent_forces
 from blocksim.kernels.explicit.sides import MOST_CORNERS
 from blocksim.kernels.explicit.step import advance
-from blocksim.world.build import empty_lists, with_more_room
-from tests.kernels.crews import bits, listed
-from tests.kernels.rectangles import corners, distances, gap, in_frame
+from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
+from blocksim.world.build import build_world, empty_lists
+from tests.kernels.crews import bits
+from tests.kernels.references import apart as gap, corners, distances, in_frame
+from tests.kernels.scenes import make_body, pose, with_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from blocksim.kernels.common.arrays import Record, World
-    from tests.conftest import Simulation, Start
+    from tests.conftest import Start
+
 
 COUNT = 30
 
@@ -73,7 +84,7 @@ def pairs_by_brute_force(world: World, within: Callable[[Record, Record], float]
 @pytest.mark.parametrize("skin", [1e-4, 2e-3, 2e-2])
 @pytest.mark.parametrize("seed", range(2))
 def test_list_misses_no_corner_within_reach_and_has_none_beyond(start: Start, seed: int, skin: float) -> None:
-    world = listed(scattered(start, seed, skin).world)
+    world = with_pairs(scattered(start, seed, skin).world)
     count = int(world.clock[0].pair_count)
     found = {
         (int(pair.a), int(pair.b)): near[: pair.near].tolist()
@@ -103,16 +114,6 @@ def cramped(world: World) -> World:
     return world._replace(**empty_lists(1, SLOTS, world.before))
 
 
-def run(world: World, last_step: int) -> tuple[World, int]:
-    """Advance with as much room as it takes; return the world and how often it ran full."""
-    grown = 0
-    while (status := advance(world, last_step)) == PAIRS_FULL:
-        world = with_more_room(world)
-        grown += 1
-    assert status == REACHED
-    return world, grown
-
-
 def test_full_list_stops_before_anything_has_moved(start: Start) -> None:
     world = cramped(unstarted(start))
     place_all_corners(world.bodies)  # as advance does before anything else
@@ -124,15 +125,171 @@ def test_full_list_stops_before_anything_has_moved(start: Start) -> None:
     assert world.clock[0].pair_count == 0
 
 
-def test_run_continued_with_more_room_has_the_same_bits(start: Start, pace: int) -> None:
-    roomy, never = run(unstarted(start), 1000 // pace)
-    grown, often = run(cramped(unstarted(start)), 1000 // pace)
-    assert never == 0
-    assert often >= 3
-    count = int(roomy.clock[0].pair_count)
-    assert count > 8
-    for name in ("bodies", "clock", "ledger"):
-        assert bits(getattr(roomy, name)) == bits(getattr(grown, name)), name
-    for name in ("pairs", "contacts", "operators"):
-        assert bits(getattr(roomy, name)[:count]) == bits(getattr(grown, name)[:count]), name
-    assert (roomy.candidates[:count] == grown.candidates[:count]).all()
+SOFT = {"stiffness_scale": 1e-4}  # a hundredth of the steps
+G = 9.81
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    """Return a block in the air; nothing has been looked at."""
+    return build_world(scenario_of([{"y": 1.0}], contact=SOFT))
+
+
+def test_travel_is_that_of_the_farthest_corner() -> None:
+    body = make_body(0.3, -0.2, 1.0)
+    body.list_x, body.list_y, body.list_angle = 0.1, 0.1, 1.5
+    assert travel(body, 0.0, 0.0) == pytest.approx(np.hypot(0.2, 0.3) + 0.5 * body.radius)
+    body.list_x, body.list_y, body.list_angle = body.x, body.y, body.angle
+    assert travel(body, 0.0, 0.0) == 0.0
+
+
+shares = st.floats(0.0, 0.999)
+speeds = st.one_of(st.just(0.0), st.floats(1e-6, 100.0))
+
+
+@given(share=shares, fastest=speeds)
+def test_no_falling_body_comes_beyond_its_share_unseen(world: World, share: float, fastest: float) -> None:
+    """The worst: the fastest body is at the edge of its share already and falls the way that it moves."""
+    reach = PAIR_SHARE * float(world.controls[0].skin)
+    steps = unseen_steps(world, share * reach, fastest)
+    time = steps * float(world.controls[0].step)
+    assert 0 <= steps <= MOST_UNSEEN
+    assert share * reach + fastest * time + 0.5 * G * time**2 <= reach
+
+
+def test_list_that_reaches_far_enough_is_kept_and_one_that_does_not_is_made_anew(start: Start) -> None:
+    world = start([{"y": 0.0125}], contact=SOFT).world
+    assert world.clock[0].rebuilds == 1
+    share = PAIR_SHARE * float(world.controls[0].skin)
+    for moved, rebuilds in ((0.9, 1), (1.01, 2), (0.9, 2), (-1.01, 3), (50.0, 4)):
+        world.bodies[0].x = world.bodies[0].list_x + moved * share
+        assert update_pairs(world) == REACHED
+        assert world.clock[0].rebuilds == rebuilds
+        assert world.clock[0].next_update > world.clock[0].steps
+    assert world.bodies[0].list_x == world.bodies[0].x
+
+
+def crash() -> World:
+    """Throw nine blocks from all sides at a pile of four."""
+    pile = [{"x": 0.036 * (i % 2), "y": 0.0126 + 0.026 * (i // 2)} for i in range(4)]
+    thrown: list[dict[str, object]] = []
+    for i in range(9):
+        angle = pi * (i + 1) / 10
+        x, y = 0.02 + 0.16 * np.cos(angle), 0.03 + 0.16 * np.sin(angle)
+        velocity = [-1.5 * float(np.cos(angle)), -1.5 * float(np.sin(angle))]
+        thrown.append({"x": float(x), "y": float(y), "angle": 0.7 * i, "velocity": velocity, "spin": 15.0 * (i - 4)})
+    time = {"stop_at_rest": False}
+    return build_world(scenario_of([*pile, *thrown], contact={**SOFT, "max_overlap": 0.02}, time=time))
+
+
+def fall() -> World:
+    """Let blocks fall on one another that hang still in the air, a wall of them just apart."""
+    bodies = [{"x": 0.034 * (i % 4) + 0.005 * (i // 4), "y": 0.02 + 0.03 * (i // 4), "angle": 0.1} for i in range(12)]
+    return build_world(scenario_of(bodies, contact=SOFT, time={"stop_at_rest": False}))
+
+
+def jolt() -> World:
+    """Jerk the ground away below three blocks at rest: the support's speed jumps from none to 2 m/s."""
+    bodies = [{"x": 0.04 * i, "y": 0.0125} for i in range(2)] + [{"x": 0.02, "y": 0.0376}]
+    pieces = zeros(2, MOTION_PIECE)
+    pieces[1].start, pieces[1].c1 = 2e-3, 2.0
+    contact = {**SOFT, "max_overlap": 0.02}
+    world = build_world(scenario_of(bodies, contact=contact, time={"stop_at_rest": False}))
+    world.controls.motion_x = 1.0
+    return world._replace(motion=pieces)
+
+
+def touching_pairs(bodies: Any) -> set[tuple[int, int]]:
+    """Return all pairs of bodies that overlap, found without any list; the half-plane is the last one."""
+    ground = len(bodies) - 1
+    x, y, radius = np.array(bodies.x), np.array(bodies.y), np.array(bodies.radius)
+    found = set()
+    for i in range(ground):
+        if y[i] - np.abs(bodies.sin[i]) * bodies.half_x[i] - np.abs(bodies.cos[i]) * bodies.half_y[i] < 0.0:
+            found.add((i, ground))
+        for j in range(i + 1, ground):
+            way = np.hypot(x[i] - x[j], y[i] - y[j])
+            if way < radius[i] + radius[j] and separation(bodies[i], bodies[j]) < 0.0:
+                found.add((i, j))
+    return found
+
+
+@pytest.mark.parametrize(("make", "end"), [(crash, 0.12), (fall, 0.08), (jolt, 0.02)])
+def test_no_body_comes_beyond_its_share_and_no_pair_is_missed(make: Callable[[], World], end: float, pace: int) -> None:
+    scene = Simulation(make())
+    controls, touched, stops = scene.world.controls[0], set(), round(end / scene.step) // pace
+    share = PAIR_SHARE * float(controls.skin)
+    for step in range(1, stops):
+        bodies = scene.to_step(step).world.bodies
+        moved = np.hypot(bodies.x - bodies.list_x, bodies.y - bodies.list_y)
+        assert (moved + bodies.radius * np.abs(bodies.angle - bodies.list_angle)).max() <= share, step
+        if step % 10 == 0:
+            pairs: Any = scene.world.pairs[: scene.world.clock[0].pair_count]
+            touching = touching_pairs(bodies)
+            assert touching <= set(zip(pairs.a.tolist(), pairs.b.tolist(), strict=True)), step
+            touched |= touching
+    assert pace > 1 or len(touched) >= 4
+    looks = scene.world.clock[0].rebuilds
+    assert 1 <= looks < stops / 3
+
+
+STEP = 1e-6
+places = st.floats(-0.05, 0.05)
+angles = st.floats(-4.0, 4.0)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2, 3, 16, 17, 18, 19])
+@given(x=places, y=places, one=angles, two=angles, seed=st.integers(0, 1000))
+def test_no_contact_begins_unseen(*, axis: int, x: float, y: float, one: float, two: float, seed: int) -> None:
+    world = pose((x, 1.0 + y, one), (0.0, 1.0, two))
+    assume(world.clock[0].pair_count > 0)
+    skin, random = float(world.controls[0].skin), np.random.default_rng(seed)
+    for body in world.bodies[:2]:
+        body.x += random.uniform(-0.2, 0.2) * skin
+        body.y += random.uniform(-0.2, 0.2) * skin
+        body.angle += random.uniform(-0.2, 0.2) * skin / float(body.radius)
+    renew_rotations(world.bodies)
+    pair = world.pairs[0]
+    pair.axis = axis  # whichever was the best one last
+    result, _ = persistent_forces(world, 0, STEP, world.particles)
+    assert result in {CHANGED, UNTOUCHED}
+    if contact_points(world, 0) > 0:
+        assert result == CHANGED
+    elif separation(*world.bodies[:2]) > 0.0:
+        assert result == UNTOUCHED
+
+
+@given(y=st.floats(0.0, 0.02), angle=angles, down=st.floats(-0.4, 0.4))
+@pytest.mark.parametrize("axis", [0, 1])
+def test_no_contact_with_the_ground_begins_unseen(axis: int, y: float, angle: float, down: float) -> None:
+    world = pose((0.2, y, angle))
+    assume(world.clock[0].pair_count > 0)
+    world.bodies[0].y += down * float(world.controls[0].skin)
+    world.pairs[0].axis = axis
+    result, _ = persistent_forces(world, 0, STEP, world.particles)
+    assert result == (CHANGED if contact_points(world, 0) > 0 else UNTOUCHED)
+
+
+@given(x=st.floats(-0.03, 0.03), depth=st.floats(1e-7, 1e-5), known=st.integers(0, 15), duplicates=st.integers(0, 15))
+def test_contact_begins_where_a_corner_that_is_neither_known_nor_a_duplicate_is_inside(
+    x: float, depth: float, known: int, duplicates: int
+) -> None:
+    world = pose((x, 1.0 + HEIGHT - depth, 0.0), (0.0, 1.0, 0.0))
+    pair, near = world.pairs[0], world.candidates[0]
+    candidates = near[: pair.near].tolist()
+    inside = [k for k in candidates if (k in {0, 1, 18, 19}) and abs(x) < WIDTH and is_over(k, x)]
+    listed = [k for n, k in enumerate(candidates) if known >> n & 1][:2]
+    marked = [k for n, k in enumerate(candidates) if duplicates >> n & 1 and k not in listed]
+    pair.active, pair.duplicates = len(listed), sum(1 << k for k in marked)
+    world.contacts[0].slot[: len(listed)] = listed
+    a, b = world.bodies[:2]
+    begins = begins_contact(world, 0, a, b, None)
+    assert begins == any(k not in listed and k not in marked for k in inside)
+    assert idle_candidates(pair) == len(candidates) - len(listed) - len(marked)
+
+
+def is_over(slot: int, shift: float) -> bool:
+    """Return True if a corner at the joint of a block, shifted by so much, and the one below lies inside the other."""
+    is_left = slot in {0, 19}
+    assume(abs(shift) > 1e-9)
+    return (shift > 0.0) == (is_left == (slot < MOST_CORNERS))

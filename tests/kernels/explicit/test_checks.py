@@ -1,28 +1,35 @@
-"""What a check of the run finds in a world as it is; nothing is stepped, so that an interpreter sees it too."""
+"""What a check of the run and the ledger find in a world as it is."""
 
 from __future__ import annotations
 
+from math import cos, inf, nan, sin
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import AT_REST, OVERLAP_LIMIT, REACHED
+from blocksim.kernels.common.arrays import AT_REST, LEDGER, NOT_FINITE, OVERLAP_LIMIT, REACHED, zeros
+from blocksim.kernels.common.energy import potential_energy
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.energy import contact_summary
+from blocksim.kernels.explicit.energy import LEDGER_ROW, contact_summary, measure, tallied
 from blocksim.kernels.explicit.step import check
 from blocksim.verification.scene import HEIGHT
+from tests.kernels.scenes import pose
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from blocksim.kernels.common.arrays import World
-    from tests.kernels.conftest import Pose
+    from tests.conftest import PaperBlock, Start
+
 
 ON_GROUND = (0.0, 0.5 * HEIGHT - 1e-7, 0.0)
 RESTS = {"stop_at_rest": True, "rest_speed": 1e-3, "rest_hold": 1e-3}
 
 
-def at_rest(pose: Pose, pairs: int) -> World:
+def at_rest(pairs: int) -> World:
     """Return a block that does not move and has so many pairs that touch."""
     world = pose(ON_GROUND, time=RESTS)
     world.bodies[0].pairs_before = pairs
@@ -30,8 +37,8 @@ def at_rest(pose: Pose, pairs: int) -> World:
     return world
 
 
-def test_rest_counts_only_where_it_has_lasted(pose: Pose) -> None:
-    world = at_rest(pose, pairs=1)
+def test_rest_counts_only_where_it_has_lasted() -> None:
+    world = at_rest(pairs=1)
     most = int(world.controls[0].rest_checks)
     assert [check(world, None) for _ in range(most - 1)] == [REACHED] * (most - 1)
     world.bodies[0].vx = 1.0  # pushed once more
@@ -40,12 +47,12 @@ def test_rest_counts_only_where_it_has_lasted(pose: Pose) -> None:
     assert [check(world, None) for _ in range(most)] == [REACHED] * (most - 1) + [AT_REST]
 
 
-def test_block_that_touches_nothing_never_rests(pose: Pose) -> None:
-    world = at_rest(pose, pairs=0)
+def test_block_that_touches_nothing_never_rests() -> None:
+    world = at_rest(pairs=0)
     assert {check(world, None) for _ in range(2 * int(world.controls[0].rest_checks))} == {REACHED}
 
 
-def touching(pose: Pose, *, depth: float, spring: float = 0.0) -> World:
+def touching(*, depth: float, spring: float = 0.0) -> World:
     """Return two blocks with one contact that has this overlap and shear spring (m)."""
     world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + HEIGHT, 0.0))
     world.pairs[0].active = 1
@@ -56,7 +63,7 @@ def touching(pose: Pose, *, depth: float, spring: float = 0.0) -> World:
 
 
 @pytest.mark.parametrize("small", [0, 1])
-def test_smaller_block_of_a_pair_limits_the_overlap(pose: Pose, small: int) -> None:
+def test_smaller_block_of_a_pair_limits_the_overlap(small: int) -> None:
     overlaps = {0.02: False, 0.03: True, 0.07: True}  # of a height; twentieths of the smallest side: 0.025
     for share, is_too_deep in overlaps.items():
         world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + (0.75 - share) * HEIGHT, 0.0))
@@ -69,17 +76,64 @@ def test_smaller_block_of_a_pair_limits_the_overlap(pose: Pose, small: int) -> N
         assert world.action[0].is_too_deep == is_too_deep
 
 
-def test_overlap_that_a_step_has_noted_ends_the_run_at_the_check(pose: Pose) -> None:
-    world = touching(pose, depth=0.04 * HEIGHT)
+def test_overlap_that_a_step_has_noted_ends_the_run_at_the_check() -> None:
+    world = touching(depth=0.04 * HEIGHT)
     assert check(world, None) == REACHED
     world.clock[0].ends_at = 1
     assert check(world, None) == OVERLAP_LIMIT
 
 
-def test_springs_hold_half_of_force_times_way(pose: Pose) -> None:
-    world = touching(pose, depth=2e-6, spring=-3e-6)
+def test_springs_hold_half_of_force_times_way() -> None:
+    world = touching(depth=2e-6, spring=-3e-6)
     pair = world.interactions[world.bodies[0].contact_class, world.bodies[1].contact_class]
     normal, shear, count, deepest = contact_summary(world)
     assert (count, deepest) == (1, 2e-6)
     assert normal == pytest.approx(0.5 * pair.normal_stiffness * 2e-6**2, rel=1e-12)
     assert shear == pytest.approx(0.5 * pair.shear_ratio * pair.normal_stiffness * 3e-6**2, rel=1e-12)
+
+
+SOFT = {"stiffness_scale": 1e-4}  # a hundredth of the steps
+
+
+def test_potential_energy_counts_against_gravity_also_on_a_slope(start: Start, paper_block: PaperBlock) -> None:
+    scene = start([{"x": 0.5, "y": 1.0}, {"x": -0.2, "y": 2.0}], tilt=0.2)
+    expected = sum(paper_block.mass * 9.81 * (sin(0.2) * x + cos(0.2) * y) for x, y in ((0.5, 1.0), (-0.2, 2.0)))
+    assert potential_energy(scene.world) == pytest.approx(expected, rel=1e-12)
+
+
+def test_row_of_the_ledger_has_the_documented_order(start: Start) -> None:
+    scene = start([{"y": 0.03, "angle": 0.6, "velocity": [0.3, -1.0]}], contact=SOFT).to_time(0.02)
+    row = np.zeros(len(LEDGER_ROW) + 2)
+    measure(scene.world, row)
+    named = dict(zip(LEDGER_ROW, row, strict=False))
+    normal, shear, count, overlap = contact_summary(scene.world)
+    assert named["potential"] == potential_energy(scene.world)
+    assert (named["stored_normal"], named["stored_shear"]) == (normal, shear)
+    assert (named["dashpot"], named["friction"], named["broken"]) == tallied(scene.world.ledger)
+    assert named["to_support"] == scene.world.ledger[0].to_support
+    assert (row[-2], row[-1]) == (count, overlap)
+    assert named["dashpot"] > 0.0
+    assert named["friction"] > 0.0
+
+
+def test_losses_are_those_of_all_tallies() -> None:
+    tallies = zeros(5, LEDGER)
+    amounts = np.random.default_rng(0).uniform(0.0, 1.0, (3, 5))
+    tallies.dashpot, tallies.friction, tallies.broken = amounts
+    assert tallied(tallies) == pytest.approx(tuple(amounts.sum(axis=1)), rel=1e-14)
+
+
+def with_value(name: str, value: float) -> Callable[[World], None]:
+    def change(world: World) -> None:
+        world.bodies[0][name] = value
+
+    return change
+
+
+@pytest.mark.usefixtures("compiler")  # the cosine of infinity is an exception in Python, not a number in IEEE
+@pytest.mark.parametrize("name", ["x", "y", "angle", "vx", "vy", "spin"])
+@pytest.mark.parametrize("value", [nan, inf])
+def test_state_that_is_not_finite_stops_the_run(start: Start, name: str, value: float) -> None:
+    scene = start([{"y": 1.0}], change=with_value(name, value)).to_time(1e-2)
+    assert scene.status == NOT_FINITE
+    assert scene.time == pytest.approx(1e-4, rel=0.01)

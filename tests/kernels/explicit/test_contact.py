@@ -1,4 +1,4 @@
-"""Springs with history, clipping, dashpots of a pair and what is tallied, seen on one block or one pair."""
+"""One pair on springs: rates and masses at its points, dashpots, clipping, and what is tallied."""
 
 from __future__ import annotations
 
@@ -8,37 +8,40 @@ import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
-from blocksim.kernels.common.arrays import NORMAL, OPERATOR, SHEAR
+from blocksim.kernels.common.arrays import (
+    CONTACT,
+    INTERACTION,
+    NORMAL,
+    OPERATOR,
+    PAIR,
+    POINT,
+    SHEAR,
+    SLOTS,
+    zeros,
+)
 from blocksim.kernels.common.tolerances import DASHPOT_RANK, OPERATOR_LIFE
 from blocksim.kernels.explicit.contact import has_new_neighbours, pair_forces, shared_step, spare_lost_faces
 from blocksim.kernels.explicit.damping import BOTH, damp
-from blocksim.kernels.explicit.forces import Touch, grip_of, renew_operator, shear_of
-from blocksim.kernels.explicit.kinematics import point_of, resolve_point
+from blocksim.kernels.explicit.forces import Touch, grip_of, inverse_masses, keep, renew_operator
+from blocksim.kernels.explicit.kinematics import Point, point_of, resolve_point, weigh_first_step
 from blocksim.kernels.explicit.laws import LINEAR, spring_at
 from blocksim.kernels.explicit.models import KERNEL, PARTICLES, SURFACE
-from tests.kernels.conftest import dashpots_by_definition, delassus
+from tests.kernels.references import dashpots_by_definition, delassus
+from tests.kernels.scenes import make_body, pose
 
 if TYPE_CHECKING:
-    from blocksim.kernels.common.arrays import World
+    from blocksim.kernels.common.arrays import Record, Records, World
     from tests.conftest import PaperBlock, Start
-    from tests.kernels.conftest import MakeBody, Pose
+
 
 SOFT = {"stiffness_scale": 1e-4}  # a hundredth of the steps
 
 
 @pytest.mark.parametrize(("of_a", "of_b", "times"), [(0, 0, 1.0), (2, 1, 1.0), (3, 2, 1.5), (1, 6, 3.0)])
-def test_own_force_counts_more_where_more_than_two_pairs_act_on_a_body(
-    make_body: MakeBody, of_a: int, of_b: int, times: float
-) -> None:
+def test_own_force_counts_more_where_more_than_two_pairs_act_on_a_body(of_a: int, of_b: int, times: float) -> None:
     a, b = make_body(), make_body()
     a.pairs_before, b.pairs_before = of_a, of_b
     assert shared_step(a, b, 1e-6) == pytest.approx(times * 1e-6)
-
-
-def test_pairs_of_a_fixed_body_do_not_count(make_body: MakeBody) -> None:
-    a, ground = make_body(), make_body()
-    ground.inverse_mass, ground.pairs_before, a.pairs_before = 0.0, 100, 1
-    assert shared_step(a, ground, 1e-6) == shared_step(ground, a, 1e-6) == 1e-6
 
 
 @pytest.mark.parametrize(
@@ -50,7 +53,7 @@ def test_pairs_of_a_fixed_body_do_not_count(make_body: MakeBody) -> None:
     ],
 )
 def test_dashpots_are_void_where_others_bear_a_body_now_and_corners_know_how_stiffly(
-    make_body: MakeBody, model: int, flag: str, other: str
+    model: int, flag: str, other: str
 ) -> None:
     a, b = make_body(), make_body()
     for of_a, of_b in ((0, 0), (1, 0), (0, 1), (1, 1)):
@@ -74,7 +77,7 @@ def test_sliding_block_has_its_springs_at_the_cone(start: Start, paper_block: Pa
 STEP, K = 2e-7, 1e8
 
 
-def two_points(pose: Pose, seed: int, direction: int) -> World:
+def two_points(seed: int, direction: int) -> World:
     """Return a pair of moving blocks with two random points, resolved along normals or tangents."""
     world, random = pose((0.1, 0.2, 0.3), (0.12, 0.18, -0.5)), np.random.default_rng(seed)
     pair = world.pairs[0]
@@ -117,9 +120,9 @@ def renew(
 @example(seed=70, weights=(1.0, 1.0))  # tangents that are nearly parallel
 @example(seed=70, weights=(0.6, 1.2))
 def test_dashpots_of_a_pair_follow_the_definition(
-    *, pose: Pose, direction: int, weights: tuple[float, float], count: int, pattern: int, seed: int
+    *, direction: int, weights: tuple[float, float], count: int, pattern: int, seed: int
 ) -> None:
-    world = two_points(pose, seed, direction)
+    world = two_points(seed, direction)
     a, b = world.bodies[:2]
     points: Any = world.points[:count]
     points.weight = weights[:count]
@@ -141,21 +144,8 @@ def test_dashpots_of_a_pair_follow_the_definition(
     assert world.operators[0, 1 - direction].tobytes() == bytes(world.operators.itemsize)
 
 
-def test_operator_is_kept_for_lasting_contacts_and_then_made_anew(pose: Pose) -> None:
-    world = two_points(pose, 1, NORMAL)
-    operator = world.operators[0, NORMAL]
-    renew(world, 2, NORMAL, BOTH)
-    first = float(operator.e_one)
-    for left in range(OPERATOR_LIFE - 1, -1, -1):
-        renew(world, 2, NORMAL, BOTH, k=4.0 * K, steady=True)
-        assert (lives(world)[NORMAL], operator.e_one) == (left, first)
-    renew(world, 2, NORMAL, BOTH, k=4.0 * K, steady=True)
-    assert lives(world)[NORMAL] == OPERATOR_LIFE
-    assert operator.e_one > 1.1 * first
-
-
-def test_operator_of_contacts_that_are_not_steady_keeps_its_masses_only(pose: Pose) -> None:
-    world, other = two_points(pose, 1, NORMAL), two_points(pose, 1, NORMAL)
+def test_operator_of_contacts_that_are_not_steady_keeps_its_masses_only() -> None:
+    world, other = two_points(1, NORMAL), two_points(1, NORMAL)
     renew(world, 2, NORMAL, BOTH)
     world.points.x += 1e-3  # other masses
     renew(world, 2, NORMAL, BOTH, k=4.0 * K)
@@ -165,25 +155,10 @@ def test_operator_of_contacts_that_are_not_steady_keeps_its_masses_only(pose: Po
     assert lives(world)[NORMAL] == OPERATOR_LIFE - 1
 
 
-def test_point_slides_where_its_spring_alone_exceeds_the_limit(pose: Pose) -> None:
-    world = two_points(pose, 1, SHEAR)
-    values, contact, b = world.interactions[1, 1], world.contacts[0, 0], world.bodies[1]
-    world.points[0].slipping = 1e-9
-    point = point_of(world.points[0], b)
-    stiffness, spring = float(values.shear_ratio) * K, spring_at(LINEAR, K, 1e-6)
-    sticks, slides = (grip_of(contact, point, values, force, spring, spring, True) for force in (100.0, 1e-3))
-    assert [sticks.slides, slides.slides] == [False, True]
-    assert [sticks.elastic, slides.elastic] == pytest.approx([stiffness * 1e-9, slides.limit])
-    assert shear_of(point, values, slides, 1e9) == slides.elastic
-    assert abs(shear_of(point, values, sticks, 1e9)) <= float(values.static_friction) * 100.0
-
-
 @pytest.mark.parametrize(("beside", "lost"), [(np.inf, False), (1.1e-6, False), (0.9e-6, True)])
 @pytest.mark.parametrize("closing", [1e-7, -1e-7])
-def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(
-    pose: Pose, beside: float, lost: bool, closing: float
-) -> None:
-    world = two_points(pose, 1, NORMAL)
+def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(beside: float, lost: bool, closing: float) -> None:
+    world = two_points(1, NORMAL)
     point = world.points[0]
     world.pairs["normal_left"] = world.pairs["shear_left"] = 5
     point.closing, point.beside = closing, beside
@@ -193,15 +168,15 @@ def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(
     assert lives(world) == ([0, 0] if lost else [5, 5])
 
 
-def standing(pose: Pose) -> World:
+def standing() -> World:
     """Return a block that stands on another one, 1 um deep, and slides; nothing has been evaluated."""
     world = pose((0.003, 1.025 - 1e-6, 0.0), (0.0, 1.0, 0.0))
     world.bodies[0].vx = 20.0
     return world
 
 
-def test_pair_whose_contacts_have_ended_does_nothing_but_lose_what_they_held(pose: Pose) -> None:
-    world = standing(pose)
+def test_pair_whose_contacts_have_ended_does_nothing_but_lose_what_they_held() -> None:
+    world = standing()
     pair_forces(world, 0, STEP)
     world.contacts["spring"][0] = 1e-6
     world.bodies[0].vx = 0.0
@@ -214,3 +189,85 @@ def test_pair_whose_contacts_have_ended_does_nothing_but_lose_what_they_held(pos
     assert world.pairs[0].active == 0
     pair_forces(world, 0, STEP)
     assert (action.dashpot, action.friction, action.broken) == (0.0, 0.0, 0.0)
+
+
+def pushed(force: float, closing: float) -> tuple[float, float]:
+    """Return the force that is left of spring (5 N) and dashpot, and what has been lost (J); none was before."""
+    point = Point(0.0, 0.0, 0.0, 1.0, 1e-6, closing, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+    contact, values = zeros(1, CONTACT)[0], zeros(1, INTERACTION)[0]
+    spring, before = spring_at(LINEAR, 5e6, 1e-6), spring_at(LINEAR, 5e6, 0.0)
+    grip = grip_of(contact, point, values, force, spring, before, True)
+    lost = 0.5 * keep(contact, point, grip, 0.0, spring, before)
+    assert contact.normal_force == grip.normal
+    return grip.normal, lost
+
+
+def test_dashpot_that_pulls_more_than_the_spring_pushes_leaves_no_force() -> None:
+    assert pushed(-3.0, -1e-6) == pytest.approx((0.0, 0.5 * -5.0 * -1e-6), rel=1e-12, abs=0.0)
+
+
+DRIFT = 1e-6
+SEEDS = st.integers(0, 10_000)
+
+
+def scene(seed: int, count: int) -> tuple[Record, Record, Records]:
+    """Return two moving bodies and `count` points between them with random normals."""
+    random = np.random.default_rng(seed)
+    a, b = make_body(0.1, 0.2, 0.3), make_body(0.12, 0.18, -0.5, width=0.05, mass=0.3)
+    for body in (a, b):
+        for name in ("vx", "vy", "spin", "ax", "ay", "spin_rate"):
+            body[name] = random.normal()
+    points = zeros(SLOTS, POINT)
+    for point in points[:count]:
+        angle = random.uniform(-np.pi, np.pi)
+        point.x, point.y = 0.11 + 0.01 * random.normal(), 0.19 + 0.01 * random.normal()
+        point.nx, point.ny = np.cos(angle), np.sin(angle)
+        resolve_point(point, a, b, DRIFT)
+    return a, b, points
+
+
+def jacobian(point: Record, a: Record, b: Record, direction: np.ndarray) -> np.ndarray:
+    """Return what the relative velocity of a against b along a direction is of (v_a, w_a, v_b, w_b)."""
+    arms = [direction[1] * (point.x - body.x) - direction[0] * (point.y - body.y) for body in (a, b)]
+    return np.array([*direction, arms[0], *-direction, -arms[1]])
+
+
+def directions(point: Record) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([point.nx, point.ny]), np.array([-point.ny, point.nx])
+
+
+@given(seed=SEEDS)
+def test_displacements_and_rates_are_those_of_rigid_bodies(seed: int) -> None:
+    a, b, points = scene(seed, 1)
+    point = points[0]
+    velocity = np.array([a.vx, a.vy, a.spin, b.vx, b.vy, b.spin])
+    acceleration = np.array([a.ax, a.ay, a.spin_rate, b.ax, b.ay, b.spin_rate])
+    normal, tangent = (jacobian(point, a, b, direction) for direction in directions(point))
+    later = velocity + 0.5 * DRIFT * acceleration
+    assert point.closing == pytest.approx(-DRIFT * normal @ velocity, abs=1e-20)
+    assert point.slipping == pytest.approx(DRIFT * tangent @ velocity, abs=1e-20)
+    assert point.closing_rate == pytest.approx(-normal @ later, abs=1e-14)
+    assert point.slip_rate == pytest.approx(tangent @ later, abs=1e-14)
+
+
+@given(seed=SEEDS, count=st.integers(1, 2))
+def test_inverse_masses_are_those_of_the_jacobian(seed: int, count: int) -> None:
+    a, b, points = scene(seed, count)
+    some: Any = points[:count]
+    contact, operator = zeros(1, CONTACT)[0], zeros(1, OPERATOR)[0]
+    touch = Touch(zeros(1, PAIR)[0], a, b, zeros(1, INTERACTION)[0], contact, contact, operator, operator)
+    one, two = (point_of(points[i], b) for i in (0, count - 1))
+    for direction in (NORMAL, SHEAR):
+        expected = delassus(some, a, b, direction)
+        found = inverse_masses(touch, one, two, count == 2, direction)
+        assert found == pytest.approx((expected[0, 0], expected[0, -1], expected[-1, -1]), rel=1e-10, abs=1e-10)
+
+
+@pytest.mark.parametrize(("depth", "weight"), [(0.0, 0.5), (0.25e-6, 0.75), (1e-6, 1.5)])
+def test_first_step_weighs_the_dashpot_by_the_time_in_contact(depth: float, weight: float) -> None:
+    point = zeros(1, POINT)[0]
+    point.weight = point.drawn = 1.0
+    point.closing, point.depth = 1e-6, depth
+    weigh_first_step(point, LINEAR)
+    assert point.weight == pytest.approx(weight)
+    assert point.drawn == pytest.approx(depth / 1e-6)

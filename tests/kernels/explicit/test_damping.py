@@ -1,4 +1,4 @@
-"""Dashpots of one or two points: the same damping ratio for every mode, passive, as defined."""
+"""Dashpots: the same damping ratio for every mode, as defined for any number of points."""
 
 from __future__ import annotations
 
@@ -10,20 +10,28 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import NORMAL, OPERATOR, PAIR, POINT, SHEAR, zeros
+from blocksim.kernels.common.tolerances import DASHPOT_RANK
 from blocksim.kernels.explicit.damping import (
     BOTH,
+    SIZE,
+    add_coupled_dashpots,
     are_dashpots_due,
     damp,
     fill_operator,
+    inverse_three_halves,
     keep_dashpots,
     keep_masses,
-    renew_dashpots,
+    solve_in_place,
 )
+from blocksim.kernels.explicit.kinematics import resolve_point
 from blocksim.verification.scene import HEIGHT, WIDTH
+from tests.kernels.references import dashpots_by_definition, delassus
+from tests.kernels.scenes import make_body
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, Records
     from tests.conftest import Start
+
 
 STEP = 2e-7
 K = 1e9
@@ -91,17 +99,6 @@ def test_every_mode_of_a_pair_has_the_asked_damping_ratio(
     assert -modes.real / np.abs(modes) == pytest.approx(np.full(2 * n, ratio), rel=1e-6)
 
 
-@pytest.mark.parametrize("parallel", [False, True])
-@pytest.mark.parametrize("alike", [False, True])
-@given(seed=SEEDS)
-def test_dashpots_never_feed_energy(parallel: bool, alike: bool, seed: int) -> None:
-    points = contact_points(2, seed)
-    points.weight = np.random.default_rng(seed).uniform(0.5, 1.5, 1 if alike else 2)
-    damping = damping_matrix(points, inverse_masses(2, seed, parallel=parallel), 0.7)
-    assert damping == pytest.approx(damping.T, rel=1e-9, abs=1e-9 * np.abs(damping).max())
-    assert np.linalg.eigvalsh(damping).min() > -1e-9 * np.abs(damping).max()
-
-
 @pytest.mark.parametrize("direction", [NORMAL, SHEAR])
 def test_operator_of_one_direction_is_due_after_as_many_uses_as_it_was_kept_for(direction: int) -> None:
     pair = zeros(1, PAIR)[0]
@@ -111,15 +108,6 @@ def test_operator_of_one_direction_is_due_after_as_many_uses_as_it_was_kept_for(
     assert [are_dashpots_due(pair, direction) for _ in range(5)] == [False] * 3 + [True] * 2
     assert (pair.normal_left, pair.shear_left) == ((0, 9) if direction == NORMAL else (9, 0))
     assert pair.sticking == (2 if direction == NORMAL else 1)  # normals have their dashpots always
-
-
-def test_renewed_dashpots_are_due_in_both_directions() -> None:
-    pair = zeros(1, PAIR)[0]
-    for direction in (NORMAL, SHEAR):
-        keep_dashpots(pair, direction, BOTH, 9)
-    renew_dashpots(pair)
-    assert are_dashpots_due(pair, NORMAL)
-    assert are_dashpots_due(pair, SHEAR)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
@@ -138,3 +126,80 @@ def test_corner_that_slides_rebounds_as_asked(start: Start, restitution: float, 
     block = scene.bodies[0]
     assert way * (block.vx - block.spin * y) > 0.0  # it has slid all the time
     assert block.vy + block.spin * x == pytest.approx(restitution * speed, abs=2e-3)
+
+
+def scene(seed: int, n: int, *, parallel: bool) -> tuple[Record, Record, Records]:
+    """Return two bodies and n points between them with random forces and stiffnesses; normals alike or not."""
+    random = np.random.default_rng(seed)
+    a, b = make_body(0.1, 0.2, 0.3), make_body(0.12, 0.18, -0.5, width=0.05, mass=0.3)
+    for body in (a, b):
+        for name in ("vx", "vy", "spin"):
+            body[name] = random.normal()
+    points = zeros(n, POINT)
+    angle = random.uniform(-np.pi, np.pi)
+    for point in points:
+        angle = angle if parallel else random.uniform(-np.pi, np.pi)
+        point.x, point.y = 0.11 + 0.01 * random.normal(), 0.19 + 0.01 * random.normal()
+        point.nx, point.ny = np.cos(angle), np.sin(angle)
+        resolve_point(point, a, b, STEP)
+    points.stiffness = random.uniform(1e6, 1e8, n)
+    points.weight = random.uniform(0.5, 1.5, n)
+    points.before, points.force = random.uniform(0.0, 100.0, (2, n))
+    return a, b, points
+
+
+def added(points: Records, a: Record, b: Record, direction: int, ratio: float) -> np.ndarray:
+    work, before = np.zeros((8, SIZE, SIZE)), points.force.copy()
+    add_coupled_dashpots(points, points.size, a, b, direction, ratio, STEP, work)
+    return np.asarray(points.force - before)
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("direction", [NORMAL, SHEAR])
+@given(seed=SEEDS, n=st.integers(3, 40), ratio=st.sampled_from([0.1, 1.0, 5.0]))
+def test_any_number_of_points_follows_the_definition(
+    direction: int, parallel: bool, ratio: float, n: int, seed: int
+) -> None:
+    a, b, points = scene(seed, n, parallel=parallel)
+    resolved = points.closing_rate if direction == NORMAL else points.slip_rate
+    points.rate = resolved
+    expected = dashpots_by_definition(points, delassus(points, a, b, direction), ratio, STEP)
+    forces = added(points, a, b, direction, ratio)
+    assert forces == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
+
+
+def positive(n: int, rank: int, seed: int) -> np.ndarray:
+    """Return a random symmetric positive n x n matrix with eigenvalues from 1 to 100, `rank` of them not zero."""
+    random = np.random.default_rng(seed)
+    basis, _ = np.linalg.qr(random.normal(size=(n, n)))
+    values = np.where(np.arange(n) < rank, random.uniform(1.0, 100.0, n), 0.0)
+    matrix = (basis * values) @ basis.T
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def power(matrix: np.ndarray, exponent: float) -> np.ndarray:
+    """Return a power of a symmetric matrix over its range."""
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > DASHPOT_RANK * values.max()
+    return np.asarray((vectors[:, kept] * values[kept] ** exponent) @ vectors[:, kept].T)
+
+
+def by_jacobi(matrix: np.ndarray) -> np.ndarray:
+    out = np.zeros((3, 3))
+    inverse_three_halves(matrix.copy(), np.zeros((3, 3)), out)
+    return out
+
+
+@given(seed=SEEDS, rank=st.integers(1, 3))
+def test_power_of_three_agrees_with_eigenvalues(seed: int, rank: int) -> None:
+    matrix = positive(3, rank, seed)
+    assert by_jacobi(matrix) == pytest.approx(power(matrix, -1.5), abs=1e-12)
+
+
+@given(n=st.integers(1, 8), seed=SEEDS)
+def test_solve_agrees_with_numpy_for_identity_plus_product_of_positive_matrices(n: int, seed: int) -> None:
+    matrix = np.eye(n) + positive(n, max(1, n - 1), seed) @ positive(n, n, seed + 1)
+    right = np.random.default_rng(seed).normal(size=n)
+    solution = right.copy()
+    solve_in_place(matrix.copy(), solution, n)
+    assert solution == pytest.approx(np.linalg.solve(matrix, right), rel=1e-8, abs=1e-10)

@@ -1,21 +1,26 @@
-"""What contacts remember, and what becomes of it when they end or pass to another corner."""
+"""What contacts remember: shear springs, friction, and what becomes of them when contacts end or change hands."""
 
 from __future__ import annotations
 
+from math import exp
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import ACTION, zeros
-from blocksim.kernels.explicit.history import change_contacts
+from blocksim.kernels.common.arrays import ACTION, CONTACT, INTERACTION, PARTICLE, PARTICLE_CONTACT, zeros
+from blocksim.kernels.common.friction import friction_coefficient
+from blocksim.kernels.explicit.friction import clip_to_cone, coulomb_limit, draw_same_spring, draw_spring
+from blocksim.kernels.explicit.history import change_contacts, shear_stiffness_before, stiffness_before
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point
-from blocksim.kernels.explicit.models.surface import slot_normal
+from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR, elastic_force, tangent_stiffness
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
+from tests.kernels.scenes import pose
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, World
-    from tests.kernels.conftest import Pose
+
 
 REMEMBERED = ("spring", "depth", "normal_force", "shear_force")
 STEP = 1e-6
@@ -23,20 +28,7 @@ RIGHT, LOWER = 1, 0  # faces
 Contact = tuple[int, int]  # corner and face
 
 
-def test_normal_of_a_contact_points_from_b_to_a_whoever_owns_the_corner(pose: Pose) -> None:
-    world = pose((0.0, 0.01, 0.2), (0.01, 0.025, -0.1))
-    blocks, ground = world.pairs[:2]
-    assert [(pair.a, pair.b) for pair in (blocks, ground)] == [(0, 1), (0, 2)]
-    for face in range(4):
-        angle = (face - 1) * np.pi / 2
-        assert slot_normal(world, blocks, 1, face) == pytest.approx((np.cos(angle - 0.1), np.sin(angle - 0.1)))
-        assert slot_normal(world, blocks, MOST_CORNERS + 1, face) == pytest.approx(
-            (-np.cos(angle + 0.2), -np.sin(angle + 0.2))
-        )
-    assert slot_normal(world, ground, 2, UPPER) == (0.0, 1.0)
-
-
-def stacked(pose: Pose, *before: Contact) -> World:
+def stacked(*before: Contact) -> World:
     """Return a block on another one that had these contacts, each with numbers of its own to remember."""
     world = pose((0.0, 1.025 - 1e-6, 0.0), (0.0, 1.0, 0.0))
     pair = world.pairs[0]
@@ -101,9 +93,9 @@ OF_B, ALSO_OF_B = (MOST_CORNERS + 2, LOWER), (MOST_CORNERS + 3, LOWER)
     ],
 )
 def test_contact_continues_only_with_the_same_corner_on_the_same_face(
-    pose: Pose, before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
+    before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
 ) -> None:
-    world = stacked(pose, *before)
+    world = stacked(*before)
     lost = find(world, *now, closing=2.0)  # those that are new close by more than they are deep
     assert kept(world) == list(zip(now, expected, strict=True))
     assert lost.broken == pytest.approx(held(world, *broken))
@@ -126,9 +118,9 @@ def test_contact_continues_only_with_the_same_corner_on_the_same_face(
     ],
 )
 def test_contact_deeper_than_it_closed_takes_the_place_of_one_that_has_ended(
-    pose: Pose, before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
+    before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
 ) -> None:
-    world = stacked(pose, *before)
+    world = stacked(*before)
     lost = find(world, *now)
     assert not has_just_begun(world.points[0])
     assert kept(world) == list(zip(now, expected, strict=True))
@@ -136,8 +128,8 @@ def test_contact_deeper_than_it_closed_takes_the_place_of_one_that_has_ended(
 
 
 @pytest.mark.parametrize(("closing", "weight"), [(2.0, 1.0), (1.0, 1.5), (0.0, 1.0)])
-def test_only_a_contact_that_begins_has_the_weight_of_a_first_step(pose: Pose, closing: float, weight: float) -> None:
-    world = stacked(pose, ONE)
+def test_only_a_contact_that_begins_has_the_weight_of_a_first_step(closing: float, weight: float) -> None:
+    world = stacked(ONE)
     find(world, ONE, TWO, closing=closing)
     one, two = world.points[:2]
     assert (one.weight, one.drawn) == (1.0, 1.0)
@@ -145,8 +137,8 @@ def test_only_a_contact_that_begins_has_the_weight_of_a_first_step(pose: Pose, c
     assert two.drawn == pytest.approx(1.0 if closing == 0.0 else 1.0 / closing)
 
 
-def test_ended_contact_tallies_half_the_work_of_its_last_step(pose: Pose) -> None:
-    world = stacked(pose, ONE)
+def test_ended_contact_tallies_half_the_work_of_its_last_step() -> None:
+    world = stacked(ONE)
     world.bodies[0].vx = 0.3
     lost = find(world, closing=2.0)
     values = world.interactions[1, 1]
@@ -155,3 +147,170 @@ def test_ended_contact_tallies_half_the_work_of_its_last_step(pose: Pose) -> Non
     dashpots = 50.0 - float(values.normal_stiffness) * 1e-6, 5.0 - stiffness * 1e-7
     assert lost.dashpot == pytest.approx(0.5 * (dashpots[0] * closing + dashpots[1] * slip))
     assert lost.broken == pytest.approx(0.5 * stiffness * 1e-7 * (1e-7 + slip))
+
+
+DEPTH, SHARE = 4e-6, 0.25
+
+
+def values() -> Record:
+    record = zeros(1, INTERACTION)[0]
+    record.normal_stiffness, record.shear_ratio = 1e6, 0.8
+    return record
+
+
+def corner() -> Record:
+    contact = zeros(1, CONTACT)[0]
+    contact.spring, contact.depth, contact.normal_force, contact.shear_force = 1e-6, DEPTH, 7.0, 1.0
+    return contact
+
+
+def particle() -> Record:
+    contact = zeros(1, PARTICLE_CONTACT)[0]
+    for name in ("spring", "depth", "normal_force", "shear_force"):
+        contact[name] = corner()[name]
+    contact.share = SHARE
+    return contact
+
+
+@pytest.mark.parametrize(("law", "stiffness"), [(LINEAR, 8e5), (HERTZ_MINDLIN, 2.4e3)])
+def test_stiffness_before_is_that_of_the_pair_or_of_the_particle(law: float, stiffness: float) -> None:
+    for contact, particles, share in ((corner(), None, 0.5), (particle(), zeros(1, PARTICLE), SHARE)):
+        of_spring = stiffness_before(contact, 0.5e6, values(), particles)
+        assert of_spring == share * 1e6
+        assert shear_stiffness_before(contact, of_spring, values(), law) == pytest.approx(share * stiffness)
+
+
+STATIC, KINETIC, SPEED = 0.31, 0.19, 0.005
+
+
+def rubbing() -> np.record:
+    """Return what the kernels know about two surfaces that rub."""
+    values: np.record = zeros(1, INTERACTION)[0]
+    values.static_friction, values.kinetic_friction, values.transition_speed = STATIC, KINETIC, SPEED
+    return values
+
+
+def test_friction_of_fast_sliding_is_kinetic() -> None:
+    assert friction_coefficient(STATIC, KINETIC, SPEED, 0.0) == STATIC
+    assert friction_coefficient(STATIC, KINETIC, SPEED, 1.0) == KINETIC
+    assert friction_coefficient(STATIC, KINETIC, SPEED, 39.9 * SPEED) == pytest.approx(KINETIC, abs=1e-15)
+    assert friction_coefficient(0.38, 0.38, SPEED, 0.002) == 0.38
+
+
+@given(speed=st.floats(-0.3, 0.3))
+def test_friction_falls_exponentially_with_speed_either_way(speed: float) -> None:
+    expected = KINETIC + (STATIC - KINETIC) * exp(-abs(speed) / SPEED)
+    assert friction_coefficient(STATIC, KINETIC, SPEED, speed) == pytest.approx(expected, rel=1e-14)
+
+
+@given(force=st.floats(0.0, 1e3), speed=st.floats(-0.05, 0.05), needed=st.floats(0.0, 1e3))
+def test_limit_decides_as_the_full_formula_does(force: float, speed: float, needed: float) -> None:
+    values = rubbing()
+    exact = friction_coefficient(STATIC, KINETIC, SPEED, speed) * force
+    limit = coulomb_limit(values, force, speed, needed)
+    assert (needed > limit) == (needed > exact)
+    if needed > limit:
+        assert limit == exact
+    assert limit <= STATIC * force
+
+
+@given(force=st.floats(-1e3, 1e3), normal=st.floats(0.0, 1e3), speed=st.floats(-0.05, 0.05), spring=st.floats(0.0, 1.0))
+def test_spring_and_dashpot_together_stay_within_the_cone(
+    force: float, normal: float, speed: float, spring: float
+) -> None:
+    cone = friction_coefficient(STATIC, KINETIC, SPEED, speed) * normal
+    limit = coulomb_limit(rubbing(), normal, speed, spring * cone)  # what the spring alone was within
+    clipped = clip_to_cone(rubbing(), force, limit, normal, speed)
+    assert clipped == (force if abs(force) <= cone else pytest.approx(np.copysign(cone, force), rel=1e-14))
+
+
+@given(
+    old=st.floats(-1e-6, 1e-6), slip=st.floats(-1e-6, 1e-6), normal=st.floats(0.0, 1.0), speed=st.floats(-0.02, 0.02)
+)
+def test_spring_of_the_same_stiffness_is_drawn_as_any_other(
+    old: float, slip: float, normal: float, speed: float
+) -> None:
+    spring, limit, slides, lost = draw_same_spring(rubbing(), STIFFNESS, old, slip, normal, speed)
+    expected = draw_spring(rubbing(), STIFFNESS, STIFFNESS, old, slip, 1.0, normal, speed)
+    assert (spring, limit, slides) == expected[:3]
+    assert lost == pytest.approx(expected[3], abs=1e-15 * STIFFNESS * 1e-12)
+    assert slides or lost == 0.0
+
+
+DEEPEST = 1e-5  # m
+STIFFNESS = 1e6  # N/m, or N/m^1.5
+
+
+class Dragged:
+    """One point whose overlap and slip are prescribed, with its shear spring."""
+
+    def __init__(self, law: float, friction: float) -> None:
+        self.law, self.friction = law, friction
+        self.values = zeros(1, INTERACTION)[0]
+        self.values.shear_ratio = 0.8
+        self.values.static_friction = self.values.kinetic_friction = friction
+        self.values.transition_speed = 1e-3
+        self.spring = self.stiffness = self.force = 0.0
+        self.slides = False
+        self.work = self.lost = 0.0
+
+    @property
+    def stored(self) -> float:
+        """Energy (J) in the shear spring."""
+        return 0.5 * self.stiffness * self.spring**2
+
+    def reach(self, depth: float) -> float:
+        """Return the longest spring (m) that sticks at an overlap (m)."""
+        stiffness = 0.8 * tangent_stiffness(self.law, STIFFNESS, depth)
+        return self.friction * elastic_force(self.law, STIFFNESS, depth) / stiffness
+
+    def drag(self, depth: float, slip: float, drawn: float = 1.0) -> float:
+        """Go to an overlap with a slip (m) of which `drawn` draws the spring; return what friction has taken (J)."""
+        normal_force = elastic_force(self.law, STIFFNESS, depth)
+        stiffness = 0.8 * tangent_stiffness(self.law, STIFFNESS, depth)
+        before, energy = self.force, self.stored
+        self.spring, limit, self.slides, lost = draw_spring(
+            self.values, stiffness, self.stiffness, self.spring, slip, drawn, normal_force, 0.0
+        )
+        self.stiffness = stiffness
+        self.force = clip_to_cone(self.values, stiffness * self.spring, limit, normal_force, 0.0)
+        self.lost += lost
+        self.work += 0.5 * (before + self.force) * slip
+        assert lost == pytest.approx(0.5 * (before + self.force) * slip - (self.stored - energy), abs=1e-16)
+        return lost
+
+
+laws = pytest.mark.parametrize("law", [LINEAR, HERTZ_MINDLIN])
+# overlaps as shares of the deepest one; slips as shares of the longest spring, or of twice that
+paths = st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=15)
+
+
+@laws
+@given(path=paths, friction=st.floats(0.01, 2.0))
+def test_shear_spring_never_gives_back_more_than_was_put_in(
+    law: int, path: list[tuple[float, float]], friction: float
+) -> None:
+    contact = Dragged(law, friction)
+    scale = friction * elastic_force(law, STIFFNESS, DEEPEST) * DEEPEST
+    for share, slip in path:
+        depth = share * DEEPEST
+        lost = contact.drag(depth, 0.0), contact.drag(depth, 2.0 * slip * contact.reach(depth))
+        assert min(lost) >= -1e-15 * scale
+        assert contact.work >= contact.stored - 1e-14 * scale
+        limit = friction * elastic_force(law, STIFFNESS, depth)
+        assert abs(contact.force) <= limit * (1.0 + 1e-12)
+
+
+@laws
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_steady_slip_costs_the_friction_force_times_the_way(law: int, way: float) -> None:
+    contact = Dragged(law, 0.3)
+    step = 0.05 * contact.reach(DEEPEST) * way
+    for _ in range(40):
+        contact.drag(DEEPEST, step)
+    assert contact.slides
+    lost, force = contact.lost, 0.3 * elastic_force(law, STIFFNESS, DEEPEST)
+    for _ in range(100):
+        contact.drag(DEEPEST, step)
+    assert contact.lost - lost == pytest.approx(force * 100 * abs(step))
+    assert contact.force == pytest.approx(way * force)

@@ -1,27 +1,34 @@
-"""Bodies and pairs divided among threads: everything once, and sums in the order of the list."""
+"""Bodies and pairs divided among threads: everything once, sums in the order of the list, losses in their tallies."""
 
 from __future__ import annotations
 
+import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import ACTION, GROUP, LEDGER, zeros
-from blocksim.kernels.explicit.forces import Effect
+from blocksim.kernels.common.integrate import accelerate_and_kick, kick_and_drift
+from blocksim.kernels.common.jit import config
 from blocksim.kernels.explicit.partition import (
+    add_from_before,
     add_kept,
     keep,
     pairs_before,
     partition,
 )
+from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
+from blocksim.kernels.explicit.step import advance, changed_forces, forces_between, forces_within
 from blocksim.world.build import with_threads
-from tests.kernels.crews import among_fixed, listed, on_hills, rows, shake, soft_world
+from tests.kernels.crews import advanced, assert_same_bits, bits
+from tests.kernels.scenes import SCENES, among_fixed, on_hills, rows, shake, soft_world, with_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from blocksim.kernels.common.arrays import Record, World
+
 
 MOST = 7  # threads
 SIZES = (1, 2, 3, MOST)
@@ -60,7 +67,7 @@ WORLDS: dict[str, Callable[[], World]] = {
 @pytest.fixture(scope="module")
 def worlds() -> dict[str, World]:
     """Return all worlds, their pairs listed, with room for as many threads as there are at most."""
-    return {name: with_threads(listed(make()), MOST) for name, make in WORLDS.items()}
+    return {name: with_threads(with_pairs(make()), MOST) for name, make in WORLDS.items()}
 
 
 @pytest.fixture(params=WORLDS)
@@ -131,28 +138,10 @@ def totals(body: Record) -> list[float]:
     return [float(body.fx), float(body.fy), float(body.torque), int(body.pairs_now)]
 
 
-EFFECT = Effect(fx=1.0, fy=2.0, torque_a=3.0, torque_b=4.0, dashpot=5.0, friction=6.0)
-
-
 def two_blocks(*, is_between: bool = False) -> World:
-    world = listed(soft_world([{"y": 1.0}, {"x": 0.033, "y": 1.0}]))
+    world = with_pairs(soft_world([{"y": 1.0}, {"x": 0.033, "y": 1.0}]))
     world.pairs[0].is_between = is_between
     return world
-
-
-@pytest.mark.parametrize("is_between", [False, True])
-@pytest.mark.parametrize("touches", [False, True])
-def test_what_is_kept_of_a_steady_pair_goes_to_its_bodies_and_its_losses_to_the_caller(
-    *, touches: bool, is_between: bool
-) -> None:
-    world, tally = two_blocks(is_between=is_between), zeros(1, LEDGER)[0]
-    action = zeros(1, ACTION)[0]
-    action.is_changed, action.broken = 1, 9.0  # of the step before
-    keep(action, EFFECT, touches)
-    assert add_kept(world, world.pairs[0], action, tally) == (5.0, 6.0)
-    assert totals(world.bodies[0]) == ([1.0, 2.0, 3.0, 1] if touches else [0.0, 0.0, 0.0, 0])
-    assert totals(world.bodies[1]) == ([-1.0, -2.0, -4.0, 1] if touches and not is_between else [0.0, 0.0, 0.0, 0])
-    assert (tally.dashpot, tally.friction, tally.broken) == (0.0, 0.0, 0.0)
 
 
 def test_losses_of_changed_contacts_are_tallied_at_once_even_where_nothing_touches_any_more() -> None:
@@ -162,3 +151,87 @@ def test_losses_of_changed_contacts_are_tallied_at_once_even_where_nothing_touch
     assert add_kept(world, world.pairs[0], action, tally) == (0.0, 0.0)
     assert (tally.dashpot, tally.friction, tally.broken) == (15.0, 26.0, 37.0)
     assert totals(world.bodies[0]) == totals(world.bodies[1]) == [0.0, 0.0, 0.0, 0]
+
+
+TALLIED = ("dashpot", "friction", "broken")
+CREW = 5  # threads
+
+
+@pytest.fixture(scope="module")
+def moving() -> Callable[[str], World]:
+    """Return a copy of a scene under way whose bodies have just drifted, with room for several threads."""
+    made: dict[str, World] = {}
+
+    def make(scene: str) -> World:
+        if scene not in made:
+            start, steps = SCENES[scene]
+            world = start()
+            if config.DISABLE_JIT:
+                advance(world, 0)
+                world.bodies["vx"][: world.bodies.size // 2] += 0.2
+            else:
+                world, _ = advanced(world, steps // 2, 1)
+            kick_and_drift(world.bodies, 0, world.bodies.size, float(world.controls[0].step))
+            made[scene] = with_threads(world, CREW)
+        return copy.deepcopy(made[scene])
+
+    return make
+
+
+def step_of(world: World) -> float:
+    return float(world.controls[0].step)
+
+
+def evaluate_in_shares(world: World, size: int, *, goes_on: bool = False) -> None:
+    """Evaluate all forces as threads do, one after the other."""
+    partition(world, size)
+    step = step_of(world)
+    for share in world.shares[:size]:
+        forces_between(world, share, step)
+    for share in world.shares[:size]:
+        add_from_before(world, share)
+    for share in world.shares[:size]:
+        forces_within(world, share, step, goes_on)
+
+
+SOME = ["wall", "among moving supports", "on hills", "discs"]
+
+
+@pytest.mark.parametrize("goes_on", [False, True])
+@pytest.mark.parametrize("size", [2, 3, CREW])
+@pytest.mark.parametrize("scene", SOME)
+def test_forces_of_several_shares_have_the_bits_of_one(
+    moving: Callable[[str], World], scene: str, size: int, *, goes_on: bool
+) -> None:
+    one, several = moving(scene), moving(scene)
+    evaluate_in_shares(one, 1, goes_on=goes_on)
+    evaluate_in_shares(several, size, goes_on=goes_on)
+    assert several.pairs.is_between.any()
+    assert not one.pairs.is_between.any()
+    assert_same_bits(one, several)
+
+
+def test_every_group_of_bodies_has_the_losses_of_its_pairs_in_its_own_tally(moving: Callable[[str], World]) -> None:
+    world, apart = moving("wall"), moving("wall")
+    before, step = world.ledger.copy(), step_of(world)
+    evaluate_in_shares(world, 1)
+    count = int(world.clock[0].pair_count)
+    tallies = zeros(count, LEDGER)
+    for p, pair in enumerate(apart.pairs[:count]):
+        kind, effect = persistent_forces(apart, p, step, apart.particles)
+        if kind == CHANGED:
+            changed_forces(apart, p, step, tallies[p])
+        else:
+            keep(apart.action[0], effect, kind == TOUCHING)
+            tallies[p].dashpot, tallies[p].friction = add_kept(apart, pair, apart.action[0], tallies[p])
+    assert np.count_nonzero(tallies.dashpot) > GROUP
+    groups = world.pairs.a[:count] // GROUP
+    assert groups.max() == 3
+    for name in TALLIED:
+        gained = world.ledger[name] - before[name]
+        expected = np.bincount(groups, tallies[name], world.ledger.size)
+        scale = 1e-12 * max(float(np.abs(before[name]).max()), float(np.abs(expected).max()))
+        assert gained == pytest.approx(expected, abs=scale), name
+    for body in apart.bodies[:-1]:
+        accelerate_and_kick(body, apart.controls[0], step)
+    assert bits(world.bodies) == bits(apart.bodies)

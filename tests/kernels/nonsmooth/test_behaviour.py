@@ -275,34 +275,9 @@ def test_block_rides_along_below_the_friction_limit(begin: Callable[..., Simulat
     assert run.residual() < 1e-12
 
 
-def test_run_is_not_over_while_the_table_waits(begin: Callable[..., Simulation]) -> None:
-    motion = {"kind": "harmonic", "amplitude": 0.001, "frequency": 5.0, "start": 0.4, "duration": 0.6}
-    scenario = scenario_of([LYING], motion=motion, time={"stop_at_rest": True, "end": 2.0})
-    run = begin(scenario).to_time(2.0)
-    assert 1.0 < run.time < 1.2
-
-
-def test_table_faster_than_the_reach_of_the_list_keeps_its_contacts(begin: Callable[..., Simulation]) -> None:
-    shove = shaken(0.3 * G, LYING, {"x": 0.1, "y": HEIGHT / 2})
-    run = begin(shove, velocity_tolerance=1e-9)
-    stepping = run.scene.contacts.stepping[0]
-    stepping.least_reach, stepping.most_reach = 5e-5, 1.5e-4
-    run.to_time(1.2)
-    assert run.bodies.x == pytest.approx([table(run), 0.1 + table(run)], abs=1e-5)
-
-
 def bare(bodies: list[Mapping[str, object]], **tables: Any) -> Scenario:
     friction = {"block_block": 0.4, "block_ground": 0.4}
     return scenario_of(bodies, **{"contact": {"restitution": 0.0}, "friction": friction, **tables})
-
-
-def test_blocks_stand_on_and_beside_a_step_without_moving(begin: Callable[..., Simulation]) -> None:
-    """The one beside it reaches far below the upper piece, the one on it far behind the riser."""
-    step = {"profile": [[-0.3, 0.0], [0.0, 0.0], [0.0, 0.006], [0.3, 0.006]]}
-    beside = {"x": -WIDTH / 2, "y": HEIGHT / 2, "velocity": [0.1, 0.0]}  # pushed against both
-    run = begin(bare([beside, {"x": WIDTH / 2, "y": 0.006 + HEIGHT / 2}], ground=step)).to_time(0.05)
-    assert run.bodies.x[:2] == pytest.approx([-WIDTH / 2, WIDTH / 2], abs=5e-5)
-    assert run.bodies.y[:2] == pytest.approx([HEIGHT / 2, 0.006 + HEIGHT / 2], abs=5e-5)
 
 
 def test_block_that_meets_the_end_of_a_wall_stops_there(begin: Callable[..., Simulation]) -> None:

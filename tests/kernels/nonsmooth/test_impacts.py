@@ -106,16 +106,6 @@ def test_blocks_that_touch_are_struck_one_after_the_other(
     assert run.kinetic <= 0.5 * run.bodies.mass[0] * more.get("incoming", 1) * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("gap", [*GAPS, 1e-4])
-def test_a_row_loses_at_every_blow_what_newton_says_however_small_its_gaps_are(
-    single: Callable[..., Simulation], gap: float
-) -> None:
-    """Up to 0.5 blocks that touched were struck as one; expected are blows between two at a time until all part."""
-    blocks, _ = struck_row(5, gap)
-    run = single(blocks, restitution=0.5, **SMOOTH).to_time(0.03)
-    assert run.bodies.vx == pytest.approx([0.15387, 0.16718, 0.17798, 0.18457, 0.31641], abs=1e-4)
-
-
 def test_contacts_report_the_impulses_of_all_rounds(single: Callable[..., Simulation]) -> None:
     run = single(constraint(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
     run.scene.contacts.stepping[0].has_cuts = 0  # it would be in an interval each

@@ -87,29 +87,6 @@ def test_list_has_all_pairs_whose_reaches_meet_each_once(seed: int) -> None:
     assert len(pairs_of(scene)) > BLOCKS
 
 
-def row_of_blocks(vx: float, vy: float = 0.0, *, fixed: bool = False) -> list[Block]:
-    blocks = [Block(0.04 * i, 1.0, vx=vx, vy=vy) for i in range(5)]
-    return [*blocks, Block(0.5, 0.0125, fixed=True)] if fixed else blocks
-
-
-@pytest.mark.parametrize(
-    ("blocks", "is_new"),
-    [
-        (row_of_blocks(3.0), False),
-        (row_of_blocks(3.0, fixed=True), True),
-        (row_of_blocks(0.0, -3.0), True),
-        (row_of_blocks(0.0), False),
-    ],
-    ids=["together", "towards something fixed", "towards the ground", "at rest"],
-)
-def test_list_is_made_again_only_where_bodies_come_nearer_to_something(blocks: list[Block], is_new: bool) -> None:
-    scene = listed(posed(blocks, step=STEP, gravity=0.0))
-    for _ in range(20):
-        fly(scene)
-        scene = listed(scene)
-    assert bool(scene.world.clock[0].rebuilds > 1) is is_new
-
-
 def test_body_that_only_turns_uses_up_its_reach() -> None:
     scene = listed(posed([Block(0.0, 1.0, spin=300.0), Block(0.04, 1.0)], step=STEP, gravity=0.0))
     for _ in range(40):

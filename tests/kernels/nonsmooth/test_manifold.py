@@ -18,20 +18,18 @@ from blocksim.kernels.nonsmooth.faces import (
     block_ahead,
     clip,
     face_on,
-    in_frame,
     side_numbered,
     side_opposite,
 )
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, bend_of, bend_time, follow_curvature, slip_of
-from tests.kernels.references import apart, brought_near, corners, meet, meeting, places_of, sides
-from tests.kernels.scenes import Block, listed, listed_constraints, posed
+from tests.kernels.references import apart, corners, meet, meeting, places_of, sides
+from tests.kernels.scenes import Block, brought_near, listed, listed_constraints, make_body, posed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from blocksim.kernels.common.arrays import Record
-    from tests.kernels.conftest import MakeBody
 
 
 MARGIN = 2e-3  # m
@@ -40,7 +38,7 @@ FEW = 100  # without the compiler
 
 
 @pytest.fixture(scope="module")
-def pairs(make_body: MakeBody, pace: int) -> list[tuple[Record, Record]]:
+def pairs(pace: int) -> list[tuple[Record, Record]]:
     """Return pairs of blocks with gaps and overlaps of up to 4 mm, of which no faces are nearly parallel."""
     random = np.random.default_rng(1)
     found = []
@@ -49,7 +47,7 @@ def pairs(make_body: MakeBody, pace: int) -> list[tuple[Record, Record]]:
         second = first + turn + math.pi / 2 * random.integers(4)
         sides = random.uniform(0.02, 0.06, 4)
         b = make_body(0.3, -0.2, first, width=sides[0], height=sides[1])
-        a = brought_near(make_body, b, sides[2:], second, way, random.uniform(-4e-3, 4e-3))
+        a = brought_near(b, sides[2:], second, way, random.uniform(-4e-3, 4e-3))
         found.append((a, b))
     return found
 
@@ -79,9 +77,7 @@ def test_manifold_is_what_two_clipped_polygons_have(pairs: list[tuple[Record, Re
 
 
 @pytest.mark.parametrize(("sunk", "way"), [(5e-6, -1.0), (5e-6, 1.0), (5e-5, 1.0)])
-def test_block_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next(
-    make_body: MakeBody, sunk: float, way: float
-) -> None:
+def test_block_that_has_sunk_in_a_little_is_not_stopped_by_the_side_of_the_next(sunk: float, way: float) -> None:
     """It overlaps the side of the next block by less than it has sunk into it: separating axes alone would stop it."""
     slider = make_body(way * (0.032 - 0.1 * sunk), 0.025 - sunk)
     constraint = row_of(slider, make_body())
@@ -121,9 +117,7 @@ def test_four_pairs_at_a_time_have_the_bits_of_each_alone(seed: int, pace: int) 
 
 
 @pytest.mark.parametrize(("degrees", "is_kept"), [(24.0, True), (-24.0, True), (26.0, False), (180.0, False)])
-def test_impulses_are_kept_until_the_normal_has_turned_by_25_degrees(
-    make_body: MakeBody, degrees: float, is_kept: bool
-) -> None:
+def test_impulses_are_kept_until_the_normal_has_turned_by_25_degrees(degrees: float, is_kept: bool) -> None:
     constraint = zeros(1, CONSTRAINT)[0]
     constraint.normal_one, constraint.normal_two, constraint.shear = 3.0, 2.0, 1.0
     constraint.nx, constraint.ny = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
@@ -132,23 +126,8 @@ def test_impulses_are_kept_until_the_normal_has_turned_by_25_degrees(
     assert (constraint.normal_one, constraint.normal_two, constraint.shear) == expected
 
 
-def test_impulses_are_forgotten_where_blocks_have_parted(make_body: MakeBody) -> None:
-    constraint = zeros(1, CONSTRAINT)[0]
-    constraint.normal_one, constraint.normal_two, constraint.shear, constraint.ny, constraint.reach = (
-        3.0,
-        2.0,
-        1.0,
-        1.0,
-        TOUCHING,
-    )
-    constraint = meet(make_body(0.0, 0.025 + 2 * MARGIN), make_body(), MARGIN, constraint)
-    assert (constraint.normal_one, constraint.normal_two, constraint.shear, constraint.reach) == (0.0, 0.0, 0.0, AWAY)
-
-
 @pytest.mark.parametrize("pressed", [True, False])
-def test_contact_that_presses_has_the_normal_and_arms_of_the_middle_of_the_step(
-    make_body: MakeBody, pressed: bool
-) -> None:
+def test_contact_that_presses_has_the_normal_and_arms_of_the_middle_of_the_step(pressed: bool) -> None:
     """One to come is taken as it is, one with an impulse of round-off too. Gaps are those of now, along that normal."""
     ahead = 1e-3
     a, b = make_body(0.004, 0.0262, 0.06), make_body(0.0, 0.0, 0.02)
@@ -181,7 +160,7 @@ places = st.floats(-0.05, 0.05)
 
 
 @given(angle=angles, way=angles)
-def test_face_opposite_a_direction_looks_most_against_it(make_body: MakeBody, angle: float, way: float) -> None:
+def test_face_opposite_a_direction_looks_most_against_it(angle: float, way: float) -> None:
     body = make_body(0.1, -0.3, angle, width=0.03, height=0.02)
     block = Seen(body.x, body.y, body.cos, body.sin, body.half_x, body.half_y)
     side, _ = side_opposite(math.cos(way), math.sin(way), block, None, 0)
@@ -192,15 +171,6 @@ def test_face_opposite_a_direction_looks_most_against_it(make_body: MakeBody, an
     assert (face.nx, face.ny) == pytest.approx((math.cos(turned), math.sin(turned)), abs=1e-12)
     assert (face.distance, face.right) == ((0.015, 0.01) if number in {0, 2} else (0.01, 0.015))
     assert face.left == -face.right
-
-
-@given(angle=angles, right=places, above=places)
-def test_frame_of_a_face_counts_to_the_right_and_from_the_face_on(angle: float, right: float, above: float) -> None:
-    """Seen from inside the body, looking out, the right is at hand where the normal has turned clockwise."""
-    n = np.array([math.cos(angle), math.sin(angle)])
-    face = Face(float(n[0]), float(n[1]), 0.2, 0.1, 0.015, -0.01, 0.01)
-    x, y = (0.2, 0.1) + (0.015 + above) * n + right * np.array([n[1], -n[0]])
-    assert in_frame(face, float(x), float(y)) == pytest.approx((right, above), abs=1e-15)
 
 
 @given(left=places, width=st.floats(1e-4, 0.1), gap=places, rise=places, half=st.floats(0.005, 0.05), middle=places)
@@ -236,9 +206,7 @@ def on_ground(body: Record, ground: Record, margin: float) -> Record:
 
 
 @given(angle=angles, height=st.floats(-2e-3, 2e-3), level=places)
-def test_ground_is_met_by_all_corners_within_the_margin(
-    make_body: MakeBody, angle: float, height: float, level: float
-) -> None:
+def test_ground_is_met_by_all_corners_within_the_margin(angle: float, height: float, level: float) -> None:
     margin = 1.5e-3
     body, ground = make_body(0.3, 0.0, angle), make_body(7.0, level, mass=1.0)
     body.y = level + height - corners(body)[:, 1].min()
@@ -284,20 +252,20 @@ class Moving(NamedTuple):
         return Motion(float(vx), float(vy), float(self.va[2]), float(self.vb[2]), 0.0, 1.0)
 
 
-def moved(body: Record, velocity: NDArray[np.float64], time: float, make_body: MakeBody) -> Record:
+def moved(body: Record, velocity: NDArray[np.float64], time: float) -> Record:
     x, y, angle = np.array([body.x, body.y, body.angle]) + time * velocity
     return make_body(x, y, angle, width=2 * body.half_x, height=2 * body.half_y)
 
 
 @pytest.fixture(scope="module")
-def examples(make_body: MakeBody) -> list[Moving]:
+def examples() -> list[Moving]:
     """Return blocks that touch with one corner, half of them with a corner of body a."""
     random = np.random.default_rng(1)
     found: list[Moving] = []
     while len(found) < MOVING:
         b = make_body(0.2, 0.1, random.uniform(-3.0, 3.0), width=0.05, height=0.03)
         angle, way, gap = b.angle + random.uniform(0.2, 1.3), random.uniform(-3.0, 3.0), random.uniform(-2e-4, 2e-4)
-        a = brought_near(make_body, b, np.array([0.02, 0.03]), angle, way, gap)
+        a = brought_near(b, np.array([0.02, 0.03]), angle, way, gap)
         known = meeting(a, b, FAR_OFF)
         constraint = meet(a, b, FAR_OFF)
         if known.is_of_b == (len(found) % 2 == 0) and max(constraint.gap_one, constraint.gap_two) >= FAR:
@@ -310,20 +278,20 @@ def examples(make_body: MakeBody) -> list[Moving]:
     return found
 
 
-def followed(one: Moving, make_body: MakeBody) -> list[float]:
+def followed(one: Moving) -> list[float]:
     """Return the gap of the corner that touches (m) a short time before, now and a short time later."""
     gaps = []
     for k in (-1, 0, 1):
-        a, b = moved(one.a, one.va, k * TIME, make_body), moved(one.b, one.vb, k * TIME, make_body)
+        a, b = moved(one.a, one.va, k * TIME), moved(one.b, one.vb, k * TIME)
         other, of = (a, b) if one.is_of_b else (b, a)
         side = sides(of)[one.side]
         gaps.append(float((corners(other)[one.corner] - side.begin) @ side.normal))
     return gaps
 
 
-def test_gaps_change_as_the_points_move_and_bend_as_blocks_turn(examples: list[Moving], make_body: MakeBody) -> None:
+def test_gaps_change_as_the_points_move_and_bend_as_blocks_turn(examples: list[Moving]) -> None:
     for one in examples:
-        before, now, after = followed(one, make_body)
+        before, now, after = followed(one)
         slip = slip_of(one.constraints, *one.motion[:2], one.motion.spin_a, one.motion.spin_b)
         is_first = one.constraint.gap_one < FAR
         assert now == pytest.approx(min(one.constraint.gap_one, one.constraint.gap_two), abs=1e-12)

@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import INTERACTION, zeros
+from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.common.tolerances import LATE
 from blocksim.kernels.nonsmooth.arrays import BEFORE, FAR, STATE, TALLY_PACKS
-from blocksim.kernels.nonsmooth.cone import shear_limit
-from blocksim.kernels.nonsmooth.motion import drift, is_in_flight, kick, kick_warm, place
+from blocksim.kernels.nonsmooth.motion import is_in_flight, kick, kick_warm, place
 from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY, range_of_thread, sweep, velocity_pass
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
 from blocksim.world.sag import soft_contact
 from tests.kernels.references import Dense, dense, least_change
-from tests.kernels.scenes import Block, after_substep, collided, pile, posed, velocities
+from tests.kernels.scenes import Block, after_substep, collided, make_body, pile, posed, velocities
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
     from blocksim.verification.scene import Simulation
-    from tests.kernels.conftest import MakeBody
 
 
 G = 9.81
@@ -156,20 +153,6 @@ def test_round_off_of_a_gap_does_not_choose_between_the_rules() -> None:
     assert [dense(scene).impulses.min() > 0.0 for scene in scenes] == [True, True]
 
 
-@given(static=st.floats(0.0, 1.0), less=st.floats(0.0, 1.0), normal=st.floats(1e-3, 2.0), needed=st.floats(0.0, 3.0))
-def test_static_friction_holds_what_it_can_and_else_friction_is_kinetic(
-    static: float, less: float, normal: float, needed: float
-) -> None:
-    material = zeros(1, INTERACTION)[0]
-    material.static_friction, material.kinetic_friction, material.transition_speed = static, less * static, 1e-3
-    limit = shear_limit(material, normal, needed, 5.0)
-    assert less * static * normal <= limit <= static * normal
-    if needed <= static * normal:
-        assert limit >= needed
-    elif (needed - static * normal) * 5.0 > 0.05:  # m/s, slides fast
-        assert limit == pytest.approx(less * static * normal, abs=1e-12)
-
-
 @pytest.mark.parametrize("friction", [0.05, 0.3, 1.5])
 def test_block_that_slides_off_a_block_takes_from_it_what_it_gives(friction: float) -> None:
     """Equal and opposite: momentum and moment of momentum of two free blocks are kept by a contact with friction."""
@@ -246,13 +229,6 @@ def test_slower_impacts_than_the_threshold_do_not_rebound(rate: float, rebounds:
     block = Block(0.0, HALF - 1e-7, vy=-rate)
     scene = after_substep([block], restitution=0.5, gravity=0.0, restitution_threshold=0.02, **SLIPPERY)
     assert velocities(scene.contacts.states)[0, 1] == pytest.approx(0.5 * rate if rebounds else 0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
-def test_gap_that_does_not_close_in_the_substep_takes_nothing_from_an_approach(restitution: float) -> None:
-    block = Block(0.0, HALF + 1.1e-3, vy=-1.0)
-    scene = after_substep([block], restitution=restitution, gravity=0.0, **SLIPPERY)
-    assert velocities(scene.contacts.states)[0].tolist() == [0.0, -1.0, 0.0]
 
 
 @pytest.mark.parametrize("others", [0, 2])  # in rounds, and not
@@ -393,21 +369,9 @@ def test_warm_kick_gives_again_what_impulses_gave_and_one_whole_kick(last: float
     assert [before.vx, before.vy, before.spin] == now.tolist()
 
 
-def test_drift_moves_by_velocity_times_time() -> None:
-    states = zeros(3, STATE)
-    states.vx, states.vy, states.spin = (1.0, 2.0, 3.0), (-1.0, 0.5, 4.0), (10.0, 20.0, 30.0)
-    for _ in range(2):
-        drift(states, 1, 3, H)
-    assert states.dx.tolist() == pytest.approx([0.0, 4e-3, 6e-3])
-    assert states.dy.tolist() == pytest.approx([0.0, 1e-3, 8e-3])
-    assert states.turned.tolist() == pytest.approx([0.0, 0.04, 0.06])
-
-
 @pytest.mark.parametrize("turned", [1e-4, -0.3])
 @pytest.mark.parametrize("is_touching", [False, True])
-def test_step_ends_with_the_pose_that_the_drifts_add_up_to(
-    make_body: MakeBody, turned: float, is_touching: bool
-) -> None:
+def test_step_ends_with_the_pose_that_the_drifts_add_up_to(turned: float, is_touching: bool) -> None:
     """Velocities of bodies in flight are brought up by half a kick; a support holds against that."""
     body = make_body(0.2, 0.1, 0.6)
     (one,), (before,) = kicked(1.0, -2.0, 3.0, 1.0)

@@ -15,17 +15,16 @@ from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.models.surface import (
     block_points,
     corner_seen,
-    corners_near,
     face_met,
     find_points,
     ground_points,
 )
-from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, corner_of, side_normal
-from tests.kernels.rectangles import corners, in_frame
+from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
+from tests.kernels.references import corners, in_frame
+from tests.kernels.scenes import make_body, pose
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record
-    from tests.kernels.conftest import MakeBody, Pose
 
 OF_B = MOST_CORNERS  # slots from there on
 ALL = np.array([*range(4), *range(OF_B, OF_B + 4)])
@@ -51,20 +50,8 @@ def points_between(a: Record, b: Record) -> list[Any]:
     return points_and_duplicates(a, b)[0]
 
 
-def test_corners_and_faces_count_counter_clockwise_from_the_lower_left_and_from_below(make_body: MakeBody) -> None:
-    body = make_body(angle=0.3)
-    for k in range(4):
-        side = corner_of(body, None, k)
-        assert (np.sign(side.x), np.sign(side.y)) == ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))[k]
-        assert (side.distance, side.half) == ((H / 2, W / 2), (W / 2, H / 2))[k % 2]
-        turned = 0.3 + (k - 1) * np.pi / 2
-        assert side_normal(body, None, k) == pytest.approx((np.cos(turned), np.sin(turned)), abs=1e-15)
-
-
 @given(x=st.floats(-0.035, 0.035), y=st.floats(-0.03, 0.03), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))
-def test_every_contact_point_is_a_corner_inside_the_other_block(
-    make_body: MakeBody, x: float, y: float, one: float, two: float
-) -> None:
+def test_every_contact_point_is_a_corner_inside_the_other_block(x: float, y: float, one: float, two: float) -> None:
     a, b = make_body(x, y, one), make_body(0.0, 0.0, two, width=0.02)
     found = points_between(a, b)
     for point in found:
@@ -83,7 +70,7 @@ def test_every_contact_point_is_a_corner_inside_the_other_block(
 
 
 @given(x=st.floats(-0.03, 0.03), one=st.floats(-0.7, 0.7), depth=st.floats(1e-9, 1e-4))
-def test_shallow_overlap_of_two_blocks_is_always_found(make_body: MakeBody, x: float, one: float, depth: float) -> None:
+def test_shallow_overlap_of_two_blocks_is_always_found(x: float, one: float, depth: float) -> None:
     a, b = make_body(x, 0.0, one), make_body(0.0, 0.0)
     a.y = 0.03
     a.y -= separation(a, b) + depth  # from above: its gap along y is the largest one
@@ -93,7 +80,7 @@ def test_shallow_overlap_of_two_blocks_is_always_found(make_body: MakeBody, x: f
 
 @pytest.mark.parametrize("shift", [0.0, 1e-9, -1e-9, 0.01])
 @pytest.mark.parametrize("depth", [1e-9, 1e-6])
-def test_stacked_blocks_touch_at_the_top_and_not_at_the_sides(make_body: MakeBody, shift: float, depth: float) -> None:
+def test_stacked_blocks_touch_at_the_top_and_not_at_the_sides(shift: float, depth: float) -> None:
     found = points_between(make_body(shift, H - depth), make_body())
     assert len(found) == 2
     for point in found:
@@ -102,7 +89,7 @@ def test_stacked_blocks_touch_at_the_top_and_not_at_the_sides(make_body: MakeBod
     assert abs(found[0].x - found[1].x) == pytest.approx(W - abs(shift))
 
 
-def face_of(make_body: MakeBody, x: float, y: float, corner: int) -> tuple[int, float]:
+def face_of(x: float, y: float, corner: int) -> tuple[int, float]:
     """Return the face of a block, and the overlap, that a corner of one which is not turned touches at a place."""
     owner, touched = make_body(), make_body()
     own = place_of(owner, corner)
@@ -111,22 +98,22 @@ def face_of(make_body: MakeBody, x: float, y: float, corner: int) -> tuple[int, 
     return face, depth
 
 
-def test_corner_touches_only_faces_within_its_normal_cone(make_body: MakeBody) -> None:
+def test_corner_touches_only_faces_within_its_normal_cone() -> None:
     tiny = 1e-9
     # a lower right corner near the upper right one, nearer to the side than to the top
-    face, depth = face_of(make_body, W / 2 - tiny, H / 2 - 2 * tiny, 1)
+    face, depth = face_of(W / 2 - tiny, H / 2 - 2 * tiny, 1)
     assert face == UPPER
     assert depth == pytest.approx(2 * tiny, rel=1e-6)
     # its mirror image at the upper left
-    face, depth = face_of(make_body, -W / 2 + tiny, H / 2 - 2 * tiny, 0)
+    face, depth = face_of(-W / 2 + tiny, H / 2 - 2 * tiny, 0)
     assert face == UPPER
     assert depth == pytest.approx(2 * tiny, rel=1e-6)
     # a lower left corner at the upper right one may touch either: the nearest counts
-    assert face_of(make_body, W / 2 - tiny, H / 2 - 2 * tiny, 0)[0] == RIGHT
-    assert face_of(make_body, W / 2 - 2 * tiny, H / 2 - tiny, 0)[0] == UPPER
+    assert face_of(W / 2 - tiny, H / 2 - 2 * tiny, 0)[0] == RIGHT
+    assert face_of(W / 2 - 2 * tiny, H / 2 - tiny, 0)[0] == UPPER
 
 
-def test_aligned_blocks_keep_the_corner_that_was_in_contact(make_body: MakeBody) -> None:
+def test_aligned_blocks_keep_the_corner_that_was_in_contact() -> None:
     a, b = make_body(0.0, H - 1e-6), make_body()
     for touching, duplicates in (((), [18, 19]), ((0, 1), [18, 19]), ((18, 19), [0, 1]), ((1, 19), [0, 18])):
         points, found = points_and_duplicates(a, b, touching)
@@ -135,7 +122,7 @@ def test_aligned_blocks_keep_the_corner_that_was_in_contact(make_body: MakeBody)
 
 
 @given(y=st.floats(-0.01, 0.03), angle=st.floats(-7.0, 7.0))
-def test_corners_below_the_ground_touch_it(make_body: MakeBody, y: float, angle: float) -> None:
+def test_corners_below_the_ground_touch_it(y: float, angle: float) -> None:
     body, points = make_body(0.4, y, angle), zeros(SLOTS, POINT)
     count = ground_points(body, 4, ALL, 0.0, points, None)
     heights = [place_of(body, k)[1] for k in range(4)]
@@ -150,7 +137,7 @@ def test_corners_below_the_ground_touch_it(make_body: MakeBody, y: float, angle:
     ("angle", "slots"), [(0.0, [0, 1]), (0.3, [0, 1]), (-1.2, [1, 2]), (3.0, [2, 3]), (2.0, [0, 3])]
 )
 def test_block_deep_under_ground_has_its_two_deepest_points_and_no_room_is_overrun(
-    pose: Pose, angle: float, slots: list[int]
+    angle: float, slots: list[int]
 ) -> None:
     world = pose((0.0, -0.05, angle), (0.1, 0.0124, 0.0))
     assert [(pair.a, pair.b, pair.near) for pair in world.pairs[:2]] == [(0, 2, 4), (1, 2, 2)]
@@ -164,23 +151,3 @@ def test_block_deep_under_ground_has_its_two_deepest_points_and_no_room_is_overr
     assert world.contacts[0].depth == pytest.approx(-np.array(heights))
     assert world.contacts[1].tobytes() == beside.tobytes()
     assert not world.contacts["normal_force"][2:].any()
-
-
-@given(x=st.floats(-0.06, 0.06), y=st.floats(-0.06, 0.06), one=st.floats(-4.0, 4.0), two=st.floats(-4.0, 4.0))
-def test_corner_is_near_when_it_lies_in_the_grown_rectangle(
-    make_body: MakeBody, x: float, y: float, one: float, two: float
-) -> None:
-    a, b = make_body(x, y, one), make_body(0.0, 0.0, two)
-    expected = []
-    for corner in range(4):
-        local = np.abs(in_frame(place_of(a, corner), b))
-        beyond = float(max(local[0] - b.half_x, local[1] - b.half_y))
-        assume(abs(beyond - 0.01) > 1e-12)
-        if beyond <= 0.01:
-            expected.append(corner)
-    slots = np.full(SLOTS, 99)
-    slots[0] = 7  # there already
-    for first in (0, OF_B):
-        count = corners_near(a, b, 0.01, first, slots, 1, None)
-        assert slots[:count].tolist() == [7] + [first + corner for corner in expected]
-        assert (slots[count:] == 99).all()  # there is no room for more

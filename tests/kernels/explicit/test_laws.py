@@ -1,4 +1,4 @@
-"""Hertz's law: what an impact of a sphere does, in closed form, and restitution that does not know the speed."""
+"""Contact laws: force, stiffness and energy belong together, and restitution does not know the speed."""
 
 from __future__ import annotations
 
@@ -9,12 +9,40 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import quad
 
-from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR, dashpot_weight, elastic_force
+from blocksim.kernels.explicit.laws import (
+    HERTZ_MINDLIN,
+    LINEAR,
+    dashpot_weight,
+    elastic_force,
+    stored_energy,
+    tangent_stiffness,
+)
+from blocksim.scenario.laws import LAWS
 
 if TYPE_CHECKING:
     from tests.conftest import PaperBlock, Simulation, Start
 
-K = 2e9  # N/m^1.5
+
+K = 9.5e8
+DEPTHS = st.floats(1e-10, 1e-3)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@given(depth=DEPTHS)
+def test_force_is_the_slope_of_the_stored_energy(law: str, depth: float) -> None:
+    exponent, h = LAWS[law].exponent, 1e-3 * depth
+    slope = (stored_energy(exponent, K, depth + h) - stored_energy(exponent, K, depth - h)) / (2.0 * h)
+    assert elastic_force(exponent, K, depth) == pytest.approx(slope, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@given(depth=DEPTHS)
+def test_stiffness_is_the_slope_of_the_force(law: str, depth: float) -> None:
+    exponent, h = LAWS[law].exponent, 1e-3 * depth
+    slope = (elastic_force(exponent, K, depth + h) - elastic_force(exponent, K, depth - h)) / (2.0 * h)
+    assert tangent_stiffness(exponent, K, depth) == pytest.approx(slope, rel=1e-6)
+
+
 SOFT = {"law": "hertz-mindlin", "stiffness_scale": 1e-2, "max_overlap": 5e-3}
 
 

@@ -109,11 +109,3 @@ def run(folder: Path, *arguments: str) -> str:
 @pytest.mark.usefixtures("compiler")
 def test_third_law_rebounds_as_asked_and_keeps_its_energy_on_all_shapes(copied: Path) -> None:
     assert run(copied, "-c", CHECKS).split() == ["done"]
-
-
-def test_third_law_stands_in_messages_and_in_the_table_of_check(copied: Path) -> None:
-    scenario = str(PACKAGE.parent / "scenarios" / "three_blocks.toml")
-    shown = run(
-        copied, "-c", "from blocksim.cli.app import main; main()", "check", scenario, "--set", "contact.law=power-1.25"
-    )
-    assert "N/m^1.25" in shown
