@@ -24,7 +24,7 @@ from blocksim.kernels.common.arrays import (
 from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import entry_kernel
 from blocksim.verification.scene import HEIGHT
-from blocksim.world.build import empty_lists, with_more_room
+from blocksim.world.build import empty_lists
 from tests.kernels.crews import (
     advanced,
     assert_same_bits,
@@ -109,16 +109,6 @@ def test_three_threads_give_the_bits_of_one_while_contacts_between_their_shares_
     assert_same_bits(world, by_one(scene))
 
 
-@pytest.mark.parametrize("scene", ["wall", "among moving supports"])
-def test_team_interrupted_anywhere_gives_the_bits_of_one_call(by_one: ByOne, scene: str) -> None:
-    worlds = crew(SCENES[scene][0](), 3)
-    steps = round(0.2 * SCENES[scene][1])
-    for last in (0, 0, 1, 2, 3, 10, 11, 49, 50, 51, 100, 400, steps - 1, steps, steps):
-        assert together(worlds, last) == REACHED
-        assert worlds[0].clock[0].steps == last
-    assert_same_bits(worlds[0], by_one(scene, 0.2))
-
-
 def overlapping() -> World:
     """Return a wall whose blocks soon overlap too much."""
     return wall(max_overlap=1e-4)
@@ -167,13 +157,3 @@ def test_full_list_sends_all_threads_back_before_anything_has_moved() -> None:
     for name in ("x", "y", "angle", "vx", "vy", "spin"):
         assert worlds[0].bodies[name].tobytes() == untouched.bodies[name].tobytes(), name
     assert bits(worlds[0].ledger) == bits(untouched.ledger)
-
-
-def test_list_that_runs_full_on_the_way_is_given_room_and_the_team_continues(by_one: ByOne) -> None:
-    steps, grown = round(0.2 * SCENES["wall"][1]), 0
-    worlds = crew(cramped(), 3)
-    while together(worlds, steps) == PAIRS_FULL:
-        worlds = crew(with_more_room(worlds[0]), 3)
-        grown += 1
-    assert grown > 3
-    assert_same_bits(worlds[0], by_one("wall", 0.2))

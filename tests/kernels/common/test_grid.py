@@ -14,6 +14,7 @@ from blocksim.kernels.common.neighbours import list_pairs
 from blocksim.kernels.explicit.broad_phase import carry_history
 from blocksim.verification.scene import scenario_of
 from blocksim.world.build import build_world, empty_lists
+from tests.kernels.references import apart
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
     Sides = Callable[[np.random.Generator, int], NDArray[np.float64]]
 
-SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 COUNT = 64
 HILL = {"ground": {"profile": [[-1.0, 0.2], [0.0, 0.0], [0.3, -0.1], [5.0, 0.4]]}}
 WALLS = {"walls": [{"from": [0.1, 0.5], "to": [0.1, 0.0]}]}
@@ -62,27 +62,15 @@ def heap(seed: int, sides: Sides, area: float, **tables: Any) -> World:
     return world
 
 
-def overlaps(bodies: Records) -> NDArray[np.float64]:
-    """Return the largest gap (m) of every two rectangles along their face normals; negative when they overlap."""
-    normals = np.array([(bodies.cos, bodies.sin), (-bodies.sin, bodies.cos)]).transpose(2, 0, 1)  # body, axis, xy
-    local = SIGNS * np.array([bodies.half_x, bodies.half_y]).T[:, None]
-    corners = np.einsum("ick,ikx->icx", local, normals)
-    centres = np.array([bodies.x, bodies.y]).T
-    apart = centres - centres[:, None]  # of the second body from the first
-    place = np.einsum("ijx,ikx->ijk", apart, normals)[..., None] + np.einsum("jcx,ikx->ijkc", corners, normals)
-    half = np.array([bodies.half_x, bodies.half_y]).T[:, None]
-    gaps = np.maximum(place.min(axis=-1) - half, -half - place.max(axis=-1)).max(axis=-1)
-    return np.asarray(np.maximum(gaps, gaps.T))
-
-
 def expected_neighbours(world: World) -> list[list[int]]:
     """Return for every body those after it that are within the skin, unless both are fixed."""
     bodies, reach = world.bodies[:-1].view(np.recarray), float(world.controls[0].skin)
     way = np.hypot(bodies.x - bodies.x[:, None], bodies.y - bodies.y[:, None])
-    is_near = (way <= bodies.radius + bodies.radius[:, None] + reach) & (overlaps(bodies) <= reach)
     is_free = bodies.inverse_mass > 0.0
-    is_near &= np.triu(is_free | is_free[:, None], 1)
-    return [np.flatnonzero(row).tolist() for row in is_near]
+    may = np.triu((way <= bodies.radius + bodies.radius[:, None] + reach) & (is_free | is_free[:, None]), 1)
+    return [
+        [j for j in np.flatnonzero(row).tolist() if apart(bodies[i], bodies[j]) <= reach] for i, row in enumerate(may)
+    ]
 
 
 def found_neighbours(world: World) -> list[list[int]]:
@@ -100,15 +88,13 @@ def found_neighbours(world: World) -> list[list[int]]:
 
 HEAPS = [
     pytest.param(alike, 0.4, {}, 0, id="alike"),
-    pytest.param(up_to(3.0), 0.3, {}, 0, id="one to three"),
     pytest.param(up_to(50.0), 2.0, {}, 5, id="one to fifty"),
     pytest.param(planks, 0.8, {}, 6, id="planks"),
     pytest.param(alike, 0.5, HILL | WALLS, 4, id="slabs"),
-    pytest.param(up_to(10.0), 0.5, HILL, 3, id="slabs and sizes"),
 ]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("sides", "area", "tables", "large"), HEAPS)
 def test_grid_finds_the_pairs_that_looking_at_all_of_them_finds(
     seed: int, sides: Sides, area: float, tables: dict[str, Any], large: int

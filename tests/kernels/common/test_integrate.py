@@ -5,17 +5,13 @@ from __future__ import annotations
 from math import cos, sin
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import BODY, CONTROLS, zeros
 from blocksim.kernels.common.integrate import (
     accelerate_and_kick,
     kick_and_drift,
-    place_all_corners,
-    renew_rotations,
 )
-from blocksim.kernels.common.shapes import place_corners
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, Records
@@ -82,22 +78,6 @@ def test_fixed_bodies_and_the_ground_stay_and_leave_their_forces_to_the_support(
         assert (bodies[name] == 1e6).all()
 
 
-def random_bodies(seed: int) -> Records:
-    """Return five free bodies, a fixed one and the ground, with random states, totals and numbers of pairs."""
-    random = np.random.default_rng(seed)
-    bodies = zeros(7, BODY)
-    for name in ("x", "y", "angle", "vx", "vy", "spin", "ax", "ay", "spin_rate"):
-        bodies[name][:5] = random.normal(size=5)
-    for name in ("fx", "fy", "torque"):
-        bodies[name] = random.normal(size=7)
-    for name in ("half_x", "half_y", "inverse_mass", "inverse_inertia"):
-        bodies[name][:5] = random.uniform(0.5, 2.0, 5)
-    bodies.half_x[-1] = np.inf  # a half-plane
-    bodies.cos, bodies.sin = np.cos(bodies.angle), np.sin(bodies.angle)
-    bodies.pairs_now, bodies.pairs_before = random.integers(0, 3, (2, 7))
-    return bodies
-
-
 def test_change_of_the_number_of_pairs_is_flagged_for_free_bodies_only() -> None:
     bodies: Any = zeros(4, BODY)
     bodies.inverse_mass = (1.0, 1.0, 0.0, 0.0)
@@ -109,19 +89,3 @@ def test_change_of_the_number_of_pairs_is_flagged_for_free_bodies_only() -> None
     finish_all(bodies, STEP)
     assert bodies.pairs_before[:2].tolist() == [0, 0]
     assert bodies.pairs_changed.tolist() == [1, 1, 0, 0]
-
-
-def corner_ways(bodies: Records) -> np.ndarray:
-    """Return the ways from the centres to the upper and to the lower right corners."""
-    return np.array([[body.upper_x, body.upper_y, body.lower_x, body.lower_y] for body in bodies])
-
-
-def test_ways_to_the_corners_follow_every_turn() -> None:
-    for advance in (lambda bodies: kick_and_drift(bodies, 0, bodies.size, STEP), place_all_corners, renew_rotations):
-        bodies = random_bodies(1)
-        advance(bodies)
-        expected = bodies.copy()
-        for body in expected[:-1]:
-            place_corners(body)
-        assert corner_ways(bodies)[:5].all()
-        assert corner_ways(bodies).tobytes() == corner_ways(expected).tobytes()  # the ground has none

@@ -7,22 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import BODY, Floats, Records, zeros
+from blocksim.kernels.common.arrays import BODY, Records, zeros
 from blocksim.kernels.common.jit import entry_kernel, kernel
 from blocksim.kernels.common.simd import (
     WIDTH,
     Lane,
     Lanes,
     branch,
-    fields_0,
-    fields_4,
     greater,
-    is_all,
     lesser,
     load,
     select,
     store,
-    write_fields_0,
 )
 from blocksim.kernels.nonsmooth.arrays import BEFORE, CONSTRAINT, PACK, STATE
 
@@ -94,27 +90,3 @@ def test_lanes_have_the_bits_of_single_numbers() -> None:
     expected = np.where((total > 0.0) & (x <= y), np.maximum(total, np.abs(y)), np.minimum(-x, y) * total)
     expected = np.where(expected > x, expected, 0.5) + np.where(x > 0.0, -0.5, y)
     assert fours["shear"] == pytest.approx(expected, rel=1e-15)
-
-
-@entry_kernel
-def exchange(lines: Records, groups: Records, limit: float) -> bool:
-    """Write sums of both bodies of a group to those of its bodies a that are fast enough."""
-    group = groups[0]
-    vx, vy, spin, mass = fields_0(None, lines, group.a)
-    inertia, dx, dy, turned = fields_4(None, lines, group.b)
-    write_fields_0(None, lines, group.a, vx > limit, (vx + inertia, vy + dx, spin + dy, mass + turned))
-    return is_all(vx > limit)
-
-
-def test_records_are_gathered_and_written_where_flags_say() -> None:
-    lines, groups = zeros(10, STATE), zeros(1, PACK)
-    numbers: Floats = lines.view(np.float64).reshape(10, 8)
-    numbers[:] = np.arange(80.0).reshape(10, 8)
-    before = numbers.copy()
-    groups[0].a[:], groups[0].b[:] = (7, 2, 5, 0), (1, 3, 8, 4)
-    assert not exchange(lines, groups, 16.0)
-    expected = before.copy()
-    for a, b in ((7, 1), (5, 8)):  # bodies 0 and 2 are too slow
-        expected[a, :4] += before[b, 4:]
-    assert np.array_equal(numbers, expected)
-    assert exchange(lines, groups, -1.0)

@@ -87,19 +87,6 @@ def test_a_moment_spins_a_block_about_its_centre(scheme: str) -> None:
     assert work_of_loads(result) == pytest.approx(-3000.0 * end["angle"], rel=EXACT)
 
 
-@pytest.mark.usefixtures("compiler")
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_force_at_a_point_is_the_force_at_the_centre_and_its_moment(scheme: str) -> None:
-    at, size = [0.4, 0.2], 1500.0
-    force = {"kind": "force", "body": "1", "magnitude": size, "direction": "90 deg", "axes": "body"}
-    moment = {"kind": "moment", "body": "1", "magnitude": size * at[0]}
-    one, two = (
-        end_of(simulate(scenario_with(*loads, scheme=scheme))) for loads in ([{**force, "point": at}], [force, moment])
-    )
-    assert one == pytest.approx(two, rel=1e-9, abs=1e-12)
-    assert one["spin"] > 0.0
-
-
 HISTORIES: dict[str, tuple[dict[str, Any], float]] = {  # and the integral of the factor over 0.1 s
     "ramp": ({"kind": "ramp", "start": 0.02, "end": 0.06, "from": 0.5, "to": 2.0}, 0.01 + 0.05 + 0.08),
     "steps": ({"kind": "steps", "times": [0.03, 0.05], "factors": [1.0, -2.0]}, 0.02 - 0.1),
@@ -148,14 +135,6 @@ def test_water_on_a_turned_face_is_the_exact_integral_along_it() -> None:
     total, moment = sizes.sum(), (sizes * (x * math.sin(angle) - y * math.cos(angle))).sum()
     assert (fx, fy) == pytest.approx((total * math.cos(angle), total * math.sin(angle)), rel=1e-6)
     assert torque == pytest.approx(moment, rel=1e-6)
-
-
-def test_uniform_pressure_acts_in_the_middle_of_its_face_against_the_outward_normal() -> None:
-    load = {"kind": "pressure", "body": "1", "face": "top", "magnitude": "5 kPa"}
-    world: World = build_world(scenario_with(load))
-    assert force_at(world, world.loads[0], 0.0, Pose(0.0, HIGH, 1.0, 0.0)) == pytest.approx(
-        (0.0, -5e3 * WIDTH * DEPTH, 0.0), abs=1e-9
-    )
 
 
 def test_the_piece_of_a_history_is_found_among_those_of_several_loads() -> None:

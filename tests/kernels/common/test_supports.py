@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import AT_REST, MOTION_PIECE, REACHED, Records, World, zeros
-from blocksim.kernels.common.supports import acceleration, displacement, has_motion, piece_at, tally_support
+from blocksim.kernels.common.supports import acceleration, displacement, piece_at, tally_support
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.build import build_world
 
@@ -127,13 +127,6 @@ def test_work_on_the_support_is_tallied_by_the_trapezoid_rule_and_its_totals_are
     assert world.moved["fx"].tolist() == [5.0, -7.0]
     assert world.moved["fy"].tolist() == [10.0, -14.0]
     assert [(body.fx, body.fy, body.torque) for body in (wall, ground)] == [(0.0, 0.0, 0.0)] * 2
-
-
-@pytest.mark.parametrize(("x", "y", "moves"), [(0.0, 0.0, False), (1.0, 0.0, True), (0.0, -1.0, True)])
-def test_support_moves_where_its_motion_has_a_direction(x: float, y: float, moves: bool) -> None:
-    world = on_support([LYING]).world
-    world.controls.motion_x, world.controls.motion_y = x, y
-    assert has_motion(world.controls[0]) == moves
 
 
 @pytest.mark.parametrize("is_driven", [False, True])

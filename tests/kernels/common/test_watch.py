@@ -56,11 +56,3 @@ def test_the_largest_rotation_is_followed_to_the_end_and_the_first_frame_of_a_mo
     assert seen.steps.tolist() == [0, 6]
     assert seen.peaks.tolist() == [0.0, 0.2]
     assert frame_to_watch(seen, 1, 7) == 9
-
-
-def test_without_peaks_nothing_stops_after_the_first_move() -> None:
-    seen = watched(peaks=False)
-    assert [frame_to_watch(seen, m, 4) for m in (0, 1)] == [0, 6]
-    watch(bodies(angle=-0.2), seen, 1, 6)
-    assert seen.steps.tolist() == [0, 6]
-    assert frame_to_watch(seen, 1, 7) == 0

@@ -13,16 +13,15 @@ from blocksim.kernels.common.arrays import (
     INTERACTION,
     NORMAL,
     OPERATOR,
-    PAIR,
     POINT,
     SHEAR,
     SLOTS,
     zeros,
 )
 from blocksim.kernels.common.tolerances import DASHPOT_RANK, OPERATOR_LIFE
-from blocksim.kernels.explicit.contact import has_new_neighbours, pair_forces, shared_step, spare_lost_faces
+from blocksim.kernels.explicit.contact import has_new_neighbours, shared_step, spare_lost_faces
 from blocksim.kernels.explicit.damping import BOTH, damp
-from blocksim.kernels.explicit.forces import Touch, grip_of, inverse_masses, keep, renew_operator
+from blocksim.kernels.explicit.forces import Touch, grip_of, keep, renew_operator
 from blocksim.kernels.explicit.kinematics import Point, point_of, resolve_point, weigh_first_step
 from blocksim.kernels.explicit.laws import LINEAR, spring_at
 from blocksim.kernels.explicit.models import KERNEL, PARTICLES, SURFACE
@@ -168,29 +167,6 @@ def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(beside: float, lost:
     assert lives(world) == ([0, 0] if lost else [5, 5])
 
 
-def standing() -> World:
-    """Return a block that stands on another one, 1 um deep, and slides; nothing has been evaluated."""
-    world = pose((0.003, 1.025 - 1e-6, 0.0), (0.0, 1.0, 0.0))
-    world.bodies[0].vx = 20.0
-    return world
-
-
-def test_pair_whose_contacts_have_ended_does_nothing_but_lose_what_they_held() -> None:
-    world = standing()
-    pair_forces(world, 0, STEP)
-    world.contacts["spring"][0] = 1e-6
-    world.bodies[0].vx = 0.0
-    world.bodies[0].y += 1e-3
-    pair_forces(world, 0, STEP)
-    action = world.action[0]
-    assert (action.touches, action.is_changed) == (0, 1)
-    assert (action.fx, action.fy, action.torque_a, action.torque_b) == (0.0, 0.0, 0.0, 0.0)
-    assert action.broken > 0.0
-    assert world.pairs[0].active == 0
-    pair_forces(world, 0, STEP)
-    assert (action.dashpot, action.friction, action.broken) == (0.0, 0.0, 0.0)
-
-
 def pushed(force: float, closing: float) -> tuple[float, float]:
     """Return the force that is left of spring (5 N) and dashpot, and what has been lost (J); none was before."""
     point = Point(0.0, 0.0, 0.0, 1.0, 1e-6, closing, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
@@ -248,19 +224,6 @@ def test_displacements_and_rates_are_those_of_rigid_bodies(seed: int) -> None:
     assert point.slipping == pytest.approx(DRIFT * tangent @ velocity, abs=1e-20)
     assert point.closing_rate == pytest.approx(-normal @ later, abs=1e-14)
     assert point.slip_rate == pytest.approx(tangent @ later, abs=1e-14)
-
-
-@given(seed=SEEDS, count=st.integers(1, 2))
-def test_inverse_masses_are_those_of_the_jacobian(seed: int, count: int) -> None:
-    a, b, points = scene(seed, count)
-    some: Any = points[:count]
-    contact, operator = zeros(1, CONTACT)[0], zeros(1, OPERATOR)[0]
-    touch = Touch(zeros(1, PAIR)[0], a, b, zeros(1, INTERACTION)[0], contact, contact, operator, operator)
-    one, two = (point_of(points[i], b) for i in (0, count - 1))
-    for direction in (NORMAL, SHEAR):
-        expected = delassus(some, a, b, direction)
-        found = inverse_masses(touch, one, two, count == 2, direction)
-        assert found == pytest.approx((expected[0, 0], expected[0, -1], expected[-1, -1]), rel=1e-10, abs=1e-10)
 
 
 @pytest.mark.parametrize(("depth", "weight"), [(0.0, 0.5), (0.25e-6, 0.75), (1e-6, 1.5)])

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import ACTION, CONTACT, INTERACTION, PARTICLE, PARTICLE_CONTACT, zeros
+from blocksim.kernels.common.arrays import ACTION, INTERACTION, zeros
 from blocksim.kernels.common.friction import friction_coefficient
 from blocksim.kernels.explicit.friction import clip_to_cone, coulomb_limit, draw_same_spring, draw_spring
-from blocksim.kernels.explicit.history import change_contacts, shear_stiffness_before, stiffness_before
+from blocksim.kernels.explicit.history import change_contacts
 from blocksim.kernels.explicit.kinematics import has_just_begun, resolve_point
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, LINEAR, elastic_force, tangent_stiffness
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
@@ -149,35 +149,10 @@ def test_ended_contact_tallies_half_the_work_of_its_last_step() -> None:
     assert lost.broken == pytest.approx(0.5 * stiffness * 1e-7 * (1e-7 + slip))
 
 
-DEPTH, SHARE = 4e-6, 0.25
-
-
 def values() -> Record:
     record = zeros(1, INTERACTION)[0]
     record.normal_stiffness, record.shear_ratio = 1e6, 0.8
     return record
-
-
-def corner() -> Record:
-    contact = zeros(1, CONTACT)[0]
-    contact.spring, contact.depth, contact.normal_force, contact.shear_force = 1e-6, DEPTH, 7.0, 1.0
-    return contact
-
-
-def particle() -> Record:
-    contact = zeros(1, PARTICLE_CONTACT)[0]
-    for name in ("spring", "depth", "normal_force", "shear_force"):
-        contact[name] = corner()[name]
-    contact.share = SHARE
-    return contact
-
-
-@pytest.mark.parametrize(("law", "stiffness"), [(LINEAR, 8e5), (HERTZ_MINDLIN, 2.4e3)])
-def test_stiffness_before_is_that_of_the_pair_or_of_the_particle(law: float, stiffness: float) -> None:
-    for contact, particles, share in ((corner(), None, 0.5), (particle(), zeros(1, PARTICLE), SHARE)):
-        of_spring = stiffness_before(contact, 0.5e6, values(), particles)
-        assert of_spring == share * 1e6
-        assert shear_stiffness_before(contact, of_spring, values(), law) == pytest.approx(share * stiffness)
 
 
 STATIC, KINETIC, SPEED = 0.31, 0.19, 0.005
@@ -201,17 +176,6 @@ def test_friction_of_fast_sliding_is_kinetic() -> None:
 def test_friction_falls_exponentially_with_speed_either_way(speed: float) -> None:
     expected = KINETIC + (STATIC - KINETIC) * exp(-abs(speed) / SPEED)
     assert friction_coefficient(STATIC, KINETIC, SPEED, speed) == pytest.approx(expected, rel=1e-14)
-
-
-@given(force=st.floats(0.0, 1e3), speed=st.floats(-0.05, 0.05), needed=st.floats(0.0, 1e3))
-def test_limit_decides_as_the_full_formula_does(force: float, speed: float, needed: float) -> None:
-    values = rubbing()
-    exact = friction_coefficient(STATIC, KINETIC, SPEED, speed) * force
-    limit = coulomb_limit(values, force, speed, needed)
-    assert (needed > limit) == (needed > exact)
-    if needed > limit:
-        assert limit == exact
-    assert limit <= STATIC * force
 
 
 @given(force=st.floats(-1e3, 1e3), normal=st.floats(0.0, 1e3), speed=st.floats(-0.05, 0.05), spring=st.floats(0.0, 1.0))
@@ -250,9 +214,7 @@ class Dragged:
         self.values.shear_ratio = 0.8
         self.values.static_friction = self.values.kinetic_friction = friction
         self.values.transition_speed = 1e-3
-        self.spring = self.stiffness = self.force = 0.0
-        self.slides = False
-        self.work = self.lost = 0.0
+        self.spring = self.stiffness = self.force = self.work = 0.0
 
     @property
     def stored(self) -> float:
@@ -264,17 +226,16 @@ class Dragged:
         stiffness = 0.8 * tangent_stiffness(self.law, STIFFNESS, depth)
         return self.friction * elastic_force(self.law, STIFFNESS, depth) / stiffness
 
-    def drag(self, depth: float, slip: float, drawn: float = 1.0) -> float:
-        """Go to an overlap with a slip (m) of which `drawn` draws the spring; return what friction has taken (J)."""
+    def drag(self, depth: float, slip: float) -> float:
+        """Go to an overlap with a slip (m); return what friction has taken (J)."""
         normal_force = elastic_force(self.law, STIFFNESS, depth)
         stiffness = 0.8 * tangent_stiffness(self.law, STIFFNESS, depth)
         before, energy = self.force, self.stored
-        self.spring, limit, self.slides, lost = draw_spring(
-            self.values, stiffness, self.stiffness, self.spring, slip, drawn, normal_force, 0.0
+        self.spring, limit, _, lost = draw_spring(
+            self.values, stiffness, self.stiffness, self.spring, slip, 1.0, normal_force, 0.0
         )
         self.stiffness = stiffness
         self.force = clip_to_cone(self.values, stiffness * self.spring, limit, normal_force, 0.0)
-        self.lost += lost
         self.work += 0.5 * (before + self.force) * slip
         assert lost == pytest.approx(0.5 * (before + self.force) * slip - (self.stored - energy), abs=1e-16)
         return lost
@@ -299,18 +260,3 @@ def test_shear_spring_never_gives_back_more_than_was_put_in(
         assert contact.work >= contact.stored - 1e-14 * scale
         limit = friction * elastic_force(law, STIFFNESS, depth)
         assert abs(contact.force) <= limit * (1.0 + 1e-12)
-
-
-@laws
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_steady_slip_costs_the_friction_force_times_the_way(law: int, way: float) -> None:
-    contact = Dragged(law, 0.3)
-    step = 0.05 * contact.reach(DEEPEST) * way
-    for _ in range(40):
-        contact.drag(DEEPEST, step)
-    assert contact.slides
-    lost, force = contact.lost, 0.3 * elastic_force(law, STIFFNESS, DEEPEST)
-    for _ in range(100):
-        contact.drag(DEEPEST, step)
-    assert contact.lost - lost == pytest.approx(force * 100 * abs(step))
-    assert contact.force == pytest.approx(way * force)

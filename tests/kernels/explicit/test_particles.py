@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sqrt
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,15 +15,13 @@ from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.models.particles import (
     ROWS,
-    first_within,
-    last_within,
     row_direction,
     row_intervals,
     seen_from_row,
 )
 from blocksim.kernels.explicit.models.smoothed import add_row
 from blocksim.kernels.sph.functions import kernel_value
-from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world.build import build_world
 from tests.kernels.scenes import pose, touch
 
@@ -70,18 +68,6 @@ def test_interlocked_discs_touch_two_each_at_thirty_degrees(below: float | None)
     slopes = np.degrees(np.arcsin(np.abs(found.points.nx)))
     assert slopes == pytest.approx(np.full(2 * COUNT, 30.0), abs=0.02)
     assert found.wrench()[0] == pytest.approx(0.0, abs=1e-18)
-
-
-@pytest.mark.parametrize("tilt", [0.0, 0.3])
-def test_straight_pieces_of_ground_have_no_bumps(tilt: float) -> None:
-    """Discs roll on lines: a sliding block keeps its height over a profile to the stiffness of its contacts."""
-    contact = {"model": "particles", "stiffness_scale": 1e-3}
-    lying = {"y": HEIGHT / 2, "velocity": [0.3 * cos(tilt), 0.0]}
-    profile = {"profile": [[-1.0, 0.0], [1.0, 0.0]]}
-    scene = Simulation(build_world(scenario_of([lying], contact=contact, ground=profile)))
-    touching = scene.to_time(2e-3).contact_records
-    assert len(touching) == COUNT
-    assert np.abs(touching.nx).max() < 1e-12
 
 
 def test_contact_keeps_its_history_while_its_disc_begins_and_ends_to_touch_others(pace: int) -> None:
@@ -134,19 +120,6 @@ def test_particles_of_a_row_lie_where_the_row_says(model: str) -> None:
     assert k == particles.size
 
 
-@given(
-    along=st.floats(-0.05, 0.05), width=st.floats(1e-5, 0.02), spacing=st.floats(1e-4, 5e-3), last=st.integers(0, 60)
-)
-def test_particles_within_a_width_are_those_between_first_and_last(
-    along: float, width: float, spacing: float, last: int
-) -> None:
-    found = set(range(first_within(along, width, spacing), last_within(along, width, spacing, last) + 1))
-    for j in range(last + 1):
-        distance = abs(along - j * spacing)
-        if abs(distance - width) > 1e-12:
-            assert (j in found) == (distance < width)
-
-
 COARSE, ABOVE, LOWER = 2e-3, 1e-4, 0
 
 
@@ -175,17 +148,6 @@ def test_face_has_the_stiffness_of_two_corners_at_any_spacing(spacing: float, be
     assert len(corners.points) == 2
     assert len(particles.points) > WIDTH / spacing
     assert particles.wrench() == pytest.approx(corners.wrench(), abs=1e-18)
-
-
-@pytest.mark.parametrize("spacing", SPACINGS)
-def test_tilted_face_is_turned_back_by_its_rows_of_springs(spacing: float) -> None:
-    # springs spread over a face have a third of the moment that two of the same sum have at its ends
-    tilt = 1e-6
-    rocked = touch("kernel", spacing=spacing, below=None, depth=2e-6 + WIDTH * tilt, angle=tilt).wrench()
-    assert rocked[1] == pytest.approx(2.0 * (2e-6 + 0.5 * WIDTH * tilt), rel=1e-6)
-    intervals = WIDTH / spacing
-    discrete = 1.0 + 2.0 / intervals**2  # the trapezoid rule over a parabola
-    assert rocked[2] == pytest.approx(-2.0 * tilt * (WIDTH / 2) ** 2 / 3.0 * discrete, rel=1e-6)
 
 
 @given(shift=st.floats(-0.6 * WIDTH, 0.6 * WIDTH), depth=DEPTHS, spacing=st.sampled_from(SPACINGS))

@@ -8,149 +8,69 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import ACTION, GROUP, LEDGER, zeros
+from blocksim.kernels.common.arrays import GROUP, LEDGER, zeros
 from blocksim.kernels.common.integrate import accelerate_and_kick, kick_and_drift
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.explicit.partition import (
     add_from_before,
     add_kept,
     keep,
-    pairs_before,
     partition,
 )
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
 from blocksim.kernels.explicit.step import advance, changed_forces, forces_between, forces_within
 from blocksim.world.build import with_threads
 from tests.kernels.crews import advanced, assert_same_bits, bits
-from tests.kernels.scenes import SCENES, among_fixed, on_hills, rows, shake, soft_world, with_pairs
+from tests.kernels.scenes import SCENES, among_fixed, rows, shake, soft_world, with_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.kernels.common.arrays import Record, World
+    from blocksim.kernels.common.arrays import World
 
 
-MOST = 7  # threads
-SIZES = (1, 2, 3, MOST)
-
-
-def lying(columns: int, count: int) -> World:
-    return soft_world(rows(columns, count))
-
-
-def apart() -> World:
-    """Return blocks in the air that no list has a pair of."""
-    return soft_world([{"x": 0.1 * i, "y": 1.0} for i in range(40)])
-
-
-def falling() -> World:
-    """Return blocks in the air but for the last ones, which all pairs are of."""
-    return soft_world(
-        [{"x": 0.1 * i, "y": 1.0} for i in range(40)] + [{**row, "x": row["x"] + 5.0} for row in rows(5, 2)]
-    )
+SIZES = (1, 2, 3, 7)  # threads
 
 
 WORLDS: dict[str, Callable[[], World]] = {
-    "many rows": lambda: lying(20, 6),
-    "fewer blocks than threads": lambda: lying(3, 1),
-    "one block": lambda: lying(1, 1),
-    "as many as a group": lambda: lying(GROUP // 2, 2),
-    "one more than groups": lambda: lying(11, 3),
-    "no pairs": apart,
-    "pairs at the end": falling,
-    "among fixed blocks": among_fixed,
+    "many rows": lambda: soft_world(rows(20, 6)),
+    "fewer blocks than threads": lambda: soft_world(rows(3, 1)),
+    "one more than groups": lambda: soft_world(rows(11, 3)),
+    "no pairs": lambda: soft_world([{"x": 0.1 * i, "y": 1.0} for i in range(40)]),
     "among moving supports": lambda: shake(among_fixed()),
-    "on hills": on_hills,
 }
 
 
-@pytest.fixture(scope="module")
-def worlds() -> dict[str, World]:
-    """Return all worlds, their pairs listed, with room for as many threads as there are at most."""
-    return {name: with_threads(with_pairs(make()), MOST) for name, make in WORLDS.items()}
-
-
-@pytest.fixture(params=WORLDS)
-def world(request: pytest.FixtureRequest, worlds: dict[str, World]) -> World:
-    """Return one world after the other."""
-    return worlds[request.param]
-
-
-def pairs_of(world: World) -> Any:
-    return world.pairs[: world.clock[0].pair_count]
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_every_body_and_every_pair_is_in_exactly_one_share_that_begins_at_a_whole_group(
-    world: World, size: int
-) -> None:
-    partition(world, size)
-    shares: Any = world.shares[:size]
-    for first, last, count in (
-        (shares.first_body, shares.last_body, world.bodies.size),
-        (shares.first_pair, shares.last_pair, int(world.clock[0].pair_count)),
-    ):
-        assert (first[0], last[-1]) == (0, count)
-        assert first[1:].tolist() == last[:-1].tolist()
-        assert (first <= last).all()
-    for share in shares:
-        a = pairs_of(world).a[share.first_pair : share.last_pair]
-        assert ((share.first_body <= a) & (a < share.last_body)).all()
-        assert share.first_body % GROUP == 0 or share.first_body == share.last_body == world.bodies.size
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_pairs_between_shares_are_those_whose_second_body_is_anothers_and_gets_a_force(world: World, size: int) -> None:
-    partition(world, size)
-    owner = np.zeros(world.bodies.size, dtype=int)
-    for k, share in enumerate(world.shares[:size]):
-        owner[share.first_body : share.last_body] = k
-    expected: list[int] = []
-    for p, pair in enumerate(pairs_of(world)):
-        is_between = bool(owner[pair.a] != owner[pair.b] and world.bodies[pair.b].counts)
-        assert bool(pair.is_between) == is_between
-        expected += [p] if is_between else []
-    assert world.between.pair[: len(expected)].tolist() == expected
-    for share in world.shares[:size]:
-        own = [p for p in expected if share.first_pair <= p < share.last_pair]
-        assert world.between.pair[share.first_between : share.last_between].tolist() == own
-    assert size > 1 or not expected
-
-
-@pytest.mark.parametrize("size", SIZES)
-def test_tasks_cover_the_pairs_between_shares_once_and_evenly(world: World, size: int) -> None:
-    partition(world, size)
-    shares: Any = world.shares[:size]
-    count = int(pairs_of(world).is_between.sum())
-    tasks = [m for share in shares for m in range(share.first_task, share.last_task)]
-    assert tasks == list(range(count))
-    lengths = shares.last_task.astype(int) - shares.first_task
-    assert lengths.max() - lengths.min() <= 1
-
-
-def test_number_of_pairs_before_a_body_is_that_of_smaller_first_bodies(world: World) -> None:
-    first = pairs_of(world).a
-    for body in range(world.bodies.size + 1):
-        assert pairs_before(world, body) == (first < body).sum()
-
-
-def totals(body: Record) -> list[float]:
-    return [float(body.fx), float(body.fy), float(body.torque), int(body.pairs_now)]
-
-
-def two_blocks(*, is_between: bool = False) -> World:
-    world = with_pairs(soft_world([{"y": 1.0}, {"x": 0.033, "y": 1.0}]))
-    world.pairs[0].is_between = is_between
-    return world
-
-
-def test_losses_of_changed_contacts_are_tallied_at_once_even_where_nothing_touches_any_more() -> None:
-    world, tally, action = two_blocks(), zeros(1, LEDGER)[0], zeros(1, ACTION)[0]
-    action.fx, action.dashpot, action.friction, action.broken, action.is_changed = 1.0, 5.0, 6.0, 7.0, 1
-    tally.dashpot, tally.friction, tally.broken = 10.0, 20.0, 30.0
-    assert add_kept(world, world.pairs[0], action, tally) == (0.0, 0.0)
-    assert (tally.dashpot, tally.friction, tally.broken) == (15.0, 26.0, 37.0)
-    assert totals(world.bodies[0]) == totals(world.bodies[1]) == [0.0, 0.0, 0.0, 0]
+@pytest.mark.parametrize("name", WORLDS)
+def test_everything_is_in_exactly_one_share_that_begins_at_a_whole_group(name: str) -> None:
+    """Bodies, pairs, and the pairs between shares: those whose second body is another's and gets a force."""
+    world = with_threads(with_pairs(WORLDS[name]()), SIZES[-1])
+    pairs: Any = world.pairs[: world.clock[0].pair_count]
+    for size in SIZES:
+        partition(world, size)
+        shares: Any = world.shares[:size]
+        for first, last, count in (
+            (shares.first_body, shares.last_body, world.bodies.size),
+            (shares.first_pair, shares.last_pair, pairs.size),
+        ):
+            assert (first[0], last[-1]) == (0, count)
+            assert first[1:].tolist() == last[:-1].tolist()
+            assert (first <= last).all()
+        owner = np.searchsorted(shares.last_body, np.arange(world.bodies.size), side="right")
+        between = (owner[pairs.a] != owner[pairs.b]) & (world.bodies.counts[pairs.b] == 1)
+        assert pairs.is_between.astype(bool).tolist() == between.tolist()
+        expected = np.flatnonzero(between)
+        assert world.between.pair[: expected.size].tolist() == expected.tolist()
+        for k, share in enumerate(shares):
+            assert (owner[pairs.a[share.first_pair : share.last_pair]] == k).all()
+            assert share.first_body % GROUP == 0 or share.first_body == share.last_body == world.bodies.size
+            own = expected[(expected >= share.first_pair) & (expected < share.last_pair)]
+            assert world.between.pair[share.first_between : share.last_between].tolist() == own.tolist()
+        tasks = [m for share in shares for m in range(share.first_task, share.last_task)]
+        assert tasks == list(range(expected.size))
+        lengths = shares.last_task.astype(int) - shares.first_task
+        assert lengths.max() - lengths.min() <= 1
+    assert bool(pairs.is_between.any()) == (name in {"many rows", "one more than groups", "among moving supports"})
 
 
 TALLIED = ("dashpot", "friction", "broken")
@@ -194,12 +114,9 @@ def evaluate_in_shares(world: World, size: int, *, goes_on: bool = False) -> Non
         forces_within(world, share, step, goes_on)
 
 
-SOME = ["wall", "among moving supports", "on hills", "discs"]
-
-
 @pytest.mark.parametrize("goes_on", [False, True])
 @pytest.mark.parametrize("size", [2, 3, CREW])
-@pytest.mark.parametrize("scene", SOME)
+@pytest.mark.parametrize("scene", ["wall", "among moving supports", "on hills", "discs"])
 def test_forces_of_several_shares_have_the_bits_of_one(
     moving: Callable[[str], World], scene: str, size: int, *, goes_on: bool
 ) -> None:

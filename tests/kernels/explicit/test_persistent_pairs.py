@@ -315,21 +315,6 @@ def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(ste
     assert kind == (CHANGED if changes else TOUCHING)
 
 
-def test_oblique_corners_that_meet_are_not_steady_and_aligned_ones_are() -> None:
-    aligned = on_block(0.0)
-    assert aligned.pairs[0].duplicates != 0
-    assert persistent_forces(aligned, 0, STEP, aligned.particles)[0] == TOUCHING
-    oblique = pose((0.0, 0.0, pi / 4), (0.0, 1.0, 0.0))
-    a, b = oblique.bodies[:2]
-    a.x, a.y = b.half_x - 1e-7, 1.0 + b.half_y - 1e-6 + 0.5 * (WIDTH + HEIGHT) * sin(pi / 4)
-    a.x += 0.5 * (WIDTH - HEIGHT) * sin(pi / 4)
-    assert rebuild_pairs(oblique)
-    pair_forces(oblique, 0, 0.0)
-    assert oblique.pairs[0].active == 1
-    assert oblique.pairs[0].duplicates != 0
-    assert_changed(oblique)
-
-
 TRIES = 4000
 SIX = [[np.cos(angle), np.sin(angle)] for angle in np.arange(6) * np.pi / 3.0]
 SHARP = [[-1.0, -0.2], [1.0, -0.2], [-0.8, 0.9]]

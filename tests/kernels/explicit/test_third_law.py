@@ -20,10 +20,8 @@ CHECKS = """
 import math
 
 from blocksim.kernels.explicit.persistent_forces import TOUCHING, persistent_forces
-from blocksim.scenario.document import scenario_from_mapping
 from blocksim.scenario.laws import LAWS
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation
-from blocksim.world.interactions import damping_ratio
 
 LAW = LAWS["power-1.25"]
 CONTACT = {"law": LAW.name, "stiffness_scale": 0.01, "max_overlap": 5e-3}
@@ -60,23 +58,12 @@ def is_steady(world):
 for shape in SHAPES:
     for angle in (0.0, TURNED):
         for on_block in (False, True):
-            for restitution in (0.3, 0.5, 0.7, 0.9):
+            for restitution in (0.3, 0.9):
                 speed, residual, steady = strike(shape, angle, restitution, on_block)
                 assert abs(speed - restitution) < 0.01, (shape, angle, on_block, restitution, speed)
                 assert residual < 1e-3, (shape, angle, on_block, restitution, residual)
                 assert steady > 0, (shape, angle, on_block, restitution)
 
-stiff, soft = (LAW.greatest_slope(1e9, 2.0, speed, 0.0) for speed in (4.0, 1.0))
-assert math.isclose(stiff / soft, 4.0 ** (2.0 * 0.25 / 2.25))  # of d^0.25, d going with v^(2/2.25)
-light = [CaseScene([{"y": height}], contact=CONTACT).start().step for height in (0.1, 1.0)]
-assert light[1] < light[0]  # harder impacts, smaller steps
-tables = {
-    "schema": 1, "name": "one", "contact": {"law": LAW.name}, "materials": {"m": {"density": 1e3, "young_modulus": 1e9,
-    "poisson_ratio": 0.2}}, "blocks": {"b": {"width": 0.1, "height": 0.1, "length": 0.1, "material": "m"}},
-    "bodies": [{"block": "b", "x": 0.0, "y": 0.05}],
-}
-assert math.isclose(LAWS[scenario_from_mapping(tables).contact.law].compression(1.0, 10.0), 10.0 ** (1.0 / 1.25))
-assert math.isclose(damping_ratio(0.5, LAW.name) / damping_ratio(0.5), math.sqrt(2.25 / 2.5))
 print("done")
 """
 

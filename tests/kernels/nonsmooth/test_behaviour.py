@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 from math import radians
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +10,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from blocksim.bench.harness import pushed_wall, three_blocks
-from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED, TEAM_SIZE
-from blocksim.kernels.common.members import Watched
+from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.cone import solve_two
 from blocksim.kernels.nonsmooth.cuts import set_length
-from blocksim.kernels.nonsmooth.energy import NONSMOOTH_LEDGER
-from blocksim.kernels.nonsmooth.step import advance_nonsmooth_in_team, advance_nonsmooth_members
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
-from blocksim.world.build import build_stacks, only_stack
-from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth, with_more_threads
-from tests.kernels.scenes import rigid
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -125,46 +117,6 @@ def test_edges_of_pieces_of_ground(begin: Callable[..., Any]) -> None:
     # as the explicit scheme has it: turned about the edge of a step
     assert run.bodies.x[0] == pytest.approx(12.285e-3, abs=1e-4)
     assert math.degrees(run.bodies.angle[0]) == pytest.approx(-47.69, abs=0.3)
-
-
-@pytest.mark.parametrize(("restitution", "steps"), [(0.1, 200), (0.9, 30)])
-def test_same_bits_for_any_number_of_threads_and_calls(
-    begin: Callable[..., Any], restitution: float, steps: int
-) -> None:
-    scenario = pushed_wall(8, 6, contact={"restitution": restitution})
-    whole = begin(scenario, velocity_tolerance=0.03).to_step(steps)
-    parts = begin(scenario, velocity_tolerance=0.03).to_step(steps // 3).to_step(steps)
-    assert np.array_equal(whole.state(), parts.state())
-    scene = with_more_threads(build_nonsmooth(rigid(scenario, velocity_tolerance=0.03)), 2)
-    scene.world.team[TEAM_SIZE] = 2
-    codes = [0, 0]
-
-    def be(k: int) -> None:
-        codes[k] = advance_nonsmooth_in_team(scene, steps, k)
-
-    threads = [threading.Thread(target=be, args=(k,)) for k in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert codes == [REACHED, REACHED]
-    for name in ("x", "y", "angle", "vx", "vy", "spin"):
-        assert np.array_equal(scene.world.bodies[name], whole.world.bodies[name])
-
-
-def test_members_of_an_ensemble_have_the_same_bits(begin: Callable[..., Any]) -> None:
-    scenarios = [three_blocks({"restitution": e}) for e in (0.0, 0.1)]
-    alone = [begin(scenario).to_step(400) for scenario in scenarios]
-    scenes = only_stack(build_stacks([rigid(scenario) for scenario in scenarios], NONSMOOTH)).scenes
-    codes, starts = np.zeros(2, dtype=np.int64), np.zeros((2, len(NONSMOOTH_LEDGER) + 2))
-    places, lengths = np.zeros((2, 3, 3)), np.zeros((2, 3))
-    watched = Watched(
-        np.zeros(2), np.zeros(2), np.zeros(2, dtype=np.int64), places, places, lengths, lengths, np.zeros(2)
-    )  # no frames
-    advance_nonsmooth_members(scenes, np.arange(2), np.full(2, 400), starts, codes, watched)
-    for m in range(2):
-        assert codes[m] == alone[m].status
-        assert np.array_equal(scenes.world.bodies[m].x, alone[m].world.bodies.x)
 
 
 def test_flight_is_a_parabola_in_position_and_velocity(single: Callable[..., Simulation]) -> None:

@@ -36,8 +36,8 @@ def test_elastic_block_comes_back_to_where_it_fell_from(single: Callable[..., Si
     assert run.residual() < 1e-12
 
 
-def constraint(gap: float) -> list[dict[str, Any]]:
-    """Return five blocks in a constraint (m between them), of which the first meets the second within a substep."""
+def row(gap: float) -> list[dict[str, Any]]:
+    """Return five blocks in a row (m between them), of which the first meets the second within a substep."""
     blocks: list[dict[str, Any]] = [{"x": i * (WIDTH + gap), "y": 0.2} for i in range(5)]
     blocks[0] |= {"x": -1.3e-4, "velocity": [1.0, 0.0]}
     return blocks
@@ -48,7 +48,7 @@ def constraint(gap: float) -> list[dict[str, Any]]:
 def test_row_of_blocks_apart_passes_a_blow_on(
     single: Callable[..., Simulation], gap: float, within: float, has_cuts: int
 ) -> None:
-    run = single(constraint(gap), restitution=1.0, gravity=0.0, **SMOOTH)
+    run = single(row(gap), restitution=1.0, gravity=0.0, **SMOOTH)
     run.scene.contacts.stepping[0].has_cuts = has_cuts
     run.to_time(0.02)
     assert run.bodies.vx == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0], abs=within)
@@ -61,53 +61,25 @@ def test_long_row_passes_a_blow_on(single: Callable[..., Simulation]) -> None:
     assert run.bodies.vx == pytest.approx([*[0.0] * 19, 1.0], abs=0.02)
 
 
-def struck_row(count: int, gap: float, **more: Any) -> tuple[list[dict[str, Any]], list[int]]:
-    """Return a row of blocks that stand on the ground (m between them), `incoming` ones at 1 m/s, and their places.
-
-    Optional are `heights` (m) and `middle` (m), `is_mirrored`, `has_outlines`, and the `order` in which they are given.
-    """
-    heights = more.get("heights", [HEIGHT] * count)
-    incoming, sign = more.get("incoming", 1), -1.0 if more.get("is_mirrored") else 1.0
-    order = more.get("order", list(range(count)))
-    blocks = []
-    for i in order:
-        x = i * WIDTH + max(0, i - incoming + 1) * gap - (1e-3 if i < incoming else 0.0)
-        speed = 1.0 if i < incoming else 0.0
-        middle = more.get("middle", 0.5 * heights[i])
-        corners = [[0.5 * a * WIDTH, 0.5 * b * heights[i]] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        shape = {"outline": corners} if more.get("has_outlines") else {"height": heights[i]}
-        blocks.append({"x": sign * x, "y": middle, **shape, "velocity": [sign * speed, 0.0]})
-    return blocks, [order.index(i) for i in range(count)]
-
-
-GAPS = (0.0, 1e-9, 1e-6)
-CRADLES: dict[str, tuple[int, dict[str, Any], list[float]]] = {
-    "three": (3, {}, [0.0, 0.0, 1.0]),
-    "five": (5, {}, [0.0, 0.0, 0.0, 0.0, 1.0]),
-    "seven": (7, {}, [0.0] * 6 + [1.0]),
-    "two on three": (5, {"incoming": 2}, [0.0, 0.0, 0.0, 1.0, 1.0]),
-    "from the right": (5, {"is_mirrored": True}, [0.0, 0.0, 0.0, 0.0, 1.0]),
-    "outlines": (5, {"has_outlines": True}, [0.0, 0.0, 0.0, 0.0, 1.0]),
-    "in another order": (5, {"order": [3, 0, 4, 2, 1]}, [0.0, 0.0, 0.0, 0.0, 1.0]),
-}
-
-
-@pytest.mark.parametrize("gap", GAPS)
-@pytest.mark.parametrize("name", CRADLES)
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-6])
+@pytest.mark.parametrize(("count", "incoming"), [(3, 1), (7, 1), (5, 2)])
 def test_blocks_that_touch_are_struck_one_after_the_other(
-    single: Callable[..., Simulation], name: str, gap: float
+    single: Callable[..., Simulation], count: int, incoming: int, gap: float
 ) -> None:
-    count, more, expected = CRADLES[name]
-    blocks, places = struck_row(count, gap, **more)
+    """As many leave a row of blocks that stand on the ground (m between them) as come in at 1 m/s."""
+    blocks: list[dict[str, Any]] = [{"x": i * WIDTH - 1e-3, "y": HEIGHT / 2} for i in range(count)]
+    for i, block in enumerate(blocks):
+        block["velocity"] = [1.0 if i < incoming else 0.0, 0.0]
+        block["x"] += 0.0 if i < incoming else (i - incoming + 1) * gap + 1e-3
     run = single(blocks, restitution=1.0, **SMOOTH).to_time(0.01)
-    sign = -1.0 if more.get("is_mirrored") else 1.0
-    assert sign * run.bodies.vx[places] == pytest.approx(expected, abs=1e-3)  # the tolerance of the velocity pass
-    assert sign * run.bodies.vx.sum() == pytest.approx(more.get("incoming", 1), abs=1e-9)
-    assert run.kinetic <= 0.5 * run.bodies.mass[0] * more.get("incoming", 1) * (1.0 + 1e-9)
+    expected = [0.0] * (count - incoming) + [1.0] * incoming
+    assert run.bodies.vx == pytest.approx(expected, abs=1e-3)  # the tolerance of the velocity pass
+    assert run.bodies.vx.sum() == pytest.approx(incoming, abs=1e-9)
+    assert run.kinetic <= 0.5 * run.bodies.mass[0] * incoming * (1.0 + 1e-9)
 
 
 def test_contacts_report_the_impulses_of_all_rounds(single: Callable[..., Simulation]) -> None:
-    run = single(constraint(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
+    run = single(row(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
     run.scene.contacts.stepping[0].has_cuts = 0  # it would be in an interval each
     before = run.bodies.vx.copy()
     run.to_step(1)

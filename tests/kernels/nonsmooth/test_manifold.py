@@ -17,9 +17,6 @@ from blocksim.kernels.nonsmooth.faces import (
     Face,
     block_ahead,
     clip,
-    face_on,
-    side_numbered,
-    side_opposite,
 )
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, bend_of, bend_time, follow_curvature, slip_of
@@ -157,20 +154,6 @@ def test_contact_that_presses_has_the_normal_and_arms_of_the_middle_of_the_step(
 
 angles = st.floats(-4.0, 4.0)
 places = st.floats(-0.05, 0.05)
-
-
-@given(angle=angles, way=angles)
-def test_face_opposite_a_direction_looks_most_against_it(angle: float, way: float) -> None:
-    body = make_body(0.1, -0.3, angle, width=0.03, height=0.02)
-    block = Seen(body.x, body.y, body.cos, body.sin, body.half_x, body.half_y)
-    side, _ = side_opposite(math.cos(way), math.sin(way), block, None, 0)
-    face = face_on(block, side)
-    (number,) = [k for k in range(4) if side_numbered(block, None, k) == side]
-    assert face.nx * math.cos(way) + face.ny * math.sin(way) <= -math.sqrt(0.5) + 1e-12
-    turned = angle + number * math.pi / 2
-    assert (face.nx, face.ny) == pytest.approx((math.cos(turned), math.sin(turned)), abs=1e-12)
-    assert (face.distance, face.right) == ((0.015, 0.01) if number in {0, 2} else (0.01, 0.015))
-    assert face.left == -face.right
 
 
 @given(left=places, width=st.floats(1e-4, 0.1), gap=places, rise=places, half=st.floats(0.005, 0.05), middle=places)

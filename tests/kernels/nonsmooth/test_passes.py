@@ -224,13 +224,6 @@ def test_impact_reverses_the_approach_of_the_point_by_its_restitution(
         assert before[is_met].max() < -0.5
 
 
-@pytest.mark.parametrize(("rate", "rebounds"), [(0.019, False), (0.021, True)])
-def test_slower_impacts_than_the_threshold_do_not_rebound(rate: float, rebounds: bool) -> None:
-    block = Block(0.0, HALF - 1e-7, vy=-rate)
-    scene = after_substep([block], restitution=0.5, gravity=0.0, restitution_threshold=0.02, **SLIPPERY)
-    assert velocities(scene.contacts.states)[0, 1] == pytest.approx(0.5 * rate if rebounds else 0.0, abs=1e-9)
-
-
 @pytest.mark.parametrize("others", [0, 2])  # in rounds, and not
 def test_point_that_parts_beside_one_that_meets_is_not_made_to_rebound(others: int) -> None:
     """A heel comes down while the toe is lifted, out of an overlap: the blow takes from that, and nothing gives."""

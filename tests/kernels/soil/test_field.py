@@ -58,14 +58,6 @@ def test_lists_hold_all_that_are_near_to_any_particle_of_a_cluster_and_each_once
         assert sorted(listed.tolist()) == np.flatnonzero(wanted).tolist()
 
 
-def test_sorting_keeps_every_particle_whole(soils: Soils) -> None:
-    assert sorted(soils.states["number"].tolist()) == list(range(soils.points.size))
-    (alone,) = np.flatnonzero(soils.states["number"] == 7)
-    assert soils.points.y[alone] > 0.5
-    assert [c for c, listed in enumerate(lists_of(soils)) if alone in listed] == [alone // CLUSTER]
-    assert set(soils.states["kind"][soils.states["number"] < 54].tolist()) == {0}
-
-
 def test_a_list_without_room_is_noticed(soils: Soils) -> None:
     soils.points["x"], soils.points["y"] = 0.0, np.linspace(0.0, SPACING, soils.points.size)
     built: Any = build_scene(scene(column(0.04, 0.03, SPACING)))

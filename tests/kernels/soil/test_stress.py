@@ -12,7 +12,6 @@ from blocksim.world.systems.soil_arrays import kind_records
 from tests.soils import column, scene
 
 STEP = 1e-5  # s
-PRESSURE = 1e3  # Pa
 
 
 def kind_of(material: str = "rods") -> Any:
@@ -30,17 +29,6 @@ def state_under(pressure: float) -> Any:
 def deviator_of(state: Any) -> tuple[float, float]:
     total, deviator = invariants(state.sxx, state.syy, state.szz, state.sxy)
     return total, deviator
-
-
-@pytest.mark.parametrize("material", ["rods", "clay"])
-def test_shear_ends_on_the_yield_surface(material: str) -> None:
-    kind, state = kind_of(material), state_under(PRESSURE)
-    lost = sum(strain(state, kind, 0.0, 1.0, 0.0, 0.0, STEP) for _ in range(3000))
-    total, deviator = deviator_of(state)
-    assert deviator == pytest.approx(kind.cohesion - kind.slope * total, rel=1e-4)
-    assert total == pytest.approx(-3.0 * PRESSURE, rel=1e-9)  # no dilation
-    assert state.plastic == pytest.approx(3000 * STEP, rel=0.1)
-    assert lost == pytest.approx(kind.volume * deviator * state.plastic, rel=0.05)
 
 
 def test_soil_without_cohesion_takes_no_tension_and_clay_only_up_to_the_apex() -> None:

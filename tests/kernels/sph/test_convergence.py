@@ -8,7 +8,7 @@ root mean square over some patches counts; the same disorder is scaled with the 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 import pytest
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.common.arrays import Floats
 
-EVERY_KERNEL = pytest.mark.parametrize("kernel", get_args(KernelName))
 PLACE = np.array([0.4, 0.3])
 RATIO = 1.3  # h/dx
 DISORDER = 0.2  # of dx, each way along x and y
@@ -83,44 +82,27 @@ def order(error: Callable[[Case, float], float], case: Case) -> float:
     return math.log(coarse / fine) / math.log(SPACINGS[0] / SPACINGS[1])
 
 
-@EVERY_KERNEL
-@pytest.mark.parametrize(
-    ("form", "inside", "disordered", "edge"),
-    [
-        ("plain", None, 0, 0),  # a part of the integral is missing
-        ("shepard", 2, 1, 1),  # the mean of r_b - r is of order h; zero by symmetry at the particles of a lattice
-        ("linear", 2, 2, 2),
-    ],
-)
-def test_order_of_interpolation(
-    kernel: KernelName, form: InterpolationForm, inside: int | None, disordered: int, edge: int
-) -> None:
-    def error(case: Case, spacing: float) -> float:
-        return interpolation_error(case, form, spacing)
+ORDERS: dict[str, tuple[float | None, float, float]] = {  # inside, disordered, at an edge
+    "plain": (None, 0, 0),  # a part of the integral is missing
+    "shepard": (2, 1, 1),  # the mean of r_b - r is of order h; zero by symmetry at the particles of a lattice
+    "linear": (2, 2, 2),
+    "plain gradient": (None, -1, -1),  # A sum V grad W, and that sum is 1/h times a number
+    "symmetric gradient": (None, -1, -1),
+    "difference gradient": (None, 0, 0),
+    "corrected gradient": (2, 1, 1),  # second derivatives times third moments, which vanish on a lattice
+}
 
+
+@pytest.mark.parametrize("kernel", get_args(KernelName))
+@pytest.mark.parametrize("name", ORDERS)
+def test_errors_fall_with_the_order_of_their_form(kernel: KernelName, name: str) -> None:
+    form: Any = name.split(maxsplit=1)[0]
+
+    def error(case: Case, spacing: float) -> float:
+        return (gradient_error if "gradient" in name else interpolation_error)(case, form, spacing)
+
+    inside, disordered, edge = ORDERS[name]
     if inside is not None:
         assert order(error, Case(kernel, at_particle=True)) == pytest.approx(inside, abs=0.1)
-    assert order(error, Case(kernel, disorder=DISORDER)) == pytest.approx(disordered, abs=0.1)
-    assert order(error, Case(kernel, is_edge=True)) == pytest.approx(edge, abs=0.1)
-
-
-@EVERY_KERNEL
-@pytest.mark.parametrize(
-    ("form", "inside", "disordered", "edge"),
-    [
-        ("plain", None, -1, -1),  # A sum V grad W, and that sum is 1/h times a number
-        ("symmetric", None, -1, -1),
-        ("difference", None, 0, 0),
-        ("corrected", 2, 1, 1),  # second derivatives times third moments, which vanish on a lattice
-    ],
-)
-def test_order_of_gradients(
-    kernel: KernelName, form: GradientForm, inside: int | None, disordered: int, edge: int
-) -> None:
-    def error(case: Case, spacing: float) -> float:
-        return gradient_error(case, form, spacing)
-
-    if inside is not None:
-        assert order(error, Case(kernel)) == pytest.approx(inside, abs=0.1)
     assert order(error, Case(kernel, disorder=DISORDER)) == pytest.approx(disordered, abs=0.1)
     assert order(error, Case(kernel, is_edge=True)) == pytest.approx(edge, abs=0.1)
