@@ -20,8 +20,10 @@ CHECKS = """
 import math
 
 from blocksim.kernels.explicit.persistent_forces import TOUCHING, persistent_forces
+from blocksim.scenario.document import scenario_from_mapping
 from blocksim.scenario.laws import LAWS
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation
+from blocksim.world.interactions import damping_ratio
 
 LAW = LAWS["power-1.25"]
 CONTACT = {"law": LAW.name, "stiffness_scale": 0.01, "max_overlap": 5e-3}
@@ -64,35 +66,35 @@ for shape in SHAPES:
                 assert residual < 1e-3, (shape, angle, on_block, restitution, residual)
                 assert steady > 0, (shape, angle, on_block, restitution)
 
+stiff, soft = (LAW.greatest_slope(1e9, 2.0, speed, 0.0) for speed in (4.0, 1.0))
+assert math.isclose(stiff / soft, 4.0 ** (2.0 * 0.25 / 2.25))  # of d^0.25, d going with v^(2/2.25)
+light = [CaseScene([{"y": height}], contact=CONTACT).start().step for height in (0.1, 1.0)]
+assert light[1] < light[0]  # harder impacts, smaller steps
+tables = {
+    "schema": 1, "name": "one", "contact": {"law": LAW.name}, "materials": {"m": {"density": 1e3, "young_modulus": 1e9,
+    "poisson_ratio": 0.2}}, "blocks": {"b": {"width": 0.1, "height": 0.1, "length": 0.1, "material": "m"}},
+    "bodies": [{"block": "b", "x": 0.0, "y": 0.05}],
+}
+assert math.isclose(LAWS[scenario_from_mapping(tables).contact.law].compression(1.0, 10.0), 10.0 ** (1.0 / 1.25))
+assert math.isclose(damping_ratio(0.5, LAW.name) / damping_ratio(0.5), math.sqrt(2.25 / 2.5))
 print("done")
 """
 
 
-@pytest.fixture(scope="module")
-def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a copy of the package that has one line more; its kernels are the same, and compiled."""
-    folder = tmp_path_factory.mktemp("third")
-    shutil.copytree(PACKAGE, folder / "blocksim", ignore=shutil.ignore_patterns("__pycache__"))
-    laws = folder / "blocksim" / "scenario" / "laws.py"
+@pytest.mark.usefixtures("compiler")
+def test_third_law_rebounds_as_asked_and_keeps_its_energy_on_all_shapes(tmp_path: Path) -> None:
+    """In a copy of the package that has one line more; its kernels are the same, and compiled."""
+    shutil.copytree(PACKAGE, tmp_path / "blocksim", ignore=shutil.ignore_patterns("__pycache__"))
+    laws = tmp_path / "blocksim" / "scenario" / "laws.py"
     text = laws.read_text()
     assert LINE in text
     laws.write_text(text.replace(LINE, THIRD + LINE))
-    return folder
-
-
-def run(folder: Path, *arguments: str) -> str:
-    """Run Python with the package of a folder; return what it prints."""
     process = subprocess.run(
-        [sys.executable, *arguments],
-        env={**os.environ, "PYTHONPATH": str(folder)},
-        cwd=folder,
+        [sys.executable, "-c", CHECKS],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        cwd=tmp_path,
         check=True,
         capture_output=True,
         text=True,
     )
-    return process.stdout
-
-
-@pytest.mark.usefixtures("compiler")
-def test_third_law_rebounds_as_asked_and_keeps_its_energy_on_all_shapes(copied: Path) -> None:
-    assert run(copied, "-c", CHECKS).split() == ["done"]
+    assert process.stdout.split() == ["done"]
