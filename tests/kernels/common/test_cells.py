@@ -54,6 +54,7 @@ def test_cells_of_an_even_cloud_have_the_size_of_the_radius() -> None:
 def test_a_few_that_have_flown_off_do_not_make_cells_larger(far: float) -> None:
     positions = np.random.default_rng(3).uniform(0.0, 1.0, (1000, 2))
     positions[::100] = np.random.default_rng(4).uniform(-far, far, (10, 2))
+    positions[7] = np.nan
     grid, cells = sort(positions, 0.1)
     assert grid.size < 0.2
     assert max(map(len, cells)) < 60

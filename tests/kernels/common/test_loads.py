@@ -87,6 +87,19 @@ def test_a_moment_spins_a_block_about_its_centre(scheme: str) -> None:
     assert work_of_loads(result) == pytest.approx(-3000.0 * end["angle"], rel=EXACT)
 
 
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_force_along_axes_of_the_body_turns_with_it_and_one_along_fixed_axes_does_not(scheme: str) -> None:
+    bodies = [{"block": "b", "x": 0.0, "y": HIGH, "angle": "90 deg"}]
+    force = {"kind": "force", "body": "1", "magnitude": "1 kN"}
+    turned, fixed = (
+        end_of(simulate(scenario_with({**force, "axes": axes}, scheme=scheme, bodies=bodies, gravity=0.0)))
+        for axes in ("body", "world")
+    )
+    speed = 1000.0 / MASS * turned["t"]
+    assert (turned["vx"], turned["vy"]) == pytest.approx((0.0, speed), abs=1e-12)
+    assert (fixed["vx"], fixed["vy"]) == pytest.approx((speed, 0.0), abs=1e-12)
+
+
 HISTORIES: dict[str, tuple[dict[str, Any], float]] = {  # and the integral of the factor over 0.1 s
     "ramp": ({"kind": "ramp", "start": 0.02, "end": 0.06, "from": 0.5, "to": 2.0}, 0.01 + 0.05 + 0.08),
     "steps": ({"kind": "steps", "times": [0.03, 0.05], "factors": [1.0, -2.0]}, 0.02 - 0.1),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
-from math import pi
+from math import nan, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -150,6 +150,15 @@ def test_list_that_reaches_far_enough_is_kept_and_one_that_does_not_is_made_anew
         assert world.clock[0].rebuilds == rebuilds
         assert world.clock[0].next_update > world.clock[0].steps
     assert world.bodies[0].list_x == world.bodies[0].x
+
+
+@pytest.mark.parametrize("name", ["x", "vx"])
+def test_state_that_is_not_finite_is_left_to_the_next_check(start: Start, name: str) -> None:
+    world = start([{"y": 1.0}], contact=SOFT).world
+    world.bodies[0][name] = nan
+    assert update_pairs(world) == REACHED
+    assert world.clock[0].rebuilds == 1
+    assert 10 < world.clock[0].next_update <= MOST_UNSEEN
 
 
 def crash() -> World:

@@ -14,6 +14,7 @@ from blocksim.kernels.common.integrate import kick_and_drift
 from blocksim.kernels.common.tolerances import IMPACT_STEPS
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
+from blocksim.kernels.explicit.damping import BOTH
 from blocksim.kernels.explicit.forces import NOTHING
 from blocksim.kernels.explicit.partition import add_kept, keep
 from blocksim.kernels.explicit.persistent_forces import (
@@ -313,6 +314,21 @@ def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(ste
     assert world.contacts[0, 0].face == UPPER
     kind, _ = persistent_forces(world, 0, beside / (steps * speed), world.particles)
     assert kind == (CHANGED if changes else TOUCHING)
+
+
+@pytest.mark.parametrize("sliding", [0, 1])
+def test_contact_that_slides_beside_one_that_sticks_has_no_dashpot(sliding: int) -> None:
+    quick = on_block(0.003)
+    assert persistent_forces(quick, 0, STEP, quick.particles)[0] == TOUCHING
+    assert quick.pairs[0].sticking == BOTH
+    assert quick.pairs[0].shear_left > 0
+    quick.contacts[0, sliding].spring = 1e-3
+    quick.bodies[0].vx = 0.1
+    slow = copy.deepcopy(quick)
+    assert take_steadily(quick, 0, STEP)
+    take_generally(slow, 0, STEP)
+    assert quick.pairs[0].sticking == (2, 1)[sliding]
+    assert_same(quick, slow)
 
 
 TRIES = 4000
