@@ -218,10 +218,7 @@ def shaped(draw: st.DrawFn) -> dict[str, Any]:
         )
         body = {"block": "b", "x": draw(LENGTH), "y": draw(st.just(10.0) | LENGTH)}
         return data | {"blocks": {"b": {"depth": 1, "material": "stone", **block}}, "bodies": [body]}
-    return data | {
-        "blocks": {"b": {"depth": 1, "material": "stone"}},
-        "structures": [{"block": "b", **draw(SHAPED)}],
-    }
+    return data | {"blocks": {"b": {"depth": 1, "material": "stone"}}, "structures": [{"block": "b", **draw(SHAPED)}]}
 
 
 def _without_none(value: Any) -> Any:

@@ -28,7 +28,7 @@ from blocksim.kernels.nonsmooth.step import substep
 from blocksim.scenario.geometry import centre_outline, regular
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
-from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, scenario_of
+from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
 from blocksim.world.build import build_world, with_more_room
 from blocksim.world.nonsmooth import with_more_constraints
 from tests.kernels.references import turning
@@ -107,6 +107,17 @@ def rigid(scenario: Scenario, **stepping: Any) -> Scenario:
     kept = {"stop_at_rest": scenario.time.stop_at_rest, "end": scenario.time.end}
     time = Stepping(**{"scheme": "nonsmooth", "step": STEP, "force_step": True, **kept, **stepping})
     return scenario.model_copy(update={"time": time})
+
+
+def begin(scenario: Scenario, **stepping: Any) -> Simulation:
+    """Start a scenario with rigid contacts; keywords are keys of [time]."""
+    return Simulation(build_scene(rigid(scenario, **stepping)))
+
+
+def single(bodies: Sequence[Mapping[str, object]], **values: Any) -> Simulation:
+    """Start single bodies with rigid contacts; keywords of [time] go there, all others to the scene."""
+    stepping = {name: values.pop(name) for name in list(values) if name in Stepping.model_fields}
+    return begin(CaseScene(bodies, time=RIGID, **values).scenario(), end=ENDLESS, **stepping)
 
 
 @dataclass(frozen=True)

@@ -93,8 +93,5 @@ def _compared(finals: Mapping[str, Final]) -> Iterator[str]:
 
 
 HEAP = Benchmark(
-    "heap",
-    "heap of hexagons, also by pymunk and Box2D",
-    measure,
-    quick="20 hexagons for 0.1 s instead of 1000 for 1 s",
+    "heap", "heap of hexagons, also by pymunk and Box2D", measure, quick="20 hexagons for 0.1 s instead of 1000 for 1 s"
 )

@@ -21,13 +21,7 @@ from tests.bench.peers.pymunk_engine import Pymunk
 from tests.bench.peers.series import wall_series
 from tests.bench.peers.three_blocks import starts
 from tests.bench.peers.wall import wasserstein
-from tests.bench.peers.work_precision import (
-    SMALLEST_SHARE,
-    Curve,
-    Panel,
-    draw_work_precision,
-    floor_of,
-)
+from tests.bench.peers.work_precision import SMALLEST_SHARE, Curve, Panel, draw_work_precision, floor_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -85,11 +85,7 @@ def measure(effort: Effort) -> Readings:
         f"{size.columns * size.rows} blocks, {size.end:g} s; change: mean distance of the sorted final x "
         "(Wasserstein-1) from a level to the next, with half the step"
     )
-    notes = (
-        meaning,
-        *(_compared(one, last) for one in computed[:-1]),
-        *(_scattered(one) for one in computed),
-    )
+    notes = (meaning, *(_compared(one, last) for one in computed[:-1]), *(_scattered(one) for one in computed))
     curves = tuple(_curve(one) for one in computed)
     scatter = max(one.scatter[0] for one in computed)
     panel = Panel("pushed wall", "change of final x at half the step (mm)", curves, scatter, "starts within 1 µm")

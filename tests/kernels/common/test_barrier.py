@@ -25,15 +25,7 @@ from blocksim.kernels.common.barrier import barrier
 from blocksim.kernels.common.jit import entry_kernel
 from blocksim.verification.scene import HEIGHT
 from blocksim.world.build import empty_lists
-from tests.kernels.crews import (
-    advanced,
-    assert_same_bits,
-    bits,
-    contacts_between,
-    crew,
-    in_threads,
-    together,
-)
+from tests.kernels.crews import advanced, assert_same_bits, bits, contacts_between, crew, in_threads, together
 from tests.kernels.scenes import SCENES, soft_world, wall
 
 if TYPE_CHECKING:

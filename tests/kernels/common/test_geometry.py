@@ -10,14 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import BODY, zeros
-from blocksim.kernels.common.shapes import (
-    corner_offset,
-    ground_gap,
-    place_corners,
-    separation,
-    slab_depth,
-    turn,
-)
+from blocksim.kernels.common.shapes import corner_offset, ground_gap, place_corners, separation, slab_depth, turn
 from blocksim.kernels.common.tolerances import END_RATIO, SMALL_TURN
 from tests.kernels.references import apart as largest_gap, corners, distances, turning
 from tests.kernels.scenes import make_body

@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from blocksim.kernels.common.arrays import BODY, CONTROLS, zeros
-from blocksim.kernels.common.integrate import (
-    accelerate_and_kick,
-    kick_and_drift,
-)
+from blocksim.kernels.common.integrate import accelerate_and_kick, kick_and_drift
 
 if TYPE_CHECKING:
     from blocksim.kernels.common.arrays import Record, Records

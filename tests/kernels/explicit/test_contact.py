@@ -8,16 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
-from blocksim.kernels.common.arrays import (
-    CONTACT,
-    INTERACTION,
-    NORMAL,
-    OPERATOR,
-    POINT,
-    SHEAR,
-    SLOTS,
-    zeros,
-)
+from blocksim.kernels.common.arrays import CONTACT, INTERACTION, NORMAL, OPERATOR, POINT, SHEAR, SLOTS, zeros
 from blocksim.kernels.common.tolerances import DASHPOT_RANK, OPERATOR_LIFE
 from blocksim.kernels.explicit.contact import has_new_neighbours, shared_step, spare_lost_faces
 from blocksim.kernels.explicit.damping import BOTH, damp

@@ -13,12 +13,7 @@ from blocksim.kernels.common.arrays import POINT, zeros
 from blocksim.kernels.common.shapes import to_world
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.models.particles import (
-    ROWS,
-    row_direction,
-    row_intervals,
-    seen_from_row,
-)
+from blocksim.kernels.explicit.models.particles import ROWS, row_direction, row_intervals, seen_from_row
 from blocksim.kernels.explicit.models.smoothed import add_row
 from blocksim.kernels.sph.functions import kernel_value
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of

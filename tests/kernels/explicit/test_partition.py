@@ -11,12 +11,7 @@ import pytest
 from blocksim.kernels.common.arrays import GROUP, LEDGER, zeros
 from blocksim.kernels.common.integrate import accelerate_and_kick, kick_and_drift
 from blocksim.kernels.common.jit import config
-from blocksim.kernels.explicit.partition import (
-    add_from_before,
-    add_kept,
-    keep,
-    partition,
-)
+from blocksim.kernels.explicit.partition import add_from_before, add_kept, keep, partition
 from blocksim.kernels.explicit.persistent_forces import CHANGED, TOUCHING, persistent_forces
 from blocksim.kernels.explicit.step import advance, changed_forces, forces_between, forces_within
 from blocksim.world.build import with_threads

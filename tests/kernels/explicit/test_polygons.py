@@ -49,13 +49,7 @@ SLIVERS: dict[str, tuple[Outline, float, Outline, float, float, float]] = {
 
 
 def struck(
-    below: Outline,
-    angle: float,
-    above: Outline,
-    turn: float,
-    x: float,
-    speed: tuple[float, float],
-    **contact: object,
+    below: Outline, angle: float, above: Outline, turn: float, x: float, speed: tuple[float, float], **contact: object
 ) -> tuple[Simulation, float]:
     """Return a block that has struck another one, elastic and smooth, and the kinetic energy (J) before."""
     high = max(sin(angle) * u + cos(angle) * v for u, v in below)

@@ -12,13 +12,7 @@ from blocksim.kernels.common.arrays import CONTACT, CONTACTS, PAIR, POINT, SLOTS
 from blocksim.kernels.common.shapes import ground_gap, separation
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE
 from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.models.surface import (
-    block_points,
-    corner_seen,
-    face_met,
-    find_points,
-    ground_points,
-)
+from blocksim.kernels.explicit.models.surface import block_points, corner_seen, face_met, find_points, ground_points
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, side_normal
 from tests.kernels.references import corners, in_frame
 from tests.kernels.scenes import make_body, pose

@@ -1,19 +1,14 @@
-"""Scenes stepped by the non-smooth scheme."""
+"""Rigid contacts without the compiler."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from blocksim.scenario.models.timeline import Nonsmooth
-from blocksim.simulation.schemes import build_scene
-from blocksim.verification.scene import CaseScene, Simulation
-from tests.kernels.scenes import ENDLESS, RIGID, rigid
-
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator
 
 
 @pytest.fixture(autouse=True)
@@ -24,21 +19,3 @@ def division() -> Iterator[None]:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         yield
-
-
-@pytest.fixture(scope="session")
-def begin() -> Callable[..., Simulation]:
-    """Start a scenario; keywords are keys of [time]."""
-    return lambda scenario, **stepping: Simulation(build_scene(rigid(scenario, **stepping)))
-
-
-@pytest.fixture(scope="session")
-def single() -> Callable[..., Simulation]:
-    """Start single bodies; keywords of [time] go there, all others to the scene."""
-
-    def start(bodies: Sequence[Mapping[str, object]], **values: Any) -> Simulation:
-        stepping = {name: values.pop(name) for name in list(values) if name in Nonsmooth.model_fields}
-        scenario = CaseScene(bodies, time=RIGID, **values).scenario()
-        return Simulation(build_scene(rigid(scenario, end=ENDLESS, **stepping)))
-
-    return start

@@ -15,9 +15,10 @@ from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.kernels.nonsmooth.cone import solve_two
 from blocksim.kernels.nonsmooth.cuts import set_length
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
+from tests.kernels.scenes import begin, single
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from blocksim.scenario import Scenario
 
@@ -41,7 +42,7 @@ def test_two_points_are_solved_exactly(lane: int | None) -> None:
 
 
 @pytest.mark.parametrize("substeps", [1, 4])
-def test_slide_ends_where_coulomb_says(single: Callable[..., Any], substeps: int) -> None:
+def test_slide_ends_where_coulomb_says(substeps: int) -> None:
     run = single([{"x": 0.0, "y": ON_GROUND, "velocity": [1.0, 0.0]}], substeps=substeps).to_time(0.5)
     assert run.bodies.x[0] == pytest.approx(1.0 / (2 * 0.38 * G), abs=1e-5)
     assert abs(run.bodies.vx[0]) < 1e-12
@@ -62,7 +63,7 @@ def pendulum(start: float, time: float) -> tuple[float, float, float]:
     return (*centre(angle), angle)
 
 
-def test_turning_about_an_edge_is_of_second_order(single: Callable[..., Any]) -> None:
+def test_turning_about_an_edge_is_of_second_order() -> None:
     start, time = -math.radians(60.0), 0.08
     x, y, _ = pendulum(start, 0.0)
     exact = np.array(pendulum(start, time))
@@ -80,7 +81,7 @@ def test_turning_about_an_edge_is_of_second_order(single: Callable[..., Any]) ->
     assert error(1e-3, 4)[:2].max() < 2e-6
 
 
-def test_static_friction_holds_what_kinetic_friction_does_not_stop(single: Callable[..., Any]) -> None:
+def test_static_friction_holds_what_kinetic_friction_does_not_stop() -> None:
     slope = math.radians(20.0)
     friction = {"static": 0.45, "kinetic": 0.2, "transition_speed": 0.001}
     body = [{"y": ON_GROUND}]
@@ -94,7 +95,7 @@ def test_static_friction_holds_what_kinetic_friction_does_not_stop(single: Calla
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.9, 1.0])
 @pytest.mark.parametrize("friction", [0.0, 0.4, 1.0])
-def test_impacts_create_no_energy(single: Callable[..., Any], restitution: float, friction: float) -> None:
+def test_impacts_create_no_energy(restitution: float, friction: float) -> None:
     random = np.random.default_rng(1)
     for _ in range(20):
         angle = float(random.uniform(-1.5, 1.5))
@@ -106,7 +107,7 @@ def test_impacts_create_no_energy(single: Callable[..., Any], restitution: float
         assert np.diff(energies).max() < 1e-5 * energies[0]
 
 
-def test_edges_of_pieces_of_ground(begin: Callable[..., Any]) -> None:
+def test_edges_of_pieces_of_ground() -> None:
     tables: dict[str, Any] = {
         "contact": {"restitution": 0.0},
         "friction": {"block_block": 0.31, "block_ground": 0.38},
@@ -119,7 +120,7 @@ def test_edges_of_pieces_of_ground(begin: Callable[..., Any]) -> None:
     assert math.degrees(run.bodies.angle[0]) == pytest.approx(-47.69, abs=0.3)
 
 
-def test_flight_is_a_parabola_in_position_and_velocity(single: Callable[..., Simulation]) -> None:
+def test_flight_is_a_parabola_in_position_and_velocity() -> None:
     run = single([{"y": 2.0, "velocity": [1.5, 2.5], "spin": 30.0, "angle": 0.4}]).to_time(0.2)
     body = run.bodies[0]
     found = [body.x, body.y, body.vx, body.vy, body.angle, body.spin]
@@ -128,12 +129,12 @@ def test_flight_is_a_parabola_in_position_and_velocity(single: Callable[..., Sim
     assert run.residual() < 1e-13
 
 
-def test_ledger_holds_on_a_slope(single: Callable[..., Simulation]) -> None:
+def test_ledger_holds_on_a_slope() -> None:
     run = single([{"y": ON_GROUND + 0.01, "angle": 0.2}], tilt=radians(35.0)).to_time(0.5)
     assert run.residual() < 1e-12
 
 
-def test_overlap_beyond_the_limit_stops_the_run(single: Callable[..., Simulation]) -> None:
+def test_overlap_beyond_the_limit_stops_the_run() -> None:
     values: Any = {"restitution": 0.0, "contact": {"max_overlap": 1e-6}}
     assert single([{"y": ON_GROUND}], **values).to_time(0.5).status == OVERLAP_LIMIT
     values["contact"] = {"max_overlap": 2e-6}
@@ -141,7 +142,7 @@ def test_overlap_beyond_the_limit_stops_the_run(single: Callable[..., Simulation
 
 
 @pytest.mark.parametrize("name", ["y", "vy", "spin"])
-def test_state_that_is_not_finite_stops_the_run(single: Callable[..., Simulation], name: str) -> None:
+def test_state_that_is_not_finite_stops_the_run(name: str) -> None:
     run = single([{"y": 0.1}]).to_step(3)
     run.world.bodies[name][0] = np.nan
     run.scene.contacts.states.vy[0] = np.nan
@@ -159,13 +160,13 @@ def cut_steps(run: Simulation, count: int) -> int:
 
 
 @pytest.mark.parametrize("start", [0.5e-4, 1.0e-4, 1.7e-4, 2.9e-4])
-def test_impact_happens_at_its_time_to_a_64th_of_a_step(single: Callable[..., Simulation], start: float) -> None:
+def test_impact_happens_at_its_time_to_a_64th_of_a_step(start: float) -> None:
     run = single([{"y": ON_GROUND + start, "velocity": [0.0, -1.0]}], restitution=0.8, gravity=0.0, **SMOOTH)
     run.to_time(3e-3)
     assert run.bodies.y[0] == pytest.approx(ON_GROUND + 0.8 * (run.time - start), abs=run.step / 64.0)
 
 
-def test_flight_is_a_parabola_though_steps_are_cut(single: Callable[..., Simulation]) -> None:
+def test_flight_is_a_parabola_though_steps_are_cut() -> None:
     run = single([{"y": 1.0, "velocity": [1.0, 2.0], "spin": 3.0}, HOPPING], restitution=0.9)
     assert cut_steps(run, 200) > 2
     t = run.time
@@ -191,7 +192,7 @@ def test_velocity_of_a_block_that_rolls_does_not_depend_on_lengths_that_are_not_
     assert found[2] == pytest.approx(found[0], rel=1e-12)
 
 
-def test_steps_of_crowds_and_of_weak_rebounds_of_more_than_two_are_not_cut(single: Callable[..., Simulation]) -> None:
+def test_steps_of_crowds_and_of_weak_rebounds_of_more_than_two_are_not_cut() -> None:
     crowd = [{**HOPPING, "x": 0.1 * k} for k in range(13)]
     assert cut_steps(single(crowd, restitution=0.9), 40) == 0
     assert cut_steps(single(crowd[:3], restitution=0.5), 400) == 0
@@ -218,7 +219,7 @@ def table(run: Simulation) -> float:
 
 
 @pytest.mark.parametrize("substeps", [1, 4])
-def test_block_rides_along_below_the_friction_limit(begin: Callable[..., Simulation], substeps: int, pace: int) -> None:
+def test_block_rides_along_below_the_friction_limit(substeps: int, pace: int) -> None:
     run = begin(shaken(0.9 * 0.38 * G), substeps=substeps, velocity_tolerance=1e-9).to_time(1.3 / pace)
     assert abs(table(run)) > (0.005 if pace == 1 else 1e-5)
     # drifts know the friction of the substep before: they lag by acceleration times substep squared, and add up to that
@@ -232,7 +233,7 @@ def bare(bodies: list[Mapping[str, object]], **tables: Any) -> Scenario:
     return scenario_of(bodies, **{"contact": {"restitution": 0.0}, "friction": friction, **tables})
 
 
-def test_block_that_meets_the_end_of_a_wall_stops_there(begin: Callable[..., Simulation]) -> None:
+def test_block_that_meets_the_end_of_a_wall_stops_there() -> None:
     shelf = [{"from": [0.0, 0.02], "to": [0.1, 0.02]}]
     run = begin(bare([{"x": -0.03, "y": 0.02, "velocity": [1.0, 0.0]}], walls=shelf, gravity=0.0)).to_time(0.03)
     assert run.bodies.x[0] == pytest.approx(-WIDTH / 2, abs=1e-5)

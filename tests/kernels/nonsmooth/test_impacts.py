@@ -14,11 +14,9 @@ from scipy.sparse.csgraph import connected_components
 from blocksim.kernels.nonsmooth.arrays import FAR
 from blocksim.kernels.nonsmooth.contact_groups import find_contact_groups
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation
-from tests.kernels.scenes import Block, after_substep, collided, listed_constraints, posed, velocities
+from tests.kernels.scenes import Block, after_substep, collided, listed_constraints, posed, single, velocities
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
@@ -28,7 +26,7 @@ SMOOTH: dict[str, Any] = {"friction": 0.0, "ground_friction": 0.0}
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5])
-def test_elastic_block_comes_back_to_where_it_fell_from(single: Callable[..., Simulation], angle: float) -> None:
+def test_elastic_block_comes_back_to_where_it_fell_from(angle: float) -> None:
     height = math.sin(angle) * WIDTH / 2 + math.cos(angle) * HEIGHT / 2 + 0.05
     run = single([{"y": height, "angle": angle}], restitution=1.0, **SMOOTH)
     start = run.mechanical
@@ -45,16 +43,14 @@ def row(gap: float) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("has_cuts", [0, 1])  # in rounds of one substep, or in steps that are cut
 @pytest.mark.parametrize(("gap", "within"), [(1e-4, 1e-6), (1e-5, 1e-3)])
-def test_row_of_blocks_apart_passes_a_blow_on(
-    single: Callable[..., Simulation], gap: float, within: float, has_cuts: int
-) -> None:
+def test_row_of_blocks_apart_passes_a_blow_on(gap: float, within: float, has_cuts: int) -> None:
     run = single(row(gap), restitution=1.0, gravity=0.0, **SMOOTH)
     run.scene.contacts.stepping[0].has_cuts = has_cuts
     run.to_time(0.02)
     assert run.bodies.vx == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0], abs=within)
 
 
-def test_long_row_passes_a_blow_on(single: Callable[..., Simulation]) -> None:
+def test_long_row_passes_a_blow_on() -> None:
     blocks: list[dict[str, Any]] = [{"x": i * WIDTH, "y": 0.2} for i in range(20)]
     blocks[0] |= {"x": -1.3e-4, "velocity": [1.0, 0.0]}
     run = single(blocks, restitution=1.0, gravity=0.0, friction=0.0).to_step(4)
@@ -63,9 +59,7 @@ def test_long_row_passes_a_blow_on(single: Callable[..., Simulation]) -> None:
 
 @pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-6])
 @pytest.mark.parametrize(("count", "incoming"), [(3, 1), (7, 1), (5, 2)])
-def test_blocks_that_touch_are_struck_one_after_the_other(
-    single: Callable[..., Simulation], count: int, incoming: int, gap: float
-) -> None:
+def test_blocks_that_touch_are_struck_one_after_the_other(count: int, incoming: int, gap: float) -> None:
     """As many leave a row of blocks that stand on the ground (m between them) as come in at 1 m/s."""
     blocks: list[dict[str, Any]] = [{"x": i * WIDTH - 1e-3, "y": HEIGHT / 2} for i in range(count)]
     for i, block in enumerate(blocks):
@@ -78,7 +72,7 @@ def test_blocks_that_touch_are_struck_one_after_the_other(
     assert run.kinetic <= 0.5 * run.bodies.mass[0] * incoming * (1.0 + 1e-9)
 
 
-def test_contacts_report_the_impulses_of_all_rounds(single: Callable[..., Simulation]) -> None:
+def test_contacts_report_the_impulses_of_all_rounds() -> None:
     run = single(row(1e-4), restitution=1.0, gravity=0.0, substeps=1, **SMOOTH)
     run.scene.contacts.stepping[0].has_cuts = 0  # it would be in an interval each
     before = run.bodies.vx.copy()
@@ -109,9 +103,7 @@ def first_impact(run: Simulation) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("friction", [0.3, 1.0, 3.0])
-def test_rebound_that_would_gain_energy_keeps_it_and_grows_with_restitution(
-    single: Callable[..., Simulation], friction: float
-) -> None:
+def test_rebound_that_would_gain_energy_keeps_it_and_grows_with_restitution(friction: float) -> None:
     random = np.random.default_rng(3)
     restrained = 0
     for _ in range(20):

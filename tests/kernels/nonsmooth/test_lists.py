@@ -1,4 +1,4 @@
-"""The list of pairs of rigid contacts, its colours, and packs of four."""
+"""The list of pairs of rigid contacts, its colours, and packs of four, which find their numbers by place."""
 
 from __future__ import annotations
 
@@ -8,23 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from blocksim.kernels.common.arrays import BODY
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, TOUCHING
+from blocksim.kernels.nonsmooth.arrays import AWAY, BEFORE, COLOURS, CONSTRAINT, STATE, TOUCHING
 from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, most_packs, rebuild, update_pairs
 from blocksim.kernels.nonsmooth.packs import gather, pack_all, unpack_all
 from blocksim.kernels.nonsmooth.step import substep
 from tests.kernels.references import apart, corners
-from tests.kernels.scenes import (
-    Block,
-    collided,
-    listed,
-    listed_constraints,
-    pairs_of,
-    pile,
-    place,
-    posed,
-    velocities,
-)
+from tests.kernels.scenes import Block, collided, listed, listed_constraints, pairs_of, pile, place, posed, velocities
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -276,3 +267,24 @@ def test_constraints_of_one_pack_have_the_restitution_and_friction_of_their_own_
     found = velocities(scene.contacts.states)[[0, 1, 3, 5]]
     assert found[:, 1] == pytest.approx([0.125, 0.125, 0.5, 0.5], abs=1e-9)
     assert found[:, 0] == pytest.approx([3.0 - 0.5 * 1.125] * 2 + [3.0 - 0.25 * 1.5] * 2, abs=1e-9)
+
+
+FIELDS = {
+    "LINE": (STATE, "vx vy spin inverse_mass inverse_inertia dx dy turned", 0),
+    "BEFORE": (BEFORE, "vx vy spin lifted", 0),
+    "ROW": (
+        CONSTRAINT,
+        "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear",
+        0,
+    ),
+    "BODY": (BODY, "x y angle cos sin", 0),
+    "BODY, half sides": (BODY, "half_x half_y", 18),
+}
+
+
+@pytest.mark.parametrize(("kind", "names", "first"), FIELDS.values(), ids=FIELDS)
+def test_records_have_their_fields_where_lanes_look_for_them(kind: np.dtype[Any], names: str, first: int) -> None:
+    assert kind.fields is not None
+    offsets = [kind.fields[name][1] for name in names.split()]
+    assert offsets == [8 * (first + k) for k in range(len(offsets))]
+    assert {kind[name] for name in names.split()} == {np.dtype(np.float64)}

@@ -11,13 +11,7 @@ from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, STEPPING, TOUCHING
-from blocksim.kernels.nonsmooth.faces import (
-    Block as Seen,
-    Edge,
-    Face,
-    block_ahead,
-    clip,
-)
+from blocksim.kernels.nonsmooth.faces import Block as Seen, Edge, Face, block_ahead, clip
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, bend_of, bend_time, follow_curvature, slip_of
 from tests.kernels.references import apart, corners, meet, meeting, places_of, sides

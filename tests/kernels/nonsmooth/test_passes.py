@@ -18,17 +18,14 @@ from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
 from blocksim.world.sag import soft_contact
 from tests.kernels.references import Dense, dense, least_change
-from tests.kernels.scenes import Block, after_substep, collided, make_body, pile, posed, velocities
+from tests.kernels.scenes import Block, after_substep, collided, make_body, pile, posed, single, velocities
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.random import Generator
     from numpy.typing import NDArray
 
     from blocksim.kernels.common.arrays import Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-    from blocksim.verification.scene import Simulation
 
 
 G = 9.81
@@ -267,7 +264,7 @@ def test_point_that_is_still_open_beside_one_in_touch_is_not_slowed_down() -> No
 
 
 @pytest.mark.parametrize("restitution", [0.4, 0.9])
-def test_blocks_that_meet_side_by_side_in_flight_fall_on(single: Callable[..., Simulation], restitution: float) -> None:
+def test_blocks_that_meet_side_by_side_in_flight_fall_on(restitution: float) -> None:
     blocks = [{"x": -0.02, "y": 1.0, "velocity": [1.0, 0.0]}, {"x": 0.02, "y": 1.0, "velocity": [-1.0, 0.0]}]
     run = single(blocks, restitution=restitution, friction=0.0).to_step(20)
     assert run.bodies.y == pytest.approx([1.0 - 0.5 * G * 0.02**2] * 2, abs=1e-9)

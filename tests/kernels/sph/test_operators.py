@@ -11,13 +11,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import quad
 
-from blocksim.kernels.sph.fields import (
-    KernelName,
-    Particles,
-    gradient,
-    interpolate,
-    pseudo_inverse,
-)
+from blocksim.kernels.sph.fields import KernelName, Particles, gradient, interpolate
 from blocksim.kernels.sph.functions import KERNEL_CODES, kernel_slope, kernel_value, support_radius
 
 if TYPE_CHECKING:
@@ -179,20 +173,3 @@ def test_without_particles_nearby_the_plain_sum_is_zero_and_a_mean_is_none() -> 
     assert interpolate(alone, [7.0], [[2.0, 1.0]], "plain").tolist() == [0.0]
     for form in ("shepard", "linear"):
         assert np.isnan(interpolate(alone, [7.0], [[2.0, 1.0]], form)).all()
-
-
-@given(
-    entries=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
-    rank=st.sampled_from([1, 2]),
-)
-def test_pseudo_inverse_is_the_one_of_numpy(entries: tuple[float, float, float], rank: int) -> None:
-    a, b, c = entries
-    root = np.array([[a, b], [0.0, c if rank == 2 else 0.0]])
-    matrix = root.T @ root
-    low, high = np.linalg.eigvalsh(matrix)
-    least = 1e-6 * max(high, 1e-3)
-    if abs(low - least) < 0.1 * least or abs(high - least) < 0.1 * least:
-        return
-    xx, xy, yy = pseudo_inverse(matrix[0, 0], matrix[0, 1], matrix[1, 1], least)
-    expected = np.linalg.pinv(matrix, rcond=least / high, hermitian=True) if high > least else np.zeros((2, 2))
-    np.testing.assert_allclose([[xx, xy], [xy, yy]], expected, atol=1e-8 * max(1.0, np.abs(expected).max()))
