@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
-from blocksim.kernels.common.arrays import CONTACT, INTERACTION, NORMAL, OPERATOR, POINT, SHEAR, SLOTS, zeros
+from blocksim.kernels.common.arrays import CONTACT, INTERACTION, NORMAL, OPERATOR, POINT, SHEAR, zeros
 from blocksim.kernels.common.tolerances import DASHPOT_RANK, OPERATOR_LIFE
 from blocksim.kernels.explicit.contact import has_new_neighbours, shared_step, spare_lost_faces
 from blocksim.kernels.explicit.damping import BOTH, damp
@@ -16,11 +16,11 @@ from blocksim.kernels.explicit.forces import Touch, grip_of, keep, renew_operato
 from blocksim.kernels.explicit.kinematics import Point, point_of, resolve_point, weigh_first_step
 from blocksim.kernels.explicit.laws import LINEAR, spring_at
 from blocksim.kernels.explicit.models import KERNEL, PARTICLES, SURFACE
-from tests.kernels.references import dashpots_by_definition, delassus
+from tests.kernels.references import dashpots_by_definition, delassus, rates_of_points
 from tests.kernels.scenes import make_body, pose
 
 if TYPE_CHECKING:
-    from blocksim.kernels.common.arrays import Record, Records, World
+    from blocksim.kernels.common.arrays import World
     from tests.conftest import PaperBlock, Start
 
 
@@ -158,63 +158,28 @@ def test_corner_about_to_lose_its_face_has_no_dashpot_on_it(beside: float, lost:
     assert lives(world) == ([0, 0] if lost else [5, 5])
 
 
-def pushed(force: float, closing: float) -> tuple[float, float]:
-    """Return the force that is left of spring (5 N) and dashpot, and what has been lost (J); none was before."""
-    point = Point(0.0, 0.0, 0.0, 1.0, 1e-6, closing, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+def test_dashpot_that_pulls_more_than_the_spring_pushes_leaves_no_force() -> None:
+    """A spring of 5 N and a dashpot that leaves -3 N of it; no force was before."""
+    point = Point(0.0, 0.0, 0.0, 1.0, 1e-6, -1e-6, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
     contact, values = zeros(1, CONTACT)[0], zeros(1, INTERACTION)[0]
     spring, before = spring_at(LINEAR, 5e6, 1e-6), spring_at(LINEAR, 5e6, 0.0)
-    grip = grip_of(contact, point, values, force, spring, before, True)
+    grip = grip_of(contact, point, values, -3.0, spring, before, True)
     lost = 0.5 * keep(contact, point, grip, 0.0, spring, before)
-    assert contact.normal_force == grip.normal
-    return grip.normal, lost
+    assert (contact.normal_force, grip.normal) == (0.0, 0.0)
+    assert lost == pytest.approx(0.5 * -5.0 * -1e-6, rel=1e-12, abs=0.0)
 
 
-def test_dashpot_that_pulls_more_than_the_spring_pushes_leaves_no_force() -> None:
-    assert pushed(-3.0, -1e-6) == pytest.approx((0.0, 0.5 * -5.0 * -1e-6), rel=1e-12, abs=0.0)
-
-
-DRIFT = 1e-6
-SEEDS = st.integers(0, 10_000)
-
-
-def scene(seed: int, count: int) -> tuple[Record, Record, Records]:
-    """Return two moving bodies and `count` points between them with random normals."""
-    random = np.random.default_rng(seed)
-    a, b = make_body(0.1, 0.2, 0.3), make_body(0.12, 0.18, -0.5, width=0.05, mass=0.3)
-    for body in (a, b):
-        for name in ("vx", "vy", "spin", "ax", "ay", "spin_rate"):
-            body[name] = random.normal()
-    points = zeros(SLOTS, POINT)
-    for point in points[:count]:
-        angle = random.uniform(-np.pi, np.pi)
-        point.x, point.y = 0.11 + 0.01 * random.normal(), 0.19 + 0.01 * random.normal()
-        point.nx, point.ny = np.cos(angle), np.sin(angle)
-        resolve_point(point, a, b, DRIFT)
-    return a, b, points
-
-
-def jacobian(point: Record, a: Record, b: Record, direction: np.ndarray) -> np.ndarray:
-    """Return what the relative velocity of a against b along a direction is of (v_a, w_a, v_b, w_b)."""
-    arms = [direction[1] * (point.x - body.x) - direction[0] * (point.y - body.y) for body in (a, b)]
-    return np.array([*direction, arms[0], *-direction, -arms[1]])
-
-
-def directions(point: Record) -> tuple[np.ndarray, np.ndarray]:
-    return np.array([point.nx, point.ny]), np.array([-point.ny, point.nx])
-
-
-@given(seed=SEEDS)
+@given(seed=st.integers(0, 10_000))
 def test_displacements_and_rates_are_those_of_rigid_bodies(seed: int) -> None:
-    a, b, points = scene(seed, 1)
-    point = points[0]
+    world = two_points(seed, NORMAL)
+    (a, b), point = world.bodies[:2], world.points[0]
     velocity = np.array([a.vx, a.vy, a.spin, b.vx, b.vy, b.spin])
-    acceleration = np.array([a.ax, a.ay, a.spin_rate, b.ax, b.ay, b.spin_rate])
-    normal, tangent = (jacobian(point, a, b, direction) for direction in directions(point))
-    later = velocity + 0.5 * DRIFT * acceleration
-    assert point.closing == pytest.approx(-DRIFT * normal @ velocity, abs=1e-20)
-    assert point.slipping == pytest.approx(DRIFT * tangent @ velocity, abs=1e-20)
-    assert point.closing_rate == pytest.approx(-normal @ later, abs=1e-14)
-    assert point.slip_rate == pytest.approx(tangent @ later, abs=1e-14)
+    later = velocity + 0.5 * STEP * np.array([a.ax, a.ay, a.spin_rate, b.ax, b.ay, b.spin_rate])
+    closing, slip = (rates_of_points(world.points[:1], a, b, direction)[0] for direction in (NORMAL, SHEAR))
+    assert point.closing == pytest.approx(STEP * closing @ velocity, abs=1e-20)
+    assert point.slipping == pytest.approx(STEP * slip @ velocity, abs=1e-20)
+    assert point.closing_rate == pytest.approx(closing @ later, abs=1e-14)
+    assert point.slip_rate == pytest.approx(slip @ later, abs=1e-14)
 
 
 @pytest.mark.parametrize(("depth", "weight"), [(0.0, 0.5), (0.25e-6, 0.75), (1e-6, 1.5)])
