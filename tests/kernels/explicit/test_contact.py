@@ -173,9 +173,10 @@ def test_dashpot_that_pulls_more_than_the_spring_pushes_leaves_no_force() -> Non
 def test_displacements_and_rates_are_those_of_rigid_bodies(seed: int) -> None:
     world = two_points(seed, NORMAL)
     (a, b), point = world.bodies[:2], world.points[0]
+    points: Any = world.points[:1]
     velocity = np.array([a.vx, a.vy, a.spin, b.vx, b.vy, b.spin])
     later = velocity + 0.5 * STEP * np.array([a.ax, a.ay, a.spin_rate, b.ax, b.ay, b.spin_rate])
-    closing, slip = (rates_of_points(world.points[:1], a, b, direction)[0] for direction in (NORMAL, SHEAR))
+    closing, slip = (rates_of_points(points, a, b, direction)[0] for direction in (NORMAL, SHEAR))
     assert point.closing == pytest.approx(STEP * closing @ velocity, abs=1e-20)
     assert point.slipping == pytest.approx(STEP * slip @ velocity, abs=1e-20)
     assert point.closing_rate == pytest.approx(closing @ later, abs=1e-14)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from math import cos, pi, sin
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import NORMAL, OPERATOR, PAIR, POINT, SHEAR, zeros
-from blocksim.kernels.common.tolerances import DASHPOT_RANK
 from blocksim.kernels.explicit.damping import (
     BOTH,
     SIZE,
@@ -28,7 +27,6 @@ from tests.kernels.references import dashpots_by_definition, delassus
 from tests.kernels.scenes import make_body
 
 if TYPE_CHECKING:
-    from blocksim.kernels.common.arrays import Record, Records
     from tests.conftest import Start
 
 
@@ -37,52 +35,13 @@ K = 1e9
 SEEDS = st.integers(0, 10_000)
 
 
-def inverse_masses(n: int, seed: int, *, parallel: bool = False) -> np.ndarray:
-    """Return what n points of a pair see (1/kg): of rank three at most, of rank one for tangents on one face."""
-    random = np.random.default_rng(seed)
-    jacobian = random.uniform(-1.0, 1.0, (n, 3)) + np.array([2.0, 0.0, 0.0])
-    if parallel:
-        jacobian[1:] = jacobian[0]
-    return np.asarray(10.0 * jacobian @ jacobian.T)
-
-
-def contact_points(n: int, seed: int, *, stiffness: tuple[float, ...] = (), weight: float = 1.0) -> Records:
-    random = np.random.default_rng(seed)
-    points = zeros(n, POINT)
-    points.weight = weight
-    points.stiffness = stiffness or K
-    points.rate = random.normal(size=n)
-    points.before = random.uniform(0.0, 100.0, n)
-    points.force = random.uniform(0.0, 100.0, n)
-    return points
-
-
-def operator_of(points: Records, masses: np.ndarray, ratio: float, pattern: int, step: float = STEP) -> Record:
-    """Return the operator of one or two points as the kernels make it."""
-    operator, half = zeros(1, OPERATOR)[0], 0.5 * step
-    one, two = points[0], points[-1]
-    a, b, d = masses[0, 0], masses[0, -1], masses[-1, -1]
-    keep_masses(operator, half, a, b, d)
-    weights = one.weight, two.weight
-    fill_operator(operator, pattern, ratio, half, a, b, d, one.stiffness, two.stiffness, *weights)
-    return operator
-
-
-def damped(points: Records, operator: Record) -> np.ndarray:
-    """Return spring and dashpot forces of all points."""
-    one, two, n = points[0], points[-1], points.size
-    return np.array(damp(operator, n == 2, one.force, two.force, one.before, two.before, one.rate, two.rate)[:n])
-
-
-def damping_matrix(points: Records, masses: np.ndarray, ratio: float) -> np.ndarray:
+def damping_matrix(stiffness: tuple[float, ...], masses: np.ndarray, ratio: float) -> np.ndarray:
     """Return C, which is what a step of no length leaves of the dashpots: the force for each rate alone."""
-    n, columns = len(masses), []
-    points.before = points.force = 0.0
-    operator = operator_of(points, masses, ratio, (1 << n) - 1, 0.0)
-    for unit in np.eye(n):
-        points.rate = unit
-        columns.append(damped(points, operator))
-    return np.array(columns).T
+    operator, n = zeros(1, OPERATOR)[0], len(stiffness)
+    seen = masses[0, 0], masses[0, -1], masses[-1, -1]
+    keep_masses(operator, 0.0, *seen)
+    fill_operator(operator, (1 << n) - 1, ratio, 0.0, *seen, stiffness[0], stiffness[-1], 1.0, 1.0)
+    return np.array([damp(operator, n == 2, 0.0, 0.0, 0.0, 0.0, unit[0], unit[-1])[:n] for unit in np.eye(n)]).T
 
 
 @pytest.mark.parametrize("stiffness", [(K,), (K, K), (K, 0.2 * K)])
@@ -91,8 +50,9 @@ def test_every_mode_of_a_pair_has_the_asked_damping_ratio(
     stiffness: tuple[float, ...], ratio: float, seed: int
 ) -> None:
     n = len(stiffness)
-    masses = inverse_masses(n, seed) + 5.0 * np.eye(n)
-    damping = damping_matrix(contact_points(n, seed, stiffness=stiffness), masses, ratio)
+    rows = np.random.default_rng(seed).uniform(-1.0, 1.0, (n, 3)) + np.array([2.0, 0.0, 0.0])
+    masses = 10.0 * rows @ rows.T + 5.0 * np.eye(n)  # 1/kg
+    damping = damping_matrix(stiffness, masses, ratio)
     motion = np.block([[np.zeros((n, n)), np.eye(n)], [-masses * stiffness, -masses @ damping]])  # x, x'
     modes = np.linalg.eigvals(motion)
     assert -modes.real / np.abs(modes) == pytest.approx(np.full(2 * n, ratio), rel=1e-6)
@@ -127,69 +87,39 @@ def test_corner_that_slides_rebounds_as_asked(start: Start, restitution: float, 
     assert block.vy + block.spin * x == pytest.approx(restitution * speed, abs=2e-3)
 
 
-def scene(seed: int, n: int, *, parallel: bool) -> tuple[Record, Record, Records]:
-    """Return two bodies and n points between them with random forces and stiffnesses; normals alike or not."""
-    random = np.random.default_rng(seed)
-    a, b = make_body(0.1, 0.2, 0.3), make_body(0.12, 0.18, -0.5, width=0.05, mass=0.3)
-    for body in (a, b):
-        for name in ("vx", "vy", "spin"):
-            body[name] = random.normal()
-    points = zeros(n, POINT)
-    angle = random.uniform(-np.pi, np.pi)
-    for point in points:
-        angle = angle if parallel else random.uniform(-np.pi, np.pi)
-        point.x, point.y = 0.11 + 0.01 * random.normal(), 0.19 + 0.01 * random.normal()
-        point.nx, point.ny = np.cos(angle), np.sin(angle)
-        resolve_point(point, a, b, STEP)
-    points.stiffness = random.uniform(1e6, 1e8, n)
-    points.weight = random.uniform(0.5, 1.5, n)
-    points.before, points.force = random.uniform(0.0, 100.0, (2, n))
-    return a, b, points
-
-
-def added(points: Records, a: Record, b: Record, direction: int, ratio: float) -> np.ndarray:
-    work, before = np.zeros((8, SIZE, SIZE)), points.force.copy()
-    add_coupled_dashpots(points, points.size, a, b, direction, ratio, STEP, work)
-    return np.asarray(points.force - before)
-
-
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize("direction", [NORMAL, SHEAR])
 @given(seed=SEEDS, n=st.integers(3, 40), ratio=st.sampled_from([0.1, 1.0, 5.0]))
 def test_any_number_of_points_follows_the_definition(
     direction: int, parallel: bool, ratio: float, n: int, seed: int
 ) -> None:
-    a, b, points = scene(seed, n, parallel=parallel)
-    resolved = points.closing_rate if direction == NORMAL else points.slip_rate
-    points.rate = resolved
-    expected = dashpots_by_definition(points, delassus(points, a, b, direction), ratio, STEP)
-    forces = added(points, a, b, direction, ratio)
-    assert forces == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
-
-
-def positive(n: int, rank: int, seed: int) -> np.ndarray:
-    """Return a random symmetric positive n x n matrix with eigenvalues from 1 to 100, `rank` of them not zero."""
+    """Points between two moving bodies, with random forces and stiffnesses; normals alike or not."""
     random = np.random.default_rng(seed)
-    basis, _ = np.linalg.qr(random.normal(size=(n, n)))
-    values = np.where(np.arange(n) < rank, random.uniform(1.0, 100.0, n), 0.0)
-    matrix = (basis * values) @ basis.T
-    return np.asarray(0.5 * (matrix + matrix.T))
-
-
-def power(matrix: np.ndarray, exponent: float) -> np.ndarray:
-    """Return a power of a symmetric matrix over its range."""
-    values, vectors = np.linalg.eigh(matrix)
-    kept = values > DASHPOT_RANK * values.max()
-    return np.asarray((vectors[:, kept] * values[kept] ** exponent) @ vectors[:, kept].T)
-
-
-def by_jacobi(matrix: np.ndarray) -> np.ndarray:
-    out = np.zeros((3, 3))
-    inverse_three_halves(matrix.copy(), np.zeros((3, 3)), out)
-    return out
+    points: Any = zeros(n, POINT)
+    a, b = make_body(0.1, 0.2, 0.3), make_body(0.12, 0.18, -0.5, width=0.05, mass=0.3)
+    for body in (a, b):
+        body.vx, body.vy, body.spin = random.normal(size=3)
+    angle = random.uniform(-np.pi, np.pi)
+    for point in points:
+        angle = angle if parallel else random.uniform(-np.pi, np.pi)
+        point.x, point.y = np.array([0.11, 0.19]) + 0.01 * random.normal(size=2)
+        point.nx, point.ny = np.cos(angle), np.sin(angle)
+        resolve_point(point, a, b, STEP)
+    points.stiffness, points.weight = random.uniform(1e6, 1e8, n), random.uniform(0.5, 1.5, n)
+    points.before, points.force = random.uniform(0.0, 100.0, (2, n))
+    resolved = points.closing_rate if direction == NORMAL else points.slip_rate
+    points.rate, before = resolved, points.force.copy()
+    expected = dashpots_by_definition(points, delassus(points, a, b, direction), ratio, STEP)
+    add_coupled_dashpots(points, n, a, b, direction, ratio, STEP, np.zeros((8, SIZE, SIZE)))
+    assert points.force - before == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
 
 
 @given(seed=SEEDS, rank=st.integers(1, 3))
 def test_power_of_three_agrees_with_eigenvalues(seed: int, rank: int) -> None:
-    matrix = positive(3, rank, seed)
-    assert by_jacobi(matrix) == pytest.approx(power(matrix, -1.5), abs=1e-12)
+    """A matrix of eigenvalues from 1 to 100, `rank` of them not zero."""
+    random, found = np.random.default_rng(seed), np.zeros((3, 3))
+    basis, _ = np.linalg.qr(random.normal(size=(3, 3)))
+    values = np.where(np.arange(3) < rank, random.uniform(1.0, 100.0, 3), 0.0)
+    powers = np.array([value**-1.5 if value else 0.0 for value in values])
+    inverse_three_halves((basis * values) @ basis.T, np.zeros((3, 3)), found)
+    assert found == pytest.approx((basis * powers) @ basis.T, abs=1e-12)
