@@ -149,12 +149,6 @@ def test_ended_contact_tallies_half_the_work_of_its_last_step() -> None:
     assert lost.broken == pytest.approx(0.5 * stiffness * 1e-7 * (1e-7 + slip))
 
 
-def values() -> Record:
-    record = zeros(1, INTERACTION)[0]
-    record.normal_stiffness, record.shear_ratio = 1e6, 0.8
-    return record
-
-
 STATIC, KINETIC, SPEED = 0.31, 0.19, 0.005
 
 
@@ -205,58 +199,29 @@ DEEPEST = 1e-5  # m
 STIFFNESS = 1e6  # N/m, or N/m^1.5
 
 
-class Dragged:
-    """One point whose overlap and slip are prescribed, with its shear spring."""
-
-    def __init__(self, law: float, friction: float) -> None:
-        self.law, self.friction = law, friction
-        self.values = zeros(1, INTERACTION)[0]
-        self.values.shear_ratio = 0.8
-        self.values.static_friction = self.values.kinetic_friction = friction
-        self.values.transition_speed = 1e-3
-        self.spring = self.stiffness = self.force = self.work = 0.0
-
-    @property
-    def stored(self) -> float:
-        """Energy (J) in the shear spring."""
-        return 0.5 * self.stiffness * self.spring**2
-
-    def reach(self, depth: float) -> float:
-        """Return the longest spring (m) that sticks at an overlap (m)."""
-        stiffness = 0.8 * tangent_stiffness(self.law, STIFFNESS, depth)
-        return self.friction * elastic_force(self.law, STIFFNESS, depth) / stiffness
-
-    def drag(self, depth: float, slip: float) -> float:
-        """Go to an overlap with a slip (m); return what friction has taken (J)."""
-        normal_force = elastic_force(self.law, STIFFNESS, depth)
-        stiffness = 0.8 * tangent_stiffness(self.law, STIFFNESS, depth)
-        before, energy = self.force, self.stored
-        self.spring, limit, _, lost = draw_spring(
-            self.values, stiffness, self.stiffness, self.spring, slip, 1.0, normal_force, 0.0
-        )
-        self.stiffness = stiffness
-        self.force = clip_to_cone(self.values, stiffness * self.spring, limit, normal_force, 0.0)
-        self.work += 0.5 * (before + self.force) * slip
-        assert lost == pytest.approx(0.5 * (before + self.force) * slip - (self.stored - energy), abs=1e-16)
-        return lost
-
-
-laws = pytest.mark.parametrize("law", [LINEAR, HERTZ_MINDLIN])
-# overlaps as shares of the deepest one; slips as shares of the longest spring, or of twice that
-paths = st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=15)
-
-
-@laws
-@given(path=paths, friction=st.floats(0.01, 2.0))
+@pytest.mark.parametrize("law", [LINEAR, HERTZ_MINDLIN])
+@given(
+    path=st.lists(st.tuples(st.floats(1e-3, 1.0), st.floats(-2.0, 2.0)), min_size=1, max_size=15),
+    friction=st.floats(0.01, 2.0),
+)
 def test_shear_spring_never_gives_back_more_than_was_put_in(
     law: int, path: list[tuple[float, float]], friction: float
 ) -> None:
-    contact = Dragged(law, friction)
+    """Of one point that is led to overlaps (of the deepest one) and slips (of the longest spring there)."""
+    values = zeros(1, INTERACTION)[0]
+    values.static_friction, values.kinetic_friction, values.transition_speed = friction, friction, 1e-3
     scale = friction * elastic_force(law, STIFFNESS, DEEPEST) * DEEPEST
-    for share, slip in path:
-        depth = share * DEEPEST
-        lost = contact.drag(depth, 0.0), contact.drag(depth, 2.0 * slip * contact.reach(depth))
-        assert min(lost) >= -1e-15 * scale
-        assert contact.work >= contact.stored - 1e-14 * scale
-        limit = friction * elastic_force(law, STIFFNESS, depth)
-        assert abs(contact.force) <= limit * (1.0 + 1e-12)
+    spring = before = force = work = stored = 0.0
+    for share, slips in path:
+        normal = elastic_force(law, STIFFNESS, share * DEEPEST)
+        stiffness = 0.8 * tangent_stiffness(law, STIFFNESS, share * DEEPEST)
+        for slip in (0.0, slips * friction * normal / stiffness):
+            pulled, held = force, stored
+            spring, limit, _, lost = draw_spring(values, stiffness, before, spring, slip, 1.0, normal, 0.0)
+            force = clip_to_cone(values, stiffness * spring, limit, normal, 0.0)
+            before, stored, done = stiffness, 0.5 * stiffness * spring**2, 0.5 * (pulled + force) * slip
+            work += done
+            assert lost == pytest.approx(done - (stored - held), abs=1e-16)
+            assert lost >= -1e-15 * scale
+            assert work >= stored - 1e-14 * scale
+            assert abs(force) <= friction * normal * (1.0 + 1e-12)
