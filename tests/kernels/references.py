@@ -67,12 +67,6 @@ def distances(points: Vector, body: Record) -> Vector:
     return np.asarray(np.hypot(outside[:, 0], outside[:, 1]))
 
 
-def gap_along(angle: float, one: Record, two: Record) -> float:
-    """Return the gap (m) between the projections of the corners of two bodies on one direction (rad)."""
-    a, b = (corners(body) @ (np.cos(angle), np.sin(angle)) for body in (one, two))
-    return float(max(b.min() - a.max(), a.min() - b.max()))
-
-
 def sides(body: Record) -> list[Side]:
     """Return the four faces of a body."""
     ends = corners(body)
@@ -170,7 +164,6 @@ class Dense(NamedTuple):
     targets: Vector  # (2 r,) m/s: what J v has to reach at least
     friction: Vector  # (r,) kinetic coefficients
     gaps: Vector  # (2 r,) m, when the step began
-    starts: Vector  # (2 r,) m, when the substep began
 
     @property
     def counts(self) -> Any:
@@ -193,7 +186,7 @@ def jacobian(n: Vector, r_a: Vector, r_b: Vector, a: int, b: int, bodies: int) -
 def dense(scene: Nonsmooth) -> Dense:
     """Return the matrices of the packed packs of a scene; its bodies have not been placed since they were made."""
     contacts, bodies = scene.contacts, scene.world.bodies
-    points, tangents, constraints, starts, targets, impulses, shears = [], [], [], [], [], [], []
+    points, tangents, constraints, targets, impulses, shears = [], [], [], [], [], []
     for pack in contacts.packs[: contacts.stepping[0].pack_count]:
         for k in range(pack["count"]):
             constraint = contacts.constraints[pack.constraint[k]]
@@ -208,14 +201,13 @@ def dense(scene: Nonsmooth) -> Dense:
             points += [jacobian(n, r_a, r_b, constraint.a, constraint.b, bodies.size) for r_a, r_b in ends]
             tangents.append(jacobian(t, *ends[0], constraint.a, constraint.b, bodies.size))
             impulses += [pack.normal_one[k], pack.normal_two[k]]
-            starts += [pack.start_one[k], pack.start_two[k]]
             targets += [pack.target_one[k], pack.target_two[k]]
             shears.append(pack.shear[k])
     states = contacts.states
     inverse = np.array([states.inverse_mass, states.inverse_mass, states.inverse_inertia]).T.ravel()
     materials = contacts.materials[[int(constraint.material) for constraint in constraints]]
     gaps = [gap for constraint in constraints for gap in (constraint.gap_one, constraint.gap_two)]
-    columns = (impulses, shears, targets, materials["kinetic_friction"], gaps, starts)
+    columns = (impulses, shears, targets, materials["kinetic_friction"], gaps)
     return Dense(np.array(points), np.array(tangents), inverse, *(np.array(one) for one in columns))
 
 
