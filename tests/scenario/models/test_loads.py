@@ -9,6 +9,7 @@ import pytest
 from blocksim.errors import ScenarioError
 from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
 from blocksim.scenario.models.loads import Gravity, Stretch, VaryingLoad, stretches_of
+from tests.scenario.conftest import data_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -16,16 +17,15 @@ if TYPE_CHECKING:
     from blocksim.scenario import Scenario
 
 
-def data_with(*loads: dict[str, Any], **changes: Any) -> dict[str, Any]:
-    return {
-        "schema": 1,
-        "name": "loads",
-        "materials": {"m": {"density": 2000, "young_modulus": "1 GPa", "poisson_ratio": 0.2}},
-        "blocks": {"b": {"width": 1, "height": 1, "length": 1, "material": "m"}},
-        "bodies": [{"block": "b", "x": 0, "y": 0.5}, {"block": "b", "x": 1, "y": 0.5, "fixed": True}],
-        "loads": list(loads),
-        **changes,
-    }
+CUBE = {"width": 1, "height": 1, "length": 1, "material": "oak"}
+BODIES: list[dict[str, Any]] = [
+    {"block": "cube", "x": 0, "y": 0.5},
+    {"block": "cube", "x": 1, "y": 0.5, "fixed": True},
+]
+
+
+def data_with(*loads: dict[str, Any], bodies: list[dict[str, Any]] = BODIES) -> dict[str, Any]:
+    return data_of(blocks={"cube": CUBE}, bodies=bodies, loads=list(loads))
 
 
 def scenario(*loads: dict[str, Any], folder: Path | None = None) -> Scenario:
@@ -70,7 +70,7 @@ def test_loads_that_cannot_be_are_refused_with_their_place(case: str) -> None:
 
 
 def test_pressure_on_a_face_below_another_body_is_refused() -> None:
-    above = [{"block": "b", "x": 0, "y": 0.5}, {"block": "b", "x": 0.2, "y": 1.5}]
+    above = [{"block": "cube", "x": 0, "y": 0.5}, {"block": "cube", "x": 0.2, "y": 1.5}]
     with pytest.raises(ScenarioError, match=r'loads\.0\.face: .* covered by body "2"'):
         scenario_from_mapping(data_with({**WATER, "face": "top", "water_level": 2}, bodies=above))
 

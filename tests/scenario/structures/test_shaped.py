@@ -1,7 +1,6 @@
 """Arches, columns, Voronoi walls and rubble: their geometry, and what keys make no blocks."""
 
 import math
-import tomllib
 from itertools import pairwise
 from typing import Any
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blocksim.scenario import PlacedBody, Scenario, place_bodies, scenario_to_toml
+from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.scenario.events import joint_between
 from blocksim.scenario.geometry import area_of, faults
 from blocksim.scenario.overlap import overlapping_pairs
@@ -161,22 +160,6 @@ def test_blocks_with_and_without_a_shape_are_not_mixed_up() -> None:
         [("structures", 0, "block")],
     ]
     assert "has no shape" in found[1][0].message
-
-
-@pytest.mark.parametrize(
-    "structure",
-    [
-        {"kind": "arch", "radius": 4, "thickness": 1, "count": 9, "velocity": [1, 0]},
-        {"kind": "column", "count": 4, "height": 4, "width": 1.2, "top_width": 0.8},
-        {"kind": "voronoi", "count": 9, "width": 4, "height": 3},
-        {"kind": "polygons", "cells": [{"outline": [[0, 0], [1, 0], [0, 1]], "name": "a", "fixed": True}]},
-    ],
-)
-def test_the_resolved_file_makes_the_same_blocks(structure: dict[str, Any]) -> None:
-    first = scenario(**structure)
-    again = Scenario.model_validate(freeze(tomllib.loads(scenario_to_toml(first))))
-    assert again == first
-    assert place_bodies(again) == place_bodies(first)
 
 
 def test_only_the_free_blocks_of_a_structure_get_its_velocity() -> None:

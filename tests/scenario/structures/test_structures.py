@@ -7,27 +7,9 @@ import pytest
 from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.structures import KINDS
 from blocksim.scenario.structures.base import Pose, UnfitError
-from blocksim.scenario.structures.cells import Arch, Column, Rubble, Voronoi
-from blocksim.scenario.structures.masonry import BlockWall, Dominoes, Grid, Pyramid, Stack, Staircase
-from blocksim.scenario.structures.polygons import Polygons
+from blocksim.scenario.structures.masonry import Dominoes, Pyramid, Stack, Staircase
 
 BRICK = Block(width=0.032, height=0.025, length=0.05, material="aluminium")
-
-
-def test_every_kind_is_registered_under_its_own_name() -> None:
-    assert {
-        "staircase": Staircase,
-        "stack": Stack,
-        "wall": BlockWall,
-        "pyramid": Pyramid,
-        "dominoes": Dominoes,
-        "grid": Grid,
-        "arch": Arch,
-        "column": Column,
-        "voronoi": Voronoi,
-        "rubble": Rubble,
-        "polygons": Polygons,
-    } == KINDS
 
 
 def test_blocks_of_a_staircase_overlap_by_the_overlap() -> None:
@@ -38,11 +20,6 @@ def test_blocks_of_a_staircase_overlap_by_the_overlap() -> None:
         [0.01] * 3
     )
     assert [pose.y - 0.0125 for pose in poses] == pytest.approx([0.0, 0.025, 0.05, 0.075], abs=1e-15)
-
-
-def test_a_staircase_of_full_overlap_is_a_straight_stack() -> None:
-    stairs = Staircase(kind="staircase", block="brick", count=3, overlap=0.032).place(BRICK)
-    assert stairs == Stack(kind="stack", block="brick", count=3).place(BRICK)
 
 
 def test_more_overlap_than_block_is_refused() -> None:

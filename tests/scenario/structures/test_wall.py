@@ -29,15 +29,6 @@ def test_every_second_course_of_a_running_bond_is_shifted_by_half_a_block(gap: f
     assert found == [pytest.approx(course, abs=1e-15) for course in (even, odd, even)]
 
 
-def test_joints_of_a_stack_bond_run_through() -> None:
-    assert courses(rows=3, columns=2, bond="stack") == [pytest.approx([0.0, 0.05], abs=1e-15)] * 3
-
-
-def test_courses_lie_on_each_other() -> None:
-    poses = BlockWall(kind="wall", block="brick", rows=3, columns=1).place(BRICK)
-    assert [pose.y for pose in poses] == pytest.approx([0.0125, 0.0375, 0.0625], abs=1e-15)
-
-
 def test_holes_are_counted_from_the_lower_left() -> None:
     found = courses(rows=3, columns=3, bond="stack", holes=((1, 1), (3, 2)))
     assert found == [pytest.approx(course, abs=1e-15) for course in ([0.05, 0.1], [0.0, 0.05, 0.1], [0.0, 0.1])]
@@ -72,13 +63,6 @@ def test_random_numbers_are_those_of_every_other_version_and_machine() -> None:
 
 def test_leaving_blocks_out_does_not_shift_the_others_differently() -> None:
     assert set(placed(offset=0.001, missing=0.5)) < set(placed(offset=0.001))
-
-
-def test_random_shifts_fill_what_they_may() -> None:
-    shifts = [a.x - b.x for a, b in zip(placed(offset=0.0007), placed(), strict=True)]
-    assert max(shifts) == pytest.approx(0.0007, rel=0.01)
-    assert min(shifts) == pytest.approx(-0.0007, rel=0.01)
-    assert sum(shifts) / len(shifts) == pytest.approx(0.0, abs=0.0001)
 
 
 @given(seed=st.integers(0, 2**32 - 1), gap=st.floats(0.0, 0.01))
