@@ -1,13 +1,12 @@
 """Loading: from files and from Python, with values set from outside."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import Document, Scenario, load_scenario, scenario_from_mapping, scenario_to_toml
+from blocksim.scenario import Document, Scenario, load_scenario, scenario_to_toml
 from tests.golden import Golden
 
 
@@ -34,10 +33,6 @@ def test_a_file_may_have_a_byte_order_mark_and_windows_line_ends(tmp_path: Path,
     other = tmp_path / "windows.toml"
     other.write_bytes(b"\xef\xbb\xbf" + file.read_bytes().replace(b"\n", b"\r\n"))
     assert load_scenario(other) == load_scenario(str(file))
-
-
-def test_python_data_mean_the_same_as_the_file(file: Path, valid_text: str) -> None:
-    assert scenario_from_mapping(tomllib.loads(valid_text)) == load_scenario(file)
 
 
 def test_the_defaults_are_the_documented_ones(file: Path, golden: Golden) -> None:
@@ -71,11 +66,6 @@ def test_overrides(file: Path, overrides: Mapping[str, object] | Sequence[str], 
     for name in attribute.split("."):
         found = getattr(found, name)
     assert found == value
-
-
-def test_an_element_of_a_list_is_set_by_its_number(file: Path) -> None:
-    scenario = load_scenario(file, ["structures.0.count=7", "structures.0.offset=1 mm"])
-    assert [structure.size for structure in scenario.structures] == [7]
 
 
 def test_an_element_of_a_list_that_is_not_given_starts_from_the_default(file: Path) -> None:

@@ -97,11 +97,6 @@ def test_limits_of_ramp_duration_and_start(keys: dict[str, object]) -> None:
     assert_smooth(motion_pieces(scenario({**HARMONIC, **keys})))
 
 
-def test_a_motion_that_begins_after_the_end_is_none() -> None:
-    displacement, velocity = at(motion_pieces(scenario({**HARMONIC, "start": 5})), 0.0, 1.0, END)
-    assert np.abs(displacement).max() == np.abs(velocity).max() == 0.0
-
-
 @pytest.mark.parametrize(
     ("angle", "expected"), [("0 deg", (1, 0)), ("90 deg", (0, 1)), ("-30 deg", (3**0.5 / 2, -0.5))]
 )
@@ -183,10 +178,3 @@ def test_the_hash_ignores_notes_and_the_place_of_the_table(tmp_path: Path, shake
     (tmp_path / "other.csv").write_text("# noted\n" + TABLE.replace("0,0", "0.0, 0e0"))
     other = scenario({"kind": "table", "table": "other.csv", "direction": "10 deg"}, tmp_path)
     assert scenario_hash(other) == scenario_hash(shaken)
-
-
-def test_a_sweep_may_vary_the_table(tmp_path: Path) -> None:
-    for name in ("m.csv", "n.csv"):
-        (tmp_path / name).write_text(TABLE)
-    sweep = {"motion.table": ["m.csv", "n.csv"]}
-    assert scenario({"kind": "table", "table": "m.csv"}, tmp_path, sweep=sweep).sweep is not None

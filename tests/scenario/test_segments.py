@@ -34,29 +34,6 @@ def touches(segment: PlacedSegment) -> tuple[bool, bool]:
     return segment.touches_start, segment.touches_end
 
 
-def test_the_flat_ground_is_no_segment() -> None:
-    assert place_segments(scenario()) == ()
-
-
-def test_a_step_up_and_down() -> None:
-    first, riser, top, fall, last = place_segments(scenario([(0, 0), (0, 1), (2, 1), (2, 0)]))
-    assert ends(first) == ((-ENDLESS, 0), (0, 0))
-    assert ends(riser) == ((0, 0), (0, 1))
-    assert ends(top) == ((0, 1), (2, 1))
-    assert ends(fall) == ((2, 1), (2, 0))
-    assert ends(last) == ((2, 0), (2 + ENDLESS, 0))
-    # valleys at the feet of the step, edges at its top; an edge belongs to the piece before it
-    assert [extends(piece) for piece in (first, riser, top, fall, last)] == [
-        (False, True),
-        (True, False),
-        (False, False),
-        (False, True),
-        (True, False),
-    ]
-    assert [touches(piece)[1] for piece in (first, riser, top, fall, last)] == [False, True, True, False, False]
-    assert not any(touches(piece)[0] for piece in (first, riser, top, fall, last))
-
-
 def test_points_within_a_straight_line_are_left_out() -> None:
     level = [(0, 0.5), (1, 0.5), (7, 0.5)]
     slope = [(0.1 * i, 0.03 * i) for i in range(8)]
@@ -97,7 +74,8 @@ def test_the_height_of_the_surface(x: float, height: float) -> None:
     assert surface_heights(made, np.array([x]))[0] == height
 
 
-def test_the_flat_ground_is_at_zero() -> None:
+def test_the_flat_ground_is_no_segment_and_at_zero() -> None:
+    assert place_segments(scenario()) == ()
     assert surface_heights(scenario(), np.array([3.0]))[0] == 0.0
 
 
