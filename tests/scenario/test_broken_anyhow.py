@@ -16,7 +16,6 @@ ODD_VALUES = [
     *('""', '"x"', '"."', '"schema"', '"structures"', '"\\u0000"', "'''a\nb'''", '"nan m"', '"1e999 m"', '"1 m^99"'),
     *('"1 mm"', '"1 deg"'),
 ]
-ODD_LINES = ["[time]", "[[time]]", "[structures]", "[[blocks]]", "[sweep]", "time = 1", '"" = 1', "a.b.c = 1", "[a]"]
 
 
 def check(text: str, settings: list[str] | None = None) -> None:
@@ -38,21 +37,6 @@ def test_any_value_anywhere(number: int, value: str, again: bool) -> None:
     key = LINES[number].split("=")[0]
     line = f"{key}= {value}"
     check("\n".join([*LINES[:number], line, *([line] if again else []), *LINES[number + 1 :]]))
-
-
-@given(st.integers(0, len(LINES)), st.sampled_from(ODD_LINES))
-def test_any_line_anywhere(number: int, line: str) -> None:
-    check("\n".join([*LINES[:number], line, *LINES[number:]]))
-
-
-@given(st.integers(0, len(TEXT)), st.integers(0, 30), st.text(max_size=3))
-def test_any_characters_anywhere(start: int, length: int, text: str) -> None:
-    check(TEXT[:start] + text + TEXT[start + length :])
-
-
-@given(st.lists(st.integers(0, len(LINES) - 1), max_size=60))
-def test_any_lines_in_any_order(order: list[int]) -> None:
-    check("\n".join(LINES[number] for number in order))
 
 
 KEYS = ["time.end", "structures.0", "structures.0.count", "blocks"]

@@ -67,12 +67,6 @@ def test_files_that_are_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     golden(str(caught.value))
 
 
-@pytest.mark.parametrize("name", ["a\0b.toml", "a" * 5000])
-def test_impossible_file_names(name: str) -> None:
-    with pytest.raises(InputMissingError, match="cannot be read: "):  # the rest is in the words of the system
-        load_scenario(name)
-
-
 def endless() -> dict[str, object]:
     """Return a mapping that contains itself."""
     data: dict[str, object] = {}

@@ -53,8 +53,3 @@ def test_what_is_no_file_is_named(tmp_path: Path, golden: Golden, name: str) -> 
     with pytest.raises(InputMissingError) as caught:
         load_table(tmp_path / name)
     golden(str(caught.value))
-
-
-def test_a_name_that_no_file_can_have_is_refused() -> None:
-    with pytest.raises(InputMissingError, match="cannot be read: embedded null"):
-        load_table("a\0b")

@@ -144,10 +144,3 @@ def test_the_friction_of_a_new_pair_of_blocks_starts_from_the_default() -> None:
     document = Document.from_mapping(scenario_data()).with_values({"pairs.oak.steel.friction.kinetic": 0.1})
     friction = resolve_pair(document.build(), "oak", "steel", ground=False).friction
     assert friction == PairFriction(static=0.31, kinetic=0.1)
-
-
-def test_a_sweep_may_vary_a_pair() -> None:
-    key = "pairs.oak.ground.friction.kinetic"
-    made = scenario(pairs={"oak": {"ground": {"friction": 0.4}}}, sweep={key: [0.1, 0.2]})
-    assert made.sweep is not None
-    assert made.sweep.vary[key] == (0.1, 0.2)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import place_bodies, scenario_from_mapping
+from blocksim.scenario import scenario_from_mapping
 from tests.scenario.conftest import BRICK, data_of
 
 SLOPE = math.atan(0.5)
@@ -66,13 +66,6 @@ def test_the_level_ground_beyond_the_ends_of_a_profile_counts() -> None:
         "body 1 reaches 10 mm into the ground's profile",
         "body 2 lies below the ground's profile",
     ]
-
-
-def test_a_structure_stands_on_a_profile_at_its_bottom() -> None:
-    stack = {"kind": "stack", "block": "brick", "count": 2, "bottom": 1.0}
-    data = scenario_data([], structures=[stack], ground={"profile": [[0, 1], [1, 1]]})
-    del data["bodies"]
-    assert [body.y for body in place_bodies(scenario_from_mapping(data))] == pytest.approx([1.05, 1.15])
 
 
 def test_spacings_count_for_the_blocks_in_use_and_the_models_that_use_them() -> None:

@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 
 from blocksim.scenario import units as q
-from blocksim.scenario.units import Dimension, Unit, UnitError, parse_unit
+from blocksim.scenario.units import Dimension, Unit, UnitError, parse_unit, unit_factor
 
 
 def test_a_degree_is_exact_to_the_last_bit() -> None:
@@ -57,3 +57,17 @@ def test_an_unknown_unit_is_named() -> None:
 def test_words_and_numbers_are_unknown_units(text: str) -> None:
     with pytest.raises(UnitError):
         parse_unit(text)
+
+
+@pytest.mark.parametrize(
+    ("unit", "target", "factor"),
+    [("µm", "mm", 1e-3), ("inch", "mm", 25.4), ("°", "deg", 1.0), ("turn", "deg", 360.0), ("1", "1", 1.0)],
+)
+def test_a_unit_of_the_right_kind_gives_its_factor(unit: str, target: str, factor: float) -> None:
+    assert unit_factor(unit, target) == pytest.approx(factor, rel=1e-14)
+
+
+@pytest.mark.parametrize("unit", ["deg", "1", "rad", "degC", "mm/mm", "mm^0*m", "2*mm", "", "m" * 1000])
+def test_a_unit_of_another_kind_and_what_is_none_have_no_factor(unit: str) -> None:
+    assert unit_factor(unit, "mm") is None
+    assert unit_factor("mm", "deg") is unit_factor("rad", "1") is None
