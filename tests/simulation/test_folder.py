@@ -42,16 +42,6 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
-    prepare_folder(tmp_path / "a" / "b", overwrite=False)
-    assert (tmp_path / "a" / "b").is_dir()
-
-
-def test_overwriting_empties_a_run(copy: Path) -> None:
-    prepare_folder(copy, overwrite=True)
-    assert names(copy) == set()
-
-
 def test_leftovers_of_a_kill_do_not_block_a_folder(copy: Path) -> None:
     for name in ("done.json", "run.json", "final.csv"):
         (copy / name).unlink()
@@ -142,12 +132,6 @@ def test_scenario_written_by_a_person_is_never_removed(tmp_path: Path) -> None:
     with pytest.raises(OutputExistsError, match=r"scenario\.toml"):
         prepare_folder(tmp_path, overwrite=True)
     assert names(tmp_path) == {"scenario.toml"}
-
-
-def test_file_in_the_place_of_the_folder_is_reported(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputExistsError, match="cannot be created"):
-        prepare_folder(tmp_path / "file", overwrite=True)
 
 
 def test_folder_holds_only_its_own_scenario(kept: Result, soft: Shipped) -> None:

@@ -221,11 +221,3 @@ def test_driven_blocks_are_not_the_ones_that_moved_farthest() -> None:
     assert found.displaced_block == "3"
     assert found.largest_displacement_mm == pytest.approx(0.1)
     assert found.largest_rotation_deg == 0.0
-
-
-def test_blocks_on_a_shaking_table_are_as_fast_as_they_move_on_it() -> None:
-    shaking = load_scenario(SCENARIOS / "shaking_table.toml", {"time.end": 0.4, "contact.stiffness_scale": 0.001})
-    movement = simulate(shaking).summary.movement
-    (member,) = run_ensemble([shaking], peaks=True)
-    assert movement is not None
-    assert member.observables == movement.row

@@ -11,7 +11,7 @@ import pytest
 from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.scenario import place_bodies
-from blocksim.simulation import run_ensemble, schemes, simulate, simulate_into
+from blocksim.simulation import schemes, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
 from blocksim.simulation.loop import BY_CODE, RESIDUAL, Outcome, diagnose
 from blocksim.simulation.schemes import build, build_scene
@@ -92,9 +92,3 @@ def test_runs_that_did_not_fail_keep_their_words() -> None:
     scenario = sliding({})
     for outcome in (BY_CODE[REACHED], Outcome("interrupted", "stopped by SIGTERM", ExitCode.STOPPED_EARLY)):
         assert diagnose(outcome, OVERLAP_LIMIT, build_scene(scenario), place_bodies(scenario)) == outcome
-
-
-def test_member_of_an_ensemble_says_the_same_as_a_run_of_its_own() -> None:
-    scenario = sliding({"contact": {"max_overlap": 1e-12}}, end=0.01)
-    (end,) = run_ensemble([scenario])
-    assert end.outcome.reason == simulate(scenario).reason

@@ -15,29 +15,6 @@ SPACING = 0.005
 ANGLE = math.radians(21.9)
 
 
-def flying(gradient: str) -> Soil:
-    """Return soil without gravity, whose particles fly in all directions."""
-    material = "clay" if gradient == "corrected" else "rods"
-    table = column(0.05, 0.05, SPACING, material=material, gradient=gradient)
-    soil = Soil(scene({**table, "y": [0.1, 0.15]}, gravity=0.0))
-    random = np.random.default_rng(3)
-    for name in ("vx", "vy"):
-        soil.soils.points[name] = random.uniform(-0.5, 0.5, soil.soils.points.size)
-    return soil
-
-
-@pytest.mark.parametrize("gradient", ["raw", "corrected"])
-def test_soil_by_itself_keeps_its_momentum(gradient: str) -> None:
-    soil = flying(gradient)
-    points = soil.soils.points
-    before = [points["vx"].sum(), points["vy"].sum()]
-    moving = np.abs(points["vx"]).sum()
-    soil.to_step(400)
-    assert np.abs(points["vx"]).sum() < 0.9 * moving  # they have met
-    after = [points["vx"].sum(), points["vy"].sum()]
-    assert after == pytest.approx(before, abs=1e-12 * moving)
-
-
 @pytest.mark.parametrize("gradient", ["raw", "corrected"])
 def test_the_energy_of_a_collapse_adds_up(gradient: str) -> None:
     soil = Soil(scene(column(0.05, 0.1, SPACING, gradient=gradient), walls=[LEFT]))

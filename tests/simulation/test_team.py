@@ -63,14 +63,6 @@ def test_team_makes_room_for_more_pairs_and_continues(alone: World, monkeypatch:
     assert same_bits(world, alone)
 
 
-def test_one_thread_takes_over_from_a_team_and_a_team_from_one(alone: World) -> None:
-    with Team(3) as together, Team(2) as couple:
-        world, _ = together.advance(build_world(wall()), STEPS // 3)
-        world, _ = ALONE.advance(world, STEPS // 2)
-        world, _ = couple.advance(world, STEPS)
-    assert same_bits(world, alone)
-
-
 def test_team_goes_from_one_scene_to_another_whatever_room_that_takes() -> None:
     few, many = (pushed_wall(8, 4, contact={"model": "kernel", "particle_spacing": d}) for d in (5e-3, 1e-3))
     with Team(2) as together:

@@ -134,47 +134,6 @@ def test_larger_stack_moves_alike_to_the_last_bit(scheme: str, examples: int) ->
     for_all(st.tuples(stacks(), st.integers(-8, 10).filter(bool)), examples, check)
 
 
-@pytest.mark.parametrize(("offset", "sides", "restitution"), [(0.6, 4, 0.2), (0.6, 4, 0.6), (0.65, 6, 0.2)])
-def test_blocks_of_a_tenth_of_a_millimetre_and_of_a_kilometre_move_as_those_of_a_metre(
-    offset: float, sides: int, restitution: float
-) -> None:
-    """A staircase of rigid contacts falls; what a user sets, and the threshold of rebounds, is scaled with it."""
-
-    def states(size: float) -> list[Any]:
-        time = float(np.sqrt(size))
-        corners = [[size * np.cos(k * np.pi / 3), size * np.sin(k * np.pi / 3)] for k in range(6)]
-        box: dict[str, object] = {"width": size, "height": 0.8 * size, "length": size}
-        shape = box if sides == 4 else {"outline": corners, "depth": size}
-        height = size * (0.8 if sides == 4 else np.sqrt(3.0))
-        friction = {"static": 0.4, "kinetic": 0.3, "transition_speed": 5e-3 * time}
-        tables = {
-            "schema": 1,
-            "name": "scaled",
-            "materials": {"any": {"density": 2700.0, "young_modulus": 69e9 * size, "poisson_ratio": 0.3}},
-            "blocks": {"block": {**shape, "material": "any"}},
-            "bodies": [{"block": "block", "x": i * offset * size, "y": height * (i + 0.5)} for i in range(3)],
-            "friction": {"block_block": friction, "block_ground": friction},
-            "contact": {"restitution": restitution},
-            "time": {
-                "scheme": RIGID,
-                "end": 10.0 * time,
-                "stop_at_rest": False,
-                "step": 2e-3 * time,
-                "velocity_tolerance": 1e-9 * time,
-                "restitution_threshold": 0.01 * time,
-            },
-        }
-        run = Simulation(build_scene(scenario_from_mapping(tables)))
-        units = np.array([size, size, 1.0, size / time, size / time, 1.0 / time])
-        return [run.to_step(steps).state() / units for steps in (100, 400)]
-
-    metre = states(1.0)
-    assert np.abs(metre[-1][:, 2]).max() > 0.3  # rad: it falls
-    for size in (1e-4, 1e3):
-        for one, two in zip(metre, states(size), strict=True):
-            np.testing.assert_allclose(two, one, atol=1e-9)
-
-
 def loose_wall(size: float) -> list[dict[str, object]]:
     """Return three courses of three blocks, none of which touches another as yet or falls at the same time."""
     return [

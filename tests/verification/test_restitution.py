@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Setting
-from blocksim.verification.impacts import COLLISION_STEPS, LANDINGS, SPACINGS, collision, drop_flat
+from blocksim.verification.impacts import COLLISION_STEPS, LANDINGS, SPACINGS, collision
 from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, Throw, Thrower, kinetic_energy
 
 TILT = radians(30.0)
@@ -34,12 +34,6 @@ def test_particle_spacing_changes_no_bit_of_an_impact(landing: str) -> None:
         for spacing in SPACINGS
     }
     assert len(states) == 1
-
-
-def test_particle_spacing_changes_no_bit_of_a_bounce() -> None:
-    falls = [drop_flat(Setting(), spacing).to_time(0.15) for spacing in SPACINGS]
-    assert len({fall.bodies.tobytes() for fall in falls}) == 1
-    assert falls[0].bodies[0].vy > 0.0
 
 
 @pytest.mark.parametrize("law", BOTH)

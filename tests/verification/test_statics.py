@@ -13,14 +13,6 @@ if TYPE_CHECKING:
     from tests.conftest import PaperBlock, Start
 
 
-def test_particle_spacing_changes_no_bit_of_a_rest(start: Start, paper_block: PaperBlock) -> None:
-    rests = [
-        start([{"y": paper_block.height / 2}], contact={"particle_spacing": spacing}).to_time(1e-3)
-        for spacing in (5e-4, 1e-3, 2e-3, 4e-3)
-    ]
-    assert len({rest.bodies.tobytes() for rest in rests}) == 1
-
-
 @pytest.mark.parametrize("offset", [0.0, 1e-12, -1e-12, 1e-9, -1e-9])
 def test_aligned_stack_stands_on_two_points_per_face(start: Start, paper_block: PaperBlock, offset: float) -> None:
     count = 4

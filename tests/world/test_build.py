@@ -76,13 +76,6 @@ def test_mass_and_inertia_are_those_of_the_solid() -> None:
     assert [body.half_x, body.half_y, body.radius] == [W / 2, H / 2, pytest.approx(hypot(W, H) / 2)]
 
 
-def test_poses_and_velocities_are_those_of_the_scenario() -> None:
-    body = build_world(scenario({"angle": "30 deg", "velocity": [1.0, -2.0], "spin": 3.0})).bodies[0]
-    assert [body.x, body.y, body.angle] == [0.1, 0.2, pytest.approx(radians(30.0))]
-    assert [body.cos, body.sin] == pytest.approx([cos(radians(30.0)), sin(radians(30.0))])
-    assert [body.vx, body.vy, body.spin] == [1.0, -2.0, 3.0]
-
-
 def test_fixed_bodies_have_no_mass_and_move_with_the_support_as_the_ground_does() -> None:
     world = build_world(scenario({"fixed": True}, more=({**BODY, "x": 0.5},)))
     fixed, free, ground = world.bodies

@@ -11,7 +11,6 @@ from blocksim.bench.harness import pushed_wall, three_blocks
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario.models import timeline
 from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
-from blocksim.simulation.provenance import run_hash
 from blocksim.simulation.schemes import ALONE, SCHEMES, Team, build_scene, build_stacks, measure_row, scheme_of
 from blocksim.world import build
 from blocksim.world.build import SceneStack, arrays_of, member, only_stack
@@ -51,10 +50,6 @@ def test_every_scheme_of_the_file_can_be_run() -> None:
         scene = build_scene(three_blocks(time={"scheme": name}))
         assert scheme_of(scene) is scheme
         assert len(measure_row(ALONE.advance(scene, 0)[0])) == len(scheme.row_names)
-
-
-def test_schemes_are_different_runs() -> None:
-    assert run_hash(three_blocks()) != run_hash(collapse())
 
 
 @pytest.fixture(scope="module")
@@ -112,12 +107,6 @@ def test_energies_of_frames_and_summary_are_those_of_the_scheme(tmp_path: Path) 
     assert kept.summary.energy_J.relative_residual < 1e-12
     assert kept.summary.energy_J.dashpot == kept.summary.energy_J.stored_normal == 0.0
     assert np.array_equal(found.frames.x, kept.frames.x)
-
-
-def test_resolved_scenario_of_a_run_repeats_it(tmp_path: Path) -> None:
-    first = simulate_into(collapse(end=0.2, velocity_sweeps=3), tmp_path / "run")
-    again = simulate(read_result(tmp_path / "run").scenario)
-    assert again.summary.final_state_sha256 == first.summary.final_state_sha256
 
 
 def test_ensemble_of_both_schemes_ends_as_single_runs_do() -> None:
