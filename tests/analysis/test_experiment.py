@@ -1,6 +1,6 @@
 """Measured tables: the numbers printed in the paper, and what a person reads when a table is broken."""
 
-from decimal import ROUND_HALF_EVEN, ROUND_HALF_UP, Decimal
+from decimal import ROUND_HALF_UP, Decimal
 from pathlib import Path
 
 import numpy as np
@@ -67,18 +67,6 @@ def test_every_centre_is_the_midpoint_of_its_edges_rounded_half_up(
     assert printed == midpoints(edges, block, ROUND_HALF_UP)
 
 
-def test_centres_are_not_the_midpoints_rounded_half_even(centres: ExperimentTable, edges: ExperimentTable) -> None:
-    differing = [
-        (block, replicate)
-        for block in centres.blocks
-        for replicate, (value, even) in enumerate(
-            zip(centres.values(block, "x"), midpoints(edges, block, ROUND_HALF_EVEN), strict=True), 1
-        )
-        if Decimal(str(value)) != even
-    ]
-    assert differing == [("2", 1), ("2", 5), ("3", 2), ("3", 4)]
-
-
 def test_statistics_of_the_paper_match_numpy_and_the_design(centres: ExperimentTable) -> None:
     statistics = centres.statistics().set_index(["block", "quantity"]).to_dict(orient="index")
     second, third = statistics["2", "x"], statistics["3", "x"]
@@ -87,18 +75,6 @@ def test_statistics_of_the_paper_match_numpy_and_the_design(centres: ExperimentT
     assert second["s"] == pytest.approx(np.std(centres.values("2", "x"), ddof=1), rel=1e-12)
     assert second["s"] == pytest.approx(2.60, abs=0.005)
     assert third["s"] == pytest.approx(2.84, abs=0.005)
-
-
-def test_rotations_say_that_the_paper_states_them_once(centres: ExperimentTable) -> None:
-    assert [mean_of(centres, block, "rotation") for block in centres.blocks] == [0.0, -90.0, -90.0]
-    assert any("ONCE for all six repeats" in note for note in centres.notes)
-
-
-def test_table_knows_its_blocks_quantities_and_repeats(centres: ExperimentTable) -> None:
-    assert centres.blocks == ("1", "2", "3")
-    assert {one.quantity for one in centres.measurements} == {"x", "rotation"}
-    assert centres.replicates == (1, 2, 3, 4, 5, 6)
-    assert centres.values("9", "x").empty
 
 
 def test_units_become_millimetres_and_degrees(tmp_path: Path) -> None:

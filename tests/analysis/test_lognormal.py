@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from scipy.stats import binom, norm
+from scipy.stats import norm
 
-from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit, inflation_of
 
 X = np.array([0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.5, 1.9])
@@ -18,13 +17,6 @@ DRAWN = [5, 9, 15, 19, 16, 23, 30, 32]
 
 def found(failed: list[int], members: int = MEMBERS) -> Curve | NoCurve:
     return fit(Counts.of(X.tolist(), failed, [members] * len(X)))
-
-
-def test_exact_limits_cover_every_probability_of_the_curve_by_their_95_percent() -> None:
-    held = [interval(k, MEMBERS) for k in range(MEMBERS + 1)]
-    for p in P:
-        covers = [low <= p <= high for low, high in held]
-        assert binom.pmf(np.arange(MEMBERS + 1), MEMBERS, p) @ covers >= 0.95
 
 
 def test_intervals_of_median_dispersion_and_curve_cover_what_they_say() -> None:

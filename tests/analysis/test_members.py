@@ -23,13 +23,10 @@ def table() -> pd.DataFrame:
 
 def test_members_that_did_not_finish_are_named_and_have_no_values() -> None:
     members = Members(table(), "sweep.csv")
+    assert members.blocks == ("left.wing", "2")
     assert (len(members.table), members.has_ended.tolist()) == (3, [True, False, False])
     assert members.failures == (Failure(2, "b", "failed", "too deep"), Failure(3, "", "invalid", ""))
     assert np.array_equal(members.values("left.wing", "x"), [1.0, np.nan, np.nan], equal_nan=True)
-
-
-def test_blocks_are_those_of_the_columns_points_in_names_included() -> None:
-    assert Members(table(), "sweep.csv").blocks == ("left.wing", "2")
 
 
 def test_values_that_are_not_finite_are_no_values() -> None:

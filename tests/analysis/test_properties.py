@@ -31,12 +31,6 @@ def test_table_1_and_the_sizes_arrive_in_si() -> None:
     )
 
 
-def test_properties_cannot_be_changed_by_accident() -> None:
-    values = load_properties(SHIPPED).values
-    with pytest.raises(TypeError):
-        values["width"] = 1.0  # type: ignore[index]
-
-
 BROKEN: dict[str, tuple[str, Mistake]] = {
     "mistyped": ("widht,mm,32", (2, "property", "unknown property 'widht', did you mean 'width'?", "widht")),
     "unit": (

@@ -6,7 +6,6 @@ import pytest
 from blocksim.scenario import Sweep
 from blocksim.scenario.models.study import Normal, Uniform
 from blocksim.study.calibrate_plan import FRESH, Prior, centre_on_fit, members_of, prior_of
-from blocksim.study.rows import si_number
 
 FRICTION = Prior("friction.block_block.kinetic", 0.17, 0.31)
 OVERLAP = Prior("structures.0.overlap", 9.5, 10.5, "mm")
@@ -49,11 +48,6 @@ def test_values_at_a_bound_are_noticed() -> None:
 )
 def test_prior_keeps_the_unit_of_its_lower_end(written: object, table: Uniform, expected: Prior) -> None:
     assert prior_of("key", table, written) == expected
-
-
-def test_si_number_of_values_with_and_without_unit() -> None:
-    assert si_number("10.12 mm") == 0.01012
-    assert si_number(0.1923) == 0.1923
 
 
 SCATTERED, KINETIC = "structures.0.overlap", "friction.block_block.kinetic"

@@ -5,7 +5,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-import blocksim
 from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Judgement, Settings
 from blocksim.errors import InputMissingError, InvalidInputError
@@ -63,7 +62,3 @@ def test_damaged_table_is_reported(tmp_path: Path) -> None:
     (tmp_path / "one.csv").write_text("block,quantity,unit,replicate,value\n1,x,mm,1,3\n")
     with pytest.raises(InvalidInputError, match=r"sweep\.csv: 1\.x_mm: 'wide' in row 1 is not a number"):
         compare_sweep(tmp_path, tmp_path / "one.csv")
-
-
-def test_python_users_compare_sweeps_by_the_same_name(swept: SweepResult) -> None:
-    assert set(blocksim.compare(swept).to_frame("outcome")["outcome"]) == {"0, -90, -90", "did not finish"}

@@ -183,14 +183,11 @@ def test_the_folder_holds_counts_curve_members_and_scenario(whole: FragilityAnsw
     assert Document.read(whole.folder / "fragility.toml").build().name == "slope"
 
 
-def test_another_study_or_file_is_not_replaced_unasked(tmp_path: Path) -> None:
+def test_another_study_is_not_replaced_unasked(tmp_path: Path) -> None:
     slides(tmp_path, members=1)
     with pytest.raises(OutputExistsError, match="contains another fragility study; --overwrite replaces it"):
         slides(tmp_path, members=1, seed=1)
     slides(tmp_path, members=1, seed=1, overwrite=True)
-    (tmp_path / "fragility.csv").write_text("a table of somebody else")
-    with pytest.raises(OutputExistsError, match=r"fragility\.csv: changed since the fragility study wrote it"):
-        slides(tmp_path, members=1, seed=1, overwrite=True)
 
 
 @pytest.mark.parametrize(
@@ -247,15 +244,6 @@ def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path)
 @pytest.mark.long
 def test_counts_and_members_are_the_same_from_processes(tmp_path: Path, whole: FragilityAnswer) -> None:
     slides(tmp_path, executor="processes", jobs=2)
-    for name in ("fragility.csv", "members.csv"):
-        assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
-
-
-@pytest.mark.long
-def test_counts_and_members_are_the_same_from_a_cluster(tmp_path: Path, whole: FragilityAnswer) -> None:
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
-        slides(tmp_path, scheduler=cluster.scheduler_address)
     for name in ("fragility.csv", "members.csv"):
         assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
 

@@ -12,8 +12,8 @@ import pytest
 from blocksim.errors import InvalidInputError, StoppedEarlyError
 from blocksim.scenario import Scenario, document_of
 from blocksim.study.executors import Batch, Execution, Rounds, RunSetting, Task
-from blocksim.study.limit import Levels, find_limit
-from blocksim.study.limit_answer import LimitAnswer, StiffnessLevel
+from blocksim.study.limit import find_limit
+from blocksim.study.limit_answer import LimitAnswer
 from blocksim.study.limit_plan import LimitOptions, read_limit
 from blocksim.study.manifest import MANIFEST
 from tests.study.test_limit import block_on_a_slope
@@ -182,14 +182,3 @@ def test_springs_of_hertz_give_way_by_another_power_and_a_step_by_hand_is_shorte
     found_with(noting, tmp_path / "noting", on_springs(time={"scheme": "explicit", "end": 1.0, "step": 1e-6}))
     assert min(steps) == pytest.approx(1e-6)
     assert max(steps) == pytest.approx(1e-6)
-
-
-def test_what_is_left_out_of_second_order_is_within_the_bracket() -> None:
-    def law(s: float) -> float:
-        return 1.0 - s - s * s
-
-    softer = StiffnessLevel(stiffness_scale=1.0, low=law(0.08), high=law(0.08))
-    stiffer = StiffnessLevel(stiffness_scale=10.0, low=law(0.008), high=law(0.008))
-    (low, high) = Levels((softer, stiffer), 10.0).stiff or (0, 0)
-    assert low < 1.0 < high
-    assert high - low < 2e-3

@@ -157,12 +157,6 @@ def test_a_distribution_that_leaves_the_possible_values_is_refused_before_anythi
     assert "cut the distribution with from and to" in str(caught.value)
 
 
-def test_a_ratio_keeps_kinetic_friction_in_step_with_the_static_one(nominal: Document) -> None:
-    ratio = nominal.with_values({"friction.block_block": {"static": 0.31, "kinetic_ratio": 0.5}})
-    made = cases(ratio, {"friction.block_block.static": [0.2, 0.4]})
-    assert [case.scenario.friction.block_block.kinetic for case in made if case.scenario] == [0.1, 0.2]
-
-
 @pytest.mark.parametrize("friction", [0.31, {"static": 0.31, "kinetic_ratio": 0.5}, None])
 def test_a_resolved_sweep_has_the_same_cases(nominal: Document, friction: object) -> None:
     """Kinetic friction that follows the static one does so in the resolved file too."""

@@ -11,7 +11,6 @@ from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.study.sensitivity import METHODS, Floats, Indices, ModelOutput, indices_of, settings_at, unit_cube
 
 Function = Callable[..., Floats]
-G_WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0])
 
 
 def indices(method: str, function: Function, vary: Mapping[str, Variation], samples: int, seed: int = 0) -> Indices:
@@ -23,11 +22,6 @@ def indices(method: str, function: Function, vary: Mapping[str, Variation], samp
 
 def ishigami(x: Floats, y: Floats, z: Floats) -> Floats:
     return np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
-
-
-def sobol_g(*places: Floats) -> Floats:
-    factors = [(np.abs(4.0 * u - 2.0) + a) / (1.0 + a) for u, a in zip(places, G_WEIGHTS, strict=True)]
-    return np.asarray(np.prod(factors, axis=0))
 
 
 def assert_within_confidence(found: Indices, column: str, exact: list[float]) -> None:
@@ -48,16 +42,6 @@ def test_sobol_indices_of_the_ishigami_function() -> None:
     assert found.sd**2 == pytest.approx(variance, rel=0.02)
     assert_within_confidence(found, "S1", [first / variance, second / variance, 0.0])
     assert_within_confidence(found, "ST", [(first + both) / variance, second / variance, both / variance])
-
-
-def test_sobol_indices_of_the_g_function() -> None:
-    # V_i = 1 / (3 (1 + a_i)^2), V = prod(1 + V_i) - 1, V_Ti = V_i prod over the others of (1 + V_j) (Sobol 1993)
-    parts = 1.0 / (3.0 * (1.0 + G_WEIGHTS) ** 2)
-    variance = np.prod(1.0 + parts) - 1.0
-    total = parts * np.prod(1.0 + parts) / (1.0 + parts)
-    found = indices("sobol", sobol_g, dict.fromkeys("abcde", Uniform(0.0, 1.0)), 1024)
-    assert_within_confidence(found, "S1", list(parts / variance))
-    assert_within_confidence(found, "ST", list(total / variance))
 
 
 def test_sobol_indices_follow_the_distributions() -> None:
@@ -104,19 +88,6 @@ def test_designs_consist_of_whole_blocks_in_the_unit_cube(method: str, keys: int
     assert points.shape == (5 * (keys + chosen.more_rows), keys)
     assert points.min() >= 0.0
     assert points.max() <= 1.0
-
-
-@pytest.mark.parametrize("method", sorted(METHODS))
-def test_blocks_may_be_left_out(method: str) -> None:
-    chosen = METHODS[method]
-    vary = dict.fromkeys("xyz", Uniform(-math.pi, math.pi))
-    points = chosen.points(3, 64, 0)
-    rows = np.array([[float(str(value)) for value in row.values()] for row in settings_at(points, vary)])
-    kept = np.repeat(np.arange(64) % 5 != 0, 3 + chosen.more_rows)
-    part = indices_of(ModelOutput("y", "mm", ishigami(*rows[kept].T)), points[kept], chosen, 0)
-    whole = indices_of(ModelOutput("y", "mm", ishigami(*rows.T)), points, chosen, 0)
-    first = next(iter(chosen.columns))
-    assert part.numbers[first] == pytest.approx(whole.numbers[first], rel=0.5, abs=0.3)
 
 
 def test_morris_trajectories_lie_farther_apart_than_random_ones_and_are_quick() -> None:

@@ -80,18 +80,6 @@ def test_rows_distinguish_what_rocked_back_from_what_stands(tmp_path: Path) -> N
     assert [kept[name] for name in table_columns()] == [table[name][1] for name in table_columns()]
 
 
-def test_cases_are_drawn_as_the_command_draws_them(quick: Document, tmp_path: Path) -> None:
-    drawn = {KINETIC: {"from": 0.2, "to": 0.25}}
-    tables = [
-        sweep(quick, drawn, mode="lhs", samples=3, seed=seed, out=tmp_path / name).table[KINETIC]
-        for seed, name in ((7, "one"), (7, "same"), (8, "other"))
-    ]
-    assert len(tables[0]) == 3
-    assert tables[0].between(0.2, 0.25).all()
-    assert tables[0].equals(tables[1])
-    assert not tables[0].equals(tables[2])
-
-
 def test_folder_holds_plan_table_and_manifest_and_the_plan_repeats_the_sweep(quick: Document, tmp_path: Path) -> None:
     result = sweep(quick, TWO, out=tmp_path)
     files = {"sweep.toml", "sweep.json", "sweep.csv", "manifest.jsonl", "timings.csv", "experiment.csv"}
