@@ -182,24 +182,6 @@ def test_json_of_a_crowd_has_every_block(blocksim: Command) -> None:
     assert data["memory"] > 210_000_000 > data["bytes"] > 0
 
 
-@pytest.mark.parametrize("end", ["5e-324", "1e-310", "1e-300 s", "1e-15"])
-def test_an_end_of_next_to_nothing_is_no_internal_error(blocksim: Command, end: str) -> None:
-    answer = blocksim("check", "scenarios/three_blocks.toml", "--set", f"time.end={end}")
-    assert answer.code == (0 if end == "1e-15" else 65)  # the interval of checks was infinite
-
-
-@pytest.mark.parametrize(
-    "line",
-    [
-        "scenarios/three_blocks.toml --set time.rest_hold=1e30",
-        "scenarios/three_blocks.toml --set 'contact.particle_spacing=\"1 nm\"'",
-        "scenarios/tower.toml --set time.scheme=nonsmooth --set 'time.step=20 ms' --set time.force_step=true",
-    ],
-)
-def test_extreme_but_meaningful_values_are_valid(blocksim: Command, line: str) -> None:
-    assert blocksim("check", *shlex.split(line)).code == 0
-
-
 def test_friction_angle_without_its_unit_is_warned_of(blocksim: Command) -> None:
     settings = ("scenarios/slide.toml", "--set", "friction.block_ground=30")
     warning = 'warning: friction.block_ground = 30 is a friction coefficient; for an angle write "30 deg"\n'

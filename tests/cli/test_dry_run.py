@@ -45,13 +45,3 @@ def test_twice_the_cores_take_half_the_time(blocksim: Command) -> None:
 
     assert solving(1).endswith(" on 1 core")
     assert solving(1).removesuffix(" on 1 core") != solving(8).removesuffix(" on 8 cores")
-
-
-def test_models_of_particles_cost_what_was_measured(blocksim: Command) -> None:
-    # measured for three blocks with 164 particles each, over the exact faces: kernel 30, particles 20
-    def seconds(model: str) -> float:
-        return float(json.loads(blocksim(*PLAN, "--json", "--vary", f"contact.model={model}").out)["seconds"])
-
-    surface = seconds("surface")
-    assert 20.0 < seconds("kernel") / surface < 60.0
-    assert 12.0 < seconds("particles") / surface < 40.0

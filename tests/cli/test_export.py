@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 import h5py
+import pytest
 
 from tests.cli.conftest import SOFT, Command
 
@@ -27,11 +28,14 @@ def test_vtkhdf_has_the_times_of_the_run(blocksim: Command, finished: Path) -> N
         assert file["VTKHDF/Steps/Values"][:].tolist() == run["particles/blocks/time"][:].tolist()
 
 
-def test_killed_run_is_exported_and_told(blocksim: Command, copied: Path) -> None:
-    (copied / "run.json").unlink()
-    answer = blocksim("export", copied, "--out", "frames.csv")
+@pytest.mark.parametrize("command", ["export", "plot", "animate"])
+def test_killed_run_is_exported_and_told(blocksim: Command, copied: Path, command: str) -> None:
+    for name in ("run.json", "done.json", "final.csv"):
+        (copied / name).unlink()
+    brief = ("--speed", "1", "--fps", "5", "--width", "200") if command == "animate" else ()
+    answer = blocksim(command, copied, *brief)
     assert answer.code == 0
-    assert "this run was killed or is still running" in answer.err
+    assert f"{copied}: this run was killed or is still running; its " in answer.err
 
 
 def test_contacts_get_a_file_beside_where_they_are_stored(blocksim: Command, tmp_path: Path) -> None:

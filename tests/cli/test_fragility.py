@@ -67,29 +67,6 @@ def test_members_without_a_result_are_exit_code_77(blocksim: Command) -> None:
     assert "samples have no result, see members.csv" in answer.err
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        "--intensity gravity=0,1",
-        "--intensity gravity=1:2",
-        "--intensity gravty=1,2",
-        "--intensity gravity=1,2 --fails fel",
-        "--intensity gravity=1,2 --scatter friction.block_ground=0.3",
-        "--intensity gravity=1,2 --scatter friction.block_ground=a:b",
-        "--intensity gravity=1,2 --shard 3/2",
-        "--intensity gravity=1,2 --samples 0",
-    ],
-)
-def test_mistakes_are_shown_and_leave_nothing(
-    blocksim: Command, golden: Golden, tmp_path: Path, arguments: str
-) -> None:
-    scatter = () if "--scatter" in arguments else SCATTER
-    answer = blocksim(*SLIDE, *arguments.split(), *scatter, "--out", "out")
-    assert answer.out == ""
-    assert not (tmp_path / "out").exists()
-    golden(f"exit code {answer.code}\n{answer.err}")
-
-
 @pytest.mark.long
 def test_a_study_killed_again_and_again_ends_as_one_that_was_not(
     blocksim: Command, process: Process, tmp_path: Path

@@ -185,32 +185,6 @@ def test_limits_over_another_key_are_a_table(blocksim: Command, golden: Golden) 
     assert blocksim(*WALL, *over, "--both-laws").code == 2
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        "--vary ground.tilt=20:40",
-        "--vary ground.tilt=20deg,40deg",
-        "--vary ground.titl=20deg:40deg",
-        "--vary ground.tilt=20deg:95deg",
-        "--vary ground.tilt=20deg:40deg --vary gravity=1:2",
-        "--vary ground.tilt=20deg:40deg --to 5",
-        "--vary ground.tilt=20deg:40deg --to much",
-        "--vary ground.tilt=20deg:40deg --stands fell",
-        "--vary ground.tilt=20deg:40deg --stiffer",
-        "--vary ground.tilt=20deg:40deg --executor dask",
-        "--vary ground.tilt=20deg:40deg --executor ensemble --scheduler tcp://localhost:1",
-        "--vary structures.0.left=0:1",
-    ],
-)
-def test_mistakes_are_shown_and_leave_nothing(
-    blocksim: Command, golden: Golden, tmp_path: Path, arguments: str
-) -> None:
-    answer = blocksim(*WALL, *arguments.split(), "--out", "out")
-    assert answer.out == ""
-    assert not (tmp_path / "out").exists()
-    golden(f"exit code {answer.code}\n{answer.err}")
-
-
 @pytest.mark.long
 def test_a_search_killed_again_and_again_ends_as_one_that_was_not(
     blocksim: Command, process: Process, tmp_path: Path

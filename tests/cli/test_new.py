@@ -16,11 +16,6 @@ SCENARIOS = [kind for kind, file in templates().items() if file.name.endswith(".
 SWEEPS = [kind for kind in SCENARIOS if kind.startswith("sweep-")]
 
 
-def test_all_promised_kinds_are_there() -> None:
-    promised = "arch column-collapse dominoes experiment pyramid retaining-wall slope soil-slope stack sweep-grid"
-    assert list(templates()) == [*promised.split(), "sweep-normal", "sweep-sobol", "three-blocks", "voronoi", "wall"]
-
-
 @pytest.mark.parametrize("kind", SCENARIOS)
 def test_a_new_scenario_passes_the_check(blocksim: Command, kind: str) -> None:
     made = blocksim("new", kind, "mine")

@@ -17,11 +17,6 @@ def test_picture_is_written_and_told(blocksim: Command, finished: Path) -> None:
     assert Path("strip.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_picture_has_the_name_of_the_scenario(blocksim: Command, finished: Path) -> None:
-    assert blocksim("plot", finished, "--quiet", "--times", "0,0.1").err == ""
-    assert Path("three_blocks_nominal.png").is_file()
-
-
 @pytest.mark.parametrize("command", ["plot", "export", "animate", "report"])
 def test_file_of_others_is_replaced_only_when_asked(blocksim: Command, finished: Path, command: str) -> None:
     out = {"plot": "thesis.pdf", "export": "lab.csv", "animate": "clip.gif", "report": "index.html"}[command]
@@ -41,14 +36,9 @@ def test_other_kinds_are_drawn(blocksim: Command, finished: Path, kind: str, tol
     assert f"<!-- {told} -->" in Path("picture.svg").read_text(encoding="utf-8")
 
 
-def test_the_motion_of_supports_is_drawn_without_a_run(blocksim: Command, finished: Path) -> None:
+def test_the_motion_of_supports_is_drawn_without_a_run(blocksim: Command) -> None:
     answer = blocksim("plot", "scenarios/pulse.toml", "--kind", "motion")
     assert (answer.code, answer.err) == (0, "picture: pulse_motion.png\n")
-    answer = blocksim("plot", finished, "--kind", "motion")
-    assert (answer.code, answer.err) == (
-        65,
-        "the supports of this scenario do not move: it has no table [motion]\n",
-    )
 
 
 def test_probes_are_drawn_by_name(blocksim: Command) -> None:
@@ -86,29 +76,10 @@ def test_page_frames_and_colours_are_those_asked_for(blocksim: Command, finished
     assert "<!-- speed (m/s) -->" in texts
 
 
-def test_killed_run_is_drawn_and_told(blocksim: Command, copied: Path) -> None:
-    for name in ("run.json", "done.json", "final.csv"):
-        (copied / name).unlink()
-    answer = blocksim("plot", copied, "--kind", "final")
-    assert answer.code == 0
-    assert f"{copied}: this run was killed or is still running; its " in answer.err
-
-
 def test_failed_run_can_be_drawn(blocksim: Command) -> None:
     failing = ("--set", "contact.max_overlap=1e-9", "--out", "out")
     assert blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, *failing).code == 76
     assert blocksim("plot", "out").code == 0
-
-
-def test_the_folder_alone_tells_what_the_blocks_stand_on(blocksim: Command) -> None:
-    brief = ("--set", "time.end=0.1", "--set", "ground.tilt=3 deg", "--out", "out")
-    assert blocksim("run", "scenarios/shaking_table.toml", *SOFT, *brief).code == 0
-    Path("out").rename("elsewhere")
-    assert blocksim("plot", "elsewhere", "--out", "strip.svg", "--times", "0,0.05").code == 0
-    texts = Path("strip.svg").read_text(encoding="utf-8")
-    assert "The support moves along x" in texts
-    assert "The ground is tilted by 3°" in texts
-    assert "<!-- support 0.00 mm -->" in texts
 
 
 SWEEP = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=0.01", "--jobs", 1, "--out", "swept")
@@ -124,32 +95,11 @@ def test_sweep_over_one_key_is_drawn(blocksim: Command) -> None:
     assert "Band: smallest to largest of the measured repeats." in text
 
 
-def test_sweep_gets_the_picture_that_is_asked_for(blocksim: Command) -> None:
-    vary = ("--vary", "structures.0.overlap=9 mm:11 mm:3", "--vary", "gravity=5:10:3")
-    assert blocksim(*SWEEP, *vary).code == 0
-    marks = {
-        "map": "final rotations of all blocks",
-        "matrix": "overlap (mm)",
-        "histogram": "all 9 cases",
-        "lines": "gravity = 5.0",
-    }
-    for kind, mark in marks.items():
-        assert blocksim("plot", "swept", "--kind", kind, "--out", f"{kind}.svg").code == 0
-        assert mark.replace(".0", "") in Path(f"{kind}.svg").read_text(encoding="utf-8")
-
-
 def test_table_of_sensitivities_is_drawn(blocksim: Command) -> None:
     text = "output,unit,key,mu*,±,mu,sigma\nx of block 2,mm,gravity,5,1,-5,0\n"
     Path("indices.csv").write_text(text, encoding="utf-8")
     answer = blocksim("plot", "indices.csv")
     assert (answer.code, answer.err) == (0, "picture: indices.png\n")
-
-
-def test_forces_are_drawn_where_contacts_are_stored(blocksim: Command) -> None:
-    brief = ("--set", "time.end=0.02", "--set", "output.contacts=true", "--out", "out", "--quiet")
-    assert blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, *brief).code == 0
-    assert blocksim("plot", "out", "--forces", "--out", "strip.svg").code == 0
-    assert "Arrows:" in Path("strip.svg").read_text(encoding="utf-8")
 
 
 SOLVER_FREE = """

@@ -95,14 +95,6 @@ def test_measured_ranges_of_a_run_are_given_to_player_and_curves(blocksim: Comma
     }  # fmt: skip
 
 
-def test_notes_of_a_sweep_are_whole_sentences(blocksim: Command, tmp_path: Path) -> None:
-    write_sweep(tmp_path / "sweep", kept=0)
-    write_experiment(tmp_path / "repeats.csv")
-    assert blocksim("report", "sweep", "--experiment", "repeats.csv").code == 0
-    text = REPORT.read_text(encoding="utf-8")
-    assert "<bdi>of the outcome" not in text
-
-
 def test_varied_inputs_of_a_real_sweep_are_its_keys_and_no_result(blocksim: Command) -> None:
     falling = Document.read(SCENARIOS / "three_blocks_nonsmooth.toml").with_values({"time.end": 0.01})
     tilts, frictions = ["10 deg", "12 deg"], [0.2, 0.25]
@@ -140,6 +132,7 @@ def test_sweep_is_judged_by_the_repeats(blocksim: Command, tmp_path: Path) -> No
     write_experiment(tmp_path / "repeats.csv")
     assert blocksim("report", "sweep", "--experiment", "repeats.csv").code == 0
     text = REPORT.read_text(encoding="utf-8")
+    assert "<bdi>of the outcome" not in text
     assert "3 of 6 samples (50.0 %) are within all measured ranges" in text
     assert "[67.00, 69.00]" in text
     assert data_of(REPORT)["measured"] == {"1.x_mm": [67.0, 69.0], "1.rotation_deg": [-95.0, -85.0]}
@@ -158,17 +151,6 @@ def test_run_needs_no_solver(tmp_path: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout == "0 []\n"
-
-
-def test_older_report_is_replaced_but_no_other_file(blocksim: Command, tmp_path: Path) -> None:
-    write_run(tmp_path / "run")
-    assert blocksim("report", "run").code == 0
-    assert blocksim("report", "run").code == 0
-    Path("mine.html").write_text("<!doctype html><p>mine", encoding="utf-8")
-    answer = blocksim("report", "run", "--out", "mine.html")
-    assert answer.code == 73
-    assert "mine.html" in answer.err
-    assert Path("mine.html").read_text(encoding="utf-8") == "<!doctype html><p>mine"
 
 
 @pytest.mark.parametrize("damaged", ["run.h5", "run.json", "final.csv", "scenario.toml", "experiment.csv"])

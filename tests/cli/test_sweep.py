@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.view.sweeps.data import short_names
 from tests.cli.conftest import SCENARIOS, SOFT, Command
 
 SHORT = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--set", "time.end=0.01", "--jobs", 1, "--out", "out")
@@ -111,29 +110,12 @@ def test_largest_move_comes_before_the_places_of_many_blocks(blocksim: Command) 
     assert "outcome  displacement_mm     turn_deg   1.x_mm   2.x_mm" in answer.out.splitlines()[0]
 
 
-def test_short_keys_are_the_shortest_ends_that_differ() -> None:
-    keys = (KINETIC, "friction.block_ground.kinetic", "contact.stiffness_scale", "time.end")
-    assert short_names(keys) == [
-        "block_block.kinetic",
-        "block_ground.kinetic",
-        "contact.stiffness_scale",
-        "time.end",
-    ]
-
-
 def test_failures_are_listed_up_to_a_few(blocksim: Command) -> None:
     answer = blocksim(*SHORT, "--vary", "contact.max_overlap=1e-3," + ",".join(f"{k}e-9" for k in range(1, 9)))
     assert answer.code == 77
     assert answer.err.count("  failed: contact.max_overlap = ") == 5
     assert "8 of 9 cases did not finish; the first: an overlap exceeds contact.max_overlap" in answer.err
     assert "  and 3 more; --retry-failed runs them again" in answer.err
-
-
-def test_many_cases_are_reported_in_few_lines(blocksim: Command) -> None:
-    answer = blocksim(*RIGID, "--vary", f"{KINETIC}=0.1:0.3:60")
-    assert answer.code == 0
-    assert "60/60 cases, " in answer.err
-    assert answer.err.count("cases, ") < 10
 
 
 def test_shards_are_merged_and_missing_ones_named(blocksim: Command) -> None:

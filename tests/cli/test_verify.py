@@ -94,10 +94,3 @@ def test_rigid_contacts_say_that_they_are_and_what_is_left_out(
     assert "V2" not in answer.out
     assert "left out: V2 (rigid blocks have no stiffness" in answer.err
     assert "1 of 1 cases inside" in answer.err
-
-
-def test_soil_has_one_setting(blocksim: Command) -> None:
-    answer = blocksim("verify", "--soil", "--scheme", "nonsmooth")
-    assert (answer.code, answer.out) == (2, "")
-    assert "--soil has one setting" in answer.err
-    assert blocksim("verify", "--soil", "S12").code == 65

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import pytest
 
-from blocksim.errors import InvalidInputError, OutputError
+from blocksim.errors import InvalidInputError
 from blocksim.view.style import OWN, Paper
 from tests.view.described import described
 from tests.view.drawings import DRAWINGS
@@ -65,27 +64,6 @@ def test_same_data_give_the_same_bytes_of_a_valid_file(tmp_path: Path, name: str
 def test_odd_names_can_be_written(tmp_path: Path, suffix: str) -> None:
     DRAWINGS["final with odd names"](tmp_path / f"final.{suffix}", OWN)
     assert (tmp_path / f"final.{suffix}").stat().st_size > 1000
-
-
-def test_png_has_150_dots_an_inch_or_those_asked_for(tmp_path: Path) -> None:
-    for name, paper in (("own", OWN), ("asked", Paper((6.0, 8.0), 100.0))):
-        DRAWINGS["strip"](tmp_path / f"{name}.png", paper)
-    own, asked = (struct.unpack(">II", (tmp_path / f"{name}.png").read_bytes()[16:24]) for name in ("own", "asked"))
-    assert own[0] == 1500
-    assert asked == (600, 800)
-
-
-@pytest.mark.parametrize("name", KINDS)
-def test_formats_that_cannot_be_written_are_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InvalidInputError, match=r"'\.bmp' unsupported picture format; use \.png, \.svg, \.pdf"):
-        DRAWINGS[name](tmp_path / "picture.bmp", OWN)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_place_that_is_not_there_is_told(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot be written: No such file or directory"):
-        DRAWINGS["tornado"](tmp_path / "none" / "picture.png", OWN)
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(("name", "size"), [(name, size) for name, sizes in SIZES.items() for size in sizes])

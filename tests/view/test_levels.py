@@ -4,9 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from blocksim.errors import InvalidInputError
-from blocksim.view.studies import MOST_BLOCKS, chosen_blocks, distance_limits, draw_levels, refuse_small_page
-from blocksim.view.style import Paper
+from blocksim.view.studies import MOST_BLOCKS, chosen_blocks, distance_limits, draw_levels
 from tests.view.drawings import panel
 
 
@@ -29,8 +27,3 @@ def test_nothing_but_zeros_can_be_drawn(tmp_path: Path) -> None:
     assert chosen_blocks([still]) == []
     draw_levels([still], tmp_path / "still.png")
     assert (tmp_path / "still.png").stat().st_size > 0
-
-
-def test_page_without_room_is_refused_before_a_study_is_run() -> None:
-    with pytest.raises(InvalidInputError, match=r"at least \d+ mm high"):
-        refuse_small_page(1, Paper((4.0, 1.0)))

@@ -1,7 +1,6 @@
 """Colours and letters that can be read."""
 
 import errno
-from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -9,9 +8,7 @@ import pytest
 from blocksim.errors import OutputError
 from blocksim.view.style import (
     BLOCK_COLOURS,
-    MEASURED_COLOUR,
     SMALLEST_FONT,
-    block_colour,
     break_lines,
     cut_to,
     fitting_font,
@@ -34,11 +31,6 @@ def luminance(colour: str) -> float:
 def test_block_names_stand_out_from_their_blocks(fill: str) -> None:
     light, dark = sorted((luminance(fill), luminance(text_colour(fill))), reverse=True)
     assert (light + 0.05) / (dark + 0.05) > 3.0
-
-
-def test_the_palette_repeats_and_keeps_measured_values_apart() -> None:
-    assert block_colour(len(BLOCK_COLOURS)) == block_colour(0)
-    assert all(first != second for first, second in combinations((*BLOCK_COLOURS, MEASURED_COLOUR), 2))
 
 
 def test_text_shrinks_to_its_room_and_vanishes_when_unreadable() -> None:
