@@ -146,6 +146,8 @@ def area_of(corners: Sequence[Corner] | Floats) -> float:
 
 def centre_outline(points: Sequence[Corner]) -> Corners:
     """Return corners counter-clockwise about their centroid; the first point stays the first."""
+    if len(points) == 0:
+        return ()
     x0, y0 = points[0]
     local = [(x - x0, y - y0) for x, y in points]
     if area_of(local) < 0.0:

@@ -74,9 +74,7 @@ class PlacedBody(NamedTuple):
     @property
     def radius(self) -> float:
         """Distance of the farthest corner from the centroid in m."""
-        if self.outline:
-            return max(math.hypot(x, y) for x, y in self.outline)
-        return 0.5 * math.hypot(self.size_x, self.size_y)
+        return max(math.hypot(x, y) for x, y in self.corners)
 
     def ground_point(self, x: float, y: float) -> geometry.Corner:
         """Return where a point is (m) that is given in the body's own axes (m)."""

@@ -1,8 +1,8 @@
 """What a scenario places where, its shapes, and the records of all bodies at time zero.
 
 Blocks come first, then pieces of ground and walls, the half-plane last. A piece is a slab of which only the upper face
-counts. Where any block is a polygon and no rectangle, the corners of all bodies are kept, each shape once; with the
-contact models `particles` and `kernel` the boundary particles of all bodies.
+counts. The corners of all bodies are kept, each shape once, and with the contact models `particles` and `kernel` the
+boundary particles of all bodies.
 
 Contact of a corner with a face lasts as long as no other face is nearer. At the distance e from the end of a face and
 so deep behind it, all others of a convex body are at least `clear` e minus the depth away: along the face the least
@@ -11,7 +11,7 @@ length. Near an end only the face beside it can be nearer, as those beyond are `
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from operator import attrgetter
 from typing import NamedTuple
@@ -26,6 +26,7 @@ from blocksim.world.excitation import Drives, LoadArrays, drive_records, load_ar
 from blocksim.world.interactions import ContactClass, Interactions, contact_classes, interactions_of
 
 NO_FACE = (0.0, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # nothing is beyond it, or looks against it
+LENGTHS = ("half_x", "half_y", "radius", "inner_radius", "least_width")  # m, of a block by its shape
 FIELDS = ("x", "y", "nx", "ny", "distance", "half", "middle", "clear", "far", "sharp", "cone")
 CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))  # of a rectangle, in half sides
 NORMALS = ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))
@@ -42,26 +43,29 @@ class Shapes(NamedTuple):
     table: arrays.Records  # (q,) CORNER
     firsts: tuple[int, ...]  # (n + 1,) of blocks, pieces of ground and the half-plane
     sizes: tuple[int, ...]  # (n + 1,) numbers of corners
-    inner: Mapping[Corners, float]  # m: from the centroid of a block to the nearest face
+    faces: tuple[int, ...]  # (n,) of blocks: kernels take OUTLINE by its corners, ALL by its half sides
+    lengths: NDArray[np.float64]  # (5, n) LENGTHS of blocks
 
 
-def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]) -> Shapes | None:
-    """Return the corners of all bodies, of rectangles too; None where all blocks are rectangles.
+def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]) -> Shapes:
+    """Return the corners of all bodies, of rectangles too.
 
     `slabs` (m) are the half sides of the pieces of ground. The half-plane, the last of all bodies, is a rectangle that
     is infinitely wide and has its upper face in its centre. After the corners of a block come as many others as a block
     may have here, so that four blocks are gone through together. Of ground no face is beside another.
     """
-    if not any(body.outline for body in placed):
-        return None
     places: dict[Corners, int] = {}
+    lengths: dict[Corners, tuple[float, ...]] = {}
     rows: list[tuple[float, ...]] = []
     blocks = [body.corners for body in placed]
-    most = max(len(corners) for corners in blocks)
-    for corners in blocks:
+    most = max(map(len, blocks), default=0)
+    for body, corners in zip(placed, blocks, strict=True):
         if corners not in places:
-            places[corners] = len(rows)
-            rows += [*corner_rows(corners), *[NO_FACE] * (most - len(corners))]
+            places[corners], own = len(rows), corner_rows(corners)
+            half_sides = (max(map(abs, axis)) for axis in zip(*corners, strict=True))
+            inner = min(row[FIELDS.index("distance")] for row in own)
+            lengths[corners] = (*half_sides, body.radius, inner, body.least_width)
+            rows += [*own, *[NO_FACE] * (most - len(corners))]
     firsts = [places[corners] for corners in blocks]
     for half_x, half_y in (*slabs, (math.inf, 0.0)):
         firsts.append(len(rows))
@@ -73,8 +77,9 @@ def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]
     for name, column in zip(FIELDS, zip(*rows, strict=True), strict=True):
         table[name] = column
     sizes = (*map(len, blocks), *[len(CORNERS)] * (len(firsts) - len(blocks)))
-    inner = {corners: float(table["distance"][place : place + len(corners)].min()) for corners, place in places.items()}
-    return Shapes(table, tuple(firsts), sizes, inner)
+    faces = tuple(arrays.OUTLINE if body.outline else arrays.ALL for body in placed)
+    of_blocks = np.array([lengths[corners] for corners in blocks]).reshape(-1, len(LENGTHS))
+    return Shapes(table, tuple(firsts), sizes, faces, of_blocks.T)
 
 
 def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
@@ -203,7 +208,7 @@ class Layout(NamedTuple):
     drives: Drives
     applied: LoadArrays
     slabs: arrays.Records  # (s,) BODY: the pieces of ground and walls
-    shapes: Shapes | None
+    shapes: Shapes
 
     @property
     def shape(self) -> tuple[object, ...]:
@@ -211,8 +216,13 @@ class Layout(NamedTuple):
         model = self.scenario.contact.model
         moved = (*self.drives.driven["body"].tolist(), self.drives.paths, self.drives.pieces.size)
         loads = self.applied.loads.size, self.applied.pieces.size
-        shapes = None if self.shapes is None else (self.shapes.firsts, self.shapes.sizes)
+        shapes = self.shapes.table.size, self.has_corners
         return model, len(self.placed), len(self.segments), len(self.classes), moved, loads, shapes
+
+    @property
+    def has_corners(self) -> bool:
+        """Whether the kernels need the corners of bodies."""
+        return arrays.OUTLINE in self.shapes.faces
 
 
 def layout_of(scenario: Scenario) -> Layout:
@@ -244,7 +254,7 @@ def _slab_records(
         record.x = segment.x0 + along[0] * middle + along[1] * 0.5 * thickness
         record.y = segment.y0 + along[1] * middle - along[0] * 0.5 * thickness
         record.half_x, record.half_y = 0.5 * (end - begin), 0.5 * thickness
-        record.radius = math.hypot(record.half_x, record.half_y)
+        record.radius, record.least_width = math.hypot(record.half_x, record.half_y), math.inf
         record.faces = UPPER_FACE
         record.corners = (UPPER_RIGHT if segment.touches_end else 0) | (UPPER_LEFT if segment.touches_start else 0)
         record.corners |= (SHARP_RIGHT if segment.sharp_end else 0) | (SHARP_LEFT if segment.sharp_start else 0)
@@ -262,20 +272,15 @@ def body_records(layouts: Sequence[Layout]) -> arrays.Records:
     bodies = arrays.zeros((len(layouts), blocks + len(layouts[0].segments) + 1), arrays.BODY)
     bodies["cos"] = 1.0  # the half-plane's, last
     bodies["faces"] = bodies["corners"] = arrays.ALL
+    bodies["least_width"] = math.inf  # the half-plane's
     _fill_blocks(bodies[:, :blocks], layouts)
     for records, layout in zip(bodies, layouts, strict=True):
         if layout.segments:
             records[blocks:-1] = layout.slabs
-        if layout.shapes is not None:
-            records["first_corner"], records["corner_count"] = layout.shapes.firsts, layout.shapes.sizes
-            records["inner_radius"][:blocks] = [layout.shapes.inner[body.corners] for body in layout.placed]
-            for record, body in zip(records[:blocks], layout.placed, strict=True):
-                if body.outline:
-                    record["least_width"] = body.least_width
-                    axes = zip(*body.outline, strict=True)
-                    record["half_x"], record["half_y"] = (max(map(abs, axis)) for axis in axes)
-                    record["radius"] = body.radius
-                    record["faces"] = arrays.OUTLINE
+        records["first_corner"], records["corner_count"] = layout.shapes.firsts, layout.shapes.sizes
+        records["faces"][:blocks] = layout.shapes.faces
+        for name, lengths in zip(LENGTHS, layout.shapes.lengths, strict=True):
+            records[name][:blocks] = lengths
     has_profile = [layout.scenario.ground.profile is not None for layout in layouts]
     bodies["y"][has_profile, -1] = -math.inf
     bodies["is_moved"] = np.where(bodies["inverse_mass"] == 0.0, arrays.SUPPORT, 0)
@@ -284,7 +289,7 @@ def body_records(layouts: Sequence[Layout]) -> arrays.Records:
 
 
 def _fill_blocks(records: NDArray[np.record], layouts: Sequence[Layout]) -> None:
-    """Write pose, velocity, size, mass and contact class of all blocks into their records."""
+    """Write pose, velocity, mass and contact class of all blocks into their records."""
     placed = [body for layout in layouts for body in layout.placed]
 
     def column(values: Iterable[float]) -> NDArray[np.float64]:
@@ -294,10 +299,6 @@ def _fill_blocks(records: NDArray[np.record], layouts: Sequence[Layout]) -> None
         records[name] = column(map(attrgetter(name), placed))
     records["cos"] = column(math.cos(body.angle) for body in placed)  # numpy's may differ in the last digit
     records["sin"] = column(math.sin(body.angle) for body in placed)
-    records["half_x"] = 0.5 * column(body.size_x for body in placed)
-    records["half_y"] = 0.5 * column(body.size_y for body in placed)
-    records["inner_radius"] = np.minimum(records["half_x"], records["half_y"])
-    records["radius"] = 0.5 * column(math.hypot(body.size_x, body.size_y) for body in placed)
     is_free = ~np.array([body.fixed for body in placed], bool).reshape(records.shape)
     for name in ("mass", "inertia"):
         records[name][is_free] = column(map(attrgetter(name), placed))[is_free]

@@ -163,9 +163,7 @@ def _divided(layouts: Sequence[Layout], bodies: arrays.Records) -> Iterator[tupl
     contact, has_springs = layouts[0].scenario.contact, layouts[0].scenario.time.has_springs
     particles: list[arrays.Records] = []
     if contact.model == SURFACE or not has_springs:
-        slots = [
-            arrays.SLOTS if one.shapes is None else max(arrays.SLOTS, 2 * max(one.shapes.sizes)) for one in layouts
-        ]
+        slots = [max(arrays.SLOTS, 2 * max(one.shapes.sizes)) for one in layouts]
     else:
         spacings = [layout.scenario.contact.particle_spacing for layout in layouts]
         particles = [place_particles(one, contact.model, space) for one, space in zip(bodies, spacings, strict=True)]
@@ -301,14 +299,13 @@ def assemble_world(
     points["share"] = 1.0  # as it stays in the surface model
     blocks = count - 1
     large = np.nonzero(is_large)[1].reshape(members, -1)
-    tables = [one.shapes.table for one in layouts if one.shapes is not None]  # none where all are rectangles
     world = arrays.World(
         bodies=bodies,
         points=points,
         before=before,
         **empty_lists(capacity, slots, before),
         particles=parts.particles,
-        corners=join_records(tables) if tables else None,
+        corners=join_records([one.shapes.table for one in layouts]) if layouts[0].has_corners else None,
         starts=numbers((members, 3 * max(blocks, LEAST_CELLS) + 3), np.uint32),
         order=numbers((members, blocks), np.uint32),
         large=numbers(large.shape, np.uint32),

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from blocksim.kernels.common.arrays import World
-from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, laws, motion, placement
+from blocksim.scenario import GROUND, PlacedBody, Scenario, geometry, laws, motion
 from blocksim.world import build, interactions, memory, nonsmooth, rigid_step, systems
 from blocksim.world.bodies import Layout, division, layout_of
 from blocksim.world.sag import inverse_mass, overlap_warning, point_stiffness, scene_sag
@@ -154,7 +154,7 @@ def describe(scenario: Scenario) -> Description:
         step=step,
         steps=steps,
         frames=frames,
-        seconds=steps * (_seconds_per_step(scenario, count, particles) + of_systems),
+        seconds=steps * (_seconds_per_step(layout, particles) + of_systems),
         bytes=memory.run_bytes(count, frames, contacts, others),
         memory=memory.PROCESS_BYTES + size.bytes + more,  # without frames: into a folder, they are written as they come
         frames_at_every_step=scenario.output.every < (1.0 - memory.ROUNDING) * step,
@@ -167,8 +167,9 @@ def describe(scenario: Scenario) -> Description:
     )
 
 
-def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
-    """Return what a step costs (s) with so many blocks and particles around them."""
+def _seconds_per_step(layout: Layout, particles: int) -> float:
+    """Return what a step costs (s) with so many particles around all blocks."""
+    scenario, blocks = layout.scenario, len(layout.placed)
     is_crowd = blocks > CROWD
     if scenario.time.has_rigid_contacts:
         return blocks * SECONDS_IN_A_SUBSTEP * scenario.time.parts
@@ -176,7 +177,7 @@ def _seconds_per_step(scenario: Scenario, blocks: int, particles: int) -> float:
         block, particle, more = SECONDS_WITH_PARTICLES[scenario.contact.model]
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
     rectangles = blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
-    return OUTLINES_COST * rectangles if placement.has_outlines(scenario) else rectangles
+    return OUTLINES_COST * rectangles if layout.has_corners else rectangles
 
 
 def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:

@@ -193,7 +193,7 @@ def thrust_shift(layout: Layout) -> float:
     scenario, placed = layout.scenario, layout.placed
     free = {i for i, body in enumerate(placed) if not body.fixed or body.freed}
     is_level = scenario.ground.profile is None
-    is_upright = is_level and not any(body.angle or body.is_polygon for body in placed)
+    is_upright = is_level and all(not body.angle and geometry.is_upright(body.corners) for body in placed)
     is_vertical = scenario.ground.tilt == 0.0 and not scenario.loads
     if not free or (is_upright and (len(free) <= FEW_UPRIGHT or is_vertical)):
         return 0.0

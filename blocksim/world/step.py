@@ -43,7 +43,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
-from blocksim.kernels.common.arrays import OUTLINE
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
 from blocksim.scenario import Scenario, laws, motion, placement
 from blocksim.scenario.models.timeline import Explicit
@@ -123,14 +122,12 @@ def bounds_of(layouts: Sequence[Layout], bodies: NDArray[np.record]) -> list[Bou
         bodies["mass"][m, i], bodies["inertia"][m, i] = body.mass, body.inertia
         bodies["inverse_mass"][m, i], bodies["inverse_inertia"][m, i] = 1.0 / body.mass, 1.0 / body.inertia
     blocks = bodies[:, :count]
-    columns = {name: np.ascontiguousarray(blocks[name]) for name in ("radius", "half_x", "half_y", "mass")}
-    sides = 2.0 * np.minimum(columns["half_x"], columns["half_y"])
-    sides = np.where(blocks["faces"] == OUTLINE, blocks["least_width"], sides)
+    columns = {name: np.ascontiguousarray(blocks[name]) for name in ("radius", "mass")}
     speeds = np.hypot(blocks["vx"], blocks["vy"]) + columns["radius"] * np.abs(blocks["spin"])
     columns_of_kinds = zip(*(blocks[name].tolist() for name in BlockKind._fields), strict=True)
     kinds = [frozenset(map(BlockKind, *one)) for one in columns_of_kinds]
     of_scenes = zip(
-        sides.min(axis=1, initial=math.inf).tolist(),
+        blocks["least_width"].min(axis=1, initial=math.inf).tolist(),
         np.max(blocks["y"] + columns["radius"], axis=1, initial=-math.inf).tolist(),
         np.max(speeds, axis=1, initial=0.0).tolist(),
         # one by one: the order of a sum must not depend on which other scenes there are
@@ -138,32 +135,26 @@ def bounds_of(layouts: Sequence[Layout], bodies: NDArray[np.record]) -> list[Bou
         np.count_nonzero(columns["mass"] > 0.0, axis=1).tolist(),
         kinds,
         map(frozenset, bodies["contact_class"][:, count:].tolist()),
-        [
-            one if layout.shapes is None else standing_kinds(own, layout.shapes)
-            for one, own, layout in zip(kinds, blocks, layouts, strict=True)
-        ],
+        [standing_kinds(own, layout.shapes) for own, layout in zip(blocks, layouts, strict=True)],
         strict=True,
     )
     return [Bounds(*one) for one in of_scenes]
 
 
 def standing_kinds(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[BlockKind]:
-    """Return the blocks of a scene as they stand, a polygon on each of its faces.
+    """Return the blocks of a scene as they stand on each of their faces.
 
-    In place of `half_x` is how far along the face a corner is from the foot of the centroid, at most, and in place of
-    `half_y` the distance of the face: what half sides are to a rectangle.
+    In place of half sides are how far along the face a corner is from the foot of the centroid, at most, and the
+    distance of the face, the smaller one first: what half sides are to a rectangle.
     """
     kinds: set[BlockKind] = set()
-    for block, first, size in zip(blocks, shapes.firsts, shapes.sizes, strict=False):
-        kind = BlockKind(*(block[name].item() for name in BlockKind._fields))
-        if block["faces"] != OUTLINE:
-            kinds.add(kind)
-            continue
-        corners = shapes.table[first : first + size].view(np.recarray)
+    columns = (blocks[name].tolist() for name in BlockKind._fields)
+    for *own, first, size in set(zip(*columns, shapes.firsts, shapes.sizes, strict=False)):
+        kind, corners = BlockKind(*own), shapes.table[first : first + size].view(np.recarray)
         tangents, places = np.stack([-corners["ny"], corners["nx"]]), np.stack([corners["x"], corners["y"]])
         ends = [(tangents * one).sum(axis=0) for one in (places, np.roll(places, -1, axis=1))]
         faces = zip(np.abs(ends).max(axis=0).tolist(), corners["distance"].tolist(), strict=True)
-        kinds.update(kind._replace(half_x=reach, half_y=distance) for reach, distance in faces)
+        kinds.update(kind._replace(half_x=min(face), half_y=max(face)) for face in faces)
     return frozenset(kinds)
 
 

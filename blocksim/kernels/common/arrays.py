@@ -98,10 +98,10 @@ BODY = on_own_lines(
             "list_x list_y list_angle "  # m, m, rad: where the body was when the pair list was made
             "k_xx k_xy k_yy "  # N/m: stiffness of all contacts along their normals; see inertia.py
             "k_x k_y "  # N: the same times the lever arms of the normals
-            "least_width "  # m: of a polygon, between two parallel lines; zero for rectangles
+            "least_width "  # m: between two parallel lines around it; infinite for the ground and its pieces
             "inner_radius",  # m: from the centroid of a block to its nearest face
             indices="first_particle particle_count "  # its part of the particles
-            "first_corner",  # its part of the corners, also of rectangles and ground beside polygons; else zero
+            "first_corner",  # its part of the corners of all shapes, which kernels have in scenes with polygons
             small="row_x row_y "  # intervals between particles on the faces along x and along y
             "seats coming "  # pairs in those sums; pairs about to touch
             "corner_count "

@@ -1,6 +1,4 @@
-"""Energies that need no contacts, the power of the weights, and the scale of lengths."""
-
-import math
+"""Energies that need no contacts and the power of the weights."""
 
 from blocksim.kernels.common import arrays, jit
 
@@ -25,12 +23,3 @@ def weights_power(world: arrays.World) -> float:
         body = world.bodies[i]
         total += body.mass * abs(controls.gravity_x * body.vx + controls.gravity_y * body.vy)
     return total
-
-
-@jit.rare_kernel
-def smallest_side(body: arrays.Record) -> float:
-    """Return the smaller side (m) of a body, of a polygon its least width; infinite for the ground and its pieces."""
-    if body.faces == arrays.OUTLINE:
-        return float(body.least_width)
-    half = min(body.half_x, body.half_y)
-    return 2.0 * half if half > 0.0 and body.faces == arrays.ALL else math.inf

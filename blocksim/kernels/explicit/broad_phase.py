@@ -6,7 +6,7 @@ come since it was made is looked at again before any can have come too far.
 
 import math
 
-from blocksim.kernels.common import arrays, energy, jit, neighbours, supports, tolerances
+from blocksim.kernels.common import arrays, jit, neighbours, supports, tolerances
 from blocksim.kernels.explicit.depth import overlap_limit
 from blocksim.kernels.explicit.models import near_slots
 
@@ -131,7 +131,7 @@ def update_pairs(world: arrays.World) -> int:
     fastest = 0.0
     for i in range(world.bodies.size):
         body = world.bodies[i]
-        way = min(way, tolerances.WAY_SHARE * energy.smallest_side(body))
+        way = min(way, tolerances.WAY_SHARE * body.least_width)
         fastest = max(fastest, neighbours.top_speed(body, 0.0, 0.0))
         if body.y > -math.inf:  # else the half-plane, out of reach
             farthest = max(farthest, neighbours.travel(body, 0.0, 0.0))

@@ -8,7 +8,7 @@ shapes. No step takes a block far into another (world/step.py, broad_phase.py), 
 found.
 """
 
-from blocksim.kernels.common import arrays, energy, jit, tolerances
+from blocksim.kernels.common import arrays, jit, tolerances
 from blocksim.kernels.explicit import sides
 from blocksim.kernels.explicit.models import KERNEL, SURFACE
 
@@ -16,7 +16,7 @@ from blocksim.kernels.explicit.models import KERNEL, SURFACE
 @jit.rare_kernel
 def overlap_limit(a: arrays.Record, b: arrays.Record, given: float) -> float:
     """Return how far (m) two bodies may overlap; `given` (m) is zero where nothing was asked for."""
-    side = min(energy.smallest_side(a), energy.smallest_side(b))
+    side = min(a.least_width, b.least_width)
     return min(given, tolerances.MIDDLE * side) if given > 0.0 else tolerances.OVERLAP_SHARE * side
 
 
@@ -38,7 +38,7 @@ def reach_of_contacts(world: arrays.World, pair: arrays.Record) -> float:
     if controls.model == SURFACE:
         return pair.limit
     reach = controls.support if controls.model == KERNEL else tolerances.ROWS_APART * controls.particle_size
-    side = min(energy.smallest_side(world.bodies[pair.a]), energy.smallest_side(world.bodies[pair.b]))
+    side = min(world.bodies[pair.a].least_width, world.bodies[pair.b].least_width)
     return min(reach, tolerances.MIDDLE * side)
 
 

@@ -97,7 +97,7 @@ def has_excessive_overlap(scene: Nonsmooth) -> bool:
         constraint = scene.contacts.constraints[r]
         overlap = max(-constraint.gap_one, -constraint.gap_two)
         if constraint.reach == TOUCHING and overlap > 0.0:
-            side = min(energy.smallest_side(bodies[constraint.a]), energy.smallest_side(bodies[constraint.b]))
+            side = min(bodies[constraint.a].least_width, bodies[constraint.b].least_width)
             if overlap > (given if given > 0.0 else MIDDLE * side):
                 return True
     return False

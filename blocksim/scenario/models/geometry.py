@@ -118,7 +118,7 @@ class Block(Table):
         return value
 
     def _check(self) -> None:
-        shape = next((key for key in (*OUTLINE_KEYS, "width") if getattr(self, key) is not None), "depth")
+        shape = self.shape_key
         fields = type(self).model_fields
         given = [fields[name].alias or name for name in fields if name in self.model_fields_set]
         own = {"width": RECTANGLE_KEYS, "depth": ("depth",)} | OUTLINE_KEYS
@@ -148,12 +148,17 @@ class Block(Table):
             return key not in RECTANGLE_KEYS and getattr(self, "given_depth" if key == "depth" else key) is not None
         return key in {*RECTANGLE_KEYS, "material"}
 
+    @property
+    def shape_key(self) -> str:
+        """The key that tells what is given of the shape: outline, sides, width or depth."""
+        return next((key for key in (*OUTLINE_KEYS, "width") if getattr(self, key) is not None), "depth")
+
     @cached_property
     def polygon(self) -> geometry.Corners:
         """Corners (m) counter-clockwise about the centroid; empty for a rectangular block."""
-        if self.outline is not None:
-            return geometry.centre_outline(self.outline)
-        return geometry.regular(self.sides, self.radius) if self.sides is not None and self.radius is not None else ()
+        if self.sides is not None and self.radius is not None:
+            return geometry.regular(self.sides, self.radius)
+        return geometry.centre_outline(self.outline or ())
 
     @cached_property
     def size_x(self) -> float:

@@ -65,25 +65,26 @@ class SoilTable(SystemTable):
                 raise q.invalid("the end must be beyond the begin", key)
         if self.angle is not None and self.x is not None and max(self._heads) >= self.x[1] - self.x[0]:
             raise q.invalid("the face reaches the other end below the crest", "angle")
-        if self.outline is None:
-            return
-        if len(self.outline) < 3:
-            raise q.invalid("an outline needs at least three corners [x, y]", "outline")
-        if len(set(self.outline)) < len(self.outline):
-            raise q.invalid("two corners are the same", "outline")
-        for one, other in geometry.self_crossings(np.array(self.outline)):
-            raise q.invalid(f"edges {one + 1} and {other + 1} of the outline meet", "outline")
-        if abs(geometry.area_of(self.outline)) <= geometry.ROUND_OFF**2:
-            raise q.invalid("the outline has no area", "outline")
+        corners, key = self._corners, SHAPES[self.kind][0]
+        if len(corners) < 3:
+            raise q.invalid("an outline needs at least three corners [x, y]", key)
+        if len(set(corners)) < len(corners):
+            raise q.invalid("two corners are the same", key)
+        for one, other in geometry.self_crossings(np.array(corners)):
+            raise q.invalid(f"edges {one + 1} and {other + 1} of the outline meet", key)
+        if abs(geometry.area_of(corners)) <= geometry.ROUND_OFF**2:
+            raise q.invalid("the outline has no area", key)
 
     @property
     def corners(self) -> "NDArray[np.float64]":
         """Corners (m, (k, 2)), counter-clockwise."""
-        if self.outline is not None:
-            return geometry.corners_of(self.outline)
+        return geometry.corners_of(self._corners)
+
+    @property
+    def _corners(self) -> tuple[Point, ...]:
         (x0, x1), (y0, y1) = self.x or (0.0, 0.0), self.y or (0.0, 0.0)
         left, right = self._heads
-        return geometry.corners_of([(x0, y0), (x1, y0), (x1 - right, y1), (x0 + left, y1)])
+        return self.outline or ((x0, y0), (x1, y0), (x1 - right, y1), (x0 + left, y1))
 
     @property
     def _heads(self) -> tuple[float, float]:
@@ -94,15 +95,14 @@ class SoilTable(SystemTable):
 
     def impossible(self, scenario: "Scenario") -> Iterator[tuple[str, str]]:
         """Find a material that is no soil, a spacing that does not suit, and what the outline meets."""
-        from blocksim.scenario.placement import has_outlines  # noqa: PLC0415 - needs the scenario's own model
-        from blocksim.scenario.start import meetings  # noqa: PLC0415 - the same
+        from blocksim.scenario import placement, start  # noqa: PLC0415 - they need the scenario's own model
 
         if self.material not in scenario.materials:
             hint = spelling.did_you_mean_or_list(self.material, scenario.materials)
             yield "material", f"unknown material {q.toml(self.material)}, {hint}"
         elif scenario.materials[self.material].friction_angle is None:
             yield "material", f"{q.toml(self.material)} is no soil; give this material a friction_angle"
-        if has_outlines(scenario):  # refused: they say nothing about spacing and place
+        if placement.has_outlines(scenario):  # refused: they say nothing about spacing and place
             return
         sides = [side for block in scenario.blocks.values() if (side := min(block.size_x, block.size_y)) > 0.0]
         across = geometry.count_across(self.corners, self.spacing)
@@ -119,7 +119,7 @@ class SoilTable(SystemTable):
             unfit.append(f"{across[0] * across[1]} particles are too many; at most {MOST_PARTICLES} are allowed")
         yield from (("spacing", message) for message in unfit)
         if not unfit:
-            yield from meetings(self, "outline" if self.kind == "outline" else "kind", scenario)
+            yield from start.meetings(self, "outline" if self.kind == "outline" else "kind", scenario)
 
 
 SYSTEMS["soils"] = SoilTable

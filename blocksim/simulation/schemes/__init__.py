@@ -78,14 +78,6 @@ def outlines_of(world: arrays.World) -> overlap.Outlines:
     return outlines._replace(polygons=np.stack([rows["x"], rows["y"]], axis=-1))
 
 
-def smallest_sides(world: arrays.World, one: NDArray[Any], other: NDArray[Any]) -> Floats:
-    """Return the smallest side (m) of each pair of bodies, infinite where neither has any."""
-    half = np.minimum(world.bodies["half_x"], world.bodies["half_y"])
-    side = np.where((half > 0.0) & (world.bodies["faces"] == arrays.ALL), 2.0 * half, np.inf)
-    smallest: Floats = np.minimum(side[one], side[other])
-    return smallest
-
-
 def corner_ways(change: Floats, radius: Floats) -> Floats:
     """Return a bound of the ways (m) of the corners of blocks whose x, y, angle changed so, (3, b)."""
     dx, dy, turned = change

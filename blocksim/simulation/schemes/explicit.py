@@ -105,7 +105,8 @@ def overlaps_of_springs(scene: Any) -> schemes.Overlaps:
     lost = np.where(is_pressed, 0.0, np.where(pairs["b"] == world.bodies.size - 1, below, inside))
     limit = pairs["limit"]
     if world.controls[0].model != models.SURFACE:
-        middle = tolerances.MIDDLE * schemes.smallest_sides(world, pairs["a"], pairs["b"])
+        widths = world.bodies["least_width"]
+        middle = tolerances.MIDDLE * np.minimum(widths[pairs["a"]], widths[pairs["b"]])
         limit = np.where(is_pressed, limit, np.minimum(_reach(world), middle))
     return schemes.Overlaps(pairs["a"], pairs["b"], np.maximum(deepest, lost), limit)
 

@@ -102,7 +102,8 @@ def overlaps_of_constraints(scene: arrays.Nonsmooth) -> schemes.Overlaps:
     depth = np.maximum(-constraints["gap_one"], -constraints["gap_two"])
     limit = np.ones(constraints.size)
     if not scene.world.controls[0].max_overlap > 0.0:
-        limit = schemes.smallest_sides(scene.world, constraints["a"], constraints["b"])
+        widths = scene.world.bodies["least_width"]
+        limit = np.minimum(widths[constraints["a"]], widths[constraints["b"]])
     return schemes.Overlaps(
         constraints["a"], constraints["b"], np.where(constraints["reach"] == arrays.TOUCHING, depth, 0.0), limit
     )

@@ -182,21 +182,17 @@ def pack_frames(frames: trajectory.Frames, most_bytes: int = MOST_BYTES) -> Pack
         kept = kept[np.unique(np.rint(np.linspace(0.0, len(kept) - 1.0, most)).astype(np.intp))]
     factors = {name: MILLIMETRES if unit.startswith("mm") else np.degrees(1.0) for name, unit in CHANNELS.items()}
     packed = {name: pack(factor * getattr(frames, name)[kept]) for name, factor in factors.items()}
-    outlines = None
-    if frames.outlines is not None:  # of every shape, and which of them each block has
-        kinds, first, which = np.unique(frames.outlines, axis=0, return_index=True, return_inverse=True)
-        uppers = MILLIMETRES * scene.upper_sides(frames)[first]
-        outlines = {
-            "corners": [[to_numbers(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
-            "upper": [[to_numbers(end) for end in upper] for upper in uppers],
-            "width": to_numbers(MILLIMETRES * frames.least_widths[first]),
-            "which": which.ravel().tolist(),
-        }
+    kinds, first, which = np.unique(frames.corners, axis=0, return_index=True, return_inverse=True)
+    uppers = MILLIMETRES * scene.upper_sides(frames)[first]
+    outlines = {
+        "corners": [[to_numbers(corner) for corner in MILLIMETRES * distinct(kind)] for kind in kinds],
+        "upper": [[to_numbers(end) for end in upper] for upper in uppers],
+        "width": to_numbers(MILLIMETRES * frames.least_widths[first]),
+        "which": which.ravel().tolist(),
+    }
     data = {
         "time": pack(frames.time[kept], exact=True)[0],
         "names": list(frames.names),
-        "size_x": to_numbers(MILLIMETRES * frames.size_x),
-        "size_y": to_numbers(MILLIMETRES * frames.size_y),
         "outlines": outlines,
         "start_angle": to_numbers(np.degrees(frames.start_angle)),
         "channels": {name: part for name, (part, _) in packed.items()},
@@ -243,7 +239,7 @@ def scene_data(
     reach = ENDLESS_WIDTHS * (extent.width + extent.height) / MILLIMETRES
     sides = np.stack([frames.size_x, frames.size_y], axis=-1)
     kinds, which = np.unique(sides, axis=0, return_inverse=True)
-    outlines = [(MILLIMETRES * boundary_particles(scenario, *map(float, kind))).round(4).tolist() for kind in kinds]
+    particles = [(MILLIMETRES * boundary_particles(scenario, *map(float, kind))).round(4).tolist() for kind in kinds]
     return {
         "extent": [extent.left, extent.right, extent.bottom, extent.top],
         "tilt": support.tilt,
@@ -254,7 +250,7 @@ def scene_data(
         "offset": (MILLIMETRES * support.offset(frames.time[kept])).round(4).tolist() if support.motion else None,
         "fixed": run_data.is_fixed(frames, support).tolist(),
         "colours": list(style.BLOCK_COLOURS),
-        "particles": {"outlines": outlines, "which": which.ravel().tolist()} if any(outlines) else None,
+        "particles": {"outlines": particles, "which": which.ravel().tolist()} if any(particles) else None,
     }
 
 

@@ -69,6 +69,7 @@ def test_smaller_block_of_a_pair_limits_the_overlap(small: int) -> None:
         world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + (0.75 - share) * HEIGHT, 0.0))
         body = world.bodies[small]
         body.half_x = body.half_y = 0.25 * HEIGHT
+        body.least_width = 0.5 * HEIGHT
         renew_rotations(world.bodies)
         assert rebuild_pairs(world)
         pair_forces(world, 0, 0.0)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from blocksim.kernels.common import energy, neighbours
+from blocksim.kernels.common import neighbours
 from blocksim.kernels.common.arrays import AHEAD, NO_FACE, NORMAL, REACHED, TOO_FAST
 from blocksim.kernels.common.jit import config
 from blocksim.kernels.common.shapes import slab_depth
@@ -169,10 +169,9 @@ def test_sums_of_all_bodies_are_made_anew_from_time_to_time(
 def test_two_bodies_may_not_come_nearer_by_a_good_part_of_a_side_in_a_step(
     monkeypatch: pytest.MonkeyPatch, way: float, answer: int
 ) -> None:
-    monkeypatch.setattr(energy, "smallest_side", lambda _: 1.0)
     monkeypatch.setattr(neighbours, "top_speed", lambda *_: way / 2.0)
     monkeypatch.setattr(broad_phase, "unseen_steps", lambda *_: 1)
-    clock, bodies = record(steps=0, rebuilds=1, next_update=0), Rows([record(y=-math.inf)])
+    clock, bodies = record(steps=0, rebuilds=1, next_update=0), Rows([record(y=-math.inf, least_width=1.0)])
     world = record(clock=[clock], controls=[record(skin=10.0, step=1.0)], bodies=bodies)
     assert broad_phase.update_pairs(world) == answer
 

@@ -84,4 +84,5 @@ def test_polygons_are_packed_once_for_each_shape() -> None:
     ]
     assert len(packed["corners"]) == len(packed["upper"]) == len(packed["width"]) == 2
     assert packed["width"][packed["which"][1]] == pytest.approx(20.0 * math.sqrt(3.0))
-    assert pack_frames(toppling(5, steps=3)).data["outlines"] is None
+    (rectangle,) = pack_frames(toppling(5, steps=3)).data["outlines"]["corners"]
+    assert rectangle[0] == [-rectangle[2][0], -rectangle[2][1]]

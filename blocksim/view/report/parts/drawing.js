@@ -128,7 +128,7 @@ class Drawing {
     if (this.isClear) this.drawUpperSides(frame);
   }
 
-  // Keeps centre and half sides of every block in pixels, as vectors along its own axes; of other blocks millimetres.
+  // Keeps centre and a millimetre of every block in pixels, as vectors along its own axes.
   takeCorners(frame) {
     const { frames, view } = this;
     this.places ??= new Float64Array(6 * frames.blocks);
@@ -138,10 +138,8 @@ class Drawing {
       const angle = frames.angle(frame, block);
       const cos = Math.cos(angle) * view.cos - Math.sin(angle) * view.sin;
       const sin = Math.sin(angle) * view.cos + Math.cos(angle) * view.sin;
-      const width = (frames.outlines ? 1 : 0.5 * frames.sizeX[block]) * view.scale;
-      const height = (frames.outlines ? 1 : 0.5 * frames.sizeY[block]) * view.scale;
       const [px, py] = view.toPixels(frames.x[at], frames.y[at]);
-      this.places.set([px, py, cos * width, -sin * width, -sin * height, -cos * height], 6 * block);
+      this.places.set([px, py, cos * view.scale, -sin * view.scale, -sin * view.scale, -cos * view.scale], 6 * block);
       smallest = Math.min(smallest, 0.5 * frames.widthOf(block) * view.scale);
     }
     this.isClear = smallest >= 2.5;
@@ -149,18 +147,10 @@ class Drawing {
 
   trace(path, block) {
     const [px, py, ax, ay, bx, by] = this.places.subarray(6 * block, 6 * block + 6);
-    const corners = this.frames.cornersOf(block);
-    if (corners) {
-      const at = ([x, y]) => [px + x * ax + y * bx, py + x * ay + y * by];
-      path.moveTo(...at(corners[0]));
-      for (const corner of corners.slice(1)) path.lineTo(...at(corner));
-      path.closePath();
-      return;
-    }
-    path.moveTo(px - ax - bx, py - ay - by);
-    path.lineTo(px + ax - bx, py + ay - by);
-    path.lineTo(px + ax + bx, py + ay + by);
-    path.lineTo(px - ax + bx, py - ay + by);
+    const at = ([x, y]) => [px + x * ax + y * bx, py + x * ay + y * by];
+    const [first, ...corners] = this.frames.cornersOf(block);
+    path.moveTo(...at(first));
+    for (const corner of corners) path.lineTo(...at(corner));
     path.closePath();
   }
 
@@ -174,16 +164,9 @@ class Drawing {
       const [px, py, ax, ay, bx, by] = places.subarray(6 * block, 6 * block + 6);
       const smaller = 0.5 * frames.widthOf(block) * this.view.scale;
       widest = Math.max(widest, smaller);
-      if (frames.outlines) {
-        const [[x0, y0], [x1, y1]] = frames.upperOf(block);
-        path.moveTo(px + x0 * ax + y0 * bx, py + x0 * ay + y0 * by);
-        path.lineTo(px + x1 * ax + y1 * bx, py + x1 * ay + y1 * by);
-        continue;
-      }
-      const along = 1 - 0.14 * smaller / Math.hypot(ax, ay);
-      const up = 1 - 0.16 * smaller / Math.hypot(bx, by);
-      path.moveTo(px - along * ax + up * bx, py - along * ay + up * by);
-      path.lineTo(px + along * ax + up * bx, py + along * ay + up * by);
+      const [[x0, y0], [x1, y1]] = frames.upperOf(block);
+      path.moveTo(px + x0 * ax + y0 * bx, py + x0 * ay + y0 * by);
+      path.lineTo(px + x1 * ax + y1 * bx, py + x1 * ay + y1 * by);
     }
     context.lineWidth = Math.max(0.05 * widest, 0.6);
     context.stroke(path);
@@ -360,15 +343,10 @@ class Drawing {
     view.apply(context, this.ratio, frames.x[at], frames.y[at], frames.angle(frame, block));
     context.strokeStyle = this.colours.link;
     context.lineWidth = 3 / view.scale;
-    const corners = frames.cornersOf(block);
-    if (corners) {
-      context.beginPath();
-      for (const [x, y] of corners) context.lineTo(x, y);
-      context.closePath();
-      context.stroke();
-      return;
-    }
-    context.strokeRect(-0.5 * frames.sizeX[block], -0.5 * frames.sizeY[block], frames.sizeX[block], frames.sizeY[block]);
+    context.beginPath();
+    for (const [x, y] of frames.cornersOf(block)) context.lineTo(x, y);
+    context.closePath();
+    context.stroke();
   }
 
   drawScale(scale) {

@@ -4,8 +4,6 @@ class Frames {
     this.names = data.names;
     this.scene = data.scene;
     this.measured = data.measured ?? [];
-    this.sizeX = data.size_x;
-    this.sizeY = data.size_y;
     this.outlines = data.outlines;
     this.startAngle = data.start_angle;
     this.time = decode(data.time);
@@ -60,21 +58,18 @@ class Frames {
     return low;
   }
 
-  // Corners of a block that is no rectangle, along its own axes (mm); null for a rectangle.
-  cornersOf(block) { return this.outlines && this.outlines.corners[this.outlines.which[block]]; }
+  // Corners of a block along its own axes (mm).
+  cornersOf(block) { return this.outlines.corners[this.outlines.which[block]]; }
 
   // Its line along the upper side, from end to end.
   upperOf(block) { return this.outlines.upper[this.outlines.which[block]]; }
 
-  // The smaller side of a block, or the least distance of two parallel lines around it (mm).
-  widthOf(block) {
-    return this.outlines ? this.outlines.width[this.outlines.which[block]] : Math.min(this.sizeX[block], this.sizeY[block]);
-  }
+  // The least distance of two parallel lines around a block (mm).
+  widthOf(block) { return this.outlines.width[this.outlines.which[block]]; }
 
   // Whether a place along the axes of a block (mm) is in it.
   isIn(block, along, across) {
     const corners = this.cornersOf(block);
-    if (!corners) return Math.abs(along) <= 0.5 * this.sizeX[block] && Math.abs(across) <= 0.5 * this.sizeY[block];
     return corners.every(([x, y], index) => {
       const [nextX, nextY] = corners[(index + 1) % corners.length];
       return (nextX - x) * (across - y) - (nextY - y) * (along - x) >= 0;
