@@ -31,6 +31,7 @@ class MeasuredQuantity:
     meaning: str
 
 
+NO_ROWS = "the table has a header and no rows"
 QUANTITIES = {
     "x": MeasuredQuantity("mm", "x_mm", "centre along the ground"),
     "y": MeasuredQuantity("mm", "y_mm", "centre above the ground"),
@@ -173,7 +174,8 @@ def load_table(path: Path | str) -> ExperimentTable:
             if first != cell.line.number:
                 what = f"block '{one.block}', {one.quantity}, replicate {one.replicate}"
                 table.problems.append(cell.problem(f"{what} is already given in line {first}"))
-    _refuse_empty(table)
+    if not table.rows and not table.problems:
+        table.problems.append(table.header.problem(NO_ROWS))
     measured = tuple(one for one, _ in rows if isfinite(one.value))
     known = {(one.block, one.quantity) for one in measured}
     for one, row in rows:
@@ -186,12 +188,6 @@ def load_table(path: Path | str) -> ExperimentTable:
     missing = tuple(one for one, _ in rows if not isfinite(one.value))
     places = {row["block"].text: row["block"] for row in reversed(table.rows)}
     return ExperimentTable(measured, str(path), table.notes, missing, places)
-
-
-def _refuse_empty(table: input_files.CsvTable) -> None:
-    """Record a problem if there is no row, and no other problem that says why."""
-    if not table.rows and not table.problems:
-        table.problems.append(table.header.problem("the table has a header and no rows"))
 
 
 def _measurement(row: dict[str, input_files.TableCell], problems: list[Problem]) -> Measurement | None:
@@ -297,7 +293,8 @@ def load_properties(path: Path | str) -> PropertyTable:
         limit = "" if interval.below == inf else f" and below {interval.below:g}{si}"
         complaint = f"{value:g}{si} is impossible, it must be above {interval.above:g}{si}{limit}"
         table.problems.append(row["value"].problem(complaint))
-    _refuse_empty(table)
+    if not table.rows and not table.problems:
+        table.problems.append(table.header.problem(NO_ROWS))
     if table.problems:
         input_files.raise_problems(table.problems)
     return PropertyTable(values=MappingProxyType(values), source=str(path), notes=table.notes)

@@ -19,7 +19,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, NoReturn
+from typing import Any
 
 STOPPED_EARLY = 75  # the exit code; its own module takes longer to import than all that is needed here, unprotected
 
@@ -36,7 +36,9 @@ class Interrupts:
     def __call__(self, _number: int, _frame: Any) -> None:
         """Take Ctrl-C."""
         if not self.has_to_clear_up:
-            leave_now()
+            with suppress(OSError):
+                os.write(2, b"stopped\n")
+            os._exit(STOPPED_EARLY)
         self.has_to_clear_up, self.has_come = False, True
         raise KeyboardInterrupt
 
@@ -68,13 +70,6 @@ def cleanup_state(*, wanted: bool) -> Iterator[None]:
         yield
     finally:
         handler.has_to_clear_up = before and not handler.has_come
-
-
-def leave_now() -> NoReturn:
-    """End the process."""
-    with suppress(OSError):
-        os.write(2, b"stopped\n")
-    os._exit(STOPPED_EARLY)
 
 
 @contextmanager

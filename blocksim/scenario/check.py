@@ -96,7 +96,8 @@ def unfit_choices(scenario: Scenario) -> Iterator[mistakes.Mistake]:
             message = f"{units.toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"
             yield mistakes.Mistake(("blocks", name, "material"), message, relation=True)
         if why and block.polygon:
-            yield mistakes.Mistake(("blocks", name, block.shape_key), why, at="key", relation=True)
+            key = next(key for key in ("outline", "sides") if block.has_key(key))
+            yield mistakes.Mistake(("blocks", name, key), why, at="key", relation=True)
     polygonal = [i for i, structure in enumerate(scenario.structures) if isinstance(structure, PolygonStructure)]
     for number in polygonal if why else ():
         yield mistakes.Mistake(("structures", number, "kind"), why, relation=True)

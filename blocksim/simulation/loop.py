@@ -27,6 +27,7 @@ RATES = ("vx", "vy", "spin")
 ACCELERATIONS = ("ax", "ay", "spin_rate")
 OF_CONTACTS = ("fx", "fy", "torque", "pairs_now", "pairs_before", "pairs_changed")
 OF_PIECES = ("seats", "coming", "is_asked", "sums_changed")  # see kernels/explicit/inertia.py
+OF_FREE_BODIES = (*NOT_THERE, *RATES, *ACCELERATIONS, *OF_CONTACTS, *OF_PIECES)  # mass, motion and forces
 
 
 class Timeline:
@@ -117,7 +118,8 @@ def remove_body(world: arrays.World, number: int) -> arrays.World:
     body.is_moved = arrays.REMOVED
     body.half_x = body.half_y = NO_SIZE
     body.faces = body.corners = body.particle_count = 0
-    _hold(body)
+    for name in OF_FREE_BODIES:
+        body[name] = 0
     return world
 
 
@@ -127,7 +129,8 @@ def fix_body(world: arrays.World, number: int) -> arrays.World:
     if body.is_moved in (arrays.SUPPORT, arrays.REMOVED):
         return world
     world = _without(world, number)
-    _hold(body)
+    for name in OF_FREE_BODIES:
+        body[name] = 0
     body.is_moved = arrays.SUPPORT
     ground, controls = world.bodies[-1], world.controls[0]
     body.vx, body.vy = ground.vx, ground.vy
@@ -164,12 +167,6 @@ def end_load(world: arrays.World, number: int) -> None:
     piece.start, piece.value, piece.rate = clock.steps * controls.step, 0.0, 0.0
     load.first_piece = last
     controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()
-
-
-def _hold(body: arrays.Record) -> None:
-    """Take mass, motion and forces from a body."""
-    for name in (*NOT_THERE, *RATES, *ACCELERATIONS, *OF_CONTACTS, *OF_PIECES):
-        body[name] = 0
 
 
 def _without(world: arrays.World, number: int) -> arrays.World:

@@ -241,8 +241,13 @@ class StandingSide:
             return max(self.give.share, 2.0 * math.radians(self.give.turn) / slender)
         if is_late or (scenario.motion is not None and scenario.contact.stiffness_scale < 1.0):
             return math.inf
-        sink = largest_static_compression(scenario)
-        width = min(min(body.size_x, body.size_y) for body in place_bodies(scenario))
+        placed = place_bodies(scenario)  # the softest contact gives way under the weight of all free blocks
+        weight = scenario.gravity * sum(body.mass for body in placed if not body.fixed)
+        table = interactions_of(scenario, contact_classes(scenario, placed))
+        springs = (pair for row in table for pair in row if pair.normal_stiffness > 0.0)
+        stiffness = min(pair.normal_stiffness * min(1.0, pair.shear_ratio) for pair in springs)  # in shear if softer
+        sink = laws.LAWS[scenario.contact.law].compression(stiffness, weight)
+        width = min(min(body.size_x, body.size_y) for body in placed)
         moved = self.plan.criterion.least_moved
         return max(2.0 * sink / (width * slender), sink / moved if moved else 0.0)
 
@@ -278,17 +283,6 @@ def slenderness(scenario: Scenario) -> float:
     ys = [body.y + side * body.size_y for body in placed for side in (-0.5, 0.5)]
     sizes.append((max(xs) - min(xs), max(ys) - min(ys)))
     return min(math.sin(2.0 * math.atan2(min(width, height), height)) for width, height in sizes)
-
-
-def largest_static_compression(scenario: Scenario) -> float:
-    """Return how far (m) the softest contact gives way under the weight of all free blocks, in shear if softer."""
-    placed = place_bodies(scenario)
-    weight = scenario.gravity * sum(body.mass for body in placed if not body.fixed)
-    table = interactions_of(scenario, contact_classes(scenario, tuple(placed)))
-    stiffness = min(
-        one.normal_stiffness * min(1.0, one.shear_ratio) for row in table for one in row if one.normal_stiffness > 0.0
-    )
-    return laws.LAWS[scenario.contact.law].compression(stiffness, weight)
 
 
 def rest_acceleration(scenario: Scenario, least_moved: float | None) -> float:

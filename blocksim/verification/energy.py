@@ -7,7 +7,7 @@ from math import log2, nan, radians
 from pathlib import Path
 
 from blocksim.kernels.common.arrays import AT_REST, REACHED
-from blocksim.scenario import Document, Scenario, place_bodies
+from blocksim.scenario import Document, place_bodies
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification import case, scene
 
@@ -94,14 +94,9 @@ def ledgers(setting: case.Setting) -> Iterator[case.Row]:
             stiffness_scale = changes.get("contact.stiffness_scale", own.contact.stiffness_scale)
             changes["contact.stiffness_scale"] = STIFFER * float(str(stiffness_scale))
         scenario = document.with_values(changes).build()
-        yield case.Row(name, "", 0.0, worst_residual(scenario), tolerance)
-
-
-def worst_residual(scenario: Scenario) -> float:
-    """Return the largest residual of a run at its outputs, as a share of the energy in play; NaN where it fails."""
-    run, worst = scene.Simulation(build_scene(scenario)), 0.0
-    for k in range(1, round(scenario.time.end / scenario.output.every) + 1):
-        worst = max(worst, run.to_time(k * scenario.output.every).residual())
-        if run.status != REACHED:
-            break
-    return worst if run.status in {REACHED, AT_REST} else nan
+        run, worst = scene.Simulation(build_scene(scenario)), 0.0  # the largest residual over the energy in play
+        for k in range(1, round(scenario.time.end / scenario.output.every) + 1):
+            worst = max(worst, run.to_time(k * scenario.output.every).residual())
+            if run.status != REACHED:
+                break
+        yield case.Row(name, "", 0.0, worst if run.status in {REACHED, AT_REST} else nan, tolerance)

@@ -124,11 +124,6 @@ class SoilScene(Simulation):
         return dict(zip(ledger_names(self.scene), self.ledger_row().tolist(), strict=False))
 
 
-def pressure_share(force: float, height: float) -> float:
-    """Return K of a horizontal force (N) on a wall of this height (m)."""
-    return 2.0 * abs(force) / (UNIT_WEIGHT * height**2 * DEPTH)
-
-
 STEP = 1e-5  # s
 STEPS = 3000  # at a strain rate of 1/s: a strain of 3 %, a hundred times that at yield
 PRESSURE = 1e3  # Pa
@@ -193,7 +188,8 @@ def at_rest(setting: Setting) -> Iterator[Row]:
             scene.to_time(0.3)
             thrust, base = scene.mean_force_on(1, 0.325)[0], scene.mean_force_on(-1, 0.35)[1]
             yield relative(f"{prefix}{start}: base / weight", "", 1.0, -base / weight, 0.005)
-            yield relative(f"{prefix}{start}: K on the wall", "", AT_REST, pressure_share(thrust, TALL), 0.01)
+            share = 2.0 * abs(thrust) / (UNIT_WEIGHT * TALL**2 * DEPTH)
+            yield relative(f"{prefix}{start}: K on the wall", "", AT_REST, share, 0.01)
 
 
 def draw_wall_back(spacing: float, base: float, speed: float, gradient: str) -> SoilScene:
@@ -213,7 +209,7 @@ def active_share(spacing: float, base: float, gradient: str) -> float:
     x, y = scene.points["x"], scene.points["y"]
     columns = np.arange(0.0, 0.02, spacing)
     tops = [y[(x >= left - 0.001) & (x < left + spacing)].max() for left in columns]
-    return pressure_share(thrust, float(np.mean(tops)) + 0.5 * spacing)
+    return 2.0 * abs(float(thrust)) / (UNIT_WEIGHT * (float(np.mean(tops)) + 0.5 * spacing) ** 2 * DEPTH)
 
 
 def active(setting: Setting) -> Iterator[Row]:

@@ -166,7 +166,10 @@ def draw_history_page(
         axes_of = dict(zip(names, rows, strict=True))
         for name, motion in motions.items():
             if not blocks:
-                _draw_others(axes_of[name], seen.time, np.delete(motion.values, shown, axis=1))
+                rest = [np.stack([seen.time, one], axis=-1) for one in np.delete(motion.values, shown, axis=1).T]
+                look: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": 0.4}
+                look["alpha"] = min(0.35, max(0.12, 30.0 / max(len(rest), 1)))
+                style.add_lines(axes_of[name], rest, **look, rasterized=len(rest) > MOST_PATHS)
             if measured is not None and motion.quantity:
                 drawn = replace(motion, values=motion.values[:, shown]) if blocks else motion
                 _draw_measured(axes_of[name], seen, drawn, measured, [frames.names[block] for block in shown])
@@ -235,14 +238,6 @@ def _panel_height(names: Sequence[str], blocks: int) -> float:
     first = next((row for row, name in enumerate(names) if name in MOTIONS), 0)
     end = next((row for row, name in enumerate(names) if row > first and name not in {*MOTIONS, CONTACTS}), len(names))
     return max(time_panels.PANEL, (legend + time_panels.GAP) / (end - first) - time_panels.GAP)
-
-
-def _draw_others(axes: "style.Axes", time: run_data.Floats, values: run_data.Floats) -> None:
-    """Draw the blocks that have no line of their own in grey, (n, k)."""
-    lines = [np.stack([time, one], axis=-1) for one in values.T]
-    faint = min(0.35, max(0.12, 30.0 / max(len(lines), 1)))
-    look: dict[str, Any] = {"colors": style.FAINT_INK, "linewidths": 0.4, "alpha": faint}
-    style.add_lines(axes, lines, **look, rasterized=len(lines) > MOST_PATHS)
 
 
 def _draw_measured(

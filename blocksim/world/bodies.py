@@ -44,6 +44,7 @@ class Shapes(NamedTuple):
     firsts: tuple[int, ...]  # (n + 1,) of blocks, pieces of ground and the half-plane
     sizes: tuple[int, ...]  # (n + 1,) numbers of corners
     faces: tuple[int, ...]  # (n,) of blocks: kernels take OUTLINE by its corners, ALL by its half sides
+    has_polygons: bool  # kernels need the table
     lengths: NDArray[np.float64]  # (5, n) LENGTHS of blocks
 
 
@@ -79,7 +80,7 @@ def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]
     sizes = (*map(len, blocks), *[len(CORNERS)] * (len(firsts) - len(blocks)))
     faces = tuple(arrays.OUTLINE if body.outline else arrays.ALL for body in placed)
     of_blocks = np.array([lengths[corners] for corners in blocks]).reshape(-1, len(LENGTHS))
-    return Shapes(table, tuple(firsts), sizes, faces, of_blocks.T)
+    return Shapes(table, tuple(firsts), sizes, faces, arrays.OUTLINE in faces, of_blocks.T)
 
 
 def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
@@ -216,13 +217,8 @@ class Layout(NamedTuple):
         model = self.scenario.contact.model
         moved = (*self.drives.driven["body"].tolist(), self.drives.paths, self.drives.pieces.size)
         loads = self.applied.loads.size, self.applied.pieces.size
-        shapes = self.shapes.table.size, self.has_corners
+        shapes = self.shapes.table.size, self.shapes.has_polygons
         return model, len(self.placed), len(self.segments), len(self.classes), moved, loads, shapes
-
-    @property
-    def has_corners(self) -> bool:
-        """Whether the kernels need the corners of bodies."""
-        return arrays.OUTLINE in self.shapes.faces
 
 
 def layout_of(scenario: Scenario) -> Layout:

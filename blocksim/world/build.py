@@ -305,7 +305,7 @@ def assemble_world(
         before=before,
         **empty_lists(capacity, slots, before),
         particles=parts.particles,
-        corners=join_records([one.shapes.table for one in layouts]) if layouts[0].has_corners else None,
+        corners=join_records([one.shapes.table for one in layouts]) if layouts[0].shapes.has_polygons else None,
         starts=numbers((members, 3 * max(blocks, LEAST_CELLS) + 3), np.uint32),
         order=numbers((members, blocks), np.uint32),
         large=numbers(large.shape, np.uint32),

@@ -177,7 +177,7 @@ def _seconds_per_step(layout: Layout, particles: int) -> float:
         block, particle, more = SECONDS_WITH_PARTICLES[scenario.contact.model]
         return (more if is_crowd else 1.0) * (blocks * block + particles * particle)
     rectangles = blocks * (SECONDS_IN_A_CROWD if is_crowd else SECONDS_PER_BODY_AND_STEP)
-    return OUTLINES_COST * rectangles if layout.has_corners else rectangles
+    return OUTLINES_COST * rectangles if layout.shapes.has_polygons else rectangles
 
 
 def _pairs(layout: Layout, world: World) -> Iterator[PairDescription]:

@@ -118,7 +118,7 @@ class Block(Table):
         return value
 
     def _check(self) -> None:
-        shape = self.shape_key
+        shape = next((key for key in (*OUTLINE_KEYS, "width") if getattr(self, key) is not None), "depth")
         fields = type(self).model_fields
         given = [fields[name].alias or name for name in fields if name in self.model_fields_set]
         own = {"width": RECTANGLE_KEYS, "depth": ("depth",)} | OUTLINE_KEYS
@@ -147,11 +147,6 @@ class Block(Table):
         if self.width is None:
             return key not in RECTANGLE_KEYS and getattr(self, "given_depth" if key == "depth" else key) is not None
         return key in {*RECTANGLE_KEYS, "material"}
-
-    @property
-    def shape_key(self) -> str:
-        """The key that tells what is given of the shape: outline, sides, width or depth."""
-        return next((key for key in (*OUTLINE_KEYS, "width") if getattr(self, key) is not None), "depth")
 
     @cached_property
     def polygon(self) -> geometry.Corners:

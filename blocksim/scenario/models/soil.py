@@ -65,7 +65,8 @@ class SoilTable(SystemTable):
                 raise q.invalid("the end must be beyond the begin", key)
         if self.angle is not None and self.x is not None and max(self._heads) >= self.x[1] - self.x[0]:
             raise q.invalid("the face reaches the other end below the crest", "angle")
-        corners, key = self._corners, SHAPES[self.kind][0]
+        corners = self.outline or tuple((float(x), float(y)) for x, y in self.corners)
+        key = SHAPES[self.kind][0]
         if len(corners) < 3:
             raise q.invalid("an outline needs at least three corners [x, y]", key)
         if len(set(corners)) < len(corners):
@@ -78,13 +79,9 @@ class SoilTable(SystemTable):
     @property
     def corners(self) -> "NDArray[np.float64]":
         """Corners (m, (k, 2)), counter-clockwise."""
-        return geometry.corners_of(self._corners)
-
-    @property
-    def _corners(self) -> tuple[Point, ...]:
         (x0, x1), (y0, y1) = self.x or (0.0, 0.0), self.y or (0.0, 0.0)
         left, right = self._heads
-        return self.outline or ((x0, y0), (x1, y0), (x1 - right, y1), (x0 + left, y1))
+        return geometry.corners_of(self.outline or [(x0, y0), (x1, y0), (x1 - right, y1), (x0 + left, y1)])
 
     @property
     def _heads(self) -> tuple[float, float]:
