@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings, strategies as st
 from pydantic import BaseModel
 
 from blocksim.scenario import (
     Document,
     Scenario,
     load_scenario,
-    place_bodies,
     scenario_from_mapping,
     scenario_hash,
     scenario_to_toml,
@@ -38,127 +36,6 @@ def test_a_shipped_scenario_is_written_and_loaded_bit_equal(shipped: Path) -> No
 def test_writing_twice_gives_the_same_text(shipped: Path) -> None:
     text = scenario_to_toml(load_scenario(shipped))
     assert scenario_to_toml(Document.parse(text).build()) == text
-
-
-def decades(low: int, high: int) -> st.SearchStrategy[float]:
-    return st.floats(10.0**low, 10.0**high)
-
-
-FRACTION = st.floats(0, 1)
-ANGLE = st.floats(-1.5, 1.5).map(lambda angle: f"{angle!r} rad")
-FRICTIONS = st.one_of(
-    st.floats(0, 5),
-    st.floats(0, 89).map(lambda angle: f"{angle!r} deg"),
-    st.tuples(st.floats(0, 5), FRACTION, decades(-6, 2)).map(
-        lambda v: {"static": v[0], "kinetic": v[0] * v[1], "transition_speed": v[2]}
-    ),
-)
-HEIGHT = st.floats(-1.0, 20.0)
-PROFILES = st.lists(HEIGHT, min_size=2, max_size=4).map(lambda heights: [[100.0 * x, y] for x, y in enumerate(heights)])
-WALLS = st.tuples(HEIGHT, HEIGHT).map(lambda y: {"from": [1e4, y[0]], "to": [1e4 + 1, y[1]], "material": "m"})
-PAIRS = st.dictionaries(
-    st.sampled_from(["restitution", "shear_stiffness_ratio", "shear_damping_ratio"]), st.floats(0.1, 1)
-).flatmap(lambda table: FRICTIONS.map(lambda friction: {**table, "friction": friction}))
-TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
-SCENARIOS = st.fixed_dictionaries(
-    {
-        "schema": st.just(1),
-        "name": st.from_regex(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,20}[A-Za-z0-9_-]", fullmatch=True),
-        "materials": st.fixed_dictionaries(
-            {
-                "m": st.fixed_dictionaries(
-                    {"young_modulus": decades(3, 12), "poisson_ratio": st.floats(-0.99, 0.49)}
-                ).flatmap(
-                    lambda table: st.tuples(st.sampled_from(["density", "unit_weight"]), decades(1, 5)).map(
-                        lambda chosen: {**table, chosen[0]: chosen[1]}
-                    )
-                )
-            }
-        ),
-        "blocks": st.fixed_dictionaries(
-            {
-                "b": st.fixed_dictionaries(
-                    {"width": decades(-3, 1), "height": decades(-3, 1), "length": decades(-3, 1)},
-                    optional={"upright": st.sampled_from(["width", "height", "length"])},
-                ).map(lambda table: {**table, "material": "m"})
-            }
-        ),
-        "bodies": st.fixed_dictionaries(
-            {
-                "x": st.floats(-1e3, 1e3),
-                "y": st.floats(50, 1e3),
-                "angle": ANGLE,
-                "spin": st.floats(-1e3, 1e3),
-            },
-            optional={"velocity": st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2)},
-        ).map(lambda table: [{**table, "block": "b"}]),
-    },
-    optional={
-        "description": TEXT,
-        "gravity": st.floats(0, 100),
-        "ground": st.fixed_dictionaries({"tilt": ANGLE}, optional={"profile": PROFILES}),
-        "walls": st.lists(WALLS, max_size=2),
-        "pairs": st.fixed_dictionaries(
-            {}, optional={"m": st.fixed_dictionaries({}, optional={"m": PAIRS, "ground": PAIRS}).filter(bool)}
-        ),
-        "friction": st.fixed_dictionaries({}, optional={"block_block": FRICTIONS, "block_ground": FRICTIONS}),
-        "contact": st.fixed_dictionaries(
-            {},
-            optional={
-                "restitution": FRACTION,
-                "stiffness_scale": decades(-6, 1),
-                "normal_stiffness": decades(3, 10),
-                "shear_damping_ratio": st.floats(0, 3),
-                "max_overlap": decades(-6, -3),
-            },
-        ),
-        "time": st.fixed_dictionaries(
-            {"end": decades(-3, 2)}, optional={"step": decades(-9, -3), "rest_hold": st.floats(0, 1)}
-        ),
-        "provenance": st.fixed_dictionaries({"time.end": TEXT}),
-    },
-)
-
-
-@settings(max_examples=40)
-@given(SCENARIOS)
-def test_any_scenario_is_written_and_loaded_bit_equal(data: dict[str, Any]) -> None:
-    scenario = scenario_from_mapping(data)
-    assert repr(again(scenario)) == repr(scenario)
-    assert scenario_hash(again(scenario)) == scenario_hash(scenario)
-
-
-ROWS = {"block": "brick", "rows": 3}
-MOVING = {"velocity": ["1 mm/s", 0], "shear_velocity": "-0.3 m/s", "left": "1 mm", "bottom": "1 m"}
-
-
-@pytest.mark.parametrize(
-    "structure",
-    [
-        {"kind": "wall", **ROWS, "columns": 4, "bond": "stack", "gap": "3 mm", "holes": [[1, 2], [3, 4]], **MOVING},
-        {"kind": "wall", **ROWS, "columns": 4, "gap": "3 mm", "missing": 0.3, "offset": "1.1 mm", "seed": 7},
-        {"kind": "pyramid", **ROWS, "gap": "3 mm", **MOVING},
-        {"kind": "dominoes", "block": "brick", "count": 5, "spacing": "7 mm", "push": "0.1 m/s", **MOVING},
-        {
-            "kind": "grid",
-            **ROWS,
-            "columns": 4,
-            "gap_x": "35 mm",
-            "gap_y": "1.1 m",
-            "offset": "0.7 mm",
-            "turn": "33 deg",
-            "seed": 4294967295,
-            **MOVING,
-        },
-        {"kind": "staircase", "block": "brick", "count": 3, "overlap": "7 mm", **MOVING},
-    ],
-    ids=lambda structure: structure["kind"],
-)
-def test_a_structure_is_written_and_loaded_bit_equal(valid_text: str, structure: dict[str, object]) -> None:
-    data = Document.parse(valid_text).data
-    scenario = scenario_from_mapping({**data, "structures": [structure]})
-    assert repr(again(scenario)) == repr(scenario)
-    assert place_bodies(again(scenario)) == place_bodies(scenario)
 
 
 def test_a_sweep_is_written_as_lists_of_values(valid_text: str) -> None:

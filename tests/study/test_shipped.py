@@ -10,14 +10,12 @@ from blocksim.analysis.compare import Comparison
 from blocksim.scenario import Document, load_scenario
 from blocksim.scenario.models.motion import read_record
 from blocksim.scenario.units import STANDARD_GRAVITY
-from blocksim.simulation import Frames, Result
+from blocksim.simulation import Result
 from blocksim.study.compare import compare_run
 from blocksim.study.run import run
-from blocksim.verification import closed_forms
 from tests.study.conftest import SCENARIOS
 from tests.study.plans import cases
 
-HALF_HEIGHT = 0.0125  # m
 STUDIES = {"sweep_friction_stiffness": 10_000, "sweep_readings": 4875, "ensemble_three_blocks": 1024}
 
 
@@ -62,42 +60,6 @@ def test_blocks_stand_where_the_overlap_is_read_as_the_offset() -> None:
     final = run_shipped("sweep_readings", **{"structures.0.overlap": "22 mm"}).final
     np.testing.assert_allclose(final["rotation_deg"], 0.0, atol=0.01)
     np.testing.assert_allclose(final["x_mm"], [16.0, 26.0, 36.0], atol=0.01)
-
-
-@pytest.fixture(scope="module")
-def bounce() -> Frames:
-    return run_shipped("bounce").frames
-
-
-def test_bouncing_block_falls_as_equation_10_says(bounce: Frames) -> None:
-    falling = bounce.time < closed_forms.fall_time(0.1) - 1e-3
-    fallen = 0.1125 - bounce.y[falling, 0]
-    expected = [closed_forms.fall_distance(float(time)) for time in bounce.time[falling]]
-    np.testing.assert_allclose(fallen, expected, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("impact", [1, 2, 3])
-def test_bouncing_block_rises_as_equation_12_says(bounce: Frames, impact: int) -> None:
-    times = [closed_forms.fall_time(0.1)]
-    for earlier in range(1, impact + 1):
-        times.append(times[-1] + closed_forms.flight_time(0.1, 0.5, earlier))
-    flying = (bounce.time > times[impact - 1]) & (bounce.time < times[impact])
-    apex = float(np.max(bounce.y[flying, 0])) - HALF_HEIGHT
-    assert apex == pytest.approx(closed_forms.apex_height(0.1, 0.5, impact), rel=2e-3)
-    middle = 0.5 * (times[impact - 1] + times[impact])
-    assert bounce.time[flying][np.argmax(bounce.y[flying, 0])] == pytest.approx(middle, abs=5e-4)
-
-
-def test_sliding_block_stops_where_equation_13_says() -> None:
-    result = run_shipped("slide")
-    assert result.reason == "at rest"
-    row = result.final.iloc[0]
-    assert row["x_mm"] == pytest.approx(1e3 * closed_forms.sliding_stop_distance(0.5, 0.38), abs=0.1)
-    assert row["rotation_deg"] == pytest.approx(0.0, abs=0.01)
-    frames = result.frames
-    sliding = (frames.time > 0.01) & (frames.time < closed_forms.sliding_stop_time(0.5, 0.38) - 0.01)
-    expected = [closed_forms.sliding_speed(float(time), 0.5, 0.38) for time in frames.time[sliding]]
-    np.testing.assert_allclose(frames.vx[sliding, 0], expected, atol=2e-3)
 
 
 def test_tower_stands() -> None:

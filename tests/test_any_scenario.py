@@ -1,0 +1,39 @@
+"""What any valid scenario does: it is read as it was written, passes the check, runs, resumes, and knows no threads."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hypothesis import given, settings
+
+from blocksim.analysis.bits import differences
+from blocksim.scenario import Document, place_bodies, scenario_from_mapping, scenario_hash, scenario_to_toml
+from blocksim.simulation.checkpoint import CheckpointPolicy
+from blocksim.study.run import run
+from blocksim.world.describe import describe
+from tests.scenarios import scenarios
+
+
+@settings(max_examples=60)
+@given(scenarios())
+def test_it_is_written_and_loaded_bit_equal(data: dict[str, Any]) -> None:
+    scenario = scenario_from_mapping(data)
+    again = Document.parse(scenario_to_toml(scenario)).build()
+    assert repr(again) == repr(scenario)
+    assert scenario_hash(again) == scenario_hash(scenario)
+    assert place_bodies(again) == place_bodies(scenario)
+
+
+@settings(max_examples=12)
+@given(scenarios())
+def test_it_passes_the_check_runs_resumes_and_ends_the_same_on_two_threads(data: dict[str, Any]) -> None:
+    moment = {**data["time"], "end": 1e-3, "stop_at_rest": False}
+    scenario = scenario_from_mapping({**data, "time": moment, "output": {"every": 2.5e-4}})
+    assert describe(scenario).frames == 5
+    straight = run(scenario)
+    assert straight.status in {"finished", "failed"}, straight.reason
+    assert differences(straight.frames, run(scenario, threads=2).frames).is_none
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "run"
+        assert run(scenario, out=out, precautions=CheckpointPolicy(wall_time=0.0)).status in {"interrupted", "failed"}
+        assert differences(straight.frames, run(scenario, out=out, resume=True).frames).is_none
