@@ -30,11 +30,11 @@ def mean_of(table: ExperimentTable, block: str, quantity: str) -> float:
     return float(rows[block, quantity])
 
 
-def midpoints(edges: ExperimentTable, block: str, rounding: str) -> list[Decimal]:
+def midpoints(edges: ExperimentTable, block: str) -> list[Decimal]:
     """Return the midpoints of the edges as a person with pencil and paper gets them."""
     pairs = zip(edges.values(block, "left"), edges.values(block, "right"), strict=True)
     sums = [Decimal(str(left)) + Decimal(str(right)) for left, right in pairs]
-    return [(total / 2).quantize(HUNDREDTH, rounding) for total in sums]
+    return [(total / 2).quantize(HUNDREDTH, ROUND_HALF_UP) for total in sums]
 
 
 @pytest.mark.parametrize(("block", "printed"), [("1", 16.0), ("2", 74.41), ("3", 131.33)])
@@ -64,7 +64,7 @@ def test_every_centre_is_the_midpoint_of_its_edges_rounded_half_up(
     centres: ExperimentTable, edges: ExperimentTable, block: str
 ) -> None:
     printed = [Decimal(str(value)) for value in centres.values(block, "x")]
-    assert printed == midpoints(edges, block, ROUND_HALF_UP)
+    assert printed == midpoints(edges, block)
 
 
 def test_statistics_of_the_paper_match_numpy_and_the_design(centres: ExperimentTable) -> None:

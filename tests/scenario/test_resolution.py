@@ -238,9 +238,3 @@ def test_resolved_scenario_has_the_keys_of_its_scheme(data: dict[str, Any], sche
     text = scenario_to_toml(scenario)
     assert ("safety" in text, "substeps" in text) == (scheme == "explicit", scheme == "nonsmooth")
     assert Document.parse(text).build() == scenario
-
-
-def test_the_hash_is_the_same_in_every_process() -> None:
-    scenario = load_scenario(REPOSITORY / "scenarios" / "slide.toml")
-    assert len(scenario_hash(scenario)) == 64
-    assert scenario_hash(scenario) == scenario_hash(again(scenario))

@@ -1,8 +1,6 @@
-"""A study that is added: two modules and a line give it folders, resuming, every executor, JSON, CSV and reports."""
+"""A study that is added: two modules and a line give it folders, resuming, JSON, CSV and reports."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,17 +13,6 @@ from blocksim.study.pictures import plot
 from blocksim.study.report import report
 from blocksim.study.verify import verify_study
 from tests.study.slip import SlipAnswer, slip
-
-CLUSTER = """
-import sys
-from distributed import LocalCluster
-from blocksim.study.executors import Execution
-from tests.study.slip import slip
-
-if __name__ == "__main__":
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
-        slip((10.0, 25.0), sys.argv[1], Execution(scheduler=cluster.scheduler_address))
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -61,24 +48,6 @@ def test_it_goes_on_where_it_was_stopped_and_runs_nothing_twice(tmp_path: Path) 
     assert slip((10.0, 25.0), tmp_path / "slip").run == 0
     with pytest.raises(OutputExistsError, match="contains another study of slip; --overwrite replaces it"):
         slip((11.0,), tmp_path / "slip")
-
-
-def test_it_is_the_same_from_processes(tmp_path: Path) -> None:
-    here, there = (
-        slip((10.0, 25.0), tmp_path / "a"),
-        slip((10.0, 25.0), tmp_path / "b", Execution(executor="processes", jobs=1)),
-    )
-    assert here.points == there.points
-
-
-@pytest.mark.long
-def test_it_is_the_same_from_a_cluster(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    (tmp_path / "script.py").write_text(CLUSTER)
-    arguments = [sys.executable, str(tmp_path / "script.py"), str(tmp_path / "there")]
-    ended = subprocess.run(arguments, check=False, capture_output=True, text=True, env={"PYTHONPATH": "."})
-    assert ended.returncode == 0, ended.stderr
-    assert SlipAnswer.read(tmp_path / "there").points == slip((10.0, 25.0), tmp_path / "here").points
 
 
 def test_it_is_drawn_reported_and_verified(tmp_path: Path) -> None:
