@@ -140,9 +140,13 @@ def implausible_values(scenario: Scenario) -> list[str]:
         key = overrides.format_key(("materials", name))
         if not LIGHTEST <= material.density <= HEAVIEST:
             given = "density" if material.unit_weight is None else "unit_weight"
-            warnings.append(f"{key}.{given} makes {material.density:.4g} kg/m^3; check its unit, SI where none is given")
+            warnings.append(
+                f"{key}.{given} makes {material.density:.4g} kg/m^3; check its unit, SI where none is given"
+            )
         if material.young_modulus < SOFTEST:
-            warnings.append(f"{key}.young_modulus = {material.young_modulus:.4g} Pa; check its unit, SI where none is given")
+            warnings.append(
+                f"{key}.young_modulus = {material.young_modulus:.4g} Pa; check its unit, SI where none is given"
+            )
     for name, block in scenario.blocks.items():
         sizes = {side: getattr(block, side) or 0.0 for side in ("width", "height", "length")}
         sizes |= {"depth": block.given_depth or 0.0, "radius": 2.0 * (block.radius or 0.0)}

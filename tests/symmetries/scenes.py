@@ -15,7 +15,7 @@ from blocksim.verification.scene import Simulation
 from tests.sizes import in_all
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from typing import Any
 
     from numpy.typing import NDArray
@@ -69,7 +69,7 @@ def for_all(strategy: st.SearchStrategy[Any], examples: int, check: Callable[[An
     limits(given(strategy)(check))()
 
 
-def start(stack: Stack, bodies: Sequence[Body], scheme: str, *, gravity: float = GRAVITY) -> Simulation:
+def start(stack: Stack, bodies: Sequence[Mapping[str, object]], scheme: str, *, gravity: float = GRAVITY) -> Simulation:
     """Start blocks made as those of a stack; impulses are solved to round-off."""
     time = {"velocity_tolerance": 1e-12} if scheme == RIGID else {}
     return Setting(scheme=scheme, rigid_step=RIGID_STEP).start(

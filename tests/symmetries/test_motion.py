@@ -101,7 +101,7 @@ def test_collisions_are_the_same_in_a_moving_frame(scheme: str, examples: int) -
         stack, seed, vx, vy = scene
         bodies = flying(stack, seed)
         ends = [
-            start(stack, thrown(bodies, *frame), scheme, gravity=0.0).to_time(BEFORE_CHAOS)  # type: ignore[arg-type]
+            start(stack, thrown(bodies, *frame), scheme, gravity=0.0).to_time(BEFORE_CHAOS)
             for frame in ((0.0, 0.0), (vx, vy))
         ]
         # Springs see approaches from a gap on that follows from the greatest speed of the scene (choose_stride), and
@@ -132,6 +132,20 @@ def test_larger_stack_moves_alike_to_the_last_bit(scheme: str, examples: int) ->
             np.testing.assert_array_equal(two.to_step(steps).state() / units, one.to_step(steps).state())
 
     for_all(st.tuples(stacks(), st.integers(-8, 10).filter(bool)), examples, check)
+
+
+@some(6, 150)
+def test_rigid_rectangles_given_by_their_corners_move_as_those_given_by_their_sides(examples: int) -> None:
+    def by_corners(body: Body) -> dict[str, object]:
+        x, y = 0.5 * body["width"], 0.5 * body["height"]
+        return {"x": body["x"], "y": body["y"], "outline": [(x, y), (x, -y), (-x, -y), (-x, y)]}
+
+    def check(stack: Stack) -> None:
+        one, two = start(stack, stack.bodies, RIGID), start(stack, [by_corners(one) for one in stack.bodies], RIGID)
+        for end in (0.1, 0.5):  # s: the last one long after impacts
+            np.testing.assert_allclose(two.to_time(end).state(), one.to_time(end).state(), atol=1e-9)
+
+    for_all(stacks(), examples, check)
 
 
 def loose_wall(size: float) -> list[dict[str, object]]:
