@@ -140,13 +140,9 @@ def implausible_values(scenario: Scenario) -> list[str]:
         key = overrides.format_key(("materials", name))
         if not LIGHTEST <= material.density <= HEAVIEST:
             given = "density" if material.unit_weight is None else "unit_weight"
-            warnings.append(
-                f"{key}.{given} makes {material.density:.4g} kg/m^3; check its unit, SI where none is given"
-            )
+            warnings.append(f"{key}.{given} makes {material.density:.4g} kg/m^3; is the unit right?")
         if material.young_modulus < SOFTEST:
-            warnings.append(
-                f"{key}.young_modulus = {material.young_modulus:.4g} Pa; check its unit, SI where none is given"
-            )
+            warnings.append(f"{key}.young_modulus = {material.young_modulus:.4g} Pa; is the unit right?")
     for name, block in scenario.blocks.items():
         sizes = {side: getattr(block, side) or 0.0 for side in ("width", "height", "length")}
         sizes |= {"depth": block.given_depth or 0.0, "radius": 2.0 * (block.radius or 0.0)}
@@ -154,7 +150,7 @@ def implausible_values(scenario: Scenario) -> list[str]:
         for side, size in sizes.items():
             if size > LONGEST:
                 key = overrides.format_key(("blocks", name, side))
-                warnings.append(f"{key} makes {size:.4g} m; check its unit, SI where none is given")
+                warnings.append(f"{key} makes {size:.4g} m; is the unit right?")
     for number, structure in enumerate(scenario.structures):
         if isinstance(structure, polygons.Polygons):
             size = median(dist(*geometry.box_of(one.outline)) for one in structure.cells_given)
