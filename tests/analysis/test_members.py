@@ -26,16 +26,13 @@ def test_members_that_did_not_finish_are_named_and_have_no_values() -> None:
     assert members.blocks == ("left.wing", "2")
     assert (len(members.table), members.has_ended.tolist()) == (3, [True, False, False])
     assert members.failures == (Failure(2, "b", "failed", "too deep"), Failure(3, "", "invalid", ""))
+    assert Members(table().drop(columns="reason"), "sweep.csv").failures[0].reason == ""
     assert np.array_equal(members.values("left.wing", "x"), [1.0, np.nan, np.nan], equal_nan=True)
 
 
 def test_values_that_are_not_finite_are_no_values() -> None:
     changed = table().assign(**{"2.rotation_deg": [np.inf, 1.0, 1.0]})
     assert np.isnan(Members(changed, "sweep.csv").values("2", "rotation")).all()
-
-
-def test_reasons_may_be_missing() -> None:
-    assert Members(table().drop(columns="reason"), "sweep.csv").failures[0].reason == ""
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
-from blocksim.scenario.events import joint_between
 from blocksim.scenario.models.loads import Face
 from blocksim.scenario.overrides import freeze
 from blocksim.scenario.start import face_of, impossible_starts, strip_before
@@ -102,22 +101,3 @@ def test_the_face_of_an_outline_is_that_whose_normal_points_that_way(face: Face,
     along, across = sorted((strip.size_x, strip.size_y), reverse=True)
     assert (along, across) == pytest.approx((0.3 - 2.0 * across, 1e-3 * 0.3 / math.sqrt(2.0)))
     assert strip.outline == ()
-
-
-def test_voussoirs_have_a_joint_along_their_slanted_faces() -> None:
-    slope, gap = math.atan2(0.2, 0.1), 0.01  # of the right face of the first
-    normal = (math.sin(slope), -math.cos(slope))
-    one = placed("keystone", 0.0, 1.0)
-    other = placed("keystone", 0.0, 0.0, 2.0 * slope - math.pi)  # its left face is turned into that direction
-    c, s = math.cos(other.angle), math.sin(other.angle)
-    (x, y), (foot_x, foot_y) = one.corners[1], other.corners[0]
-    moved = other._replace(
-        x=one.x + x + gap * normal[0] - (c * foot_x - s * foot_y),
-        y=one.y + y + gap * normal[1] - (s * foot_x + c * foot_y),
-    )
-    joint = joint_between(one, moved)
-    assert joint is not None
-    assert joint.normal == pytest.approx(normal)
-    assert math.dist(*joint.ends_of_a) == pytest.approx(math.hypot(0.1, 0.2))
-    assert joint_between(one, moved._replace(angle=moved.angle + math.radians(0.5))) is not None  # as drawings have it
-    assert joint_between(one, moved._replace(angle=moved.angle + math.radians(1.5))) is None

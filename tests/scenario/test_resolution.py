@@ -202,7 +202,7 @@ def test_the_hash_changes_with_every_key_of_an_outline(
         assert "upright" not in text
 
 
-def test_rectangles_are_hashed_and_written_as_before_there_were_outlines(data: dict[str, Any]) -> None:
+def test_rectangles_are_hashed_without_the_keys_of_outlines(data: dict[str, Any]) -> None:
     keys = {"width", "height", "length", "upright", "along", "material"}
     assert set(deciding_values(scenario_from_mapping(data))["blocks"]["b"]) == keys
 
