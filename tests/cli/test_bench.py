@@ -53,12 +53,6 @@ def test_json_and_file_hold_the_same(blocksim: Command) -> None:
     assert data["measurements"][0]["details"] == [{"quick": False}]
 
 
-def test_quiet_prints_the_table_only(blocksim: Command) -> None:
-    answer = blocksim("bench", "first", "--quiet")
-    assert (answer.code, answer.err) == (0, "")
-    assert answer.out.startswith("quantity")
-
-
 def test_a_stop_keeps_what_was_measured(blocksim: Command) -> None:
     answer = blocksim("bench", "--out", "bench.json")
     assert answer.code == 75

@@ -117,15 +117,6 @@ def test_finished_calibration_that_is_resumed_ends_with_0_and_leaves_its_file(sl
     assert file.read_text().endswith("# mine\n")
 
 
-def test_more_trials_continue_where_fewer_ended(slide: Slide) -> None:
-    many = (*FIT, *SCATTER, "--samples", 2, "--fresh", 2)
-    assert slide(*many, "--trials", 18, "--out", "one.toml").code == 0
-    assert slide(*many, "--trials", 20, "--out", "other.toml").code == 0
-    told = slide(*many, "--trials", 20, "--out", "one.toml", "--resume", "--overwrite")
-    assert told.code == 0
-    assert Path("one.toml").read_text() == Path("other.toml").read_text()
-
-
 def test_scatter_of_the_scenario_is_the_default_and_stays_in_the_file(slide: Slide, tmp_path: Path) -> None:
     scenario = tmp_path / "mine" / "slide.toml"
     own = f'\n[sweep]  # my scatter\nmode = "normal"\n"{SPEED}" = {{ mean = "0.5 m/s", sd = "0.01 m/s" }}\n'

@@ -2,11 +2,11 @@
 
 import json
 import signal
-import struct
 import time
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from tests.cli.conftest import PATIENCE, SOFT, Command, Process
 
@@ -14,7 +14,7 @@ SLIDE = ("converge", "scenarios/slide.toml", "--set", "contact.stiffness_scale=0
 
 
 def test_tables_verdicts_recommendation_and_picture(blocksim: Command) -> None:
-    answer = blocksim(*SLIDE)
+    answer = blocksim(*SLIDE, "--size", "500x400px", "--dpi", 80)
     assert answer.code == 0
     lines = answer.out.splitlines()
     assert lines[0] == "time step: time.safety"
@@ -27,18 +27,8 @@ def test_tables_verdicts_recommendation_and_picture(blocksim: Command) -> None:
     assert max(map(len, lines[:-1])) <= 80
     assert "time.safety = 0.1: finished (at rest)" in answer.err
     assert answer.err.splitlines()[-1] == "picture: results/slide/converge.png"
-    assert Path("results/slide/converge.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_picture_has_the_size_and_resolution_that_were_asked_for(blocksim: Command) -> None:
-    assert blocksim(*SLIDE, "--study", "step", "-q", "--size", "500x400px", "--dpi", 80).code == 0
-    head = Path("results/slide/converge.png").read_bytes()[:24]
-    assert struct.unpack(">II", head[16:]) == (500, 400)
-
-
-def test_recommended_command_can_be_run(blocksim: Command) -> None:
-    command = blocksim(*SLIDE, "--study", "step", "--no-picture", "-q").out.splitlines()[-1].split()
-    assert blocksim(*command[1:], "-q").out.split()[-3:-2] == ["33.53"]
+    with Image.open("results/slide/converge.png") as picture:
+        assert picture.size == (500, 400)
 
 
 def test_json_and_quiet_tell_nothing_else(blocksim: Command) -> None:

@@ -30,6 +30,14 @@ def test_cost_is_told_and_nothing_written(blocksim: Command, tmp_path: Path, gol
     golden(answer.out + answer.err, rules=["times", "sizes"])
 
 
+def test_twice_the_cores_take_half_the_time(blocksim: Command) -> None:
+    def solving(jobs: int) -> str:
+        return blocksim(*PLAN, "--jobs", jobs, "--vary", "time.end=2,4").out.splitlines()[1]
+
+    assert solving(1).endswith(" on 1 core")
+    assert solving(1).removesuffix(" on 1 core") != solving(8).removesuffix(" on 8 cores")
+
+
 def test_cost_grows_with_cases_and_steps(blocksim: Command) -> None:
     def seconds(*vary: str) -> float:
         return float(json.loads(blocksim(*PLAN, "--json", *vary).out)["seconds"])
@@ -37,11 +45,3 @@ def test_cost_grows_with_cases_and_steps(blocksim: Command) -> None:
     one = seconds("--vary", f"{KINETIC}=0.2")
     assert seconds("--vary", f"{KINETIC}=0.2,0.21,0.22") / one == 3.0
     assert 1.9 < seconds("--vary", "time.end=4") / one < 2.1
-
-
-def test_twice_the_cores_take_half_the_time(blocksim: Command) -> None:
-    def solving(jobs: int) -> str:
-        return blocksim(*PLAN, "--jobs", jobs, "--vary", "time.end=2,4").out.splitlines()[1]
-
-    assert solving(1).endswith(" on 1 core")
-    assert solving(1).removesuffix(" on 1 core") != solving(8).removesuffix(" on 8 cores")

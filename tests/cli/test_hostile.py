@@ -138,13 +138,6 @@ def test_cases_of_a_sweep_that_are_links_are_left_out(blocksim: Command, swept: 
     assert "part-1-member-2" not in page
 
 
-def test_results_behind_a_link_of_the_user_are_found(blocksim: Command, copied: Path) -> None:
-    Path("disk/three_blocks").mkdir(parents=True)
-    copied.rename("disk/three_blocks/0123")
-    Path("mine").symlink_to("disk")
-    assert blocksim("plot", "mine/three_blocks").code == 0
-
-
 @pytest.mark.parametrize("command", ["plot", "report", "compare", "check"])
 def test_nothing_of_a_stranger_steers_the_terminal(blocksim: Command, copied: Path, command: str) -> None:
     evil = "\x1b]0;owned\x07\x9b31m\u202egnp.exe"

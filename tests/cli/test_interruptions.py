@@ -87,16 +87,6 @@ def frames_in(folder: Path) -> int:
 
 
 @pytest.mark.long
-def test_killed_run_continues_to_the_same_bits(process: Process, tmp_path: Path, whole: Path) -> None:
-    folder = tmp_path / "out"
-    assert kill_again_and_again(process, folder, 3, 1.2) >= 1
-    running = process(*LONG, "--out", "out", "--resume")
-    _, err = running.communicate(timeout=PATIENCE)
-    assert running.returncode == 0, err
-    assert_same(folder, whole)
-
-
-@pytest.mark.long
 def test_killed_run_with_soil_continues_to_the_same_bits(process: Process, tmp_path: Path) -> None:
     run = ("run", str(SCENARIOS / "soil" / "seawall.toml"), "--set", "time.end=0.2", "--quiet")
     whole = in_one_go(run, tmp_path / "whole")

@@ -61,18 +61,6 @@ def test_a_new_structure_stands_up_to_one_percent_below_its_limit_of_tilt(
     assert result.summary.movement.outcome == "stands"
 
 
-def test_a_new_wall_is_of_stone_and_stands_until_its_push_is_uncommented(blocksim: Command) -> None:
-    blocksim("new", "wall", "mine")
-    assert "aluminium" not in Path("mine.toml").read_text()
-    document = Document.read(Path("mine.toml"))
-    outcomes = []
-    for push in (0.0, 6.0):
-        movement = simulate(document.with_values({"structures.0.shear_velocity": push}).build()).summary.movement
-        outcomes.append("" if movement is None else movement.outcome)
-    assert document.data["structures"][0].get("shear_velocity") is None  # type: ignore[index]
-    assert outcomes == ["stands", "fell"]
-
-
 @pytest.mark.parametrize("kind", SWEEPS)
 def test_a_new_sweep_passes_a_dry_run(blocksim: Command, kind: str) -> None:
     blocksim("new", kind, "mine")

@@ -118,14 +118,6 @@ def test_folder_of_a_run_that_is_going_on_is_left_alone(
     assert not any((tmp_path / "out").iterdir())
 
 
-def test_largest_movement_outcome_and_first_mover_are_reported(blocksim: Command) -> None:
-    answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--out", "slid")
-    assert "slid: peak displacement 33." in answer.err
-    assert "(block block)\nfirst to move: block block at 0.001 s" in answer.err  # 0.5 m/s past a hundredth of 25 mm
-    movement = json.loads(Path("slid/run.json").read_text())["movement"]
-    assert (movement["outcome"], movement["first_mover"]) == ("slid", "block")
-
-
 def test_block_that_is_fast_at_the_end_is_told(blocksim: Command) -> None:
     answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--set", "time.end=0.02")
     assert "not at rest: block block at 0." in answer.err
@@ -154,3 +146,11 @@ def test_the_end_of_a_run_reads_none_of_its_frames(blocksim: Command, monkeypatc
     answer = blocksim("run", "scenarios/three_blocks_nonsmooth.toml", "--set", "time.end=0.02", "--out", "run")
     assert answer.code in {0, 1}
     assert "results: run" in answer.err
+
+
+def test_largest_movement_outcome_and_first_mover_are_reported(blocksim: Command) -> None:
+    answer = blocksim("run", "scenarios/slide.toml", *SOFT, "--out", "slid")
+    assert "slid: peak displacement 33." in answer.err
+    assert "(block block)\nfirst to move: block block at 0.001 s" in answer.err  # 0.5 m/s past a hundredth of 25 mm
+    movement = json.loads(Path("slid/run.json").read_text())["movement"]
+    assert (movement["outcome"], movement["first_mover"]) == ("slid", "block")

@@ -1,7 +1,6 @@
 """blocksim sensitivity: tables, files and what it refuses."""
 
 import csv
-import json
 from pathlib import Path
 
 import pytest
@@ -31,15 +30,6 @@ def test_tables_tell_what_matters_most_first(blocksim: Command, method: str, hea
     with Path("indices.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["key"] for row in rows] == ["friction.block_ground", "bodies.0.velocity.0"]
-
-
-def test_json_tells_everything_and_nothing_else(blocksim: Command) -> None:
-    answer = blocksim(*SLIDE, *VARY, "--samples", 4, "--json")
-    data = json.loads(answer.out)
-    assert (answer.code, answer.err) == (0, "")
-    assert (data["method"], data["runs"], data["failed"], data["trajectories"]) == ("morris", 12, 0, 4)
-    assert len(data["indices"]) == 2
-    assert data["indices"][0]["mu"] < 0.0  # friction shortens the way
 
 
 def test_distributions_of_the_scenario_are_the_default(blocksim: Command, tmp_path: Path) -> None:

@@ -132,19 +132,3 @@ def test_shards_are_merged_and_missing_ones_named(blocksim: Command) -> None:
     assert blocksim(*RIGID, *vary, "--shard", "1/2").code == 0
     assert blocksim("sweep", "--merge", "out").code == 0
     assert len(rows()) == 5
-
-
-SAMPLED = ("--vary", f"{KINETIC}=0.1:0.3", "--vary", "structures.0.overlap=10 mm+-0.1 mm", "--mode", "lhs")
-
-
-def test_samples_from_the_command_line(blocksim: Command) -> None:
-    answer = blocksim(*SHORT, *SAMPLED, "--samples", 2, "--seed", 3)
-    assert answer.code == 0
-    kinetic = sorted(float(row[KINETIC]) for row in rows())
-    assert 0.1 < kinetic[0] < 0.2 < kinetic[1] < 0.3
-    assert all(9.5 < float(row["structures.0.overlap [mm]"]) < 10.5 for row in rows())
-    first = Path("out/sweep.csv").read_text()
-    blocksim(*SHORT[:-1], "again", *SAMPLED, "--samples", 2, "--seed", 3)
-    assert [row.split(",")[:3] for row in Path("again/sweep.csv").read_text().splitlines()] == [
-        row.split(",")[:3] for row in first.splitlines()
-    ]

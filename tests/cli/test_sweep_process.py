@@ -56,11 +56,6 @@ def check_kills(start: Sweep, folder: Path, count: int, shares: Iterable[float],
 
 
 @pytest.mark.long
-def test_killed_sweep_continues_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
-    check_kills(start, tmp_path, 150, (0.6, 0.9))
-
-
-@pytest.mark.long
 def test_sweep_killed_at_20_moments_continues_to_the_same_table(start: Sweep, tmp_path: Path) -> None:
     moments = random.Random(6)  # noqa: S311 - no secret
     check_kills(start, tmp_path, 500, [moments.random() for _ in range(in_all(20))])
@@ -82,21 +77,6 @@ def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, numb
     assert running.returncode == 75
     assert err == "stopped with 0 of 2 cases done; rerun the command to finish\n"
     assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 1
-
-
-@pytest.mark.long
-def test_same_sweep_twice_at_a_time_is_refused(process: Process, tmp_path: Path) -> None:
-    vary = ("--vary", "time.end=1e4,2e4", "--set", "time.stop_at_rest=false", "--out", "out", "--jobs", 1)
-    arguments = ("sweep", "scenarios/three_blocks_nonsmooth.toml", *vary)
-    first = process(*arguments)
-    wait_for(tmp_path / "out" / "manifest.jsonl", first)
-    time.sleep(0.2)
-    second = process(*arguments, "--overwrite")
-    _, err = second.communicate(timeout=PATIENCE)
-    assert second.returncode == 73
-    assert "a sweep is running here" in err
-    first.kill()
-    first.communicate()
 
 
 SLOWLY = """

@@ -75,12 +75,6 @@ def test_misses_shortened_cases_and_a_stop_are_told(
     golden(f"exit code {answer.code}\n{answer.out}{answer.err}", rules=["times"])
 
 
-def test_quiet_prints_the_table_only(blocksim: Command) -> None:
-    answer = blocksim("verify", "V2", "--quiet")
-    assert (answer.code, answer.err) == (0, "")
-    assert answer.out.startswith("quantity")
-
-
 def test_rigid_contacts_say_that_they_are_and_what_is_left_out(
     blocksim: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,4 +1,4 @@
-"""Command lines that write nothing: exit code and text in full; a mistake changes and leaves nothing."""
+"""Command lines, right and wrong: exit code, what is printed, and the files that are written."""
 
 import shlex
 import sys
@@ -13,7 +13,7 @@ FIT = "calibrate slide.toml --experiment measured.csv --fit friction.block_groun
 SCATTER = "--scatter 'bodies.0.velocity.0=0.5 m/s+-0.01 m/s'"
 JUDGED = "compare swept --experiment measured.csv"
 MORRIS = "sensitivity scenarios/slide.toml --vary friction.block_ground=0.3:0.4"
-LINES = [line for line in Path(__file__).with_name("mistakes.txt").read_text().splitlines() if line and line[0] != "#"]
+LINES = [line for line in Path(__file__).with_name("commands.txt").read_text().splitlines() if line and line[0] != "#"]
 
 SWEPT = "case,status,reason,block.x_mm\n1,finished,,42.0\n2,finished,,43.5\n"
 MEASURED = "block,quantity,unit,replicate,value\nblock,x,mm,1,41\nblock,x,mm,2,43\n"
@@ -34,7 +34,7 @@ def place(blocksim: Command, made_up_run: Path, finished_sweep: Path, tmp_path: 
         "broken/sweep.csv": "a,b\n1,2\n",
         "empty/run.h5": "",
         "foreign/thesis.tex": "years of work",
-        **{f"mine.{ending}": "years of work" for ending in ("json", "png", "csv", "pdf", "html")},
+        **{f"mine.{ending}": "years of work" for ending in ("json", "png", "csv", "pdf", "html", "gif")},
     }
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -51,12 +51,15 @@ def contents(folder: Path) -> dict[Path, bytes | None]:
 
 
 @pytest.mark.parametrize("line", LINES, ids=str)
-def test_mistakes(blocksim: Command, place: Path, golden: Golden, line: str) -> None:
+def test_commands(blocksim: Command, place: Path, golden: Golden, line: str) -> None:
     before = contents(place)
     answer = blocksim(*shlex.split(line))
-    assert answer.out == "" or answer.code == 0
-    assert contents(place) == before
-    golden(f"exit code {answer.code}\n{answer.out}{answer.err}")
+    assert max(map(len, answer.out.splitlines()), default=0) <= 80
+    after = contents(place)
+    files = sorted(str(path.relative_to(place)) for path, content in after.items() if content is not None)
+    written = [f"writes {name}\n" for name in files if after[place / name] != before.get(place / name)]
+    assert before.keys() <= after.keys()
+    golden(f"exit code {answer.code}\n{answer.out}{answer.err}{''.join(written)}", rules=["sizes"])
 
 
 NEEDED = {
