@@ -17,7 +17,7 @@ from blocksim.view.animation import Animation, Look, Pace, Pixels, beyond_view, 
 from blocksim.view.paints import PAINTS
 from blocksim.view.run_data import Support
 from blocksim.view.style import BLOCK_COLOURS
-from tests.view.made_up import HOSTILE, toppling
+from tests.view.made_up import toppling
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FAST = Pace(speed=1.0, rate=10.0)
@@ -51,15 +51,6 @@ def test_blocks_are_where_they_were_recorded(support: Support, trails: bool) -> 
             assert pixel_of(animation, picture, *near_the_centre(frames, frame, block)) == colour(block)
 
 
-def test_trails_are_drawn_for_few_blocks_unless_somebody_decides() -> None:
-    assert Animation(toppling(3), Support(), SMALL).has_trails
-    assert not Animation(toppling(31), Support(), SMALL).has_trails
-    without, with_trails = (
-        Animation(toppling(1), Support(), Look(240, trails=one)).picture(39) for one in (False, True)
-    )
-    assert not np.array_equal(without, with_trails)
-
-
 def test_a_moving_support_moves() -> None:
     frames = toppling(1)
     frames.x[:], frames.y[:], frames.angle[:] = 0.0, 0.025, 0.0
@@ -87,14 +78,6 @@ def test_pictures_are_even_in_time_and_the_last_frame_is_shown_and_held() -> Non
     assert len(chosen) == 73
     assert seconds[0] == pytest.approx(1.0 / 30.0)
     assert seconds[-1] > 1.0
-
-
-def test_uneven_frames_are_shown_at_their_times_and_a_single_one_is_an_animation() -> None:
-    frames = replace(toppling(1, steps=4), time=np.array([0.0, 0.1, 0.11, 0.5]))
-    assert frame_times(frames, np.arange(4), Pace(1.0, 10.0))[0].tolist() == [0, 1, 2, 2, 3, 3]
-    chosen, seconds = frame_times(frames, np.array([3]), FAST)
-    assert chosen.tolist() == [3]
-    assert len(seconds) == 1
 
 
 def test_gif_plays_as_long_as_it_should_in_the_blocks_own_colours_with_the_same_bytes(tmp_path: Path) -> None:
@@ -174,16 +157,6 @@ def test_a_film_is_coloured_like_the_other_pictures(name: str) -> None:
         assert found == [round(255 * part) for part in to_rgb(paint.fills(20)[block])]
 
 
-def test_one_far_flyer_leaves_the_window_and_debris_and_each_of_few_blocks_stay_in_it() -> None:
-    near, far, spread, few = toppling(60), toppling(60), toppling(60), toppling(3)
-    far.x[-1, 59] += 5.0
-    spread.x[-1] += np.linspace(0.0, 1.0, 60)  # without a gap
-    few.x[-1, 2] += 0.1
-    films = [Animation(frames, Support(), SMALL) for frames in (near, far, spread, few)]
-    assert films[1].page.points_per_mm > 0.9 * films[0].page.points_per_mm
-    assert [np.flatnonzero(~film.seen).tolist() for film in films] == [[], [59], [], []]
-
-
 def test_blocks_far_from_one_another_stay_in_the_window_but_one() -> None:
     two, three = toppling(2), toppling(3)
     for frames in (two, three):
@@ -204,7 +177,18 @@ def test_pictures_say_which_blocks_leave_the_view() -> None:
     assert beyond_view(frames.names, np.arange(60) >= 3) == "3 of 60 blocks leave the view"
 
 
-def test_hostile_names_are_text() -> None:
-    frames = replace(toppling(len(HOSTILE)), names=HOSTILE)
-    for title in HOSTILE:
-        assert Animation(frames, Support(), Look(800, title=title)).picture(0).shape[1] == 800
+def test_trails_are_drawn_for_few_blocks_unless_somebody_decides() -> None:
+    assert Animation(toppling(3), Support(), SMALL).has_trails
+    assert not Animation(toppling(31), Support(), SMALL).has_trails
+    without, with_trails = (
+        Animation(toppling(1), Support(), Look(240, trails=one)).picture(39) for one in (False, True)
+    )
+    assert not np.array_equal(without, with_trails)
+
+
+def test_uneven_frames_are_shown_at_their_times_and_a_single_one_is_an_animation() -> None:
+    frames = replace(toppling(1, steps=4), time=np.array([0.0, 0.1, 0.11, 0.5]))
+    assert frame_times(frames, np.arange(4), Pace(1.0, 10.0))[0].tolist() == [0, 1, 2, 2, 3, 3]
+    chosen, seconds = frame_times(frames, np.array([3]), FAST)
+    assert chosen.tolist() == [3]
+    assert len(seconds) == 1

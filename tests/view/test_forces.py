@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.trajectory import CONTACT_ROW, Contacts
 from blocksim.view.animation import Look, Pace, draw_animation
-from blocksim.view.arrows import FORCES, ForceScale, arrows, force_scale, round_down
+from blocksim.view.arrows import ForceScale, arrows, force_scale
 from blocksim.view.kinds import RUN_KINDS
 from blocksim.view.scene import PictureOptions
 from tests.view.made_up import pressed, toppling
@@ -46,26 +44,6 @@ def test_scale_is_that_of_usual_forces_not_of_impacts() -> None:
     assert "5 N is 20.4 mm long, capped at 12.1 N" in scale.explanation
 
 
-def test_run_without_a_single_contact_has_a_scale() -> None:
-    frames = replace(toppling(1, steps=3), contacts=Contacts(np.zeros(3, dtype=np.int64), np.zeros(0, CONTACT_ROW)))
-    assert force_scale(frames).mm_per_newton > 0.0
-
-
-@pytest.mark.parametrize(("value", "expected"), [(1.0, 1.0), (0.0199, 0.01), (7.3, 5.0), (0.2, 0.2), (999.0, 500.0)])
-def test_round_numbers_are_not_larger(value: float, expected: float) -> None:
-    assert round_down(value) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("kind", ["strip", "final"])
-def test_every_panel_has_its_arrows(caught: list[Figure], kind: str) -> None:
-    RUN_KINDS[kind](pressed(toppling(3)), Path("picture.png"), PictureOptions(forces=True))
-    panels = [axes for axes in caught[0].axes if axes.get_xlabel() == "x (mm)" or axes.get_title(loc="left")]
-    assert panels
-    for axes in panels:
-        shafts = [one for one in axes.collections if isinstance(one, LineCollection) and one.get_zorder() == FORCES]
-        assert [len(one.get_segments()) for one in shafts] == [2 * 3]
-
-
 @pytest.mark.parametrize("kind", [kind for kind in RUN_KINDS if kind != "profile"])  # draws soil, without forces
 def test_missing_contacts_are_reported_with_what_to_do(tmp_path: Path, kind: str) -> None:
     with pytest.raises(InvalidInputError, match=r"stored no contacts.* --set output\.contacts=true"):
@@ -81,3 +59,8 @@ def test_animation_with_forces_differs_and_one_of_a_run_without_is_refused(tmp_p
     with pytest.raises(InvalidInputError, match="stored no contacts"):
         draw_animation(toppling(2), tmp_path / "none.gif", pace, Look(240, forces=True))
     assert not (tmp_path / "none.gif").exists()
+
+
+def test_run_without_a_single_contact_has_a_scale() -> None:
+    frames = replace(toppling(1, steps=3), contacts=Contacts(np.zeros(3, dtype=np.int64), np.zeros(0, CONTACT_ROW)))
+    assert force_scale(frames).mm_per_newton > 0.0

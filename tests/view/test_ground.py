@@ -12,7 +12,6 @@ from blocksim.view.scene import (
     GROUND_THICKNESS,
     WALL_THICKNESS,
     Canvas,
-    draw_shift,
     draw_start,
     draw_support,
     finish_panel,
@@ -78,18 +77,6 @@ def test_the_solid_is_below_the_displaced_profile(offset: tuple[float, float]) -
         assert is_solid(drawn, x, y) == expected, (x, y)
 
 
-def test_the_ground_ends_a_little_below_its_lowest_part_and_its_line_where_the_picture_does() -> None:
-    drawn = canvas()
-    draw_support(drawn, STEP, NOWHERE)
-    floor = -40.0 - GROUND_THICKNESS / SCALE
-    assert is_solid(drawn, 0.0, floor + 0.1)
-    assert not is_solid(drawn, 0.0, floor - 0.1)
-    left, riser, right = lines_of(drawn)
-    assert riser.tolist() == [pytest.approx([20.0, 0.0]), pytest.approx([20.0, -40.0])]
-    assert -200.0 < left[0, 0] <= -100.0
-    assert 100.0 <= right[1, 0] < 200.0
-
-
 def test_a_profile_that_is_kilometres_long_and_deep_is_cut_to_the_picture() -> None:
     drawn = canvas()
     draw_support(drawn, Support(profile=((-1e4, 0.0), (0.0, 0.0), (0.0, -1e4), (0.01, -1e4), (0.01, 1e4))), NOWHERE)
@@ -137,17 +124,6 @@ def test_the_start_is_dashed_where_it_can_be_told_from_the_present(
     assert sorted({float(line[0, 1]) for line in lines_of(drawn)}) == pytest.approx(heights)
     if len(heights) == 1:
         assert [line.tolist() for line in lines_of(drawn)] == [[pytest.approx([20.0, 0]), pytest.approx([20.0, -40.0])]]
-
-
-def test_an_arrow_in_the_ground_shows_how_far_it_has_moved() -> None:
-    drawn = canvas()
-    draw_shift(drawn, STEP, np.array([-8.0, 5.0]), x=50.0)
-    (arrow,) = drawn.axes.texts
-    depth = -35.0 - 0.5 * GROUND_THICKNESS / SCALE
-    assert arrow.xyann == pytest.approx((50.0, depth))  # type: ignore[attr-defined]
-    assert arrow.xy == pytest.approx((42.0, depth))  # type: ignore[attr-defined]
-    draw_shift(drawn, STEP, np.array([0.1, 40.0]), x=50.0)
-    assert len(drawn.axes.texts) == 1
 
 
 @pytest.mark.parametrize("tilt", [-0.5, 0.3])

@@ -1,6 +1,5 @@
 """Histories: what is drawn over time, of how many blocks, in which units and colours."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +8,11 @@ from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.trajectory import force_on_supports
-from blocksim.view import style
-from blocksim.view.history import ENERGY_LOOKS, draw_history, line_looks
+from blocksim.view.history import draw_history
 from blocksim.view.paints import by_speed
 from blocksim.view.run_data import Support
 from blocksim.view.scene import PictureOptions
-from blocksim.view.time_panels import LEAST_SPAN, energy_groups, unit_for
+from blocksim.view.time_panels import LEAST_SPAN
 from tests.golden import Golden
 from tests.view.drawings import MOVING
 from tests.view.made_up import overlapping, pressed, toppling
@@ -38,18 +36,6 @@ def test_lines_are_what_was_recorded_in_millimetres_and_degrees(caught: list[Fig
     np.testing.assert_allclose(weight, 12.0)
 
 
-def test_energies_are_grouped_and_small_ones_left_out() -> None:
-    frames = toppling(1)
-    drawn = energy_groups(frames.energy, np.arange(len(frames)))
-    assert list(drawn) == ["kinetic", "potential", "lost in impacts", "elf"]  # friction is zero, elf is unknown
-    assert float(drawn["potential"].min()) == 0.0
-
-
-@pytest.mark.parametrize(("most", "unit"), [(2e3, "kJ"), (1.0, "J"), (0.1, "mJ"), (1e-5, "µJ"), (0.0, "µJ")])
-def test_energies_are_reported_in_a_unit_that_fits(most: float, unit: str) -> None:
-    assert unit_for(most, "J")[1] == unit
-
-
 def test_long_runs_are_thinned_and_many_grey_lines_stored_as_an_image(tmp_path: Path) -> None:
     draw_history(toppling(200, steps=3000), tmp_path / "history.svg")
     assert (tmp_path / "history.svg").stat().st_size < 2_000_000
@@ -68,22 +54,6 @@ def test_displacements_and_velocities_are_those_seen_from_the_moving_ground(caug
             np.testing.assert_allclose(lines_of(figure, k), [there[k] - share * moved[k]], atol=1e-9)
             expected = 1000.0 * velocity - share * along[k] * speed
             np.testing.assert_allclose(lines_of(figure, 2 + k), [expected], atol=1e-9)
-
-
-def test_a_block_has_one_colour_in_all_pictures_and_dashes_tell_equal_ones_apart(caught: list[Figure]) -> None:
-    draw_history(toppling(20), "history.png", PictureOptions(panels=("x",), blocks=("2", "8", "14", "3")))
-    assert [line.get_color() for line in caught[0].axes[0].lines] == ["#E69F00"] * 3 + ["#009E73"]
-    looks = line_looks([style.block_colour(block) for block in range(20)], [1, 7, 13, 2]).values()
-    assert len({str(look) for look in looks}) == 4
-
-
-def test_an_energy_has_one_colour_whatever_else_is_drawn(caught: list[Figure]) -> None:
-    for energy in ({"kinetic": 1.0, "friction": 1.0}, {"kinetic": 1.0, "stored_normal": 1.0, "friction": 1.0}):
-        frames = toppling(1)
-        frames = replace(frames, energy={name: value + frames.time for name, value in energy.items()})
-        draw_history(frames, "history.png", PictureOptions(panels=("energy",)))
-    drawn = [{line.get_label(): line.get_color() for line in figure.axes[0].lines} for figure in caught]
-    assert {figure["lost to friction"] for figure in drawn} == {ENERGY_LOOKS["lost to friction"][0]}
 
 
 def test_round_off_looks_flat(caught: list[Figure]) -> None:

@@ -55,9 +55,3 @@ def test_every_kind_draws_what_it_does_not_refuse(caught: list[Figure], name: st
     SWEEP_KINDS[kind].draw(SWEEPS[name][0], Path("picture.svg"))
     assert overlapping(caught[0]) == []
     assert "made up" in [text for text, _ in boxes_of(caught[0])]
-
-
-def test_refusals_say_what_is_missing() -> None:
-    assert "two numeric inputs" in SWEEP_KINDS["map"].refusal(made_up(ONE))
-    assert "3 keys are varied" in SWEEP_KINDS["lines"].refusal(made_up(grid(3)))
-    assert "(such as 'explicit')" in SWEEP_KINDS["lines"].refusal(made_up(samples()[3:], "list"))

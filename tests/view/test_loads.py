@@ -92,23 +92,6 @@ def test_water_is_as_long_as_it_is_deep_and_air_evenly() -> None:
     assert even.at[0, :, 0] == pytest.approx([-80.0, -40.0, 0.0, 40.0, 80.0])
 
 
-def test_water_on_tilted_ground_is_deep_against_gravity() -> None:
-    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": 1.0}
-    (deep,) = only(acting([water], block([0.0]), ground={"tilt": "30 deg"}), PRESSURE)
-    depth = 1.0 - 1e-3 * deep.at[0] @ np.array([0.5, np.sqrt(0.75)])
-    assert deep.way[0, :, 0] == pytest.approx(depth / depth.max())
-
-
-def test_moments_turn_by_their_size_to_either_side() -> None:
-    turns = [
-        {"kind": "moment", "body": "1", "magnitude": size, "history": {"kind": "ramp", "end": 1.0}}
-        for size in (-4.0, 2.0)
-    ]
-    found = acting(turns, block([0.0, 0.3])).turns
-    assert found is not None
-    assert found.sweep / np.pi == pytest.approx(np.array([[0.0, 0.0], [-1.5, 0.75]]))
-
-
 def test_marks_show_the_sum_of_coefficients_and_where_gravity_points_in_the_picture() -> None:
     loads: list[Mapping[str, object]] = [
         {"kind": "horizontal", "magnitude": -0.3},
@@ -150,3 +133,10 @@ def test_arrows_are_inside_the_picture_and_nothing_changes_without_loads() -> No
     assert (nothing.arrows, nothing.turns, any(nothing.marks)) == ((), None, False)
     assert with_room(extent, nothing)[0] == extent
     assert nothing.explanation == ""
+
+
+def test_water_on_tilted_ground_is_deep_against_gravity() -> None:
+    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": 1.0}
+    (deep,) = only(acting([water], block([0.0]), ground={"tilt": "30 deg"}), PRESSURE)
+    depth = 1.0 - 1e-3 * deep.at[0] @ np.array([0.5, np.sqrt(0.75)])
+    assert deep.way[0, :, 0] == pytest.approx(depth / depth.max())

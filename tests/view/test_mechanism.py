@@ -17,7 +17,6 @@ from blocksim.view.run_data import support_of
 from blocksim.view.scene import corners
 from blocksim.view.style import BLOCK_COLOURS, INK, MEASURED_COLOUR, Paper
 from tests.study.test_limit import SLENDER, SQUAT, block_on_a_slope
-from tests.view.made_up import boxes_of
 
 
 def side(size: tuple[float, float], tilt: str, *, contacts: bool = True, **tables: Any) -> BracketRun:
@@ -51,12 +50,6 @@ def test_a_toppling_block_rocks_about_its_lower_edge(toppling: BracketRun) -> No
     (joint,) = joints(toppling.frames, toppling.frame, toppling.support)
     assert not joint.slides
     assert joint.hinges == pytest.approx(np.array([[-0.5 * SLENDER[0], 0.0]]), abs=1e-4)
-
-
-def test_a_block_that_stands_has_no_such_joint() -> None:
-    still = side(SQUAT, "5 deg")
-    assert joints(still.frames, still.frame, still.support) == []
-    assert still.frame == len(still.frames.time) - 1
 
 
 def test_an_arch_placed_without_force_has_its_four_hinges() -> None:
@@ -120,10 +113,7 @@ def test_no_line_but_a_sliding_joint_reads_as_one_and_the_legend_has_its_colour(
     assert SLIDES not in {*BLOCK_COLOURS, MEASURED_COLOUR, INK}
 
 
-def test_loads_are_drawn_on_the_side_that_has_them_and_told(sliding: BracketRun, caught: list[Figure]) -> None:
-    pushed = side(SQUAT, "5 deg", loads=[{"kind": "force", "body": "1", "magnitude": "1 N"}])
-    draw_mechanisms([(pushed, sliding)], "loads.png")
-    draw_mechanisms([(sliding, sliding)], "none.png")
-    loaded, bare = ("".join(text for text, _ in boxes_of(figure)) for figure in caught)
-    assert "arrows: loads" in loaded
-    assert "arrows" not in bare
+def test_a_block_that_stands_has_no_such_joint() -> None:
+    still = side(SQUAT, "5 deg")
+    assert joints(still.frames, still.frame, still.support) == []
+    assert still.frame == len(still.frames.time) - 1

@@ -3,9 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from blocksim.errors import InvalidInputError
 from blocksim.scenario.motion import motion_pieces
 from blocksim.view.run_data import Support
 from blocksim.view.time_panels import MOST_POINTS, draw_support_motion, thin_line
@@ -20,11 +18,6 @@ def test_the_peaks_and_what_stays_are_printed(tmp_path: Path) -> None:
     texts = path.read_text(encoding="utf-8")
     for told in ("PGA 4.903 m/s²", "= 0.5 g", "PGV 490.3 mm/s", "PGD 1348 mm", "At the end: 490.3 mm/s, 1348 mm."):
         assert f"{told}" in texts
-
-
-def test_supports_at_rest_have_no_picture(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="do not move"):
-        draw_support_motion(Support(), END, tmp_path / "motion.png")
 
 
 def test_a_thinned_line_keeps_its_peaks() -> None:

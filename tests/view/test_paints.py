@@ -8,23 +8,11 @@ import pytest
 
 from blocksim.scenario import load_scenario
 from blocksim.view import paints, style
-from blocksim.view.paints import PAINTS, by_block, by_material, by_speed, by_turn
+from blocksim.view.paints import PAINTS, by_speed, by_turn
 from blocksim.view.sweeps.outcome_map import CLASS_COLOURS
 from tests.view.made_up import toppling
 
 SCENARIOS = Path(paints.__file__).parents[2] / "scenarios"
-
-
-def test_a_block_keeps_its_colour_and_others_take_turns() -> None:
-    fills = by_block(toppling(8)).fills(0)
-    assert fills[0] == fills[6] == style.BLOCK_COLOURS[0]
-    assert len(set(fills[:6])) == 6
-
-
-def test_blocks_of_one_material_are_alike_and_the_key_names_it() -> None:
-    found = by_material(None, load_scenario(SCENARIOS / "slope.toml"))
-    assert set(found.fills(0)) == {found.entries[0][1]}
-    assert [name for name, _ in found.entries] == ["granite"]
 
 
 def test_speeds_have_one_scale_for_the_whole_run() -> None:
@@ -56,6 +44,11 @@ def test_turns_to_either_side_differ_and_none_lies_between() -> None:
     assert len(set(by_turn(frames).fills(len(frames) - 1))) == 3
 
 
+def test_classes_of_a_map_are_reported_apart_in_grey() -> None:
+    shades = sorted(style.brightness(colour) for colour in CLASS_COLOURS)
+    assert min(np.diff(shades)) > 0.12
+
+
 @pytest.mark.parametrize("name", PAINTS)
 def test_blocks_that_never_move_have_colours_too(name: str) -> None:
     frames = toppling(5)
@@ -63,8 +56,3 @@ def test_blocks_that_never_move_have_colours_too(name: str) -> None:
         field[:] = 0.0
     fills = PAINTS[name](frames, load_scenario(SCENARIOS / "shaking_table.toml")).fills(0)
     assert all(len(fill) == 7 for fill in fills)
-
-
-def test_classes_of_a_map_are_reported_apart_in_grey() -> None:
-    shades = sorted(style.brightness(colour) for colour in CLASS_COLOURS)
-    assert min(np.diff(shades)) > 0.12

@@ -88,11 +88,6 @@ def test_picture_looks_like_its_reference(name: str, monkeypatch: pytest.MonkeyP
     new.unlink()
 
 
-@pytest.mark.parametrize("name", PICTURES)
-def test_references_are_small(name: str) -> None:
-    assert (REFERENCES / f"{name}.png").stat().st_size <= MOST_BYTES
-
-
 def test_a_line_that_is_gone_and_a_letter_that_has_moved_are_seen() -> None:
     reference = pixels(REFERENCES / "history.png")
     gone = reference.copy()

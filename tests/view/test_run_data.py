@@ -58,13 +58,6 @@ def test_short_or_still_runs_show_no_frame_twice(places: list[float], expected: 
     assert list(moments_by_motion(frames, drawable_frames(frames), 8)) == expected
 
 
-def test_one_violent_step_is_shown_once() -> None:
-    frames = moving([0.0, 0.1, 100.0, 100.1])
-    chosen = moments_by_motion(frames, drawable_frames(frames), 8)
-    assert len(set(chosen)) == len(chosen)
-    assert 2 in chosen
-
-
 def test_a_failed_run_is_drawn_as_far_as_it_has_numbers() -> None:
     frames = moving([0.0, 1.0, float("nan"), 3.0])
     frames.angle[3] = np.inf
@@ -76,11 +69,6 @@ def test_a_run_without_a_number_or_a_block_is_refused() -> None:
         drawable_frames(moving([float("nan")]))
     with pytest.raises(InvalidInputError, match="nothing to draw"):
         drawable_frames(replace(moving([0.0]), names=()))
-
-
-def test_times_find_their_nearest_frames_in_the_order_given() -> None:
-    frames = moving([0.0, 1.0, 2.0, 3.0])
-    assert list(moments_at(frames, drawable_frames(frames), [0.29, 0.0, 0.14])) == [3, 0, 1]
 
 
 def test_the_printed_time_of_the_last_frame_means_the_last_frame() -> None:
@@ -124,16 +112,6 @@ def test_walls_go_at_the_time_of_an_event_and_at_rest_when_a_run_came_to_it() ->
     times = (0.8, 1.0, 1.4, 1.5)
     assert [len(support_of(scenario).at(time).walls) for time in times] == [2, 1, 1, 1]
     assert [len(support_of(scenario, [happened]).at(time).walls) for time in times] == [2, 1, 1, 0]
-
-
-def test_a_plain_scenario_has_level_ground_at_rest() -> None:
-    plain = {key: value for key, value in SCENE.items() if key not in {"ground", "walls", "motion", "bodies"}}
-    support = support_of(scenario_from_mapping(plain))
-    assert support == Support(fixed=(False, False), weight=support.weight)
-    assert support.weight == pytest.approx(19.62)  # two blocks of one kilogram
-    assert support.height(np.array([-1e6, 0.0, 1e6])).tolist() == [0.0, 0.0, 0.0]
-    assert support.offset(np.array([0.0, 5.0])).tolist() == [[0.0, 0.0], [0.0, 0.0]]
-    assert support.corners().tolist() == []
 
 
 def test_heights_and_corners_of_a_profile() -> None:

@@ -54,15 +54,6 @@ def test_the_line_along_the_upper_side_is_within_the_polygon(shape: tuple[tuple[
     assert np.hypot(*(ends[1] - ends[0])) > 0.2 * width
 
 
-def test_the_line_of_a_rectangle_as_a_polygon_is_that_of_the_rectangle() -> None:
-    x, y = 0.016, 0.025
-    frames = blocks_at([0.0])
-    outlined = polygons(frames, ((-x, -y), (x, -y), (x, y), (-x, y)))
-    one, other = np.sort(upper_sides(frames)[0], axis=0), np.sort(upper_sides(outlined)[0], axis=0)
-    assert other == pytest.approx(one, abs=1e-15)
-    assert readable_scale(outlined) == pytest.approx(readable_scale(frames))
-
-
 def test_names_are_readable_from_the_scale_at_which_they_are_written() -> None:
     scale = readable_scale(FRAMES)
     assert name_at(1.01 * scale) == "1"
@@ -102,20 +93,6 @@ def test_fixed_blocks_are_hatched_in_the_ground_s_colour_and_free_ones_keep_thei
     assert not free.get_hatch()
     assert np.asarray(fixed.get_facecolor()).tolist() == [list(to_rgba(GROUND_COLOUR))]
     assert np.asarray(free.get_facecolor()).tolist() == [list(to_rgba(block_colour(1)))]
-
-
-def test_only_free_blocks_show_their_upper_side() -> None:
-    lines = drawn(PAIR, Support(fixed=(True, False))).axes.collections[-1]
-    assert len(lines.get_paths()) == 1
-    assert points(lines.get_paths()[0])[:, 0].min() > 184.0
-
-
-def test_a_fixed_block_s_long_name_does_not_take_the_others_names_away() -> None:
-    scale = 0.3
-    free = drawn(PAIR, Support(), scale).axes.texts
-    held = drawn(PAIR, Support(fixed=(True, False)), scale).axes.texts
-    assert [text.get_text() for text in free] == []
-    assert [text.get_text() for text in held] == ["2"]
 
 
 def test_a_moving_fixed_block_is_dashed_where_it_was() -> None:

@@ -60,6 +60,12 @@ def test_tilted_panels_have_room_for_the_numbers_along_the_ground() -> None:
     assert below[1] - below[0] > 12.0
 
 
+def test_importing_the_room_does_not_load_matplotlib() -> None:
+    code = "import sys, blocksim.view; sys.exit('matplotlib' in sys.modules or 'pandas' in sys.modules)"
+    root = Path(strip.__file__).parents[2]
+    assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
+
+
 def test_overlapping_measured_ranges_get_rows_of_their_own() -> None:
     measured = table(b3=(100.0, 110.0, 120.0), b1=(0.0, 5.0, 10.0), b2=(8.0, 20.0, 30.0), b9=(0.0, 1.0, 2.0))
     ranges = ranges_of(measured, ("1", "2", "3"), width=150.0)
@@ -72,9 +78,3 @@ def test_a_scene_is_widened_to_hold_what_was_measured_and_a_tower_s_caption() ->
     assert wide.right > 400.0
     tower = widen(Extent(0.0, 30.0, 0.0, 1000.0), [])
     assert tower.width == pytest.approx(final.NARROWEST * 1000.0)
-
-
-def test_importing_the_room_does_not_load_matplotlib() -> None:
-    code = "import sys, blocksim.view; sys.exit('matplotlib' in sys.modules or 'pandas' in sys.modules)"
-    root = Path(strip.__file__).parents[2]
-    assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0

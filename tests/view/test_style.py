@@ -8,10 +8,8 @@ import pytest
 from blocksim.errors import OutputError
 from blocksim.view.style import (
     BLOCK_COLOURS,
-    SMALLEST_FONT,
     break_lines,
     cut_to,
-    fitting_font,
     open_figure,
     save_figure,
     shorten,
@@ -31,21 +29,6 @@ def luminance(colour: str) -> float:
 def test_block_names_stand_out_from_their_blocks(fill: str) -> None:
     light, dark = sorted((luminance(fill), luminance(text_colour(fill))), reverse=True)
     assert (light + 0.05) / (dark + 0.05) > 3.0
-
-
-def test_text_shrinks_to_its_room_and_vanishes_when_unreadable() -> None:
-    assert fitting_font("1", (100.0, 100.0)) == 8.0
-    assert SMALLEST_FONT <= fitting_font("block_12", (30.0, 100.0)) < 8.0
-    assert fitting_font("block_12", (10.0, 100.0)) == 0.0
-    assert fitting_font("", (10.0, 100.0)) > 0.0
-
-
-@pytest.mark.parametrize(
-    ("name", "shown"),
-    [("block", "block"), ("exactly 12 l", "exactly 12 l"), ("more than 12 letters", "more than 1…"), ("", "")],
-)
-def test_long_names_are_cut(name: str, shown: str) -> None:
-    assert shorten(name, 12) == shown
 
 
 def test_signs_that_are_no_letters_become_boxes_and_wide_ones_count_twice() -> None:

@@ -6,7 +6,7 @@ import pytest
 from blocksim.scenario import PlacedSegment
 from blocksim.scenario.motion import MotionPieces
 from blocksim.simulation.trajectory import Frames
-from blocksim.view.run_data import Extent, Support, extent_of, parts_within, rotate_points
+from blocksim.view.run_data import Extent, Support, extent_of, rotate_points
 from blocksim.view.scene import corners
 from tests.view.made_up import blocks_at
 
@@ -93,17 +93,3 @@ def test_tilted_ground_is_turned_so_that_gravity_points_down() -> None:
     assert pictured[6, 1] - pictured[2, 1] == pytest.approx(1000.0 * np.sin(tilt))  # the same corner has risen
     gravity = np.array([-np.sin(tilt), -np.cos(tilt)])  # as the world has it, along and across the ground
     assert rotate_points(gravity, tilt) == pytest.approx([0.0, -1.0])
-
-
-@pytest.mark.parametrize("tilt", [-0.4, 0.0, 0.7])
-def test_a_line_along_the_ground_is_lowest_at_the_edge_of_the_picture(tilt: float) -> None:
-    extent = Extent(-100.0, 300.0, 0.0, 200.0, base=-20.0, tilt=tilt)
-    ends = rotate_points(np.array([[x, -20.0] for x in extent.span(-20.0)]), tilt)
-    assert ends[:, 0] == pytest.approx([-100.0, 300.0])
-    assert ends[:, 1].min() == pytest.approx(extent.lowest)
-
-
-def test_lines_are_cut_to_a_box() -> None:
-    line = np.array([[-1e5, 0.5], [0.5, 0.5], [0.5, 3.0], [5.0, 3.0]])
-    parts = parts_within(line, np.array([0.0, 0.0]), np.array([1.0, 1.0]))
-    assert parts == pytest.approx(np.array([[[0.0, 0.5], [0.5, 0.5]], [[0.5, 0.5], [0.5, 1.0]]]))

@@ -11,7 +11,8 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.geometry import regular
 from blocksim.simulation.results import EventRecord
-from blocksim.view.report.player import boundary_particles, pack_frames, scene_data
+from blocksim.view.report import player
+from blocksim.view.report.player import boundary_particles, pack, pack_frames, scene_data
 from blocksim.world.build import build_world
 from tests.view.made_up import polygons, toppling
 from tests.view.report.folders import SCENARIOS, numbers, write_run
@@ -34,20 +35,6 @@ def test_frames_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
         pack_frames(replace(frames, x=np.full_like(x, np.nan)))
 
 
-def test_thousand_blocks_and_many_frames_stay_below_the_limit(tmp_path: Path) -> None:
-    frames = write_run(tmp_path / "run", "wall", count=2)
-    rows = np.arange(600) % 2
-    many = {
-        name: getattr(frames, name)[rows]
-        for name in ("step", "x", "y", "angle", "vx", "vy", "spin", "contact_count", "largest_overlap")
-    }
-    energy = {name: values[rows] for name, values in frames.energy.items()}
-    packed = pack_frames(replace(frames, time=np.arange(600.0), energy=energy, **many))
-    size = sum(len(part["data"]) for part in packed.data["channels"].values())
-    assert 300 < len(packed.kept) < 1700
-    assert size < 17_000_000
-
-
 def test_page_knows_when_blocks_and_walls_are_gone(tmp_path: Path) -> None:
     frames = write_run(tmp_path / "run", "slope", count=5)
     scenario = load_scenario(SCENARIOS / "slope.toml", {"events": [{"when": "rest", "remove": ["wall 1"]}]})
@@ -58,10 +45,6 @@ def test_page_knows_when_blocks_and_walls_are_gone(tmp_path: Path) -> None:
     assert data["gone"] == [None, 2, *[None] * (len(frames.names) - 2)]
     assert data["walls_gone"] == [1, *[None] * (len(scenario.walls) - 1)]
     assert scene_data(frames, scenario, kept)["walls_gone"] == [None] * len(scenario.walls)
-
-
-def test_surface_model_has_none() -> None:
-    assert len(boundary_particles(load_scenario(SCENARIOS / "three_blocks.toml"), 0.05, 0.025)) == 0
 
 
 @pytest.mark.parametrize("model", ["particles", "kernel"])
@@ -86,3 +69,20 @@ def test_polygons_are_packed_once_for_each_shape() -> None:
     assert packed["width"][packed["which"][1]] == pytest.approx(20.0 * math.sqrt(3.0))
     (rectangle,) = pack_frames(toppling(5, steps=3)).data["outlines"]["corners"]
     assert rectangle[0] == [-rectangle[2][0], -rectangle[2][1]]
+
+
+@pytest.mark.parametrize(("most", "kind"), [(1000, "f4"), (10, "u2")])
+def test_told_error_is_the_largest_one(monkeypatch: pytest.MonkeyPatch, most: int, kind: str) -> None:
+    values = np.random.default_rng(1).normal(0.0, 100.0, (50, 7))
+    monkeypatch.setattr(player, "EXACT_VALUES", most)
+    part, error = pack(values)
+    assert part["type"] == kind
+    assert np.abs(numbers(part) - values.ravel()).max() == pytest.approx(error)
+    assert error <= 0.5 * np.ptp(values) / 65_535 * (1.0 + 1e-9)
+
+
+def test_equal_values_can_be_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(player, "EXACT_VALUES", 0)
+    part, error = pack(np.full((3, 2), 4.5))
+    assert numbers(part).tolist() == [4.5] * 6
+    assert error == 0.0

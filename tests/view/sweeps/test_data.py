@@ -7,13 +7,6 @@ from blocksim.view.sweeps.data import Input, InputUnit, SweepData, outcome_label
 from tests.view.sweeps.made_up import made_up
 
 
-def test_keys_get_the_shortest_ends_that_tell_them_apart() -> None:
-    keys = ["friction.block_block.static", "friction.block_ground.static", "contact.restitution", "gravity"]
-    assert short_names(keys) == ["block_block.static", "block_ground.static", "contact.restitution", "gravity"]
-    assert short_names(["a", "b.a"]) == ["a", "b.a"]
-    assert short_names(["time.end", "structures.0.rows"]) == ["time.end", "structures.0.rows"]  # of what, too
-
-
 def test_outcomes_are_quarters_of_a_turn_and_none_where_a_case_failed() -> None:
     sweep = made_up((Input("gravity", "", np.arange(4.0)),), failed=1)
     turns = np.array([[np.nan, np.nan], [0.4, -89.0], [0.0, 44.0], [-0.2, -181.0]])
@@ -24,10 +17,6 @@ def test_outcomes_are_quarters_of_a_turn_and_none_where_a_case_failed() -> None:
 def test_classes_of_many_blocks_are_counted() -> None:
     assert outcome_label((0, -90)) == "0°/−90°"
     assert outcome_label((0, 90, 0, 0, 0, -90, 0)) == "2 of 7 turned"
-
-
-def test_blocks_that_stay_are_not_worth_drawing() -> None:
-    assert made_up((Input("gravity", "", np.arange(4.0)),)).movers == [1]
 
 
 @pytest.mark.parametrize(
@@ -43,10 +32,6 @@ def test_values_are_reported_in_the_unit_in_which_they_are_best_read(
     key: str, unit: str, value: float, expected: str
 ) -> None:
     assert Input(key, unit, np.array([0.1 * value, value])).label(value) == expected
-
-
-def test_words_are_reported_as_they_are() -> None:
-    assert Input("time.scheme", "", np.array([0.0, 1.0]), ("explicit", "nonsmooth")).label(1.0) == "nonsmooth"
 
 
 @pytest.mark.parametrize(
@@ -84,3 +69,10 @@ def test_axis_keeps_the_typed_unit(values: list[float], typed: InputUnit, label:
     axis = value_axis(np.array(values), "key", "m", typed=typed)
     assert axis.label == label
     assert axis.scale(np.array(values)).tolist() == pytest.approx(shown)
+
+
+def test_keys_get_the_shortest_ends_that_tell_them_apart() -> None:
+    keys = ["friction.block_block.static", "friction.block_ground.static", "contact.restitution", "gravity"]
+    assert short_names(keys) == ["block_block.static", "block_ground.static", "contact.restitution", "gravity"]
+    assert short_names(["a", "b.a"]) == ["a", "b.a"]
+    assert short_names(["time.end", "structures.0.rows"]) == ["time.end", "structures.0.rows"]  # of what, too

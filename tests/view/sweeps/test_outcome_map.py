@@ -12,36 +12,16 @@ from blocksim.view.sweeps.outcome_map import (
     classes_of,
     edges_of,
     manners_of,
-    map_of,
-    on_grid,
     outline_of,
     run_out_scale,
 )
 from tests.view.sweeps.made_up import grid, made_up
 
 
-def test_numbers_stand_in_the_cells_of_their_inputs() -> None:
-    sweep = made_up(grid())
-    found = map_of(sweep)
-    x, y, table = on_grid(found.plane(np.ones(35, dtype=bool)), sweep.x_mm[:, 1])
-    assert x.tolist() == pytest.approx(np.linspace(0.2, 0.4, 7).tolist())
-    assert y.tolist() == pytest.approx(np.geomspace(1e-3, 1e-1, 5).tolist())
-    assert table[2, 4] == sweep.x_mm[4 * 5 + 2, 1]
-    assert [axis.is_log for axis in found.axes] == [False, True]
-
-
 def test_case_that_failed_has_a_class_of_its_own() -> None:
     found = classes_of(made_up(grid(), failed=1))
     assert found.numbers[0] == found.numbers.max() == len(found.labels) - 1
     assert found.labels[-1].startswith("failed")
-
-
-def test_cells_that_were_not_run_stay_empty() -> None:
-    friction, scale = grid()
-    cut = tuple(Input(one.key, one.unit, one.values[:-1]) for one in (friction, scale))
-    found = map_of(made_up(cut))
-    _, _, table = on_grid(found.plane(np.ones(34, dtype=bool)), np.ones(34))
-    assert np.argwhere(np.isnan(table)).tolist() == [[4, 6]]
 
 
 def test_edges_lie_midway_between_cells() -> None:

@@ -1,8 +1,8 @@
-"""Scatter matrices: which variables they show, and as what."""
+"""Scatter matrices and histograms: which variables they show, and how far their axes reach."""
 
 import numpy as np
 
-from blocksim.view.sweeps.scatter import MOST_INPUTS, variables_of
+from blocksim.view.sweeps.scatter import MOST_INPUTS, limits_of, variables_of
 from tests.view.sweeps.made_up import REPEATS, grid, made_up, samples
 
 
@@ -26,3 +26,12 @@ def test_limits_hold_all_values_and_repeats() -> None:
 
 def test_many_inputs_are_cut() -> None:
     assert len(variables_of(made_up(samples(20), "sobol"))) == MOST_INPUTS + 1
+
+
+def test_axis_leaves_out_the_rarest_run_outs_but_nothing_measured() -> None:
+    x = np.append(np.linspace(60.0, 80.0, 999), 1000.0)
+    low, high = limits_of(x, np.array([50.0, 85.0]))
+    assert 49.0 > low > 45.0
+    assert 85.0 < high < 90.0
+    low, high = limits_of(np.full(3, 70.0), np.empty(0))
+    assert low < 70.0 < high
