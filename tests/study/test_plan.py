@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError, ScenarioError
-from blocksim.scenario import Document, scenario_to_toml
+from blocksim.scenario import Document, Sweep, scenario_to_toml
 from blocksim.simulation.provenance import run_hash
 from blocksim.study import plan
 from blocksim.study.plan import Values, Variations, design_of, with_sweep
@@ -167,3 +167,8 @@ def test_a_resolved_sweep_has_the_same_cases(nominal: Document, friction: object
     names = [[case.name for case in cases(document)] for document in (first, again)]
     assert names[0] == names[1]
     assert len(set(names[0])) == 2
+
+
+def test_keys_to_vary_may_stand_under_vary_in_python() -> None:
+    beside = Sweep.model_validate({"mode": "list", SCALE: [1.0, 2.0]})
+    assert Sweep.model_validate({"mode": "list", "vary": {SCALE: [1.0, 2.0]}}) == beside
