@@ -4,6 +4,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 
 from blocksim.analysis.bits import differences
@@ -32,7 +33,11 @@ def test_it_passes_the_check_runs_resumes_and_ends_the_same_on_two_threads(data:
     assert describe(scenario).frames == 5
     straight = run(scenario)
     assert straight.status in {"finished", "failed"}, straight.reason
-    assert differences(straight.frames, run(scenario, threads=2).frames).is_none
+    with pytest.MonkeyPatch.context() as patch:  # small scenes would not use them
+        patch.setattr("blocksim.simulation.schemes.useful_threads", lambda threads, *_: threads)
+        shared = run(scenario, threads=2)
+    assert (straight.summary.threads, shared.summary.threads) == (1, 2)
+    assert differences(straight.frames, shared.frames).is_none
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "run"
         assert run(scenario, out=out, precautions=CheckpointPolicy(wall_time=0.0)).status in {"interrupted", "failed"}
