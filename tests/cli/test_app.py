@@ -1,5 +1,6 @@
-"""The command itself: help, version, mistyped commands, and that it starts quickly."""
+"""The command itself: help, mistyped words completed, the schema, and that it starts quickly."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -84,3 +85,9 @@ def test_shell_completes_kinds_and_keys(
         app(prog_name="blocksim")
     said = capsys.readouterr()
     assert (said.out.split(), said.err) == (offered, "")
+
+
+def test_schema_is_json(blocksim: Command) -> None:
+    answer = blocksim("schema")
+    assert json.loads(answer.out)["properties"]["schema"]
+    assert answer.err == ""
