@@ -13,6 +13,7 @@ from blocksim.kernels.common.energy import potential_energy
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
+from blocksim.kernels.explicit.depth import is_too_deep
 from blocksim.kernels.explicit.energy import LEDGER_ROW, contact_summary, measure, tallied
 from blocksim.kernels.explicit.step import check
 from blocksim.verification.scene import HEIGHT
@@ -65,7 +66,7 @@ def touching(*, depth: float, spring: float = 0.0) -> World:
 @pytest.mark.parametrize("small", [0, 1])
 def test_smaller_block_of_a_pair_limits_the_overlap(small: int) -> None:
     overlaps = {0.02: False, 0.03: True, 0.07: True}  # of a height; twentieths of the smallest side: 0.025
-    for share, is_too_deep in overlaps.items():
+    for share, is_deep in overlaps.items():
         world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + (0.75 - share) * HEIGHT, 0.0))
         body = world.bodies[small]
         body.half_x = body.half_y = 0.25 * HEIGHT
@@ -74,7 +75,13 @@ def test_smaller_block_of_a_pair_limits_the_overlap(small: int) -> None:
         assert rebuild_pairs(world)
         pair_forces(world, 0, 0.0)
         assert world.pairs[0].active == 2
-        assert world.action[0].is_too_deep == is_too_deep
+        assert world.action[0].is_too_deep == is_deep
+
+
+@pytest.mark.parametrize(("share", "is_deep"), [(0.001, False), (0.9, True)])
+def test_bodies_within_one_another_overlap_too_far_where_no_contact_is_found(share: float, *, is_deep: bool) -> None:
+    world = pose((0.0, 1.0, 0.0), (0.0, 1.0 + (1.0 - share) * HEIGHT, 0.0))
+    assert is_too_deep(world, 0, 0) == is_deep
 
 
 def test_overlap_that_a_step_has_noted_ends_the_run_at_the_check() -> None:
