@@ -88,6 +88,11 @@ def test_result_table_and_folder_compare_alike(kept: Result, what: str) -> None:
     assert [row.simulated for row in found.rows] == [row.simulated for row in compare_run(kept).rows]
 
 
+def test_comparison_needs_a_table(kept: Result) -> None:
+    with pytest.raises(InputMissingError, match="--experiment"):
+        compare_run(kept.final)
+
+
 def test_unfinished_run_is_not_judged(scenario: Scenario, tmp_path: Path) -> None:
     limited = scenario.contact.model_copy(update={"max_overlap": 1e-9})
     failed = run(scenario.model_copy(update={"contact": limited}), out=tmp_path / "run")
