@@ -118,21 +118,3 @@ def test_a_file_takes_the_place_of_the_older_one_once_it_is_whole(tmp_path: Path
         temporary.write_text("new")
         assert (tmp_path / "a.mp4").read_text() == "old"
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.mp4": "new"}
-
-
-@pytest.mark.parametrize(
-    ("error", "told"), [(OSError(28, "No space left on device"), OutputError), (KeyError(), KeyError)]
-)
-def test_a_file_that_is_not_finished_leaves_the_older_one(
-    tmp_path: Path, error: Exception, told: type[Exception]
-) -> None:
-    (tmp_path / "a.mp4").write_text("old")
-
-    def begin() -> None:
-        with files.atomic_path(tmp_path / "a.mp4") as temporary:
-            temporary.write_text("half")
-            raise error
-
-    with pytest.raises(told):
-        begin()
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.mp4": "old"}

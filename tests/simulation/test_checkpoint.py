@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from blocksim.errors import InvalidInputError, OutputError
+from blocksim.errors import InvalidInputError
 from blocksim.kernels.common.arrays import CACHE_LINE
 from blocksim.simulation.checkpoint import (
     DIGEST_BYTES,
@@ -116,17 +116,3 @@ def test_checkpoint_larger_than_the_memory_is_not_read(written: Path, monkeypatc
 def test_arrays_of_another_scene_are_refused(written: Path, name: str) -> None:
     with pytest.raises(InvalidInputError, match="do not fit this scene"):
         restore_scene(read_checkpoint(written), build_scene(sliding(MODELS[name])))
-
-
-def test_write_that_fails_leaves_the_older_one(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = written.read_bytes()
-
-    def fail(*_: object, **__: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("blocksim.simulation.checkpoint.npy.write_array", fail)
-    scenario = sliding({})
-    with pytest.raises(OutputError, match="No space left on device"):
-        write_checkpoint(written, build_scene(scenario), AT, origin_of(scenario))
-    assert [path.name for path in written.parent.iterdir()] == [written.name]
-    assert written.read_bytes() == whole

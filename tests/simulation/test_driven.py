@@ -87,21 +87,6 @@ def slope_of(run: Simulation) -> float:
 
 
 @both
-def test_block_slides_from_a_turning_plate_at_the_friction_angle(scheme: str) -> None:
-    slope = degrees(atan(FRICTION))
-    run = turning(scheme, slope, FRICTION)
-    while run.time < 0.4 and along_plate(run) > -2e-5:
-        run.to_step(run.steps + 20)
-    assert slope - 0.1 < slope_of(run) < slope + 0.6  # until it has slid so far
-
-
-def along_plate(run: Simulation) -> float:
-    """Return the place (m) of the block along the plate, from the point that it turns about."""
-    angle = float(run.bodies.angle[1])
-    return float(run.bodies.x[0]) * cos(angle) + (float(run.bodies.y[0]) - 0.2) * sin(angle)
-
-
-@both
 def test_slender_block_tips_from_a_turning_plate_at_its_own_slope(scheme: str) -> None:
     slope = degrees(atan(0.25))
     run = turning(scheme, slope, 2.0, width=0.01, height=0.04)
@@ -118,22 +103,6 @@ def test_driven_plate_does_to_a_block_what_a_fixed_one_on_a_moving_support_does(
     shared = simulate(on_plate(scheme, [block(), plate()], 0.1, motion=motion, time=time))
     assert own.final.iloc[0, 1:].tolist() == pytest.approx(shared.final.iloc[0, 1:].tolist(), abs=1e-9)
     assert own.summary.energy_J.to_support == pytest.approx(shared.summary.energy_J.to_support, abs=1e-12)
-
-
-@both
-def test_uniformly_moving_plate_is_rest_seen_from_elsewhere(scheme: str) -> None:
-    tumbling = block(y=0.15, angle=0.4, spin=3.0)
-    resting = simulate(on_plate(scheme, [tumbling, plate(width=0.6)], 0.15))
-    ramp = {"kind": "ramp", "distance": 1.5, "speed": 1.5}
-    moving = simulate(on_plate(scheme, [{**tumbling, "velocity": [1.5, 0.0]}, plate(ramp, width=0.6)], 0.15))
-    way = 1.5 * moving.summary.simulated_time_s
-    assert run_x(moving) - 1e3 * way == pytest.approx(run_x(resting), abs=0.5)
-    assert moving.summary.energy_J.relative_residual < 1e-3
-
-
-def run_x(run: Any) -> float:
-    """Return where the block has ended (mm)."""
-    return float(run.final.loc[0, "x_mm"])
 
 
 @both

@@ -49,11 +49,6 @@ def test_what_is_not_finite_is_an_empty_cell(tmp_path: Path) -> None:
     assert [row["x_mm"] for row in rows_of(tmp_path / "frames.csv", frames)] == ["0.0", ""]
 
 
-def test_hostile_names_come_back_as_they_are(tmp_path: Path) -> None:
-    frames = replace(toppling(len(HOSTILE), steps=1), names=HOSTILE)
-    assert tuple(row["block"] for row in rows_of(tmp_path / "frames.csv", frames)) == HOSTILE
-
-
 def test_trouble_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written: No such file"):
         write_frames_csv(tmp_path / "none" / "frames.csv", toppling(1))
@@ -78,10 +73,3 @@ def test_every_contact_has_a_row_with_the_names_of_its_bodies(tmp_path: Path) ->
     assert [float(row["x_mm"]) for row in found] == pytest.approx([100.0, 200.0, 300.0])
     assert [row["normal_force_N"] for row in found] == ["1.5", "2.5", ""]
     assert float(found[0]["overlap_mm"]) == pytest.approx(1e-3)
-
-
-def test_trouble_with_contacts_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
-    contacts = Contacts(np.zeros(1, dtype=np.int64), np.zeros(0, CONTACT_ROW))
-    with pytest.raises(OutputError, match="cannot be written: No such file"):
-        write_contacts_csv(tmp_path / "none" / "contacts.csv", toppling(1, steps=1), contacts)
-    assert list(tmp_path.iterdir()) == []

@@ -3,7 +3,6 @@
 Ground and walls are cells where the scenario has them, solid inwards, and move as the support does.
 """
 
-import errno
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blocksim.errors import InvalidInputError, OutputError
+from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.geometry import regular
 from blocksim.simulation.stores import exports
@@ -191,15 +190,3 @@ def test_frames_that_are_not_finite_are_left_out(tmp_path: Path) -> None:
     frames.x[:] = np.nan
     with pytest.raises(InvalidInputError, match="no frame to export"):
         write_vtkhdf(tmp_path / "other.vtkhdf", frames, LEVEL)
-
-
-def test_full_disk_is_reported_and_leaves_the_older_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_room(*_: object) -> int:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    (tmp_path / "run.vtkhdf").write_text("older")
-    monkeypatch.setattr("os.fsync", no_room)
-    with pytest.raises(OutputError, match=r"run\.vtkhdf: cannot be written: No space left on device$"):
-        write_vtkhdf(tmp_path / "run.vtkhdf", toppling(1), LEVEL)
-    assert (tmp_path / "run.vtkhdf").read_text() == "older"
-    assert len(list(tmp_path.iterdir())) == 1
