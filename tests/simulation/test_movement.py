@@ -154,16 +154,6 @@ def test_a_block_moves_on_that_would_soon_have_left_its_place(
     assert found.moves_on is moves_on
 
 
-def test_members_end_as_fast_as_the_same_runs_alone() -> None:
-    changes = ({"time.end": 0.15}, {"time.end": 0.15, "friction.block_ground": 0.2})
-    scenarios = [load_scenario(SCENARIOS / "three_blocks_nominal.toml", {**FALLING, **one}) for one in changes]
-    for scenario, member in zip(scenarios, run_ensemble(scenarios, peaks=True), strict=True):
-        alone = simulate(scenario).summary.movement
-        assert alone is not None
-        assert member.observables == alone.row
-        assert member.observables["moves_on"] is True
-
-
 def on_a_table(scheme: str, **motion: object) -> Scenario:
     """Return a block on a table that shakes by 6 mm, on which its friction holds it or does not."""
     friction = motion.pop("friction", 2.0)

@@ -56,15 +56,6 @@ def test_scene_that_blows_up_stops_and_names_step_block_and_checkpoint(soft: Shi
     assert not (tmp_path / "run" / "done.json").exists()
 
 
-@pytest.mark.usefixtures("forced")
-def test_run_that_failed_fails_again_where_it_continues(soft: Shipped, tmp_path: Path) -> None:
-    often = CheckpointPolicy(checkpoint_steps=1)
-    first = simulate_into(soft(output__every=1.0), tmp_path / "run", precautions=often)
-    again = simulate_into(soft(output__every=1.0), tmp_path / "run", resume=True)
-    assert again.reason == first.reason
-    assert again.summary.resumed_from == (first.summary.last_checkpoint,)
-
-
 @pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
 def test_overlap_names_the_pair_that_is_deepest(scheme: str) -> None:
     scenario = sliding({"time": {"scheme": scheme}, "contact": {"max_overlap": 1e-12}}, end=0.01)

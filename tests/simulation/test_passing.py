@@ -165,14 +165,6 @@ def test_plates_that_are_shaken_strike_a_rigid_block_between_them_and_do_not_pas
     assert frames.vx[met, 0] == pytest.approx(struck, rel=1e-3)
 
 
-@pytest.mark.parametrize("scale", SCALES)
-def test_two_blocks_that_meet_head_on_do_not_pass_through_one_another(scale: float) -> None:
-    for speed in SPEEDS:
-        upper = {"y": FACE + 0.02, "velocity": [0.0, -speed]}
-        lower = {"y": FACE - 0.02, "x": 3e-3, "velocity": [0.0, speed]}
-        stays_or_says(simulate(scene([upper, lower], 0.1 / speed, {"stiffness_scale": scale})), "block 2", FACE)
-
-
 @pytest.mark.parametrize("speed", [1.0, 1000.0])
 def test_forced_step_in_which_a_block_could_pass_ends_the_run(speed: float) -> None:
     bodies: list[dict[str, object]] = [

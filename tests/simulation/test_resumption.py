@@ -267,10 +267,3 @@ def test_times_of_all_parts_are_summed_and_told(begun: Path) -> None:
     assert told["last_checkpoint"] is None
     assert {path.name for path in begun.iterdir()} == {"scenario.toml", "final.csv", "run.h5", "run.json", "done.json"}
     assert resumed.reason == "end of simulated time"
-
-
-def test_nothing_half_written_is_left_by_a_run_that_continues(begun: Path) -> None:
-    (begun / ".checkpoint.0.abcd_123.0").write_bytes(b"half")
-    (begun / ".run.h5.new").write_bytes(b"half")
-    simulate_into(sliding({}), begun, resume=True)
-    assert not [path for path in begun.iterdir() if path.name.startswith(".")]

@@ -54,16 +54,6 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(registry, key, entry)
 
 
-def test_a_system_is_one_line_for_itself_and_one_for_every_pair(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert [list(registry).count(key) for registry, key, _ in REGISTRATIONS] == [1, 1, 1, 1]
-    build(scene())
-    for registry, key, _ in REGISTRATIONS:
-        with monkeypatch.context() as without:
-            without.delitem(registry, key)
-            with pytest.raises((InvalidInputError, ScenarioError)):
-                build(scene())
-
-
 def scene(masses: dict[str, Any] | None = THREE, **changes: Any) -> Scenario:
     """Return a scenario of one block at rest and some masses that fall."""
     data: dict[str, Any] = {
