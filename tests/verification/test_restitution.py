@@ -51,20 +51,3 @@ def test_impact_beside_the_centre_loses_the_asked_share_of_its_energy(law: str, 
     arm = forms.lowest_corner(WIDTH, HEIGHT, TILT)[0]
     along_normal = 0.5 * speed**2 / (1.0 / body.mass + arm**2 / body.inertia)
     assert (before - kinetic_energy(body)) / along_normal == pytest.approx(1.0 - e**2, abs=0.004)
-
-
-@pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
-def test_corner_beside_the_centre_leaves_with_the_asked_speed(e: float) -> None:
-    body = Thrower(Setting(), e).throw(Throw(TILT))
-    arm = forms.lowest_corner(WIDTH, HEIGHT, TILT)[0]
-    assert body.vy + body.spin * arm == pytest.approx(e, abs=0.003)
-
-
-@pytest.mark.parametrize("law", BOTH)
-@pytest.mark.parametrize("e", [0.0, 0.2, 1.0])
-def test_the_two_blocks_meet_and_lose_energy(law: str, e: float) -> None:
-    scene = collision(Setting(law=law), e)
-    before = scene.kinetic
-    scene.to_step(COLLISION_STEPS)
-    assert scene.bodies[0].vx < 0.6
-    assert scene.kinetic < before

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import REACHED
 from blocksim.scenario import place_bodies, place_segments
-from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
+from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -113,13 +113,6 @@ def test_records_are_the_bodies_as_placed() -> None:
     assert records.is_moved[:4].tolist() == [0, 0, 1, 0]
 
 
-def test_slab_is_solid_on_the_right_hand_of_its_wall() -> None:
-    slabs, _ = slabs_of(walls=[{"from": [0.5, 1.0], "to": [0.5, 0.2]}, {"from": [-0.5, 0.2], "to": [-0.5, 1.0]}])
-    down, up = slabs
-    assert down.x < 0.5  # walking down, the right hand points towards -x
-    assert up.x > -0.5
-
-
 def test_slabs_can_be_touched_from_above_only_and_at_their_free_ends() -> None:
     slabs, pieces = slabs_of(ground={"profile": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.0]]})
     assert [piece.touches_end for piece in pieces] == [False, True, False, False]
@@ -204,16 +197,6 @@ def test_block_sliding_over_an_edge_gets_no_kick(model: str, drop: float) -> Non
         assert block.vx == pytest.approx(1.0 - FRICTION * 9.81 * scene.time, abs=2e-3)
         assert abs(block.vy) < 5e-3  # springs that carry the weight unload, no more
     assert scene.residual() < 1e-3
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_block_past_an_edge_lies_on_the_slope(model: str) -> None:
-    drop = 0.02
-    scene = scene_of([{**LYING, "x": -0.03, "velocity": [1.0, 0.0]}], model=model, ground=edge_at(drop)).to_time(0.1)
-    block, slope = scene.bodies[0], atan2(-drop, 1.0)
-    assert block.x > 1.5 * WIDTH
-    assert block.angle == pytest.approx(slope, abs=5e-5)
-    assert block.y * cos(slope) - block.x * sin(slope) == pytest.approx(HEIGHT / 2, abs=1e-5)
 
 
 @pytest.mark.parametrize("model", ["surface", "kernel"])

@@ -68,23 +68,6 @@ def test_bodies_of_one_material_and_depth_share_a_class_after_the_ground() -> No
     assert others == [ContactClass("aluminium", 0.025), ContactClass("aluminium", 0.05), ContactClass("oak", 0.05)]
 
 
-def test_papers_block_has_the_stiffness_of_its_material() -> None:
-    of = scenario()
-    ground, paper, *_ = classes(of)
-    expected = 69e9 / (2.0 * (1.0 - 0.3**2)) * 0.025
-    assert interaction(of, paper, paper).normal_stiffness == pytest.approx(expected, rel=1e-12)
-    assert interaction(of, paper, paper).normal_stiffness == pytest.approx(9.48e8, rel=1e-3)
-    assert interaction(of, paper, ground).normal_stiffness == interaction(of, paper, paper).normal_stiffness
-
-
-def test_equal_materials_have_mindlins_stiffness_ratio() -> None:
-    of = scenario()
-    ground, paper, _, wooden = classes(of)
-    assert interaction(of, paper, ground).shear_ratio == pytest.approx(2.0 * 0.7 / 1.7, rel=1e-12)
-    assert interaction(of, paper, paper).shear_ratio == pytest.approx(0.8235, abs=5e-5)
-    assert interaction(of, wooden, wooden).shear_ratio == pytest.approx(2.0 * 0.6 / 1.6, rel=1e-12)
-
-
 def test_different_materials_add_their_compliances_and_the_shorter_depth_counts() -> None:
     of = scenario()
     _, paper, flat, wooden = classes(of)
@@ -108,13 +91,6 @@ def test_given_stiffness_replaces_that_of_the_materials_and_is_scaled() -> None:
     table = table_of(of)
     assert set(table.normal_stiffness[1:].ravel().tolist()) == {3e6}
     assert set(table.shear_ratio[1:].ravel().tolist()) == {0.5}
-
-
-def test_stiffness_scale_multiplies_every_stiffness() -> None:
-    usual, scaled = (table_of(of) for of in (scenario(), scenario(contact={"stiffness_scale": 0.01})))
-    assert scaled.normal_stiffness == pytest.approx(0.01 * usual.normal_stiffness, rel=1e-12)
-    assert (scaled.shear_ratio == usual.shear_ratio).all()
-    assert (scaled.normal_damping == usual.normal_damping).all()
 
 
 def test_parameters_have_the_names_and_the_order_of_the_fields_of_the_table() -> None:

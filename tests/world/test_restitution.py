@@ -1,6 +1,6 @@
 """Closed form of the clipped restitution against numerical integration, and its inverse."""
 
-from math import exp, pi, sqrt
+from math import sqrt
 
 import numpy as np
 import pytest
@@ -34,21 +34,9 @@ def test_closed_form_is_the_rebound_of_a_contact_that_cannot_pull(ratio: float) 
     assert restitution_of(ratio) == pytest.approx(integrated(ratio), abs=1e-8)
 
 
-def test_unclipped_textbook_formula_is_not_used() -> None:
-    ratio = damping_ratio(0.3)
-    assert exp(-pi * ratio / sqrt(1.0 - ratio**2)) < 0.25
-    assert integrated(ratio) == pytest.approx(0.3, abs=1e-8)
-
-
 @given(e=st.floats(SMALLEST_RESTITUTION, 0.999999))
 def test_damping_ratio_is_the_inverse_of_the_restitution(e: float) -> None:
     assert restitution_of(damping_ratio(e)) == pytest.approx(e, abs=1e-12)
-
-
-@given(one=st.floats(0.0, 30.0), two=st.floats(0.0, 30.0))
-def test_more_damping_never_gives_more_rebound(one: float, two: float) -> None:
-    low, high = sorted((one, two))
-    assert restitution_of(high) <= restitution_of(low) + 1e-9
 
 
 def test_undamped_contact_gives_everything_back() -> None:
@@ -59,13 +47,6 @@ def test_undamped_contact_gives_everything_back() -> None:
 def test_no_restitution_is_a_rebound_of_less_than_one_percent() -> None:
     assert damping_ratio(0.0) == damping_ratio(SMALLEST_RESTITUTION)
     assert 0.0 < restitution_of(damping_ratio(0.0)) < 0.01
-
-
-def test_both_branches_meet_at_critical_damping() -> None:
-    at = exp(-2.0)
-    assert restitution_of(1.0) == at
-    for ratio in (1.0 - 1e-6, 1.0 + 1e-6, 1.0 - 2e-9, 1.0 + 2e-9):
-        assert restitution_of(ratio) == pytest.approx(at, rel=1e-4)
 
 
 def rebound_of_hertz(ratio: float) -> float:
@@ -90,32 +71,9 @@ def rebound_of_hertz(ratio: float) -> float:
     return -float(motion.y_events[0][0][1])
 
 
-def rebound_in_time(ratio: float) -> float:
-    """Return the same from the equation of motion in time, by small explicit steps."""
-    motion = solve_ivp(
-        lambda _, state: [state[1], -max(hertz_force(ratio, *state), 0.0)],
-        (0.0, 60.0),
-        [1e-12, 1.0],
-        max_step=4e-3,
-        method="RK45",
-        rtol=1e-9,
-        atol=1e-12,
-    )
-    return -float(motion.y[1, -1])
-
-
-def hertz_force(ratio: float, x: float, v: float) -> float:
-    return 0.0 if x <= 0.0 else float(x**1.5 + 2.0 * ratio * sqrt(1.5) * x**0.25 * v)
-
-
 @pytest.mark.parametrize("e", [SMALLEST_RESTITUTION, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.99])
 def test_hertzian_contact_rebounds_as_asked(e: float) -> None:
     assert rebound_of_hertz(damping_ratio(e, "hertz-mindlin")) == pytest.approx(e, abs=1e-4)
-
-
-@pytest.mark.parametrize("e", [0.2, 0.6])
-def test_hertzian_contact_rebounds_as_asked_in_time_too(e: float) -> None:
-    assert rebound_in_time(damping_ratio(e, "hertz-mindlin")) == pytest.approx(e, abs=1e-4)
 
 
 def test_hertzian_limits_are_those_of_the_linear_law() -> None:
