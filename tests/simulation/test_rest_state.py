@@ -175,10 +175,6 @@ def test_the_limit_of_wall_time_holds_while_a_scene_settles(scheme: str, tmp_pat
     assert not (tmp_path / "out").exists()
 
 
-def test_nothing_settles_unless_it_is_asked_for() -> None:
-    assert simulate(stack("nonsmooth", start={})).summary.settled is None
-
-
 JERK = {"kind": "pulse", "shape": "rectangular", "duration": 1.0, "direction": "0 deg"}
 
 

@@ -92,11 +92,3 @@ def test_rigid_contacts_refuse_a_skin_with_which_impacts_are_found_late(share: f
             build_nonsmooth(thin)
     else:
         assert build_nonsmooth(thin).contacts.stepping[0].least_reach == 0.5 * share * least
-
-
-def test_a_small_skin_goes_with_a_small_step() -> None:
-    step = float(build_world(scenario()).controls[0].step)
-    thin = {"skin": 1e-4 * H}
-    with pytest.raises(SkinTooSmallError):
-        build_world(scenario(contact=thin))
-    assert build_world(scenario(contact=thin, time={"step": 0.01 * step})).controls[0].skin == thin["skin"]

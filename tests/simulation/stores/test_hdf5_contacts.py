@@ -43,11 +43,3 @@ def test_what_was_committed_is_there_after_a_kill(soft: Shipped, tmp_path: Path)
         assert len(contacts) == count
         for step in (0, 1, 2, 500, count - 1):
             np.testing.assert_array_equal(contacts.at(step), table_of(step))
-
-
-def test_file_without_contacts_has_none(soft: Shipped, tmp_path: Path) -> None:
-    with FrameFile(
-        tmp_path / "run.h5", Recorder(place_bodies(soft()), 1.0, 1e-6), "", SCHEMES["explicit"].ledger
-    ) as sink:
-        add_frames(sink, 0, 3)
-    assert read_frames(tmp_path / "run.h5", soft()).contacts is None

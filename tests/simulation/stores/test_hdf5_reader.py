@@ -80,14 +80,6 @@ def test_a_flush_that_takes_long_is_a_tenth_of_the_time_at_most(soft: Shipped, t
             assert len(sink.waiting) == waiting
 
 
-def test_reader_takes_committed_frames_only(soft: Shipped, tmp_path: Path) -> None:
-    with open_file(tmp_path / "run.h5", soft) as sink:
-        add_frames(sink, 5)
-    with h5py.File(tmp_path / "run.h5", "r+") as file:
-        file["n_committed"][()] = 2
-    assert len(read_frames(tmp_path / "run.h5", soft())) == 2
-
-
 @pytest.mark.parametrize("size", [0, 7, 60, 3000])
 def test_file_that_is_cut_off_is_refused(kept: Result, soft: Shipped, tmp_path: Path, size: int) -> None:
     (tmp_path / "run.h5").write_bytes(file_of(kept).read_bytes()[:size])
