@@ -1,4 +1,4 @@
-"""Same bits in one call or in many; the pair list has no influence on contact history."""
+"""Same bits every time, in one call or in many; the pair list has no influence on contact history."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 # work space
 WORK_SPACE = {"points", "matrices", "before", "action", "starts", "order", "shares", "between", "team"}
 NOT_STATE = {*WORK_SPACE, "near_pairs"}
+END = 0.24  # s, after the first impacts
 
 
 def bits(scene: Simulation) -> dict[str, bytes]:

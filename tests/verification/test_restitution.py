@@ -8,7 +8,7 @@ import pytest
 
 from blocksim.verification import closed_forms as forms
 from blocksim.verification.case import Setting
-from blocksim.verification.impacts import COLLISION_STEPS, LANDINGS, SPACINGS, collision
+from blocksim.verification.impacts import LANDINGS, SPACINGS
 from blocksim.verification.scene import GOLDEN, HEIGHT, WIDTH, Throw, Thrower, kinetic_energy
 
 TILT = radians(30.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, cos, hypot, radians, sin
+from math import ceil, cos, hypot, radians, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -128,6 +128,19 @@ def test_automatic_step_is_the_admissible_one_and_follows_safety_and_stiffness()
     assert build_world(scenario(contact={"stiffness_scale": 0.01})).controls[0].step == pytest.approx(10 * step)
     strong = damping_ratio(0.0)
     assert build_world(scenario(contact={"restitution": 0.0})).controls[0].step == pytest.approx(step / (strong / 2))
+
+
+def test_automatic_step_resolves_the_oscillation_on_two_corners() -> None:
+    world = build_world(scenario())
+    frequency = sqrt(2.0 * world.interactions[1, 0].normal_stiffness / world.bodies[0].mass)
+    assert 0.02 < frequency * world.controls[0].step < 0.1
+
+
+def test_smallest_body_decides_about_the_step() -> None:
+    small = {"brick": {"width": W, "height": H, "length": D, "material": "aluminium"}}
+    small["pebble"] = {**small["brick"], "width": 0.002, "height": 0.002}
+    both = scenario(more=({"block": "pebble", "x": 0.5, "y": 0.2},), blocks=small)
+    assert build_world(both).controls[0].step < 0.2 * build_world(scenario()).controls[0].step
 
 
 def test_step_above_the_admissible_one_is_refused_with_both_numbers() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -69,6 +69,14 @@ def test_threads_do_not_change_a_bit_of_a_collapse_nor_of_its_ledger(alone: Nons
     assert same_bits(scene, alone)
 
 
+def test_one_thread_takes_over_from_a_team_and_a_team_from_one(alone: Nonsmooth) -> None:
+    with Team(3) as together, Team(2) as couple:
+        scene, _ = together.advance(build_nonsmooth(wall()), STEPS // 3)
+        scene, _ = ALONE.advance(scene, STEPS // 2)
+        scene, _ = couple.advance(scene, STEPS)
+    assert same_bits(scene, alone)
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_more_room_for_pairs_keeps_impulses_and_tallies(
     alone: Nonsmooth, monkeypatch: pytest.MonkeyPatch, threads: int
@@ -81,6 +89,12 @@ def test_more_room_for_pairs_keeps_impulses_and_tallies(
         scene, _ = together.advance(scene, STEPS)
     assert scene.contacts.constraints.size > capacity
     assert same_bits(scene, alone)
+
+
+def test_outputs_do_not_change_a_bit(alone: Nonsmooth) -> None:
+    result = simulate(wall())
+    assert result.summary.steps == STEPS
+    assert np.array_equal(result.frames.x[-1], alone.world.bodies.x[:-1])
 
 
 def test_energies_of_frames_and_summary_are_those_of_the_scheme(tmp_path: Path) -> None:
