@@ -35,7 +35,9 @@ from blocksim.kernels.explicit.sliver_axes import Jet
 
 pytestmark = pytest.mark.skipif(not config.DISABLE_JIT, reason="calls kernels without records")
 record: Any = SimpleNamespace
-SQUARE = record(half_x=1.0, half_y=1.0, radius=math.sqrt(2.0), x=0.0, y=0.0, cos=1.0, sin=0.0, faces=15)
+SQUARE = record(
+    half_x=1.0, half_y=1.0, radius=math.sqrt(2.0), x=0.0, y=0.0, cos=1.0, sin=0.0, faces=15, least_width=2.0
+)
 sides = pytest.mark.parametrize
 
 
