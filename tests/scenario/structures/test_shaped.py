@@ -166,3 +166,9 @@ def test_only_the_free_blocks_of_a_structure_get_its_velocity() -> None:
     *ring, left, right = built(kind="arch", radius=4, thickness=1, count=9, velocity=[1, 0], shear_velocity=2)
     assert all(body.vx > 1.0 for body in ring)
     assert (left.vx, right.vx) == (0.0, 0.0)
+
+
+def test_block_that_keys_make_too_sharp_has_its_number() -> None:
+    (where, message), *_ = told(kind="column", count=3, height=2.0, width=1.0, top_width=1e-9)
+    assert where == ("kind",)
+    assert message.startswith("block 3 of this structure: this corner is only 1e-06 mm from the one before")
