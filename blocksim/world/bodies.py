@@ -12,6 +12,7 @@ length. Near an end only the face beside it can be nearer, as those beyond are `
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from operator import attrgetter
 from typing import NamedTuple
@@ -48,6 +49,14 @@ class Shapes(NamedTuple):
     lengths: NDArray[np.float64]  # (5, n) LENGTHS of blocks
 
 
+class CornerTable(NamedTuple):
+    """The corners of some shapes and pieces of ground."""
+
+    table: arrays.Records  # (q,) CORNER, not to be written
+    firsts: dict[Corners, int]  # where those of a shape begin; those of pieces come last
+    lengths: dict[Corners, tuple[float, ...]]  # LENGTHS of a shape but the last one
+
+
 def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]) -> Shapes:
     """Return the corners of all bodies, of rectangles too.
 
@@ -55,21 +64,33 @@ def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]
     is infinitely wide and has its upper face in its centre. After the corners of a block come as many others as a block
     may have here, so that four blocks are gone through together. Of ground no face is beside another.
     """
-    places: dict[Corners, int] = {}
+    blocks = [body.corners for body in placed]
+    kinds = dict(zip(blocks, placed, strict=True))  # a body of each shape
+    ground = (*slabs, (math.inf, 0.0))
+    table, first_of, lengths_of = corner_table((*kinds,), ground)
+    lengths = {corners: (*lengths_of[corners], body.least_width) for corners, body in kinds.items()}
+    pieces = range(len(table) - len(CORNERS) * len(ground), len(table), len(CORNERS))
+    firsts = (*(first_of[corners] for corners in blocks), *pieces)
+    sizes = (*map(len, blocks), *[len(CORNERS)] * len(pieces))
+    faces = tuple(arrays.OUTLINE if body.outline else arrays.ALL for body in placed)
+    of_blocks = np.array([lengths[corners] for corners in blocks]).reshape(-1, len(LENGTHS))
+    return Shapes(table, firsts, sizes, faces, arrays.OUTLINE in faces, of_blocks.T)
+
+
+@lru_cache(maxsize=16)  # ensembles are made of scenes of the same shapes
+def corner_table(kinds: tuple[Corners, ...], slabs: tuple[tuple[float, float], ...]) -> CornerTable:
+    """Return the corners of shapes and of pieces of ground with half sides (m), and what each shape has there."""
+    firsts: dict[Corners, int] = {}
     lengths: dict[Corners, tuple[float, ...]] = {}
     rows: list[tuple[float, ...]] = []
-    blocks = [body.corners for body in placed]
-    most = max(map(len, blocks), default=0)
-    for body, corners in zip(placed, blocks, strict=True):
-        if corners not in places:
-            places[corners], own = len(rows), corner_rows(corners)
-            half_sides = (max(map(abs, axis)) for axis in zip(*corners, strict=True))
-            inner = min(row[FIELDS.index("distance")] for row in own)
-            lengths[corners] = (*half_sides, body.radius, inner, body.least_width)
-            rows += [*own, *[NO_FACE] * (most - len(corners))]
-    firsts = [places[corners] for corners in blocks]
-    for half_x, half_y in (*slabs, (math.inf, 0.0)):
-        firsts.append(len(rows))
+    most = max(map(len, kinds), default=0)
+    for corners in kinds:
+        firsts[corners], own = len(rows), corner_rows(corners)
+        half_sides = (max(map(abs, axis)) for axis in zip(*corners, strict=True))
+        inner = min(row[FIELDS.index("distance")] for row in own)
+        lengths[corners] = (*half_sides, max(math.hypot(x, y) for x, y in corners), inner)
+        rows += [*own, *[NO_FACE] * (most - len(corners))]
+    for half_x, half_y in slabs:
         corners = ((-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y))
         for (x, y), (nx, ny) in zip(corners, NORMALS, strict=True):
             side = (half_y, half_x) if nx == 0.0 else (half_x, half_y)
@@ -77,10 +98,8 @@ def shapes_of(placed: Sequence[PlacedBody], slabs: Iterable[tuple[float, float]]
     table = arrays.zeros(len(rows), arrays.CORNER)
     for name, column in zip(FIELDS, zip(*rows, strict=True), strict=True):
         table[name] = column
-    sizes = (*map(len, blocks), *[len(CORNERS)] * (len(firsts) - len(blocks)))
-    faces = tuple(arrays.OUTLINE if body.outline else arrays.ALL for body in placed)
-    of_blocks = np.array([lengths[corners] for corners in blocks]).reshape(-1, len(LENGTHS))
-    return Shapes(table, tuple(firsts), sizes, faces, arrays.OUTLINE in faces, of_blocks.T)
+    table.flags.writeable = False  # it is shared
+    return CornerTable(table, firsts, lengths)
 
 
 def corner_rows(corners: Corners) -> list[tuple[float, ...]]:
@@ -217,7 +236,7 @@ class Layout(NamedTuple):
         model = self.scenario.contact.model
         moved = (*self.drives.driven["body"].tolist(), self.drives.paths, self.drives.pieces.size)
         loads = self.applied.loads.size, self.applied.pieces.size
-        shapes = self.shapes.table.size, self.shapes.has_polygons
+        shapes = self.shapes.table.size if self.shapes.has_polygons else 0
         return model, len(self.placed), len(self.segments), len(self.classes), moved, loads, shapes
 
 
@@ -273,10 +292,11 @@ def body_records(layouts: Sequence[Layout]) -> arrays.Records:
     for records, layout in zip(bodies, layouts, strict=True):
         if layout.segments:
             records[blocks:-1] = layout.slabs
-        records["first_corner"], records["corner_count"] = layout.shapes.firsts, layout.shapes.sizes
-        records["faces"][:blocks] = layout.shapes.faces
-        for name, lengths in zip(LENGTHS, layout.shapes.lengths, strict=True):
-            records[name][:blocks] = lengths
+    plain, shapes = bodies.view(np.ndarray), [layout.shapes for layout in layouts]
+    plain["first_corner"], plain["corner_count"] = [one.firsts for one in shapes], [one.sizes for one in shapes]
+    plain["faces"][:, :blocks] = [one.faces for one in shapes]
+    for name, *lengths in zip(LENGTHS, *(one.lengths for one in shapes), strict=True):
+        plain[name][:, :blocks] = lengths
     has_profile = [layout.scenario.ground.profile is not None for layout in layouts]
     bodies["y"][has_profile, -1] = -math.inf
     bodies["is_moved"] = np.where(bodies["inverse_mass"] == 0.0, arrays.SUPPORT, 0)

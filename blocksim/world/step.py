@@ -135,7 +135,10 @@ def bounds_of(layouts: Sequence[Layout], bodies: NDArray[np.record]) -> list[Bou
         np.count_nonzero(columns["mass"] > 0.0, axis=1).tolist(),
         kinds,
         map(frozenset, bodies["contact_class"][:, count:].tolist()),
-        [standing_kinds(own, layout.shapes) for own, layout in zip(blocks, layouts, strict=True)],
+        [
+            standing_kinds(own, layout.shapes) if layout.shapes.has_polygons else one
+            for one, own, layout in zip(kinds, blocks, layouts, strict=True)
+        ],
         strict=True,
     )
     return [Bounds(*one) for one in of_scenes]
@@ -150,11 +153,17 @@ def standing_kinds(blocks: NDArray[np.record], shapes: Shapes) -> frozenset[Bloc
     kinds: set[BlockKind] = set()
     columns = (blocks[name].tolist() for name in BlockKind._fields)
     for *own, first, size in set(zip(*columns, shapes.firsts, shapes.sizes, strict=False)):
-        kind, corners = BlockKind(*own), shapes.table[first : first + size].view(np.recarray)
-        tangents, places = np.stack([-corners["ny"], corners["nx"]]), np.stack([corners["x"], corners["y"]])
-        ends = [(tangents * one).sum(axis=0) for one in (places, np.roll(places, -1, axis=1))]
-        faces = zip(np.abs(ends).max(axis=0).tolist(), corners["distance"].tolist(), strict=True)
-        kinds.update(kind._replace(half_x=min(face), half_y=max(face)) for face in faces)
+        kind, corners = BlockKind(*own), shapes.table[first : first + size]
+        places = [*zip(corners["x"].tolist(), corners["y"].tolist(), strict=True)]
+        faces = zip(
+            places,
+            (*places[1:], places[0]),
+            *(corners[name].tolist() for name in ("nx", "ny", "distance")),
+            strict=True,
+        )
+        for begin, end, nx, ny, distance in faces:
+            reach = max(abs(nx * y - ny * x) for x, y in (begin, end))
+            kinds.add(kind._replace(half_x=min(reach, distance), half_y=max(reach, distance)))
     return frozenset(kinds)
 
 
