@@ -1,5 +1,6 @@
 """Short runs for the tests of what a run leaves behind."""
 
+import shutil
 from pathlib import Path
 from typing import Protocol
 
@@ -33,3 +34,16 @@ def soft() -> Shipped:
 def kept(soft: Shipped, tmp_path_factory: pytest.TempPathFactory) -> Result:
     """Give one finished run in its folder; not to be changed."""
     return simulate_into(soft(), tmp_path_factory.mktemp("kept") / "run")
+
+
+@pytest.fixture(scope="session")
+def folder(kept: Result) -> Path:
+    """Give the folder of that run; not to be changed."""
+    assert kept.folder is not None
+    return kept.folder
+
+
+@pytest.fixture
+def copy(folder: Path, tmp_path: Path) -> Path:
+    """Give a copy of that folder."""
+    return Path(shutil.copytree(folder, tmp_path / "run"))
