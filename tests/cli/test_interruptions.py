@@ -188,25 +188,6 @@ def test_run_of_other_code_or_values_that_waits_is_reported(blocksim: Command) -
     assert "an unfinished run of another scenario or code version is in results/three_blocks_nominal/" in answer.err
 
 
-@pytest.mark.parametrize("executor", ["ensemble", pytest.param("processes", marks=pytest.mark.long)])
-def test_sweep_around_a_case_that_blows_up_continues(blocksim: Command, tmp_path: Path, executor: str) -> None:
-    forced = ("--set", "time.force_step=true", "--set", "contact.max_overlap=1", "--vary", "time.step=1e-6,5e-4,2e-6")
-    shorter = ("--set", "time.end=0.01", "--jobs", "1", "--executor", executor)
-    answer = blocksim("sweep", NOMINAL, *SOFT, *forced, *shorter, "--out", "out")
-    assert answer.code == 77
-    rows = (tmp_path / "out" / "sweep.csv").read_text().splitlines()
-    assert [("finished" in row, "failed" in row) for row in rows[1:]] == [(True, False), (False, True), (True, False)]
-    assert "the fastest is block " in rows[2]
-
-
-def test_results_that_cannot_fit_are_reported_before_the_start(blocksim: Command, tmp_path: Path) -> None:
-    answer = blocksim("run", NOMINAL, "--set", "output.every=1e-9", "--set", "time.end=1e6", "--out", "out")
-    assert answer.code == 74
-    assert "out: the results may take " in answer.err
-    assert " are free there; write elsewhere with --out DIR" in answer.err
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.long
 def test_disk_that_fills_is_74_and_keeps_what_was_there(process: Process, small_disk: Path, whole: Path) -> None:
     small_disk.joinpath("others").write_bytes(bytes(1_200_000))

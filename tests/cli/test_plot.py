@@ -5,24 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from PIL import Image
 
-from tests.cli.conftest import SOFT, Command
-
-
-def test_probes_are_drawn_by_name(blocksim: Command) -> None:
-    probe = ("--set", 'probes=[{ kind = "force", on = "supports", name = "base" }, { kind = "energy" }]')
-    brief = ("--set", "time.end=0.02", "--out", "out")
-    assert blocksim("run", "scenarios/three_blocks_nonsmooth.toml", *probe, *brief).code == 0
-    answer = blocksim("plot", "out", "--kind", "probe", "--probe", "base", "--out", "probe.svg")
-    assert (answer.code, answer.err) == (0, "picture: probe.svg\n")
-    assert "<!-- probe base -->" in Path("probe.svg").read_text(encoding="utf-8")
-    answer = blocksim("plot", "out", "--kind", "probe", "--block", "1")
-    assert (answer.code, answer.err) == (
-        65,
-        "--block selects the blocks of a run's history, but this picture is of kind probe\n",
-    )
+from tests.cli.conftest import Command
 
 
 def test_the_last_frame_is_reached_by_the_time_printed_above_it(blocksim: Command, finished: Path) -> None:
@@ -75,20 +60,3 @@ def test_stored_results_are_shown_without_the_solver(finished: Path, finished_sw
         check=False,
     )
     assert done.returncode == 0, done.stderr
-
-
-def test_failed_run_can_be_drawn(blocksim: Command) -> None:
-    failing = ("--set", "contact.max_overlap=1e-9", "--out", "out")
-    assert blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, *failing).code == 76
-    assert blocksim("plot", "out").code == 0
-
-
-OWN = {"plot": "picture", "export": "file", "animate": "animation", "report": "report"}
-
-
-@pytest.mark.parametrize("command", OWN)
-def test_own_file_is_told_and_replaced_unasked(blocksim: Command, made_up_run: Path, command: str) -> None:
-    for _ in range(2):
-        answer = blocksim(command, made_up_run)
-        assert (answer.code, answer.out) == (0, "")
-        assert answer.err.splitlines()[-1].startswith(f"{OWN[command]}: ")

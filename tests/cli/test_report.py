@@ -12,7 +12,7 @@ import pytest
 from blocksim.scenario import Document
 from blocksim.simulation.observables import table_columns
 from blocksim.study.sweep import sweep
-from tests.cli.conftest import SOFT, Command
+from tests.cli.conftest import Command
 from tests.view.report.folders import SCENARIOS, write_experiment, write_run, write_sweep
 
 REPORT = Path("report.html")
@@ -137,21 +137,3 @@ def test_damaged_run_is_shown_as_far_as_it_can_be_read(blocksim: Command, tmp_pa
     text = REPORT.read_text(encoding="utf-8")
     assert damaged in text.split("Some parts could not be read or compared")[1]
     assert (data_of(REPORT)["frames"] is None) == (damaged in ("run.h5", "scenario.toml"))
-
-
-def test_run_that_was_killed_is_played_as_far_as_it_came(blocksim: Command, tmp_path: Path) -> None:
-    write_run(tmp_path / "run")
-    for name in ("run.json", "final.csv", "done.json"):
-        (tmp_path / "run" / name).unlink()
-    assert blocksim("report", "run").code == 0
-    assert "unfinished" in REPORT.read_text(encoding="utf-8")
-    assert data_of(REPORT)["frames"] is not None
-
-
-def test_of_several_runs_of_a_scenario_the_report_says_which_it_shows(blocksim: Command) -> None:
-    short = ("run", "scenarios/slide.toml", "--quiet", *SOFT)
-    assert blocksim(*short, "--set", "time.end=0.01").code == 0
-    assert blocksim(*short, "--set", "time.end=0.02").code == 0
-    answer = blocksim("report", "results/slide")
-    assert answer.err.startswith("results/slide: the newest of 2 runs is taken: results/slide/")
-    assert blocksim("report", "results/slide", "--quiet").err == ""
