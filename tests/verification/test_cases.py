@@ -1,17 +1,24 @@
-"""Every case, under both laws; `blocksim verify` runs the same functions. And: what the README says is still so."""
+"""Every case with springs and with rigid contacts, and all soil; and: what the README says is still so."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import isnan
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import place_bodies
 from blocksim.verification.case import Case, CaseOutcome, Row, Setting, at_least, run_case
-from blocksim.verification.cases import CASES, choose_cases
+from blocksim.verification.cases import CASES, SettingError, choose_cases, exclusions
 from blocksim.verification.reference import (
     BEGIN,
     END,
+    RIGID,
     SETTINGS,
+    SOIL,
     STORE,
     cases_of,
     read_store,
@@ -19,60 +26,126 @@ from blocksim.verification.reference import (
     table,
     with_table,
 )
-from tests.verification.rows import allowed, missed, same_kind
+from blocksim.verification.soil import SOIL_CASES
+from blocksim.world import bodies
+
+if TYPE_CHECKING:
+    from blocksim.scenario import PlacedBody, Scenario
 
 ROOT = Path(__file__).parents[2]
-LAWS = {"linear": "linear", "Hertz–Mindlin": "hertz-mindlin"}  # head of the column in the README: law
-SLOW = {"V10", "V12", "V15", "V18", "V23"}  # seconds; V9, V11 and the ledgers of tests/simulation are there always
+STORED = read_store(ROOT / STORE)
 LONG = pytest.mark.long
-HEADS = [
-    pytest.param(
-        case, head, id=f"{case.id}-{law}", marks=pytest.mark.long if law != "linear" or case.id in SLOW else ()
-    )
-    for head, law in LAWS.items()
-    for case in CASES
-]  # make test has the linear law; tests of Hertz' law are in tests/kernels, its cases are for make test-long
+SHARE = 0.2  # of its tolerance by which a measured number may differ from the kept one
+ORDER_SHARE = 0.1  # of its bound, for a number with a lower bound only
+HERTZ = "Hertz–Mindlin"  # its law is tested in tests/kernels, its cases are for make test-long
+SLOW = {  # seconds; V9, V11 and the ledgers of tests/simulation are there always
+    "linear": {"V10", "V12", "V15", "V18", "V23"},
+    HERTZ: {case.id for case in CASES} - {"V25"},
+    RIGID: {"V18", "V23"},
+}
+COLUMNS = [
+    pytest.param(case, head, id=f"{case.id}-{head}", marks=LONG if case.id in slow else ())
+    for head, slow in SLOW.items()
+    for case in cases_of(head)
+]
 
 
-def outcome(case_id: str, law: str, *, quick: bool) -> CaseOutcome:
-    (case,) = choose_cases([case_id], Setting())
-    return run_case(case, Setting(law=law, quick=quick))
+def missed(outcome: CaseOutcome) -> list[str]:
+    return [row.quantity for row in outcome.rows if not row.is_inside]
 
 
-@pytest.mark.parametrize(("case", "head"), HEADS)
+def allowed(row: Row) -> float:
+    """Return by how much the kept number may differ from the one measured now."""
+    if row.at_least:
+        return ORDER_SHARE * row.expected
+    return SHARE * row.tolerance * (abs(row.expected) if row.relative else 1.0)
+
+
+@pytest.mark.parametrize(("case", "head"), COLUMNS)
 def test_case_is_inside_its_tolerances_and_what_the_readme_says(case: Case, head: str) -> None:
     """The quick size may leave rows out; numbers are compared where the sizes are the same."""
-    found = outcome(case.id, LAWS[head], quick=True)
+    found = run_case(case, replace(SETTINGS[head], quick=True))
     assert found.rows
     assert missed(found) == []
-    kept = {row.quantity: row for row in rows_of(read_store(ROOT / STORE), head, case)}
-    assert case.quick or list(kept) == [row.quantity for row in found.rows], "run: make verify-table"
+    kept = {row.quantity: row for row in rows_of(STORED, head, case)}
+    is_full = not case.quick or head == RIGID
+    assert not is_full or list(kept) == [row.quantity for row in found.rows], "run: make verify-table"
     for row in found.rows:
-        assert same_kind(kept[row.quantity], row), "run: make verify-table"
-        if not case.quick:
-            assert kept[row.quantity].measured == pytest.approx(row.measured, rel=1e-9, abs=allowed(row))
+        old = kept[row.quantity]
+        assert (old.unit, old.relative, old.at_least) == (row.unit, row.relative, row.at_least)
+        assert [old.expected, old.tolerance] == pytest.approx([row.expected, row.tolerance], rel=1e-6)
+        assert not is_full or old.measured == pytest.approx(row.measured, rel=1e-9, abs=allowed(row))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("law", LAWS.values())
+@LONG
+@pytest.mark.parametrize("head", ["linear", HERTZ])
 @pytest.mark.parametrize("case", [case for case in CASES if case.quick], ids=lambda case: case.id)
-def test_case_in_full_is_inside_its_tolerances(case: Case, law: str) -> None:
-    assert missed(outcome(case.id, law, quick=False)) == []
+def test_case_in_full_is_inside_its_tolerances(case: Case, head: str) -> None:
+    assert missed(run_case(case, SETTINGS[head])) == []
 
 
-def test_table_of_the_readme_is_that_of_the_kept_results() -> None:
+@pytest.mark.parametrize(
+    ("name", "outside"),
+    [
+        pytest.param("S2", ["corrected: K, 5 mm"], marks=LONG),  # tests/simulation has a wall that is drawn back
+        pytest.param("S4", [], marks=LONG),
+        pytest.param("S6", [], marks=LONG),
+        ("S7", []),
+        ("S8", []),
+    ],
+)
+def test_quick_case_of_soil_is_inside_its_tolerances(name: str, outside: list[str]) -> None:
+    (case,) = choose_cases([name], Setting(), soil=True)
+    assert missed(run_case(case, Setting(quick=True))) == outside
+
+
+@LONG
+@pytest.mark.parametrize("case", SOIL_CASES, ids=lambda case: case.id)
+def test_case_of_soil_is_as_the_table_has_it(case: Case) -> None:
+    kept = rows_of(STORED, SOIL, case)
+    assert missed(run_case(case, Setting())) == [row.quantity for row in kept if not row.is_inside]
+
+
+RECTANGLES = [
+    pytest.param(case, SETTINGS[RIGID], id=f"{case.id}-{RIGID}", marks=LONG if is_long else ())
+    for case in cases_of(RIGID)
+    for is_long in [case.id in {"V3", "V4", "V9", "V10", "V13", "V15", "V17", "V18", "V23"}]
+] + [
+    pytest.param(case, Setting(quick=True), id=f"{case.id}-linear", marks=LONG if case.id == "V3" else ())
+    for case in choose_cases(["V3", "V5", "V6", "V7", "V8"], Setting())
+]
+
+
+@pytest.mark.parametrize(("case", "setting"), RECTANGLES)
+def test_rectangles_given_as_outlines_have_the_same_answers(
+    case: Case, setting: Setting, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def as_outlines(scenario: Scenario) -> tuple[PlacedBody, ...]:
+        return tuple(body._replace(outline=body.corners) for body in place_bodies(scenario))
+
+    plain = run_case(case, setting)
+    monkeypatch.setattr(bodies, "place_bodies", as_outlines)
+    near = 1e-9 if setting.has_springs else 0.0  # a domino of V18 jams, and a last bit grows to 2.5e-3
+    for rectangle, outline in zip(plain.rows, run_case(case, setting).rows, strict=True):
+        same = outline.measured == pytest.approx(rectangle.measured, rel=near, abs=near)
+        assert same or (isnan(rectangle.measured) and isnan(outline.measured)), rectangle.quantity
+
+
+def test_table_of_the_readme_is_that_of_the_kept_results_of_all_cases() -> None:
     readme = (ROOT / "blocksim/verification/README.md").read_text(encoding="utf-8")
     assert BEGIN in readme
     assert END in readme
-    assert with_table(readme, read_store(ROOT / STORE)) == readme, "run: make verify-table"
-
-
-def test_kept_results_have_all_cases_in_every_column() -> None:
-    stored = read_store(ROOT / STORE)
-    assert list(stored) == list(SETTINGS), "run: make verify-table"
-    for head, column in stored.items():
+    assert with_table(readme, STORED) == readme, "run: make verify-table"
+    assert list(STORED) == list(SETTINGS), "run: make verify-table"
+    for head, column in STORED.items():
         assert list(column) == [case.id for case in cases_of(head)]
         assert all(column.values())
+
+
+def test_table_shows_a_miss() -> None:
+    row = {**STORED["linear"]["V2"][0], "measured": None}
+    changed = {**STORED, "linear": {**STORED["linear"], "V2": [row]}}
+    assert "– ✗" in next(line for line in table(changed).splitlines() if line.startswith("| V2 "))
 
 
 @pytest.mark.parametrize(
@@ -91,9 +164,11 @@ def test_a_number_is_inside_up_to_its_tolerance(row: Row, inside: bool) -> None:
     assert row.is_inside == inside
 
 
-def test_table_shows_a_miss_and_its_reason() -> None:
-    stored = read_store(ROOT / STORE)
-    changed = {head: dict(column) for head, column in stored.items()}
-    changed["linear"]["V2"] = [{**changed["linear"]["V2"][0], "measured": None}]
-    line = next(line for line in table(changed).splitlines() if line.startswith("| V2 "))
-    assert "– ✗" in line
+def test_cases_that_are_not_there_are_told_and_those_about_springs_say_why() -> None:
+    with pytest.raises(InvalidInputError, match="S12: no such case of soil; choose S1, S2"):
+        choose_cases(["S12"], Setting(), soil=True)
+    assert [case.id for case in CASES if case not in cases_of(RIGID)] == ["V2", "V20", "V25"]
+    assert all(len(reason) > 20 for reason in exclusions(RIGID))
+    assert exclusions("explicit") == ()
+    with pytest.raises(SettingError, match=r"V20 \(.*springs"):
+        choose_cases(["V1", "v20"], SETTINGS[RIGID])
