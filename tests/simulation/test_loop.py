@@ -1,37 +1,65 @@
-"""The loop is heard between outputs too, and stops where it should."""
+"""The loop: frames at the nearest steps, calls short enough to be heard in, energy that adds up, and how a run ends."""
 
-from pathlib import Path
+from __future__ import annotations
 
+import json
+import os
+import signal
+import threading
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 import pytest
 
+from blocksim.errors import ExitCode
+from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.scenario import load_scenario, place_bodies
-from blocksim.simulation import loop, simulate
+from blocksim.simulation import loop, run_ensemble, schemes, simulate, simulate_into
+from blocksim.simulation.balance import BODY_STEPS, FIRST_CHECK, EnergyLedger, next_energy_check
+from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
 from blocksim.simulation.instruments import Recorder
-from blocksim.simulation.loop import CALL_SECONDS, MOST_GROWTH, steps_of_call
+from blocksim.simulation.interruption import WallTime, interruptible, stop_requests
+from blocksim.simulation.loop import BY_CODE, CALL_SECONDS, MOST_GROWTH, RESIDUAL, Outcome, diagnose, steps_of_call
+from blocksim.simulation.schemes import build, build_scene
 from blocksim.world.build import build_world
-from tests.simulation.conftest import Shipped
+from tests.simulation.conftest import SCENARIOS
+from tests.simulation.sliding import sliding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from blocksim.scenario import Scenario
+    from blocksim.world.build import InitialScene
+    from tests.simulation.conftest import Shipped
 
 
-def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped) -> None:
-    scenario = soft(time__end=20.0, time__stop_at_rest=False)
-    world = build_world(scenario)
-    recorder = Recorder(place_bodies(scenario), 100.0, float(world.controls[0].step))
-    seen: list[loop.Progress] = []
-    control = loop.RunControl(seen.append, lambda: "enough" if len(seen) == 3 else "")
-    ended = loop.run_loop(world, recorder, 20.0, control=control)
-    assert (ended.outcome.status, ended.outcome.reason, ended.outcome.exit_code) == ("interrupted", "enough", 75)
-    assert len(seen) == 3
-    assert recorder.steps == [0, seen[-1].steps]
-    assert 0 < seen[0].steps < seen[1].steps < seen[2].steps < recorder.next_step(0)
+def steps_of(recorder: Recorder, last: int) -> list[int]:
+    done, found = 0, [0]
+    while done < last:
+        done = recorder.next_step(done)
+        found.append(done)
+    return found
 
 
-def test_stop_before_the_first_step_leaves_one_frame(soft: Shipped) -> None:
-    scenario = soft()
-    world = build_world(scenario)
-    recorder = Recorder(place_bodies(scenario), 1e-3, float(world.controls[0].step))
-    ended = loop.run_loop(world, recorder, 1.0, control=loop.RunControl(stop=lambda: "at once"))
-    assert ended.outcome.status == "interrupted"
-    assert recorder.steps == [0]
+@pytest.mark.parametrize(
+    ("every", "step", "expected"),
+    [
+        (1.0, 0.25, [0, 4, 8, 12]),
+        (1.0, 0.4, [0, 2, 5, 8, 10, 12]),  # 2.5, 5, 7.5, 10, 12.5 steps
+        (0.1, 1.0, [*range(13)]),
+    ],
+)
+def test_frames_fall_on_the_nearest_steps(every: float, step: float, expected: list[int]) -> None:
+    recorder = Recorder([], every, step)
+    assert steps_of(recorder, 12) == expected
+    recorder.steps = [0, 5, 10]
+    assert [recorder.count_until(step) for step in (0, 4, 5, 9, 10)] == [1, 1, 2, 2, 3]
+
+
+def test_frames_do_not_drift_over_a_long_run() -> None:
+    steps = steps_of(Recorder([], 1e-3, 2.984e-7), 7_000_000)
+    assert all(abs(step * 2.984e-7 - k * 1e-3) < 2.984e-7 for k, step in enumerate(steps))
 
 
 @pytest.mark.parametrize(("end", "step", "last"), [(1.0, 0.25, 4), (1.0, 0.3, 3), (1e-9, 1.0, 1)])
@@ -39,20 +67,18 @@ def test_last_step_is_the_nearest_and_at_least_one(end: float, step: float, last
     assert loop.last_step_of(end, step) == last
 
 
-def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blocksim.simulation.balance.RESIDUAL_LIMIT", 1e-30)
-    scenario = soft(time__end=0.25)
+@pytest.mark.parametrize("wanted", [0, 3])
+def test_rare_output_does_not_make_the_loop_deaf(soft: Shipped, wanted: int) -> None:
+    scenario = soft(time__end=20.0, time__stop_at_rest=False)
     world = build_world(scenario)
-    recorder = Recorder(place_bodies(scenario), 1e-2, float(world.controls[0].step))
-    ended = loop.run_loop(world, recorder, 0.25)
-    assert (ended.outcome.status, ended.outcome.exit_code) == ("failed", 76)
-    assert "the fastest is block " in ended.outcome.reason
-
-
-def test_body_that_hangs_in_the_air_does_not_rest_however_slowly_it_falls() -> None:
-    shipped = Path(__file__).parents[2] / "scenarios" / "bounce.toml"
-    slow = {"gravity": 0.001, "time.stop_at_rest": True, "time.end": 0.08, "contact.stiffness_scale": 0.001}
-    assert simulate(load_scenario(shipped, slow)).reason == "end of simulated time"
+    recorder = Recorder(place_bodies(scenario), 100.0, float(world.controls[0].step))
+    seen: list[int] = []
+    control = loop.RunControl(lambda at: seen.append(at.steps), lambda: "enough" if len(seen) == wanted else "")
+    ended = loop.run_loop(world, recorder, 20.0, control=control)
+    assert (ended.outcome.status, ended.outcome.reason, ended.outcome.exit_code) == ("interrupted", "enough", 75)
+    assert len(seen) == wanted
+    assert recorder.steps == sorted({0, *seen[-1:]})
+    assert all(np.diff([0, *seen, recorder.next_step(0)]) > 0)
 
 
 @pytest.mark.parametrize("seconds_a_step", [1e-7, 1e-4, 0.5])
@@ -61,11 +87,164 @@ def test_calls_come_to_last_as_long_as_wanted(seconds_a_step: float) -> None:
     for _ in range(20):
         steps = steps_of_call(steps, steps, steps * seconds_a_step)
     assert steps * seconds_a_step == pytest.approx(max(CALL_SECONDS, seconds_a_step), rel=0.01)
-
-
-def test_quick_first_steps_do_not_make_a_call_endless() -> None:
-    assert steps_of_call(25_000, 1, 0.0) <= MOST_GROWTH * 25_000
-
-
-def test_there_is_always_a_step_to_take() -> None:
+    assert steps_of_call(25_000, 1, 0.0) <= MOST_GROWTH * 25_000  # quick first steps do not make a call endless
     assert steps_of_call(1, 1, 1e6) == 1
+
+
+def test_body_that_hangs_in_the_air_does_not_rest_however_slowly_it_falls() -> None:
+    slow = {"gravity": 0.001, "time.stop_at_rest": True, "time.end": 0.08, "contact.stiffness_scale": 0.001}
+    assert simulate(load_scenario(SCENARIOS / "bounce.toml", slow)).reason == "end of simulated time"
+
+
+ENTRIES = dict.fromkeys(sorted(set(EnergyLedger.model_fields) - {"start", "in_play"}), 0.0)
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_every_entry_is_in_the_residual(name: str) -> None:
+    some = EnergyLedger(**{**ENTRIES, name: 4.0}, start=7.0, in_play=2.0)
+    assert (some.residual, some.relative_residual) == (-3.0, 1.5)
+
+
+@pytest.mark.parametrize("bodies", [1, 3, 50, 10_000])
+def test_looks_are_rarer_where_steps_are_cheap_whenever_a_run_was_interrupted(bodies: int) -> None:
+    looks = [0]
+    while looks[-1] < 10 * BODY_STEPS:
+        looks.append(next_energy_check(looks[-1], bodies))
+        assert next_energy_check(looks[-1] - 1, bodies) == looks[-1]
+    assert looks[1] == FIRST_CHECK
+    assert BODY_STEPS // bodies <= looks[-1] - looks[-2] <= max(FIRST_CHECK, 4 * BODY_STEPS // bodies)
+
+
+def test_loss_of_energy_fails_a_run(soft: Shipped, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("blocksim.simulation.balance.RESIDUAL_LIMIT", 1e-30)
+    ended = simulate(soft(time__end=0.25))
+    assert (ended.status, ended.summary.exit_code) == ("failed", 76)
+    assert "the fastest is block " in ended.reason
+
+
+def test_where_a_run_fails_depends_on_nothing_that_watches_it(soft: Shipped, tmp_path: Path) -> None:
+    wild: dict[str, Any] = {"time__force_step": True, "time__step": 6e-4, "contact__max_overlap": 1.0}
+    wild["time__end"] = 20.0
+    often = CheckpointPolicy(checkpoint_steps=13)
+    one = simulate(soft(**wild))
+    other = simulate_into(soft(**wild, output__every=0.0137), tmp_path / "run", precautions=often)
+    assert (one.summary.exit_code, one.summary.steps) == (76, FIRST_CHECK)
+    assert one.reason.startswith("energy residual above 5% of the energy in play (the fastest is block ")
+    assert (other.reason, other.summary.final_state_sha256) == (one.reason, one.summary.final_state_sha256)
+    members = run_ensemble([soft(**wild), soft(), soft(**wild)])
+    assert [end.outcome.status for end in members] == ["failed", "finished", "failed"]
+    assert (members[0].outcome.reason, members[0].columns) == (one.reason, one.columns)
+
+
+@pytest.fixture
+def forced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every scene step fifty times as far as it safely can."""
+
+    def forced_build(scenario: Scenario) -> InitialScene:
+        built = build(scenario)
+        built.scene.world.controls[0].step *= 50.0
+        return built
+
+    monkeypatch.setattr(schemes, "build", forced_build)
+
+
+@pytest.mark.usefixtures("forced")
+def test_scene_that_blows_up_stops_and_names_step_block_and_checkpoint(soft: Shipped, tmp_path: Path) -> None:
+    often = CheckpointPolicy(checkpoint_steps=1)
+    result = simulate_into(soft(output__every=1.0), tmp_path / "run", precautions=often)
+    assert (result.status, result.summary.exit_code) == ("failed", ExitCode.NUMERICAL_FAILURE)
+    assert 0 < result.summary.steps <= 1000
+    assert f"step {result.summary.steps})" in result.reason
+    assert "block " in result.reason
+    last = max(read_checkpoint(path).head.position.step for path in (tmp_path / "run").glob("checkpoint.*"))
+    assert 0 < last < result.summary.steps
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["last_checkpoint"] == last
+    assert not (tmp_path / "run" / "done.json").exists()
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+def test_overlap_names_the_pair_that_is_deepest(scheme: str) -> None:
+    result = simulate(sliding({"time": {"scheme": scheme}, "contact": {"max_overlap": 1e-12}}, end=0.01))
+    assert result.summary.exit_code == ExitCode.NUMERICAL_FAILURE
+    assert "(block below and the ground by " in result.reason or "(block below and block above by " in result.reason
+    assert f"mm, step {result.summary.steps})" in result.reason
+
+
+def test_what_failed_is_named_and_runs_that_did_not_fail_keep_their_words() -> None:
+    scenario = sliding({})
+    scene, placed = build_scene(scenario), place_bodies(scenario)
+    told = diagnose(RESIDUAL, REACHED, scene, placed).reason
+    assert told.endswith("(the fastest is block above with 1 m/s, step 0)")
+    for outcome in (BY_CODE[REACHED], Outcome("interrupted", "stopped by SIGTERM", ExitCode.STOPPED_EARLY)):
+        assert diagnose(outcome, OVERLAP_LIMIT, scene, placed) == outcome
+    scene.world.bodies[1].vy = np.nan
+    assert diagnose(BY_CODE[NOT_FINITE], NOT_FINITE, scene, placed).reason.endswith("(block above, step 0)")
+
+
+@pytest.fixture
+def handler(request: pytest.FixtureRequest) -> Iterator[signal.Signals]:
+    """Let a signal be dealt with by somebody else."""
+    number, own = request.param
+    before = signal.signal(number, own)
+    yield number
+    signal.signal(number, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1])
+def test_signal_becomes_a_request_and_the_handler_comes_back(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with stop_requests() as is_stopped:
+        assert not is_stopped()
+        os.kill(os.getpid(), number)
+        assert is_stopped()
+        assert is_stopped.reason() == f"stopped by {number.name}"
+    assert signal.getsignal(number) is before
+
+
+def test_second_signal_stops_at_once_but_only_when_the_first_was_heard() -> None:
+    with stop_requests() as requests:
+        for _ in range(2):  # a terminal and a launcher may both send one
+            os.kill(os.getpid(), signal.SIGTERM)
+        assert requests.reason() == "stopped by SIGTERM"
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_limit_of_wall_time_is_a_reason_to_stop_once_it_is_over() -> None:
+    assert WallTime(None).reason() == WallTime(60.0).reason() == ""
+    assert WallTime(1e-9).reason() == "wall-time limit of 1e-09 s reached"
+    assert WallTime(60.0, 61.0).reason() == "wall-time limit of 60 s reached"
+
+
+@pytest.mark.parametrize(
+    "handler",
+    [(signal.SIGINT, lambda *_: None), (signal.SIGHUP, signal.SIG_IGN)],  # a nohup wants that one ignored
+    ids=["own handler", "nohup"],
+    indirect=True,
+)
+def test_signals_of_which_somebody_else_takes_care_are_left_alone(handler: signal.Signals) -> None:
+    own = signal.getsignal(handler)
+    with stop_requests() as is_stopped:
+        os.kill(os.getpid(), handler)
+        assert not is_stopped()
+        assert signal.getsignal(handler) is own
+
+
+def test_runs_in_other_threads_leave_signals_alone() -> None:
+    answers: list[bool] = []
+
+    def ask() -> None:
+        with stop_requests() as is_stopped:
+            answers.append(is_stopped())
+
+    thread = threading.Thread(target=ask)
+    thread.start()
+    thread.join()
+    assert answers == [False]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+def test_being_terminated_is_like_ctrl_c_during_a_study(number: signal.Signals) -> None:
+    with pytest.raises(KeyboardInterrupt), interruptible():
+        os.kill(os.getpid(), number)
+    assert signal.getsignal(number) is signal.SIG_DFL
