@@ -16,6 +16,7 @@ SESSIONS = {
     for file in sorted(Path(__file__).with_name("sessions").glob("*.txt"))
     for found in HEAD.finditer(file.read_text())
 }
+PIPE = re.compile(r"((?:[^'|]|'[^']*')*)(\|?)(.*)")  # a command, and what its answer is given to
 PACE = re.compile(r"\d+(?= steps of)|(?<= s in )[\d.]+ s; relative energy error \S+|\d+(?= frames\b| a second\b)")
 MARKED = [pytest.param(name, marks=pytest.mark.long if "long" in SESSIONS[name][1] else ()) for name in SESSIONS]
 
@@ -46,7 +47,9 @@ def test_sessions(blocksim: Command, golden: Golden, name: str) -> None:
     lines, rules = SESSIONS[name]
     told = []
     for line in lines:
-        command, piped, after = line.partition(" | ")
+        found = PIPE.fullmatch(line)
+        assert found
+        command, piped, after = found.groups()
         told.append(f"$ {line}\n")
         if not line.startswith("blocksim "):
             told.append(in_shell(line))
