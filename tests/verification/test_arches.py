@@ -1,129 +1,76 @@
-"""Arches of voussoirs: least thickness and tilt, bracketed within a percent, rigid and on springs; limit analysis."""
+"""Arches of voussoirs: least thickness and tilt beside limit analysis, rigid and on springs, and forces at the joints.
+
+Limit analysis is a linear programme here: each joint carries what is beyond it with a force inside the joint and inside
+the friction cone. At the limit that is one state only: it has hinges where the force is at a corner, and slips where
+friction is used up.
+"""
 
 from __future__ import annotations
 
 import csv
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
-from blocksim.scenario import load_scenario
-from blocksim.scenario.geometry import centre_outline
+from blocksim.scenario import Document, load_scenario
+from blocksim.scenario.geometry import area_of, centroid
 from blocksim.simulation import simulate
-from blocksim.simulation.rest_state import SettleError
 from blocksim.simulation.schemes import build_scene
-from blocksim.study.limit import limit_curve
+from blocksim.study.criterion import Stability
+from blocksim.study.limit import limit, limit_curve
+from blocksim.study.run_folder import read_run
+from blocksim.study.sweep_folder import CASES
 from blocksim.verification.arches import COCCHETTI_RIZZI, HEAD, VOUSSOIRS, least_thickness
 from blocksim.verification.scene import Simulation
-from tests.kernels.scenes import Block, posed
 from tests.simulation.conftest import SCENARIOS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from blocksim.scenario import Scenario
-    from blocksim.scenario.geometry import Corners
+    from numpy.typing import NDArray
+
+    from blocksim.simulation.trajectory import Frames
+    from blocksim.study.limit_answer import LimitAnswer
 
 RADIUS = 10.0  # m, mean
-STEP = 2.5e-4  # s: contacts give way by 1.5 mm at four times as long a step, and friction holds an arch by less
 FALLS, STANDS = 0.02, 2e-3  # m/s: of the fastest voussoir after a second
-
-
-def voussoir(ends: tuple[float, float], thickness: float) -> list[tuple[float, float]]:
-    """Return the corners of a voussoir between two angles (rad) from the right, on the circles."""
-    inner, outer = RADIUS - 0.5 * thickness, RADIUS + 0.5 * thickness
-    places = ((inner, ends[0]), (outer, ends[0]), (outer, ends[1]), (inner, ends[1]))
-    return [(radius * math.cos(angle), radius * math.sin(angle)) for radius, angle in places]
-
-
-def abutment(angle: float, thickness: float) -> list[tuple[float, float]]:
-    """Return the corners of a block that carries an arch at an angle (rad), beyond the joint there."""
-    along = np.array([math.cos(angle), math.sin(angle)])
-    away = np.array([math.sin(angle), -math.cos(angle)]) * (1.0 if angle < math.pi / 2 else -1.0)
-    places = ((-1, 0), (-1, 0.2), (1, 0.2), (1, 0))
-    return [tuple(RADIUS * along + u * thickness * along + v * RADIUS * away) for u, v in places]
-
-
-def block(corners: list[tuple[float, float]], *, fixed: bool = False) -> Block:
-    """Return a block with corners at some places, above all ground."""
-    outline: Corners = centre_outline(corners)
-    first = min(outline, key=lambda one: math.hypot(one[0] - outline[0][0], one[1] - outline[0][1]))
-    x, y = corners[0][0] - first[0], corners[0][1] - first[1]
-    return Block(x, y + 2.0 * RADIUS, fixed=fixed, outline=outline)
-
-
-def arch(count: int, thickness: float, embrace: float, **values: Any) -> Simulation:
-    """Return an arch under way on two fixed abutments."""
-    begin = 0.5 * (math.pi - embrace)
-    angles = np.linspace(begin, begin + embrace, count + 1).tolist()
-    stones = [block(voussoir(ends, thickness)) for ends in pairwise(angles)]
-    feet = [block(abutment(angle, thickness), fixed=True) for angle in (angles[0], angles[-1])]
-    return Simulation(posed([*stones, *feet], restitution=0.0, step=STEP, **values))
-
-
-def fastest(run: Simulation) -> float:
-    """Return the speed (m/s) of the fastest voussoir after a second."""
-    run.to_time(1.0)
-    return float(np.hypot(run.bodies.vx, run.bodies.vy).max())
-
-
 LEAST = [(0.4, 0.10672), (0.375, 0.12597), (0.35, 0.15118), (0.325, 0.17821)]  # of thickness over mean radius
+HINGE, SLIP = 0.99, 0.999  # of half a joint from its middle, and of the friction that a joint has
+PULL = 0.37361  # along the ground over weight, under which the arch of tilting_arch.toml falls
 
 
-def at_its_own_step(friction: float, thickness: float) -> Simulation:
-    """Return the arch of `arch.toml` under way, of a thickness (m), with the automatic step."""
-    arch = {"kind": "arch", "block": "voussoir", "radius": RADIUS, "thickness": thickness, "count": 27}
-    frictions = {"block_block": friction, "block_ground": friction}
-    values: Any = {"time.step": "auto", "friction": frictions, "structures": [arch]}
-    return Simulation(build_scene(load_scenario(SCENARIOS / "arch.toml", values)))
-
-
-@pytest.mark.parametrize(("friction", "least"), LEAST)
-def test_automatic_step_is_short_enough_for_the_least_thickness(friction: float, least: float) -> None:
-    assert fastest(at_its_own_step(friction, 0.99 * least * RADIUS)) > FALLS
-    assert fastest(at_its_own_step(friction, 1.01 * least * RADIUS)) < STANDS
-
-
-def on_springs(friction: float, thickness: float) -> Scenario:
-    """Return the arch of `arch.toml`, of a thickness (m), settled on springs of full stiffness."""
-    arch = {"kind": "arch", "block": "voussoir", "radius": RADIUS, "thickness": thickness, "count": 27}
-    frictions = {"block_block": friction, "block_ground": friction}
-    time = {"end": 1.0, "stop_at_rest": False}
-    values: Any = {"time": time, "start": {"settle": True}, "friction": frictions, "structures": [arch]}
-    return load_scenario(SCENARIOS / "arch.toml", values)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("friction", "least"), LEAST)
-def test_least_thickness_of_an_arch_settled_on_springs_is_that_of_limit_analysis(friction: float, least: float) -> None:
-    with pytest.raises(SettleError, match="does not come to rest"):
-        simulate(on_springs(friction, 0.99 * least * RADIUS))
-    stands = simulate(on_springs(friction, 1.01 * least * RADIUS))
-    assert np.hypot(stands.frames.vx, stands.frames.vy).max() < STANDS
+def after_a_second(name: str, **values: Any) -> tuple[Simulation, float]:
+    """Return a shipped arch on its way, at the step it takes by itself, and the speed (m/s) of its fastest block."""
+    scenario = load_scenario(SCENARIOS / f"{name}.toml", {"time.step": "auto", **values})
+    run = Simulation(build_scene(scenario)).to_time(1.0)
+    return run, float(np.hypot(run.bodies.vx, run.bodies.vy).max())
 
 
 @pytest.mark.parametrize(("friction", "least"), LEAST)
 def test_least_thickness_of_a_semicircular_arch_is_that_of_limit_analysis(friction: float, least: float) -> None:
     """27 voussoirs, thickness over mean radius; below a friction of 0.396 their joints slide."""
-    for share, stands in ((0.99, False), (1.01, True)):
-        speed = fastest(arch(27, share * least * RADIUS, math.pi, friction=friction))
-        assert speed < STANDS if stands else speed > FALLS
+    frictions = {"block_block": friction, "block_ground": friction}
+    thin, thick = (
+        after_a_second("arch", friction=frictions, **{"structures.0.thickness": share * least * RADIUS})[1]
+        for share in (0.99, 1.01)
+    )
+    assert thin > FALLS
+    assert thick < STANDS
 
 
-@pytest.mark.parametrize(("share", "stands"), [(0.99, True), (1.01, False)])
-def test_arch_on_a_tilting_table_falls_at_20_49_degrees(share: float, stands: bool) -> None:
-    """Seven voussoirs over 157.5 degrees: tan = 0.37361."""
-    tilt = math.atan(share * 0.37361)
-    run = arch(7, 1.5, math.radians(157.5), friction=0.75, tilt=tilt)
-    speed = fastest(run)
-    assert speed < STANDS if stands else speed > FALLS
-    if not stands:  # four hinges: three parts of the arch turn, in turn one way and the other
-        spins = run.to_time(1.5).bodies.spin[:7]
-        parts = 1 + np.count_nonzero(np.abs(np.diff(spins)) > 0.1 * np.abs(spins).max())
-        assert parts == 3
+def test_arch_on_a_tilting_table_falls_at_20_49_degrees_in_three_parts() -> None:
+    """Seven voussoirs over 157.5 degrees; four hinges: three parts of the arch turn, in turn one way and the other."""
+    below, above = (
+        after_a_second("tilting_arch", **{"ground.tilt": f"{math.atan(share * PULL)} rad"}) for share in (0.99, 1.01)
+    )
+    assert below[1] < STANDS
+    assert above[1] > FALLS
+    spins = above[0].to_time(1.5).bodies.spin[:7]
+    assert 1 + np.count_nonzero(np.abs(np.diff(spins)) > 0.1 * np.abs(spins).max()) == 3
 
 
 @pytest.mark.parametrize(("friction", "least"), LEAST)
@@ -148,10 +95,10 @@ def test_the_table_beside_the_picture_is_what_limit_analysis_gives() -> None:
     for name, count in (("limit analysis of that ring", None), (f"the same of {VOUSSOIRS} voussoirs", VOUSSOIRS)):
         curve = [row for row in rows if row[2] == name]
         assert len(curve) > 20
-        for over, limit, _ in curve[2::9]:
+        for over, share, _ in curve[2::9]:
             least = least_thickness(float(over), count)
             assert least is not None
-            assert float(limit) == pytest.approx(RADIUS * least, abs=1e-4)
+            assert float(share) == pytest.approx(RADIUS * least, abs=1e-4)
 
 
 def limits_over(frictions: list[float], out: Path) -> None:
@@ -174,10 +121,140 @@ def limits_over(frictions: list[float], out: Path) -> None:
         assert 0.99 * RADIUS * least < change.low < change.high < 1.01 * RADIUS * least
 
 
-def test_limit_finds_the_least_thickness_where_joints_slide(tmp_path: Path) -> None:
-    limits_over([0.35], tmp_path / "curve")
-
-
 @pytest.mark.long
 def test_every_point_of_the_picture_is_within_a_percent_of_limit_analysis(tmp_path: Path) -> None:
     limits_over([0.3125, 0.325, 0.3375, 0.35, 0.3625, 0.375, 0.3875, 0.4, 0.45, 0.5], tmp_path / "curve")
+
+
+def voussoir(ends: tuple[float, float], thickness: float) -> list[tuple[float, float]]:
+    """Return the corners of a voussoir between two angles (rad) from the right, on the circles."""
+    inner, outer = RADIUS - 0.5 * thickness, RADIUS + 0.5 * thickness
+    places = ((inner, ends[0]), (outer, ends[0]), (outer, ends[1]), (inner, ends[1]))
+    return [(radius * math.cos(angle), radius * math.sin(angle)) for radius, angle in places]
+
+
+class Joints(NamedTuple):
+    """Forces at all joints from the right: places over half a joint from its middle, and shares of friction used."""
+
+    places: NDArray[np.float64]
+    used: NDArray[np.float64]
+
+    def named(self) -> tuple[dict[int, float], list[int]]:
+        """Return the joints that are hinges, -1 at the intrados and 1 at the extrados, and those that slip."""
+        hinges = {int(n): float(np.sign(self.places[n])) for n in np.flatnonzero(np.abs(self.places) > HINGE)}
+        return hinges, np.flatnonzero(self.used > SLIP).tolist()
+
+
+def limit_analysis(
+    count: int, thickness: float, embrace: float, friction: float, *, pulls: bool
+) -> tuple[float, Joints]:
+    """Return the largest pull to the left over weight that an arch carries (0 without), and its joints then."""
+    inner, outer = RADIUS - 0.5 * thickness, RADIUS + 0.5 * thickness
+    angles = np.linspace(0.5 * (math.pi - embrace), 0.5 * (math.pi + embrace), count + 1)
+    shapes = [voussoir(ends, thickness) for ends in pairwise(angles.tolist())]
+    areas = np.array([area_of(shape) for shape in shapes])
+    moments = areas[:, None] * np.array([centroid(shape) for shape in shapes])
+    weight = np.concatenate([[0.0], np.cumsum(areas)])
+    at_x, at_y = np.concatenate([np.zeros((1, 2)), np.cumsum(moments, axis=0)]).T
+    c, s, one, none = np.cos(angles), np.sin(angles), np.ones(count + 1), np.zeros(count + 1)
+    # rows: a joint; columns: force and moment about the centre at the right springing, share of the weight, constant
+    across = np.column_stack([one, none, none, -weight, none])
+    up = np.column_stack([none, one, none, none, -weight])
+    moment = np.column_stack([none, none, one, at_y, -at_x])
+    normal = c[:, None] * up - s[:, None] * across
+    shear = c[:, None] * across + s[:, None] * up
+    needs = np.vstack(
+        [inner * normal - moment, moment - outer * normal, shear - friction * normal, -shear - friction * normal]
+    )
+    free = (None, None)
+    bounds = [free, free, free, free if pulls else (0.0, 0.0)]
+    found = linprog([0.0, 0.0, 0.0, -1.0], A_ub=needs[:, :4], b_ub=-needs[:, 4], bounds=bounds).x
+    carried = [rows[:, :4] @ found + rows[:, 4] for rows in (normal, shear, moment)]
+    places = (carried[2] / carried[0] - RADIUS) / (0.5 * thickness)
+    return float(found[3]), Joints(places, np.abs(carried[1]) / (friction * carried[0]))
+
+
+def joints_of(frames: Frames, count: int, friction: float) -> Joints:
+    """Return the joints of an arch in the first frame of a run; its abutments come last."""
+    assert frames.contacts is not None
+    rows = frames.contacts.at(0)
+    x, y = frames.x[0, :count], frames.y[0, :count]  # on a circle about the centre
+    middle = np.linalg.lstsq(np.column_stack([2.0 * x, 2.0 * y, np.ones(count)]), x**2 + y**2)[0][:2]
+    found = []
+    for pair in sorted({(int(row["body_a"]), int(row["body_b"])) for row in rows}):
+        points = rows[(rows["body_a"] == pair[0]) & (rows["body_b"] == pair[1])]
+        force, away = points["normal_force"], np.column_stack([points["x"], points["y"]]) - middle
+        normal, shear = force.sum(), abs(points["shear_force"].sum())
+        sides = np.sign(np.hypot(*away.T) - RADIUS)
+        angle = math.atan2(*(force @ away)[::-1])
+        found.append((angle, float(force @ sides) / normal, shear / (friction * normal)))
+    return Joints(*np.array(sorted(found)).T[1:])
+
+
+def assert_same(found: Joints, expected: Joints) -> None:
+    assert found.named() == expected.named()
+    assert found.places == pytest.approx(expected.places, abs=0.02)
+    assert found.used == pytest.approx(expected.used, abs=0.01)
+
+
+def on_springs(friction: float, **values: object) -> dict[str, Any]:
+    """Return values with which the arches that ship begin at rest, on springs."""
+    frictions = {"block_block": friction, "block_ground": friction}
+    time = {"end": 0.1, "scheme": "explicit"}
+    return {"time": time, "start.settle": True, "friction": frictions, "output": {"contacts": True}, **values}
+
+
+def at_least_thickness(friction: float) -> tuple[float, Joints]:
+    """Return the least thickness (m), and the joints at it."""
+    share = least_thickness(friction)
+    assert share is not None
+    return RADIUS * share, limit_analysis(27, RADIUS * share * (1.0 + 1e-6), math.pi, friction, pulls=False)[1]
+
+
+@pytest.mark.parametrize(("friction", "hinges", "slips"), [(0.4, 6, 0), (0.35, 4, 2)])
+def test_arch_just_thick_enough_has_hinges_and_slips_where_limit_analysis_has_them(
+    friction: float, hinges: int, slips: int
+) -> None:
+    """Beside the crown and 57 degrees from it; at the springings hinges, or slips where friction is below 0.396."""
+    least, expected = at_least_thickness(friction)
+    assert [len(one) for one in expected.named()] == [hinges, slips]
+    values = on_springs(friction, **{"structures.0.thickness": 1.003 * least})
+    run = simulate(load_scenario(SCENARIOS / "arch.toml", values))
+    assert_same(joints_of(run.frames, 27, friction), expected)
+
+
+def test_arch_about_to_fall_on_a_tilting_table_has_four_hinges_where_limit_analysis_has_them() -> None:
+    pull, expected = limit_analysis(7, 1.5, math.radians(157.5), 0.75, pulls=True)
+    assert pull == pytest.approx(PULL, abs=5e-6)
+    assert list(expected.named()[0].values()) == [-1.0, 1.0, -1.0, 1.0]
+    values = on_springs(0.75, **{"ground.tilt": f"{math.atan(0.999 * pull)} rad"})
+    run = simulate(load_scenario(SCENARIOS / "tilting_arch.toml", values))
+    assert_same(joints_of(run.frames, 7, 0.75), expected)
+
+
+def searched(name: str, friction: float, vary: dict[str, Any], folder: Path) -> LimitAnswer:
+    """Return what `limit` finds for an arch on springs, from two values."""
+    document = Document.read(SCENARIOS / f"{name}.toml").with_values(on_springs(friction))
+    ((key, ends),) = vary.items()
+    return limit(document, {key: {**ends, "count": 2}}, tolerance=0.01, jobs=1, out=folder)
+
+
+@pytest.mark.long
+def test_limit_on_springs_finds_the_least_thickness_and_what_stands_above_it(tmp_path: Path) -> None:
+    least, expected = at_least_thickness(0.35)
+    ends = {"from": "1.4 m", "to": "1.6 m"}
+    found = searched("arch", 0.35, {"structures.0.thickness": ends}, tmp_path / "limit")
+    (change,) = found.limits
+    assert (change.below, change.above) == (Stability.FALLS, Stability.STANDS)
+    assert 0.99 * least < change.low < change.high < 1.01 * least
+    stands = read_run(found.folder / CASES / found.case_folders[change.high])
+    assert_same(joints_of(stands.frames, 27, 0.35), expected)
+
+
+@pytest.mark.long
+def test_limit_on_springs_finds_the_tilt_at_which_an_arch_falls(tmp_path: Path) -> None:
+    found = searched("tilting_arch", 0.75, {"ground.tilt": {"from": "20 deg", "to": "21 deg"}}, tmp_path / "limit")
+    (change,) = found.limits
+    assert (change.below, change.above) == (Stability.STANDS, Stability.FALLS)
+    low, high = (math.tan(math.radians(degrees)) for degrees in (change.low, change.high))
+    assert 0.99 * PULL < low < high < 1.01 * PULL

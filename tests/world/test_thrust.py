@@ -15,8 +15,7 @@ from blocksim.simulation.schemes import ALONE, build
 from blocksim.world.bodies import layout_of
 from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.rigid_step import USUAL_STEP, thrust_shift
-from tests.verification.test_arch_joints import limit_analysis
-from tests.verification.test_arches import RADIUS
+from tests.verification.test_arches import RADIUS, limit_analysis
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
