@@ -9,14 +9,12 @@ import pytest
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import REACHED
-from blocksim.kernels.explicit.broad_phase import list_reach
 from blocksim.verification.scene import Simulation
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from blocksim.kernels.common.arrays import World
     from tests.conftest import PaperBlock, Start
 
 # work space
@@ -59,40 +57,29 @@ def test_calls_for_steps_already_done_change_nothing(start: Start, paper_block: 
     assert bits(scene) == before
 
 
-def with_skin(skin: float) -> Callable[[World], None]:
-    def change(world: World) -> None:
-        controls = world.controls[0]
-        controls.skin = skin
-        controls.cell_width = 2.0 * controls.cell_radius + list_reach(controls)
-
-    return change
-
-
 def motion_bits(scene: Simulation) -> dict[str, bytes]:
     """Return the bits of all that moves, and of what the contacts remember."""
     names = ("x", "y", "angle", "cos", "sin", "vx", "vy", "spin", "ax", "ay", "spin_rate")
     return {name: scene.bodies[name].tobytes() for name in names} | {"contacts": scene.contact_records.tobytes()}
 
 
-CROWDS = [
-    {"stiffness_scale": 1e-3},
-    pytest.param({"stiffness_scale": 1e-3, "law": "hertz-mindlin"}, marks=pytest.mark.long),
-    pytest.param(
-        {"stiffness_scale": 1e-4, "model": "kernel", "particle_spacing": 4e-3, "max_overlap": 5e-3},
-        marks=pytest.mark.long,
-    ),
-]
-
-
-@pytest.mark.parametrize("contact", CROWDS)
-def test_a_crowd_moves_the_same_to_the_last_bit_with_any_reach(contact: dict[str, object]) -> None:
-    scenario = pushed_wall(5, 8, contact=contact)
-    usual = float(build_world(scenario).controls[0].skin)
+@pytest.mark.parametrize(
+    "contact",
+    [
+        {"stiffness_scale": 1e-3},
+        pytest.param({"stiffness_scale": 1e-3, "law": "hertz-mindlin"}, marks=pytest.mark.long),
+        pytest.param(
+            {"stiffness_scale": 1e-4, "model": "kernel", "particle_spacing": 4e-3, "max_overlap": 5e-3},
+            marks=pytest.mark.long,
+        ),
+    ],
+)
+def test_a_crowd_moves_the_same_to_the_last_bit_with_any_skin_of_the_scenario(contact: dict[str, object]) -> None:
+    usual = float(build_world(pushed_wall(5, 8, contact=contact)).controls[0].skin)
     ends, rebuilds = [], []
     for share in (0.5, 1.0, 3.0):
-        world = build_world(scenario)
-        with_skin(share * usual)(world)
-        scene = Simulation(world).to_time(0.15)
+        skin = {} if share == 1.0 else {"skin": share * usual}
+        scene = Simulation(build_world(pushed_wall(5, 8, contact={**contact, **skin}))).to_time(0.15)
         assert scene.status == REACHED
         ends.append(motion_bits(scene))
         rebuilds.append(int(scene.world.clock[0].rebuilds))
@@ -100,28 +87,16 @@ def test_a_crowd_moves_the_same_to_the_last_bit_with_any_reach(contact: dict[str
     assert rebuilds[0] > rebuilds[1] > rebuilds[2] > 10
 
 
-def test_skin_of_the_scenario_does_not_change_a_bit_of_a_collapse(start_shipped: Callable[..., Simulation]) -> None:
-    ends, rebuilds = [], []
-    skins: list[dict[str, str]] = [{}, {"contact__skin": "0.2 mm"}, {"contact__skin": "32 mm"}]
-    for skin in skins:
-        scene = start_shipped("three_blocks_nominal", contact__stiffness_scale=3e-4, **skin).to_time(0.3)
-        assert scene.status == REACHED
-        ends.append(motion_bits(scene))
-        rebuilds.append(int(scene.world.clock[0].rebuilds))
-    assert ends[0] == ends[1] == ends[2]
-    assert rebuilds[1] > 10 * rebuilds[0] > 20 * rebuilds[2] > 0
-
-
 @pytest.mark.parametrize(("slope", "slides"), [(0.3, False), (0.5, True)])
 def test_friction_history_survives_a_new_pair_list(
     start: Start, paper_block: PaperBlock, slope: float, slides: bool
 ) -> None:
     seldom, often = (
-        start([{"y": paper_block.height / 2}], tilt=-slope, change=with_skin(skin)).to_time(0.02)
-        for skin in (1e-2, 1e-7)
+        start([{"y": paper_block.height / 2}], tilt=-slope, contact={"skin": skin}).to_time(0.02)
+        for skin in (1e-2, 2.5e-6)
     )
     assert seldom.status == often.status == REACHED
     assert seldom.world.clock[0].rebuilds == 1
-    assert not slides or often.world.clock[0].rebuilds > 10_000
+    assert not slides or often.world.clock[0].rebuilds > 50
     assert motion_bits(seldom) == motion_bits(often)
     assert abs(often.contact_records.shear_force).min() > 0.05
