@@ -1,6 +1,7 @@
+"""A member of an ensemble ends as it would alone, to the last bit, whoever else there is; what fails, fails alone."""
+
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,19 +9,21 @@ import pytest
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.errors import ExitCode
-from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
+from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import ensemble, simulate
 from blocksim.simulation.ensemble import Ensemble, EnsembleEnd, MemberEnd, MemberFailure, run_ensemble, run_in_batches
 from blocksim.simulation.schemes import build_stacks
 from blocksim.world import build, memory
-from blocksim.world.build import SceneStack
+from blocksim.world.build import SceneStack, arrays_of, member, only_stack
 from blocksim.world.memory import SceneTooLargeError, scene_size
+from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.step import SkinTooSmallError, StepError
+from tests.simulation.conftest import SCENARIOS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
 WALL = {"stiffness_scale": 1e-3}
 SOFT = {"contact.stiffness_scale": 1e-3, "contact.restitution": 0.2, "time.end": 0.3}
 
@@ -29,11 +32,12 @@ def collapses(*changes: dict[str, Any]) -> list[Scenario]:
     return [load_scenario(SCENARIOS / "three_blocks_nominal.toml", {**SOFT, **change}) for change in changes]
 
 
-def assert_same(end: MemberEnd, scenario: Scenario) -> None:
+def assert_same(end: EnsembleEnd, scenario: Scenario) -> None:
     alone = simulate(scenario)
+    assert isinstance(end, MemberEnd)
     assert alone.final.equals(end.final)
     assert alone.summary.energy_J == end.ledger
-    assert alone.columns == end.columns
+    assert repr(alone.columns) == repr(end.columns)
     assert alone.summary.movement is not None
     assert end.observables.items() <= alone.summary.movement.row.items()  # one that ran alone lacks peaks
     assert (alone.summary.status, alone.summary.reason) == (end.outcome.status, end.outcome.reason)
@@ -42,51 +46,50 @@ def assert_same(end: MemberEnd, scenario: Scenario) -> None:
     assert all(np.array_equal(alone.frames.energy[name][-1:], end.frames.energy[name]) for name in end.frames.energy)
 
 
-DIFFERENT: tuple[dict[str, Any], ...] = (
-    {},
-    {"friction.block_block": 0.2},
-    {"contact.restitution": 0.0},
-    {"contact.stiffness_scale": 2e-3},
-    {"time.end": 0.01},
-    {"contact.law": "hertz-mindlin", "contact.stiffness_scale": 0.01, "time.end": 0.05},
-    {"structures": [{"kind": "staircase", "block": "brick", "count": 3, "overlap": 0.011}]},
-)
-
-
 def test_the_number_of_threads_and_the_size_of_batches_change_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
-    changes = [{"friction.block_block": 0.2 + 0.01 * k, "time.end": 0.05} for k in range(7)]
-    scenarios = collapses(*changes)
-    one = [end.final for end in run_ensemble(scenarios, threads=1)]
+    scenarios = collapses(*({"friction.block_block": 0.2 + 0.01 * k, "time.end": 0.05} for k in range(7)))
+    one = [end.columns for end in run_ensemble(scenarios, threads=1)]
     monkeypatch.setattr(ensemble, "BATCH", 3)
     monkeypatch.setattr(ensemble, "CHUNK", 1)
-    four = [end.final for end in run_ensemble(scenarios, threads=4)]
-    assert all(a.equals(b) for a, b in zip(one, four, strict=True))
+    assert [end.columns for end in run_ensemble(scenarios, threads=4)] == one
+    monkeypatch.setattr(build, "MOST_BYTES", 2 * scene_size(4, 16, 8).bytes)
+    stacks = [len(stack.placed) for stack in build_stacks(scenarios) if isinstance(stack, SceneStack)]
+    assert stacks == [2, 2, 2, 1]  # no more memory than a stack may take
+    assert [end.columns for end in run_ensemble(scenarios)] == one
 
 
 def test_a_batch_of_everything_has_the_bits_of_runs_of_their_own() -> None:
-    """Both schemes, all laws, walls, profiles, supports that move, fixed and large blocks, one member or several."""
-    brick = {"block": "brick", "x": 0.3, "y": 0.1}
+    """Both schemes, all laws, all supports, fixed, driven and large blocks, starts at rest, events; one or several."""
+    brick = {"block": "brick", "x": 0.3, "y": 0.1, "name": "one"}
+    rigid: dict[str, Any] = {"time.scheme": "nonsmooth"}
+    profile = {"ground": {"profile": [[0.0, 0.0], [0.1, 0.0], [0.3, -0.1]]}}
+    shaken = {"motion": {"kind": "harmonic", "amplitude": 0.002, "frequency": 5.0}}
+    jerk = {"motion": {"kind": "pulse", "shape": "rectangular", "duration": 1.0, "amplitude": 1.0}}
+    steady = {"structures": [{"kind": "stack", "block": "brick", "count": 2}]}
+    settled = {**steady, "start": {"settle": True}}
+    driven = {"bodies": [{**brick, "motion": {"kind": "ramp", "distance": 0.3, "speed": 1.0}}]}
+    eventful = {"bodies": [brick], "events": [{"at": 0.01, "fix": ["one"]}, {"at": 0.02, "remove": ["one"]}]}
     kinds: tuple[dict[str, Any], ...] = (
         {},
         {"contact.restitution": 0.0},
         {"contact.stiffness_scale": 2e-3, "time.end": 0.01},
         {"structures": [{"kind": "staircase", "block": "brick", "count": 4, "overlap": 0.011}]},
-        {"time.scheme": "nonsmooth"},
-        {"time.scheme": "nonsmooth", "time.step": 5e-4, "contact.restitution": 0.6},
+        rigid,
+        {**rigid, "time.step": 5e-4, "contact.restitution": 0.6},
+        {**rigid, "time.velocity_tolerance": 1e-5},
         {"contact.law": "hertz-mindlin", "contact.stiffness_scale": 0.01},
         {"bodies": [{**brick, "fixed": True}]},
         {"bodies": [{**brick, "velocity": [0.3, -0.2], "spin": 2.0}]},
         {"walls": [{"from": [0.15, 0.2], "to": [0.15, 0.0]}]},
-        {"ground": {"profile": [[0.0, 0.0], [0.1, 0.0], [0.3, -0.1]]}, "time.scheme": "nonsmooth"},
-        {"ground": {"profile": [[0.0, 0.0], [0.1, 0.0], [0.3, -0.1]]}},
-        {"motion": {"kind": "harmonic", "amplitude": 0.002, "frequency": 5.0}},
-        {"motion": {"kind": "harmonic", "amplitude": 0.002, "frequency": 5.0}, "time.scheme": "nonsmooth"},
+        *({**scheme, **kind} for scheme in ({}, rigid) for kind in (profile, shaken, driven, eventful)),
     )
+    release = {"ground.tilt": "50 deg", "start.release": "always"}
+    settling = ({**settled, **release}, {**rigid, **settled}, {**rigid, **settled, **jerk})
     scenarios = [
         one
-        for number in range(2)
-        for kind in kinds
-        for one in collapses({"time.end": 0.03, "friction.block_block": 0.25 + 0.1 * number, **kind})
+        for friction, some in ((0.25, (*kinds, *settling)), (0.35, kinds))
+        for kind in some
+        for one in collapses({"time.end": 0.03, "friction.block_block": friction, **kind})
     ]
     for end, scenario in zip(run_ensemble(scenarios, threads=2), scenarios, strict=True):
         assert_same(end, scenario)
@@ -123,16 +126,16 @@ def test_a_member_whose_pair_list_is_full_gets_more_room(monkeypatch: pytest.Mon
 @pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
 def test_a_pair_list_that_fills_up_on_the_way_changes_no_bit(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scenarios = [pushed_wall(4, 5, contact=WALL, time={"scheme": scheme, "end": end}) for end in (0.05, 0.06)]
-    alone = [simulate(scenario) for scenario in scenarios]
     monkeypatch.setattr(build, "PAIRS_PER_BODY", 2)
-    for end, single in zip(run_ensemble(scenarios), alone, strict=True):
-        assert end.columns == single.columns
-        assert end.ledger == single.summary.energy_J
-        assert single.summary.movement is not None
-        assert end.observables.items() <= single.summary.movement.row.items()
+    ends = run_ensemble(scenarios)
+    monkeypatch.undo()
+    for end, scenario in zip(ends, scenarios, strict=True):
+        assert_same(end, scenario)
 
 
-def test_members_that_cannot_be_built_fail_in_their_place_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_members_that_cannot_be_built_or_fail_do_so_in_their_place_and_the_others_go_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     quick = {"time.end": 0.01}
     scenarios = collapses(
         quick,
@@ -140,17 +143,18 @@ def test_members_that_cannot_be_built_fail_in_their_place_and_the_others_go_on(m
         {**quick, "contact.skin": 4e-6},
         {**quick, "time.scheme": "nonsmooth"},
         {"time.end": 1.0, "time.scheme": "nonsmooth", "time.step": 1.0},
+        {**quick, "contact.max_overlap": 1e-9},
         {**quick, "contact.restitution": 0.1},
     )
     ends = [end for batch in run_in_batches(scenarios) for end in batch]
     errors = [type(end.error) if isinstance(end, MemberFailure) else None for end in ends]
-    assert errors == [None, StepError, SkinTooSmallError, None, StepError, None]
-    assert [end.outcome.status for end in ends] == ["failed" if error else "finished" for error in errors]
+    assert errors == [None, StepError, SkinTooSmallError, None, StepError, None, None]
+    assert [end.outcome.status == "failed" for end in ends] == [False, True, True, False, True, True, False]
     assert "largest safe step" in ends[1].outcome.reason
+    assert "max_overlap" in ends[5].outcome.reason
     assert ends[1].outcome.exit_code == ExitCode.INVALID_INPUT
-    for end, scenario in zip(ends, scenarios, strict=True):
-        if isinstance(end, MemberEnd):
-            assert_same(end, scenario)
+    for number in (0, 3, 5, 6):
+        assert_same(ends[number], scenarios[number])
     with pytest.raises(StepError):
         run_ensemble(scenarios)
     monkeypatch.setattr(memory, "available_bytes", lambda: 1000)
@@ -176,45 +180,25 @@ def test_batches_take_no_more_scenarios_than_they_run(monkeypatch: pytest.Monkey
     assert len(next(run_in_batches(endless()))) == 2
 
 
-def test_a_stack_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenarios = collapses(*({"friction.block_block": 0.3, "time.end": 1e-3 * k} for k in range(1, 6)))
-    whole = [end.columns for end in run_ensemble(scenarios)]
-    one = next(iter(build_stacks(scenarios[:1])))
-    assert isinstance(one, SceneStack)
-    monkeypatch.setattr(build, "MOST_BYTES", 2 * scene_size(4, 16, 8).bytes)
-    assert [len(stack.placed) for stack in build_stacks(scenarios) if isinstance(stack, SceneStack)] == [2, 2, 1]
-    assert [end.columns for end in run_ensemble(scenarios)] == whole
-
-
-def test_a_member_that_fails_says_so_and_the_others_go_on() -> None:
-    def fall(overlap: float) -> Scenario:
-        return scenario_from_mapping(
-            {
-                "schema": 1,
-                "name": "fall",
-                "materials": {"any": {"density": 2700.0, "young_modulus": 69e9, "poisson_ratio": 0.3}},
-                "blocks": {"any": {"width": 0.03, "height": 0.03, "length": 0.03, "material": "any"}},
-                "bodies": [{"block": "any", "x": 0.0, "y": 0.02, "velocity": [0.0, -1.0]}],
-                "contact": {"stiffness_scale": 1e-3, "max_overlap": overlap},
-                "time": {"end": 0.02},
-            }
-        )
-
-    ends = run_ensemble([fall(1e-6), fall(1e-3)])
-    assert [end.outcome.status for end in ends] == ["failed", "finished"]
-    assert "max_overlap" in ends[0].outcome.reason
-
-
-def test_no_scenarios_give_no_ends() -> None:
+def test_no_scenarios_give_no_ends_and_less_than_one_thread_or_member_is_refused() -> None:
     assert run_ensemble([]) == []
-
-
-@pytest.mark.parametrize("threads", [0, -1])
-def test_less_than_one_thread_is_refused(threads: int) -> None:
-    with pytest.raises(ValueError, match=f"threads must be at least 1, not {threads}"):
-        run_ensemble([], threads=threads)
-
-
-def test_batches_without_members_are_refused() -> None:
+    for threads in (0, -1):
+        with pytest.raises(ValueError, match=f"threads must be at least 1, not {threads}"):
+            run_ensemble([], threads=threads)
     with pytest.raises(ValueError, match="members must be at least 1, not 0"):
         run_in_batches([], most=0)
+
+
+def test_members_of_a_stack_are_the_scenes_that_would_be_built_alone() -> None:
+    rigid = [{"time.scheme": "nonsmooth", "time.step": step} for step in (1e-3, 5e-4, 2e-4)]
+    scenarios = collapses(*rigid, {}, {**rigid[0], "bodies": [{"block": "brick", "x": 0.3, "y": 0.1}]})
+    stacks = [one for one in build_stacks(scenarios) if isinstance(one, SceneStack)]
+    assert sorted(stack.numbers for stack in stacks) == [[0, 1, 2], [3], [4]]  # one for each scheme and shape
+    stack = only_stack(build_stacks(scenarios[:3]))
+    assert all(array.ctypes.data % 64 == 0 for array in arrays_of(stack.scenes) if array.size)
+    for m, scenario in enumerate(scenarios[:3]):
+        one, alone = member(stack.scenes, m), build_nonsmooth(scenario)
+        assert isinstance(one, Nonsmooth)
+        for a, b in zip(arrays_of(one), arrays_of(alone), strict=True):
+            assert (type(a), a.dtype, a.shape) == (type(b), b.dtype, b.shape)
+            assert np.array_equal(a, b)

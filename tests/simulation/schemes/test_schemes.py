@@ -1,47 +1,66 @@
-"""Both schemes behind one interface: the same commands run them, and nothing mixes them up."""
+"""Both schemes behind one interface, and the threads that share a scene: the same bits, however many there are."""
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from blocksim.bench.harness import pushed_wall, three_blocks
+from blocksim.errors import InvalidInputError
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario.models import timeline
-from blocksim.simulation import read_result, run_ensemble, simulate, simulate_into
-from blocksim.simulation.schemes import ALONE, SCHEMES, Team, build_scene, build_stacks, measure_row, scheme_of
+from blocksim.simulation import read_result, simulate, simulate_into
+from blocksim.simulation.provenance import state_hash
+from blocksim.simulation.schemes import (
+    ALONE,
+    BODIES_A_THREAD,
+    SCHEMES,
+    Team,
+    build_scene,
+    measure_row,
+    scheme_of,
+    team_for,
+    useful_threads,
+)
 from blocksim.world import build
-from blocksim.world.build import SceneStack, arrays_of, member, only_stack
-from blocksim.world.nonsmooth import build_nonsmooth
+from blocksim.world.build import arrays_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.scenario import Scenario
 
+COLUMNS, ROWS = 12, 18
 RIGID: dict[str, object] = {"scheme": "nonsmooth", "step": 1e-3}
-STEPS = 300
+STEPS = {"explicit": 1500, "nonsmooth": 300}
+both = pytest.mark.parametrize("scheme", STEPS)
 
 
-def collapse(**time: object) -> Scenario:
-    return three_blocks(time={**RIGID, **time})
+def wall(scheme: str, columns: int = COLUMNS, rows: int = ROWS, end: float = 0.3) -> Scenario:
+    """Return a wall that falls to pieces within a tenth of a second."""
+    time = RIGID if scheme == "nonsmooth" else {"safety": 0.1}
+    contact = {} if scheme == "nonsmooth" else {"stiffness_scale": 2e-4}
+    return pushed_wall(columns, rows, contact=contact, time={"end": end, **time})
 
 
-def wall() -> Scenario:
-    return pushed_wall(12, 18, time={**RIGID, "end": 0.3})
+def bits(scene: Any) -> dict[str, bytes]:
+    """Return everything that moves, presses or is tallied."""
+    bodies, is_rigid = scene.world.bodies[:-1], isinstance(scene, Nonsmooth)
+    names = ("x", "y", "angle", "vx", "vy", "spin") if is_rigid else bodies.dtype.names
+    found = {name: bodies[name].tobytes() for name in names}
+    if is_rigid:
+        rows = scene.contacts.constraints[: int(scene.contacts.stepping[0].constraint_count)]
+        found |= {name: rows[name].tobytes() for name in ("normal_one", "normal_two", "shear")}
+    return {**found, "ledger": measure_row(scene).tobytes()}
 
 
-def same_bits(one: Nonsmooth, other: Nonsmooth) -> bool:
-    """Compare everything that moves, presses or is tallied."""
-    rows, count = ("normal_one", "normal_two", "shear"), int(one.contacts.stepping[0].constraint_count)
-    bodies = (np.array_equal(one.world.bodies[name], other.world.bodies[name]) for name in ("x", "y", "angle", "vx"))
-    impulses = (
-        np.array_equal(one.contacts.constraints[name][:count], other.contacts.constraints[name][:count])
-        for name in rows
-    )
-    return all([*bodies, *impulses, np.array_equal(measure_row(one), measure_row(other))])
+@pytest.fixture(scope="module")
+def alone() -> dict[str, dict[str, bytes]]:
+    """Return the walls as one thread leaves them."""
+    return {scheme: bits(ALONE.advance(build_scene(wall(scheme)), last)[0]) for scheme, last in STEPS.items()}
 
 
 def test_every_scheme_of_the_file_can_be_run() -> None:
@@ -52,53 +71,77 @@ def test_every_scheme_of_the_file_can_be_run() -> None:
         assert len(measure_row(ALONE.advance(scene, 0)[0])) == len(scheme.row_names)
 
 
-@pytest.fixture(scope="module")
-def alone() -> Nonsmooth:
-    """Return the wall as one thread leaves it."""
-    return ALONE.advance(build_nonsmooth(wall()), STEPS)[0]
-
-
-@pytest.mark.parametrize("threads", [2, 3])
-def test_threads_do_not_change_a_bit_of_a_collapse_nor_of_its_ledger(alone: Nonsmooth, threads: int) -> None:
-    with Team(threads) as together:
-        scene, status = build_nonsmooth(wall()), 0
-        for last in (0, 7, STEPS // 2, STEPS):
-            scene, status = together.advance(scene, last)
-    assert status == 0
-    assert scene.world.clock[0].rebuilds > 5
-    assert same_bits(scene, alone)
-
-
-def test_one_thread_takes_over_from_a_team_and_a_team_from_one(alone: Nonsmooth) -> None:
+@both
+def test_threads_do_not_change_a_bit_of_a_collapse_nor_of_its_ledger(
+    alone: dict[str, dict[str, bytes]], scheme: str
+) -> None:
+    """A team continues where it, one thread or another team has stopped."""
+    scene, last = build_scene(wall(scheme)), STEPS[scheme]
     with Team(3) as together, Team(2) as couple:
-        scene, _ = together.advance(build_nonsmooth(wall()), STEPS // 3)
-        scene, _ = ALONE.advance(scene, STEPS // 2)
-        scene, _ = couple.advance(scene, STEPS)
-    assert same_bits(scene, alone)
+        for team, step in ((together, 0), (together, 7), (couple, last // 3), (ALONE, last // 2), (together, last)):
+            scene, status = team.advance(scene, step)
+            assert status == 0
+    assert scene.world.clock[0].rebuilds > 5
+    assert bits(scene) == alone[scheme]
 
 
+@both
 @pytest.mark.parametrize("threads", [1, 2])
 def test_more_room_for_pairs_keeps_impulses_and_tallies(
-    alone: Nonsmooth, monkeypatch: pytest.MonkeyPatch, threads: int
+    alone: dict[str, dict[str, bytes]], monkeypatch: pytest.MonkeyPatch, scheme: str, threads: int
 ) -> None:
     monkeypatch.setattr(build, "PAIRS_PER_BODY", 1)
     monkeypatch.setattr(build, "GROWTH", 1.05)
-    scene = build_nonsmooth(wall())
-    capacity = scene.contacts.constraints.size
+    scene = build_scene(wall(scheme))
+    capacity = sum(array.size for array in arrays_of(scene))
     with Team(threads) as together:
-        scene, _ = together.advance(scene, STEPS)
-    assert scene.contacts.constraints.size > capacity
-    assert same_bits(scene, alone)
+        scene, _ = together.advance(scene, STEPS[scheme])
+    assert sum(array.size for array in arrays_of(scene)) > capacity
+    assert bits(scene) == alone[scheme]
 
 
-def test_outputs_do_not_change_a_bit(alone: Nonsmooth) -> None:
-    result = simulate(wall())
-    assert result.summary.steps == STEPS
-    assert np.array_equal(result.frames.x[-1], alone.world.bodies.x[:-1])
+def test_team_goes_from_one_scene_to_another_whatever_room_that_takes() -> None:
+    few, many = (pushed_wall(8, 4, contact={"model": "kernel", "particle_spacing": d}) for d in (5e-3, 1e-3))
+    with Team(2) as together:
+        for scenario in (few, many):
+            one, other = (team.advance(build_scene(scenario), 20)[0] for team in (together, ALONE))
+            assert bits(one) == bits(other)
+
+
+def test_run_ends_in_the_same_state_with_outputs_and_says_how_many_threads_there_were(
+    alone: dict[str, dict[str, bytes]],
+) -> None:
+    runs = [simulate(wall("nonsmooth"), threads=threads) for threads in (1, 2, 8)]
+    assert len({(run.summary.final_state_sha256, run.summary.energy_J) for run in runs}) == 1
+    assert runs[0].summary.steps == STEPS["nonsmooth"]
+    assert runs[0].frames.x[-1].tobytes() == alone["nonsmooth"]["x"]
+    assert [run.summary.threads for run in runs] == [1, 2, useful_threads(8, COLUMNS * ROWS)]
+
+
+def test_threads_that_would_only_wait_are_not_used() -> None:
+    assert [useful_threads(4, bodies) for bodies in (3, 199, 200, 399, 400, 10_000)] == [1, 1, 2, 3, 4, 4]
+    few = build_scene(wall("explicit", 4, 4))
+    assert team_for(few, 4).threads == 1
+    assert state_hash(team_for(few, 4).advance(few, 10)[0]) == state_hash(few)
+    assert BODIES_A_THREAD == 100  # the README says from how many blocks on threads help
+
+
+def test_threads_that_there_are_not_are_refused_and_nothing_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
+    for threads in (0, -1):
+        with pytest.raises(ValueError, match=f"threads must be at least 1, not {threads}"):
+            simulate(wall("explicit"), threads=threads)
+
+    def refuse(*_: object) -> None:
+        message = "can't start new thread"
+        raise RuntimeError(message)
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", refuse)
+    with pytest.raises(InvalidInputError, match="2 threads cannot be started here: can't start new thread"):
+        Team(2).__enter__()
 
 
 def test_energies_of_frames_and_summary_are_those_of_the_scheme(tmp_path: Path) -> None:
-    kept = simulate_into(collapse(end=0.3, stop_at_rest=False), tmp_path / "run")
+    kept = simulate_into(three_blocks(time={**RIGID, "end": 0.3, "stop_at_rest": False}), tmp_path / "run")
     found = read_result(tmp_path / "run")
     assert tuple(found.frames.energy) == SCHEMES["nonsmooth"].ledger
     total = np.sum([*found.frames.energy.values()], axis=0)
@@ -107,32 +150,3 @@ def test_energies_of_frames_and_summary_are_those_of_the_scheme(tmp_path: Path) 
     assert kept.summary.energy_J.relative_residual < 1e-12
     assert kept.summary.energy_J.dashpot == kept.summary.energy_J.stored_normal == 0.0
     assert np.array_equal(found.frames.x, kept.frames.x)
-
-
-def test_ensemble_of_both_schemes_ends_as_single_runs_do() -> None:
-    soft = {"stiffness_scale": 1e-3}
-    changes: list[Any] = [RIGID, {**RIGID, "velocity_tolerance": 1e-5}, {}, {**RIGID, "end": 0.1}]
-    scenarios = [three_blocks(soft, {"end": 0.2, **change}) for change in changes]
-    for end, scenario in zip(run_ensemble(scenarios, threads=2), scenarios, strict=True):
-        single = simulate(scenario)
-        assert single.final.equals(end.final)
-        assert single.summary.energy_J == end.ledger
-
-
-def test_members_of_a_stack_are_the_scenes_that_would_be_built_alone() -> None:
-    scenarios = [collapse(step=step) for step in (1e-3, 5e-4, 2e-4)]
-    stack = only_stack(build_stacks(scenarios))
-    assert all(array.ctypes.data % 64 == 0 for array in arrays_of(stack.scenes) if array.size)
-    for m, scenario in enumerate(scenarios):
-        one, alone = member(stack.scenes, m), build_nonsmooth(scenario)
-        assert isinstance(one, Nonsmooth)
-        for a, b in zip(arrays_of(one), arrays_of(alone), strict=True):
-            assert (type(a), a.dtype, a.shape) == (type(b), b.dtype, b.shape)
-            assert np.array_equal(a, b)
-
-
-def test_scenes_of_other_schemes_and_shapes_come_in_stacks_of_their_own() -> None:
-    scenarios = [collapse(), wall(), three_blocks(), collapse(step=5e-4)]
-    stacks = [one for one in build_stacks(scenarios) if isinstance(one, SceneStack)]
-    assert [stack.numbers for stack in stacks] == [[0, 3], [1], [2]]
-    assert [len(stack.placed) for stack in stacks] == [2, 1, 1]
