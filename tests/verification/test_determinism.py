@@ -93,10 +93,10 @@ def test_friction_history_survives_a_new_pair_list(
 ) -> None:
     seldom, often = (
         start([{"y": paper_block.height / 2}], tilt=-slope, contact={"skin": skin}).to_time(0.02)
-        for skin in (1e-2, 2.5e-6)
+        for skin in (1e-2, 4e-6)
     )
     assert seldom.status == often.status == REACHED
     assert seldom.world.clock[0].rebuilds == 1
-    assert not slides or often.world.clock[0].rebuilds > 50
+    assert not slides or often.world.clock[0].rebuilds > 20
     assert motion_bits(seldom) == motion_bits(often)
     assert abs(often.contact_records.shear_force).min() > 0.05
