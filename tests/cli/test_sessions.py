@@ -18,14 +18,15 @@ SESSIONS = {
 }
 PIPE = re.compile(r"((?:[^'|]|'[^']*')*)(\|?)(.*)")  # a command, and what its answer is given to
 NOW_AND_THEN = re.compile(r"^\d+( of \d+ \w+|/\d+ cases, .*)\n", re.MULTILINE)
-PACE = re.compile(r"\d+(?= steps of)|(?<= s in )[\d.]+ s; relative energy error \S+|\d+(?= frames\b| a second\b)")
+PACE = re.compile(r"\d+(?= steps of)|(?<= s in )[\d.]+ s; relative energy error \S+|(?<!at most )\b\d+(?= frames\b)")
 MARKED = [pytest.param(name, marks=pytest.mark.long if "long" in SESSIONS[name][1] else ()) for name in SESSIONS]
 
 
 @pytest.fixture
 def _place(finished: Path, made_up_run: Path, finished_sweep: Path, tmp_path: Path) -> None:
-    """Give a folder with links to a finished run, one with made-up motion, and a sweep."""
-    for name, folder in (("finished", finished), ("made_up", made_up_run), ("swept", finished_sweep)):
+    """Give a folder with links to a finished run, one with made-up motion, a sweep, and pieces of scenarios."""
+    folders = {"finished": finished, "made_up": made_up_run, "swept": finished_sweep}
+    for name, folder in (folders | {"scenes": Path(__file__).with_name("scenes")}).items():
         (tmp_path / name).symlink_to(folder)
 
 
