@@ -60,13 +60,18 @@ Process = Callable[..., Running]
 PATIENCE = 300.0  # s with a process, on a machine that does much else; alone it takes ten
 
 
-def wait_for(path: Path, running: Running) -> None:
-    """Wait until a process has made a file."""
+def wait_until(is_so: Callable[[], bool], running: Running) -> None:
+    """Wait until something is so that a process does."""
     began = time.monotonic()
-    while not path.exists():
+    while not is_so():
         assert running.poll() is None, running.communicate()
         assert time.monotonic() - began < PATIENCE
         time.sleep(0.005)
+
+
+def wait_for(path: Path, running: Running) -> None:
+    """Wait until a process has made a file."""
+    wait_until(path.exists, running)
 
 
 def committed(path: Path) -> int:
@@ -81,11 +86,7 @@ def committed(path: Path) -> int:
 def wait_for_frames(path: Path, running: Running) -> None:
     """Wait until a run has stored some."""
     wait_for(path, running)
-    began = time.monotonic()
-    while committed(path) < 3:
-        assert running.poll() is None, running.communicate()
-        assert time.monotonic() - began < PATIENCE
-        time.sleep(0.005)
+    wait_until(lambda: committed(path) >= 3, running)
 
 
 @pytest.fixture

@@ -4,17 +4,14 @@ import json
 import math
 import re
 import shutil
-import signal
-import time
 import types
 from pathlib import Path
 
 import pytest
 
 from blocksim.scenario import scenario_from_mapping, scenario_to_toml
-from tests.cli.conftest import Command, Process
+from tests.cli.conftest import Command
 from tests.golden import Golden
-from tests.sizes import in_all
 from tests.study.test_limit import SLENDER, block_on_a_slope
 
 WALL = ("limit", "scenarios/tilting_wall.toml")
@@ -133,24 +130,3 @@ def test_full_disk_is_74_and_not_a_limit_without_its_runs(
     (again,) = json.loads((small_disk / "out" / "limit.json").read_text())["changes"]
     assert (again["low"], again["high"]) == (change["low"], change["high"])
     assert (small_disk / "out" / "cases" / again["below"]["case"] / "done.json").is_file()
-
-
-@pytest.mark.long
-def test_a_search_killed_again_and_again_ends_as_one_that_was_not(
-    blocksim: Command, process: Process, tmp_path: Path
-) -> None:
-    slow = (*WALL, *TILT, *FELL, "--set", "time.stop_at_rest=false", "--jobs", 1)
-    assert blocksim(*slow, "--out", "whole").code == 0
-    whole = json.loads((tmp_path / "whole" / "limit.json").read_text())
-    for _ in range(in_all(20)):
-        running = process(*slow, "--out", "killed")
-        time.sleep(1.2)
-        running.send_signal(signal.SIGKILL)
-        running.communicate()
-    answer = blocksim(*slow, "--out", "killed")
-    assert answer.code == 0
-    killed = json.loads((tmp_path / "killed" / "limit.json").read_text())
-    assert killed["changes"] == whole["changes"]
-    lines = (tmp_path / "killed" / "manifest.jsonl").read_text().splitlines()
-    values = [json.loads(line)["values"] for line in lines]
-    assert len(values) == len(set(values)) == whole["runs"]

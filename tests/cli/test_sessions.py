@@ -17,7 +17,13 @@ SESSIONS = {
     for found in HEAD.finditer(file.read_text())
 }
 PIPE = re.compile(r"((?:[^'|]|'[^']*')*)(\|?)(.*)")  # a command, and what its answer is given to
-NOW_AND_THEN = re.compile(r"^\d+( of \d+ \w+|/\d+ cases, .*)\n", re.MULTILINE)
+SOMETIMES = (
+    r"\d+ of \d+ \w+",
+    r"\d+/\d+ cases, .*",
+    r"[\d.]+ of at most .* steps, .*",
+    "Compil(?:ing the solver|ed in) .*",
+)
+NOW_AND_THEN = re.compile(f"^(?:{'|'.join(SOMETIMES)})\n", re.MULTILINE)  # where a command takes long
 PACE = re.compile(r"\d+(?= steps of)|(?<= s in )[\d.]+ s; relative energy error \S+|(?<!at most )\b\d+(?= frames\b)")
 MARKED = [pytest.param(name, marks=pytest.mark.long if "long" in SESSIONS[name][1] else ()) for name in SESSIONS]
 
