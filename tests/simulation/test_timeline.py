@@ -1,0 +1,372 @@
+"""Driven bodies move what lies on them as closed forms say; events happen at their moment; the ledger has it all."""
+
+from __future__ import annotations
+
+from math import atan, cos, degrees, pi, radians, sin
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.errors import ScenarioError
+from blocksim.scenario.motion import drives_of
+from blocksim.simulation import read_result, simulate, simulate_into
+from blocksim.simulation.schemes import build_scene
+from blocksim.verification.scene import HEIGHT, PaperBlock, Simulation, scenario_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from blocksim.scenario import Scenario
+    from blocksim.simulation import Result
+    from tests.golden import Golden
+
+G = 9.81  # m/s2
+MASS = PaperBlock().mass  # kg
+FRICTION = 0.4
+THICK = 0.02  # m
+SOFT = {"explicit": 1e-4, "nonsmooth": 1.0}  # of the material's stiffness: milliseconds are some hundred steps
+PEAK = 10.0 / 3.0**0.5  # greatest acceleration of a smooth ramp, over distance / duration^2
+REST = {"stop_at_rest": True, "rest_hold": 0.004, "rest_speed": 0.02}
+both = pytest.mark.parametrize("scheme", SOFT)
+
+
+def plate(motion: Mapping[str, object] | None = None, *, width: float = 0.3, **keys: Any) -> dict[str, Any]:
+    """Return a plate with its upper face at y = 0.1 m, driven, or fixed without a motion."""
+    moves = {"fixed": True} if motion is None else {"motion": motion}
+    return {"y": 0.1 - THICK / 2, "width": width, "height": THICK, "name": "plate", **moves, **keys}
+
+
+def block(**keys: Any) -> dict[str, Any]:
+    """Return the paper's block on the plate."""
+    return {"y": 0.1 + keys.get("height", HEIGHT) / 2, "name": "block", **keys}
+
+
+def on_plate(scheme: str, bodies: Sequence[Mapping[str, object]], end: float, **tables: Any) -> Scenario:
+    """Return a scenario of bodies, without rebounds unless `restitution` is among the tables."""
+    return scenario_of(
+        bodies,
+        contact={"restitution": tables.pop("restitution", 0.0), "stiffness_scale": SOFT[scheme]},
+        friction={"block_block": tables.pop("friction", FRICTION), "block_ground": FRICTION},
+        time={"scheme": scheme, "end": end, "stop_at_rest": False, **tables.pop("time", {})},
+        **tables,
+    )
+
+
+def smooth(acceleration: float, duration: float = 0.08, **keys: Any) -> dict[str, Any]:
+    """Return a smooth ramp with this greatest acceleration (m/s2), after a rest in which springs settle."""
+    distance = acceleration * duration**2 / PEAK
+    return {"kind": "ramp", "distance": distance, "duration": duration, "course": "smooth", "start": 0.02, **keys}
+
+
+@both
+def test_plate_takes_a_block_along_below_the_friction_limit(scheme: str) -> None:
+    motion = smooth(0.9 * FRICTION * G)
+    run = simulate(on_plate(scheme, [block(), plate(motion)], 0.12))
+    assert run.final["x_mm"].tolist() == pytest.approx([1e3 * motion["distance"]] * 2, rel=0.01)
+    assert run.summary.energy_J.relative_residual < 1e-3
+
+
+@both
+def test_block_slips_on_its_plate_at_exactly_the_friction_limit(scheme: str) -> None:
+    run = Simulation(build_scene(on_plate(scheme, [block(), plate(smooth(4.0 * FRICTION * G))], 0.12)))
+    run.to_time(0.03)
+    rates = []
+    while run.time < 0.05:  # the plate is ahead of the block all this time
+        before, since = float(run.bodies.vx[0]), run.time
+        run.to_step(run.steps + 20)
+        rates.append((float(run.bodies.vx[0]) - before) / (run.time - since))
+    assert rates == pytest.approx([FRICTION * G] * len(rates), rel=0.02 if scheme == "explicit" else 1e-3)
+    assert run.residual() < 1e-3
+
+
+@both
+def test_lift_presses_with_the_mass_times_gravity_and_acceleration(scheme: str) -> None:
+    motion = smooth(6.0, direction="90 deg")
+    run = simulate(on_plate(scheme, [block(), plate(motion)], 0.2, output={"contacts": True, "every": 0.0005}))
+    contacts = run.frames.contacts
+    assert contacts is not None
+    for share in (0.25, 0.75):
+        frame = int(np.argmin(np.abs(run.frames.time - (0.02 + 0.08 * share))))
+        pull = 6.0 / PEAK * (60.0 * share - 180.0 * share**2 + 120.0 * share**3)
+        assert sum(contacts.at(frame)["normal_force"]) == pytest.approx(MASS * (G + pull), rel=0.02)
+    assert run.summary.energy_J.to_support == pytest.approx(-MASS * G * motion["distance"], rel=0.01)
+    assert run.summary.energy_J.relative_residual < 1e-3
+
+
+@both
+def test_slender_block_tips_from_a_turning_plate_at_its_own_slope(scheme: str) -> None:
+    slope = degrees(atan(0.25))
+    angle = radians(slope - 2.0)
+    c, s = cos(angle), sin(angle)
+    motion = {"kind": "rotation", "angle": "10 deg", "duration": 1.0, "about": [0.0, 0.2]}
+    below = plate(motion, x=s * THICK / 2, y=0.2 - c * THICK / 2, angle=angle)
+    above = {"x": -s * 0.02, "y": 0.2 + c * 0.02, "angle": angle, "width": 0.01, "height": 0.04}
+    run = Simulation(build_scene(on_plate(scheme, [above, below], 1.0, friction=2.0)))
+    while run.time < 0.4 and float(run.bodies.angle[0] - run.bodies.angle[1]) < radians(0.5):
+        run.to_step(run.steps + 20)
+    assert slope - 0.1 < degrees(float(run.bodies.angle[1])) < slope + 1.5  # until it has tipped so far
+
+
+@both
+def test_driven_plate_does_to_a_block_what_a_fixed_one_on_a_moving_support_does(scheme: str) -> None:
+    motion = {"kind": "harmonic", "amplitude": "4 mm", "frequency": 8, "direction": "20 deg"}
+    time = {"step": 1e-4} if scheme == "nonsmooth" else {}  # the usual one follows from how fast bodies are
+    own = simulate(on_plate(scheme, [block(), plate(motion)], 0.1, time=time))
+    shared = simulate(on_plate(scheme, [block(), plate()], 0.1, motion=motion, time=time))
+    assert own.final.iloc[0, 1:].tolist() == pytest.approx(shared.final.iloc[0, 1:].tolist(), abs=1e-9)
+    assert own.summary.energy_J.to_support == pytest.approx(shared.summary.energy_J.to_support, abs=1e-12)
+
+
+@both
+def test_bodies_come_back_to_the_last_bit_and_the_run_rests_only_then(scheme: str) -> None:
+    motion = {"kind": "harmonic", "amplitude": "1 mm", "frequency": 50, "duration": 0.06, "ramp": 0.02}
+    rest = {"stop_at_rest": True, "rest_hold": 0.002, "rest_speed": 0.01}
+    run = simulate(on_plate(scheme, [block(), plate(motion)], 0.2, time=rest))
+    assert run.reason == "at rest"
+    assert 0.06 < run.summary.simulated_time_s < 0.15
+    assert run.frames.y[-1, 1] == run.frames.y[0, 1]
+    assert run.frames.x[-1, 1] == pytest.approx(run.frames.x[0, 1], abs=1e-12)
+
+
+@both
+def test_wheel_of_a_far_point_moves_on_its_circle(scheme: str) -> None:
+    turn = {"kind": "rotation", "angle": "90 deg", "duration": "50 ms", "about": [0.2, 0.1]}
+    frame = simulate(on_plate(scheme, [block(x=1.0, y=HEIGHT / 2), plate(turn, width=0.1)], 0.06)).frames
+    radius = np.hypot(frame.x[:, 1] - 0.2, frame.y[:, 1] - 0.1)
+    assert radius == pytest.approx(np.hypot(0.2, THICK / 2), abs=1e-12)
+    assert (frame.x[-1, 1], frame.y[-1, 1]) == pytest.approx((0.2 + THICK / 2, -0.1), abs=1e-12)
+    assert frame.angle[-1, 1] == pytest.approx(pi / 2)
+
+
+@both
+def test_block_struck_by_a_driven_body_leaves_as_restitution_says(scheme: str) -> None:
+    """At 1.8 times the speed, with energy that the driven body brings in: no gain that had to be prevented."""
+    ramp = {"kind": "ramp", "distance": 0.05, "speed": 1.0}
+    pusher = {"x": -0.04, "y": HEIGHT / 2, "width": 0.02, "height": 0.02, "name": "pusher", "motion": ramp}
+    scenario = on_plate(scheme, [{"x": 0.0, "y": HEIGHT / 2}, pusher], 0.09, friction=0.0, gravity=0.0, restitution=0.8)
+    run = simulate(scenario)
+    assert run.final.loc[0, "vx_mm_s"] == pytest.approx(1800.0, rel=0.01)
+    assert run.summary.energy_J.relative_residual < 1e-3
+
+
+def test_speed_of_a_ramp_is_the_greatest_of_its_course() -> None:
+    for course, mean in (("constant", 2.0), ("smooth", 2.0 * 8.0 / 15.0)):
+        motion = {"kind": "ramp", "distance": 0.3, "speed": 2.0, "course": course}
+        (drive,) = drives_of(on_plate("explicit", [block(), plate(motion)], 1.0))
+        assert drive.rest_time == pytest.approx(0.3 / mean)
+
+
+def with_events(scheme: str, events: Sequence[Mapping[str, object]], end: float = 0.08, **tables: Any) -> Scenario:
+    """Return a block on a fixed plate to which something happens."""
+    bodies = tables.pop("bodies", [block(), plate()])
+    return on_plate(scheme, bodies, end, events=events, **{"output": {"every": 0.0005}, **tables})
+
+
+@both
+def test_block_falls_freely_from_the_very_moment_its_plate_goes(scheme: str) -> None:
+    run = simulate(with_events(scheme, [{"at": 0.03, "remove": ["plate"]}]))
+    (event,) = run.summary.events
+    frames = run.frames
+    since = frames.time - event.time_s
+    start = int(np.argmin(np.abs(since)))
+    fall = since[start:-1] - since[start]
+    y, vy = frames.y[start, 0], frames.vy[start, 0]
+    assert event.time_s == pytest.approx(0.03, abs=0.5 * run.summary.time_step_s)
+    assert since[start] >= -1e-12
+    assert vy == pytest.approx(0.0, abs=0.01)
+    assert frames.y[start:-1, 0] == pytest.approx(y + vy * fall - 0.5 * G * fall**2, abs=1e-9)
+    assert frames.contact_count[start] == 0
+    assert run.summary.energy_J.relative_residual < 1e-4
+
+
+@both
+def test_removed_body_stays_where_it_was_without_a_velocity_and_takes_its_energy_along(
+    tmp_path: Path, scheme: str
+) -> None:
+    bodies = [block(velocity=[1.0, 0.0]), plate(), block(x=0.1, name="flying", y=0.3)]
+    run = simulate_into(with_events(scheme, [{"at": 0.03, "remove": ["flying"]}], bodies=bodies), tmp_path)
+    (event,) = run.summary.events
+    frames = read_result(tmp_path).frames
+    gone = frames.time > event.time_s - 1e-9
+    assert np.isnan(frames.vx[gone, 2]).all()
+    assert frames.y[gone, 2] == pytest.approx(0.3 - 0.5 * G * event.time_s**2, abs=1e-6)
+    assert np.isfinite(frames.vx[~gone]).all()
+    assert (tmp_path / "final.csv").read_text().splitlines()[-1].endswith(",,,")
+    assert run.summary.energy_J.events == pytest.approx(event.energy_J)
+    assert event.energy_J == pytest.approx(0.3 * G * MASS, rel=1e-6)
+    assert run.summary.energy_J.relative_residual < 1e-3
+    assert run.summary.movement is not None
+    assert run.summary.movement.first_mover == "block"
+
+
+@both
+def test_body_is_held_in_its_flight_and_falls_again_from_rest(scheme: str) -> None:
+    events = [{"at": 0.02, "fix": ["block"]}, {"at": 0.05, "free": ["block"]}]
+    run = simulate(with_events(scheme, events, bodies=[block(y=1.0), plate()]))
+    held, free = (event.time_s for event in run.summary.events)
+    y = 1.0 - 0.5 * G * held**2
+    still = (run.frames.time > held + 1e-3) & (run.frames.time < free)
+    assert run.frames.y[still, 0] == pytest.approx(y, abs=1e-9)
+    end = run.summary.simulated_time_s
+    assert run.frames.y[-1, 0] == pytest.approx(y - 0.5 * G * (end - free) ** 2, abs=1e-9)
+    fixed, freed = (event.energy_J for event in run.summary.events)
+    assert fixed == pytest.approx(-freed + 0.5 * MASS * (G * held) ** 2, rel=1e-6)
+    assert run.summary.energy_J.relative_residual < 1e-6
+
+
+@both
+def test_new_velocity_is_had_at_once_and_its_energy_is_tallied(scheme: str) -> None:
+    event = {"at": 0.01, "velocity": {"body": "block", "vx": 2.0, "spin": "0 rad/s"}}
+    run = simulate(with_events(scheme, [event], bodies=[block(y=1.0, spin=3.0), plate()]))
+    end = run.summary.simulated_time_s
+    row = [run.final.loc[0, name] for name in ("x_mm", "vy_mm_s", "spin_deg_s")]
+    expected = [2e3 * (end - run.summary.events[0].time_s), -1e3 * G * end, 0.0]
+    assert row == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert run.summary.events[0].energy_J < 0.0
+    assert run.summary.energy_J.relative_residual < 1e-6
+
+
+@both
+@pytest.mark.parametrize(("action", "way"), [("free", 80.0), ("fix", 40.0)])
+def test_driven_plate_that_is_freed_flies_on_and_one_that_is_fixed_stops(scheme: str, action: str, way: float) -> None:
+    bodies = [block(x=5.0), plate({"kind": "ramp", "distance": 1.0, "speed": 1.0}, y=2.0)]
+    run = simulate(with_events(scheme, [{"at": 0.04, action: ["plate"]}], bodies=bodies))
+    assert run.final.loc[1, "x_mm"] == pytest.approx(way, rel=0.01)
+
+
+@both
+def test_wall_that_is_removed_lets_a_block_pass(scheme: str) -> None:
+    scene: dict[str, Any] = {"bodies": [block(y=1.0, velocity=[1.0, 0.0])]}
+    scene["walls"] = [{"from": [0.05, 0.5], "to": [0.05, 1.5]}]
+    stopped = simulate(with_events(scheme, [], **scene))
+    passed = simulate(with_events(scheme, [{"at": 0.005, "remove": ["wall 1"]}], **scene))
+    assert 30.0 < stopped.columns["x_mm"][0] < 35.0
+    assert passed.final.loc[0, "x_mm"] == pytest.approx(1e3 * passed.summary.simulated_time_s, rel=1e-6)
+
+
+@both
+def test_rest_lets_the_next_event_happen_and_the_run_go_on(scheme: str) -> None:
+    push, removal = {"velocity": {"body": "block", "vx": 0.3}}, {"remove": ["plate"]}
+    events: list[Mapping[str, object]] = [{"when": "rest", **one} for one in (push, removal)]
+    run = simulate(with_events(scheme, events, end=1.0, time=REST))
+    first, second = run.summary.events
+    assert first.time_s >= 0.004
+    assert second.time_s > first.time_s + (0.3 - REST["rest_speed"]) / (FRICTION * G)
+    assert run.reason == "at rest"
+    assert run.final.loc[0, "y_mm"] == pytest.approx(500.0 * HEIGHT, abs=0.5)
+    slid = 0.5 * 0.3**2 / (FRICTION * G)
+    flight = (0.2 / G) ** 0.5
+    assert 0.99 * slid < 1e-3 * run.columns["x_mm"][0] < slid + flight * REST["rest_speed"]
+
+
+@both
+def test_load_that_ends_leaves_a_body_as_fast_as_it_has_become(scheme: str) -> None:
+    pull = {"kind": "force", "name": "pull", "body": "block", "magnitude": 2.0 * MASS}
+    wind = {"kind": "horizontal", "name": "wind", "magnitude": 3.0 / G, "history": {"kind": "ramp", "end": 1e-9}}
+    events = [{"at": 0.03, "unload": ["pull"]}, {"at": 0.05, "unload": ["wind"]}]
+    run = simulate(with_events(scheme, events, bodies=[block(y=1.0), plate()], loads=[wind, pull]))
+    assert [event.what for event in run.summary.events] == ["load pull ended", "load wind ended"]
+    first, second = (event.time_s for event in run.summary.events)
+    vx = 5.0 * first + 3.0 * (second - first)
+    x = 2.5 * first**2 + 5.0 * first * (second - first) + 1.5 * (second - first) ** 2
+    x += vx * (run.summary.simulated_time_s - second)
+    assert [run.final.loc[0, name] for name in ("vx_mm_s", "x_mm")] == pytest.approx([1e3 * vx, 1e3 * x], rel=1e-3)
+    assert run.summary.energy_J.to_loads == pytest.approx(-0.5 * MASS * vx**2, rel=2e-3)
+    assert run.summary.energy_J.relative_residual < 1e-4
+
+
+@both
+def test_load_that_has_ended_at_rest_delays_no_later_rest(scheme: str) -> None:
+    push = {"kind": "force", "name": "push", "body": "block", "magnitude": 0.5 * FRICTION * MASS * G}
+    late = {**push, "name": "late", "magnitude": 1e-9, "history": {"kind": "ramp", "end": 50.0}}
+    events = [{"at": 0.01, "unload": ["late"]}, {"when": "rest", "unload": ["push"]}]
+    run = simulate(with_events(scheme, events, end=1.0, time=REST, loads=[push, late]))
+    assert [event.what for event in run.summary.events] == ["load late ended", "load push ended"]
+    assert run.reason == "at rest"
+    assert run.summary.simulated_time_s < 0.5
+
+
+@both
+def test_rest_before_a_time_does_not_end_the_run_and_what_never_happens_is_told(scheme: str) -> None:
+    late = simulate(with_events(scheme, [{"at": 0.06, "remove": ["plate"]}], time=REST))
+    assert [one.what for one in late.summary.events] == ["plate removed"]
+    removal = [{"when": "rest", "remove": ["plate"]}]
+    never = simulate(with_events(scheme, removal, bodies=[block(y=1.0), plate()], time=REST))
+    assert never.summary.events == ()
+    assert any("events.0 has not happened" in text for text in never.summary.warnings)
+
+
+JOINT = 0.002  # m, where two seats meet, from the middle of the block
+SOON = 3.3  # steps before it lands
+LEFT, RIGHT = (plate(width=0.1, x=JOINT + 0.05 * side, name=f"seat{side:g}") for side in (-1.0, 1.0))
+FALLING = {"velocity": [0.0, -1.0]}
+
+
+def landing(
+    seats: Sequence[Mapping[str, object]], start: Mapping[str, object], *events: Mapping[str, object]
+) -> Result:
+    """Return a block 1 mm above its seats that comes down on them at 1 m/s, or does so after an event."""
+    bodies = [block(**{"y": 0.1 + 0.5 * HEIGHT + 1e-3, **start}), *seats]
+    return simulate(with_events("explicit", events, 0.01, bodies=bodies, gravity=0.0, restitution=0.5))
+
+
+def test_seat_that_is_removed_bears_no_part_of_a_block_that_lands_steps_later() -> None:
+    alone = landing([LEFT], FALLING)
+    run = landing([LEFT, RIGHT], FALLING, {"at": 1e-3 - SOON * alone.summary.time_step_s, "remove": [RIGHT["name"]]})
+    for name in ("vy_mm_s", "spin_deg_s"):
+        assert run.final.loc[0, name] == pytest.approx(alone.final.loc[0, name], rel=1e-9)
+
+
+def test_block_that_is_freed_steps_before_it_lands_is_borne_by_both_seats() -> None:
+    step = landing([LEFT, RIGHT], FALLING).summary.time_step_s
+    start = {"fixed": True, "y": 0.1 + 0.5 * HEIGHT + SOON * step}
+    freed = {"at": step, "free": ["block"], "velocity": {"body": "block", "vy": -1.0}}
+    run = landing([LEFT, RIGHT], start, freed)
+    assert run.final.loc[0, "vy_mm_s"] == pytest.approx(500.0, abs=1.0)
+    assert run.final.loc[0, "spin_deg_s"] == pytest.approx(0.0, abs=0.1)
+
+
+def test_block_on_two_others_is_fixed_and_freed_and_they_stay_where_they_are() -> None:
+    bodies = [block(y=0.1 + 1.5 * HEIGHT), block(name="left", x=-0.016), block(name="right", x=0.016), plate()]
+    events = [{"at": 0.02, "fix": ["block"]}, {"at": 0.03, "free": ["block"]}]
+    run = simulate(with_events("explicit", events, bodies=bodies))
+    assert run.reason == "end of simulated time"
+    assert run.final.loc[0, "y_mm"] == pytest.approx(100.0 + 1500.0 * HEIGHT, abs=0.05)
+    assert run.final.loc[1:2, "y_mm"].to_numpy() == pytest.approx(100.0 + 500.0 * HEIGHT, abs=0.05)
+    assert run.summary.energy_J.relative_residual < 1e-3
+
+
+IMPOSSIBLE: list[list[Mapping[str, object]]] = [
+    [{"at": 0.0, "remove": ["plate"]}],
+    [{"at": 0.5, "remove": ["plate"]}],
+    [{"at": 0.01, "remove": ["plat"]}],
+    [{"at": 0.01, "fix": ["plate"]}],
+    [{"at": 0.01, "free": ["block"]}],
+    [{"at": 0.01, "fix": ["wall 1"]}],
+    [{"at": 0.01, "remove": ["block"]}, {"at": 0.02, "fix": ["block"]}],
+    [{"at": 0.02, "fix": ["block"]}, {"at": 0.01, "remove": ["block"]}],
+    [{"at": 0.01, "fix": ["block"]}, {"at": 0.01, "free": ["block"]}],
+    [{"at": 0.01, "fix": ["block"], "velocity": {"body": "block", "vx": 1.0}}],
+    [{"at": 0.01, "velocity": {"body": "plate", "vx": 1.0}}],
+    [{"at": 0.01, "unload": ["winf"]}],
+    [{"at": 0.01, "unload": ["table"]}],
+    [{"at": 0.02, "unload": ["wind"]}, {"at": 0.01, "unload": ["wind"]}],
+    [{"at": 0.01, "when": "rest", "remove": ["plate"]}],
+    [{"remove": ["plate"]}],
+    [{"at": 0.01}],
+    [{"when": "rest", "remove": ["plate"]}],
+]
+
+
+def test_impossible_events_are_told_with_their_place(golden: Golden) -> None:
+    wind = {"kind": "horizontal", "name": "wind", "magnitude": 0.1}
+    loads = [wind, {"kind": "gravity", "name": "table", "to": "1 deg", "rate": "1 deg/s"}]
+    told = []
+    for events in IMPOSSIBLE:
+        with pytest.raises(ScenarioError, match=r"events\.\d") as caught:
+            with_events("explicit", events, loads=loads, walls=[{"from": [0.4, 0.3], "to": [0.4, 0.1]}])
+        told.append(f"{events}\n{caught.value}")
+        assert caught.value.exit_code == 65
+    golden("\n\n".join(told))
