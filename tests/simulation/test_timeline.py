@@ -248,9 +248,8 @@ def test_wall_that_is_removed_lets_a_block_pass(scheme: str) -> None:
 
 @both
 def test_rest_lets_the_next_event_happen_and_the_run_go_on(scheme: str) -> None:
-    push, removal = {"velocity": {"body": "block", "vx": 0.3}}, {"remove": ["plate"]}
-    events: list[Mapping[str, object]] = [{"when": "rest", **one} for one in (push, removal)]
-    run = simulate(with_events(scheme, events, end=1.0, time=REST))
+    push: dict[str, object] = {"when": "rest", "velocity": {"body": "block", "vx": 0.3}}
+    run = simulate(with_events(scheme, [push, {"when": "rest", "remove": ["plate"]}], end=1.0, time=REST))
     first, second = run.summary.events
     assert first.time_s >= 0.004
     assert second.time_s > first.time_s + (0.3 - REST["rest_speed"]) / (FRICTION * G)
@@ -281,7 +280,7 @@ def test_load_that_ends_leaves_a_body_as_fast_as_it_has_become(scheme: str) -> N
 def test_load_that_has_ended_at_rest_delays_no_later_rest(scheme: str) -> None:
     push = {"kind": "force", "name": "push", "body": "block", "magnitude": 0.5 * FRICTION * MASS * G}
     late = {**push, "name": "late", "magnitude": 1e-9, "history": {"kind": "ramp", "end": 50.0}}
-    events = [{"at": 0.01, "unload": ["late"]}, {"when": "rest", "unload": ["push"]}]
+    events: list[dict[str, object]] = [{"at": 0.01, "unload": ["late"]}, {"when": "rest", "unload": ["push"]}]
     run = simulate(with_events(scheme, events, end=1.0, time=REST, loads=[push, late]))
     assert [event.what for event in run.summary.events] == ["load late ended", "load push ended"]
     assert run.reason == "at rest"
