@@ -1,4 +1,4 @@
-"""What a run with soil leaves: probes of thrust, soils.csv, pictures, exports."""
+"""What a run with soil leaves, beside blocks or alone: probes of thrust, soils.csv, pictures, exports, reports."""
 
 from pathlib import Path
 
@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 import blocksim
-from blocksim.errors import InvalidInputError
+from blocksim.errors import InvalidInputError, ScenarioError
+from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation import Result
-from blocksim.simulation.stores.exports import write_vtkhdf
+from blocksim.simulation.stores.exports import write_geojson, write_vtkhdf
 from blocksim.study.run import open_run
 from blocksim.view.kinds import run_kind
 from blocksim.view.paints import paint_of
 from blocksim.view.report.player import pack_frames
 from blocksim.view.scene import PictureOptions
-from tests.soils import DEPTH, LEFT, column, scene
+from tests.soils import DEPTH, LEFT, column, data_of, scene
 from tests.view.made_up import toppling
 
 WEIGHT = 20e3 * 0.05 * 0.05 * DEPTH
@@ -33,13 +34,19 @@ SCENE = scene(
     blocks={"weir": {"width": 0.04, "height": 0.045, "length": DEPTH, "material": "soft"}},
     bodies=[{"block": "weir", "x": 0.08, "y": 0.0225}],
 )
+ALONE = data_of(column(0.04, 0.04, 0.005), walls=[LEFT], end=0.06, output={"every": 0.02}, blocks={}, bodies=[])
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Result:
     """Run a column that collapses against a block."""
-    folder = tmp_path_factory.mktemp("soil") / "run"
-    return blocksim.run(SCENE, out=folder)
+    return blocksim.run(SCENE, out=tmp_path_factory.mktemp("soil") / "run")
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    """Run a column without any block."""
+    return blocksim.run(scenario_from_mapping(ALONE), out=tmp_path_factory.mktemp("alone") / "run")
 
 
 def test_probes_record_what_soil_does_to_walls_and_ground_and_gets_back(run: Result) -> None:
@@ -48,10 +55,12 @@ def test_probes_record_what_soil_does_to_walls_and_ground_and_gets_back(run: Res
     assert wall["x"] == pytest.approx(0.0, abs=1e-9)
     assert 0.01 < wall["y"][0] < 0.025  # a third of the height
     assert -ground["fy"][0] == pytest.approx(WEIGHT, rel=0.02)
-    block = run.probes["soil"]["fy"] + run.probes["wall"]["fy"] + run.probes["ground"]["fy"]
+    block = soil["fy"] + wall["fy"] + ground["fy"]
     assert block[0] == pytest.approx(0.0, abs=1e-6 * WEIGHT)  # until it reaches the block
     assert soil["fx"][0] == pytest.approx(-wall["fx"][0] - ground["fx"][0])
     assert ((wall["mobilised"] >= 0.0) & (wall["mobilised"] <= 1.0 + 1e-9)).all()
+    with pytest.raises(InvalidInputError, match='unknown body "colum", did you mean'):
+        scene(column(0.05, 0.05, 0.005), probes=[{"kind": "force", "on": "ground", "by": "colum"}])
 
 
 def test_the_end_of_soils_is_a_table_of_the_folder_and_of_the_result(run: Result) -> None:
@@ -67,11 +76,14 @@ def test_the_end_of_soils_is_a_table_of_the_folder_and_of_the_result(run: Result
 
 
 @pytest.mark.parametrize("kind", ["strip", "final", "profile"])
-def test_pictures_show_soil(run: Result, kind: str, tmp_path: Path) -> None:
+def test_pictures_show_soil(run: Result, alone: Result, kind: str, tmp_path: Path) -> None:
     paint = paint_of("pressure", run.frames, SCENE)
     run_kind(kind)(run.frames, tmp_path / "one.svg", PictureOptions("title", paint=paint))
-    text = (tmp_path / "one.svg").read_text()
-    assert text.count("<path") > (100 if kind != "profile" else 8)
+    assert (tmp_path / "one.svg").read_text().count("<path") > (100 if kind != "profile" else 8)
+    assert blocksim.plot(alone, tmp_path / "alone.png", kind=kind).stat().st_size > 5000
+    if kind == "profile":
+        with pytest.raises(InvalidInputError, match="no soil in this run"):
+            run_kind(kind)(toppling(3), tmp_path / "one.svg", PictureOptions())
 
 
 def test_soil_has_the_colour_asked_for_and_blocks_keep_theirs(run: Result) -> None:
@@ -86,19 +98,10 @@ def test_soil_has_the_colour_asked_for_and_blocks_keep_theirs(run: Result) -> No
         paint_of("plastic", toppling(2), SCENE)
 
 
-def test_a_run_without_soil_has_no_profile(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="no soil in this run"):
-        run_kind("profile")(toppling(3), tmp_path / "one.svg", PictureOptions())
-
-
 def test_the_player_gets_every_shade_with_its_scale(run: Result) -> None:
     (soil,) = pack_frames(run.frames).data["systems"]
-    assert [shade["label"].split(" (")[0] for shade in soil["shades"]] == [
-        "displacement",
-        "speed",
-        "plastic shear strain",
-        "mean pressure",
-    ]
+    labels = [shade["label"].split(" (")[0] for shade in soil["shades"]]
+    assert labels == ["displacement", "speed", "plastic shear strain", "mean pressure"]
     assert all(shade["high"] > 0.0 for shade in soil["shades"])
     assert len(set(soil["palette"])) == len(soil["palette"])
 
@@ -111,6 +114,33 @@ def test_paraview_gets_displacement_stress_and_pressure(run: Result, tmp_path: P
         assert np.max(data["displacement_mm"]) > 5.0
 
 
-def test_a_name_that_is_no_soil_is_located() -> None:
-    with pytest.raises(InvalidInputError, match='unknown body "colum", did you mean'):
-        scene(column(0.05, 0.05, 0.005), probes=[{"kind": "force", "on": "ground", "by": "colum"}])
+def test_soil_alone_falls_as_beside_a_block_far_away_and_needs_no_wall(alone: Result) -> None:
+    beside = blocksim.run(scenario_from_mapping(data_of(*ALONE["soils"], walls=[LEFT], end=0.06)))
+    assert alone.columns["block"] == []
+    assert alone.summary.movement is None
+    front, expected = (one.endings["soils"]["right_mm"] for one in (alone, beside))
+    assert front == pytest.approx(expected, rel=1e-3)  # other steps
+    assert alone.folder is not None
+    (again,) = blocksim.open_run(alone.folder).frames.others
+    assert np.ptp(again["y"][-1]) > 0.02
+    free = blocksim.run(scenario_from_mapping({**ALONE, "walls": []}))
+    left, right = (free.endings["soils"][name][0] for name in ("left_mm", "right_mm"))
+    assert left + right == pytest.approx(40.0, abs=0.1)  # it spreads alike to both sides
+
+
+def test_soil_alone_is_exported_and_reported_and_what_is_about_blocks_says_that_there_are_none(
+    alone: Result, tmp_path: Path
+) -> None:
+    assert write_vtkhdf(tmp_path / "run.vtkhdf", alone.frames, alone.scenario) == len(alone.frames.time)
+    assert blocksim.report(alone, out=tmp_path / "run.html").stat().st_size > 20_000
+    assert blocksim.animate(alone, tmp_path / "run.gif").stat().st_size > 5000
+    with pytest.raises(InvalidInputError, match="a history is that of blocks"):
+        blocksim.plot(alone, tmp_path / "picture.png", kind="history")
+    with pytest.raises(InvalidInputError, match="no block to export"):
+        write_geojson(tmp_path / "run.geojson", alone.frames, alone.scenario)
+
+
+def test_soil_on_the_solid_side_of_a_wall_is_refused_as_it_would_pass_through() -> None:
+    turned = {**LEFT, "from": LEFT["to"], "to": LEFT["from"]}
+    with pytest.raises(ScenarioError, match="meets the solid side of wall 1, right of the way"):
+        scenario_from_mapping({**ALONE, "walls": [turned]})

@@ -87,7 +87,7 @@ def test_case_in_full_is_inside_its_tolerances(case: Case, head: str) -> None:
 @pytest.mark.parametrize(
     ("name", "outside"),
     [
-        pytest.param("S2", ["corrected: K, 5 mm"], marks=LONG),  # tests/simulation has a wall that is drawn back
+        pytest.param("S2", ["corrected: K, 5 mm"], marks=LONG),  # tests/simulation has one on a rough base
         pytest.param("S4", [], marks=LONG),
         pytest.param("S6", [], marks=LONG),
         ("S7", []),
