@@ -1,19 +1,170 @@
-"""The face for users: what it refuses, what it copies, and the examples in its documentation and in the README."""
+"""Smoothing functions, what sums over disordered particles keep exactly, and the face for users."""
 
 from __future__ import annotations
 
 import doctest
+import math
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
+from scipy.integrate import quad
 
 from blocksim.kernels.sph import fields
-from blocksim.kernels.sph.fields import Particles, gradient, interpolate
+from blocksim.kernels.sph.fields import KernelName, Particles, gradient, interpolate
+from blocksim.kernels.sph.functions import KERNEL_CODES, kernel_slope, kernel_value, support_radius
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from blocksim.kernels.common.arrays import Floats
+
+H = 0.013
+EVERY_CODE = pytest.mark.parametrize("code", KERNEL_CODES.values(), ids=KERNEL_CODES.keys())
+
+
+def over_pieces(integrand: Callable[[float], float], end: float) -> float:
+    """Integrate from 0 to `end` (in smoothing lengths), knot by knot."""
+    return float(sum(quad(integrand, i, i + 1, epsabs=1e-13, epsrel=1e-12)[0] for i in range(round(end))))
+
+
+@EVERY_CODE
+@pytest.mark.parametrize("h", [1.0, H, 250.0])
+def test_integral_over_the_plane_is_one(code: int, h: float) -> None:
+    end = support_radius(code, h) / h
+    total = over_pieces(lambda q: 2.0 * math.pi * q * h * kernel_value(code, q * h, h) * h, end)
+    assert total == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("name", "support"), [("cubic-spline", 2.0), ("wendland-c2", 2.0), ("quintic-spline", 3.0)])
+def test_function_is_positive_and_falls_within_its_support_and_is_zero_beyond(name: str, support: float) -> None:
+    code = KERNEL_CODES[name]
+    assert support_radius(code, H) == pytest.approx(support * H)
+    inside = [kernel_value(code, q * H, H) for q in np.linspace(0.0, 0.99 * support, 200)]
+    assert min(inside) > 0.0
+    assert (np.diff(inside) < 0.0).all()
+    for q in (support, 1.001 * support, 1e6):
+        assert kernel_value(code, q * H, H) == 0.0
+        assert kernel_slope(code, q * H, H) == 0.0
+
+
+@EVERY_CODE
+@given(q=st.floats(0.0, 3.2))
+def test_slope_is_the_derivative(code: int, q: float) -> None:
+    # central difference of step e: error W''' e^2/6; |W'''| < 10/h^5 for all three
+    step = 1e-4 * H
+    r = max(q * H, step)
+    difference = (kernel_value(code, r + step, H) - kernel_value(code, r - step, H)) / (2.0 * step)
+    assert kernel_slope(code, r, H) == pytest.approx(difference, abs=3e-8 / H**3)
+    assert kernel_slope(code, r, H) <= 0.0
+
+
+EVERY_KERNEL = pytest.mark.parametrize("kernel", get_args(KernelName))
+POINTS = np.array([[0.0, 0.0], [-0.5, 0.3], [0.61, 0.61], [0.23, -0.41]])  # inside, and on edges and corners
+ROUND_OFF = 1e-12
+
+
+def scatter(kernel: KernelName = "wendland-c2", seed: int = 0) -> Particles:
+    """Throw 12 x 12 particles, 0.1 m apart and moved by up to 0.03 m, with masses and densities that differ."""
+    random = np.random.default_rng(seed)
+    lattice = np.stack(np.meshgrid(np.arange(12), np.arange(12)), axis=-1).reshape(-1, 2)
+    positions = 0.1 * (lattice + random.uniform(-0.3, 0.3, lattice.shape)) - 0.5
+    density = random.uniform(1000.0, 2000.0, len(lattice))
+    return Particles(positions, density * 0.01 * random.uniform(0.8, 1.2, len(lattice)), density, 0.15, kernel)
+
+
+def way(particles: Particles, points: Floats) -> tuple[Floats, Floats]:
+    """Return r - r_b for every point and particle, and its length."""
+    apart = points[:, None, :] - particles.sources.positions[None, :, :]
+    return apart, np.hypot(apart[..., 0], apart[..., 1])
+
+
+def dense(function: Callable[..., float], particles: Particles, distance: Floats) -> Floats:
+    """Return W or dW/dr for a table of distances."""
+    sources = particles.sources
+    table: Floats = np.vectorize(function)(sources.function, distance, sources.smoothing_length)
+    return table
+
+
+def gradients_of_kernel(particles: Particles) -> Floats:
+    """Return grad_a W_ab for all pairs (a, b)."""
+    apart, distance = way(particles, particles.sources.positions)
+    return dense(kernel_slope, particles, distance)[..., None] * apart / np.maximum(distance, 1e-300)[..., None]
+
+
+@EVERY_KERNEL
+def test_plain_and_symmetric_gradients_are_their_equations(kernel: KernelName) -> None:
+    particles = scatter(kernel)
+    m, rho = particles.sources.mass, particles.sources.density
+    values = np.random.default_rng(1).normal(size=m.size)
+    slopes = gradients_of_kernel(particles)
+    plain = np.einsum("b,abk->ak", m * values / rho, slopes)
+    symmetric = np.einsum("a,ab,abk->ak", rho, m * (values[:, None] / rho[:, None] ** 2 + values / rho**2), slopes)
+    np.testing.assert_allclose(gradient(particles, values), plain, atol=ROUND_OFF * np.abs(plain).max())
+    np.testing.assert_allclose(
+        gradient(particles, values, "symmetric"), symmetric, atol=ROUND_OFF * np.abs(symmetric).max()
+    )
+
+
+@EVERY_KERNEL
+@pytest.mark.parametrize("seed", range(3))
+def test_corrected_forms_reproduce_linear_fields(kernel: KernelName, seed: int) -> None:
+    particles = scatter(kernel, seed)
+
+    def linear(places: Floats) -> Floats:
+        return 7.0 - 3.0 * places[:, 0] + 2.0 * places[:, 1]
+
+    values = linear(particles.sources.positions)
+    assert interpolate(particles, values, POINTS, "linear") == pytest.approx(linear(POINTS), rel=ROUND_OFF)
+    slopes = gradient(particles, values, "corrected")
+    np.testing.assert_allclose(slopes, np.broadcast_to([-3.0, 2.0], slopes.shape), rtol=ROUND_OFF * 10)
+    # and nothing else does
+    for form in ("plain", "shepard"):
+        assert np.abs(interpolate(particles, values, POINTS, form) - linear(POINTS)).max() > 0.01
+    for other in ("plain", "symmetric", "difference"):
+        assert np.abs(gradient(particles, values, other) - (-3.0, 2.0)).max() > 0.1
+
+
+@EVERY_KERNEL
+def test_constants_are_reproduced_by_all_but_the_plain_forms(kernel: KernelName) -> None:
+    particles = scatter(kernel)
+    assert interpolate(particles, 5.0, POINTS, "shepard") == pytest.approx(5.0, rel=ROUND_OFF)
+    assert interpolate(particles, 5.0, POINTS, "linear") == pytest.approx(5.0, rel=ROUND_OFF)
+    assert not gradient(particles, 5.0, "difference").any()
+    assert not gradient(particles, 5.0, "corrected").any()
+
+
+def on_a_line(angle: float) -> tuple[Particles, Floats]:
+    """Return nine particles on a line through the origin, and its direction."""
+    along = np.array([np.cos(angle), np.sin(angle)])
+    places = np.outer(np.linspace(-0.4, 0.4, 9) ** 3 + np.linspace(-0.4, 0.4, 9), along)
+    return Particles(places, 1.0, 100.0, 0.2), along
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.6, np.pi / 2, 2.5])
+def test_neighbours_on_a_line_know_the_slope_along_it_only(angle: float) -> None:
+    particles, along = on_a_line(angle)
+    steepest = np.array([2.0, -5.0])
+    values = 3.0 + particles.sources.positions @ steepest
+    expected = np.broadcast_to(along * (steepest @ along), (9, 2))
+    np.testing.assert_allclose(gradient(particles, values, "corrected"), expected, atol=1e-11)
+    points = np.array([0.05 * along, 0.05 * along + 0.1 * np.array([-along[1], along[0]])])  # on the line, beside it
+    on_it = 3.0 + 0.05 * steepest @ along
+    assert interpolate(particles, values, points, "linear") == pytest.approx([on_it, on_it], rel=1e-11)
+
+
+def test_without_particles_nearby_the_plain_sum_is_zero_and_a_mean_is_none() -> None:
+    alone = Particles([[1.0, 1.0]], 1.0, 100.0, 0.1)
+    assert interpolate(alone, [7.0], [[2.0, 1.0]], "plain").tolist() == [0.0]
+    for form in ("shepard", "linear"):
+        assert np.isnan(interpolate(alone, [7.0], [[2.0, 1.0]], form)).all()
+
 
 GOOD: dict[str, Any] = {
     "positions": [[0.0, 0.0], [0.1, 0.0]],
