@@ -14,7 +14,6 @@ from blocksim.kernels.common.integrate import kick_and_drift
 from blocksim.kernels.common.tolerances import IMPACT_STEPS
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.contact import pair_forces
-from blocksim.kernels.explicit.damping import BOTH
 from blocksim.kernels.explicit.forces import NOTHING
 from blocksim.kernels.explicit.partition import add_kept, keep
 from blocksim.kernels.explicit.persistent_forces import (
@@ -26,8 +25,6 @@ from blocksim.kernels.explicit.persistent_forces import (
 )
 from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER, into_world, next_number, number_before
 from blocksim.kernels.explicit.sliver_axes import is_sliver, meets_along
-from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation
 from tests.kernels.scenes import pose
 
@@ -36,7 +33,6 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.common.arrays import Record, World
     from tests.conftest import Start
-
 
 STEP = 1e-6
 ROUND_OFF = 64 * np.finfo(float).eps  # of places, which are some ten sums and products
@@ -185,8 +181,6 @@ SITUATIONS |= {
         {},
     ),
 }
-
-
 # with a hundredth of the stiffness: overlaps are far from round-off, and no slivers
 HERTZ = {"law": "hertz-mindlin", "stiffness_scale": 0.01, "max_overlap": 2e-3}
 SITUATIONS |= {
@@ -205,33 +199,6 @@ def test_steady_pairs_have_the_forces_and_losses_of_the_general_way(start: Start
         assert_same(quick, slow)
         seen += tally.steady
         scene.to_step(scene.steps + 1 + n % 4)
-    assert seen > 20 // pace
-
-
-def test_steady_polygons_on_pieces_of_ground_have_the_forces_of_the_general_way(pace: int) -> None:
-    """On a slope, at the joint to the flat beside it, and against a wall."""
-    outline = HEXAGON["outline"]
-    tables = {
-        "schema": 1,
-        "name": "pieces",
-        "materials": {"stone": {"density": 2500.0, "young_modulus": 1e10, "poisson_ratio": 0.2}},
-        "blocks": {"hexagon": {"outline": outline, "depth": 0.05, "material": "stone"}},
-        "ground": {"profile": [[-0.5, 0.1], [0.0, 0.0], [0.5, 0.0]]},
-        "walls": [{"from": [0.1, 0.0], "to": [0.1, 0.3]}],
-        "bodies": [
-            {"block": "hexagon", "x": -0.2, "y": 0.04 + 1.0198039 * APOTHEM + 1e-6, "angle": "-0.19739556 rad"},
-            {"block": "hexagon", "x": 0.0005, "y": RADIUS + 1e-4, "angle": "90 deg", "velocity": [-0.1, -0.1]},
-            {"block": "hexagon", "x": 0.1 - RADIUS - 1e-6, "y": APOTHEM + 1e-6, "velocity": [0.2, 0.0]},
-        ],
-        "contact": {"stiffness_scale": 1e-2},
-    }
-    scene = Simulation(build_scene(scenario_from_mapping(tables)))
-    seen = 0
-    for n in range(120 // pace):
-        tally, quick, slow = evaluate(scene.world)
-        assert_same(quick, slow)
-        seen += tally.steady
-        scene.to_step(scene.steps + 1 + 4 * (n % 4))
     assert seen > 20 // pace
 
 
@@ -288,17 +255,6 @@ def test_corner_of_a_polygon_beyond_the_end_of_its_face_is_not_steady(
     assert kind == (CHANGED if changes else TOUCHING)
 
 
-@pytest.mark.parametrize(("down", "changes"), [(-0.9e-6, True), (0.0, False)])
-def test_corner_that_begins_is_not_steady(down: float, changes: bool) -> None:
-    world = pose((0.0, tip(1e-4) - 1e-6, 1e-4))  # on its lower left corner, the other one 2 um above the ground
-    pair_forces(world, 0, 0.0)
-    assert (world.pairs[0].active, world.pairs[0].idle) == (1, 1)
-    world.bodies[0].y += down - 1.5e-6 if changes else 0.0
-    if changes:
-        assert_changed(world)
-    assert persistent_forces(world, 0, STEP, world.particles)[0] == (CHANGED if changes else TOUCHING)
-
-
 @pytest.mark.parametrize(("steps", "changes"), [(0.9 * IMPACT_STEPS, True), (1.2 * IMPACT_STEPS, False)])
 def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(steps: float, changes: bool) -> None:
     # tilted, so that its lower left corner may touch the upper face of the other block or its side
@@ -314,21 +270,6 @@ def test_corner_about_to_lose_a_face_while_another_one_is_near_is_not_steady(ste
     assert world.contacts[0, 0].face == UPPER
     kind, _ = persistent_forces(world, 0, beside / (steps * speed), world.particles)
     assert kind == (CHANGED if changes else TOUCHING)
-
-
-@pytest.mark.parametrize("sliding", [0, 1])
-def test_contact_that_slides_beside_one_that_sticks_has_no_dashpot(sliding: int) -> None:
-    quick = on_block(0.003)
-    assert persistent_forces(quick, 0, STEP, quick.particles)[0] == TOUCHING
-    assert quick.pairs[0].sticking == BOTH
-    assert quick.pairs[0].shear_left > 0
-    quick.contacts[0, sliding].spring = 1e-3
-    quick.bodies[0].vx = 0.1
-    slow = copy.deepcopy(quick)
-    assert take_steadily(quick, 0, STEP)
-    take_generally(slow, 0, STEP)
-    assert quick.pairs[0].sticking == (2, 1)[sliding]
-    assert_same(quick, slow)
 
 
 TRIES = 4000
