@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
     from matplotlib.text import Text
 
+CORNERS = 12  # of areas, and ends of lines, that are told one by one
 MOST = 6  # lines and colours that are told one by one
 
 
@@ -45,7 +47,16 @@ def _drawn(axes: Axes) -> list[str]:
     if len(axes.lines) > MOST:
         told.append(f"{len(axes.lines) - MOST} more lines")
     told += [_parts(one) for one in axes.collections if one.get_paths() and len(np.atleast_2d(one.get_offsets()))]
-    return told + [f"{type(one).__name__}" for one in axes.patches]
+    return told + [_area(one) for one in axes.patches]
+
+
+def _area(patch: Patch) -> str:
+    """Return the colour of an area, and its corners or the box around many."""
+    path = patch.get_path()
+    corners = patch.get_patch_transform().transform(np.asarray(path.vertices))
+    if len(corners) <= CORNERS:
+        return f"{type(patch).__name__} {to_hex(patch.get_facecolor())}: {' '.join(map(_numbers, corners))}"
+    return f"{type(patch).__name__} {to_hex(patch.get_facecolor())}: {_way(corners)}"
 
 
 def _parts(parts: Collection) -> str:
@@ -58,7 +69,10 @@ def _parts(parts: Collection) -> str:
     points = points[np.isfinite(points).all(axis=1)]
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else ((), ())
     count = len(places) if len(places) > 1 else len(paths)
-    return f"{count} {type(parts).__name__} {shown} in {_numbers([*low, *high])}"
+    told = f"{count} {type(parts).__name__} {shown}{f' {parts.get_hatch()}' if parts.get_hatch() else ''}"
+    if len(places) > 1 or len(points) > CORNERS:
+        return f"{told} in {_numbers([*low, *high])}"
+    return f"{told}: {'; '.join(' '.join(map(_numbers, np.asarray(path.vertices))) for path in paths)}"
 
 
 def _way(points: Any) -> str:

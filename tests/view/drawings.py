@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blocksim.analysis import load_table
+from blocksim.scenario import PlacedSegment, scenario_from_mapping
+from blocksim.scenario.geometry import regular
 from blocksim.scenario.models.loads import Force, Horizontal, Moment, Pressure, Stretch
 from blocksim.scenario.motion import MotionPieces
 from blocksim.view import style
@@ -17,17 +19,17 @@ from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
 from blocksim.view.kinds import SWEEP_KINDS
 from blocksim.view.paints import by_speed, by_turn
-from blocksim.view.run_data import ActingLoad, Support
+from blocksim.view.run_data import ActingLoad, Support, support_of
 from blocksim.view.scene import PictureOptions
 from blocksim.view.strip import draw_strip
 from blocksim.view.studies import Bars, LevelPanel, draw_levels, draw_tornado
 from blocksim.view.sweeps.lines import Series, draw_series
 from tests.bench.peers.work_precision import Curve, Panel as Work, draw_work_precision
-from tests.view.made_up import HOSTILE, pressed, stacked, toppling
+from tests.view.made_up import HOSTILE, blocks_at, polygons, pressed, stacked, toppling
 from tests.view.sweeps.made_up import grid, made_up, samples
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping, Sequence
 
     from blocksim.simulation.trajectory import Frames
     from blocksim.view.style import Paper
@@ -53,6 +55,88 @@ LOADED = Support(
     ),
     motion=PIECES,
 )
+
+
+HELD = Support(fixed=(True, False))
+CLIFF = Support(profile=((0.12, 0.0), (0.12, -10.0)))
+DEEP = Support(profile=((-1e4, 0.0), (0.0, 0.0), (0.0, -1e4), (0.01, -1e4), (0.01, 1e4)))
+MOVED = Support(motion=MotionPieces(np.array([0.0, 1.0]), np.array([[0.0, 0.03, 0.0, 0.0]]), 0.03))
+WEDGE = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
+
+
+def wall(x0: float, y0: float, x1: float, y1: float, *, from_cover: bool = False) -> PlacedSegment:
+    """Return a wall (m) whose first end is free, or reaches into what covers it."""
+    ends = {"extends_start": from_cover, "extends_end": False, "touches_start": False, "touches_end": False}
+    return PlacedSegment(x0, y0, x1, y1, material=None, **ends)
+
+
+FAR = Support(profile=((-5.0, 0.01), (-4.0, 0.0)), walls=(wall(3.0, 0.0, 3.0, 100.0),))
+JOINED = (
+    *(wall(0.15, 0.1, 0.15, 0.0, from_cover=True), wall(0.15, 0.0, 0.16, 0.0)),
+    *(wall(0.05, 0.0, 0.05, 0.01), wall(0.05, 0.01, 0.06, 0.01)),
+    *(wall(0.0, 0.0, 0.1, 0.0), wall(0.1, 0.0, 0.0, 0.005)),
+)
+SINKING = Support(walls=(wall(0.15, 0.0, 0.15, 0.05),), direction=(0.0, -1.0), motion=MOVED.motion)
+BODY = {"block": "brick", "x": 0.0, "y": 0.2, "name": "1"}
+RAMP = {"kind": "ramp", "distance": 1.0, "speed": 0.5}
+FORCES: tuple[Mapping[str, object], ...] = (
+    {"kind": "force", "name": "push", "body": "1", "magnitude": 6.0, "point": [-0.1, 0.1]},
+    {"kind": "force", "name": "pull", "body": "1", "magnitude": 12.0, "point": [0.1, 0.0], "axes": "body"}
+    | {"history": {"kind": "ramp", "end": 4.0}},
+)
+SLOPE = {"tilt": "30 deg"}
+END = [{"at": 2.5, "unload": ["push"]}]
+PRESSURES: tuple[Mapping[str, object], ...] = (
+    {"kind": "pressure", "body": "1", "face": "left", "water_level": 0.3},
+    {"kind": "pressure", "body": "1", "face": "top", "magnitude": -1471.5},  # suction of half the water's
+)
+COEFFICIENTS: tuple[Mapping[str, object], ...] = (
+    {"kind": "horizontal", "magnitude": -0.3},
+    {"kind": "horizontal", "magnitude": 0.05},
+    {"kind": "gravity", "to": "30 deg", "rate": "30 deg/s"},
+)
+
+
+def acting(loads: Sequence[Mapping[str, object]], **tables: Any) -> Support:
+    """Return the support of a scene with one block and these loads."""
+    block = {"width": 0.2, "height": 0.4, "length": 0.1, "material": "oak"}
+    oak = {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}
+    scene = {"schema": 1, "name": "a", "materials": {"oak": oak}, "blocks": {"brick": block}, "bodies": [BODY]}
+    return support_of(scenario_from_mapping({**scene, "time": {"end": 9.0}, "loads": loads, **tables}))
+
+
+def slab(angles: Sequence[float], x: float = 0.0) -> Frames:
+    """Return the block of such a scene at these angles, a second apart."""
+    return blocks_at(np.full(len(angles), x), 0.2, angles, size=(0.2, 0.4))
+
+
+def driven() -> Frames:
+    """Return such a block that is driven."""
+    frames = slab([0.0, 0.0])
+    frames.x[1], frames.vx[1], frames.vy[1] = 0.1, 0.3, 0.4
+    return frames
+
+
+def turned() -> Frames:
+    """Return a block that has turned by one and a half turns, from half a turn on."""
+    frames = toppling(1)
+    frames.angle[:, 0] = np.linspace(np.pi, 4.0 * np.pi, len(frames))
+    frames.start_angle[0] = np.pi
+    return frames
+
+
+def rounded() -> Frames:
+    """Return a block that moves by no more than round-off."""
+    frames = toppling(1)
+    frames.x[:] = 0.1 + 1e-15 * np.arange(len(frames))[:, None]
+    return frames
+
+
+def constant(speed: float) -> Frames:
+    """Return a block whose speed (m/s) hardly changes."""
+    frames = toppling(1)
+    frames.vx[:] = speed + 1e-9 * np.sin(frames.time)[:, None]
+    return frames
 
 
 def panel(blocks: int = 3, levels: int = 4, size_mm: float = 1.0, **more: Any) -> LevelPanel:
@@ -178,7 +262,32 @@ DRAWINGS: dict[str, Drawing] = {
     "final that nobody measured": of_run(draw_final, replace(toppling(2), names=("a", "b"))),
     "final with forces, by speed": of_run(draw_final, pressed(toppling(3)), forces=True, paint=by_speed(toppling(3))),
     "final with odd names": of_run(draw_final, odd(7), title="<b>" * 100),
+    "final on a cliff": of_run(draw_final, blocks_at([0.1]), support=CLIFF),
+    "final below a cliff": of_run(draw_final, blocks_at([0.1, 0.2], [0.025, 0.0]), support=CLIFF),
+    "final on a profile of kilometres": of_run(draw_final, blocks_at([0.0]), support=DEEP),
+    "final far from corners and walls": of_run(draw_final, blocks_at([0.1], 0.025), support=FAR),
+    "final between walls that join": of_run(draw_final, blocks_at([0.1], 0.025), support=Support(walls=JOINED)),
+    "final on steep ground": of_run(draw_final, blocks_at([0.0, 1.0], 0.025), support=Support(tilt=0.5)),
+    "final of polygons": of_run(
+        draw_final, polygons(blocks_at([[0.1, 0.2]] * 2, 0.05, 1.57), WEDGE, regular(6, 0.03))
+    ),
+    "final with a fixed block": of_run(draw_final, blocks_at([[0.1, 0.2]], 0.025), support=HELD),
+    "final of a turn before the start": of_run(draw_final, turned()),
+    "strip on a sinking pier": of_run(draw_strip, blocks_at([0.1, 0.1], 0.025), support=SINKING),
+    "strip of a block that is moved": of_run(
+        draw_strip, blocks_at([0.1, 0.11], 0.025), support=replace(MOVED, fixed=(True,))
+    ),
+    "strip with forces that turn and end": of_run(
+        draw_strip, slab([0.0, 1.57, 1.57, 0.0], 1.0), support=acting(FORCES, events=END)
+    ),
+    "strip with water and air": of_run(draw_strip, slab([0.0]), support=acting(PRESSURES)),
+    "strip with water on tilted ground": of_run(draw_strip, slab([0.0]), support=acting(PRESSURES[:1], ground=SLOPE)),
+    "strip with coefficients and a tilt": of_run(draw_strip, slab([0.0, 0.0]), support=acting(COEFFICIENTS)),
+    "strip of a driven body": of_run(draw_strip, driven(), support=acting((), bodies=[{**BODY, "motion": RAMP}])),
     "history": of_run(draw_history, toppling(3)),
+    "history of round-off": of_run(draw_history, rounded(), panels=("x", "dx")),
+    "history of a constant speed": of_run(draw_history, constant(123.456789), panels=("vx", "x")),
+    "history of a slow constant speed": of_run(draw_history, constant(-0.123456789), panels=("vx", "x")),
     "history of twenty": of_run(draw_history, far()),
     "history of fixed blocks": of_run(draw_history, toppling(2), support=Support(fixed=(True, True))),
     "history of a failed run": of_run(draw_history, failed()),

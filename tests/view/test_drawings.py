@@ -14,12 +14,14 @@ from blocksim.view.style import OWN, Paper
 from tests.view.described import described
 from tests.view.drawings import DRAWINGS
 from tests.view.made_up import overlapping
+from tests.view.study_drawings import STUDIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tests.golden import Golden
 
+ALL = DRAWINGS | STUDIES
 KINDS = ("strip", "final", "history", "levels", "work", "tornado", "series", "lines", "map", "matrix", "histogram")
 SIZES = {
     "strip": ((4.0, 8.0), (10.0, 3.5)),
@@ -36,11 +38,11 @@ SIZES = {
 }
 
 
-@pytest.mark.parametrize("name", DRAWINGS)
+@pytest.mark.parametrize("name", ALL)
 def test_picture_shows_what_it_should_and_no_text_is_covered_or_cut(
     caught: list[Figure], golden: Golden, name: str
 ) -> None:
-    DRAWINGS[name](Path("picture.png"), OWN)
+    ALL[name](Path("picture.png"), OWN)
     (figure,) = caught
     assert overlapping(figure) == []
     golden(described(figure))

@@ -9,15 +9,7 @@ from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
 from blocksim.view.paints import by_turn
 from blocksim.view.scene import PictureOptions
-from tests.view.made_up import boxes_of, stacked, toppling
-
-
-def test_rotation_counts_from_the_start_and_is_not_wrapped(caught: list[Figure]) -> None:
-    frames = toppling(1)
-    frames.angle[:, 0] = np.linspace(np.pi, 4.0 * np.pi, len(frames))
-    frames.start_angle[0] = np.pi
-    draw_final(frames, "final.png")
-    assert "540.00°" in [text for text, _ in boxes_of(caught[0])]
+from tests.view.made_up import boxes_of, stacked
 
 
 def test_rotation_of_what_turned_while_settling_is_that_of_the_table(caught: list[Figure]) -> None:

@@ -9,29 +9,10 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.trajectory import CONTACT_ROW, Contacts
 from blocksim.view.animation import Look, Pace, draw_animation
-from blocksim.view.arrows import ForceScale, arrows, force_scale
+from blocksim.view.arrows import force_scale
 from blocksim.view.kinds import RUN_KINDS
 from blocksim.view.scene import PictureOptions
 from tests.view.made_up import pressed, toppling
-
-SCALE = ForceScale(mm_per_newton=10.0, longest=35.0)
-
-
-def test_arrow_is_that_of_the_force_on_the_block_that_it_pushes_up() -> None:
-    rows = np.zeros(2, CONTACT_ROW)
-    rows["x"], rows["y"] = [0.1, 0.2], 0.05
-    rows["normal_y"], rows["normal_force"] = [1.0, -1.0], 2.0  # body a above body b, and below it
-    rows["shear_force"] = 0.5
-    found = arrows(rows, SCALE, 0.0)
-    np.testing.assert_allclose(found[:, 0], [[100.0, 50.0], [200.0, 50.0]])
-    np.testing.assert_allclose(found[:, 1] - found[:, 0], [[-5.0, 20.0], [-5.0, 20.0]])
-
-
-def test_long_arrows_are_cut_and_what_is_not_finite_is_left_out() -> None:
-    rows = np.zeros(3, CONTACT_ROW)
-    rows["normal_x"], rows["normal_force"] = 1.0, [1.0, 100.0, np.nan]
-    found = arrows(rows, SCALE, 0.0)
-    assert (found[:, 1] - found[:, 0])[:, 0].tolist() == pytest.approx([10.0, 35.0])
 
 
 def test_scale_is_that_of_usual_forces_not_of_impacts() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from blocksim.scenario import scenario_from_mapping
 from blocksim.simulation.results import EventRecord
-from blocksim.view.arrows import FORCE, PRESSURE, SPEED, Actions, Arrows, actions_on, with_room
+from blocksim.view.arrows import FORCE, Actions, Arrows, actions_on, with_room
 from blocksim.view.run_data import Support, extent_of, support_of
 from tests.view.made_up import blocks_at
 
@@ -55,16 +55,6 @@ def only(found: Actions, kind: str) -> list[Arrows]:
     return [one for one in found.arrows if one.kind == kind]
 
 
-def test_forces_lie_outside_their_body_are_in_proportion_and_turn_where_they_should() -> None:
-    turning = {**STRONGER, "axes": "body"}
-    push, pull = only(acting([PUSH, turning], block([0.0, QUARTER], x=1.0)), FORCE)
-    assert push.lines(100.0)[0, 0] == pytest.approx(np.array([[850.0, 300.0], [900.0, 300.0]]))
-    assert pull.lines(100.0)[0, 0] == pytest.approx(np.array([[1100.0, 200.0], [1200.0, 200.0]]))
-    assert pull.lines(100.0)[1, 0] == pytest.approx(np.array([[1000.0, 300.0], [1000.0, 400.0]]))
-    assert push.at[1, 0] == pytest.approx([900.0, 100.0])
-    assert push.way[1, 0] == pytest.approx([0.5, 0.0])
-
-
 def test_loads_follow_their_histories_and_are_gone_when_an_event_ends_them_or_their_body_is_removed() -> None:
     ramp = {**PUSH, "history": {"kind": "ramp", "end": 4.0}}
     frames, events = block([0.0] * 6), [{"when": "rest", "unload": ["push"]}]
@@ -76,20 +66,6 @@ def test_loads_follow_their_histories_and_are_gone_when_an_event_ends_them_or_th
     frames.vx[2:] = np.nan
     (gone,) = only(acting([PUSH], frames), FORCE)
     assert gone.way[:, 0, 0] == pytest.approx([1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-
-
-def test_water_is_as_long_as_it_is_deep_and_air_evenly() -> None:
-    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": 0.3}
-    air = {"kind": "pressure", "body": "1", "face": "top", "magnitude": -0.5 * 9810.0 * 0.3}
-    deep, even = only(acting([water, air], block([0.0])), PRESSURE)
-    depth = np.maximum(0.3 - 1e-3 * deep.at[0, :, 1], 0.0)
-    assert (deep.at[0, 0, 1], deep.at[0, -1, 1]) == pytest.approx((0.0, 400.0))
-    assert deep.at[0, :, 0] == pytest.approx(np.full(9, -100.0))
-    assert deep.way[0, :, 0] == pytest.approx(depth / 0.3)
-    assert deep.lines(10.0)[0, 0] == pytest.approx(np.array([[-110.0, 0.0], [-100.0, 0.0]]))
-    assert even.way[0] == pytest.approx(np.array([[0.0, 0.5]] * 5))  # suction
-    assert even.lines(10.0)[0, :, 0, 1] == pytest.approx(np.full(5, 400.0))
-    assert even.at[0, :, 0] == pytest.approx([-80.0, -40.0, 0.0, 40.0, 80.0])
 
 
 def test_marks_show_the_sum_of_coefficients_and_where_gravity_points_in_the_picture() -> None:
@@ -109,17 +85,6 @@ def test_marks_show_the_sum_of_coefficients_and_where_gravity_points_in_the_pict
     assert tilted[0][0].way == pytest.approx((0.0, -1.0))  # such a picture is turned
 
 
-def test_driven_bodies_show_their_velocity_from_their_edge_on() -> None:
-    frames = block([0.0, 0.0])
-    frames.vx[1], frames.vy[1] = 0.3, 0.4
-    ramp = {"kind": "ramp", "distance": 1.0, "speed": 0.5}
-    body = {"block": "brick", "x": 0.0, "y": 0.2, "name": "1", "motion": ramp}
-    (speed,) = only(acting([], frames, bodies=[body]), SPEED)
-    assert speed.lines(10.0)[0, 0] == pytest.approx(np.array([[0.0, 200.0]] * 2))
-    assert speed.lines(10.0)[1, 0] == pytest.approx(np.array([[100.0, 333.33], [106.0, 341.33]]), abs=0.01)
-    assert acting([], frames, bodies=[body]).explanation.endswith("the longest 0.5 m/s.")
-
-
 def test_arrows_are_inside_the_picture_and_nothing_changes_without_loads() -> None:
     frames, chosen = block([0.0, QUARTER]), np.arange(2)
     loaded = support([PUSH, STRONGER])
@@ -133,10 +98,3 @@ def test_arrows_are_inside_the_picture_and_nothing_changes_without_loads() -> No
     assert (nothing.arrows, nothing.turns, any(nothing.marks)) == ((), None, False)
     assert with_room(extent, nothing)[0] == extent
     assert nothing.explanation == ""
-
-
-def test_water_on_tilted_ground_is_deep_against_gravity() -> None:
-    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": 1.0}
-    (deep,) = only(acting([water], block([0.0]), ground={"tilt": "30 deg"}), PRESSURE)
-    depth = 1.0 - 1e-3 * deep.at[0] @ np.array([0.5, np.sqrt(0.75)])
-    assert deep.way[0, :, 0] == pytest.approx(depth / depth.max())
