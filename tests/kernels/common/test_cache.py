@@ -1,23 +1,220 @@
-"""Files of compiled kernels that are damaged, exchanged or cannot be written never end a run, nor are they executed."""
+"""The cache of compiled kernels: never stale, reused, not needed, and no file of it that is damaged is executed."""
 
 from __future__ import annotations
 
 import logging
+import multiprocessing
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from numba.core import funcdesc
+from numba.core.types import abstract, functions
 
 from blocksim.kernels.common import jit
+from blocksim.kernels.common.arrays import PAIR, zeros
+from blocksim.kernels.common.compiler import INNER, InnerLibrary, shortcuts
+from blocksim.kernels.common.jit import config, njit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
+    from collections.abc import Callable, Iterator
+
+    from blocksim.kernels.common.arrays import Record
+
+PACKAGE = Path(jit.__file__).parents[2]
+
+
+@pytest.fixture
+def copied_kernels(tmp_path: Path) -> Path:
+    """Return a folder with a copy of the kernels that a test may edit."""
+    folder = tmp_path / "copy"
+    (folder / "blocksim").mkdir(parents=True)
+    (folder / "blocksim" / "__init__.py").touch()
+    shutil.copytree(PACKAGE / "kernels", folder / "blocksim" / "kernels", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+@pytest.fixture
+def fresh_folder_choice() -> Iterator[None]:
+    """Forget the chosen cache folder before and after a test."""
+    jit.cache_folder.cache_clear()
+    yield
+    jit.cache_folder.cache_clear()
+
+
+@pytest.fixture
+def file_in_the_way(tmp_path: Path) -> Path:
+    """Return a path below which nothing can be written, not even by root."""
+    file = tmp_path / "file"
+    file.touch()
+    return file / "cache"
+
+
+REFUSED = {
+    "group": (0o770, 0o755),
+    "all": (0o777, 0o755),
+    "all, sticky": (0o1777, 0o755),
+    "all, a folder above": (0o700, 0o777),
+    "group, a folder above": (0o700, 0o770),
+}
+
+
+@pytest.fixture
+def chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Choose a cache folder, inside another one; the temporary folder is there as well."""
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path / "above" / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    monkeypatch.setattr(multiprocessing, "parent_process", lambda: None)  # a worker process tells nothing
+    (tmp_path / "above" / "cache").mkdir(parents=True)
+    return tmp_path / "above" / "cache"
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+@pytest.mark.parametrize("modes", REFUSED.values(), ids=REFUSED)
+def test_cache_folder_that_others_may_write_is_refused_with_a_line(
+    chosen: Path, modes: tuple[int, int], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(jit, "_is_group_of_one", lambda _: False)
+    chosen.chmod(modes[0])
+    chosen.parent.chmod(modes[1])
+    with caplog.at_level(logging.WARNING, "blocksim"):
+        folder = jit.cache_folder()
+    assert folder is not None
+    assert folder.is_relative_to(tempfile.gettempdir())
+    assert list(chosen.iterdir()) == []
+    (line,) = (record.getMessage() for record in caplog.records)
+    assert line.startswith(f"{chosen}: other users may write ")
+    assert line.endswith(f"; compiled kernels are kept in {folder.parent}")
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+def test_cache_folder_of_another_user_is_refused_with_a_line(
+    chosen: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    other = os.getuid() + 1
+    monkeypatch.setattr(os, "getuid", lambda: other)
+    with caplog.at_level(logging.WARNING, "blocksim"):
+        assert jit.cache_folder() is None
+    (line,) = (record.getMessage() for record in caplog.records)
+    assert line.startswith(f"{chosen}: other users may write there; compiled kernels are not kept")
+
+
+@pytest.mark.usefixtures("fresh_folder_choice")
+@pytest.mark.parametrize("way", ["sticky folder above", "link"])
+def test_cache_folder_that_only_this_user_may_write_serves(
+    chosen: Path, way: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    if way == "link":
+        (chosen.parent.parent / "link").symlink_to(chosen.parent)
+        monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(chosen.parent.parent / "link" / "cache"))
+    else:
+        chosen.parent.chmod(0o1777)
+    assert jit.cache_folder() == chosen / jit.source_hash()
+    assert caplog.records == []
+
+
+def test_compiled_code_of_another_user_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "source" / "module" / "code.nbc"
+    jit._write(file, b"code")
+    assert jit._read(file) == b"code"
+    fstat, other = os.fstat, os.getuid() + 1
+
+    def of_another(number: int) -> os.stat_result:
+        state = fstat(number)
+        return os.stat_result((*state[:4], other, *state[5:]))
+
+    monkeypatch.setattr(os, "fstat", of_another)
+    assert jit._read(file) is None
+
+
+@pytest.mark.usefixtures("fresh_folder_choice", "compiler")
+def test_without_a_writable_folder_the_temporary_one_serves_and_without_that_kernels_are_compiled_and_not_kept(
+    file_in_the_way: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(file_in_the_way))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    folder = jit.cache_folder()
+    assert folder is not None
+    assert folder.is_relative_to(tmp_path / "temporary")
+    assert folder.name == jit.source_hash()
+    jit.cache_folder.cache_clear()
+    monkeypatch.setattr(tempfile, "tempdir", str(file_in_the_way))
+    assert jit.cache_folder() is None
+    assert not jit.is_compiled()
+    jit.mark("seen")
+    assert not jit.is_marked("seen")
+
+    def double(number: float) -> float:
+        return 2.0 * number
+
+    assert jit.kernel(double)(3.0) == 6.0
+
+
+def test_cache_root_follows_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("BLOCKSIM_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+    assert jit.cache_root() == Path("/somewhere/blocksim")
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", "/elsewhere")
+    assert jit.cache_root() == Path("/elsewhere")
+
+
+def test_hash_sees_every_source_below_the_folder(copied_kernels: Path) -> None:
+    folder = copied_kernels / "blocksim" / "kernels"
+    assert jit.source_hash(folder) == jit.source_hash()
+    seen = {jit.source_hash(folder)}
+    deepest = folder / "explicit" / "models" / "smoothed.py"
+    for path in (folder / "common" / "shapes.py", deepest):
+        path.write_text(path.read_text() + "# edited\n")
+        seen.add(jit.source_hash(folder))
+    deepest.rename(deepest.with_name("smooth.py"))
+    seen.add(jit.source_hash(folder))
+    assert len(seen) == 4
+
+
+@pytest.mark.usefixtures("fresh_folder_choice", "compiler")
+def test_marks_and_compiled_kernels_are_found_for_this_source_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BLOCKSIM_CACHE_DIR", str(tmp_path))
+    below = tmp_path / jit.source_hash() / "kernels"
+    assert not jit.is_marked("seen")
+    assert not jit.is_compiled()
+    jit.mark("seen")
+    below.mkdir(parents=True)
+    (below / "step.advance_alone-1.py311.1.nbc").touch()
+    assert jit.is_marked("seen")
+    assert jit.is_compiled()
+    assert not jit.is_marked("unseen")
+    monkeypatch.setattr(jit, "source_hash", lambda: "another")
+    jit.cache_folder.cache_clear()
+    assert not jit.is_marked("seen")
+    assert not jit.is_compiled()
+
+
+@pytest.mark.usefixtures("compiler")
+def test_kernel_is_compiled_once_whatever_integers_it_is_called_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "cache_folder", lambda: None)
+
+    @jit.rare_kernel
+    def twice(number: int) -> int:
+        return 2 * number
+
+    @jit.entry_kernel
+    def add_up(pair: Record) -> int:
+        return twice(3) + twice(pair.a) + twice(pair.near) + twice(pair.axis)
+
+    pair = zeros(1, PAIR)[0]
+    pair.a, pair.near, pair.axis = 4_000_000_000, 60_000, 200
+    assert add_up(pair) == 2 * (3 + 4_000_000_000 + 60_000 + 200)
+    assert [str(one) for (one,) in twice.overloads] == ["int64"]  # type: ignore[attr-defined]
+
 
 pytestmark = pytest.mark.usefixtures("compiler")
-
 DAMAGE: dict[str, Callable[[bytes], bytes]] = {
     "cut": lambda content: content[:-100],
     "empty": lambda _: b"",
@@ -148,3 +345,82 @@ assert "scipy.linalg" in sys.modules
 """)
     environment = {**os.environ, "BLOCKSIM_CACHE_DIR": str(tmp_path / "cache")}
     subprocess.run([sys.executable, script], check=True, timeout=120, env=environment)
+
+
+def chain() -> tuple[Any, Any, Any]:
+    """Return kernels as a new process has them: two and the one that calls them."""
+
+    @jit.kernel
+    def square(number: float) -> float:
+        return number * number
+
+    @jit.rare_kernel
+    def successor(number: float) -> float:
+        return number + 1.0
+
+    @jit.entry_kernel
+    def two(number: float) -> float:
+        return square(number) + square(successor(number))
+
+    return square, successor, two
+
+
+def loads(kernel: Any) -> int:
+    return sum(kernel.stats.cache_hits.values())
+
+
+def library_of(kernel: Any) -> Any:
+    (compiled,) = kernel.overloads.values()
+    return compiled.library
+
+
+def test_inner_kernels_are_kept_without_machine_code_and_serve_callers_of_later_processes(kept: Path) -> None:
+    square, successor, two = chain()
+    assert two(3.0) == 25.0
+    for kernel in (square, successor):
+        library = library_of(kernel)
+        assert isinstance(library, InnerLibrary)
+        assert library.serialize_using_object_code()[1] == INNER
+        assert not library.codegen._engine.is_symbol_defined(kernel.overloads.popitem()[1].fndesc.mangled_name)
+    for file in kept.rglob("*two*"):
+        file.unlink()
+    square, successor, two = chain()
+    assert two(3.0) == 25.0
+    assert (loads(square), loads(successor), loads(two)) == (1, 1, 0)
+
+
+@pytest.mark.usefixtures("kept")
+def test_inner_kernel_that_python_calls_is_compiled_and_kept_for_that_beside_what_its_callers_need() -> None:
+    square, _, two = chain()
+    assert (square(3.0), two(3.0), square(number=4.0)) == (9.0, 25.0, 16.0)
+    assert isinstance(library_of(square), InnerLibrary)
+    assert not isinstance(library_of(square.for_python), InnerLibrary)
+    square, _, _ = chain()
+    assert square(3.0) == 9.0
+    assert loads(square.for_python) == 1
+    assert not square.overloads, "its callers' version has been loaded for nothing"
+
+
+def fail_in_shortcuts() -> None:
+    with shortcuts():
+        raise OSError("no room on the disk")
+
+
+def test_numba_is_as_before_after_shortcuts_even_where_compiling_fails() -> None:
+    kinds, calls = abstract.Type, functions.BaseFunction
+    before = (kinds.__hash__, calls.get_call_type, funcdesc.default_mangler)
+    with shortcuts():
+        assert kinds.__hash__ is not before[0]
+    with pytest.raises(OSError, match="no room"):
+        fail_in_shortcuts()
+    assert before == (kinds.__hash__, calls.get_call_type, funcdesc.default_mangler)
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="is about the compiler")
+def test_operators_are_resolved_anew_for_other_types() -> None:
+    def twice(x: float) -> float:
+        return x + x
+
+    with shortcuts():
+        doubled = njit(twice)
+        assert [type(doubled(x)) for x in (1, 1.0, 1j)] == [int, float, complex]

@@ -1,7 +1,8 @@
-"""Supports that move: the ground carries, drops and throws blocks as closed forms say, and its work is tallied."""
+"""Motion of bodies: Verlet steps, supports that move and their work, and members that stop once a block has moved."""
 
 from __future__ import annotations
 
+import math
 from math import cos, sin
 from typing import TYPE_CHECKING, Any
 
@@ -9,13 +10,83 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import AT_REST, MOTION_PIECE, REACHED, Records, World, zeros
-from blocksim.kernels.common.supports import acceleration, displacement, piece_at, tally_support
+from blocksim.kernels.common.arrays import AT_REST, BODY, CONTROLS, MOTION_PIECE, REACHED, Records, World, zeros
+from blocksim.kernels.common.integrate import accelerate_and_kick, kick_and_drift
+from blocksim.kernels.common.members import Watched, frame_to_watch, watch
+from blocksim.kernels.common.supports import acceleration, displacement, tally_support
+from blocksim.simulation.instruments import POSITION
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+
+    from blocksim.kernels.common.arrays import Record, Records
+
+STEP = 1e-3
+
+
+def bodies_of(**values: float) -> Records:
+    """Return one free body of 2 kg and 0.5 kg m2, and the ground."""
+    bodies = zeros(2, BODY)
+    bodies.cos = 1.0
+    body = bodies[0]
+    body.mass, body.inertia, body.inverse_mass, body.inverse_inertia, body.radius = 2.0, 0.5, 0.5, 2.0, 0.1
+    for name, value in values.items():
+        body[name] = value
+    return bodies
+
+
+def controls_with_gravity() -> Record:
+    controls = zeros(1, CONTROLS)[0]
+    controls.step, controls.gravity_x, controls.gravity_y = STEP, 0.3, -9.81
+    return controls
+
+
+def finish_all(bodies: Records, step: float) -> None:
+    """Finish the step of all bodies; nobody does it for the ground."""
+    for body in bodies[:-1]:
+        accelerate_and_kick(body, controls_with_gravity(), step)
+
+
+def free_steps(bodies: Records, count: int) -> None:
+    finish_all(bodies, 0.0)
+    for _ in range(count):
+        kick_and_drift(bodies, 0, bodies.size, STEP)
+        finish_all(bodies, STEP)
+
+
+def test_gravity_and_free_spin_are_exact() -> None:
+    bodies = bodies_of(vx=1.0, vy=2.0, spin=3.0)
+    free_steps(bodies, 500)
+    body, t = bodies[0], 0.5
+    assert [body.x, body.y] == pytest.approx([1.0 * t + 0.15 * t * t, 2.0 * t - 4.905 * t * t], abs=1e-13)
+    assert [body.vx, body.vy, body.spin] == pytest.approx([1.0 + 0.3 * t, 2.0 - 9.81 * t, 3.0], abs=1e-13)
+    assert body.angle == pytest.approx(1.5, abs=1e-13)
+    assert [body.cos, body.sin] == pytest.approx([cos(1.5), sin(1.5)], abs=1e-12)
+
+
+def test_forces_and_torques_accelerate_by_the_inverse_masses_and_are_used_up() -> None:
+    bodies = bodies_of(fx=4.0, fy=6.0, torque=1.5)
+    finish_all(bodies, STEP)
+    body = bodies[0]
+    assert [body.ax, body.ay, body.spin_rate] == pytest.approx([0.3 + 2.0, -9.81 + 3.0, 3.0])
+    assert [body.vx, body.vy, body.spin] == pytest.approx([2.3 * STEP / 2, -6.81 * STEP / 2, 3.0 * STEP / 2])
+    assert (body.fx, body.fy, body.torque) == (0.0, 0.0, 0.0)
+
+
+def test_change_of_the_number_of_pairs_is_flagged_for_free_bodies_only() -> None:
+    bodies: Any = zeros(4, BODY)
+    bodies.inverse_mass = (1.0, 1.0, 0.0, 0.0)
+    bodies.pairs_now, bodies.pairs_before = (2, 3, 2, 5), (2, 2, 0, 0)
+    finish_all(bodies, STEP)
+    assert bodies.pairs_changed.tolist() == [0, 1, 0, 0]
+    assert bodies.pairs_before[:2].tolist() == [2, 3]
+    assert not bodies.pairs_now[:2].any()
+    finish_all(bodies, STEP)
+    assert bodies.pairs_before[:2].tolist() == [0, 0]
+    assert bodies.pairs_changed.tolist() == [1, 1, 0, 0]
+
 
 SOFT = 1e-4  # of the material's stiffness: milliseconds are some hundred steps
 FRICTION = 0.4
@@ -57,13 +128,6 @@ def on_support(
     if change is not None:
         change(world)
     return Simulation(world)
-
-
-@given(time=st.floats(0.0, 5.0), first=st.integers(0, 2))
-def test_piece_is_the_last_one_that_has_begun(time: float, first: int) -> None:
-    pieces = pieces_of((0.0,), (1.0,), (2.5,), (4.0,))
-    begun = int(np.searchsorted(pieces.start, time, side="right")) - 1
-    assert piece_at(pieces, min(first, begun), time) == begun
 
 
 @given(seed=st.integers(0, 1000), time=st.floats(0.5, 1.5))
@@ -144,3 +208,52 @@ def test_rest_is_not_found_before_the_support_has_stopped(last: tuple[float, ...
     scene = on_support([LYING], creeping, time=rest).to_time(0.06)
     assert scene.status == (AT_REST if len(last) == 1 else REACHED)
     assert scene.time > 0.02
+
+
+THRESHOLD, REACH = 1e-3, 0.03  # m
+
+
+def watched(threshold: float = THRESHOLD, *, peaks: bool = True) -> Watched:
+    """Watch the second of two members, of two blocks each, the second of them fixed."""
+    thresholds = np.array([[math.inf, math.inf], [threshold, math.inf]])
+    places = np.zeros((2, 3, 2))
+    periods, steps = np.array([0.0, 3.0]), np.zeros(2, dtype=np.int64)
+    frames = periods if peaks else np.zeros(2)
+    return Watched(frames, periods, steps, places, np.zeros((2, 3, 2)), np.full((2, 2), REACH), thresholds, np.zeros(2))
+
+
+def bodies(**state: float) -> Records:
+    """Return two blocks and the ground; both blocks are where `state` says."""
+    all_bodies = zeros(3, BODY)
+    for name, value in state.items():
+        all_bodies[name][:2] = value
+    return all_bodies
+
+
+@pytest.mark.parametrize(
+    ("state", "moved"),
+    [
+        ({"x": 0.999e-3}, False),
+        ({"x": -1.001e-3}, True),
+        ({"x": 0.6e-3, "y": -0.801e-3}, True),
+        ({"angle": -0.999 * THRESHOLD / REACH}, False),
+        ({"angle": -1.001 * THRESHOLD / REACH}, True),
+        ({"y": math.nan}, True),
+    ],
+)
+def test_first_frame_in_which_a_free_block_has_moved_is_kept(state: dict[str, float], moved: bool) -> None:
+    seen = watched()
+    watch(bodies(**state), seen, 1, 6)
+    assert seen.steps.tolist() == [0, 6 if moved else 0]
+    if moved:
+        assert np.array_equal(seen.places[1], [[state.get(name, 0.0)] * 2 for name in POSITION], equal_nan=True)
+
+
+def test_the_largest_rotation_is_followed_to_the_end_and_the_first_frame_of_a_move_kept() -> None:
+    seen = watched()
+    assert [frame_to_watch(seen, m, 4) for m in (0, 1)] == [0, 6]
+    for step, angle in ((6, -0.2), (9, 0.1)):
+        watch(bodies(angle=angle), seen, 1, step)
+    assert seen.steps.tolist() == [0, 6]
+    assert seen.peaks.tolist() == [0.0, 0.2]
+    assert frame_to_watch(seen, 1, 7) == 9

@@ -8,20 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import BODY
 from blocksim.kernels.common.simd import WIDTH
-from blocksim.kernels.nonsmooth.arrays import AWAY, BEFORE, COLOURS, CONSTRAINT, STATE, TOUCHING
+from blocksim.kernels.nonsmooth.arrays import AWAY, COLOURS, TOUCHING
 from blocksim.kernels.nonsmooth.neighbours import frame_of_supports, most_packs, rebuild, update_pairs
-from blocksim.kernels.nonsmooth.packs import gather, pack_all, unpack_all
+from blocksim.kernels.nonsmooth.packs import gather
 from blocksim.kernels.nonsmooth.step import substep
 from tests.kernels.references import apart, corners
-from tests.kernels.scenes import Block, collided, listed, listed_constraints, pairs_of, pile, place, posed, velocities
+from tests.kernels.scenes import Block, collided, listed, listed_constraints, pairs_of, place, posed, velocities
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-
 
 STEP = 1e-3  # s
 BLOCKS = 24
@@ -196,10 +194,6 @@ def test_impulses_go_with_their_pair_into_the_next_list() -> None:
     assert carried > 20
 
 
-BACK = ("normal_one", "normal_two", "shear")
-OF_ROW = ("nx", "ny", "arm_a", "arm_b", "width", "shear_arm_a", "shear_arm_b", "gap_one", "gap_two")
-
-
 def members(scene: Nonsmooth) -> list[list[int]]:
     """Return the constraints of all packs, without copies."""
     packs = scene.contacts.packs[: scene.contacts.stepping[0].pack_count]
@@ -229,28 +223,6 @@ def test_every_constraint_within_the_margin_is_in_one_pack_of_its_colour(seed: i
         assert pack.constraint.tolist() == inside + [inside[-1]] * (WIDTH - len(inside))
 
 
-def test_constraints_are_packed_as_they_are_and_get_their_impulses_back() -> None:
-    random = np.random.default_rng(4)
-    scene = collided(posed(pile(random, 4, 3)))
-    constraints: Any = listed_constraints(scene)
-    for name in BACK:
-        constraints[name] = random.uniform(size=constraints.size)
-    before = constraints.copy()
-    count = int(scene.contacts.stepping[0].pack_count)
-    pack_all(scene.contacts, 0, count)
-    for pack, inside in zip(scene.contacts.packs, members(scene), strict=False):
-        for name in (*OF_ROW, *BACK, "bend", "shear_bend", "a", "b"):
-            assert pack[name][: len(inside)].tolist() == constraints[name][inside].tolist(), name
-    for name in BACK:
-        constraints[name] = -1.0
-    unpack_all(scene.contacts, 0, count)
-    near = constraints.reach != AWAY
-    assert 0 < near.sum() < constraints.size
-    for name in BACK:
-        assert np.array_equal(constraints[name][near], before[name][near])
-        assert np.all(constraints[name][~near] == -1.0)
-
-
 def test_constraints_of_one_pack_have_the_restitution_and_friction_of_their_own_materials() -> None:
     """Blocks that land and slide on the ground, and on fixed blocks, of other materials."""
     landing: dict[str, Any] = {"vy": -1.0, "vx": 3.0}
@@ -267,24 +239,3 @@ def test_constraints_of_one_pack_have_the_restitution_and_friction_of_their_own_
     found = velocities(scene.contacts.states)[[0, 1, 3, 5]]
     assert found[:, 1] == pytest.approx([0.125, 0.125, 0.5, 0.5], abs=1e-9)
     assert found[:, 0] == pytest.approx([3.0 - 0.5 * 1.125] * 2 + [3.0 - 0.25 * 1.5] * 2, abs=1e-9)
-
-
-FIELDS = {
-    "LINE": (STATE, "vx vy spin inverse_mass inverse_inertia dx dy turned", 0),
-    "BEFORE": (BEFORE, "vx vy spin lifted", 0),
-    "ROW": (
-        CONSTRAINT,
-        "nx ny arm_a arm_b width shear_arm_a shear_arm_b gap_one gap_two normal_one normal_two shear",
-        0,
-    ),
-    "BODY": (BODY, "x y angle cos sin", 0),
-    "BODY, half sides": (BODY, "half_x half_y", 18),
-}
-
-
-@pytest.mark.parametrize(("kind", "names", "first"), FIELDS.values(), ids=FIELDS)
-def test_records_have_their_fields_where_lanes_look_for_them(kind: np.dtype[Any], names: str, first: int) -> None:
-    assert kind.fields is not None
-    offsets = [kind.fields[name][1] for name in names.split()]
-    assert offsets == [8 * (first + k) for k in range(len(offsets))]
-    assert {kind[name] for name in names.split()} == {np.dtype(np.float64)}

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.common.arrays import Record
 
-
 MARGIN = 2e-3  # m
 EXAMPLES = 250
 FEW = 100  # without the compiler
@@ -176,28 +175,6 @@ def test_block_ahead_turns_to_third_order_in_the_angle() -> None:
         angle = 0.4 + 30.0 * ahead
         errors.append(math.hypot(moved.cos - math.cos(angle), moved.sin - math.sin(angle)))
     assert 0.0 < errors[1] < 0.13 * errors[0] < 0.13 * 0.06**3
-
-
-def on_ground(body: Record, ground: Record, margin: float) -> Record:
-    return meet(body, ground, margin, is_ground=True)
-
-
-@given(angle=angles, height=st.floats(-2e-3, 2e-3), level=places)
-def test_ground_is_met_by_all_corners_within_the_margin(angle: float, height: float, level: float) -> None:
-    margin = 1.5e-3
-    body, ground = make_body(0.3, 0.0, angle), make_body(7.0, level, mass=1.0)
-    body.y = level + height - corners(body)[:, 1].min()
-    near = [corner for corner in corners(body).tolist() if corner[1] - level <= margin]
-    near.sort(reverse=True)  # along the tangent of an upward normal, which points to the left
-    constraint = on_ground(body, ground, margin)
-    assert bool(constraint.reach == AWAY) is (not near)
-    if not near:
-        return
-    assert (constraint.nx, constraint.ny) == (0.0, 1.0)
-    gaps = np.array([constraint.gap_one, constraint.gap_two])
-    assert gaps[gaps < FAR] == pytest.approx([y - level for _, y in near], abs=1e-12)
-    found = places_of(constraint, body, of_a=True)[gaps < FAR]
-    assert found == pytest.approx(np.array([(x, level) for x, _ in near]), abs=1e-12)
 
 
 FAR_OFF = 4e-3

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import INTERACTION, zeros
+from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.common.tolerances import LATE
 from blocksim.kernels.nonsmooth.arrays import BEFORE, FAR, STATE, TALLY_PACKS
-from blocksim.kernels.nonsmooth.cone import shear_limit
 from blocksim.kernels.nonsmooth.motion import is_in_flight, kick, kick_warm, place
 from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY, range_of_thread, sweep, velocity_pass
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
@@ -26,7 +24,6 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.common.arrays import Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-
 
 G = 9.81
 H = 1e-3  # s, a substep
@@ -150,20 +147,6 @@ def test_round_off_of_a_gap_does_not_choose_between_the_rules() -> None:
     for scene in scenes:
         sweep(scene.contacts, FIRST_VELOCITY, scene.world.team, 0)
     assert [dense(scene).impulses.min() > 0.0 for scene in scenes] == [True, True]
-
-
-@given(static=st.floats(0.0, 1.0), less=st.floats(0.0, 1.0), normal=st.floats(1e-3, 2.0), needed=st.floats(0.0, 3.0))
-def test_static_friction_holds_what_it_can_and_else_friction_is_kinetic(
-    static: float, less: float, normal: float, needed: float
-) -> None:
-    material = zeros(1, INTERACTION)[0]
-    material.static_friction, material.kinetic_friction, material.transition_speed = static, less * static, 1e-3
-    limit = shear_limit(material, normal, needed, 5.0)
-    assert less * static * normal <= limit <= static * normal
-    if needed <= static * normal:
-        assert limit >= needed
-    elif (needed - static * normal) * 5.0 > 0.05:  # m/s, slides fast
-        assert limit == pytest.approx(less * static * normal, abs=1e-12)
 
 
 @pytest.mark.parametrize("friction", [0.05, 0.3, 1.5])
