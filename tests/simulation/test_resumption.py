@@ -46,15 +46,22 @@ def points(whole: Result, seed: str, count: int) -> list[int]:
     return sorted(np.random.default_rng([*map(ord, seed)]).choice(steps, count, replace=False).tolist())
 
 
+def sliding_seen(name: str) -> Scenario:
+    """Return a model's scenario with its contacts recorded."""
+    return sliding({**MODELS[name], "output": {"contacts": True}}, end=0.02)
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str) -> None:
-    scenario = sliding(MODELS[name], end=0.02)
+    scenario = sliding_seen(name)
     whole = simulate_into(scenario, tmp_path / "whole")
     steps = points(whole, name, 3)
     stopped = interrupted_at(scenario, tmp_path / "parts", steps)
     resumed = simulate_into(scenario, tmp_path / "parts", resume=True)
     assert stopped == steps
     assert resumed.summary.resumed_from == tuple(steps)
+    assert whole.frames.contacts is not None
+    assert len(whole.frames.contacts.rows) > 10
     assert_same(whole, resumed)
 
 
@@ -97,49 +104,14 @@ def test_lists_that_have_grown_come_back_as_long(tmp_path: Path, monkeypatch: py
     assert_same(whole, simulate_into(scenario, tmp_path / "parts", resume=True))
 
 
-def test_frames_after_the_checkpoint_are_kept_once_and_that_of_the_interruption_goes(tmp_path: Path) -> None:
-    scenario = sliding({}, end=0.02, every=1e-3)
-    whole = simulate_into(scenario, tmp_path / "whole")
-    last = whole.summary.steps
-    folder = tmp_path / "parts"
-    interrupted_at(scenario, folder, [last // 3])
-    kept = {name: (folder / name).read_bytes() for name in ("checkpoint.0",)}
-    (later,) = interrupted_at_once(scenario, folder, 2 * last // 3)
-    for name in ("checkpoint.0", "checkpoint.1"):  # as if it had been killed before it wrote another one
-        (folder / name).unlink(missing_ok=True)
-    (folder / "checkpoint.0").write_bytes(kept["checkpoint.0"])
-    assert later not in whole.frames.step
-    resumed = simulate_into(scenario, folder, resume=True)
-    assert resumed.summary.resumed_from == (last // 3,)
-    assert_same(whole, resumed)
-
-
-def interrupted_at_once(scenario: Scenario, folder: Path, step: int) -> list[int]:
-    """Go on with a run until a step."""
-    part = simulate_into(scenario, folder, resume=True, precautions=CheckpointPolicy(wall_time=1e-9))
-    assert part.summary.steps < step
-    return [part.summary.steps]
-
-
-@pytest.mark.parametrize("name", ["surface-linear", "particles-linear", "nonsmooth"])
-def test_contacts_of_all_frames_are_kept_once(tmp_path: Path, name: str) -> None:
-    scenario = sliding({**MODELS[name], "output": {"contacts": True}}, end=0.02)
-    whole = simulate_into(scenario, tmp_path / "whole")
-    interrupted_at(scenario, tmp_path / "parts", [whole.summary.steps // 3, whole.summary.steps // 2])
-    resumed = simulate_into(scenario, tmp_path / "parts", resume=True)
-    assert whole.frames.contacts is not None
-    assert len(whole.frames.contacts.rows) > 10
-    assert_same(whole, resumed)
-
-
 def test_checkpoints_threads_and_outputs_change_no_bit(tmp_path: Path) -> None:
-    scenario = sliding({}, end=0.005)
+    scenario = sliding({}, end=0.002)
     often = CheckpointPolicy(checkpoint_steps=7, checkpoint_time=1e-4, checkpoint_seconds=1e-3)
     one = simulate_into(scenario, tmp_path / "one")
     other = simulate_into(scenario, tmp_path / "other", precautions=often)
     assert_same(one, other)
     assert not [path for path in (tmp_path / "other").iterdir() if path.name.startswith(("checkpoint", "."))]
-    rare = simulate_into(sliding({}, end=0.005, every=0.00137), tmp_path / "rare", precautions=often)
+    rare = simulate_into(sliding({}, end=0.002, every=0.00057), tmp_path / "rare", precautions=often)
     assert rare.summary.final_state_sha256 == one.summary.final_state_sha256
 
 
@@ -158,29 +130,45 @@ def begun(interrupted: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(interrupted, tmp_path / "begun"))
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    """Return that run without an interruption."""
+    whole = simulate_into(sliding({}), tmp_path_factory.mktemp("whole") / "run", resume=True)
+    assert whole.summary.warnings == ()
+    return whole
+
+
 def newest(folder: Path) -> Path:
     return max(folder.glob("checkpoint.*"), key=lambda path: read_checkpoint(path).head.position.step)
 
 
-@pytest.mark.parametrize("damage", ["flip", "cut", "empty"])
-def test_damaged_checkpoint_falls_back_to_the_older_one_and_says_so(begun: Path, tmp_path: Path, damage: str) -> None:
+def test_frames_after_the_checkpoint_are_kept_once_and_that_of_the_interruption_goes(
+    begun: Path, whole: Result
+) -> None:
+    newest(begun).unlink()  # as if it had been killed before it wrote this one
+    assert 1000 not in whole.frames.step
+    resumed = simulate_into(sliding({}), begun, resume=True)
+    assert resumed.summary.resumed_from == (500,)
+    assert resumed.summary.warnings == ()
+    assert_same(whole, resumed)
+
+
+def test_damaged_checkpoint_falls_back_to_the_older_one_and_none_that_is_whole_is_told(
+    begun: Path, tmp_path: Path, whole: Result
+) -> None:
     path = newest(begun)
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes({"flip": bytes(content), "cut": bytes(content[:-100]), "empty": b""}[damage])
+    path.write_bytes(path.read_bytes()[:-1])
+    shutil.copytree(begun, tmp_path / "none")
     resumed = simulate_into(sliding({}), begun, resume=True)
     assert resumed.summary.resumed_from == (500,)
     assert f"{path}: not a complete checkpoint" in resumed.summary.warnings[0]
-    assert_same(simulate_into(sliding({}), tmp_path / "whole"), resumed)
-
-
-def test_nothing_continues_where_no_checkpoint_is_whole(begun: Path) -> None:
-    for path in begun.glob("checkpoint.*"):
-        path.write_bytes(path.read_bytes()[:-1])
-    before = {path.name: path.read_bytes() for path in begun.iterdir()}
+    assert_same(whole, resumed)
+    for one in (tmp_path / "none").glob("checkpoint.*"):
+        one.write_bytes(b"")
+    before = {one.name: one.read_bytes() for one in (tmp_path / "none").iterdir()}
     with pytest.raises(InvalidInputError, match="no checkpoint is complete; --overwrite starts again"):
-        simulate_into(sliding({}), begun, resume=True)
-    assert {path.name: path.read_bytes() for path in begun.iterdir()} == before
+        simulate_into(sliding({}), tmp_path / "none", resume=True)
+    assert {one.name: one.read_bytes() for one in (tmp_path / "none").iterdir()} == before
 
 
 def test_other_scenario_is_refused_with_the_keys(begun: Path) -> None:
@@ -215,7 +203,7 @@ def test_missing_frames_are_no_ground_to_go_on(begun: Path, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("name", ["particles/blocks/vy", "observables/friction", "contacts/normal_force"])
 def test_frame_that_was_changed_before_the_run_continues_is_found(tmp_path: Path, name: str) -> None:
-    scenario = sliding({"output": {"contacts": True}}, end=0.02)
+    scenario = sliding_seen("surface-linear")
     interrupted_at(scenario, tmp_path, [1000])
     with h5py.File(tmp_path / "run.h5", "r+") as file:
         place = (4, 0) if file[name].ndim == 2 else 4
@@ -235,22 +223,14 @@ def test_changed_frame_after_the_checkpoint_is_reported_when_it_is_repeated(begu
     assert told.startswith(f"{begun}/run.h5: the frame of step {steps[place]} differs from the recomputed one")
 
 
-def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, tmp_path: Path) -> None:
+def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, whole: Result) -> None:
     for path in begun.glob("checkpoint.*"):
         path.unlink()
     again = simulate_into(sliding({}), begun, resume=True)
     assert again.status == "finished"
     assert again.summary.resumed_from == ()
     assert again.summary.warnings == (f"{begun}: no checkpoint saved; the run starts again",)
-    nothing = simulate_into(sliding({}), tmp_path / "nothing", resume=True)
-    assert nothing.summary.warnings == ()
-    assert_same(again, nothing)
-
-
-def test_another_finished_run_is_not_resumed_over(begun: Path) -> None:
-    simulate_into(sliding({}), begun, resume=True)
-    with pytest.raises(OutputExistsError, match="contains another run"):
-        simulate_into(sliding({}, end=0.07), begun, resume=True)
+    assert_same(again, whole)
 
 
 def test_times_of_all_parts_are_summed_and_told(begun: Path) -> None:
@@ -267,3 +247,5 @@ def test_times_of_all_parts_are_summed_and_told(begun: Path) -> None:
     assert told["last_checkpoint"] is None
     assert {path.name for path in begun.iterdir()} == {"scenario.toml", "final.csv", "run.h5", "run.json", "done.json"}
     assert resumed.reason == "end of simulated time"
+    with pytest.raises(OutputExistsError, match="contains another run"):
+        simulate_into(sliding({}, end=0.07), begun, resume=True)
