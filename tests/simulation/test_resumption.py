@@ -46,9 +46,9 @@ def points(whole: Result, seed: str, count: int) -> list[int]:
     return sorted(np.random.default_rng([*map(ord, seed)]).choice(steps, count, replace=False).tolist())
 
 
-def sliding_seen(name: str) -> Scenario:
+def sliding_seen(name: str, end: float = 0.02) -> Scenario:
     """Return a model's scenario with its contacts recorded."""
-    return sliding({**MODELS[name], "output": {"contacts": True}}, end=0.02)
+    return sliding({**MODELS[name], "output": {"contacts": True}}, end=end)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -68,7 +68,7 @@ def test_resumed_run_has_the_bits_of_a_continuous_one(tmp_path: Path, name: str)
 @pytest.mark.usefixtures("two_threads")
 @pytest.mark.parametrize("name", ["surface-linear", "outlines", "nonsmooth"])
 def test_run_continues_with_another_number_of_threads(tmp_path: Path, name: str) -> None:
-    scenario = sliding(MODELS[name], end=0.01)
+    scenario = sliding_seen(name, end=0.01)
     whole = simulate_into(scenario, tmp_path / "whole")
     for threads, then in ((1, 2), (2, 1), (2, 2)):
         folder = tmp_path / f"{threads}{then}"

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from blocksim.errors import OutputError
+from blocksim.errors import InvalidInputError, OutputError
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
 from blocksim.simulation import Result
 from blocksim.simulation.instruments import MOTION, Frame, Recorder
@@ -99,6 +99,11 @@ def test_what_was_committed_is_there_under_way_and_after_a_kill(scenario: Scenar
     with h5py.File(path, "r+") as stored:
         stored["n_committed"][()] = 2  # killed after the third was written, before it was announced
     assert read_frames(path, scenario).step.tolist() == [0, 1]
+    with h5py.File(path, "r+") as stored:
+        stored["n_committed"][()] = 1400
+        stored["contacts/normal_force"].resize(3, axis=0)
+    with pytest.raises(InvalidInputError, match="contacts/normal_force: holds 3 contacts, not 1399"):
+        read_frames(path, scenario)
 
 
 def test_outlines_are_stored_once_and_rectangles_store_none(scenario: Scenario, tmp_path: Path) -> None:
