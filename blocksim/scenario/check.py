@@ -89,8 +89,6 @@ def unfit_choices(scenario: Scenario) -> Iterator[mistakes.Mistake]:
         modelled = " or ".join(f"{units.toml(name)} and {units.toml(one)}" for name, one in known)
         where = f"with time.scheme = {units.toml(scheme)} and contact.model = {units.toml(model)}"
         why = f"outlines are not modelled {where}{reason}; use {modelled}"
-    elif scenario.systems:
-        why = f"outlines are not modelled beside {', '.join(scenario.systems)}, whose particles meet rectangles only"
     for name, block in scenario.blocks.items():
         if scenario.materials[block.material].friction_angle is not None:
             message = f"{units.toml(block.material)} is soil, as it has a friction_angle; blocks are of other materials"

@@ -9,6 +9,7 @@ Rectangles, pieces and the half-plane count from the lower left corner, so that 
 half-plane is infinitely wide, and its upper face goes through its centre.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -171,6 +172,63 @@ def face_before(body: Record, table: Corners, x: float, y: float, last: int, roo
             return k
         k = k + 1 if k + 1 < count else 0
     return NO_FACE
+
+
+@kernel
+def is_within(body: Record, table: Corners, x: float, y: float, reach: float) -> bool:
+    """Return True if a place (m, in its frame) is within reach (m) of a body, or inside; at sharp ends also farther."""
+    if table is None:
+        along, across = max(abs(x) - body.half_x, 0.0), max(abs(y) - body.half_y, 0.0)
+        return along * along + across * across < reach * reach
+    for k in range(number_of_corners(body, table)):
+        side = corner_of(body, table, k)
+        if side.nx * x + side.ny * y - side.distance >= reach:
+            return False
+    return True
+
+
+@kernel
+def distance_from(body: Record, table: Corners, x: float, y: float) -> tuple[float, float, float]:
+    """Return the distance (m, negative inside) of a place (m) from a body and its outward normal, all in its frame."""
+    if table is None:
+        along, across = abs(x) - body.half_x, abs(y) - body.half_y
+        if along > 0.0 and across > 0.0:
+            distance = math.sqrt(along * along + across * across)
+            return distance, math.copysign(along / distance, x), math.copysign(across / distance, y)
+        if along > across:
+            return along, math.copysign(1.0, x), 0.0
+        return across, 0.0, math.copysign(1.0, y)
+    face, best = 0, -math.inf
+    for k in range(number_of_corners(body, table)):
+        side = corner_of(body, table, k)
+        gap = side.nx * x + side.ny * y - side.distance
+        if gap > best:
+            face, best = k, gap
+    side = corner_of(body, table, face)
+    if best <= 0.0 or abs(side.nx * y - side.ny * x - side.middle) <= side.half:
+        return best, side.nx, side.ny
+    return distance_beyond_ends(body, table, x, y)
+
+
+@rare_kernel
+def distance_beyond_ends(body: Record, table: Corners, x: float, y: float) -> tuple[float, float, float]:
+    """Return the same of a place outside a polygon that is beyond an end of the face which it is farthest from.
+
+    The nearest point is a corner, or lies on another face: beside a sharp corner that may be one that is nearer.
+    """
+    best, nx, ny = math.inf, 0.0, 1.0
+    for k in range(number_of_corners(body, table)):
+        side = corner_of(body, table, k)
+        gap = side.nx * x + side.ny * y - side.distance
+        if gap > 0.0 and abs(side.nx * y - side.ny * x - side.middle) <= side.half:
+            return gap, side.nx, side.ny
+        dx, dy = x - side.x, y - side.y
+        away = math.sqrt(dx * dx + dy * dy)
+        if not away > 0.0:
+            return 0.0, side.nx, side.ny
+        if away < best:
+            best, nx, ny = away, dx / away, dy / away
+    return best, nx, ny
 
 
 @kernel

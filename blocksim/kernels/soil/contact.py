@@ -9,33 +9,20 @@ Which particles are near which bodies: a sorted list of touches that carries the
 
 Made when the lists of neighbours are, by one thread, as few particles are near a body.
 
-Distance of a particle's centre from the exact shape of a body.
-
-Blocks are rectangles. A piece of ground or a wall is its upper face, with the ends that can be touched; what lies
-beyond an end is its neighbour's affair. The half-plane, the last of all bodies, is what lies below its height.
+A piece of ground or a wall is its upper face, with the ends that can be touched; what lies beyond an end is its
+neighbour's affair. The half-plane, the last of all bodies, is what lies below its height.
 """
 
 import math
 
 from blocksim.kernels.common import arrays, jit, neighbours, supports, systems, tolerances
 from blocksim.kernels.common.barrier import barrier
+from blocksim.kernels.explicit import sides
 from blocksim.kernels.explicit.friction import clip_to_cone, draw_same_spring
 from blocksim.kernels.soil.arrays import GROUP, Soils
 from blocksim.kernels.soil.neighbours import grid_of
 
 UPPER_RIGHT, UPPER_LEFT = 4, 8  # bits of corners that can be touched
-
-
-@jit.kernel
-def from_rectangle(u: float, v: float, half_x: float, half_y: float) -> tuple[float, float, float]:
-    """Return the distance (m, negative inside) from a rectangle and its outward normal, all in the body's frame."""
-    along, across = abs(u) - half_x, abs(v) - half_y
-    if along > 0.0 and across > 0.0:
-        distance = math.sqrt(along * along + across * across)
-        return distance, math.copysign(along / distance, u), math.copysign(across / distance, v)
-    if along > across:
-        return along, math.copysign(1.0, u), 0.0
-    return across, 0.0, math.copysign(1.0, v)
 
 
 @jit.kernel
@@ -57,28 +44,28 @@ def from_piece(body: arrays.Record, u: float, v: float, radius: float) -> tuple[
 
 
 @jit.kernel
-def from_body(body: arrays.Record, is_ground: bool, x: float, y: float, radius: float) -> tuple[float, float, float]:
-    """Return the distance (m) of a place from a body and the outward normal there; a disc of that radius is meant."""
-    if is_ground:
+def from_body(world: arrays.World, b: int, x: float, y: float, radius: float) -> tuple[float, float, float]:
+    """Return the distance (m) of a place from body b and the outward normal there; a disc of that radius is meant."""
+    body = world.bodies[b]
+    if b == world.bodies.size - 1:
         return y - body.y, 0.0, 1.0
-    dx, dy = x - body.x, y - body.y
-    u, v = body.cos * dx + body.sin * dy, body.cos * dy - body.sin * dx
-    if body.faces == arrays.ALL:
-        distance, nu, nv = from_rectangle(u, v, body.half_x, body.half_y)
-    else:
+    u, v = sides.into_frame(body, x - body.x, y - body.y)
+    if sides.is_piece(body):
         distance, nu, nv = from_piece(body, u, v, radius)
-    return distance, body.cos * nu - body.sin * nv, body.sin * nu + body.cos * nv
+    else:
+        distance, nu, nv = sides.distance_from(body, world.corners, u, v)
+    nx, ny = sides.into_world(body, nu, nv)
+    return distance, nx, ny
 
 
 @jit.kernel
-def is_near(body: arrays.Record, is_ground: bool, x: float, y: float, reach: float) -> bool:
-    """Return True if a place (m) is within reach (m) of a body, or inside."""
-    if is_ground:
-        return y - body.y < reach
-    dx, dy = x - body.x, y - body.y
-    u, v = body.cos * dx + body.sin * dy, body.cos * dy - body.sin * dx
-    along, across = max(abs(u) - body.half_x, 0.0), max(abs(v) - body.half_y, 0.0)
-    return along * along + across * across < reach * reach
+def is_near(world: arrays.World, b: int, x: float, y: float, reach: float) -> bool:
+    """Return True if a place (m) is within reach (m) of body b, or inside."""
+    body = world.bodies[b]
+    if b == world.bodies.size - 1:
+        return bool(y - body.y < reach)
+    u, v = sides.into_frame(body, x - body.x, y - body.y)
+    return bool(sides.is_within(body, world.corners, u, v, reach))
 
 
 @jit.kernel
@@ -98,11 +85,12 @@ def rates(point: arrays.Record, body: arrays.Record, is_ground: bool, nx: float,
 
 
 @jit.rare_kernel
-def press(soils: Soils, touch: arrays.Record, body: arrays.Record, is_ground: bool, step: float) -> None:
+def press(soils: Soils, world: arrays.World, touch: arrays.Record, step: float) -> None:
     """Evaluate one touch: forces on its particle, losses of the last drift."""
+    body, is_ground = world.bodies[touch.body], touch.body == world.bodies.size - 1
     point, state = soils.points[touch.particle], soils.states[touch.particle]
     radius = soils.controls[0].radius
-    distance, nx, ny = from_body(body, is_ground, point.x, point.y, radius)
+    distance, nx, ny = from_body(world, touch.body, point.x, point.y, radius)
     depth = radius - distance
     if depth <= 0.0 and touch.depth == 0.0:
         return
@@ -166,13 +154,12 @@ def press_all(soils: Soils, world: arrays.World, k: int, step: float, of_blocks:
     first, last = particles_of_thread(soils, world, k)
     if first >= last:
         return
-    ground = world.bodies.size - 1
     blocks = soils.controls[0].blocks
     end = soils.states[last - 1]
     for e in range(soils.states[first].first, end.first + end.count):
         touch = soils.touches[e]
         if (touch.body < blocks) == of_blocks:
-            press(soils, touch, world.bodies[touch.body], touch.body == ground, step)
+            press(soils, world, touch, step)
 
 
 @jit.kernel
@@ -249,7 +236,7 @@ def find_near(soils: Soils, world: arrays.World, b: int, count: int) -> int:
     first, last = neighbours.column_of(grid, left), neighbours.column_of(grid, right)
     for row in range(neighbours.row_of(grid, bottom), neighbours.row_of(grid, top) + 1):
         for i in range(soils.starts[row * grid.columns + first], soils.starts[row * grid.columns + last + 1]):
-            if is_near(body, is_ground, soils.points[i].x, soils.points[i].y, reach):
+            if is_near(world, b, soils.points[i].x, soils.points[i].y, reach):
                 if count < soils.by_body.size:
                     soils.by_body[count] = i
                 count += 1
@@ -344,7 +331,7 @@ def preload(soils: Soils, world: arrays.World) -> None:
         touch = soils.touches[e]
         point, state = soils.points[touch.particle], soils.states[touch.particle]
         body = world.bodies[touch.body]
-        distance, nx, ny = from_body(body, touch.body == world.bodies.size - 1, point.x, point.y, radius)
+        distance, nx, ny = from_body(world, touch.body, point.x, point.y, radius)
         pressure = -(state.sxx * nx * nx + 2.0 * state.sxy * nx * ny + state.syy * ny * ny)
         pressure -= radius * soils.kinds[state.kind].density * min(gravity_x * nx + gravity_y * ny, 0.0)
         if abs(distance - radius) < tolerances.AT_TOUCH * radius and state.syy < 0.0 and pressure > 0.0:

@@ -186,11 +186,11 @@ def share_across(row: float, is_corrected: bool) -> float:
 
 
 @jit.rare_kernel
-def row_beside(body: arrays.Record, is_ground: bool, x: float, y: float, spacing: float) -> tuple[float, float, float]:
-    """Return the row along a face of a body in which a place (m) is, and the normal; 0 if it is in none."""
-    if not is_near(body, is_ground, x, y, ROWS * spacing):
+def row_beside(world: arrays.World, b: int, x: float, y: float, spacing: float) -> tuple[float, float, float]:
+    """Return the row along a face of body b in which a place (m) is, and the normal; 0 if it is in none."""
+    if not is_near(world, b, x, y, ROWS * spacing):
         return 0.0, 0.0, 1.0
-    distance, nx, ny = from_body(body, is_ground, x, y, 0.5 * spacing)
+    distance, nx, ny = from_body(world, b, x, y, 0.5 * spacing)
     if math.isinf(distance) or min(abs(nx), abs(ny)) > tolerances.OUT_OF_LINE:
         return 0.0, nx, ny
     row = distance / spacing + 0.5
@@ -206,7 +206,7 @@ def shares_of_place(world: arrays.World, x: float, y: float, spacing: float, is_
     """
     left = right = below = above = ROWS + 1.0
     for b in range(world.bodies.size):
-        row, nx, ny = row_beside(world.bodies[b], b == world.bodies.size - 1, x, y, spacing)
+        row, nx, ny = row_beside(world, b, x, y, spacing)
         if row > 0.0:
             left = min(left, row) if nx > 0.5 else left
             right = min(right, row) if nx < -0.5 else right

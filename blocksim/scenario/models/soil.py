@@ -20,7 +20,7 @@ Start = Literal["geostatic", "ramp"]
 Gradient = Literal["raw", "corrected"]
 MOST_PARTICLES = 1_000_000
 LEAST_ACROSS = 4
-SPACINGS_A_SIDE = 8  # least number of spacings along the smallest side of all blocks
+SPACINGS_A_SIDE = 8  # least number of spacings across the thinnest block
 MILLI = 1e3
 SHAPES: dict[str, tuple[str, ...]] = {"outline": ("outline",), "rectangle": ("x", "y"), "slope": ("x", "y", "angle")}
 """Keys that give the shape, by kind."""
@@ -99,16 +99,14 @@ class SoilTable(SystemTable):
             yield "material", f"unknown material {q.toml(self.material)}, {hint}"
         elif scenario.materials[self.material].friction_angle is None:
             yield "material", f"{q.toml(self.material)} is no soil; give this material a friction_angle"
-        if placement.has_outlines(scenario):  # refused: they say nothing about spacing and place
-            return
-        sides = [side for block in scenario.blocks.values() if (side := min(block.size_x, block.size_y)) > 0.0]
+        side = placement.smallest_width(placement.place_bodies(scenario))
         across = geometry.count_across(self.corners, self.spacing)
         first = scenario.systems["soils"][0]
         unfit = []
         if isinstance(first, SoilTable) and self.spacing != first.spacing:
             unfit.append(f"all soils have the same spacing, here {MILLI * first.spacing:.6g} mm")
-        if sides and SPACINGS_A_SIDE * self.spacing > min(sides) * (1.0 + 1e-9):
-            most = MILLI * min(sides) / SPACINGS_A_SIDE
+        if SPACINGS_A_SIDE * self.spacing > side * (1.0 + 1e-9):
+            most = MILLI * side / SPACINGS_A_SIDE
             unfit.append(f"above an eighth of the smallest side of the blocks: at most {most:.4g} mm")
         if min(across) < LEAST_ACROSS:
             unfit.append(f"only {min(across)} particles across; at least {LEAST_ACROSS} are needed")
