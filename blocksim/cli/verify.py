@@ -28,7 +28,7 @@ def verify_command(
     model: Annotated[str, Option("Contact model.", choices=("surface", "particles", "kernel"))] = "surface",
     law: Annotated[str, Option("Force law.", choices=tuple(LAWS))] = LINEAR.name,
     scheme: Annotated[str, Option("Stepping: springs or impulses.", choices=(SPRINGS, IMPULSES))] = SPRINGS,
-    soil: Annotated[bool, Option("The cases of soil, S1 to S11.")] = False,
+    soil: Annotated[bool, Option("The cases of soil, S1 to S12.")] = False,
     quick: Annotated[bool, Option("Run reduced cases; the last lines list what was reduced.")] = False,
     screen: command_line.Screen,
 ) -> command_line.Report:

@@ -1,8 +1,8 @@
-"""S1 to S11: soil by itself and with blocks, against closed forms, measurements and another code; `verify --soil`.
+"""S1 to S12: soil by itself and with blocks, against closed forms, measurements and another code; `verify --soil`.
 
 S1 to S6 and S11 are about what soil does to walls that hold it or are drawn back, and to walls of blocks that slide or
-turn; S7, S9 and S10 about what moving soil conserves, how far columns of it run and how much of their energy they keep;
-S8 leads one particle through the law itself. Everything is 50 mm deep, in SI units.
+turn, S12 about its thrust on polygons; S7, S9 and S10 about what moving soil conserves, how far columns of it run and
+how much of their energy they keep; S8 leads one particle through the law itself. Everything is 50 mm deep, in SI units.
 """
 
 import math
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.soil import arrays, stress
-from blocksim.scenario import scenario_from_mapping
+from blocksim.scenario import geometry, scenario_from_mapping
 from blocksim.simulation.schemes import build_scene, ledger_names
 from blocksim.verification.case import Case, Row, Setting, at_least, count, relative
 from blocksim.verification.scene import Simulation
@@ -40,6 +40,7 @@ RODS = {**SOFT, "unit_weight": UNIT_WEIGHT, "friction_angle": f"{math.degrees(AN
 MATERIALS: dict[str, dict[str, Any]] = {
     "rods": RODS,
     "rods_of_SPHinXsys": {**RODS, "yield_surface": "plane-strain-associated"},  # the only one that it has
+    "sand": {**RODS, "friction_angle": "30 deg"},
     "wall": {**SOFT, "density": DENSITY},
     "block": {**SOFT, "density": DENSITY},
 }
@@ -53,7 +54,7 @@ def block(width: float, height: float, material: str = "block") -> dict[str, Any
 
 
 class SoilScene(Simulation):
-    """A rectangle of soil with its lower left corner at x, y, between what is given."""
+    """Soil between what is given: a rectangle with its lower left corner at x, y, unless there is an `outline`."""
 
     def __init__(  # noqa: PLR0913 - what cases differ by
         self,
@@ -72,7 +73,9 @@ class SoilScene(Simulation):
         **keys: Any,
     ) -> None:
         """Build and start it; `walls` are places of faces, that at 0 to the right, others to the left."""
-        soil = {"name": "soil", "material": "rods", "kind": "rectangle", "spacing": spacing, **keys}
+        rectangle = {"kind": "rectangle", "x": [x, x + size[0]], "y": [y, y + size[1]]}
+        shape = {} if "outline" in keys else rectangle
+        soil = {"name": "soil", "material": "rods", "spacing": spacing, **shape, **keys}
         ends = [(place, (0.0, WALL) if place else (WALL, 0.0)) for place in walls]
         data = {
             "schema": 1,
@@ -80,7 +83,7 @@ class SoilScene(Simulation):
             "materials": MATERIALS,
             "blocks": {"far": block(0.04, 0.04), **(blocks or {})},
             "bodies": list(bodies),
-            "soils": [{**soil, "x": [x, x + size[0]], "y": [y, y + size[1]]}],
+            "soils": [soil],
             "walls": [{"from": [at, first], "to": [at, last], "material": "wall"} for at, (first, last) in ends],
             "pairs": {
                 str(soil["material"]): {
@@ -192,20 +195,40 @@ def at_rest(setting: Setting) -> Iterator[Row]:
             yield relative(f"{prefix}{start}: K on the wall", "", AT_REST, share, 0.01)
 
 
-def draw_wall_back(spacing: float, base: float, speed: float, gradient: str) -> SoilScene:
-    """Return soil at rest behind a smooth wall that begins to leave at a speed (m/s)."""
-    blocks = {"wall": block(0.04, 0.16, "wall")}
-    bodies = [{"block": "wall", "x": -0.02, "y": 0.08, "fixed": True}, FAR]
-    scene = SoilScene((0.15, TALL), spacing, walls=(0.15,), base=base, bodies=bodies, blocks=blocks, gradient=gradient)
+def draw_wall_back(spacing: float, base: float, speed: float, gradient: str, batter: float = 0.0) -> SoilScene:
+    """Return soil at rest behind a smooth wall that begins to leave at a speed (m/s).
+
+    Sand lies on the back of a wall with a batter (rad), rods stand beside an upright one.
+    """
+    body, kind = {"block": "wall", "x": -0.02, "y": 0.08, "fixed": True}, block(0.04, 0.16, "wall")
+    keys: dict[str, Any] = {}
+    if batter:
+        lean = math.tan(batter)
+        left, crest = -0.04 - 0.16 * lean, -0.16 * lean
+        body, kind = fixed_polygon("wall", [(left, 0.0), (0.0, 0.0), (crest, 0.16), (left, 0.16)])
+        keys = {"material": "sand", "outline": [(0.0, 0.0), (0.15, 0.0), (0.15, TALL), (-lean * TALL, TALL)]}
+    bodies, blocks, walls = [body, FAR], {"wall": kind}, (0.15,)
+    scene = SoilScene(
+        (0.15, TALL), spacing, walls=walls, base=base, bodies=bodies, blocks=blocks, gradient=gradient, **keys
+    )
     scene.to_time(0.05)
     scene.world.bodies.vx[0] = -speed
     return scene
 
 
-def active_share(spacing: float, base: float, gradient: str) -> float:
-    """Return K of a smooth wall drawn back by 1 % of the height at 5 mm/s: the mean over its second half."""
-    scene = draw_wall_back(spacing, base, 0.005, gradient).to_time(0.15)
-    thrust, _ = scene.mean_force_on(0, 0.25)
+def fixed_polygon(name: str, corners: Sequence[tuple[float, float]]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the tables of a fixed block with these corners (m), and of its kind."""
+    x, y = geometry.centroid(corners)
+    return {"block": name, "x": x, "y": y, "fixed": True}, {"outline": corners, "depth": DEPTH, "material": "wall"}
+
+
+def active_share(spacing: float, base: float, gradient: str, batter: float = 0.0) -> float:
+    """Return K of a smooth wall drawn back by 1 % of the height at 5 mm/s: the mean over its second half.
+
+    The thrust is that along the normal of the back, the height that of the soil that has sunk.
+    """
+    scene = draw_wall_back(spacing, base, 0.005, gradient, batter).to_time(0.15)
+    thrust = scene.mean_force_on(0, 0.25) @ (math.cos(batter), math.sin(batter))
     x, y = scene.points["x"], scene.points["y"]
     columns = np.arange(0.0, 0.02, spacing)
     tops = [y[(x >= left - 0.001) & (x < left + spacing)].max() for left in columns]
@@ -328,6 +351,48 @@ def surcharge(setting: Setting) -> Iterator[Row]:
         yield count(f"{prefix}{share:g} of the load: topples", falls, int(float(np.abs(own["angle"]).max()) > LEANING))
 
 
+SAND = math.radians(30.0)
+SAND_IN_BANDS = math.atan(math.sin(SAND))
+BATTERS = (10, 20)  # degrees
+SLOPE = math.radians(15.0)  # of blocks
+FOOT = 0.05  # m, height of that slope where it ends
+
+
+def wedge_share(batter: float, friction: float) -> float:
+    """Return K of a wedge above the smooth back of a wall, all angles in rad: C. A. Coulomb, 1776."""
+    ahead = 1.0 + math.sin(friction) / math.cos(batter)
+    return math.cos(friction - batter) ** 2 / (math.cos(batter) ** 3 * ahead**2)
+
+
+def polygons(setting: Setting) -> Iterator[Row]:
+    """Draw smooth walls with a batter back from sand on a smooth base; lay a pile on a smooth slope of two blocks."""
+    for degrees, spacing in product(BATTERS, (COARSE,) if setting.quick else (COARSE, FINE)):
+        found, batter = active_share(spacing, SMOOTH, "corrected", math.radians(degrees)), math.radians(degrees)
+        name = f"batter {degrees}°: K, {1e3 * spacing:g} mm"
+        yield relative(name, "", wedge_share(batter, SAND), found, 0.05)
+        name = f"batter {degrees}°: K of bands less K, {1e3 * spacing:g} mm"
+        yield at_least(name, "", 0.0, wedge_share(batter, SAND_IN_BANDS) - found)
+
+    def height(x: float) -> float:
+        return FOOT + math.tan(SLOPE) * (TALL - x)
+
+    pairs = []
+    for begin, end in ((0.0, 0.04), (0.04, TALL)):
+        corners = [(begin, 0.0), (end, 0.0), (end, height(end)), (begin, height(begin))]
+        pairs.append(fixed_polygon(f"at-{begin:g}", corners))
+    blocks = {str(body["block"]): kind for body, kind in pairs}
+    outline = [(0.0, height(0.0)), (TALL, FOOT), (TALL, height(0.0) + TALL), (0.0, height(0.0) + TALL)]
+    bodies = [body for body, _ in pairs]
+    pile = SoilScene((TALL, TALL), COARSE, walls=(0.0, TALL), bodies=bodies, blocks=blocks, outline=outline)
+    pile.to_time(0.3)
+    weight = float(pile.soils.kinds["mass"][0]) * len(pile.points) * GRAVITY
+    left, right, *walls = (pile.mean_force_on(body, 0.31 + 0.01 * body) for body in range(4))
+    normal = -float((left + right) @ (math.sin(SLOPE), math.cos(SLOPE)))
+    yield relative("slope: force on it / (weight / cos 15°)", "", 1.0, normal * math.cos(SLOPE) / weight, 0.005)
+    thrust = float(sum(force[0] for force in walls))
+    yield relative("slope: thrust on walls / (weight tan 15°)", "", 1.0, thrust / (weight * math.tan(SLOPE)), 0.005)
+
+
 REFERENCES = ((0.1 / 0.7, "143"), (0.1, "100"), (0.1 / 1.5, "67"))  # m: widths of the source's columns
 STRIKER = 0.04  # m: side of a block that is thrown at soil
 THROWN = 2.0  # m/s
@@ -418,6 +483,10 @@ BANDS = {
     "gradients, the more it slips in bands, and soil that keeps its volume slips at tan φ* = sin φ (E. H. Davis, "
     "1968): K = 0.482. What is measured lies between"
 }
+SLIPS = {
+    "surface": "as S2: the finer the particles, the more the sand slips in bands, whose wedge has K = 0.455 at 10° and "
+    "0.546 at 20°. There 2.5 mm come to 3 % more than that, on the safe side"
+}
 SHORT = {
     "surface": "an error of first order in the spacing, as the rows with 5, 2.5 and 1.25 mm show. A last bit more or "
     "less of speed moves ends by 1 to 4 %, and heights with 5 mm know whole particles only, of 7 %"
@@ -452,4 +521,5 @@ SOIL_CASES = (
     ),
     Case("S10", "energy that a column 200 × 100 mm keeps", "SPHinXsys", energy_share, "5 mm, raw", ONE_SPACING),
     Case("S11", "surcharge behind two blocks", "moments about the toe", surcharge, "0.4 s, raw"),
+    Case("S12", "walls with a batter, a pile on a slope", "Coulomb's wedge, statics", polygons, "5 mm only", SLIPS),
 )

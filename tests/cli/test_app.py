@@ -70,7 +70,7 @@ def test_every_command_is_in_one_group_of_the_list() -> None:
         ("plot run --colour s", ["speed"]),
         ("animate run --colour pl", ["plastic"]),
         ("verify V2", ["V2", "V20", "V21", "V22", "V23", "V24", "V25"]),
-        ("verify --soil S1", ["S1", "S10", "S11"]),
+        ("verify --soil S1", ["S1", "S10", "S11", "S12"]),
         ("plo", ["plot"]),
     ],
 )

@@ -15,11 +15,12 @@ from blocksim.kernels.common.simd import fields_0, split
 from blocksim.kernels.common.tolerances import DECAY
 from blocksim.kernels.soil import contact
 from blocksim.kernels.soil.arrays import CLUSTER, GROUP, NEIGHBOURS, STATE, Soils
-from blocksim.kernels.soil.contact import from_body
+from blocksim.kernels.soil.contact import from_body, is_near
 from blocksim.kernels.soil.neighbours import places_of
 from blocksim.kernels.soil.step import correction, forces_on, raw_gradient, renew_lists, stress_group
 from blocksim.kernels.soil.stress import ROWS, invariants, share_of_row, strain
 from blocksim.kernels.sph.functions import wendland_slope
+from blocksim.scenario import geometry
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.simulation.schemes import build_scene
 from blocksim.world.systems.soil_arrays import kind_records
@@ -257,12 +258,17 @@ def test_corrected_soil_starts_within_the_yield_surface() -> None:
 
 
 RADIUS = 0.0025
+INTERPRETED = pytest.mark.skipif(not config.DISABLE_JIT, reason="calls kernels with whole worlds, or without records")
+SIDES = {"width": 0.04, "height": 0.04, "length": 0.05, "material": "soft"}
+OUTLINE = {"outline": [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]], "depth": 0.05, "material": "soft"}
 
 
-def bodies(**changes: Any) -> Any:
-    return build_scene(scene(column(0.04, 0.04, 0.005), **changes)).world.bodies
+def world_of(**changes: Any) -> Any:
+    return build_scene(scene(column(0.04, 0.04, 0.005), **changes)).world
 
 
+@INTERPRETED
+@pytest.mark.parametrize("shape", [SIDES, OUTLINE], ids=["sides", "outline"])
 @pytest.mark.parametrize(
     ("u", "v", "distance", "normal"),
     [
@@ -272,39 +278,63 @@ def bodies(**changes: Any) -> Any:
         (-0.019, 0.0, -0.001, (-1.0, 0.0)),
     ],
 )
-def test_a_rectangle_has_faces_and_corners_however_it_is_turned(
-    u: float, v: float, distance: float, normal: tuple[float, float]
+def test_a_rectangle_has_faces_and_corners_however_it_is_given_and_turned(
+    u: float, v: float, distance: float, normal: tuple[float, float], shape: dict[str, Any]
 ) -> None:
-    block = bodies()[0]
+    world = world_of(blocks={"far": shape})
+    block = world.bodies[0]
     for angle in (0.0, 0.4, 2.0):
         block.cos, block.sin = math.cos(angle), math.sin(angle)
         turn = np.array([[block.cos, -block.sin], [block.sin, block.cos]])
         x, y = (block.x, block.y) + turn @ (u, v)
-        found, nx, ny = from_body(block, False, x, y, RADIUS)
+        found, nx, ny = from_body(world, 0, x, y, RADIUS)
         assert found == pytest.approx(distance, abs=1e-12)
         assert (nx, ny) == pytest.approx(tuple(turn @ normal), abs=1e-9)
 
 
+@INTERPRETED
+@pytest.mark.parametrize("angles", [(0, 170, 190), (0, 100, 200, 280), (0, 40, 90, 150, 210, 280)])
+def test_distance_from_a_polygon_is_that_from_the_nearest_place_on_its_outline(angles: tuple[int, ...]) -> None:
+    """A triangle with a tip of 10 degrees is among them."""
+    turns = np.radians(angles)
+    outline = 0.04 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    kind = {"outline": outline.tolist(), "depth": 0.05, "material": "soft"}
+    world = world_of(
+        blocks={"far": kind}, soils=[column(0.04, 0.04, 0.0005)], bodies=[{"block": "far", "x": -1, "y": 1}]
+    )
+    corners = outline - np.array(geometry.centroid(outline.tolist()))
+    places = np.random.default_rng(5).uniform(-0.07, 0.07, (300, 2))
+    apart = geometry.edge_distance(places, corners) * np.where(geometry.is_inside(places, corners), -1.0, 1.0)
+    for (x, y), expected in zip(places, apart, strict=True):
+        found, nx, ny = from_body(world, 0, x - 1.0, y + 1.0, RADIUS)
+        assert found == pytest.approx(expected, abs=1e-15)
+        foot = np.array([[x - found * nx, y - found * ny]])
+        assert geometry.edge_distance(foot, corners)[0] == pytest.approx(0.0, abs=1e-14)
+        assert is_near(world, 0, x - 1.0, y + 1.0, 0.02) or expected >= 0.02
+
+
+@INTERPRETED
 def test_a_wall_has_one_face_and_a_free_end() -> None:
-    wall = bodies(walls=[LEFT])[1]
-    assert from_body(wall, False, 0.002, 0.1, RADIUS) == pytest.approx((0.002, 1.0, 0.0), abs=1e-9)
-    assert from_body(wall, False, -0.0005, 0.1, RADIUS)[0] == pytest.approx(-0.0005)  # pressed in
-    assert from_body(wall, False, -0.002, 0.1, RADIUS)[0] == math.inf  # behind
-    assert from_body(wall, False, 0.0, 0.301, RADIUS)[0] == pytest.approx(0.001)  # on its end
-    assert from_body(wall, False, 0.002, -0.02, RADIUS)[0] == math.inf  # that end stands on the ground
+    world = world_of(walls=[LEFT])
+    assert from_body(world, 1, 0.002, 0.1, RADIUS) == pytest.approx((0.002, 1.0, 0.0), abs=1e-9)
+    assert from_body(world, 1, -0.0005, 0.1, RADIUS)[0] == pytest.approx(-0.0005)  # pressed in
+    assert from_body(world, 1, -0.002, 0.1, RADIUS)[0] == math.inf  # behind
+    assert from_body(world, 1, 0.0, 0.301, RADIUS)[0] == pytest.approx(0.001)  # on its end
+    assert from_body(world, 1, 0.002, -0.02, RADIUS)[0] == math.inf  # that end stands on the ground
 
 
+@INTERPRETED
 def test_an_edge_of_a_profile_is_touched_once() -> None:
     profile = [[-0.2, 0.0], [0.2, 0.0], [0.2, -0.1], [0.5, -0.1]]
-    pieces = bodies(ground={"profile": profile})[1:-1]
-    found = [from_body(piece, False, 0.201, 0.001, RADIUS)[0] for piece in pieces]
+    world = world_of(ground={"profile": profile})
+    found = [from_body(world, piece, 0.201, 0.001, RADIUS)[0] for piece in range(1, world.bodies.size - 1)]
     assert sorted(one for one in found if one < RADIUS) == pytest.approx([math.hypot(0.001, 0.001)])
 
 
 record: Any = SimpleNamespace
 
 
-@pytest.mark.skipif(not config.DISABLE_JIT, reason="calls kernels without records")
+@INTERPRETED
 @pytest.mark.parametrize(("apart", "touches"), [(3e-4, True), (3e-3, False)])
 def test_particle_that_nearly_touches_a_body_at_the_start_is_pressed_against_it(
     monkeypatch: pytest.MonkeyPatch, apart: float, touches: bool

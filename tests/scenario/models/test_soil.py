@@ -124,19 +124,11 @@ def test_a_material_is_soil_or_not(material: dict[str, Any], told: tuple[str, ..
     assert all(part in problem for part in told), problem
 
 
-@pytest.mark.parametrize(
-    "shaped",
-    [
-        {"structures": [{"kind": "voronoi", "block": "cell", "width": 0.2, "height": 0.1, "count": 4, "left": 0.3}]},
-        {"blocks": {**BLOCKS, "cell": {"sides": 5, "radius": 0.02, "depth": 0.1, "material": "rod"}}},
-    ],
-)
-def test_polygons_beside_soil_are_refused_with_the_cause_alone(shaped: dict[str, Any]) -> None:
-    cell = {"depth": 0.1, "material": next(iter(MATERIALS))}
-    blocks = {**BLOCKS, **shaped.get("blocks", {"cell": cell})}
-    blocks["cell"]["material"] = BLOCKS["far"]["material"]
-    (problem,) = problems(data_of(column(0.05, 0.05, 0.005), **{**shaped, "blocks": blocks}))
-    assert "outlines are not modelled beside soils, whose particles meet rectangles only" in problem
+def test_a_thin_polygon_beside_soil_wants_particles_of_an_eighth_of_its_width() -> None:
+    wedge = {"outline": [[0.0, 0.0], [0.08, 0.0], [0.0, 0.03]], "depth": 0.1, "material": "soft"}
+    bodies = [{"block": "wedge", "x": -1.0, "y": 0.5}]
+    (problem,) = problems(data_of(column(0.05, 0.05, 0.005), blocks={"wedge": wedge}, bodies=bodies))
+    assert "above an eighth of the smallest side of the blocks: at most 3.511 mm" in problem
 
 
 def test_soil_needs_springs_and_exact_shapes() -> None:
