@@ -52,7 +52,9 @@ def turning(angle: float) -> Vector:
 
 
 def corners(body: Record) -> Vector:
-    """Return the corners (4, 2) of a body, counter-clockwise, from its angle."""
+    """Return the corners (n, 2) of a body, counter-clockwise: its `places`, or those of a rectangle."""
+    if hasattr(body, "places"):
+        return np.asarray(body.places)
     return np.asarray(SIGNS * (body.half_x, body.half_y) @ turning(body.angle) + (body.x, body.y))
 
 
