@@ -1,14 +1,17 @@
-"""Scenes that are measured, runs from the same state, the registry, what a number tells of its samples, the report."""
+"""Measurements at their quick sizes: scenes, runs from the same state, what they tell, the registry and the report."""
 
 from __future__ import annotations
 
 import itertools
 import json
+from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from blocksim.bench import registry
 from blocksim.bench.harness import (
     UNTIL_SOLVED,
     Benchmark,
@@ -26,10 +29,104 @@ from blocksim.bench.harness import (
     this_machine,
     three_blocks,
 )
-from blocksim.bench.registry import MEASUREMENTS, UnknownMeasurementError, choose
+from blocksim.bench.registry import MEASUREMENTS, StartError, UnknownMeasurementError, choose
+from blocksim.bench.three_blocks import CLOSE, SETTINGS, Solution, converged_levels, scatter_friction
 from blocksim.errors import ExitCode
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.scenario.models.timeline import Nonsmooth
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tests.golden import Golden
+
+NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
+SOFT = {"stiffness_scale": 1e-4}
+
+
+def of_springs(found: Readings) -> None:
+    step, answer, stiffest = (one.median for one in found.numbers)
+    assert 20.0 < step < 1e5
+    assert 0.0 < answer < stiffest
+    off = {(row["stiffness_scale"], row["safety"]): float(str(row["off_mm"])) for row in found.details}
+    assert off[1e-2, 0.05] == 0.0
+    assert off[1e-4, 0.05] > 0.2
+    assert "stiffness_scale 0.001" in found.notes[0]
+
+
+def of_rigid_blocks(found: Readings) -> None:
+    assert found.numbers[4].samples == pytest.approx([1e3 / one for one in found.numbers[5].samples])
+    *levels, finest, without = found.details
+    assert (len(levels), finest["step"], finest["off_mm"]) == (6, 2e-4, 0.0)
+    assert "settings that are, as all with shorter steps, within 0.2 mm" in found.notes[1]
+    assert (without["step"], without["substeps"], without["velocity_sweeps"]) == (1e-3, 1, 1)
+    x = np.array(without["x_mm"])
+    assert np.abs(x - [16.0, 67.03, 128.78]).max() < 0.25  # where one sweep without restitution puts them
+    assert f"at x = {x[1]:.2f} and" in found.notes[0]
+
+
+def of_rigid_walls(found: Readings) -> None:
+    whole, share, *_, x, y = (one.median for one in found.numbers)
+    assert share == pytest.approx(1e9 * whole / (100 * 4 * 40))
+    assert 100.0 < x < 250.0  # mm; the wall is 272 mm long
+    assert 0.0 < y < 62.5  # mm: lower than it stood
+    assert all(float(str(row["sweeps_per_substep"])) >= 1.0 for row in found.details)
+
+
+def of_walls(found: Readings) -> None:
+    assert all(800.0 < one.median < 2000.0 for one in found.numbers[2:4])
+    assert {row["rebuilds"] for row in found.details} != {0}  # making pair lists is part of what is timed
+
+
+def of_threads(found: Readings) -> None:
+    assert found.notes[1].endswith("blocks always use one thread")
+
+
+SPECIAL: dict[str, Callable[[Readings], None]] = {
+    "three-blocks": of_springs,
+    "nonsmooth-blocks": of_rigid_blocks,
+    "walls": of_walls,
+    "nonsmooth-walls": of_rigid_walls,
+    "threads": of_threads,
+    "nonsmooth-threads": of_threads,
+}
+
+
+@pytest.mark.parametrize("measurement", MEASUREMENTS, ids=lambda one: one.name)
+def test_measurement_tells_its_numbers(
+    measurement: Benchmark, golden: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = measurement.measure(Effort(quick=True, repeats=2))
+    for one in found.numbers:
+        assert all(isfinite(sample) for sample in one.samples)
+        assert min(one.samples) > 0.0 or "exponent" in one.quantity
+    golden("\n".join(f"{one.quantity} | {one.unit} | {len(one.samples)}" for one in found.numbers))
+    SPECIAL.get(measurement.name, lambda _: None)(found)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_levels_count_as_converged_from_where_all_finer_ones_agree() -> None:
+    def level(scale: float, x: float) -> Solution:
+        return Solution({"scale": scale}, np.array([[0.0, 0.0, x], [0.0, 0.0, 0.0]]), (3.0, 1.0, 2.0), 10)
+
+    levels = [level(1e-4, 0.9 * CLOSE), level(1e-3, 2.0 * CLOSE), level(1e-2, -0.9 * CLOSE), level(1.0, 0.0)]
+    assert [one.setting["scale"] for one in converged_levels(levels, levels[-1])] == [1.0, 1e-2]
+    told = levels[1].detail(levels[-1])
+    assert (levels[1].text, told["scale"], told["steps"], told["cpu_ms"]) == ("scale 0.001", 1e-3, 10, 2000.0)
+    assert told["off_mm"] == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("scheme", SETTINGS)
+def test_members_of_the_ensemble_differ_in_friction(scheme: str) -> None:
+    members = scatter_friction(5, scheme)
+    assert len({scenario.friction.model_dump_json() for scenario in members}) == 5
+    assert {scenario.time.scheme for scenario in members} == {scheme}
+
+
+def test_a_command_that_fails_is_not_timed() -> None:
+    with pytest.raises(StartError, match=r"rnu: exit code 2: .*No such command 'rnu'"):
+        registry._seconds(registry.MAIN, "rnu")
 
 
 def test_a_number_is_the_median_of_its_samples_with_their_spread() -> None:
@@ -80,9 +177,6 @@ def test_a_busy_machine_is_reported(load: float, told: str, busy: int, monkeypat
     assert lines[0].endswith(f" cores, load {told} at the start")
 
 
-NOMINAL = Path(__file__).parents[2] / "scenarios" / "three_blocks_nominal.toml"
-
-
 def test_three_blocks_are_those_of_the_scenario_that_ships() -> None:
     ours, shipped = three_blocks(), load_scenario(NOMINAL)
     assert place_bodies(ours) == place_bodies(shipped)
@@ -106,9 +200,6 @@ def test_a_wall_is_pushed_in_proportion_to_height() -> None:
     assert {(body.size_x, body.size_y, body.depth) for body in placed} == {(0.05, 0.032, 0.025)}
     assert vx == pytest.approx(1.0 * y / 0.096)
     assert not any(body.vy or body.spin for body in placed)
-
-
-SOFT = {"stiffness_scale": 1e-4}
 
 
 def test_every_run_starts_from_the_same_state() -> None:
