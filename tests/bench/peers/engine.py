@@ -1,21 +1,28 @@
-"""What engines have in common: a scene, its result, and the timed loop over steps."""
+"""The engines: a scene, its result, the timed loop over steps; pymunk, Box2D, and blocksim with either scheme."""
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.bench import harness
+from blocksim.bench.harness import FRICTION, Rerun
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
+from blocksim.scenario.geometry import edges_of
+from blocksim.simulation.loop import last_step_of
+from blocksim.simulation.schemes import ALONE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from blocksim.bench.harness import TimeSteps
     from tests.bench.peers.work_precision import Panel
 
 Floats = NDArray[np.float64]
@@ -129,3 +136,200 @@ def timed(call: Callable[..., object], arguments: tuple[Any, ...], count: int) -
 def call_time(stepper: Stepper, empty: Any) -> float:
     """Return the seconds that a call from Python costs where there is nothing to compute."""
     return timed(*stepper.call(empty), count=CALLS) / CALLS
+
+
+# Overlap that is left alone so that contacts last. The default of 0.1 is a tenth of a pixel; here it would be 0.1 m.
+SLOP = 1e-6  # m
+GROUND = ((-50.0, -1.0), (100.0, -1.0), (100.0, 0.0), (-50.0, 0.0))  # m
+
+
+class Pymunk(Stepper):
+    """Chipmunk2D: rigid contacts, impulses by Gauss-Seidel iterations, double precision."""
+
+    def call(self, world: Any) -> tuple[Callable[..., object], tuple[Any, ...]]:
+        """Return the function of a step, and its arguments."""
+        return world.step, (self.step,)
+
+    def made(self, scene: Scene) -> tuple[Any, list[Any]]:
+        """Sleeping is off by default, and so is any damping of free motion.
+
+        `collision_bias` stays as it is: a tenth of the overlap beyond the slop goes in a sixtieth of a second, by
+        velocities that are forgotten after the step, so that it brings no energy in.
+        """
+        pymunk = import_module("pymunk")
+        space = empty_space()
+        space.iterations = self.iterations
+        # Both coefficients of a pair are products: blocks a and ground b with a*a and a*b as wanted.
+        friction = math.sqrt(FRICTION["block_block"])
+        bounce = math.sqrt(scene.restitution)
+        ground = pymunk.Poly(space.static_body, GROUND)
+        ground.friction = FRICTION["block_ground"] / friction
+        ground.elasticity = bounce
+        space.add(ground)
+        bodies = []
+        placed = scene.placed()
+        for block in placed:
+            body = pymunk.Body(block.mass / placed[0].mass, block.inertia / placed[0].mass)
+            body.position = (block.x, block.y)
+            body.velocity = (block.vx, block.vy)
+            shape = pymunk.Poly(body, block.corners)  # its corners are sharp: radius 0
+            shape.friction, shape.elasticity = friction, bounce
+            space.add(body, shape)
+            bodies.append(body)
+        return space, bodies
+
+
+def empty_space() -> Any:
+    """Return an empty space."""
+    space = import_module("pymunk").Space()
+    space.gravity = (0.0, -9.81)
+    space.collision_slop = SLOP
+    return space
+
+
+UNITS = 200.0  # a metre
+GRAVITY = 9.81  # m/s2
+GROUND_LENGTH, GROUND_DEPTH = 150.0, 1.0  # m
+
+
+class Box2D(Stepper):
+    """Box2D 2.3: rigid contacts, impulses by as many iterations for velocities as for positions, single precision.
+
+    Its lengths are made for metres: overlap up to 5 mm is left alone (b2_linearSlop), polygons have a skin of twice
+    that, approaches below 1 m/s do not bounce (b2_velocityThreshold), and nothing moves more than 2 m a step
+    (b2_maxTranslation). All this is compiled in. So lengths and gravity are scaled up together, which leaves times as
+    they are: 200 units a metre make that 25 µm, 50 µm, 5 mm/s and 10 mm a step, which a block at 2.5 m/s does not reach
+    in 4 ms. Ten times more would cut the motion of long steps short, ten times less would end bounces at 50 mm/s.
+    """
+
+    units = UNITS
+
+    def call(self, world: Any) -> tuple[Callable[..., object], tuple[Any, ...]]:
+        """Return the function of a step, and its arguments."""
+        return world.Step, (self.step, self.iterations, self.iterations)
+
+    def made(self, scene: Scene) -> tuple[Any, list[Any]]:
+        """Return world and blocks, lengths in the engine's units."""
+        box2d = import_module("Box2D")
+        world = empty_world()
+        # Friction of a pair is the root of the product, restitution the larger one.
+        blocks = {"friction": FRICTION["block_block"], "restitution": scene.restitution}
+        ground = {"friction": FRICTION["block_ground"] ** 2 / FRICTION["block_block"], "restitution": scene.restitution}
+        skin = box2d.b2_polygonRadius
+        depth = 0.5 * UNITS * GROUND_DEPTH
+        slab = box2d.b2PolygonShape(box=(0.5 * UNITS * GROUND_LENGTH, depth, (0.0, -depth - skin), 0.0))
+        world.CreateStaticBody().CreateFixture(box2d.b2FixtureDef(shape=slab, **ground))
+        bodies = []
+        placed = scene.placed()
+        for block in placed:
+            body = world.CreateDynamicBody(
+                position=(UNITS * block.x, UNITS * block.y), linearVelocity=(UNITS * block.vx, UNITS * block.vy)
+            )
+            shape = box2d.b2PolygonShape(vertices=_inside_of_skin(block, skin))
+            body.CreateFixture(box2d.b2FixtureDef(shape=shape, density=1.0, **blocks))
+            body.massData = _mass_data(box2d, block, placed[0].mass)
+            bodies.append(body)
+        return world, bodies
+
+
+def empty_world() -> Any:
+    """Return an empty world.
+
+    Nothing sleeps: a stack has to stand by itself. Continuous physics, which keeps fast bodies from passing through the
+    ground, is off: at these steps none does, and without it a step takes 10 to 25 % less time for the same answers.
+    """
+    world = import_module("Box2D").b2World(gravity=(0.0, -GRAVITY * UNITS), doSleep=False)
+    world.continuousPhysics = False
+    return world
+
+
+def _inside_of_skin(block: PlacedBody, skin: float) -> list[tuple[float, float]]:
+    """Return corners in the engine's units: the skin is part of the block, what is inside of it smaller by as much."""
+    edges = list(edges_of(block.corners))
+    found = []
+    for (_, _, (ax, ay)), ((x, y), _, (bx, by)) in zip([edges[-1], *edges[:-1]], edges, strict=True):
+        reach = skin / (1.0 + ax * bx + ay * by)
+        found.append((UNITS * x - reach * (ax + bx), UNITS * y - reach * (ay + by)))
+    return found
+
+
+def _mass_data(box2d: Any, block: PlacedBody, unit: float) -> Any:
+    """Return mass, in units of that of a block, and inertia of the whole block, skin included."""
+    data = box2d.b2MassData()
+    data.mass = block.mass / unit
+    data.center = (0.0, 0.0)
+    data.I = UNITS**2 * block.inertia / unit
+    return data
+
+
+OWN_CALLS = 1000  # that are timed with nothing to do
+Table = dict[str, object]
+
+
+class Blocksim(ABC):
+    """One setting of a scheme: springs, whose step follows from their stiffness, or impulses, with a step of choice."""
+
+    @property
+    @abstractmethod
+    def setting(self) -> str:
+        """For people."""
+
+    @abstractmethod
+    def tables(self) -> tuple[Table, Table]:
+        """Return keys of [contact] and of [time]."""
+
+    def calls(self, scene: Scene) -> int:  # noqa: ARG002 - others have one a step
+        """Return how often Python calls the engine for a scene."""
+        return 1
+
+    def solve(self, scene: Scene) -> Final:
+        """Compute the scene. Not counted: building the world and what a run does once, as the others' scenes are not.
+
+        A run that fails, as when soft blocks overlap too far, ends at positions that are NaN.
+        """
+        start = self._started(scene, {"end": scene.end, "stop_at_rest": False})
+        run = start.attempt(last_step_of(scene.end, start.step))
+        places = np.array([run.bodies.x, run.bodies.y])
+        x, y = places if run.outcome.status == "finished" else np.full_like(places, np.nan)
+        return Final(x, y, run.seconds)
+
+    def call_time(self, scene: Scene) -> float:
+        """Return the seconds that a call from Python costs where there is nothing to compute."""
+        return timed(ALONE.advance, (self._started(scene, {}).scene, 0), OWN_CALLS) / OWN_CALLS
+
+    def _started(self, scene: Scene, more: Mapping[str, object]) -> Rerun:
+        contact, time = self.tables()
+        return Rerun(scene.make(contact=contact, time={**time, **more}), scene.shift)
+
+
+@dataclass(frozen=True)
+class Explicit(Blocksim):
+    """One stiffness and safety of the step."""
+
+    scale: float  # stiffness_scale
+    safety: float
+
+    @property
+    def setting(self) -> str:
+        """For people."""
+        return f"stiffness {self.scale:g}"
+
+    def tables(self) -> tuple[Table, Table]:
+        """Return stiffness and step."""
+        return {"stiffness_scale": self.scale}, {"safety": self.safety}
+
+
+@dataclass(frozen=True)
+class Nonsmooth(Blocksim):
+    """One step and its parts, also where it is longer than what is safe: the error will tell."""
+
+    stepping: TimeSteps
+
+    @property
+    def setting(self) -> str:
+        """For people."""
+        return self.stepping.setting
+
+    def tables(self) -> tuple[Table, Table]:
+        """Return step, parts and sweeps."""
+        return {}, self.stepping.time(force_step=True)

@@ -16,22 +16,19 @@ from blocksim.bench.harness import (
     WALL_RESTITUTION,
     Benchmark,
     Effort,
-    Number,
     Readings,
     Table,
     one_structure,
 )
 from tests.bench.peers.engine import Final, Scene
 from tests.bench.peers.series import heap_racers
-from tests.bench.peers.wall import distances
+from tests.bench.peers.wall import ROUNDS, distances, raced
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from blocksim.scenario import Scenario
-    from tests.bench.peers.engine import Solver
 
-ROUNDS = 3  # of engines in turns, at most
 HEXAGONS, HEXAGONS_GAP = (0.02, 0.04), 0.002  # m, smallest and largest of a heap, and the least distance at the start
 
 
@@ -65,23 +62,11 @@ FULL, SMALL = Heap(40, 25, 1.0), Heap(5, 4, 0.1)
 
 
 def measure(effort: Effort) -> Readings:
-    """Measure the engines in turns, so that what else the machine does slows all of them."""
+    """Measure the engines in turns."""
     heap = SMALL if effort.quick else FULL
-    racers = heap_racers()
-    rounds = [
-        {name: solver.solve(heap.scene()) for name, solver in racers.items()}
-        for _ in range(min(ROUNDS, effort.repeats))
-    ]
+    numbers, finals = raced(heap_racers(), heap.scene, min(ROUNDS, effort.repeats))
     meaning = f"{heap.columns * heap.rows} random hexagons of 20 to 40 mm that fall, {heap.end:g} s"
-    return Readings(tuple(_numbers(racers, rounds)), notes=(meaning, *_compared(rounds[-1])))
-
-
-def _numbers(racers: Mapping[str, Solver], rounds: Sequence[Mapping[str, Final]]) -> Iterator[Number]:
-    """Yield the CPU time of the first one, and how many times as long the others take."""
-    first, *others = racers
-    yield Number(f"{first}, {racers[first].setting}", "CPU s", tuple(one[first].seconds for one in rounds))
-    for name in others:
-        yield Number(f"{name}: times that", "", tuple(one[name].seconds / one[first].seconds for one in rounds))
+    return Readings(tuple(numbers), notes=(meaning, *_compared(finals)))
 
 
 def _compared(finals: Mapping[str, Final]) -> Iterator[str]:

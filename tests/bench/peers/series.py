@@ -5,10 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from blocksim.bench.harness import UNTIL_SOLVED, TimeSteps
-from tests.bench.peers.blocksim_engine import Explicit, Nonsmooth
-from tests.bench.peers.box2d_engine import Box2D
-from tests.bench.peers.engine import Series
-from tests.bench.peers.pymunk_engine import Pymunk
+from tests.bench.peers.engine import Box2D, Explicit, Nonsmooth, Pymunk, Series
 
 if TYPE_CHECKING:
     from tests.bench.peers.engine import Solver

@@ -13,11 +13,8 @@ import pytest
 from blocksim.bench.harness import Benchmark, Effort, TimeSteps, single
 from tests.bench.peers import __main__ as script, three_blocks as three_blocks_peers, wall
 from tests.bench.peers.__main__ import main
-from tests.bench.peers.blocksim_engine import Explicit, Nonsmooth
-from tests.bench.peers.box2d_engine import Box2D
-from tests.bench.peers.engine import Final, Readings, Scene, Series, Solver
+from tests.bench.peers.engine import Box2D, Explicit, Final, Nonsmooth, Pymunk, Readings, Scene, Series, Solver
 from tests.bench.peers.heap import HEAP
-from tests.bench.peers.pymunk_engine import Pymunk
 from tests.bench.peers.series import wall_series
 from tests.bench.peers.three_blocks import starts
 from tests.bench.peers.wall import wasserstein

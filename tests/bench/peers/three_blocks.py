@@ -11,10 +11,19 @@ import numpy as np
 
 from blocksim.bench.harness import RESTITUTION, Benchmark, Effort, Number, Table, TimeSteps, single, three_blocks
 from blocksim.scenario.structures.base import draws
-from tests.bench.peers.blocksim_engine import Nonsmooth
-from tests.bench.peers.box2d_engine import Box2D, empty_world
-from tests.bench.peers.engine import Final, Readings, Scene, Series, Solver, call_time
-from tests.bench.peers.pymunk_engine import Pymunk, empty_space
+from tests.bench.peers.engine import (
+    Box2D,
+    Final,
+    Nonsmooth,
+    Pymunk,
+    Readings,
+    Scene,
+    Series,
+    Solver,
+    call_time,
+    empty_space,
+    empty_world,
+)
 from tests.bench.peers.series import BOX2D, NONSMOOTH, PYMUNK, three_blocks_series
 from tests.bench.peers.work_precision import Curve, Panel
 

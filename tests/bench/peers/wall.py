@@ -20,7 +20,7 @@ from tests.bench.peers.series import wall_racers, wall_series
 from tests.bench.peers.work_precision import Curve, Panel
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -79,7 +79,7 @@ def measure(effort: Effort) -> Readings:
     size = SMALL if effort.quick else FULL
     computed = [_computed(series, size) for series in wall_series(quick=effort.quick)]
     numbers = [number for one in computed for number in _numbers(one)]
-    numbers += raced(wall_racers(), size, min(ROUNDS, effort.repeats))
+    numbers += raced(wall_racers(), size.scene, min(ROUNDS, effort.repeats), ", in turns")[0]
     last = computed[-1]  # the explicit one
     meaning = (
         f"{size.columns * size.rows} blocks, {size.end:g} s; change: mean distance of the sorted final x "
@@ -105,18 +105,19 @@ def _numbers(one: Computed) -> list[Number]:
     return seconds + changes
 
 
-def raced(racers: Mapping[str, Solver], size: Size, rounds: int) -> list[Number]:
-    """Return the CPU time of the first one, and how many times as long the others take.
+def raced(
+    racers: Mapping[str, Solver], scene: Callable[[], Scene], rounds: int, how: str = ""
+) -> tuple[list[Number], dict[str, Final]]:
+    """Return the CPU time of the first one, and how many times as long the others take; and the last finals of all.
 
     They run in turns, so that what else the machine does slows all of them.
     """
-    times = [{name: solver.solve(size.scene()).seconds for name, solver in racers.items()} for _ in range(rounds)]
+    finals = [{name: solver.solve(scene()) for name, solver in racers.items()} for _ in range(rounds)]
     first, *others = racers
-    own = Number(f"{first}, {racers[first].setting}, in turns", "CPU s", tuple(one[first] for one in times))
-    return [
-        own,
-        *(Number(f"{name}: times that", "", tuple(one[name] / one[first] for one in times)) for name in others),
-    ]
+    own = Number(f"{first}, {racers[first].setting}{how}", "CPU s", tuple(one[first].seconds for one in finals))
+    ratios = [tuple(one[name].seconds / one[first].seconds for one in finals) for name in others]
+    numbers = [own, *(Number(f"{name}: times that", "", ratio) for name, ratio in zip(others, ratios, strict=True))]
+    return numbers, finals[-1]
 
 
 def _compared(one: Computed, other: Computed) -> str:
