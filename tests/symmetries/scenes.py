@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation.schemes import build_scene
 from blocksim.verification.case import Setting
-from blocksim.verification.scene import Simulation
 from tests.sizes import in_all
 
 if TYPE_CHECKING:
@@ -19,6 +16,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from numpy.typing import NDArray
+
+    from blocksim.verification.scene import Simulation
 
 EXPLICIT, RIGID = "explicit", "nonsmooth"
 GRAVITY = 9.81
@@ -111,44 +110,3 @@ def apart(one: NDArray[np.float64], two: NDArray[np.float64]) -> float:
     """Return how far (m) centres or corners of two states are apart at most."""
     differences = np.abs(one - two)
     return float(max(differences[:, :2].max(), CORNER * differences[:, 2].max()))
-
-
-def scaled(stack: Stack, length: float, scheme: str) -> Simulation:
-    """Start a stack `length` times as large, under the same gravity.
-
-    Froude's similarity: with the same densities, masses go with length^3, times and speeds with its root, and stiffness
-    (N/m) with its square, which is a modulus of elasticity that goes with length. Everything in a scenario that is a
-    length, a speed or a time is scaled.
-    """
-    time = np.sqrt(length)
-    friction = [
-        {"static": mu, "kinetic": 0.8 * mu, "transition_speed": 5e-3 * time}
-        for mu in (stack.friction, stack.ground_friction)
-    ]
-    stepping = {"step": RIGID_STEP * time, "velocity_tolerance": 1e-9 * time, "restitution_threshold": 0.01 * time}
-    material = {"density": 2700.0, "young_modulus": 69e9 * SCALE * length, "poisson_ratio": 0.3}
-    sizes = [{name: body[name] * length for name in (*SIZES, "length")} for body in stack.bodies]
-    return Simulation(
-        build_scene(
-            scenario_from_mapping(
-                {
-                    "schema": 1,
-                    "name": "scaled",
-                    "materials": {"any": material},
-                    "blocks": {f"block{i}": {**size, "material": "any"} for i, size in enumerate(sizes)},
-                    "bodies": [
-                        {"block": f"block{i}", "x": body["x"] * length, "y": body["y"] * length}
-                        for i, body in enumerate(stack.bodies)
-                    ],
-                    "friction": dict(zip(("block_block", "block_ground"), friction, strict=True)),
-                    "contact": {"restitution": stack.restitution},
-                    "time": {
-                        "end": time,
-                        "stop_at_rest": False,
-                        "rest_hold": 0.05 * time,
-                        **({"scheme": RIGID, **stepping} if scheme == RIGID else {}),
-                    },
-                }
-            )
-        )
-    )

@@ -55,19 +55,11 @@ class Pair(NamedTuple):
     spin: float  # of the second, as a share of the closing speed over its longer side
 
 
-@st.composite
-def pairs(draw: st.DrawFn, ratio: float = 4.0) -> Pair:
+def pairs(ratio: float = 4.0) -> st.SearchStrategy[Pair]:
     """Draw a pair whose sides are from 1 / ratio to 1."""
-    share = st.floats(0.0, 1.0).map(lambda power: ratio**-power)
-    width, height, *other = (draw(share) for _ in range(4))
-    return Pair(
-        (width, height, other[0], other[1]),
-        draw(st.floats(-0.9, 0.9)),
-        draw(st.one_of(st.just(0.0), st.floats(-0.7, 0.7))),
-        draw(st.floats(-3.0, 3.0)),
-        draw(st.floats(-1.0, 1.0)),
-        draw(st.floats(-1.0, 1.0)),
-    )
+    share, speed = st.floats(0.0, 1.0).map(lambda power: ratio**-power), st.floats(-1.0, 1.0)
+    tilt = st.one_of(st.just(0.0), st.floats(-0.7, 0.7))
+    return st.builds(Pair, st.tuples(*[share] * 4), st.floats(-0.9, 0.9), tilt, st.floats(-3.0, 3.0), speed, speed)
 
 
 def bodies_of(pair: Pair, size: float, *, gap: float) -> list[dict[str, object]]:
@@ -83,17 +75,9 @@ def bodies_of(pair: Pair, size: float, *, gap: float) -> list[dict[str, object]]
     place = turned @ away + np.array([0.0, FAR_UP * 4.0 * size])
     velocity = turned @ np.array([pair.slip, -1.0]) * CLOSING
     first = {"x": 0.0, "y": FAR_UP * 4.0 * size, "width": width, "height": height, "length": size, "angle": pair.turn}
-    second = {
-        "x": float(place[0]),
-        "y": float(place[1]),
-        "width": wide,
-        "height": high,
-        "length": size,
-        "angle": pair.turn + pair.tilt,
-        "velocity": velocity.tolist(),
-        "spin": pair.spin * CLOSING / max(wide, high),
-    }
-    return [first, second]
+    second = {"x": float(place[0]), "y": float(place[1]), "width": wide, "height": high, "length": size}
+    moving = {"velocity": velocity.tolist(), "spin": pair.spin * CLOSING / max(wide, high)}
+    return [first, {**second, **moving, "angle": pair.turn + pair.tilt}]
 
 
 def smallest(bodies: Sequence[dict[str, object]]) -> float:
