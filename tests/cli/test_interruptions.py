@@ -140,21 +140,6 @@ def test_stopped_run_continues_to_the_same_bits(
     assert_same(tmp_path / "out", short)
 
 
-def test_second_signal_stops_while_a_checkpoint_is_being_written(process: Process, tmp_path: Path) -> None:
-    slow = (
-        "import blocksim.simulation.checkpoint as w, time\n"
-        "w.write_checkpoint = lambda *_: (open('writing', 'w').close(), time.sleep(600))"
-    )
-    running = process(*LONG, "--out", "out", before=slow)
-    wait_for_frames(tmp_path / "out" / "run.h5", running)
-    running.send_signal(signal.SIGINT)
-    wait_for(tmp_path / "writing", running)
-    running.send_signal(signal.SIGINT)
-    _, err = running.communicate(timeout=PATIENCE)  # sooner than the checkpoint is written
-    assert (running.returncode, err) == (75, "stopped\n")
-    assert committed(tmp_path / "out" / "run.h5") > 0
-
-
 def test_wall_time_stops_and_resume_tells_where_it_continues(blocksim: Command, tmp_path: Path, short: Path) -> None:
     stopped = blocksim(*SHORT, "--out", "out", "--wall-time", "0.1 s")
     assert stopped.code == 75

@@ -1,31 +1,132 @@
-"""What only a real process shows: signals, kills, full disks, closed pipes, terminals."""
+"""What only a real process shows: Ctrl-C at any moment, full disks, closed pipes, terminals; never a traceback."""
 
+import fcntl
+import json
 import os
 import pty
+import re
 import select
 import signal
+import subprocess
+import sys
+import termios
 import time
 from pathlib import Path
 
 import h5py
 import pytest
 
+from blocksim.cli.app import STOPPED_EARLY
+from blocksim.errors import ExitCode
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5 import read_frames
 from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for, wait_for_frames
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
-SLOW = ("run", NOMINAL, *SOFT, "--set", "time.end=500", "--set", "time.stop_at_rest=false")
-DENSE = (*SLOW, "--set", "output.every=1e-5", "--set", "time.end=20")
+ENDLESS = ("run", NOMINAL, *SOFT, "--set", "time.end=500", "--set", "time.stop_at_rest=false", "--out", "out")
+DENSE = (*ENDLESS, "--set", "output.every=1e-5", "--set", "time.end=20", "--quiet")
+SCHEMA = ("schema",)
+IMPORTED = """
+import os, signal, sys
+
+class Finder:
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name == "{}":
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Finder)
+"""
+CALLED = """
+import ctypes, os, signal, time
+import blocksim.scenario as s
+call = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))  # as functions that the compiler calls are
+s.json_schema = lambda: (call(), time.sleep(20))
+"""
+LATE = "import atexit, os, signal; atexit.register(os.kill, os.getpid(), signal.SIGINT)"
+BROKEN = "import blocksim.scenario; blocksim.scenario.json_schema = lambda: 1 / 0"
 LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"
+TOO_LARGE = "out/{}: cannot be written: File too large\n"
+INTERNAL = "internal error: ZeroDivisionError: division by zero; please report it with the file FILE\n"
+ENDS = {
+    **{f"import of {name}": (ENDLESS, IMPORTED.format(name), 75, "stopped\n") for name in ("typer", "numba")},
+    "import of a run": (ENDLESS, IMPORTED.format("blocksim.simulation.run"), 75, "stopped\n"),
+    "function that the compiler calls": (SCHEMA, CALLED, 75, "stopped\n"),
+    "last moments": (SCHEMA, LATE, 0, ""),
+    "internal error": (SCHEMA, BROKEN, 70, INTERNAL),
+    "full disk": (DENSE, LIMIT.format(600_000), 74, TOO_LARGE.format("run.h5")),
+    "full disk at once": (DENSE, LIMIT.format(1000), 74, TOO_LARGE.format("scenario.toml")),
+    "full disk soon": (DENSE, LIMIT.format(100_000), 74, TOO_LARGE.format("run.h5")),
+}
+LONG = ("full disk at once", "full disk soon")
 
 
-DELAYS = [0.1, *(pytest.param(delay, marks=pytest.mark.long) for delay in (0.0, 0.003, 0.6, 0.9))]
+@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.long if one in LONG else ()) for one in ENDS])
+def test_a_process_ends_with_its_exit_code_and_at_most_a_line(process: Process, tmp_path: Path, name: str) -> None:
+    arguments, before, code, told = ENDS[name]
+    running = process(*arguments, before=before)
+    out, err = running.communicate(timeout=PATIENCE)
+    for file in re.findall(r"with the file (\S+)", err):
+        Path(file).unlink()
+        err = err.replace(file, "FILE")
+    assert (running.returncode, err, bool(out)) == (code, told, name == "last moments")
+    assert not list((tmp_path / "out").glob(".*"))
+    if name == "full disk":
+        assert len(read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))) > 0
 
 
-@pytest.mark.parametrize("delay", DELAYS)
+def test_exit_code_after_ctrl_c_is_the_one_that_is_documented() -> None:
+    assert STOPPED_EARLY == ExitCode.STOPPED_EARLY
+
+
+def test_nothing_heavy_is_imported_before_ctrl_c_is_handled() -> None:
+    code = "import sys; import blocksim.cli.app; print({'dataclasses', 'inspect', 'typer'} & set(sys.modules))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "set()"
+
+
+def test_ctrl_c_while_worker_processes_start_prints_no_traceback(process: Process) -> None:
+    early = (
+        "import multiprocessing.popen_spawn_posix as p, os, signal, time\n"
+        "launch = p.Popen._launch\n"
+        "interrupt = lambda: (time.sleep(0.3), os.killpg(0, signal.SIGINT), time.sleep(0.7))\n"  # as a terminal does
+        "p.Popen._launch = lambda *a: (launch(*a), interrupt())"
+    )
+    cases = ("--executor", "processes", "--jobs", "2", "--vary", "ground.tilt=0deg:1deg:8", "--out", "out")
+    running = process("sweep", NOMINAL, *SOFT, *cases, before=early, start_new_session=True)
+    _, err = running.communicate(timeout=PATIENCE)
+    assert running.returncode == 75, err
+    assert "Traceback" not in err
+    assert "rerun the command to finish" in err
+
+
+@pytest.mark.parametrize(
+    ("slow", "presses"),
+    [
+        ("checkpoint.write_checkpoint = lambda *_: (open('slow', 'w').close(), time.sleep(600))", 1),
+        ("run.FrameFile.__exit__ = lambda *a: (open('slow', 'w').close(), time.sleep(600), close(*a))", 2),
+    ],
+    ids=["checkpoint", "file"],
+)
+def test_ctrl_c_again_stops_a_run_that_is_writing(process: Process, tmp_path: Path, slow: str, presses: int) -> None:
+    before = "import time; from blocksim.simulation import checkpoint, run; close = run.FrameFile.__exit__\n"
+    running = process(*ENDLESS, "--quiet", before=before + slow)
+    wait_for_frames(tmp_path / "out" / "run.h5", running)
+    running.send_signal(signal.SIGINT)
+    wait_for(tmp_path / "slow", running)
+    for press in range(presses):
+        time.sleep(0.002 * press)
+        running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=PATIENCE)  # sooner than it is written
+    assert running.returncode == 75
+    assert err == "stopped\n" or (presses > 1 and err.count("\n") <= 3 and "Traceback" not in err)
+
+
+@pytest.mark.parametrize(
+    "delay", [0.1, *(pytest.param(delay, marks=pytest.mark.long) for delay in (0.0, 0.003, 0.6, 0.9))]
+)
 def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, delay: float) -> None:
-    running = process(*DENSE, "--out", "out", "--quiet")
+    running = process(*DENSE)
     (wait_for if delay < 0.1 else wait_for_frames)(tmp_path / "out" / "run.h5", running)
     time.sleep(delay)
     running.kill()
@@ -40,78 +141,27 @@ def test_killed_run_leaves_a_readable_file(process: Process, tmp_path: Path, del
     assert len(frames) > 1 or delay < 0.6
 
 
-@pytest.mark.parametrize(
-    ("limit", "file"),
-    [
-        (600_000, "run.h5"),
-        pytest.param(1000, "scenario.toml", marks=pytest.mark.long),
-        pytest.param(100_000, "run.h5", marks=pytest.mark.long),
-    ],
-)
-def test_full_disk_is_74_with_one_line(process: Process, tmp_path: Path, limit: int, file: str) -> None:
-    running = process(*DENSE, "--out", "out", "-q", before=LIMIT.format(limit))
-    out, err = running.communicate(timeout=PATIENCE)
-    assert (running.returncode, out) == (74, "")
-    assert err == f"out/{file}: cannot be written: File too large\n"
-    folder = tmp_path / "out"  # an empty one is removed again
-    assert not folder.exists() or not [path.name for path in folder.iterdir() if path.name.startswith(".")]
-    if limit == 600_000:
-        assert len(read_frames(folder / "run.h5", load_scenario(folder / "scenario.toml"))) > 0
-
-
-def test_answer_that_cannot_be_written_is_74(process: Process) -> None:
-    with Path("/dev/full").open("w") as full:
-        running = process("schema", stdout=full)
-        _, err = running.communicate(timeout=PATIENCE)
-    assert running.returncode == 74
-    assert err == "the answer: cannot be written: No space left on device\n"
-
-
-def test_reader_that_has_gone_is_no_traceback(process: Process) -> None:
+def test_answer_that_nobody_can_take_is_74(process: Process) -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)
-    running = process("schema", stdout=write_end)
+    with Path("/dev/full").open("w") as full:
+        for target, told in ((full, "the answer: cannot be written: No space left on device\n"), (write_end, "")):
+            running = process("schema", stdout=target)
+            _, err = running.communicate(timeout=PATIENCE)
+            assert (running.returncode, err) == (74, told)
     os.close(write_end)
-    _, err = running.communicate(timeout=PATIENCE)
-    assert (running.returncode, err) == (74, "")
-
-
-def test_internal_error_is_70_with_one_line(process: Process) -> None:
-    breaking = "import blocksim.scenario; blocksim.scenario.json_schema = lambda: 1 / 0"
-    running = process("schema", before=breaking)
-    _, err = running.communicate(timeout=PATIENCE)
-    assert running.returncode == 70
-    assert err.startswith("internal error: ZeroDivisionError: division by zero; please report it with the file ")
-    Path(err.split()[-1]).unlink()
 
 
 def test_terminal_without_the_signs_gets_an_answer(process: Process) -> None:
     before = "import sys; sys.stdout.reconfigure(encoding='ascii'); sys.stderr.reconfigure(encoding='ascii')"
     running = process("run", NOMINAL, *SOFT, "--out", "out", before=before)
     out, _ = running.communicate(timeout=PATIENCE)
-    assert running.returncode == 0
-    assert "16.00 ? 0.00" in out
-
-
-@pytest.mark.long
-def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Path) -> None:
-    vary = ("--vary", "time.end=0.001,1e4,2e4", "--set", "time.stop_at_rest=false", "--jobs", 2)
-    executor = ("--executor", "processes", "--out", "out")
-    running = process("sweep", NOMINAL, *SOFT, *vary, *executor, start_new_session=True)
-    assert running.stderr is not None
-    line = running.stderr.readline()
-    while line and "1/3 finished" not in line:
-        line = running.stderr.readline()
-    os.killpg(running.pid, signal.SIGHUP)  # to all, as when a terminal is lost
-    _, err = running.communicate(timeout=PATIENCE)  # returns when the workers, too, have let go of the pipes
-    assert running.returncode == 75
-    assert err == "stopped with 1 of 3 cases done; rerun the command to finish\n"
-    assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 2
+    assert (running.returncode, "16.00 ? 0.00" in out) == (0, True)
 
 
 def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> None:
     leader, follower = pty.openpty()
-    running = process(*SLOW, "--set", "time.end=2", "--out", "out", stderr=follower)
+    running = process(*ENDLESS, "--set", "time.end=2", stderr=follower)
     os.close(follower)
     shown = b""
     while select.select([leader], [], [], PATIENCE)[0]:
@@ -126,3 +176,17 @@ def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> 
     assert "of 2 s " in text
     assert "steps/s, relative energy error " in text
     assert "…" not in text
+
+
+def test_lost_terminal_stops_a_run_with_a_checkpoint(process: Process, tmp_path: Path) -> None:
+    leader, follower = pty.openpty()
+    own = {"start_new_session": True, "preexec_fn": lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0)}
+    running = process(*ENDLESS, stdin=follower, stdout=follower, stderr=follower, **own)
+    os.close(follower)
+    wait_for_frames(tmp_path / "out" / "run.h5", running)
+    os.close(leader)
+    running.wait(timeout=PATIENCE)
+    assert running.returncode == 75
+    told = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert (told["status"], told["reason"]) == ("interrupted", "stopped by SIGHUP")
+    assert told["last_checkpoint"] == told["steps"]

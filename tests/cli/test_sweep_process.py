@@ -1,6 +1,7 @@
 """A sweep that is killed continues where it was; a sweep that is stopped stops at once."""
 
 import json
+import os
 import random
 import shutil
 import signal
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.study.manifest import read_entries
-from tests.cli.conftest import PATIENCE, Process, Running, wait_for
+from tests.cli.conftest import PATIENCE, SOFT, Process, Running, wait_for
 from tests.sizes import in_all
 
 Sweep = Callable[..., Running]
@@ -77,6 +78,22 @@ def test_endless_case_is_given_up_at_once(process: Process, tmp_path: Path, numb
     assert running.returncode == 75
     assert err == "stopped with 0 of 2 cases done; rerun the command to finish\n"
     assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 1
+
+
+@pytest.mark.long
+def test_stopped_sweep_is_75_and_ends_its_workers(process: Process, tmp_path: Path) -> None:
+    vary = ("--vary", "time.end=0.001,1e4,2e4", "--set", "time.stop_at_rest=false", "--jobs", 2)
+    executor = ("--executor", "processes", "--out", "out")
+    running = process("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, *vary, *executor, start_new_session=True)
+    assert running.stderr is not None
+    line = running.stderr.readline()
+    while line and "1/3 finished" not in line:
+        line = running.stderr.readline()
+    os.killpg(running.pid, signal.SIGHUP)  # to all, as when a terminal is lost
+    _, err = running.communicate(timeout=PATIENCE)  # returns when the workers, too, have let go of the pipes
+    assert running.returncode == 75
+    assert err == "stopped with 1 of 3 cases done; rerun the command to finish\n"
+    assert (tmp_path / "out" / "sweep.csv").read_text().count("\n") == 2
 
 
 SLOWLY = """

@@ -296,6 +296,9 @@ DRAWINGS: dict[str, Drawing] = {
     "history seen from the ground": of_run(
         draw_history, toppling(3), support=MOVING, relative=True, **CHOICE
     ),
+    "history of velocities seen from the ground": of_run(
+        draw_history, toppling(3), support=MOVING, relative=True, panels=("velocity",), blocks=("3",)
+    ),
     "history of chosen panels": of_run(draw_history, toppling(20), support=MOVING, **CHOICE),
     "history with many names": of_run(
         draw_history, toppling(20), panels=("x", "energy"), blocks=tuple(map(str, range(1, 13)))
