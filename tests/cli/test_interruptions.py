@@ -5,6 +5,7 @@ import shutil
 import signal
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from blocksim.simulation.stores.hdf5 import read_frames
 from tests.cli.conftest import PATIENCE, SCENARIOS, SOFT, Command, Process, committed, wait_for, wait_for_frames
 from tests.sizes import in_all
 
+SCENES = Path(__file__).with_name("scenes")
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 ENDLESS = ("run", NOMINAL, *SOFT, "--set", "time.stop_at_rest=false", "--quiet")
 LONG = (*ENDLESS, "--set", "time.end=10")  # seconds of a process that is killed somewhere
@@ -220,3 +222,34 @@ def test_full_disk_leaves_the_older_picture_or_export(
     assert (running.returncode, err.count("\n")) == (74, 1), err
     assert f"{name}: cannot be written: No space left on device" in err
     assert {path.name: path.stat().st_size for path in small_disk.iterdir() if path.name != "others"} == {name: 5}
+
+
+def test_full_disk_is_74_and_not_a_limit_without_its_runs(
+    blocksim: Command, small_disk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = (
+        "limit",
+        SCENES / "slender.toml",
+        "--vary",
+        "ground.tilt=5deg:40deg:2",
+        "--to",
+        "50%",
+        "--out",
+        small_disk / "out",
+    )
+    room = shutil.disk_usage(small_disk).free
+    (small_disk / "others").write_bytes(bytes(room - 200_000))
+    roomy = SimpleNamespace(free=10**9)  # as if others filled it while the search runs
+    with monkeypatch.context() as patch:
+        patch.setattr("shutil.disk_usage", lambda _: roomy)
+        answer = blocksim(*search)
+    assert answer.code == 74
+    assert "No space left on device; the limit is found, its runs are not kept" in answer.err
+    (change,) = json.loads((small_disk / "out" / "limit.json").read_text())["changes"]
+    (small_disk / "others").unlink()
+    answer = blocksim(*search)
+    assert answer.code == 0
+    assert ", 0 of them now" in answer.err
+    (again,) = json.loads((small_disk / "out" / "limit.json").read_text())["changes"]
+    assert (again["low"], again["high"]) == (change["low"], change["high"])
+    assert (small_disk / "out" / "cases" / again["below"]["case"] / "done.json").is_file()

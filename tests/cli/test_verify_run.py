@@ -12,7 +12,6 @@ from blocksim.simulation.files import sha256_of
 from blocksim.study.limit import limit
 from blocksim.study.manifest import read_entries
 from tests.cli.conftest import Command
-from tests.cli.test_limit import on_soft_springs
 from tests.study.test_limit import SQUAT, block_on_a_slope
 
 X = "1.x_mm"
@@ -141,11 +140,3 @@ def test_runs_of_a_study_that_were_moved_are_told(blocksim: Command, tmp_path: P
     shift_a_run(tmp_path / "study")
     answer = blocksim("verify-run", "study", "--sample", 100)
     assert (answer.code, f"{X}: " in answer.out) == (1, True)
-
-
-@pytest.mark.long
-def test_an_extrapolated_limit_comes_out_again(blocksim: Command, tmp_path: Path) -> None:
-    steep = {"ground.tilt": {"from": "24.8 deg", "to": "26.6 deg", "count": 2}}
-    limit(on_soft_springs(), steep, out=tmp_path / "study")
-    answer = blocksim("verify-run", "study", "--sample", 100)
-    assert (answer.code, answer.err) == (0, "")
