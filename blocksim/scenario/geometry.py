@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Corner = tuple[float, float]
 Corners = tuple[Corner, ...]  # corners (m) counter-clockwise
+Edge = tuple[Corner, Corner, Corner]  # its ends (m) and its outward unit normal
 ROUND_OFF = 1e-9  # m; polygons that overlap by less touch
 DISC_SHARE = 0.5 * (1.0 - 1e-6)  # radius of a particle in spacings, less what round-off may take
 
@@ -219,7 +220,7 @@ def holds(corners: Sequence[Corner], point: Corner, margin: float) -> bool:
     return all(_cross(_minus(b, a), _minus(point, a)) >= -margin * math.dist(a, b) for a, b in _edges(corners))
 
 
-def edges_of(corners: Sequence[Corner]) -> Iterator[tuple[Corner, Corner, Corner]]:
+def edges_of(corners: Sequence[Corner]) -> Iterator[Edge]:
     """Yield the ends (m) of every edge, counter-clockwise, and its outward unit normal."""
     for a, b in _edges(corners):
         length = math.dist(a, b)

@@ -10,21 +10,20 @@ import numpy as np
 from blocksim.scenario import events, geometry, laws, overlap, overrides, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS, SUPPORT
-from blocksim.scenario.models.loads import Face, Force, Gravity, OnBody, Pressure
+from blocksim.scenario.models.loads import NORMALS, Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
 from blocksim.scenario.models.scenario import Scenario
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.scenario.placement import PlacedBody
 from blocksim.scenario.structures import base, polygons
-from blocksim.scenario.units import toml
+from blocksim.scenario.units import ANGLE, Quantity, toml
 
 MAX_LOADS = 1000
+NO_FACE = (0.0, 0.0), (0.0, 0.0), (0.0, 1.0)
 STRIP = 1e-3
 """Thickness of the strip before a face in which nothing else may lie, in smaller sides of the body."""
-NORMALS: Mapping[Face, geometry.Corner] = {"left": (-1, 0), "right": (1, 0), "top": (0, 1), "bottom": (0, -1)}
-"""Outward normals of faces, in the body."""
-PARALLEL = 1e-6
-"""Sine of the angle between the normal of a face and the axis of an outline that it is named after, at most."""
+AS_NEAR = 1e-6
+"""Difference of cosines up to which two faces point into a direction as much as one another."""
 
 
 def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
@@ -59,8 +58,9 @@ def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str,
             (left, bottom), (right, top) = ((1e3 * x, 1e3 * y) for x, y in geometry.box_of(body.corners))
             extent = f"which extends from ({left:g}, {bottom:g}) to ({right:g}, {top:g}) mm along its own axes"
             yield Mistake((*path, "point"), f"the point lies outside of body {toml(load.body)}, {extent}")
-    elif isinstance(load, Pressure) and face_of(body, load.face) is None:
-        message = f"the outline of body {toml(load.body)} has no face whose normal points exactly that way"
+    elif isinstance(load, Pressure) and face_of(body.corners, load.face) is None:
+        numbers = f"1 to {len(body.corners)}, counter-clockwise from its first corner"
+        message = f"no face, or no single one, of body {toml(load.body)} is that; its faces have the numbers {numbers}"
         yield Mistake((*path, "face"), message)
     elif isinstance(load, Pressure):
         other = next(_covers(scenario, load, body, [*bodies.values()]), None)
@@ -69,13 +69,23 @@ def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str,
             yield Mistake((*path, "face"), message)
 
 
-def face_of(body: PlacedBody, face: Face) -> tuple[geometry.Corner, geometry.Corner] | None:
-    """Return the middle of a face and half its extents along x and y (m, in the body); None where there is none."""
-    nx, ny = NORMALS[face]
-    for (ax, ay), (bx, by), (x, y) in geometry.edges_of(body.corners):
-        if nx * x + ny * y > 0.0 and abs(nx * y - ny * x) <= PARALLEL:
-            return (0.5 * (ax + bx), 0.5 * (ay + by)), (0.5 * abs(bx - ax), 0.5 * abs(by - ay))
-    return None
+def face_of(corners: Sequence[geometry.Corner], face: Face) -> geometry.Edge | None:
+    """Return the ends of a face (m, in the body), the left or else lower one first, and its outward normal.
+
+    `corners` are counter-clockwise. None where it does not exist, or two faces point that way as much as one another.
+    """
+    edges = [*geometry.edges_of(corners)]
+    if isinstance(face, int):
+        edges = edges[face - 1 : face]
+    else:
+        angle = 0.0 if face in NORMALS else Quantity(ANGLE).read(face)
+        way = NORMALS.get(face, (math.cos(angle), math.sin(angle)))
+        most = max(geometry.dot(way, normal) for _, _, normal in edges)
+        edges = [edge for edge in edges if geometry.dot(way, edge[2]) >= most - AS_NEAR]
+    if len(edges) != 1:
+        return None
+    begin, end, normal = edges[0]
+    return min(begin, end), max(begin, end), normal
 
 
 def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequence[PlacedBody]) -> Iterator[str]:
@@ -98,12 +108,11 @@ def _covers(scenario: Scenario, load: Pressure, body: PlacedBody, bodies: Sequen
 def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
     """Return the strip before a face of a body, a little shorter than the face at both ends."""
     thickness = STRIP * body.least_width
-    nx, ny = NORMALS[face]
-    (x, y), (half_x, half_y) = face_of(body, face) or ((0.0, 0.0), (0.0, 0.0))
-    x, y = x + 0.5 * nx * thickness, y + 0.5 * ny * thickness
-    size_x, size_y = (thickness, 2.0 * (half_y - thickness)) if nx else (2.0 * (half_x - thickness), thickness)
+    (x0, y0), (x1, y1), (nx, ny) = face_of(body.corners, face) or NO_FACE
+    x, y = 0.5 * (x0 + x1 + nx * thickness), 0.5 * (y0 + y1 + ny * thickness)
+    size_x, angle = math.hypot(x1 - x0, y1 - y0) - 2.0 * thickness, body.angle + math.atan2(y1 - y0, x1 - x0)
     x, y = body.ground_point(x, y)
-    return body._replace(size_x=size_x, size_y=size_y, x=x, y=y, outline=())
+    return body._replace(size_x=size_x, size_y=thickness, x=x, y=y, angle=angle, outline=())
 
 
 MOST_MEETINGS = 20

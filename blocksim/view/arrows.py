@@ -8,12 +8,12 @@ import numpy as np
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.models.loads import Force, Gravity, Horizontal, Moment, Pressure
-from blocksim.scenario.start import NORMALS
+from blocksim.scenario.start import NO_FACE, face_of
 from blocksim.simulation.trajectory import Contacts, Frames, Rows, forces_on_a
 from blocksim.view import style
 from blocksim.view.run_data import MILLIMETRES, Extent, Floats, Indices, Support, rotate_points
 from blocksim.view.scene import Canvas
-from blocksim.world.systems.blocks import are_removed
+from blocksim.world.systems.blocks import are_removed, distinct
 
 USUAL = 0.9  # share of all recorded forces that are no larger than the one the scale is made for
 USUAL_LENGTH = 0.6  # of the mean side of the blocks: length of the arrow of that force
@@ -245,8 +245,13 @@ class _Poses:
         self.time, self.angle = frames.time[chosen], frames.angle[chosen]
         self.places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
         self.velocities = np.stack([frames.vx[chosen], frames.vy[chosen]], axis=-1)
+        self.all_corners = frames.corners  # (b, k, 2) m
         self.sides = np.stack([frames.size_x, frames.size_y], axis=-1)  # (b, 2)
         self.is_there = 1.0 - are_removed(frames.vx[chosen])  # (f, b) 1 or 0
+
+    def corners(self, body: int) -> list[tuple[float, float]]:
+        """Return the corners (m) of a body along its own axes."""
+        return [(x, y) for x, y in distinct(self.all_corners[body]).tolist()]
 
     def to_scene(self, body: int, vectors: Floats) -> Floats:
         """Return vectors (k, 2) of a body's own axes in those of the scene, (f, k, 2)."""
@@ -275,9 +280,9 @@ def _loads_and_speeds(poses: _Poses, support: Support) -> Iterator[Arrows]:
             yield poses.arrows(FORCE, one.body, arms, (load.magnitude * factor)[..., None] * ways)
         elif isinstance(load, Pressure):
             is_water = load.water_level is not None
-            normal, half = np.array(NORMALS[load.face]), 0.5 * poses.sides[one.body]
+            begin, end, normal = map(np.array, face_of(poses.corners(one.body), load.face) or NO_FACE)
             along = np.linspace(0.0, 1.0, DEEP) if is_water else (np.arange(UNIFORM) + 0.5) / UNIFORM
-            arms = poses.to_scene(one.body, half * (normal + np.outer(2.0 * along - 1.0, np.abs(normal[::-1]))))
+            arms = poses.to_scene(one.body, begin + np.outer(along, end - begin))
             up = np.array([np.sin(support.tilt), np.cos(support.tilt)])
             heights = (poses.places[:, one.body, None] + arms) @ up
             size = np.broadcast_to(factor * (load.magnitude or 0.0), heights.shape)

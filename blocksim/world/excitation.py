@@ -13,8 +13,6 @@ from blocksim.kernels.common import arrays
 from blocksim.scenario import PlacedBody, Scenario, motion, place_bodies, start
 from blocksim.scenario.models import loads
 
-NO_FACE = ((0.0, 0.0), (0.0, 0.0))
-"""Of a body that has none: no load acts on it, as such a scenario is refused."""
 COEFFICIENTS = ("c0", "c1", "c2", "c3")
 STANDSTILL = arrays.zeros(1, arrays.MOTION_PIECE)
 
@@ -78,17 +76,15 @@ def _fields(
         fields = {"kind": arrays.LOAD_FORCE, "x": x, "y": y, "fx": fx, "fy": fy, "turns": load.axes == "body"}
         force, arm = abs(load.magnitude), math.hypot(*load.point)
     else:
-        nx, ny = map(float, start.NORMALS[load.face])
-        (x, y), (half_x, half_y) = start.face_of(body, load.face) or NO_FACE
-        along_x, along_y = abs(ny) * half_x, abs(nx) * half_y
-        length = 2.0 * (along_x + along_y)
-        fields = {"kind": arrays.LOAD_FORCE, "x": x, "y": y, "turns": 1.0}
+        (x0, y0), (x1, y1), (nx, ny) = start.face_of(body.corners, load.face) or start.NO_FACE
+        length = math.hypot(x1 - x0, y1 - y0)
+        fields = {"kind": arrays.LOAD_FORCE, "x": 0.5 * (x0 + x1), "y": 0.5 * (y0 + y1), "turns": 1.0}
         if load.magnitude is not None:
             force = load.magnitude * length * body.depth
             fields |= {"fx": -nx * force, "fy": -ny * force}
         else:
-            fields |= {"kind": arrays.LOAD_WATER, "x": x - along_x, "y": y - along_y, "end_x": x + along_x}
-            fields |= {"end_y": y + along_y, "fx": -nx * body.depth, "fy": -ny * body.depth}
+            fields |= {"kind": arrays.LOAD_WATER, "x": x0, "y": y0, "end_x": x1, "end_y": y1}
+            fields |= {"fx": -nx * body.depth, "fy": -ny * body.depth}
             fields |= {"unit_weight": load.unit_weight * length, "up_x": math.sin(tilt), "up_y": math.cos(tilt)}
         deepest = abs(load.magnitude or 0.0)
         if load.water_level is not None:

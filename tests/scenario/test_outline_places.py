@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from blocksim.scenario import PlacedBody, Scenario, place_bodies
@@ -68,14 +69,15 @@ def test_a_wall_may_pass_by_the_slanted_side() -> None:
     ("load", "key"),
     [
         ({"kind": "force", "point": [0.15, 0.15]}, "point"),
-        ({"kind": "pressure", "face": "right"}, "face"),
-        ({"kind": "pressure", "face": "top"}, "face"),
+        ({"kind": "pressure", "face": 4}, "face"),
+        ({"kind": "pressure", "face": "225 deg"}, "face"),  # between two of them
     ],
 )
 def test_loads_beside_an_outline_are_refused(load: dict[str, Any], key: str) -> None:
     body = {"block": "wedge", "x": 0.1, "y": 0.1}
-    ((path, _),) = told([body], loads=[{"body": "1", "magnitude": 1, **load}])
+    ((path, message),) = told([body], loads=[{"body": "1", "magnitude": 1, **load}])
     assert path == ("loads", 0, key)
+    assert key == "point" or "its faces have the numbers 1 to 3" in message
 
 
 def test_loads_on_an_outline_are_accepted() -> None:
@@ -85,19 +87,27 @@ def test_loads_on_an_outline_are_accepted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("face", "middle", "half"),
-    [("bottom", (0.05, -0.1), (0.15, 0.0)), ("left", (-0.1, 0.05), (0.0, 0.15)), ("top", None, None)],
+    ("face", "ends"),
+    [
+        ("bottom", ((-0.1, -0.1), (0.2, -0.1))),
+        (1, ((-0.1, -0.1), (0.2, -0.1))),
+        ("left", ((-0.1, -0.1), (-0.1, 0.2))),
+        ("top", ((-0.1, 0.2), (0.2, -0.1))),
+        ("30 deg", ((-0.1, 0.2), (0.2, -0.1))),
+    ],
 )
-def test_the_face_of_an_outline_is_that_whose_normal_points_that_way(face: Face, middle: Any, half: Any) -> None:
+def test_the_face_of_an_outline_is_the_nearest_that_way_or_that_of_its_number(
+    face: Face, ends: tuple[tuple[float, float], ...]
+) -> None:
     body = placed("wedge", 0.1, 0.1, math.radians(30))
-    found = face_of(body, face)
-    if middle is None:
-        assert found is None
-        return
+    found = face_of(body.corners, face)
     assert found is not None
-    assert found[0] == pytest.approx(middle, abs=1e-15)
-    assert found[1] == pytest.approx(half, abs=1e-15)
+    assert np.array(found[:2]) == pytest.approx(np.array(ends), abs=1e-15)
     strip = strip_before(body, face)
-    along, across = sorted((strip.size_x, strip.size_y), reverse=True)
-    assert (along, across) == pytest.approx((0.3 - 2.0 * across, 1e-3 * 0.3 / math.sqrt(2.0)))
-    assert strip.outline == ()
+    assert strip.size_y == pytest.approx(1e-3 * 0.3 / math.sqrt(2.0))
+    assert strip.size_x == pytest.approx(math.dist(*ends) - 2.0 * strip.size_y)
+    normal = np.array([-math.sin(strip.angle), math.cos(strip.angle)])
+    out = np.array(body.own_point(strip.x, strip.y)) - np.mean(ends, axis=0)
+    assert np.abs(np.hypot(*out)) == pytest.approx(0.5 * strip.size_y)
+    turned = np.array(body.ground_point(*out)) - (body.x, body.y)
+    assert abs(turned @ normal) == pytest.approx(0.5 * strip.size_y)

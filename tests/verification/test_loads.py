@@ -106,3 +106,20 @@ def test_the_shipped_dam_stands_until_its_base_is_too_narrow() -> None:
     assert narrow.moves_on
     assert narrow.first_moved_s is not None
     assert 3.9 < narrow.first_moved_s < 6.0  # as the level comes near the crest
+
+
+def test_water_on_the_battered_back_of_a_dam_adds_its_weight(tmp_path: Path) -> None:
+    """Thrust gamma H^2/2 over the friction of its weight and of the water above the back: where it slides."""
+    width, lean = 6.0, 2.0  # m, of the base, and the foot of the back beyond its crest
+    outline = [[0.0, 0.0], [width, 0.0], [width, HEIGHT], [lean, HEIGHT]]
+    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": HEIGHT, "unit_weight": WATER}
+    dam = block("nonsmooth", 1.0, HEIGHT, 1.0, loads=[water])
+    area = (width - 0.5 * lean) * HEIGHT
+    below = HEIGHT * (width**2 / 2.0 - lean**2 / 6.0) / area  # from the corner at the back to the centroid
+    dam["blocks"] = {"b": {"outline": outline, "depth": 1.0, "material": "concrete"}}
+    rise = (0.5 * width * HEIGHT**2 - lean * HEIGHT**2 / 3.0) / area
+    dam["bodies"] = [{"block": "b", "x": below, "y": rise}]
+    slides = 0.5 * WATER * HEIGHT**2 / (CONCRETE * area + 0.5 * WATER * HEIGHT * lean)
+    within = {"friction.block_ground": {"from": 0.99 * slides, "to": 1.01 * slides, "count": 2}}
+    (change,) = limit(dam, within, tolerance=0.03, out=tmp_path / "limit", jobs=1, keep_runs=False).limits
+    assert (change.below, change.above) == (Stability.FALLS, Stability.STANDS)

@@ -19,8 +19,9 @@ from itertools import pairwise
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import ConfigDict, Field, ValidationInfo, model_validator
+from pydantic.json_schema import JsonSchemaValue
 
-from blocksim.scenario import units as q
+from blocksim.scenario import spelling, units as q
 from blocksim.scenario.models import base, geometry, motion
 from blocksim.scenario.models.base import setting
 
@@ -124,7 +125,31 @@ HISTORIES: dict[str, type[base.Table]] = base.by_kind(AnyHistory)
 
 
 Axes = Annotated[Literal["world", "body"], base.OneOf(("world", "body"))]
-Face = Annotated[Literal["left", "right", "top", "bottom"], base.OneOf(("left", "right", "top", "bottom"))]
+NORMALS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, 1.0), "bottom": (0.0, -1.0)}
+"""Outward normals of the sides of a body, along its axes."""
+
+
+class FaceChoice(q.FieldReader):
+    """Annotation of a face of a body: a side, the direction of its normal, or its number."""
+
+    def read(self, value: object) -> object:
+        """Pass what may name a face; raises a pydantic error."""
+        if isinstance(value, str) and any(letter.isdigit() for letter in value):
+            q.Quantity(q.ANGLE).read(value)
+        elif value not in NORMALS and not (type(value) is int and 0 < value <= geometry.COUNTS["maxItems"]):
+            similar = spelling.nearest(value, NORMALS, most=2) if isinstance(value, str) else None
+            hint = f"did you mean {q.toml(similar)}? " if similar else ""
+            wanted = 'the direction of its normal such as "150 deg", or its number from 1 on'
+            raise q.invalid(f"{q.toml(value)} is no face; {hint}use {' or '.join(map(q.toml, NORMALS))}, {wanted}")
+        return value
+
+    def json_schema(self, usual: JsonSchemaValue) -> JsonSchemaValue:
+        """Return the JSON Schema of all three."""
+        number = {"type": "integer", "minimum": 1, "maximum": geometry.COUNTS["maxItems"]}
+        return {**usual, "anyOf": [{"enum": [*NORMALS]}, number, {"type": "string", "examples": ["150 deg"]}]}
+
+
+Face = Annotated[int | str, FaceChoice()]
 WATER = 9810.0  # N/m³; unit weight of water
 BODY = setting("the name of the body that it acts on (without a name, its number)")
 
@@ -168,7 +193,10 @@ class Pressure(VaryingLoad):
 
     kind: Literal["pressure"] = setting("kind of load")
     body: str = BODY
-    face: Face = setting("face of the body before it is turned by its angle: left, right, top or bottom")
+    face: Face = setting(
+        "face of the body before it is turned by its angle: left, right, top, bottom, the direction of its normal "
+        '("150 deg" from +x), each the nearest there is, or its number (1 begins at the first corner)'
+    )
     magnitude: q.AnyPressure | None = setting("uniform pressure, negative for suction; give this or water_level", None)
     water_level: q.NonNegativeLength | None = setting(
         "level of the water above the origin; give this or magnitude", None
