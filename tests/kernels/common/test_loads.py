@@ -10,7 +10,7 @@ import pytest
 
 from blocksim.kernels.common.loads import Pose, force_at, value_at
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.simulation import Result, simulate
+from blocksim.simulation import simulate
 from blocksim.world.build import build_world
 
 if TYPE_CHECKING:
@@ -44,60 +44,45 @@ def scenario_with(*loads: dict[str, Any], scheme: str = "explicit", **changes: A
     return scenario_from_mapping(data)
 
 
-def end_of(result: Result) -> dict[str, float]:
-    row = result.final.iloc[0]
-    return {
-        "t": result.summary.simulated_time_s,
-        "x": 1e-3 * row["x_mm"],
-        "y": 1e-3 * row["y_mm"] - HIGH,
-        "vx": 1e-3 * row["vx_mm_s"],
-        "vy": 1e-3 * row["vy_mm_s"],
-        "angle": math.radians(row["rotation_deg"]),
-        "spin": math.radians(row["spin_deg_s"]),
-    }
+class End:
+    """Where a block is at the end of a run, how fast (m, rad, s), and the work (J) that loads have done."""
 
-
-def work_of_loads(result: Result) -> float:
-    return -result.summary.energy_J.to_loads
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_constant_force_accelerates_a_free_block_exactly_and_its_work_is_the_energy_gained(scheme: str) -> None:
-    force = {"kind": "force", "body": "1", "magnitude": "2 kN", "direction": "30 deg"}
-    result = simulate(scenario_with(force, scheme=scheme))
-    end, a = end_of(result), 2000.0 / MASS
-    ax, ay = a * math.cos(math.pi / 6), a * 0.5 - G
-    assert end["vx"] == pytest.approx(ax * end["t"], rel=EXACT)
-    assert end["vy"] == pytest.approx(ay * end["t"], rel=EXACT)
-    assert end["x"] == pytest.approx(0.5 * ax * end["t"] ** 2, rel=EXACT)
-    assert end["y"] == pytest.approx(0.5 * ay * end["t"] ** 2, rel=1e-7)  # a small difference of places
-    assert end["spin"] == 0.0
-    along = end["x"] * math.cos(math.pi / 6) + end["y"] * 0.5
-    assert work_of_loads(result) == pytest.approx(2000.0 * along, rel=1e-7)
-    assert result.summary.energy_J.relative_residual < EXACT
+    def __init__(self, scheme: str, load: dict[str, Any], **changes: Any) -> None:
+        """Run it."""
+        result = simulate(scenario_with(load, scheme=scheme, **changes))
+        row = result.final.iloc[0]
+        self.t = result.summary.simulated_time_s
+        self.place = 1e-3 * row["x_mm"], 1e-3 * row["y_mm"] - HIGH
+        self.velocity = 1e-3 * row["vx_mm_s"], 1e-3 * row["vy_mm_s"]
+        self.angle, self.spin = math.radians(row["rotation_deg"]), math.radians(row["spin_deg_s"])
+        self.work = -result.summary.energy_J.to_loads
+        self.residual = result.summary.energy_J.relative_residual
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_moment_spins_a_block_about_its_centre(scheme: str) -> None:
-    result = simulate(scenario_with({"kind": "moment", "body": "1", "magnitude": "-3 kN m"}, scheme=scheme))
-    end, rate = end_of(result), -3000.0 / INERTIA
-    assert end["spin"] == pytest.approx(rate * end["t"], rel=EXACT)
-    assert end["angle"] == pytest.approx(0.5 * rate * end["t"] ** 2, rel=EXACT)
-    assert end["vx"] == 0.0
-    assert work_of_loads(result) == pytest.approx(-3000.0 * end["angle"], rel=EXACT)
+def test_a_constant_force_and_a_moment_accelerate_a_free_block_exactly_and_work_as_much(scheme: str) -> None:
+    end = End(scheme, {"kind": "force", "body": "1", "magnitude": "2 kN", "direction": "30 deg"})
+    ax, ay = 2000.0 / MASS * math.cos(math.pi / 6), 1000.0 / MASS - G
+    assert end.velocity == pytest.approx((ax * end.t, ay * end.t), rel=EXACT)
+    assert end.place == pytest.approx((0.5 * ax * end.t**2, 0.5 * ay * end.t**2), rel=1e-7)  # small differences
+    assert end.spin == 0.0
+    along = end.place[0] * math.cos(math.pi / 6) + end.place[1] * 0.5
+    assert end.work == pytest.approx(2000.0 * along, rel=1e-7)
+    assert end.residual < EXACT
+    end, rate = End(scheme, {"kind": "moment", "body": "1", "magnitude": "-3 kN m"}), -3000.0 / INERTIA
+    assert (end.spin, end.angle) == pytest.approx((rate * end.t, 0.5 * rate * end.t**2), rel=EXACT)
+    assert end.velocity[0] == 0.0
+    assert end.work == pytest.approx(-3000.0 * end.angle, rel=EXACT)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_force_along_axes_of_the_body_turns_with_it_and_one_along_fixed_axes_does_not(scheme: str) -> None:
+@pytest.mark.parametrize(("axes", "way"), [("body", (0.0, 1.0)), ("world", (1.0, 0.0))])
+def test_a_force_along_axes_of_the_body_turns_with_it(scheme: str, axes: str, way: tuple[float, float]) -> None:
     bodies = [{"block": "b", "x": 0.0, "y": HIGH, "angle": "90 deg"}]
-    force = {"kind": "force", "body": "1", "magnitude": "1 kN"}
-    turned, fixed = (
-        end_of(simulate(scenario_with({**force, "axes": axes}, scheme=scheme, bodies=bodies, gravity=0.0)))
-        for axes in ("body", "world")
-    )
-    speed = 1000.0 / MASS * turned["t"]
-    assert (turned["vx"], turned["vy"]) == pytest.approx((0.0, speed), abs=1e-12)
-    assert (fixed["vx"], fixed["vy"]) == pytest.approx((speed, 0.0), abs=1e-12)
+    force = {"kind": "force", "body": "1", "magnitude": "1 kN", "axes": axes}
+    end = End(scheme, force, bodies=bodies, gravity=0.0)
+    speed = 1000.0 / MASS * end.t
+    assert end.velocity == pytest.approx((speed * way[0], speed * way[1]), abs=1e-12)
 
 
 HISTORIES: dict[str, tuple[dict[str, Any], float]] = {  # and the integral of the factor over 0.1 s
@@ -113,11 +98,10 @@ HISTORIES: dict[str, tuple[dict[str, Any], float]] = {  # and the integral of th
 def test_a_force_that_goes_with_time_brings_the_integral_of_its_history(scheme: str, kind: str) -> None:
     history, integral = HISTORIES[kind]
     force = {"kind": "force", "body": "1", "magnitude": "2 kN", "history": history}
-    result = simulate(scenario_with(force, scheme=scheme, gravity=0.0, time={"end": 0.1, "step": 2e-5}))
-    end = end_of(result)
-    assert end["t"] == pytest.approx(0.1, rel=1e-12)
-    assert end["vx"] == pytest.approx(2000.0 / MASS * integral, rel=1e-3)
-    assert work_of_loads(result) == pytest.approx(0.5 * MASS * end["vx"] ** 2, rel=SECOND_ORDER)
+    end = End(scheme, force, gravity=0.0, time={"end": 0.1, "step": 2e-5})
+    assert end.t == pytest.approx(0.1, rel=1e-12)
+    assert end.velocity[0] == pytest.approx(2000.0 / MASS * integral, rel=1e-3)
+    assert end.work == pytest.approx(0.5 * MASS * end.velocity[0] ** 2, rel=SECOND_ORDER)
 
 
 def water(level: float, **pose: float) -> tuple[float, float, float]:
