@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import nnls
 
 from blocksim.kernels.common.arrays import BODY, NORMAL, zeros
 from blocksim.kernels.nonsmooth import arrays
@@ -211,25 +210,6 @@ def dense(scene: Nonsmooth) -> Dense:
     gaps = [gap for constraint in constraints for gap in (constraint.gap_one, constraint.gap_two)]
     columns = (impulses, shears, targets, materials["kinetic_friction"], gaps)
     return Dense(np.array(points), np.array(tangents), inverse, *(np.array(one) for one in columns))
-
-
-def least_change(start: Vector, rows: Vector, least: Vector, inverse_mass: Vector) -> Vector:
-    """Return the velocities with J v >= least that differ least from `start`, in kinetic energy.
-
-    That is Gauss's principle for impulses without friction. Solved as least distance programming (C. L. Lawson and
-    R. J. Hanson, Solving Least Squares Problems (1974), chapter 23): min |x| with G x >= h, x = M^(1/2) (v - start).
-    """
-    g = rows * np.sqrt(inverse_mass)
-    h = least - rows @ start
-    if h.max() <= 0.0:
-        return start.copy()
-    scale = float(np.abs(h).max())
-    matrix = np.vstack([g.T, h / scale])
-    wanted = np.zeros(len(matrix))
-    wanted[-1] = 1.0
-    found, _ = nnls(matrix, wanted, maxiter=10000)
-    rest = wanted - matrix @ found
-    return np.asarray(start + np.sqrt(inverse_mass) * scale * -rest[:-1] / rest[-1])
 
 
 def dashpots_by_definition(points: Records, masses: Vector, ratio: float, step: float) -> Vector:

@@ -122,15 +122,6 @@ def test_edges_of_pieces_of_ground() -> None:
     assert math.degrees(run.bodies.angle[0]) == pytest.approx(-47.69, abs=0.3)
 
 
-def test_flight_is_a_parabola_in_position_and_velocity() -> None:
-    run = single([{"y": 2.0, "velocity": [1.5, 2.5], "spin": 30.0, "angle": 0.4}]).to_time(0.2)
-    body = run.bodies[0]
-    found = [body.x, body.y, body.vx, body.vy, body.angle, body.spin]
-    expected = [0.3, 2.5 - 0.5 * G * 0.04, 1.5, 2.5 - G * 0.2, 6.4, 30.0]
-    assert found == pytest.approx(expected, abs=1e-12)
-    assert run.residual() < 1e-13
-
-
 def test_ledger_holds_on_a_slope() -> None:
     run = single([{"y": ON_GROUND + 0.01, "angle": 0.2}], tilt=radians(35.0)).to_time(0.5)
     assert run.residual() < 1e-12

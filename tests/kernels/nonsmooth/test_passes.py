@@ -11,11 +11,11 @@ import pytest
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.common.tolerances import LATE
 from blocksim.kernels.nonsmooth.arrays import BEFORE, FAR, STATE, TALLY_PACKS
-from blocksim.kernels.nonsmooth.motion import is_in_flight, kick, kick_warm, place
+from blocksim.kernels.nonsmooth.motion import kick, kick_warm, place
 from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY, range_of_thread, sweep, velocity_pass
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
 from blocksim.world.sag import soft_contact
-from tests.kernels.references import Dense, dense, least_change
+from tests.kernels.references import Dense, dense
 from tests.kernels.scenes import Block, after_substep, collided, make_body, pile, posed, single, velocities
 
 if TYPE_CHECKING:
@@ -49,11 +49,15 @@ def slips(scene: Nonsmooth, all_of: Dense) -> tuple[NDArray[np.float64], NDArray
 def test_friction_stops_all_slip_or_resists_it_with_all_it_has(
     seed: int, friction: float, size: tuple[int, int]
 ) -> None:
-    scene = after_substep(pile(np.random.default_rng(seed), *size), friction=friction, ground_friction=0.7, **EXACT)
-    all_of = dense(scene)
+    """And is within the cone after any sweep."""
+    blocks = pile(np.random.default_rng(seed), *size)
+    for sweeps in (1, 2, 3, EXACT["velocity_sweeps"]):
+        values = {**EXACT, "velocity_sweeps": sweeps}
+        scene = after_substep(blocks, friction=friction, ground_friction=0.7, **values)
+        all_of = dense(scene)
+        limit = all_of.friction * all_of.impulses.reshape(-1, 2).sum(axis=1)
+        assert np.all(np.abs(all_of.shears) <= limit * (1.0 + 1e-9))
     _, slip = slips(scene, all_of)
-    limit = all_of.friction * all_of.impulses.reshape(-1, 2).sum(axis=1)
-    assert np.all(np.abs(all_of.shears) <= limit * (1.0 + 1e-9))
     pressed = limit > 0.0
     is_at_limit = np.abs(all_of.shears) > limit * (1.0 - 1e-6)
     assert np.abs(slip[pressed & ~is_at_limit]).max(initial=0.0) < ROUND_OFF
@@ -72,25 +76,16 @@ def test_one_contact_is_solved_exactly_at_once(seed: int) -> None:
     """Both normals in the first sweep, and friction to the slip that they leave: effective masses are right."""
     once = {**EXACT, "velocity_sweeps": 1, "gravity": 0.0}
     scene = after_substep(two_blocks(seed), **SMOOTH, **once)
-    all_of, free = dense(scene), velocities(scene.contacts.before).ravel()
-    expected = least_change(free, all_of.normals, all_of.targets, all_of.inverse_mass)
-    assert velocities(scene.contacts.states).ravel() == pytest.approx(expected, abs=1e-10)
+    all_of = dense(scene)
+    rest = slips(scene, all_of)[0] - all_of.targets
+    assert min(all_of.impulses.min(), rest.min()) > -1e-10
+    assert np.minimum(all_of.impulses, rest) == pytest.approx(0.0, abs=1e-10)
+    assert all_of.impulses.max() > 0.0
     scene = after_substep(two_blocks(seed), friction=100.0, **once)
     all_of = dense(scene)
     _, slip = slips(scene, all_of)
     assert slip == pytest.approx([0.0], abs=1e-12)
     assert np.all(all_of.shears != 0.0)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_friction_is_within_the_cone_after_any_sweep(seed: int, size: tuple[int, int]) -> None:
-    blocks = pile(np.random.default_rng(seed), *size)
-    for sweeps in (1, 2, 3):
-        scene = after_substep(blocks, friction=0.3, ground_friction=0.3, **{**EXACT, "velocity_sweeps": sweeps})
-        all_of = dense(scene)
-        limit = 0.3 * all_of.impulses.reshape(-1, 2).sum(axis=1)
-        assert np.all(np.abs(all_of.shears) <= limit * (1.0 + 1e-12))
-        assert np.any(all_of.shears != 0.0)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -147,23 +142,6 @@ def test_round_off_of_a_gap_does_not_choose_between_the_rules() -> None:
     for scene in scenes:
         sweep(scene.contacts, FIRST_VELOCITY, scene.world.team, 0)
     assert [dense(scene).impulses.min() > 0.0 for scene in scenes] == [True, True]
-
-
-@pytest.mark.parametrize("friction", [0.05, 0.3, 1.5])
-def test_block_that_slides_off_a_block_takes_from_it_what_it_gives(friction: float) -> None:
-    """Equal and opposite: momentum and moment of momentum of two free blocks are kept by a contact with friction."""
-    blocks = [Block(0.0, 1.0, 0.01, 0.3, 0.2, 4.0), Block(0.004, 1.0248, -0.02, -0.4, -0.6, -3.0)]
-    scene = posed(blocks, friction=friction, gravity=0.0, **EXACT)
-    before = velocities(scene.contacts.states)
-    scene = collided(scene)
-    substep(scene, 0, 0, False, scene.contacts.impact_lanes)
-    after = velocities(scene.contacts.states)
-    bodies: Any = scene.world.bodies[:2]
-    gained = (after - before)[:2]
-    assert np.abs(gained).min() > 1e-3
-    assert bodies.mass @ gained[:, :2] == pytest.approx([0.0, 0.0], abs=1e-15)
-    moment = bodies.mass * (bodies.x * gained[:, 1] - bodies.y * gained[:, 0]) + bodies.inertia * gained[:, 2]
-    assert float(moment.sum()) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_tallies_have_what_impulses_take_from_blocks_that_meet_without_gravity() -> None:
@@ -373,11 +351,3 @@ def test_step_ends_with_the_pose_that_the_drifts_add_up_to(turned: float, is_tou
     brought = np.array([0.0, 0.0, 0.0]) if is_touching else np.array([*KICK, 0.0]) / 2
     assert [body.vx, body.vy, body.spin] == pytest.approx(velocity + brought, abs=1e-15)
     assert (one.dx, one.dy, one.turned) == (0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize(("extra", "flies"), [(0.0, True), (1e-7, False), (-1e-7, False)])
-def test_body_is_in_flight_where_gravity_alone_has_changed_its_velocity(extra: float, flies: bool) -> None:
-    for name in ("vx", "vy"):
-        (one,), (before,) = kicked(1.0, -2.0, 3.0, 1.0)
-        one[name] += extra
-        assert bool(is_in_flight(one, before, *KICK)) is flies
