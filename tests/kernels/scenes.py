@@ -16,7 +16,7 @@ import numpy as np
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.kernels.common.arrays import ALL, BODY, MOTION_PIECE, TEAM_SIZE, zeros
-from blocksim.kernels.common.integrate import place_all_corners, renew_rotations
+from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.common.shapes import place_corners, separation
 from blocksim.kernels.explicit.broad_phase import rebuild_pairs
 from blocksim.kernels.explicit.models import contact_points
@@ -29,7 +29,7 @@ from blocksim.scenario.geometry import centre_outline, regular
 from blocksim.scenario.models.timeline import Nonsmooth as Stepping
 from blocksim.simulation.schemes import build_scene
 from blocksim.verification.scene import HEIGHT, WIDTH, CaseScene, Simulation, scenario_of
-from blocksim.world.build import build_world, with_more_room
+from blocksim.world.build import build_world
 from blocksim.world.nonsmooth import with_more_constraints
 from tests.kernels.references import turning
 
@@ -367,11 +367,3 @@ SCENES: dict[str, tuple[Callable[[], World], int]] = {  # and steps
     "discs": (lambda: with_particles("particles"), 600),
     "kernel": (lambda: with_particles("kernel"), 600),
 }
-
-
-def with_pairs(world: World) -> World:
-    """Return a world whose pairs are listed, before anything has moved."""
-    place_all_corners(world.bodies)  # as advance does before anything else
-    while not rebuild_pairs(world):
-        world = with_more_room(world)
-    return world

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import assume, given, strategies as st
 
 from blocksim.kernels.common.arrays import (
-    BODY,
     MOTION_PIECE,
     NORMAL,
     PAIR,
@@ -21,8 +20,8 @@ from blocksim.kernels.common.arrays import (
 )
 from blocksim.kernels.common.integrate import renew_rotations
 from blocksim.kernels.common.neighbours import lay_cells, list_pairs, sort_into_cells, travel
-from blocksim.kernels.common.shapes import separation, slab_depth, turn
-from blocksim.kernels.common.tolerances import END_RATIO, MOST_UNSEEN, SMALL_TURN
+from blocksim.kernels.common.shapes import separation, turn
+from blocksim.kernels.common.tolerances import MOST_UNSEEN, SMALL_TURN
 from blocksim.kernels.explicit.broad_phase import PAIR_SHARE, carry_history, unseen_steps
 from blocksim.kernels.explicit.models import contact_points
 from blocksim.kernels.explicit.persistent_forces import CHANGED, UNTOUCHED, persistent_forces
@@ -71,18 +70,6 @@ def test_separation_is_the_largest_gap_and_never_exceeds_the_distance(
     nearest = min(distances(points_of(a), b).min(), distances(points_of(b), a).min())
     assert gap <= nearest + 1e-15
     assert (gap <= 0.0) or (nearest > 0.0)
-
-
-@given(x=st.floats(-0.6, 0.6), depth=st.floats(-1e-3, 0.02))
-def test_depth_below_a_slab_is_the_distance_from_its_line_except_far_below_its_ends(x: float, depth: float) -> None:
-    slab = zeros(1, BODY)[0]
-    slab.half_x, slab.half_y = 0.5, 0.01
-    found = slab_depth(x, slab.half_y - depth, slab)
-    inside = 0.5 - abs(x)
-    if depth <= 0.0 or inside < 0.0 or depth > 1.001 * END_RATIO * inside:
-        assert found == 0.0
-    elif 1e-12 < depth < 0.999 * END_RATIO * inside:
-        assert found == pytest.approx(depth, abs=1e-16)
 
 
 RADIUS = 0.1
@@ -373,38 +360,17 @@ def jolt() -> World:
     return world._replace(motion=pieces)
 
 
-def touching_pairs(bodies: Any) -> set[tuple[int, int]]:
-    """Return all pairs of bodies that overlap, found without any list; the half-plane is the last one."""
-    ground = len(bodies) - 1
-    x, y, radius = np.array(bodies.x), np.array(bodies.y), np.array(bodies.radius)
-    found = set()
-    for i in range(ground):
-        if y[i] - np.abs(bodies.sin[i]) * bodies.half_x[i] - np.abs(bodies.cos[i]) * bodies.half_y[i] < 0.0:
-            found.add((i, ground))
-        for j in range(i + 1, ground):
-            way = np.hypot(x[i] - x[j], y[i] - y[j])
-            if way < radius[i] + radius[j] and separation(bodies[i], bodies[j]) < 0.0:
-                found.add((i, j))
-    return found
-
-
 @pytest.mark.parametrize(("make", "end"), [(crash, 0.12), (jolt, 0.02)])
-def test_no_body_comes_beyond_its_share_and_no_pair_is_missed(make: Callable[[], World], end: float, pace: int) -> None:
+def test_no_body_comes_beyond_its_share_before_pairs_are_looked_for(
+    make: Callable[[], World], end: float, pace: int
+) -> None:
     scene = Simulation(make())
-    controls, touched, stops = scene.world.controls[0], set(), round(end / scene.step) // pace
-    share = PAIR_SHARE * float(controls.skin)
+    stops, share = round(end / scene.step) // pace, PAIR_SHARE * float(scene.world.controls[0].skin)
     for step in range(1, stops):
         bodies = scene.to_step(step).world.bodies
         moved = np.hypot(bodies.x - bodies.list_x, bodies.y - bodies.list_y)
         assert (moved + bodies.radius * np.abs(bodies.angle - bodies.list_angle)).max() <= share, step
-        if step % 10 == 0:
-            pairs: Any = scene.world.pairs[: scene.world.clock[0].pair_count]
-            touching = touching_pairs(bodies)
-            assert touching <= set(zip(pairs.a.tolist(), pairs.b.tolist(), strict=True)), step
-            touched |= touching
-    assert pace > 1 or len(touched) >= 4
-    looks = scene.world.clock[0].rebuilds
-    assert 1 <= looks < stops / 3
+    assert 1 <= scene.world.clock[0].rebuilds < stops / 3
 
 
 STEP = 1e-6

@@ -168,13 +168,6 @@ def test_two_pieces_have_together_mass_centre_and_inertia_of_the_body() -> None:
     assert shear == pytest.approx((body.inverse_mass / 0.7, body.inverse_inertia / 0.7, 0.0))
 
 
-@pytest.mark.parametrize("seats", [0, 1, 2])
-def test_pair_that_bears_alone_stands_for_the_whole_body(seats: int) -> None:
-    body = make_body()
-    body.seats, body.k_yy, body.k_y = seats, K if seats == 2 else 0.5 * K, 1e-3 * K
-    assert piece_of(body, K, 0.0, 1.0, 5e-3, NORMAL) == (body.inverse_mass, body.inverse_inertia, 0.0)
-
-
 def test_seats_are_known_before_a_block_comes_down_on_them(start: Start) -> None:
     left = {"x": JOINT - 0.05, "y": 0.5 * HEIGHT, "width": 0.1, "fixed": True}
     right = {"x": JOINT + 0.05, "y": 0.5 * HEIGHT, "width": 0.1, "fixed": True}
@@ -269,13 +262,3 @@ def test_block_sliding_along_a_flat_face_feels_no_bump(shift: float, depth: floa
     assert found.points.depth == pytest.approx(depth, rel=1e-6, abs=1e-16)
     is_own = found.points.slot < found.upper.particle_count
     assert found.points.share[is_own].sum() == pytest.approx(1.0, rel=1e-12)  # half of a face, wherever it stands
-
-
-@given(angle=st.floats(0.15, 0.7), shift=st.floats(-0.5 * WIDTH, 0.5 * WIDTH), depth=DEPTHS)
-def test_corner_on_a_flat_face_touches_it_to_its_true_depth(angle: float, shift: float, depth: float) -> None:
-    found = touch("kernel", angle=angle, shift=shift, depth=depth, below=BROAD)
-    own = found.points[found.points.slot < found.upper.particle_count]
-    assert own.size == 2  # the corner is the last particle of one row and the first of the next
-    assert own.depth == pytest.approx(depth, rel=1e-6, abs=1e-16)
-    assert np.abs(own.nx).max() < 1e-12
-    assert own.share.min() > 0.0
