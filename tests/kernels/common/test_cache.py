@@ -19,7 +19,7 @@ from numba.core.types import abstract, functions
 from blocksim.kernels.common import jit
 from blocksim.kernels.common.arrays import PAIR, zeros
 from blocksim.kernels.common.compiler import INNER, InnerLibrary, shortcuts
-from blocksim.kernels.common.jit import config, njit
+from blocksim.kernels.common.jit import njit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -214,7 +214,6 @@ def test_kernel_is_compiled_once_whatever_integers_it_is_called_with(monkeypatch
     assert [str(one) for (one,) in twice.overloads] == ["int64"]  # type: ignore[attr-defined]
 
 
-pytestmark = pytest.mark.usefixtures("compiler")
 DAMAGE: dict[str, Callable[[bytes], bytes]] = {
     "cut": lambda content: content[:-100],
     "empty": lambda _: b"",
@@ -255,6 +254,7 @@ def files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.rglob("*") if path.is_file())
 
 
+@pytest.mark.usefixtures("compiler")
 @pytest.mark.parametrize("wrong", [*DAMAGE, *OTHERS])
 def test_file_that_is_damaged_or_that_others_may_write_is_reported_and_compiled_anew(
     kept: Path, wrong: str, caplog: pytest.LogCaptureFixture
@@ -279,6 +279,7 @@ def test_file_that_is_damaged_or_that_others_may_write_is_reported_and_compiled_
         assert loads_and_compilations(third) == (1, 0)
 
 
+@pytest.mark.usefixtures("compiler")
 def test_code_of_another_version_is_not_executed(kept: Path) -> None:
     one: Any = double()
     one(1.5)
@@ -291,12 +292,14 @@ def test_code_of_another_version_is_not_executed(kept: Path) -> None:
     assert loads_and_compilations(again) == (0, 1)
 
 
+@pytest.mark.usefixtures("compiler")
 def test_cache_that_cannot_be_written_does_not_end_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path / "file" / "cache")
     assert double()(1.5) == 3.0
 
 
+@pytest.mark.usefixtures("compiler")
 def test_full_disk_leaves_no_half_of_a_file(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -314,6 +317,7 @@ def test_user_without_a_home_folder_can_compile(monkeypatch: pytest.MonkeyPatch)
     assert jit.cache_folder.__wrapped__() is not None
 
 
+@pytest.mark.usefixtures("compiler")
 def test_kernel_starts_without_the_blas_that_a_function_of_the_user_still_finds(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text("""
@@ -361,6 +365,7 @@ def library_of(kernel: Any) -> Any:
     return compiled.library
 
 
+@pytest.mark.usefixtures("compiler")
 def test_inner_kernels_are_kept_without_machine_code_and_serve_callers_of_later_processes(kept: Path) -> None:
     square, successor, two = chain()
     assert two(3.0) == 25.0
@@ -376,7 +381,7 @@ def test_inner_kernels_are_kept_without_machine_code_and_serve_callers_of_later_
     assert (loads(square), loads(successor), loads(two)) == (1, 1, 0)
 
 
-@pytest.mark.usefixtures("kept")
+@pytest.mark.usefixtures("compiler", "kept")
 def test_inner_kernel_that_python_calls_is_compiled_and_kept_for_that_beside_what_its_callers_need() -> None:
     square, _, two = chain()
     assert (square(3.0), two(3.0), square(number=4.0)) == (9.0, 25.0, 16.0)
@@ -393,6 +398,7 @@ def fail_in_shortcuts() -> None:
         raise OSError("no room on the disk")
 
 
+@pytest.mark.usefixtures("compiler")
 def test_numba_is_as_before_after_shortcuts_even_where_compiling_fails() -> None:
     kinds, calls = abstract.Type, functions.BaseFunction
     before = (kinds.__hash__, calls.get_call_type, funcdesc.default_mangler)
@@ -403,7 +409,7 @@ def test_numba_is_as_before_after_shortcuts_even_where_compiling_fails() -> None
     assert before == (kinds.__hash__, calls.get_call_type, funcdesc.default_mangler)
 
 
-@pytest.mark.skipif(config.DISABLE_JIT, reason="is about the compiler")
+@pytest.mark.usefixtures("compiler")
 def test_operators_are_resolved_anew_for_other_types() -> None:
     def twice(x: float) -> float:
         return x + x
