@@ -1,4 +1,4 @@
-"""Free point masses in gravity that bounce on the ground, and may be tied to a block: a system of tests alone.
+"""Free point masses in gravity that bounce on the ground: a system of tests alone.
 
 Registered by two lines a test: one for its table, and one for each pair that can meet.
 """
@@ -17,7 +17,7 @@ from blocksim.scenario.models.base import SystemTable, Whole
 from blocksim.world.systems import Function
 from blocksim.world.systems.system import Channel, Dataset, Elements, Indices, System, Track, discs
 
-POINT = record_type("x y vx vy fx fy mass stiffness tie reach")  # m, m/s, N, kg, N/m, N/m, m
+POINT = record_type("x y vx vy fx fy mass stiffness")  # m, m/s, N, kg, N/m
 RADIUS = 0.004  # m, in pictures
 
 
@@ -31,7 +31,6 @@ class MassTable(SystemTable):
     spacing: q.Length = 0.01
     mass: q.PositiveLength = 1.0  # kg; there is no quantity of masses
     stiffness: q.PositiveLength = 1e4  # N/m
-    tie: float = 0.0  # N/m, to the first block
 
     def impossible(self, scenario: Scenario) -> Iterator[tuple[str, str]]:
         """Find masses that begin in level ground."""
@@ -89,8 +88,6 @@ def measure(system: Masses, world: World, row: Floats) -> None:
         row[0] += 0.5 * point.mass * (point.vx**2 + point.vy**2)
         row[1] -= point.mass * (controls.gravity_x * point.x + controls.gravity_y * point.y)
         row[2] += 0.5 * point.stiffness * depth**2
-        stretch = world.bodies[0].x - point.x - point.reach
-        row[2] += 0.5 * point.tie * stretch**2
         row[3] += point.mass
 
 
@@ -103,26 +100,9 @@ def bounce(system: Masses, _: World, world: World, k: int, _step: float) -> None
         point.fy += point.stiffness * max(0.0, -point.y)
 
 
-@rare_kernel
-def pull(system: Masses, _: World, world: World, k: int, _step: float) -> None:
-    """Let springs along x act on masses and on the centre of the first block; one thread for all."""
-    body = world.bodies[0]
-    if k == 0:
-        for i in range(system.points.size):
-            point = system.points[i]
-            force = point.tie * (body.x - point.x - point.reach)
-            point.fx += force
-            body.fx -= force
-
-
 def ground() -> Function:
     """Return how masses and supports act on one another."""
     return bounce
-
-
-def tie() -> Function:
-    """Return how masses and blocks act on one another."""
-    return pull
 
 
 def _tables(scenario: Scenario) -> list[MassTable]:
@@ -141,11 +121,10 @@ def _elements(scenario: Scenario) -> Elements:
 
 
 def _build(scenario: Scenario) -> Masses:
-    rows, first = _rows(scenario), scenario.bodies[0]
+    rows = _rows(scenario)
     points = zeros(len(rows), POINT)
     for point, (x, y, table) in zip(points, rows, strict=True):
-        point.x, point.y, point.mass, point.stiffness, point.tie = x, y, table.mass, table.stiffness, table.tie
-        point.reach = first.x - x
+        point.x, point.y, point.mass, point.stiffness = x, y, table.mass, table.stiffness
     return Masses(points)
 
 
@@ -158,7 +137,7 @@ def _outlines(track: Track, chosen: Indices) -> Any:
 
 
 def _largest_step(scenario: Scenario) -> float:
-    return min(0.1 * math.sqrt(table.mass / max(table.stiffness, table.tie)) for table in _tables(scenario))
+    return min(0.1 * math.sqrt(table.mass / table.stiffness) for table in _tables(scenario))
 
 
 MASSES = System(
