@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +10,11 @@ import numpy as np
 import pytest
 
 from blocksim.bench.harness import pushed_wall, three_blocks
-from blocksim.errors import InvalidInputError
+from blocksim.errors import InvalidInputError, OutputError
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
+from blocksim.scenario import scenario_from_mapping
 from blocksim.scenario.models import timeline
-from blocksim.simulation import read_result, simulate, simulate_into
+from blocksim.simulation import read_result, schemes, simulate, simulate_into
 from blocksim.simulation.provenance import state_hash
 from blocksim.simulation.schemes import (
     ALONE,
@@ -25,6 +27,8 @@ from blocksim.simulation.schemes import (
     team_for,
     useful_threads,
 )
+from blocksim.simulation.schemes.explicit import SURFACE_OF_OUTLINES
+from blocksim.simulation.schemes.nonsmooth import IN_ROUNDS, OF_OUTLINES
 from blocksim.world import build
 from blocksim.world.build import arrays_of
 
@@ -150,3 +154,37 @@ def test_energies_of_frames_and_summary_are_those_of_the_scheme(tmp_path: Path) 
     assert kept.summary.energy_J.relative_residual < 1e-12
     assert kept.summary.energy_J.dashpot == kept.summary.energy_J.stored_normal == 0.0
     assert np.array_equal(found.frames.x, kept.frames.x)
+
+
+SETS = {name: changes for scheme in SCHEMES.values() for name, changes in scheme.kernel_sets.items()}
+REBOUND: dict[str, Any] = {"time": {"scheme": "nonsmooth"}, "pairs": {"any": {"ground": {"restitution": 0.9}}}}
+
+
+@pytest.mark.parametrize("name", [*SETS, "rebound of a pair"])
+def test_only_scenes_with_outlines_or_impacts_in_rounds_have_the_kernels_for_them(name: str) -> None:
+    changes = SETS.get(name, REBOUND)
+    scenario = scenario_from_mapping({**schemes.SMALLEST_SCENE, **changes})
+    found, scene = schemes.kernels_of(scenario), build_scene(scenario)
+    assert found == (name if name in SETS else IN_ROUNDS["nonsmooth"])
+    in_rounds = isinstance(scene, Nonsmooth) and scene.contacts.impact_lanes is not None
+    assert in_rounds == (found in IN_ROUNDS.values())
+    rectangles = {key: value for key, value in changes.items() if key != "blocks"}
+    of_outlines = {
+        OF_OUTLINES: "nonsmooth",
+        SURFACE_OF_OUTLINES: "surface",
+        IN_ROUNDS[OF_OUTLINES]: IN_ROUNDS["nonsmooth"],
+    }
+    plain = scenario_from_mapping({**schemes.SMALLEST_SCENE, **rectangles})
+    assert schemes.kernels_of(plain) == of_outlines.get(name, found)
+
+
+def test_full_disk_of_the_kernel_cache_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(schemes, "build_scene", fail)
+    monkeypatch.setattr("blocksim.simulation.schemes.jit.cache_folder", lambda: "/disk/blocksim/0123")
+    schemes.compile_kernels.cache_clear()
+    told = r"^/disk/blocksim/0123: the compiled solver cannot be stored there: No space"
+    with pytest.raises(OutputError, match=told):
+        schemes.compile_kernels()
