@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -64,13 +63,19 @@ def test_runs_of_other_versions_are_runs_whatever_their_words_and_frames(
     assert not any(copy.iterdir())
 
 
+def refusal(folder: Path, *, overwrite: bool = True) -> str:
+    """Return why a folder is not emptied, and assert that nothing in it is touched."""
+    before = content_of(folder)
+    with pytest.raises(OutputExistsError) as caught:
+        prepare_folder(folder, overwrite=overwrite)
+    assert content_of(folder) == before
+    return str(caught.value)
+
+
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_foreign_file_is_never_removed(copy: Path, overwrite: bool) -> None:
     (copy / "thesis.tex").write_text("years of work")
-    before = content_of(copy)
-    with pytest.raises(OutputExistsError, match=r"not a blocksim run \(thesis\.tex\)"):
-        prepare_folder(copy, overwrite=overwrite)
-    assert content_of(copy) == before
+    assert "not a blocksim run (thesis.tex)" in refusal(copy, overwrite=overwrite)
 
 
 TAKEN = ("scenario.toml", "experiment.csv", "motion.csv", ".final.csv.swp")
@@ -81,17 +86,12 @@ def test_a_file_of_a_person_with_the_name_of_a_result_is_never_removed(tmp_path:
     for folder in (tmp_path / "alone", copy) if name in TAKEN else (tmp_path / "alone",):
         folder.mkdir(exist_ok=True)
         (folder / name).write_text("years,of,work\n")
-        before = content_of(folder)
-        with pytest.raises(OutputExistsError, match=re.escape(name)):
-            prepare_folder(folder, overwrite=True)
-        assert content_of(folder) == before
+        assert name in refusal(folder)
 
 
 def test_scenario_written_by_a_person_is_never_removed(tmp_path: Path) -> None:
     shutil.copyfile(SCENARIOS / "tower.toml", tmp_path / "scenario.toml")
-    with pytest.raises(OutputExistsError, match=r"scenario\.toml"):
-        prepare_folder(tmp_path, overwrite=True)
-    assert set(content_of(tmp_path)) == {"scenario.toml"}
+    assert "scenario.toml" in refusal(tmp_path)
 
 
 def test_a_link_in_the_place_of_a_result_is_not_removed_but_replaced_and_not_what_it_leads_to(
@@ -100,12 +100,9 @@ def test_a_link_in_the_place_of_a_result_is_not_removed_but_replaced_and_not_wha
     theirs = Path(shutil.move(copy / "final.csv", tmp_path / "theirs.csv"))
     before = theirs.read_bytes()
     (copy / "final.csv").symlink_to(theirs)
-    with pytest.raises(OutputExistsError, match=r"final\.csv"):
-        prepare_folder(copy, overwrite=True)
-    assert (copy / "final.csv").is_symlink()
+    assert "final.csv" in refusal(copy)
     write_text(copy / "final.csv", csv_text({name: [] for name in COLUMNS}))
-    assert theirs.read_bytes() == before
-    assert not (copy / "final.csv").is_symlink()
+    assert (theirs.read_bytes(), (copy / "final.csv").is_symlink()) == (before, False)
 
 
 def test_end_of_a_run_leaves_the_unsaved_edits_of_an_editor(copy: Path) -> None:

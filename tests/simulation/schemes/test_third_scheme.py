@@ -44,10 +44,9 @@ def test_blocks_move_by_its_steps_and_are_recorded() -> None:
 
 
 def test_resumed_runs_are_bit_identical(tmp_path: Path) -> None:
-    whole = blocksim.run(thrown(), out=tmp_path / "whole", threads=2)
-    assert (
-        blocksim.run(thrown(), out=tmp_path / "cut", precautions=CheckpointPolicy(wall_time=1e-9)).status != "finished"
-    )
+    whole = blocksim.run(thrown(), threads=2)
+    part = blocksim.run(thrown(), out=tmp_path / "cut", precautions=CheckpointPolicy(wall_time=1e-9))
+    assert part.status == "interrupted"
     again = blocksim.run(thrown(), out=tmp_path / "cut", resume=True)
     assert again.summary.final_state_sha256 == whole.summary.final_state_sha256
     (end,) = run_ensemble([thrown()])
@@ -56,13 +55,12 @@ def test_resumed_runs_are_bit_identical(tmp_path: Path) -> None:
 
 def test_its_keys_are_checked_and_written() -> None:
     assert Document.parse(scenario_to_toml(thrown(drag=0.5))).build() == thrown(drag=0.5)
-    for changes, place, told in (
-        ({"drags": 1.0}, "time.drags", "did you mean 'drag'"),
-        ({"drag": "fast"}, "time.drag", "fast"),
+    for name, value, told in (
+        ("drags", 1.0, "time.drags: .*did you mean 'drag'"),
+        ("drag", "fast", "time.drag: .*fast"),
     ):
-        with pytest.raises(ScenarioError, match=told) as error:
-            thrown(**changes)
-        assert place in str(error.value)
+        with pytest.raises(ScenarioError, match=told):
+            thrown(**{name: value})
 
 
 def test_sweeps_vary_its_keys_and_resume(tmp_path: Path) -> None:
