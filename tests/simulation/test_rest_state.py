@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.errors import ExitCode, ScenarioError, StoppedEarlyError
+from blocksim.errors import ExitCode, StoppedEarlyError
 from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
@@ -191,18 +191,6 @@ def test_what_is_to_drop_or_moves_already_does_not_settle_unasked_under_such_a_s
         assert result.summary.settled is None
         assert result.frames.y[0, 0] == body["y"]
         assert result.summary.warnings == ()
-
-
-@pytest.mark.parametrize(
-    ("start", "message"),
-    [
-        ({"hold": ["1"]}, "nothing is held without settle = true"),
-        ({"settle": True, "hold": ["nobody"]}, 'unknown body "nobody"'),
-    ],
-)
-def test_impossible_starts_are_told_with_their_place(start: dict[str, Any], message: str) -> None:
-    with pytest.raises(ScenarioError, match=message):
-        stack("explicit", start=start)
 
 
 def tilted_ring(tilt: str) -> Scenario:
