@@ -38,7 +38,7 @@ BRICK: dict[str, Any] = {"width": 0.2, "height": 0.1, "length": 0.1, "material":
 
 Overrides = Mapping[str, object] | Sequence[str]
 Refusal = Callable[..., tuple[int, str]]
-Edit = str | tuple[str, str]  # what is added to the valid scenario, or a piece of it and what takes its place
+Edit = str | tuple[str, str]  # a whole scenario, what is added to the valid one, or a piece of it and what replaces it
 Refused = Callable[[Edit], None]
 
 
@@ -78,7 +78,7 @@ def refusal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Refusal:
 def edited(edit: Edit) -> str:
     """Return the valid scenario with an edit."""
     if isinstance(edit, str):
-        return f"{VALID}\n{edit}\n"
+        return f"{edit}\n" if edit.startswith("schema = ") else f"{VALID}\n{edit}\n"
     assert VALID.count(edit[0]) == 1
     return VALID.replace(*edit)
 

@@ -1,7 +1,8 @@
 """Broken scenarios: each is refused with a located message, which stands in golden/broken.txt.
 
 A section of broken/*.txt is what is added to the valid scenario, or lines that it loses (-) and gets in place (+). In
-broken/structures.txt it is what stands in place of the structure.
+broken/structures.txt it is what stands in place of the structure. In broken/files/NAME.txt the first is the scenario,
+the others what stands in the file NAME.
 """
 
 from pathlib import Path
@@ -58,24 +59,21 @@ def test_particles_finer_than_a_side_can_have_are_refused(refused: Refused, mode
     refused(f'[contact]\nmodel = "{model}"\nparticle_spacing = "{spacing}"')  # they overflowed a field of 16 bits
 
 
-COLUMNS = b"time_s,displacement_m\n"
-TABLES = {
-    "empty": b"",
-    "unknown column": b"# n\ntime_s,displacement\n0,0\n",
-    "no time": b"t,displacement_m\n0,0\n",
-    "time twice": b"time_s,time_s\n0,0\n",
-    "one sample": COLUMNS + b"0,0\n",
-    "time stands still": COLUMNS + b"0,0\n# a note\n\n0,1\n",
-    "negative time": COLUMNS + b"-1,0\n1,0\n",
-    "word": COLUMNS + b"0,0\n1,a\n",
-    "not a number": COLUMNS + b"0,0\n1,nan\n",
-    "one cell": COLUMNS + b"0,0\n1\n2,0\n",
-    "open quote": COLUMNS + b'0,"0\n1,0\n',
-    "no text": b"\xff\xfe\x00",
-}
+def files() -> dict[str, tuple[Edit, str, bytes]]:
+    """Return what is wrong in a file that a scenario names: the scenario, the file's name and content."""
+    found: dict[str, tuple[Edit, str, bytes]] = {}
+    for file in sorted(Path(__file__).parent.glob("broken/files/*.txt")):
+        sections = parsed(file.read_text())
+        scenario = read(sections.pop("scenario"))
+        contents = {name: text.encode() for name, text in sections.items()} | {"bytes": b"\0\1\xff\xfe"}
+        found |= {f"{file.stem}: {name}": (scenario, file.stem, content) for name, content in contents.items()}
+    return found
 
 
-@pytest.mark.parametrize("content", TABLES.values(), ids=TABLES)
-def test_tables(tmp_path: Path, refused: Refused, content: bytes) -> None:
-    (tmp_path / "m.csv").write_bytes(content)
-    refused('[motion]\nkind = "table"\ntable = "m.csv"')
+FILES = files()
+
+
+@pytest.mark.parametrize(("edit", "name", "content"), FILES.values(), ids=FILES)
+def test_files(tmp_path: Path, refused: Refused, edit: Edit, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(content)
+    refused(edit)

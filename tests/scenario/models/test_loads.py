@@ -81,24 +81,6 @@ def test_two_loads_that_turn_gravity_are_refused() -> None:
         scenario(turn, turn)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("time_s,factor\n0,1\n1,\n", "load.csv: line 3: the factor is missing"),
-        ("time_s,force\n0,1\n1,2\n", 'load.csv: line 1: the columns are "time_s,force"; time_s,factor are needed'),
-        ("time_s,factor\n1,1\n0.5,2\n", "load.csv: line 3: time 0.5 s: times must increase"),
-        ("time_s,factor\n0,1\n", "load.csv: 1 lines with samples"),
-        ("time_s,factor\n0,1\n1,2 N\n", 'load.csv: line 3: "2 N" is not a finite number'),
-    ],
-)
-def test_a_table_with_a_gap_or_of_other_columns_is_refused_with_its_line(
-    tmp_path: Path, text: str, message: str
-) -> None:
-    (tmp_path / "load.csv").write_text(text)
-    with pytest.raises(ScenarioError, match=message):
-        scenario({**FORCE, "history": {"kind": "table", "table": "load.csv"}}, folder=tmp_path)
-
-
 def test_a_table_is_read_and_the_resolved_scenario_needs_it_no_more(tmp_path: Path) -> None:
     (tmp_path / "load.csv").write_text("# jack\ntime_s,factor\n0.5,1\n1.5,3\n")
     (tmp_path / "tilt.csv").write_text("time_s,tilt_deg\n0,0\n10,20\n")
