@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import copy
 import threading
-from functools import cache
 from math import nan
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -206,31 +205,10 @@ def test_nobody_leaves_a_meeting_before_everybody_has_come(size: int) -> None:
     assert team[MEETINGS] == (400 if size > 1 else 0)
 
 
-class ByOne(Protocol):
-    """Return a scene advanced by one thread; the signature of the fixture `by_one`."""
-
-    def __call__(self, scene: str, share: float = 1.0) -> World:
-        """`share` of its steps; all calls with the same arguments share the world."""
-
-
-@pytest.fixture(scope="module")
-def by_one() -> ByOne:
-    """Return every scene, advanced by one thread."""
-
-    @cache
-    def make(scene: str, share: float = 1.0) -> World:
-        start, steps = SCENES[scene]
-        world, status = advanced(start(), round(share * steps), 1)
-        assert status == REACHED
-        return world
-
-    return make
-
-
 @COMPILED
 @pytest.mark.parametrize("scene", SCENES)
 def test_three_threads_give_the_bits_of_one_while_contacts_between_their_shares_begin_and_end(
-    by_one: ByOne, scene: str
+    scene: str,
 ) -> None:
     start, steps = SCENES[scene]
     world = start()
@@ -245,7 +223,9 @@ def test_three_threads_give_the_bits_of_one_while_contacts_between_their_shares_
     assert len(ended) > 10
     assert np.count_nonzero(world.ledger.dashpot) >= 3
     assert np.count_nonzero(world.ledger.friction) >= 3
-    assert_same_bits(world, by_one(scene))
+    one, status = advanced(start(), steps, 1)
+    assert status == REACHED
+    assert_same_bits(world, one)
 
 
 def overlapping() -> World:

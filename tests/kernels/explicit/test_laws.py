@@ -124,53 +124,45 @@ ONE, TWO, OTHER = (0, UPPER), (1, UPPER), (0, RIGHT)
 OF_B, ALSO_OF_B = (MOST_CORNERS + 2, LOWER), (MOST_CORNERS + 3, LOWER)
 
 
+CONTINUED: list[tuple[list[Contact], list[Contact], list[int], list[int]]] = [
+    ([ONE, TWO], [ONE, TWO], [1, 2], []),
+    ([ONE, TWO], [TWO], [2], [1]),
+    ([ONE, TWO], [ONE], [1], [2]),
+    ([TWO], [ONE, TWO], [0, 1], []),
+    ([ONE], [ONE, OF_B], [1, 0], []),
+    ([ONE, TWO], [], [], [1, 2]),
+    ([ONE], [OTHER], [0], [1]),
+    ([ONE, TWO], [OTHER, TWO], [0, 2], [1]),
+    ([], [ONE, TWO], [0, 0], []),
+]
+HANDED_ON: list[tuple[list[Contact], list[Contact], list[int], list[int]]] = [
+    ([TWO], [OF_B], [1], []),  # under another corner, of the other block
+    ([ONE, TWO], [ONE, OF_B], [1, 2], []),
+    ([ONE, TWO], [TWO, OF_B], [2, 1], []),
+    ([ONE, TWO], [OF_B, ALSO_OF_B], [1, 2], []),
+    ([OTHER], [OF_B], [0], [1]),  # their normals do not agree
+    ([OTHER, TWO], [ONE, TWO], [0, 2], [1]),  # the corner itself has changed its face
+    ([OTHER, TWO], [ONE], [0], [1, 2]),
+]
+
+
 @pytest.mark.parametrize(
-    ("before", "now", "expected", "broken"),
-    [
-        ([ONE, TWO], [ONE, TWO], [1, 2], []),
-        ([ONE, TWO], [TWO], [2], [1]),
-        ([ONE, TWO], [ONE], [1], [2]),
-        ([TWO], [ONE, TWO], [0, 1], []),
-        ([ONE], [ONE, OF_B], [1, 0], []),
-        ([ONE, TWO], [], [], [1, 2]),
-        ([ONE], [OTHER], [0], [1]),
-        ([ONE, TWO], [OTHER, TWO], [0, 2], [1]),
-        ([], [ONE, TWO], [0, 0], []),
-    ],
+    ("closing", "before", "now", "expected", "broken"),
+    [(closing, *one) for closing, cases in ((2.0, CONTINUED), (0.0, HANDED_ON)) for one in cases],
 )
-def test_contact_continues_only_with_the_same_corner_on_the_same_face(
-    before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
+def test_contact_continues_with_the_same_corner_and_face_or_takes_the_place_of_one_that_has_ended(
+    closing: float, before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
 ) -> None:
+    """A new one that closes by more than it is deep has just begun, and takes no other's place."""
     world = stacked(*before)
-    lost = find(world, *now, closing=2.0)  # those that are new close by more than they are deep
+    lost = find(world, *now, closing=closing)
+    assert closing > 0.0 or not has_just_begun(world.points[0])
     assert kept(world) == list(zip(now, expected, strict=True))
     assert lost.broken == pytest.approx(held(world, *broken))
     assert world.pairs[0].idle == 4 - len(now)
     for name in ("normal_left", "shear_left"):
         assert world.pairs[name][0] == 0
         assert (world.pairs[name][1:] == 5).all()
-
-
-@pytest.mark.parametrize(
-    ("before", "now", "expected", "broken"),
-    [
-        ([TWO], [OF_B], [1], []),  # under another corner, of the other block
-        ([ONE, TWO], [ONE, OF_B], [1, 2], []),
-        ([ONE, TWO], [TWO, OF_B], [2, 1], []),
-        ([ONE, TWO], [OF_B, ALSO_OF_B], [1, 2], []),
-        ([OTHER], [OF_B], [0], [1]),  # their normals do not agree
-        ([OTHER, TWO], [ONE, TWO], [0, 2], [1]),  # the corner itself has changed its face
-        ([OTHER, TWO], [ONE], [0], [1, 2]),
-    ],
-)
-def test_contact_deeper_than_it_closed_takes_the_place_of_one_that_has_ended(
-    before: list[Contact], now: list[Contact], expected: list[int], broken: list[int]
-) -> None:
-    world = stacked(*before)
-    lost = find(world, *now)
-    assert not has_just_begun(world.points[0])
-    assert kept(world) == list(zip(now, expected, strict=True))
-    assert lost.broken == pytest.approx(held(world, *broken))
 
 
 STATIC, KINETIC, SPEED = 0.31, 0.19, 0.005
