@@ -167,58 +167,22 @@ def nearly_convex(draw: st.DrawFn) -> list[list[float]]:
 
 
 OUTLINE = st.integers(0, 5).flatmap(lambda kind: nearly_convex() if kind else ANY)
-LENGTH = st.integers(0, 15).flatmap(lambda kind: st.floats(1e-3, 10.0) if kind else st.one_of(NUMBER, MAGNITUDE))
-COUNT = st.integers(0, 15).flatmap(
-    lambda kind: st.integers(1, 40) if kind else st.one_of(NUMBER, st.integers(-1, 2000))
-)
-SHAPED = st.one_of(
-    st.fixed_dictionaries(
-        {"kind": st.just("arch"), "count": COUNT, "thickness": LENGTH, "radius": LENGTH},
-        optional={
-            "abutments": st.booleans(),
-            "left": LENGTH,
-            "embrace": st.sampled_from(["90 deg", "1 rad", 2, "1e-9 deg"]),
-        },
-    ),
-    st.fixed_dictionaries(
-        {"kind": st.just("column"), "count": COUNT, "height": LENGTH, "width": LENGTH}, optional={"top_width": LENGTH}
-    ),
-    st.fixed_dictionaries(
-        {"kind": st.just("voronoi"), "count": COUNT, "width": LENGTH, "height": LENGTH},
-        optional={"smallest": LENGTH, "relax": st.integers(0, 3)},
-    ),
-    st.fixed_dictionaries({"kind": st.just("voronoi"), "count": COUNT, "region": OUTLINE}),
-    st.fixed_dictionaries(
-        {"kind": st.just("rubble"), "count": COUNT, "columns": COUNT, "smallest": LENGTH, "largest": LENGTH},
-        optional={"exponent": LENGTH, "gap": LENGTH},
-    ),
-    st.fixed_dictionaries(
-        {
-            "kind": st.just("polygons"),
-            "cells": st.lists(st.fixed_dictionaries({"outline": OUTLINE}, optional={"fixed": NUMBER}), max_size=3),
-        }
-    ),
-)
 
 
 @st.composite
 def shaped(draw: st.DrawFn) -> dict[str, Any]:
-    """Draw a scenario of one block with an outline, or of one structure that shapes its blocks."""
-    data: dict[str, Any] = {
-        "schema": 1,
-        "name": "bad",
-        "materials": {"stone": {"density": 2000, "young_modulus": 1e9, "poisson_ratio": 0.2}},
-        "time": {"scheme": "nonsmooth", "end": 0.01},
-    }
+    """Draw a scenario of one block with an outline, or of a structure of such cells."""
+    stone = {"density": 2000, "young_modulus": 1e9, "poisson_ratio": 0.2}
+    data: dict[str, Any] = {"schema": 1, "name": "bad", "materials": {"stone": stone}}
+    block = {"depth": draw(st.floats(1e-3, 10.0) | NUMBER) if draw(ODD) else 1, "material": "stone"}
     if draw(st.booleans()):
-        block = (
-            {"sides": draw(COUNT), "radius": draw(LENGTH)}
-            if draw(ODD)
-            else draw(st.fixed_dictionaries({"outline": OUTLINE}, optional={"upright": NUMBER} if draw(ODD) else {}))
-        )
-        body = {"block": "b", "x": draw(LENGTH), "y": draw(st.just(10.0) | LENGTH)}
-        return data | {"blocks": {"b": {"depth": 1, "material": "stone", **block}}, "bodies": [body]}
-    return data | {"blocks": {"b": {"depth": 1, "material": "stone"}}, "structures": [{"block": "b", **draw(SHAPED)}]}
+        return data | {
+            "blocks": {"b": {**block, "outline": draw(OUTLINE)}},
+            "bodies": [{"block": "b", "x": 0, "y": 10}],
+        }
+    region = {"kind": "voronoi", "count": draw(st.integers(1, 40)), "region": draw(OUTLINE)}
+    cells = {"kind": "polygons", "cells": [{"outline": draw(OUTLINE)} for _ in range(draw(st.integers(0, 3)))]}
+    return data | {"blocks": {"b": block}, "structures": [{"block": "b", **draw(st.sampled_from([region, cells]))}]}
 
 
 def _without_none(value: Any) -> Any:

@@ -110,27 +110,6 @@ def usual(child: Child, folder: Path) -> dict[tuple[str, ...], float]:
     return {command: left.seconds for command, left in lefts.items()}
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        (b",friction.block_block.static,", b",nan,", "no column friction.block_block.static"),
-        (b"\n000000000000,0.2,", b"\n000000000000,nan,", "holds values that are not numbers"),
-        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,1e308,", "too far to be drawn"),
-        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,sixteen,", "not a number"),
-        (b",1.rotation_deg,", b",turned,", "no column 1.rotation_deg"),
-        (b"at rest,0.5,True,16.0,", b"at rest,0.5,True,,", "has finished, but its row lacks positions"),
-    ],
-)
-def test_tables_that_do_not_go_with_their_plan_are_not_drawn(  # found by the damage below
-    child: Child, folder: Path, usual: object, old: bytes, new: bytes, told: str
-) -> None:
-    assert usual
-    (folder / "sweep" / "sweep.csv").write_bytes(_table().replace(old, new, 1))
-    left = child.call(folder, "plot", "sweep", "--out", "sweep.png")
-    assert_harmless(left, {65}, 1.0)
-    assert told in left.err
-
-
 @tries(200)
 def test_damaged_tables_of_sweeps_do_no_harm(
     child: Child, folder: Path, usual: dict[tuple[str, ...], float], tried: int
