@@ -1,18 +1,18 @@
-"""Measured tables: the numbers printed in the paper, and what a person reads when a table is broken."""
+"""Measured tables and tables of properties: the numbers that the paper prints, and what is said of broken ones."""
 
 from decimal import ROUND_HALF_UP, Decimal
+from math import radians
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.analysis.experiment import ExperimentTable, load_properties, load_table
 from blocksim.errors import InvalidInputError
-from tests.analysis.broken import Mistake, rendered, written
+from tests.golden import Golden, read
 
 EXPERIMENTS = Path(__file__).parents[2] / "scenarios" / "experiments"
 HEADER = "block,quantity,unit,replicate,value\n"
-HUNDREDTH = Decimal("0.01")
 
 
 @pytest.fixture(name="centres", scope="module")
@@ -25,46 +25,34 @@ def fixture_edges() -> ExperimentTable:
     return load_table(EXPERIMENTS / "three_blocks_edges.csv")
 
 
+def written(folder: Path, text: str) -> Path:
+    path = folder / "table.csv"
+    path.write_bytes(text.encode())
+    return path
+
+
 def mean_of(table: ExperimentTable, block: str, quantity: str) -> float:
     rows = table.statistics().set_index(["block", "quantity"])["mean"].to_dict()
     return float(rows[block, quantity])
 
 
-def midpoints(edges: ExperimentTable, block: str) -> list[Decimal]:
-    """Return the midpoints of the edges as a person with pencil and paper gets them."""
-    pairs = zip(edges.values(block, "left"), edges.values(block, "right"), strict=True)
-    sums = [Decimal(str(left)) + Decimal(str(right)) for left, right in pairs]
-    return [(total / 2).quantize(HUNDREDTH, ROUND_HALF_UP) for total in sums]
-
-
-@pytest.mark.parametrize(("block", "printed"), [("1", 16.0), ("2", 74.41), ("3", 131.33)])
-def test_centres_average_to_what_table_3_prints(centres: ExperimentTable, block: str, printed: float) -> None:
-    assert mean_of(centres, block, "x") == pytest.approx(printed, abs=0.005)
-
-
-@pytest.mark.parametrize(
-    ("block", "quantity", "printed"),
-    [
-        ("1", "left", 0.0),
-        ("2", "left", 49.01),
-        ("3", "left", 111.15),
-        ("1", "right", 32.0),
-        ("2", "right", 99.8),
-        ("3", "right", 151.51),
-    ],
-)
-def test_edges_average_to_what_table_2_prints(
-    edges: ExperimentTable, block: str, quantity: str, printed: float
+def test_centres_and_edges_average_to_what_tables_2_and_3_print(
+    centres: ExperimentTable, edges: ExperimentTable
 ) -> None:
-    assert mean_of(edges, block, quantity) == pytest.approx(printed, abs=0.005 + 1e-9)  # 151.505 became 151.51
+    assert [mean_of(centres, block, "x") for block in "123"] == pytest.approx([16.0, 74.41, 131.33], abs=0.005)
+    slack = 0.005 + 1e-9  # 151.505 became 151.51
+    assert [mean_of(edges, block, "left") for block in "123"] == pytest.approx([0.0, 49.01, 111.15], abs=slack)
+    assert [mean_of(edges, block, "right") for block in "123"] == pytest.approx([32.0, 99.8, 151.51], abs=slack)
 
 
 @pytest.mark.parametrize("block", ["1", "2", "3"])
 def test_every_centre_is_the_midpoint_of_its_edges_rounded_half_up(
     centres: ExperimentTable, edges: ExperimentTable, block: str
 ) -> None:
+    pairs = zip(edges.values(block, "left"), edges.values(block, "right"), strict=True)
+    middles = [(Decimal(str(left)) + Decimal(str(right))) / 2 for left, right in pairs]
     printed = [Decimal(str(value)) for value in centres.values(block, "x")]
-    assert printed == midpoints(edges, block)
+    assert printed == [middle.quantize(Decimal("0.01"), ROUND_HALF_UP) for middle in middles]
 
 
 def test_statistics_of_the_paper_match_numpy_and_the_design(centres: ExperimentTable) -> None:
@@ -111,74 +99,30 @@ def test_a_repeat_without_a_value_is_left_out_and_told(tmp_path: Path, cell: str
     assert [row.n for row in table.summaries()] == [2, 1]  # a row that is absent is no mistake
 
 
-def test_blocks_that_a_run_lacks_are_shown_where_they_are_first_named(tmp_path: Path) -> None:
-    rows = "# source\n1,x,mm,1,3\nleft,x,mm,1,4\n9,x,mm,1,4\n9,x,mm,2,4\n"
-    table = load_table(written(tmp_path, HEADER + rows))
-    with pytest.raises(InvalidInputError) as caught:
-        table.refuse_unknown(("1", "2"), "the run")
-    path = tmp_path / "table.csv"
-    assert str(caught.value) == (
-        f"{path}:4: block: the table measures block 'left', but the run has only '1', '2'\n"
-        "    4 | left,x,mm,1,4\n"
-        "      | ^^^^\n"
-        f"{path}:5: block: the table measures block '9', but the run has only '1', '2'\n"
-        "    5 | 9,x,mm,1,4\n"
-        "      | ^"
+def test_table_1_and_the_sizes_arrive_in_si() -> None:
+    assert dict(load_properties(EXPERIMENTS / "three_blocks_properties.csv").values) == pytest.approx(
+        {
+            "width": 0.032,
+            "height": 0.025,
+            "length": 0.050,
+            "overlap": 0.010,
+            "unit_weight": 26.7e3,
+            "young_modulus": 69e9,
+            "poisson_ratio": 0.3,
+            "friction_block_block": 0.31,
+            "friction_block_ground": 0.38,
+            "ground_friction_angle": radians(21),
+        },
+        rel=1e-14,
     )
 
 
-NO_NUMBER = "is not a number, write it as 71.69 or 7.169e1"
-NO_REPEAT = "is not a repeat number; count repeats as 1, 2, 3, ..."
-QUANTITIES = "allowed: x, y, rotation, left, right"
-LENGTH, ANGLE = "is not the unit of a length; write mm, cm or m", "is not the unit of an angle; write deg or rad"
-BROKEN: dict[str, tuple[str, *tuple[Mistake, ...]]] = {
-    "unit of another kind": ("1,x,kg,1,16", (2, "unit", f"'kg' {LENGTH}", "kg")),
-    "unit that does not exist": ("1,x,millimetrs,1,16", (2, "unit", f"'millimetrs' {LENGTH}", "millimetrs")),
-    "no unit": ("1,rotation,,1,16", (2, "unit", "no unit; write deg or rad", ",1,16")),
-    "pure number as an angle": ("1,rotation,1,2,16", (2, "unit", f"'1' {ANGLE}", "1,2")),
-    "unit with a tower of powers": ("1,x,mm**9**9**9,1,16", (2, "unit", f"'mm**9**9**9' {LENGTH}", "mm**9**9**9")),
-    "word for a number": ("1,x,mm,1,about 16", (2, "value", f"'about 16' {NO_NUMBER}", "about 16")),
-    "no value in any repeat": (
-        "1,x,mm,1,nan\n1,x,mm,2,\n2,x,mm,1,3",
-        (2, "value", "block '1', x has no value in any replicate", "nan"),
-    ),
-    "dash for a missing value": ("1,x,mm,1,-", (2, "value", f"'-' {NO_NUMBER}", "-")),
-    "missing value given twice": (
-        "1,x,mm,1,3\n1,x,mm,1,",
-        (3, "replicate", "block '1', x, replicate 1 is already given in line 2", "1"),
-    ),
-    "infinite after reading": ("1,x,mm,1,1e999", (2, "value", "'1e999' is too large", "1e999")),
-    "too far away": ("1,x,m,1,1e7", (2, "value", "'1e7' is too large, at most 1e+09 mm or degrees", "1e7")),
-    "mistyped quantity": (
-        "1,rotaton,deg,1,16",
-        (2, "quantity", "unknown quantity 'rotaton', did you mean 'rotation'?", "rotaton"),
-    ),
-    "foreign quantity": ("1,mass,kg,1,16", (2, "quantity", f"unknown quantity 'mass', {QUANTITIES}", "mass")),
-    "repeat is no number": ("1,x,mm,first,16", (2, "replicate", f"'first' {NO_REPEAT}", "first")),
-    "repeat zero": ("1,x,mm,0,16", (2, "replicate", f"'0' {NO_REPEAT}", "0")),
-    "nameless block": (" ,x,mm,1,16", (2, "block", "the block has no name", ",x")),
-    "long name": ("b" * 101 + ",x,mm,1,16", (2, "block", "the name has 101 characters, at most 100", "b" * 101)),
-    "no rows": ("", (1, "", "the table has a header and no rows", HEADER.strip())),
-    "measured twice": (
-        "1,x,mm,1,16\n2,x,mm,1,70\n1,x,cm,1,17",
-        (4, "replicate", "block '1', x, replicate 1 is already given in line 2", "1,17"),
-    ),
-    "several mistakes, by line": (
-        "1,x,mm,1,a\n1,z,mm,2,b\n1,x,mm",
-        (2, "value", f"'a' {NO_NUMBER}", "a"),
-        (3, "quantity", f"unknown quantity 'z', {QUANTITIES}", "z"),
-        (3, "value", f"'b' {NO_NUMBER}", "b"),
-        (4, "", "3 cells where the header has 5 columns", "1,x,mm"),
-    ),
-}
-
-
-@pytest.mark.parametrize(("rows", "mistakes"), [(rows, told) for rows, *told in BROKEN.values()], ids=BROKEN.keys())
-def test_a_broken_table_is_explained_where_it_is_broken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows: str, mistakes: list[Mistake]
+def test_broken_tables_are_explained_where_they_are_broken(
+    golden: Golden, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    written(tmp_path, HEADER + rows)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InvalidInputError) as caught:
-        load_table("table.csv")
-    assert str(caught.value) == rendered(HEADER + rows, mistakes)
+    for name, text in read(Path(__file__).with_name("broken.txt")).items():
+        load = load_properties if text.startswith("property") else load_table
+        with pytest.raises(InvalidInputError) as caught:
+            load(written(tmp_path, text + "\n").name)
+        golden(str(caught.value), name)
