@@ -39,7 +39,7 @@ BRICK: dict[str, Any] = {"width": 0.2, "height": 0.1, "length": 0.1, "material":
 Overrides = Mapping[str, object] | Sequence[str]
 Refusal = Callable[..., tuple[int, str]]
 Edit = str | tuple[str, str]  # a whole scenario, what is added to the valid one, or a piece of it and what replaces it
-Refused = Callable[[Edit], None]
+Refused = Callable[..., None]
 
 
 def data_of(**tables: object) -> dict[str, Any]:
@@ -75,20 +75,21 @@ def refusal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Refusal:
     return load
 
 
-def edited(edit: Edit) -> str:
-    """Return the valid scenario with an edit."""
+def edited(edit: Edit, valid: str = VALID) -> str:
+    """Return a valid scenario with an edit."""
     if isinstance(edit, str):
-        return f"{edit}\n" if edit.startswith("schema = ") else f"{VALID}\n{edit}\n"
-    assert VALID.count(edit[0]) == 1
-    return VALID.replace(*edit)
+        return f"{edit}\n" if edit.startswith("schema = ") else f"{valid.rstrip()}\n\n{edit}\n"
+    valid = f"{valid.rstrip()}\n"
+    assert valid.count(edit[0]) == 1
+    return valid.replace(*edit)
 
 
 @pytest.fixture
 def refused(refusal: Refusal, golden: Golden) -> Refused:
-    """Load the valid scenario with an edit: it must be refused with the message of the golden file and exit code 65."""
+    """Load a valid scenario with an edit: it must be refused with the message of the golden file and exit code 65."""
 
-    def check(edit: Edit) -> None:
-        code, message = refusal(edited(edit))
+    def check(edit: Edit, valid: str = VALID) -> None:
+        code, message = refusal(edited(edit, valid))
         assert code == 65
         golden(message)
 

@@ -1,8 +1,8 @@
 """Broken scenarios: each is refused with a located message, which stands in golden/broken.txt.
 
-A section of broken/*.txt is what is added to the valid scenario, or lines that it loses (-) and gets in place (+). In
-broken/structures.txt it is what stands in place of the structure. In broken/files/NAME.txt the first is the scenario,
-the others what stands in the file NAME.
+A section of broken/*.txt is what is added to a valid scenario, the first section or that of conftest.py, or lines that
+it loses (-) and gets in place (+). In broken/structures.txt it is what stands in place of the structure. In
+broken/files/NAME.txt the first is the scenario, the others what stands in the file NAME.
 """
 
 from pathlib import Path
@@ -10,19 +10,21 @@ from pathlib import Path
 import pytest
 
 from tests.golden import parsed
-from tests.scenario.conftest import Edit, Refused
+from tests.scenario.conftest import VALID, Edit, Refused
 
 STACK = 'kind = "stack"\nblock = "brick"\ncount = 3\n'
 WIDTH = 'width = "40 mm"'
 
 
-def edits() -> dict[str, Edit]:
-    """Return what is done to the valid scenario, by subject and name."""
-    return {
-        f"{file.stem}: {name}": read(text) if file.stem != "structures" else (STACK, f"{text}\n")
-        for file in sorted(Path(__file__).parent.glob("broken/*.txt"))
-        for name, text in parsed(file.read_text()).items()
-    }
+def edits() -> dict[str, tuple[Edit, str]]:
+    """Return what is done to which valid scenario, by subject and name."""
+    found: dict[str, tuple[Edit, str]] = {}
+    for file in sorted(Path(__file__).parent.glob("broken/*.txt")):
+        sections = parsed(file.read_text())
+        valid = sections.pop("scenario", VALID)
+        for name, text in sections.items():
+            found[f"{file.stem}: {name}"] = (STACK, f"{text}\n") if file.stem == "structures" else read(text), valid
+    return found
 
 
 def read(text: str) -> Edit:
@@ -36,9 +38,9 @@ def read(text: str) -> Edit:
 EDITS = edits()
 
 
-@pytest.mark.parametrize("edit", EDITS.values(), ids=EDITS)
-def test_scenarios(refused: Refused, edit: Edit) -> None:
-    refused(edit)
+@pytest.mark.parametrize(("edit", "valid"), EDITS.values(), ids=EDITS)
+def test_scenarios(refused: Refused, edit: Edit, valid: str) -> None:
+    refused(edit, valid)
 
 
 ODD = {

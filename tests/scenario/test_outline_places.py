@@ -65,21 +65,6 @@ def test_a_wall_may_pass_by_the_slanted_side() -> None:
     assert "body 1 and walls.0 overlap" in message
 
 
-@pytest.mark.parametrize(
-    ("load", "key"),
-    [
-        ({"kind": "force", "point": [0.15, 0.15]}, "point"),
-        ({"kind": "pressure", "face": 4}, "face"),
-        ({"kind": "pressure", "face": "225 deg"}, "face"),  # between two of them
-    ],
-)
-def test_loads_beside_an_outline_are_refused(load: dict[str, Any], key: str) -> None:
-    body = {"block": "wedge", "x": 0.1, "y": 0.1}
-    ((path, message),) = told([body], loads=[{"body": "1", "magnitude": 1, **load}])
-    assert path == ("loads", 0, key)
-    assert key == "point" or "its faces have the numbers 1 to 3" in message
-
-
 def test_loads_on_an_outline_are_accepted() -> None:
     body = {"block": "wedge", "x": 0.1, "y": 0.1}
     force = {"kind": "force", "body": "1", "magnitude": 1, "point": [0.05, 0.05]}

@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from blocksim.errors import ScenarioError
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import Document, scenario_hash, scenario_to_toml
 from blocksim.scenario.models.contact import Contact, PairFriction, Restitution
@@ -87,27 +86,6 @@ def test_kinetic_is_the_ratio_times_static_unless_set_last(
     document: Document, values: dict[str, object], kinetic: float
 ) -> None:
     assert friction(document, values).kinetic == pytest.approx(kinetic)
-
-
-@pytest.mark.parametrize(
-    ("value", "told"),
-    [
-        ({"static": 0.5, "kinetic": 0.4, "kinetic_ratio": 0.8}, "kinetic and kinetic_ratio mean the same"),
-        ({"static": 0.5, "kinetic_ratio": 0}, "0 is too small; a plain number above 0 and at most 1 is needed"),
-        ({"static": 0.5, "kinetic_ratio": 1.1}, "1.1 is too large"),
-        ({"static": 0.5, "kinetic_ratio": "3 deg"}, "is an angle; a plain number"),
-        ({"static": 0.5, "kinetic_rato": 0.5}, "unknown key, did you mean 'kinetic_ratio'?"),
-    ],
-)
-def test_impossible_ratios_are_refused(document: Document, value: object, told: str) -> None:
-    with pytest.raises(ScenarioError, match=told):
-        friction(document, {SIDE: value})
-
-
-def test_ratio_and_kinetic_friction_are_not_varied_together(document: Document) -> None:
-    sweep = {"mode": "list", f"{SIDE}.kinetic": [0.1], f"{SIDE}.kinetic_ratio": [0.5]}
-    with pytest.raises(ScenarioError, match=f"{SIDE}.kinetic, which means the same, is varied too"):
-        document.with_values({"sweep": sweep}).build()
 
 
 def test_a_resolved_ratio_is_the_same_scenario_and_the_same_run_as_its_value(document: Document) -> None:

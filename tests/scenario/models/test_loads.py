@@ -33,52 +33,6 @@ def scenario(*loads: dict[str, Any], folder: Path | None = None) -> Scenario:
 
 
 FORCE: dict[str, Any] = {"kind": "force", "body": "1", "magnitude": "2 kN"}
-WATER: dict[str, Any] = {"kind": "pressure", "body": "1", "face": "left", "water_level": 1}
-REFUSED: dict[str, tuple[dict[str, Any], str]] = {
-    "unknown body": ({**FORCE, "body": "9"}, 'loads.0.body: unknown body "9"'),
-    "fixed body": ({**FORCE, "body": "2"}, 'loads.0.body: body "2" is fixed; a load has no effect on it'),
-    "wrong unit": ({**FORCE, "magnitude": "2 kN m"}, 'loads.0.magnitude: "2 kN m" is a moment; a force'),
-    "point outside": ({**FORCE, "point": [0.6, 0]}, "loads.0.point: the point lies outside"),
-    "covered by the ground": ({**WATER, "face": "bottom"}, "loads.0.face: .* covered by the ground"),
-    "covered by a body": ({**WATER, "face": "right"}, 'loads.0.face: .* covered by body "2"'),
-    "negative level": ({**WATER, "water_level": -1}, "loads.0.water_level: -1 is too small"),
-    "no pressure": ({"kind": "pressure", "body": "1", "face": "left"}, "loads.0: the pressure is missing"),
-    "two pressures": ({**WATER, "magnitude": 5}, "loads.0.water_level: .* both given"),
-    "unknown kind": ({**FORCE, "kind": "forse"}, "loads.0.kind: unknown load kind \"forse\"; did you mean 'force'"),
-    "unknown history": ({**FORCE, "history": {"kind": "rmp"}}, "loads.0.history.kind: unknown history kind"),
-    "ramp of no length": (
-        {**FORCE, "history": {"kind": "ramp", "start": 1, "end": 1}},
-        "loads.0.history.end: a ramp that begins at 1 s cannot end at 1 s",
-    ),
-    "times that go back": (
-        {**FORCE, "history": {"kind": "steps", "times": [1, 0.5], "factors": [1, 2]}},
-        "loads.0.history.times.1: 0.5 s comes after 1 s",
-    ),
-    "a factor too few": (
-        {**FORCE, "history": {"kind": "table", "times": [0, 1], "factors": [1]}},
-        "loads.0.history.factors: 1 factors for 2 times",
-    ),
-    "no rate": ({"kind": "gravity", "to": "5 deg"}, "loads.0: rate is missing"),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_loads_that_cannot_be_are_refused_with_their_place(case: str) -> None:
-    load, message = REFUSED[case]
-    with pytest.raises(ScenarioError, match=message):
-        scenario(load)
-
-
-def test_pressure_on_a_face_below_another_body_is_refused() -> None:
-    above = [{"block": "cube", "x": 0, "y": 0.5}, {"block": "cube", "x": 0.2, "y": 1.5}]
-    with pytest.raises(ScenarioError, match=r'loads\.0\.face: .* covered by body "2"'):
-        scenario_from_mapping(data_with({**WATER, "face": "top", "water_level": 2}, bodies=above))
-
-
-def test_two_loads_that_turn_gravity_are_refused() -> None:
-    turn = {"kind": "gravity", "to": "5 deg", "rate": "1 deg/s"}
-    with pytest.raises(ScenarioError, match=r"loads\.1: gravity turns already"):
-        scenario(turn, turn)
 
 
 def test_a_table_is_read_and_the_resolved_scenario_needs_it_no_more(tmp_path: Path) -> None:
