@@ -26,7 +26,6 @@ from tests.simulation.conftest import SCENARIOS
 from tests.simulation.sliding import sliding
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from blocksim.scenario import Scenario
@@ -181,15 +180,6 @@ def test_what_failed_is_named_and_runs_that_did_not_fail_keep_their_words() -> N
     assert diagnose(BY_CODE[NOT_FINITE], NOT_FINITE, scene, placed).reason.endswith("(block above, step 0)")
 
 
-@pytest.fixture
-def handler(request: pytest.FixtureRequest) -> Iterator[signal.Signals]:
-    """Let a signal be dealt with by somebody else."""
-    number, own = request.param
-    before = signal.signal(number, own)
-    yield number
-    signal.signal(number, before)
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1])
 def test_signal_becomes_a_request_and_the_handler_comes_back(number: signal.Signals) -> None:
     before = signal.getsignal(number)
@@ -216,18 +206,17 @@ def test_limit_of_wall_time_is_a_reason_to_stop_once_it_is_over() -> None:
     assert WallTime(60.0, 61.0).reason() == "wall-time limit of 60 s reached"
 
 
-@pytest.mark.parametrize(
-    "handler",
-    [(signal.SIGINT, lambda *_: None), (signal.SIGHUP, signal.SIG_IGN)],  # a nohup wants that one ignored
-    ids=["own handler", "nohup"],
-    indirect=True,
-)
-def test_signals_of_which_somebody_else_takes_care_are_left_alone(handler: signal.Signals) -> None:
-    own = signal.getsignal(handler)
-    with stop_requests() as is_stopped:
-        os.kill(os.getpid(), handler)
-        assert not is_stopped()
-        assert signal.getsignal(handler) is own
+@pytest.mark.parametrize(("number", "own"), [(signal.SIGINT, lambda *_: None), (signal.SIGHUP, signal.SIG_IGN)])
+def test_signals_of_which_somebody_else_takes_care_are_left_alone(number: signal.Signals, own: Any) -> None:
+    """A program that has blocksim in it, and nohup, which wants a lost connection to be ignored."""
+    before = signal.signal(number, own)
+    try:
+        with stop_requests() as is_stopped:
+            os.kill(os.getpid(), number)
+            assert not is_stopped()
+            assert signal.getsignal(number) is own
+    finally:
+        signal.signal(number, before)
 
 
 def test_runs_in_other_threads_leave_signals_alone() -> None:
