@@ -1,50 +1,11 @@
 """blocksim verify: the table on a screen, for programs, and its exit code."""
 
-import json
-
 import pytest
 
 from blocksim.verification import cases
 from blocksim.verification.case import Case, Row, Setting
 from tests.cli.conftest import Command
 from tests.golden import Golden
-
-KEYS = {
-    "case",
-    "title",
-    "source",
-    "model",
-    "law",
-    "scheme",
-    "shortened",
-    "quantity",
-    "unit",
-    "expected",
-    "measured",
-    "error",
-}
-
-
-def test_table_fits_80_columns_and_says_that_all_is_inside(blocksim: Command) -> None:
-    answer = blocksim("verify", "v5", "V2")
-    assert answer.code == 0
-    lines = answer.out.splitlines()
-    assert lines[0].split() == ["quantity", "expected", "measured", "error", "tolerance", "verdict"]
-    assert [line[:2] for line in lines[2:]] == ["V2", "  ", "V5", "  ", "  ", "  ", "  "]
-    assert all(line.endswith("inside" if line.startswith(" ") else " s") for line in lines[2:])
-    assert "…" not in answer.out
-    assert max(map(len, lines)) <= 80
-    assert "2 of 2 cases inside" in answer.err
-
-
-def test_json_has_every_number_unrounded(blocksim: Command) -> None:
-    answer = blocksim("verify", "V2", "--law", "hertz-mindlin", "--json")
-    (row,) = json.loads(answer.out)
-    assert answer.err == ""
-    assert set(row) >= KEYS | {"tolerance", "tolerance_kind", "verdict", "seconds", "remark"}
-    assert (row["law"], row["tolerance_kind"], row["verdict"]) == ("hertz-mindlin", "relative", "inside")
-    assert row["expected"] == pytest.approx(481.449, rel=1e-6)
-    assert row["measured"] == pytest.approx(row["expected"], rel=1e-3)
 
 
 def missed(_: Setting) -> list[Row]:
@@ -75,12 +36,7 @@ def test_misses_shortened_cases_and_a_stop_are_told(
     golden(f"exit code {answer.code}\n{answer.out}{answer.err}", rules=["times"])
 
 
-def test_rigid_contacts_say_that_they_are_and_what_is_left_out(
-    blocksim: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (row, *_) = json.loads(blocksim("verify", "V5", "--scheme", "nonsmooth", "--json").out)
-    assert (row["scheme"], row["verdict"]) == ("nonsmooth", "inside")
-    assert row["measured"] == pytest.approx(row["expected"], rel=1e-12)
+def test_rigid_contacts_say_what_is_left_out(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     few = tuple(case for case in cases.CASES if case.id in {"V2", "V5"})
     monkeypatch.setattr(cases, "CASES", few)
     answer = blocksim("verify", "--scheme", "nonsmooth")

@@ -1,0 +1,125 @@
+"""Pictures of a run: what their golden texts cannot tell, panels, windows and names."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario.geometry import holds, least_width, regular
+from blocksim.simulation.trajectory import Frames, final_columns
+from blocksim.view import strip
+from blocksim.view.final import draw_final
+from blocksim.view.history import draw_history
+from blocksim.view.paints import by_block, by_speed, by_turn
+from blocksim.view.run_data import Extent, Support, extent_of
+from blocksim.view.scene import Canvas, PictureOptions, Scene, draw_scene, readable_scale, upper_sides
+from blocksim.view.strip import Lines, arrangement, plan
+from blocksim.view.style import OWN, open_figure
+from tests.golden import Golden
+from tests.view.made_up import blocks_at, boxes_of, polygons, stacked, toppling
+
+
+def test_rotation_of_what_turned_while_settling_is_that_of_the_table(caught: list[Figure]) -> None:
+    frames = stacked(1)
+    frames.angle[:] = np.radians(1.24)  # from the first frame on, which is after settling
+    (rotation,) = final_columns(frames)["rotation_deg"]
+    draw_final(frames, "final.png")
+    draw_history(frames, "history.png", PictureOptions(panels=("rotation",)))
+    assert f"{rotation:.2f}°" == "1.24°" in [text for text, _ in boxes_of(caught[0])]
+    (curve,) = (line for axes in caught[1].axes for line in axes.lines if np.size(line.get_xdata()) == len(frames))
+    assert np.asarray(curve.get_ydata())[-1] == pytest.approx(rotation)
+    scale = by_turn(frames).scale
+    assert scale is not None
+    assert scale.high == pytest.approx(rotation)
+
+
+def test_long_runs_are_thinned_and_many_grey_lines_stored_as_an_image(tmp_path: Path) -> None:
+    draw_history(toppling(200, steps=3000), tmp_path / "history.svg")
+    assert (tmp_path / "history.svg").stat().st_size < 2_000_000
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        PictureOptions(panels=("speeed",)),
+        PictureOptions(blocks=("9",)),
+        PictureOptions(panels=("force",)),
+        PictureOptions(paint=by_speed(toppling(3))),
+    ],
+    ids=["panel", "block", "contacts", "speed"],
+)
+def test_what_a_run_does_not_have_or_lines_cannot_show_is_refused(golden: Golden, options: PictureOptions) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        draw_history(toppling(3), "history.png", options)
+    golden(str(caught.value))
+
+
+@pytest.mark.parametrize(
+    ("extent", "readable", "expected"),
+    [
+        (Extent(0, 160, 0, 150), 0.0, (4, 8)),
+        (Extent(0, 500, 0, 100), 0.0, (2, 8)),
+        (Extent(0, 900, 0, 50), 0.0, (1, 6)),
+        (Extent(0, 800, 0, 400), 0.3, (2, 8)),  # names need larger panels
+        (Extent(0, 800, 0, 400), 0.1, (4, 8)),  # readable as it is
+        (Extent(0, 800, 0, 400), 5.0, (4, 8)),  # not readable either way
+        (Extent(0, 400, 0, 400), 0.5, (4, 8)),
+    ],
+)
+def test_long_scenes_and_small_names_get_fewer_columns(
+    extent: Extent, readable: float, expected: tuple[int, int]
+) -> None:
+    assert arrangement(extent, readable=readable) == expected
+
+
+def test_tilted_panels_have_room_for_the_numbers_along_the_ground() -> None:
+    level, tilted = (plan(OWN, Extent(0, 400, 0, 300, tilt=tilt), 4, 8, Lines(measured_rows=1)) for tilt in (0.0, 0.3))
+    below = [one.panel[1] * 72 - (300 - one.extent.lowest) * one.points_per_mm for one in (level, tilted)]
+    assert below[1] - below[0] > 12.0
+
+
+def test_importing_the_room_does_not_load_matplotlib() -> None:
+    code = "import sys, blocksim.view; sys.exit('matplotlib' in sys.modules or 'pandas' in sys.modules)"
+    root = Path(strip.__file__).parents[2]
+    assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
+
+
+FRAMES = blocks_at([0.1, 0.2], [0.025, 0.016], [0.0, -np.pi / 2])
+
+
+WEDGE = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
+
+
+@pytest.mark.parametrize(
+    "shape", [WEDGE, regular(6, 0.03), regular(5, 0.03), ((-0.03, -0.01), (0.03, -0.01), (0, 0.02))]
+)
+def test_the_line_along_the_upper_side_is_within_the_polygon(shape: tuple[tuple[float, float], ...]) -> None:
+    (ends,) = upper_sides(polygons(blocks_at([0.0]), shape))
+    width = least_width(shape)
+    assert all(holds(shape, (float(x), float(y)), -0.069 * width) for x, y in ends)
+    assert np.hypot(*(ends[1] - ends[0])) > 0.2 * width
+
+
+def test_names_are_readable_from_the_scale_at_which_they_are_written() -> None:
+    scale = readable_scale(FRAMES)
+    assert name_at(1.01 * scale) == "1"
+    assert name_at(0.99 * scale) == ""
+
+
+def name_at(points_per_mm: float) -> str:
+    """Return what is written on the block of FRAMES at this scale."""
+    return "".join(text.get_text() for text in drawn(FRAMES, Support(), points_per_mm).axes.texts)
+
+
+def drawn(frames: Frames, support: Support, points_per_mm: float = 1.0) -> Canvas:
+    """Draw the last frame."""
+    frame = len(frames.time) - 1
+    extent = extent_of(frames, np.arange(frame + 1), support)
+    with open_figure(1.0, 1.0) as figure:
+        canvas = Canvas(figure.add_axes((0.0, 0.0, 1.0, 1.0)), extent, points_per_mm)
+        draw_scene(canvas, Scene(frames, support, by_block(frames)), frame)
+    return canvas
