@@ -6,6 +6,7 @@ from itertools import chain, islice, pairwise
 from operator import attrgetter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blocksim.scenario import events, geometry, laws, overlap, overrides, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
@@ -124,14 +125,40 @@ def soil_tables(scenario: Scenario) -> list[SoilTable]:
     return [table for table in scenario.systems.get("soils", ()) if isinstance(table, SoilTable)]
 
 
-def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
-    """Yield the key of an outline and what it meets: ground, walls, blocks, soils before it."""
-    found, corners = [*_boundaries(soil, scenario)], soil.corners
-    low, high = corners.min(axis=0), corners.max(axis=0)
+def particle_places(soil: SoilTable, scenario: Scenario) -> NDArray[np.float64]:
+    """Return where the particles of a soil are at the start (m, (n, 2)).
+
+    They fill its outline; what is poured in lies where no block is, or is above.
+    """
+    places = geometry.fill_lattice(soil.corners, soil.spacing)
+    if soil.kind != "fill":
+        return places
+    for _, corners in _blocks_in(soil, scenario):
+        near = np.flatnonzero(np.all(places > corners.min(axis=0) - (soil.spacing, math.inf), axis=1))
+        near = near[np.all(places[near] < corners.max(axis=0) + soil.spacing, axis=1)]
+        is_free = geometry.height_above(corners, places[near]) == 0.0
+        is_free &= geometry.edge_distance(places[near], corners) >= geometry.DISC_SHARE * soil.spacing
+        places = np.delete(places, near[~is_free], axis=0)
+    return places
+
+
+def _blocks_in(soil: SoilTable, scenario: Scenario) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """Yield the names and corners (m, (k, 2)) of blocks that are in the outline of a soil."""
+    low, high = soil.corners.min(axis=0), soil.corners.max(axis=0)
     for body in placement.place_bodies(scenario):
         is_near = bool(np.all(low - body.radius < (body.x, body.y)) and np.all((body.x, body.y) < high + body.radius))
-        if is_near and geometry.overlap(corners, np.array([body.ground_point(*corner) for corner in body.corners])):
-            found.append(f"block {body.name}")
+        corners = np.array([body.ground_point(*corner) for corner in body.corners])
+        if is_near and geometry.overlap(soil.corners, corners):
+            yield body.name, corners
+
+
+def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Yield the key of an outline and what it meets: ground, walls, blocks that it is not poured onto, other soils."""
+    found, corners = [*_boundaries(soil, scenario)], soil.corners
+    if soil.kind != "fill":
+        found += [f"block {name}" for name, _ in _blocks_in(soil, scenario)]
+    elif not len(particle_places(soil, scenario)):
+        found.append("blocks everywhere: no particle has room")
     for other in soil_tables(scenario):
         if other is soil:
             break

@@ -15,30 +15,37 @@ if TYPE_CHECKING:
 
     from blocksim.scenario.models.scenario import Scenario
 
-Kind = Literal["outline", "rectangle", "slope"]
+Kind = Literal["outline", "rectangle", "slope", "fill"]
 Start = Literal["geostatic", "ramp"]
 Gradient = Literal["raw", "corrected"]
 MOST_PARTICLES = 1_000_000
 LEAST_ACROSS = 4
 SPACINGS_A_SIDE = 8  # least number of spacings across the thinnest block
 MILLI = 1e3
-SHAPES: dict[str, tuple[str, ...]] = {"outline": ("outline",), "rectangle": ("x", "y"), "slope": ("x", "y", "angle")}
+SHAPES: dict[str, tuple[str, ...]] = {
+    "outline": ("outline",),
+    "rectangle": ("x", "y"),
+    "slope": ("x", "y", "angle"),
+    "fill": ("x", "y"),
+}
 """Keys that give the shape, by kind."""
 
 
 class SoilTable(SystemTable):
-    """A body of soil: an outline, a rectangle or a slope, filled with particles."""
+    """A body of soil: an outline, a rectangle, a slope or what is poured onto blocks, filled with particles."""
 
     declared_in = "blocksim.world.systems.soils:SOILS"
     name: Identifier = setting("name of the soil in tables")
     material: str = setting("the name of its material, which has a friction_angle")
     kind: Annotated[Kind, OneOf(get_args(Kind))] = setting(
-        "what is given of its shape: an outline, x and y of a rectangle, or these and the angle of a slope", "outline"
+        "what is given of its shape: an outline; x and y of a rectangle; these and the angle of a slope; x and y of a "
+        "fill, a rectangle poured in from above: without the blocks in it, and what is below them",
+        "outline",
     )
     outline: tuple[Point, ...] | None = setting(
         "corners [x, y] in order; where an edge is inclined, discs of a spacing stay inside", None
     )
-    x: Point | None = setting("where a rectangle, or the base of a slope, begins and ends", None)
+    x: Point | None = setting("where a rectangle, a fill, or the base of a slope, begins and ends", None)
     y: Point | None = setting("where it begins and ends above the ground", None)
     angle: q.SlopeAngle | None = setting(
         "rise of the face of a slope, from its foot at the left; above 90 deg from the right", None

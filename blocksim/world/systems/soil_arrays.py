@@ -9,7 +9,7 @@ from blocksim.kernels.common.arrays import INTERACTION, zeros
 from blocksim.kernels.common.systems import Stages
 from blocksim.kernels.soil import arrays, contact, energy, step
 from blocksim.kernels.sph.functions import WENDLAND_SUPPORT
-from blocksim.scenario import GROUND, Scenario, geometry, place_bodies, place_segments, start
+from blocksim.scenario import GROUND, Scenario, place_bodies, place_segments, start
 from blocksim.scenario.models.soil import SoilTable
 from blocksim.world import build, interactions
 from blocksim.world.systems import soils
@@ -27,7 +27,7 @@ FEW_TOUCHES = 128
 def build_soils(scenario: Scenario) -> arrays.Soils:
     """Return the arrays of the soils of a scenario at time zero."""
     tables = start.soil_tables(scenario)
-    places = [geometry.fill_lattice(table.corners, table.spacing) for table in tables]  # m, (n, 2)
+    places = [start.particle_places(table, scenario) for table in tables]  # m, (n, 2)
     initial = soils.elements_of(scenario).start
     n = initial.shape[1]
     points, states = zeros(n, arrays.POINT), zeros(n, arrays.STATE)

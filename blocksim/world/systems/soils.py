@@ -304,7 +304,7 @@ SHADES = (
 def elements_of(scenario: Scenario) -> system.Elements:
     """Return the particles of all soils of a scenario."""
     tables = start.soil_tables(scenario)
-    places = [geometry.fill_lattice(table.corners, table.spacing) for table in tables]  # m, (n, 2)
+    places = [start.particle_places(table, scenario) for table in tables]  # m, (n, 2)
     soils = [*zip(tables, places, strict=True)]
     names = tuple(f"{table.name}.{number}" for table, one in soils for number in range(1, len(one) + 1))
     depth = depth_of_scene(scenario)
