@@ -22,7 +22,9 @@ SWEEP = "sweep-"
 def templates() -> dict[str, Traversable]:
     """Return the templates by kind: the name of their file without its extension."""
     found = (files("blocksim.cli") / TEMPLATES).iterdir()
-    return {entry.name.partition(".")[0]: entry for entry in sorted(found, key=lambda entry: entry.name)}
+    return {
+        entry.name.partition(".")[0]: entry for entry in sorted(found, key=lambda entry: entry.name.partition(".")[0])
+    }
 
 
 def new_command(

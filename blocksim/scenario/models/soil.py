@@ -106,15 +106,16 @@ class SoilTable(SystemTable):
             yield "material", f"unknown material {q.toml(self.material)}, {hint}"
         elif scenario.materials[self.material].friction_angle is None:
             yield "material", f"{q.toml(self.material)} is no soil; give this material a friction_angle"
-        side = placement.smallest_width(placement.place_bodies(scenario))
+        thinnest = min(placement.place_bodies(scenario), key=lambda body: body.least_width, default=None)
         across = geometry.count_across(self.corners, self.spacing)
         first = scenario.systems["soils"][0]
         unfit = []
         if isinstance(first, SoilTable) and self.spacing != first.spacing:
             unfit.append(f"all soils have the same spacing, here {MILLI * first.spacing:.6g} mm")
-        if SPACINGS_A_SIDE * self.spacing > side * (1.0 + 1e-9):
-            most = MILLI * side / SPACINGS_A_SIDE
-            unfit.append(f"above an eighth of the smallest side of the blocks: at most {most:.4g} mm")
+        if thinnest and SPACINGS_A_SIDE * self.spacing > thinnest.least_width * (1.0 + 1e-9):
+            most = MILLI * thinnest.least_width / SPACINGS_A_SIDE
+            which = f"of the blocks, which body {thinnest.name} has"
+            unfit.append(f"above an eighth of the smallest side {which}: at most {most:.4g} mm")
         if min(across) < LEAST_ACROSS:
             unfit.append(f"only {min(across)} particles across; at least {LEAST_ACROSS} are needed")
         if across[0] * across[1] > MOST_PARTICLES:

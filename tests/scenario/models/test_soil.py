@@ -7,9 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blocksim.scenario import load_scenario, scenario_from_mapping, scenario_hash, scenario_to_toml
+from blocksim.errors import ScenarioError
+from blocksim.scenario import (
+    geometry,
+    load_scenario,
+    place_bodies,
+    scenario_from_mapping,
+    scenario_hash,
+    scenario_to_toml,
+    start,
+)
 from blocksim.scenario.models.soil import SoilTable
-from tests.soils import BLOCKS, MATERIALS, column, scene
+from tests.soils import BLOCKS, MATERIALS, column, data_of, scene
 
 OUTLINE = {"name": "heap", "material": "rods", "spacing": 0.005}
 CORNERS = [[0.2, 0.0], [0.3, 0.0], [0.2, 0.05]]
@@ -66,3 +75,32 @@ def test_a_scenario_with_soil_is_written_and_read_back(tmp_path: Path) -> None:
     assert isinstance(table, SoilTable)
     assert after == before
     assert BLOCKS["far"]["width"] == after.blocks["far"].width
+
+
+def arch_under(level: float) -> dict[str, Any]:
+    """Return the data of an arch with abutments under fill to a level (m)."""
+    fill = {"name": "fill", "material": "rods", "kind": "fill", "x": [-0.1, 1.5], "y": [0.0, level], "spacing": 0.01}
+    arch = {"kind": "arch", "block": "cell", "span": 1.0, "thickness": 0.12, "count": 9, "abutments": True}
+    blocks = {"cell": {"depth": 0.1, "material": "soft"}}
+    return data_of(fill, blocks=blocks, structures=[arch], bodies=[])
+
+
+def test_fill_lies_around_and_above_blocks_but_not_in_and_below_them() -> None:
+    scenario = scenario_from_mapping(arch_under(0.8))
+    (soil,) = start.soil_tables(scenario)
+    places, whole = start.particle_places(soil, scenario), geometry.fill_lattice(soil.corners, soil.spacing)
+    outlines = [np.array([body.ground_point(*at) for at in body.corners]) for body in place_bodies(scenario)]
+    apart = np.min([geometry.edge_distance(places, corners) for corners in outlines], axis=0)
+    assert apart.min() >= 0.4999 * soil.spacing
+    for corners in outlines:
+        assert not geometry.is_inside(places, corners).any()
+    covered = np.max([geometry.height_above(corners, whole) for corners in outlines], axis=0) > 0.0
+    near = np.min([geometry.edge_distance(whole, corners) for corners in outlines], axis=0) < 0.4999 * soil.spacing
+    assert len(places) == np.count_nonzero(~covered & ~near)
+
+
+def test_fill_without_room_for_a_particle_says_so() -> None:
+    data = arch_under(0.04)
+    data["soils"][0]["x"] = [0.0, 0.1]
+    with pytest.raises(ScenarioError, match="soil fill meets blocks everywhere: no particle has room"):
+        scenario_from_mapping(data)
