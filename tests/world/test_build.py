@@ -13,18 +13,17 @@ from blocksim.kernels.common.arrays import (
     ARRIVED,
     BODY as BODY_RECORD,
     CACHE_LINE,
-    CONTACT,
     GROUP,
     MEETINGS,
-    PARTICLE_CONTACT,
     STATUS,
     TEAM_SIZE,
     TEAM_WORDS,
     zeros,
 )
 from blocksim.kernels.explicit.energy import tallied
-from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
+from blocksim.scenario import Scenario, place_bodies
 from blocksim.scenario.laws import LINEAR
+from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world import memory
 from blocksim.world.bodies import layout_of
 from blocksim.world.build import (
@@ -33,7 +32,6 @@ from blocksim.world.build import (
     MOST_LARGE,
     build_world,
     cell_radius,
-    empty_lists,
     with_more_room,
     with_threads,
 )
@@ -46,43 +44,19 @@ if TYPE_CHECKING:
 
     from blocksim.kernels.common.arrays import Records
 
-W, H, D = 0.032, 0.025, 0.05
-BODY = {"block": "brick", "x": 0.1, "y": 0.2}
+W, H = WIDTH, HEIGHT
+BODY = {"x": 0.1, "y": 0.2}
 
 
-def scenario(
-    body: Mapping[str, object] | None = None, more: tuple[Mapping[str, object], ...] = (), **tables: Any
-) -> Scenario:
-    return scenario_from_mapping(
-        {
-            "schema": 1,
-            "name": "build",
-            "materials": {"aluminium": {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}},
-            "blocks": {"brick": {"width": W, "height": H, "length": D, "material": "aluminium"}},
-            "bodies": [{**BODY, **(body or {})}, *more],
-            **tables,
-        }
-    )
+def scenario(body: Mapping[str, object] | None = None, *more: Mapping[str, object], **tables: Any) -> Scenario:
+    return scenario_of([{**BODY, **(body or {})}, *more], **tables)
 
 
-def test_mass_and_inertia_are_those_of_the_solid() -> None:
-    body = build_world(scenario()).bodies[0]
-    assert body.mass == pytest.approx(0.10887, abs=5e-6)
-    assert body.inertia == pytest.approx(1.496e-5, abs=5e-9)
-    assert body.mass == pytest.approx(26.7e3 / 9.81 * W * H * D, rel=1e-12)
-    assert body.inertia == pytest.approx(body.mass * (W**2 + H**2) / 12.0, rel=1e-12)
-    assert body.inverse_mass * body.mass == pytest.approx(1.0)
-    assert body.inverse_inertia * body.inertia == pytest.approx(1.0)
-    assert [body.half_x, body.half_y, body.radius] == [W / 2, H / 2, pytest.approx(hypot(W, H) / 2)]
-
-
-def test_fixed_bodies_have_no_mass_and_move_with_the_support_as_the_ground_does() -> None:
-    world = build_world(scenario({"fixed": True}, more=({**BODY, "x": 0.5},)))
+def test_fixed_bodies_move_with_the_support_as_the_ground_does() -> None:
+    world = build_world(scenario({"fixed": True}, {**BODY, "x": 0.5}))
     fixed, free, ground = world.bodies
-    assert (fixed.mass, fixed.inertia, fixed.inverse_mass, fixed.inverse_inertia) == (0.0, 0.0, 0.0, 0.0)
     assert (fixed.is_moved, ground.is_moved, free.is_moved) == (1, 1, 0)
     assert (ground.inverse_mass, ground.inverse_inertia, ground.contact_class) == (0.0, 0.0, 0)
-    assert free.inverse_mass > 0.0
     assert [ground.x, ground.y, ground.cos, ground.sin] == [0.0, 0.0, 1.0, 0.0]
 
 
@@ -136,13 +110,6 @@ def test_automatic_step_resolves_the_oscillation_on_two_corners() -> None:
     assert 0.02 < frequency * world.controls[0].step < 0.1
 
 
-def test_smallest_body_decides_about_the_step() -> None:
-    small = {"brick": {"width": W, "height": H, "length": D, "material": "aluminium"}}
-    small["pebble"] = {**small["brick"], "width": 0.002, "height": 0.002}
-    both = scenario(more=({"block": "pebble", "x": 0.5, "y": 0.2},), blocks=small)
-    assert build_world(both).controls[0].step < 0.2 * build_world(scenario()).controls[0].step
-
-
 def test_step_above_the_admissible_one_is_refused_with_both_numbers() -> None:
     limit = float(build_world(scenario()).controls[0].step)
     with pytest.raises(StepError) as refusal:
@@ -188,7 +155,7 @@ def test_more_room_keeps_what_there_is(model: str) -> None:
 
 @pytest.mark.parametrize("more", [0, GROUP - 2, GROUP - 1, GROUP, 3 * GROUP])
 def test_every_group_of_bodies_has_a_tally_of_its_own_whatever_the_room_for_pairs(more: int) -> None:
-    world = build_world(scenario(more=tuple({**BODY, "x": 0.1 * i} for i in range(2, 2 + more))))
+    world = build_world(scenario(None, *({**BODY, "x": 0.1 * i} for i in range(2, 2 + more))))
     last = (world.bodies.size - 1) // GROUP
     assert world.ledger.size > last
     world.ledger.friction[last] = 11.0
@@ -220,19 +187,6 @@ def test_more_room_than_there_is_memory_is_refused(monkeypatch: pytest.MonkeyPat
         with_more_room(world)
 
 
-@pytest.mark.parametrize("kind", [CONTACT, PARTICLE_CONTACT])
-def test_empty_lists_hold_no_contact(kind: np.dtype[np.void]) -> None:
-    lists = empty_lists(5, 8, zeros(3, kind))
-    assert {name: lists[name].shape for name in ("contacts", "candidates", "operators")} == {
-        "contacts": (5, 3),
-        "candidates": (5, 8),
-        "operators": (5, 2),
-    }
-    assert lists["contacts"].dtype == kind
-    assert len(lists["pairs"]) == len(lists["near_pairs"]) == 5
-    assert not lists["pairs"].active.any()
-
-
 def radii(*values: float) -> Records:
     """Return bodies of these half diagonals, and a half-plane."""
     bodies = zeros(len(values) + 1, BODY_RECORD)
@@ -253,11 +207,9 @@ def test_few_bodies_that_are_much_larger_stay_out_of_the_grid() -> None:
 
 
 def test_what_is_large_is_listed_and_cells_are_as_wide_as_two_others_can_reach() -> None:
-    plank = {"plank": {"width": 3.2, "height": H, "length": D, "material": "aluminium"}}
-    brick = {"width": W, "height": H, "length": D, "material": "aluminium"}
-    bricks = tuple({**BODY, "x": 0.1 * i} for i in range(2, 10))
-    long = ({"block": "plank", "x": 0.0, "y": 1.0},)
-    world = build_world(scenario(more=bricks[:3] + long + bricks[3:], blocks={"brick": brick, **plank}))
+    bricks = [{**BODY, "x": 0.1 * i} for i in range(2, 10)]
+    plank = {"x": 0.0, "y": 1.0, "width": 3.2}
+    world = build_world(scenario(None, *bricks[:3], plank, *bricks[3:]))
     assert world.large.tolist() == [4]
     assert world.controls[0].cell_radius == pytest.approx(hypot(W, H) / 2)
     assert world.controls[0].cell_width == pytest.approx(hypot(W, H) + world.controls[0].skin)

@@ -1,6 +1,6 @@
 """The skin of the list of neighbours: by default, as given, and never so small that a contact is missed."""
 
-from math import sqrt
+from math import hypot, sqrt
 from typing import Any
 
 import pytest
@@ -8,35 +8,24 @@ import pytest
 from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import REACHED
 from blocksim.kernels.explicit.broad_phase import list_reach
-from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.verification.scene import Simulation
+from blocksim.scenario import Scenario
+from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.build import build_world
 from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.step import SkinTooSmallError
 
-W, H, D = 0.032, 0.025, 0.05
+H = HEIGHT
 FALL = 0.2  # m, from the highest point of a block to the ground
-BODY = {"block": "brick", "x": 0.1, "y": FALL - sqrt(W**2 + H**2) / 2}
+BODY = {"y": FALL - hypot(WIDTH, HEIGHT) / 2}
 SOFT = 1e-4  # of the stiffness
 
 
 def scenario(*more: dict[str, Any], contact: dict[str, Any] | None = None, **tables: Any) -> Scenario:
-    sides = {"length": D, "material": "aluminium"}
-    return scenario_from_mapping(
-        {
-            "schema": 1,
-            "name": "skin",
-            "materials": {"aluminium": {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}},
-            "blocks": {"brick": {"width": W, "height": H, **sides}, "plate": {"width": 0.3, "height": 0.01, **sides}},
-            "bodies": [BODY, *more],
-            "contact": {"stiffness_scale": SOFT, **(contact or {})},
-            **tables,
-        }
-    )
+    return scenario_of([BODY, *more], contact={"stiffness_scale": SOFT, **(contact or {})}, **tables)
 
 
 def test_by_default_the_skin_is_a_quarter_of_the_smallest_side_of_all_blocks() -> None:
-    plate = {"block": "plate", "x": 1.0, "y": 0.1, "fixed": True}
+    plate = {"width": 0.3, "height": 0.01, "x": 1.0, "y": 0.1, "fixed": True}
     assert build_world(scenario()).controls[0].skin == 0.25 * H
     assert build_world(scenario(plate)).controls[0].skin == 0.25 * 0.01
     walls = [{"from": [2, 0], "to": [2, 0.001]}]
@@ -72,7 +61,6 @@ def test_a_skin_that_blocks_can_outrun_is_refused_with_the_least_one() -> None:
 
 
 def test_a_skin_that_a_shaken_support_outruns_is_refused_and_the_least_one_runs_to_the_end() -> None:
-    """It was accepted, and the run ended with: a block moves too far in one step for its contacts to be found."""
     motion = {"kind": "harmonic", "amplitude": "0.2 m", "frequency": "10 Hz", "duration": "0.5 s"}
     with pytest.raises(SkinTooSmallError) as refusal:
         build_world(scenario(contact={"skin": 1e-3 * H}, motion=motion))
@@ -82,7 +70,6 @@ def test_a_skin_that_a_shaken_support_outruns_is_refused_and_the_least_one_runs_
 
 @pytest.mark.parametrize("share", [0.999, 1.001])
 def test_rigid_contacts_refuse_a_skin_with_which_impacts_are_found_late(share: float) -> None:
-    """It was accepted, and blocks came to rest elsewhere."""
     time = {"scheme": "nonsmooth"}
     step = build_nonsmooth(scenario(time=time)).world.controls[0].step
     least = 2.0 * sqrt(2 * 9.81 * FALL) * step
