@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import Document, Scenario, load_scenario, scenario_to_toml
+from blocksim.scenario import Document, load_scenario, scenario_to_toml
 from tests.golden import Golden
 
 
@@ -100,12 +100,6 @@ def test_setting_values_leaves_the_document_as_it_was(file: Path) -> None:
     changed = document.with_values({"structures.0.count": 9, "blocks.brick.width": 1})
     assert document.build() == before
     assert changed.build() != before
-
-
-def test_a_scenario_cannot_be_changed(file: Path) -> None:
-    scenario: Scenario = load_scenario(file)
-    with pytest.raises(ValueError, match="frozen"):
-        scenario.name = "other"  # type: ignore[misc]
 
 
 def test_the_experiment_table_is_found_beside_the_scenario(

@@ -41,28 +41,22 @@ def test_friction_angle_without_its_unit_is_warned_of(settings: dict[str, Any], 
         ({"materials.aluminium.young_modulus": 69}, ["materials.aluminium.young_modulus = 69 Pa"]),
         ({"blocks.brick.width": 600}, ["blocks.brick.width makes 600 m"]),
         ({"materials.aluminium.young_modulus": "0.1 MPa", "blocks.brick.width": "2 m"}, []),
+        ({"blocks.brick": {"outline": [[0, 0], [90, 0], [0, 120]], "depth": 1}}, ["blocks.brick.outline makes 150 m"]),
+        ({"blocks.brick": {"outline": [[0, 0], [1, 0], [0, 1]], "depth": 100}}, ["blocks.brick.depth makes 100 m"]),
+        ({"blocks.brick": {"sides": 6, "radius": 40, "depth": 1}}, ["blocks.brick.radius makes 80 m"]),
+        ({"blocks.brick": {"sides": 6, "radius": "0.1 m", "depth": "100 mm"}}, []),
     ],
 )
 def test_numbers_that_look_like_another_unit_are_warned_of(settings: dict[str, Any], expected: list[str]) -> None:
-    base = {"poisson_ratio": 0.3, "young_modulus": 69e9}
-    given = {key: {**base, **value} if isinstance(value, dict) else value for key, value in settings.items()}
-    found = implausible_values(Document.read(APART).with_values(given).build())
-    assert [text.removesuffix("; is the unit right?") for text in found] == expected
-
-
-@pytest.mark.parametrize(
-    ("shape", "expected"),
-    [
-        ({"outline": [[0, 0], [90, 0], [0, 120]], "depth": 1}, ["blocks.brick.outline makes 150 m"]),
-        ({"outline": [[0, 0], [1, 0], [0, 1]], "depth": 100}, ["blocks.brick.depth makes 100 m"]),
-        ({"sides": 6, "radius": 40, "depth": 1}, ["blocks.brick.radius makes 80 m"]),
-        ({"sides": 6, "radius": "0.1 m", "depth": "100 mm"}, []),
-    ],
-)
-def test_sizes_of_polygons_that_look_like_another_unit_are_warned_of(
-    shape: dict[str, object], expected: list[str]
-) -> None:
-    given = {"blocks.brick": {**shape, "material": "aluminium"}, "bodies.0.y": 500}
+    rest: dict[str, dict[str, Any]] = {
+        "materials": {"poisson_ratio": 0.3, "young_modulus": 69e9},
+        "blocks": {"material": "aluminium"},
+    }
+    given = {
+        key: {**rest[key.split(".")[0]], **value} if isinstance(value, dict) else value
+        for key, value in settings.items()
+    }
+    given["bodies.0.y"] = 500
     found = implausible_values(Document.read(APART).with_values(given).build())
     assert [text.removesuffix("; is the unit right?") for text in found] == expected
 
