@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.errors import InvalidInputError, StoppedEarlyError
+from blocksim.errors import StoppedEarlyError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.start import soil_tables
 from blocksim.study.converge import (
-    REFINEMENTS,
     ConvergenceVerdict,
     Coordinates,
     Refinement,
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.study.rows import Row
-    from tests.golden import Golden
 
 HALVED = Refinement("step", "time step", "time.safety", 0.05, 0.5, 1)
 
@@ -252,13 +250,6 @@ def test_interrupt_stops_the_study(slide: Scenario, tmp_path: Path) -> None:
         converge(slide, out=tmp_path, on_run=interrupt)
 
 
-@pytest.mark.parametrize("wrong", [{"tolerance_mm": 0.0}, {"tolerance_mm": float("nan")}, {"levels": 1}])
-def test_useless_limits_are_refused(slide: Scenario, tmp_path: Path, wrong: dict[str, float]) -> None:
-    with pytest.raises(InvalidInputError, match="levels 2 or more"):
-        converge(slide, out=tmp_path, **wrong)  # type: ignore[call-overload]
-    assert list(tmp_path.iterdir()) == []
-
-
 def rigid(name: str, **values: object) -> Scenario:
     """Return a shipped scenario with rigid contacts; double underscores in names stand for dots."""
     keys: dict[str, Any] = {key.replace("__", "."): value for key, value in values.items()}
@@ -276,17 +267,6 @@ def test_step_and_tolerance_of_rigid_contacts_are_refined_from_what_the_run_take
     step, tolerance = refinements_of(rigid("wall", time__step=5e-4))  # a crowd has a tolerance of its own
     assert (step.own, tolerance.own) == (5e-4, 0.1)
     assert refinements_of(rigid("three_blocks_nominal", time__step=6e-3))[0].coarser == 0  # 12 ms would be refused
-
-
-@pytest.mark.parametrize(
-    ("is_rigid", "studies"),
-    [(True, "stiffness spacing"), (True, "spacing"), (False, "tolerance"), (False, "spacing"), (False, "speed")],
-)
-def test_what_has_no_effect_is_not_studied(slide: Scenario, golden: Golden, is_rigid: bool, studies: str) -> None:
-    with pytest.raises(InvalidInputError) as caught:
-        refinements_of(rigid("slide") if is_rigid else slide, studies.split())
-    golden(str(caught.value))
-    assert {one.study for one in refinements_of(slide)} | {"spacing", "tolerance"} == set(REFINEMENTS)
 
 
 def test_slide_converges_in_the_square_of_the_step(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import pytest
 
-from blocksim.errors import InvalidInputError
 from blocksim.study.criterion import DEFAULT, Stability, read_criterion
 
 ROW = {"status": "finished", "reason": "at rest", "outcome": "slid", "displacement_mm": 4.9, "turn_deg": 30.0}
@@ -30,25 +29,6 @@ def test_conditions_are_judged_in_the_units_that_were_typed(text: str, stands: b
 
 def test_a_run_that_failed_neither_stands_nor_falls() -> None:
     assert read_criterion(DEFAULT).verdict({"status": "invalid"}) is Stability.FAILED
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("", 'write for example "moved < 5 mm"'),
-        ("moved < 5", "the unit is missing"),
-        ("moved < 5 deg", "a length is needed"),
-        ("moved < 5 furlong", "unknown unit 'furlong'"),
-        ("moved = 5 mm", "moved is compared with"),
-        ("movd < 5 mm", "did you mean 'moved'"),
-        ("outcome = falls", "unknown outcome 'falls'"),
-        ("outcome < fell", "an outcome is compared with = or !="),
-        ("moved < 5 mm,", 'write for example "moved < 5 mm"'),
-    ],
-)
-def test_what_is_no_condition_is_refused_with_what_may_be_written(text: str, why: str) -> None:
-    with pytest.raises(InvalidInputError, match=why):
-        read_criterion(text)
 
 
 @pytest.mark.parametrize(("text", "verdict"), [("moved < 5 mm", "undecided"), ("moved < 4 mm", "falls")])

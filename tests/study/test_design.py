@@ -8,7 +8,6 @@ from blocksim.errors import BlocksimError
 from blocksim.scenario import Document
 from blocksim.study import plan as mode
 from blocksim.study.plan import Design, design_of, with_sweep
-from tests.golden import Golden
 from tests.study.plans import cases, plan_of
 
 
@@ -77,44 +76,7 @@ def test_cells_may_have_units_of_their_own(document: Document) -> None:
     }
 
 
-WRONG = [
-    "gravity,gravty\n1,2\n",
-    "gravity,name\n1,2\n",
-    "gravity,a..b\n1,2\n",
-    "gravity,\n1,2\n",
-    "gravity,gravity\n1,2\n",
-    "gravity,gravity [m/s^2]\n1,2\n",
-    "gravity [m/ss]\n1\n",
-    "gravity []\n1\n",
-    "gravity\n",
-    "# nothing\n",
-    "gravity\n1\n2,3\n",
-    "gravity,time.end\n1,\n",
-    'time.end\n"[1, 2]"\n',
-    "time.end\n{a = 1}\n",
-    "gravity [m/s^2]\n1\nx\n",
-    "gravity [mm]\n1\n",
-    "contact.restitution\n0.1\n1.5\n",
-    "contact.restitution\n0.1\nnan\n",
-    "time.scheme\nexplicit\nnonsmoth\n",
-    "blocks.brick.material\nsteel\n",
-]
-
-
-def test_mistakes_are_shown_where_they_are(document: Document, golden: Golden) -> None:
-    golden("\n".join(told(document, text) for text in WRONG))
-
-
-def test_mistakes_in_a_table_are_reported_together(document: Document, golden: Golden) -> None:
-    golden(told(document, "contact.restitution,time.end [mm],graviti\n2,1,1\n0.1,1,1\n3,1,1\n"))
-
-
 def test_a_wrong_number_far_down_is_found(document: Document, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mode, "MOST_TRIED", 3)
     found = told(document, "contact.restitution\n" + "".join(f"{k / 1000}\n" for k in range(1, 400)) + "1.5\n0.1\n")
     assert "samples.csv:401: contact.restitution: 1.5 is too large" in found
-
-
-def test_a_missing_table_is_reported_at_its_key(document: Document) -> None:
-    with pytest.raises(BlocksimError, match=r'sweep.table: "samples.csv": no such file'):
-        with_sweep(document, None)

@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
-from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError, UnavailableError
+from blocksim.errors import OutputExistsError, StoppedEarlyError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
 from blocksim.study.fragility import FragilityAnswer, fragility, read_fragility
@@ -190,33 +190,6 @@ def test_another_study_is_not_replaced_unasked(tmp_path: Path) -> None:
     slides(tmp_path, members=1, seed=1, overwrite=True)
 
 
-@pytest.mark.parametrize(
-    ("intensity", "scatter", "wanted", "error", "why"),
-    [
-        ({}, FRICTION, {}, InvalidInputError, "one key is the intensity, not 0"),
-        ({"gravity": [1.0, 0.0]}, FRICTION, {}, InvalidInputError, "0.0 is not above 0, as a lognormal curve needs"),
-        ({"gravity": [1.0, 1]}, FRICTION, {}, InvalidInputError, "1 is given twice"),
-        ({"time.scheme": ["explicit"]}, FRICTION, {}, InvalidInputError, "explicit is not a number"),
-        ({"gravty": [1.0]}, FRICTION, {}, ScenarioError, "did you mean 'gravity'"),
-        ({"gravity": [1.0]}, {MU: {"mean": 0.3}}, {}, ScenarioError, "--scatter .*sd is missing"),
-        ({"gravity": [1.0]}, {MU: {"mean": 0.1, "sd": 0.2}}, {}, ScenarioError, "cut the distribution"),
-        ({"gravity": [1.0]}, {"gravity": {"from": 1.0, "to": 2.0}}, {}, InvalidInputError, "cannot scatter too"),
-        ({"gravity": [1.0]}, {MU: [0.3]}, {}, InvalidInputError, "one value does not scatter"),
-        ({"gravity": {"from": 1, "to": 2}}, FRICTION, {}, InvalidInputError, "single values are needed"),
-        ({"gravity": [1.0]}, {}, {}, InvalidInputError, "no scatter: give --scatter"),
-        ({"gravity": [1.0]}, FRICTION, {"members": 0}, InvalidInputError, "0 samples at 1 intensities"),
-        ({"gravity": [1.0]}, FRICTION, {"fails": "fel"}, InvalidInputError, "--fails fel: write for example"),
-        ({"gravity": [1.0]}, FRICTION, {"executor": "dask"}, InvalidInputError, "needs the address of a scheduler"),
-    ],
-)
-def test_mistakes_are_refused_before_anything_is_written(
-    tmp_path: Path, intensity: Any, scatter: Any, wanted: dict[str, Any], error: type[Exception], why: str
-) -> None:
-    with pytest.raises(error, match=why):
-        fragility(SLOPE, intensity, scatter, out=tmp_path / "study", **wanted)
-    assert not (tmp_path / "study").exists()
-
-
 def test_without_scipy_it_says_what_to_install_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -266,24 +239,6 @@ def test_stripes_have_each_record_once_at_each_intensity_and_wider_intervals(tmp
     twice = fragility(SLOPE, TILTS, {"gravity": [9.8, 9.9]}, **stripes, members=12, out=tmp_path / "twice")
     assert [point.members for point in twice.points] == [12] * 5
     assert twice.to_dict()["records"] == 6
-
-
-@pytest.mark.parametrize(
-    ("stripes", "members", "why"),
-    [
-        ({MU: [0.2, 0.3, 0.2]}, None, "a record is given twice"),
-        ({MU: [0.2]}, None, "one record does not scatter"),
-        ({MU: [0.2, 0.3]}, 3, "each must be there equally often; give a multiple of 2"),
-        ({"gravity": [9.8, 9.9]}, None, "gravity is given as stripes; it cannot be drawn too"),
-        ({"ground.tilt": ["1 deg", "2 deg"]}, None, "is the intensity"),
-    ],
-)
-def test_stripes_that_are_not_equally_often_there_are_refused(
-    stripes: dict[str, list[Any]], members: int | None, why: str
-) -> None:
-    document, drawn = Document.from_mapping(SLOPE), {"gravity": [9.7, 9.8]}
-    with pytest.raises((InvalidInputError, ScenarioError), match=why):
-        read_fragility(document, {"ground.tilt": ["10 deg", "20 deg"]}, drawn, stripes=stripes, members=members)
 
 
 def test_a_median_beyond_what_was_run_is_known_as_such(whole: FragilityAnswer, tmp_path: Path) -> None:

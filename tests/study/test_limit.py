@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from blocksim.errors import InvalidInputError, OutputExistsError, ScenarioError, StoppedEarlyError
+from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document
 from blocksim.study.criterion import Stability
 from blocksim.study.executors.processes import pool_of
@@ -154,24 +154,6 @@ def test_values_that_do_not_go_with_the_others_are_told_and_not_taken_for_fallin
     with pytest.raises(InvalidInputError, match="bodies 1 and 2 overlap"):
         limit(low, {"bodies.1.x": {"from": 0.05, "to": 0.2}}, out=tmp_path / "other")
     assert not (tmp_path / "other").exists()
-
-
-@pytest.mark.parametrize(
-    ("vary", "error", "why"),
-    [
-        ({}, InvalidInputError, "one key, not 0"),
-        ({"gravity": [1.0, 2.0]}, InvalidInputError, "a range is needed"),
-        ({"gravity": {"from": 1.0, "to": 2.0, "count": 1}}, InvalidInputError, "1 values cannot be scanned"),
-        ({"gravity": {"mean": 1.0, "sd": 2.0}}, InvalidInputError, "a range is needed"),
-        ({"gravty": {"from": 1.0, "to": 2.0}}, ScenarioError, "did you mean 'gravity'"),
-    ],
-)
-def test_what_is_no_range_of_one_key_is_refused_before_anything_is_written(
-    tmp_path: Path, vary: dict[str, Any], error: type[Exception], why: str
-) -> None:
-    with pytest.raises(error, match=why):
-        limit(block_on_a_slope(SQUAT), vary, out=tmp_path / "limit")
-    assert not (tmp_path / "limit").exists()
 
 
 def test_both_laws_are_the_same_scene_without_what_only_one_of_them_knows() -> None:

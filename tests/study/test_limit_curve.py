@@ -91,23 +91,6 @@ def test_a_table_beside_a_single_limit_is_refused(found: CurveAnswer, tmp_path: 
         plot(single, out=tmp_path / "limit.png", experiment=tmp_path / "any.csv")
 
 
-@pytest.mark.parametrize(
-    ("over", "why"),
-    [
-        ({}, "over one key, not 0"),
-        ({"friction.block_ground": {"from": 0.1, "to": 0.2}}, "--over .*: single values are needed"),
-        ({"time.scheme": ["explicit"]}, "explicit is not a number"),
-        ({"friction.block_ground": [0.3, 0.3]}, "0.3 is given twice"),
-    ],
-)
-def test_what_is_no_list_of_numbers_is_refused_before_anything_is_written(
-    tmp_path: Path, over: dict[str, Any], why: str
-) -> None:
-    with pytest.raises(InvalidInputError, match=why):
-        limit_curve(block_on_a_slope(SIZE), TILT, over, out=tmp_path / "curve")
-    assert not (tmp_path / "curve").exists()
-
-
 def test_only_neighbours_with_the_same_changes_are_joined() -> None:
     one, two = LimitRange(1.0, 3.0, "stands", "falls"), LimitRange(4.0, 6.0, "falls", "stands")
     points = [(0.0, [one]), (1.0, [one]), (2.0, [one, two]), (3.0, []), (4.0, [two])]

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from blocksim.errors import InvalidInputError, StoppedEarlyError
+from blocksim.errors import StoppedEarlyError
 from blocksim.scenario import Scenario, document_of
 from blocksim.study.executors import Batch, Execution, Rounds, RunSetting, Task
 from blocksim.study.limit import find_limit
@@ -151,17 +151,6 @@ def test_a_search_stopped_after_any_run_goes_on_with_the_same_values_and_repeats
     tables = [(tmp_path / name / "limit.csv").read_bytes() for name in ("whole", "stopped")]
     assert tables[0] == tables[1]
     assert again.limits == whole.limits
-
-
-def test_limits_of_stiffness_itself_are_left_as_given_and_rigid_contacts_cannot_be_stiffer(tmp_path: Path) -> None:
-    vary = {"contact.stiffness_scale": {"from": 0.5, "to": 2.0}}
-    options = LimitOptions(vary, stands="moved < 5 mm", out=tmp_path / "limit", stiffer=True)
-    with pytest.raises(InvalidInputError, match=r"not made stiffer for a limit of contact\.stiffness_scale"):
-        find_limit(read_limit(document_of(on_springs()), options), options)
-    rigid = on_springs(time={"scheme": "nonsmooth", "end": 1.0})
-    with pytest.raises(InvalidInputError, match="rigid contacts have no stiffness"):
-        found_with(Execution(), tmp_path / "limit", rigid, stiffer=True)
-    assert not (tmp_path / "limit").exists()
 
 
 def test_springs_of_hertz_give_way_by_another_power_and_a_step_by_hand_is_shortened_with_them(tmp_path: Path) -> None:

@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blocksim.errors import InvalidInputError, ScenarioError
+from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document, Sweep, scenario_to_toml
 from blocksim.simulation.provenance import run_hash
 from blocksim.study import plan
-from blocksim.study.plan import Values, Variations, design_of, with_sweep
-from tests.golden import Golden
+from blocksim.study.plan import Values, design_of, with_sweep
 from tests.study.plans import SCALE, cases, plan_of
 
 KINETIC = "friction.block_block.kinetic"
@@ -44,49 +43,6 @@ def test_a_whole_number_key_takes_a_spaced_range_whose_values_are_whole(nominal:
     uneven = with_sweep(nominal, {COUNT: {"from": 1, "to": 6, "count": 3}}, "grid")
     problems = [case.problem for case in cases(uneven)]
     assert (problems[0], "3.5 is not a whole number" in problems[1], problems[2]) == ("", True, "")
-
-
-WRONG: dict[str, tuple[dict[str, Values], str]] = {
-    "key": ({"friction.block_blok": [0.1]}, "grid"),
-    "value": ({SCALE: [-1.0]}, "grid"),
-    "no value": ({SCALE: []}, "grid"),
-    "name": ({"name": ["a"]}, "grid"),
-    "count": ({SCALE: {"from": 1.0, "to": 2.0, "count": 1}}, "grid"),
-    "lengths": ({KINETIC: [0.1, 0.2], SCALE: [1.0]}, "list"),
-    "range in a grid": ({SCALE: {"from": 0.1, "to": 1}}, "grid"),
-    "normal in a list": ({SCALE: {"mean": 0.1, "sd": 1}}, "list"),
-    "count in a sample": ({SCALE: {"from": 0.1, "to": 1, "count": 3}}, "lhs"),
-    "empty range": ({SCALE: {"from": 1, "to": 1}}, "lhs"),
-    "logarithm of zero": ({SCALE: {"from": 0.0, "to": 1, "scale": "log"}}, "lhs"),
-    "negative sd": ({SCALE: {"mean": 0.5, "sd": -0.1}}, "normal"),
-    "bounds": ({SCALE: {"mean": 0.5, "sd": 0.1, "from": 0.9, "to": 0.1}}, "sobol"),
-    "far bound": ({SCALE: {"mean": 0.5, "sd": 0.1, "from": 2}}, "sobol"),
-    "no sd": ({SCALE: {"mean": 0.5}}, "sobol"),
-    "misspelt": ({SCALE: {"form": 0.5, "to": 1.0}}, "sobol"),
-    "two kinds": ({"structures.0.overlap": {"mean": "10 mm", "sd": "1 s"}}, "normal"),
-    "unit of a mean": ({"structures.0.overlap": {"mean": "10 s", "sd": "1 s"}}, "normal"),
-    "unit of a range": ({"structures.0.overlap": {"from": "1 s", "to": "2 s", "count": 2}}, "grid"),
-    "many at once": ({SCALE: {"from": 2, "to": 1}, KINETIC: {"mean": 1, "sd": 0}, "seeds": [1]}, "lhs"),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_wrong_keys_values_and_distributions_are_reported_where_they_were_given(
-    nominal: Document, golden: Golden, name: str
-) -> None:
-    vary, mode = WRONG[name]
-    with pytest.raises(ScenarioError) as caught:
-        with_sweep(nominal, Variations(vary, {key: f"{key}=typed" for key in vary}), mode).build()
-    golden(str(caught.value))
-
-
-@pytest.mark.parametrize(("mode", "samples", "seed"), [("lhs", 0, -1), ("grid", 3, None)])
-def test_wrong_numbers_and_seeds_of_samples_are_reported(
-    nominal: Document, golden: Golden, mode: str, samples: int, seed: int | None
-) -> None:
-    with pytest.raises(ScenarioError) as caught:
-        with_sweep(nominal, {SCALE: [1.0]}, mode, samples=samples, seed=seed).build()
-    golden(str(caught.value))
 
 
 def test_new_keys_replace_those_of_the_file_and_a_mode_alone_leaves_them(nominal: Document) -> None:
@@ -147,14 +103,6 @@ def test_tables_of_motion_are_read_once_for_all_cases(tmp_path: Path) -> None:
         ("table", 1.0),
         ("table", 2.0),
     ]
-
-
-def test_a_distribution_that_leaves_the_possible_values_is_refused_before_anything_runs(nominal: Document) -> None:
-    vary: dict[str, Values] = {"contact.restitution": {"mean": 0.1, "sd": 0.1}, KINETIC: {"mean": 0.2, "sd": 0.01}}
-    with pytest.raises(ScenarioError, match=r"--vary contact.restitution=typed: drawn: -0\.\d+ is too small") as caught:
-        cases(nominal, Variations(vary, {key: f"{key}=typed" for key in vary}), "normal", samples=100)
-    assert len(caught.value.problems) == 1
-    assert "cut the distribution with from and to" in str(caught.value)
 
 
 @pytest.mark.parametrize("friction", [0.31, {"static": 0.31, "kinetic_ratio": 0.5}, None])

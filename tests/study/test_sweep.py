@@ -23,12 +23,11 @@ from blocksim.simulation.observables import table_columns
 from blocksim.study.executors.ensemble import run_case
 from blocksim.study.fragility import fragility, read_fragility
 from blocksim.study.limit import limit, limit_curve
-from blocksim.study.manifest import Manifest, Shard, read_sweep
+from blocksim.study.manifest import Manifest, read_sweep
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.run import run
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_folder import SWEEP, note_table, prepare
-from tests.golden import Golden
 from tests.study.conftest import SCENARIOS
 from tests.study.test_fragility import FRICTION, MU, SLOPE, TILTS
 
@@ -367,28 +366,6 @@ def test_who_begins_a_sweep_waits_while_another_one_makes_room_for_it(
         may_go_on.set()
         for one in waiting:
             one.result(timeout=10.0)
-
-
-WRONG: dict[str, tuple[dict[str, Values] | None, dict[str, Any]]] = {
-    "key": ({"friction.block_blok": [1]}, {}),
-    "nothing": (None, {}),
-    "table": ({"experiment.table": ["a.csv"]}, {}),
-    "executor": (TWO, {"executor": "ensembel"}),
-    "dask alone": (TWO, {"executor": "dask"}),
-    "cases of ensembles": (TWO, {"executor": "ensemble", "keep_cases": True}),
-    "scheduler of processes": (TWO, {"scheduler": "tcp://localhost:1", "executor": "processes"}),
-    "cases of a cluster": (TWO, {"scheduler": "tcp://localhost:1", "keep_cases": True}),
-    "overwriting shard": (TWO, {"shard": Shard(0, 2), "overwrite": True}),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_mistake_is_reported_and_leaves_no_folder(quick: Document, tmp_path: Path, golden: Golden, name: str) -> None:
-    vary, options = WRONG[name]
-    with pytest.raises(InvalidInputError) as caught:
-        sweep(quick, vary, out=tmp_path / "sweep", **options)
-    golden(str(caught.value))
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_ctrl_c_keeps_the_rows_so_far_and_the_next_call_does_the_rest(quick: Document, tmp_path: Path) -> None:

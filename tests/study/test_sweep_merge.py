@@ -2,26 +2,11 @@
 
 from pathlib import Path
 
-import pytest
-
-from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document
 from blocksim.study.manifest import Shard, read_sweep
 from blocksim.study.sweep import merge, sweep
 
 VARY = {"friction.block_block.kinetic": [0.1 + 0.02 * k for k in range(10)]}
-
-
-def test_missing_shards_are_listed(quick: Document, tmp_path: Path) -> None:
-    sweep(quick, VARY, out=tmp_path, shard=Shard(1, 4))
-    with pytest.raises(InvalidInputError) as caught:
-        merge(tmp_path)
-    first, *shards = str(caught.value).splitlines()
-    assert "7 of 10 cases are missing; --allow-missing" in first
-    assert shards == ["  --shard 0/4: 3 of 3 missing", "  --shard 2/4: 2 of 2 missing", "  --shard 3/4: 2 of 2 missing"]
-    assert not (tmp_path / "sweep.csv").exists()
-    result = merge(tmp_path, allow_missing=True)
-    assert (len(result.table), result.missing) == (3, 7)
 
 
 def test_sweep_does_what_shards_have_left(quick: Document, tmp_path: Path) -> None:
@@ -30,11 +15,6 @@ def test_sweep_does_what_shards_have_left(quick: Document, tmp_path: Path) -> No
     sweep(quick, VARY, out=tmp_path / "two")
     assert (tmp_path / "two" / "manifest.jsonl").read_text().count("\n") == 5
     assert (tmp_path / "two" / "sweep.csv").read_bytes() == (tmp_path / "one" / "sweep.csv").read_bytes()
-
-
-def test_what_is_no_sweep_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(InputMissingError, match=r"not a sweep folder \(no sweep.toml\)"):
-        merge(tmp_path)
 
 
 def test_case_that_was_retried_elsewhere_counts_as_finished(quick: Document, tmp_path: Path) -> None:
@@ -48,12 +28,6 @@ def test_case_that_was_retried_elsewhere_counts_as_finished(quick: Document, tmp
     (tmp_path / "manifest-0-of-2.jsonl").write_bytes(died.to_line())
     assert merge(tmp_path).failed == 0
     assert read_sweep(tmp_path).failed == 0
-
-
-@pytest.mark.parametrize("text", ["", "1", "2/2", "-1/2", "0/0", "a/b", "0/1/2", "1.0/2"])
-def test_wrong_shard_is_reported(text: str) -> None:
-    with pytest.raises(InvalidInputError, match="write I/N with I from 0 to N - 1"):
-        Shard.parse(text)
 
 
 def test_shards_share_all_cases_out() -> None:
