@@ -11,8 +11,8 @@ from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.results import read_summary
 from blocksim.study.executors.ensemble import BATCH, rows_of, run_case, run_members
 from blocksim.study.run import run
+from tests.study.conftest import SCENARIOS
 
-SCENARIOS = Path(__file__).parents[3] / "scenarios"
 FRICTION = "friction.block_ground"
 
 

@@ -1,7 +1,12 @@
-"""Every executor gives the same rows, in batches of any size, and the table does not tell them apart."""
+"""Every executor gives the same rows, in batches of any size; a pool ends with whoever started it."""
 
+import logging
+import os
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
-from multiprocessing import current_process
+from multiprocessing import active_children, current_process
 from pathlib import Path
 
 import pytest
@@ -10,9 +15,11 @@ from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study import executors as batches
 from blocksim.study.executors import GROWTH, MOST, BatchSize, Execution, RunSetting, Task, load_executor, take
+from blocksim.study.executors.dask import silence
 from blocksim.study.manifest import Shard
 from blocksim.study.plan import Values
 from blocksim.study.sweep import SweepOptions, merge, sweep
+from tests.study.conftest import SCENARIOS
 
 KINETIC = "friction.block_block.kinetic"
 # values that finish, fail in the run, fail before it, and do not go together; other shapes and schemes beside them
@@ -22,6 +29,27 @@ VARY: dict[str, Values] = {
     "structures.0.count": [2, 3],
     "time.end": [0.004, 0.008],
 }
+
+
+COUNT = 400
+SCRIPT = f"""
+import os, sys
+from distributed import LocalCluster
+from blocksim.study.sweep import sweep
+from blocksim.scenario import Document
+
+if __name__ == "__main__":
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
+        workers = [worker.process.pid for worker in cluster.workers.values()]
+
+        def on_row(done, total, row):
+            if done == 10 and "kill" in sys.argv:
+                os.kill(workers[0], 9)
+
+        document = Document.read("{SCENARIOS / "three_blocks_nonsmooth.toml"}").with_values({{"time.end": 0.1}})
+        vary = {{"friction.block_ground": {{"from": 0.2, "to": 0.6, "count": {COUNT}}}}}
+        sweep(document, vary, out=sys.argv[1], scheduler=cluster.scheduler_address, on_row=on_row)
+"""
 
 
 @pytest.fixture(scope="module")
@@ -87,16 +115,34 @@ def test_stopped_executor_begins_no_batch(quick: Document, name: str) -> None:
     assert len(made) <= 1
 
 
-def test_unreachable_scheduler_is_reported_before_anything_is_written(quick: Document, tmp_path: Path) -> None:
-    with pytest.raises(UnavailableError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1 "):
-        sweep(quick, {KINETIC: [0.1]}, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
+def test_ctrl_c_ends_the_workers_at_once(nominal: Document, tmp_path: Path) -> None:
+    quick = nominal.with_values({"time.end": 0.01}).build()
+    # of few frames: a run whose results may not fit on the disk is refused before it starts
+    endless = nominal.with_values({"time.end": 1e5, "time.stop_at_rest": False, "output.every": 10.0}).build()
+    scenarios = {"quick": quick, "a": endless, "b": endless}
+    tasks = (Task(number, name, {}, one) for number, (name, one) in enumerate(scenarios.items()))
+    with load_executor("processes").for_rounds() as run:
+        batches = run(tasks, RunSetting(2, folder=tmp_path))
+        assert next(batches).tasks[0].name == "quick"
+        before = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                next(batches)
+        finally:
+            signal.signal(signal.SIGALRM, before)
+        assert active_children() == []
+
+
+def test_unreachable_scheduler_is_reported_before_anything_is_written(
+    quick: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So is a missing package."""
+    for told in (r"no Dask scheduler answers at tcp://127\.0\.0\.1:1 ", r"pip install 'blocksim\[cluster\]'"):
+        with pytest.raises(UnavailableError, match=told):
+            sweep(quick, {KINETIC: [0.1]}, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
+        monkeypatch.setitem(sys.modules, "distributed", None)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_missing_package_names_the_extra(quick: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[cluster\]'"):
-        sweep(quick, {KINETIC: [0.1]}, out=tmp_path / "out", scheduler="tcp://127.0.0.1:1")
 
 
 def test_batch_grows_with_the_speed_and_never_without_bounds() -> None:
@@ -125,3 +171,32 @@ def test_a_script_without_a_main_guard_is_told_so_whatever_study_it_begins(monke
         InvalidInputError, match=r'^worker processes import this script: .* below if __name__ == "__main'
     ):
         Execution(executor="processes").ready()
+
+
+def test_dask_is_quiet_while_a_sweep_uses_it_and_not_longer(capsys: pytest.CaptureFixture[str]) -> None:
+    logger = logging.getLogger("distributed.client")
+    handler = logging.StreamHandler(sys.stderr)
+    logger.addHandler(handler)
+    try:
+        with silence():
+            logger.error("Traceback: connection refused")
+        assert capsys.readouterr().err == ""
+        logger.error("something else")
+        assert capsys.readouterr().err == "something else\n"
+    finally:
+        logger.removeHandler(handler)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kill", [(), ("kill",)])
+def test_cluster_gives_the_same_table_also_when_a_worker_dies(tmp_path: Path, kill: tuple[str, ...]) -> None:
+    document = Document.read(SCENARIOS / "three_blocks_nonsmooth.toml").with_values({"time.end": 0.1})
+    sweep(document, {"friction.block_ground": {"from": 0.2, "to": 0.6, "count": COUNT}}, out=tmp_path / "here")
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    ended = subprocess.run(
+        [sys.executable, str(script), str(tmp_path / "cluster"), *kill], check=False, capture_output=True, text=True
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / "cluster" / "manifest.jsonl").read_text().count("\n") == COUNT
+    assert (tmp_path / "cluster" / "sweep.csv").read_bytes() == (tmp_path / "here" / "sweep.csv").read_bytes()
