@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.scenario import place_bodies, place_segments, scenario_from_mapping
+from blocksim.scenario import place_bodies, place_segments
+from blocksim.verification.scene import scenario_of
 from blocksim.world.rigid_step import ContactJoint, joints_of
 
 if TYPE_CHECKING:
@@ -16,25 +17,14 @@ if TYPE_CHECKING:
 NEAR = 1e-5  # m
 
 
+BRICK = {"width": 0.2, "height": 0.1, "length": 1.0}
+TRIANGLE = {"outline": [[-0.1, -0.05], [0.1, -0.05], [0.0, 0.1]], "length": 1.0}
+
+
 def joints(*bodies: Mapping[str, Any], **tables: Any) -> list[ContactJoint]:
-    """Return the joints of bricks of 0.2 x 0.1 m and triangles, the fixed ones supports."""
-    triangle = {"outline": [[-0.1, -0.05], [0.1, -0.05], [0.0, 0.1]], "depth": 1.0, "material": "stone"}
-    scenario = scenario_from_mapping(
-        {
-            "schema": 1,
-            "name": "joints",
-            "materials": {"stone": {"density": 2000.0, "young_modulus": "1 GPa", "poisson_ratio": 0.2}},
-            "blocks": {
-                "brick": {"width": 0.2, "height": 0.1, "length": 1.0, "material": "stone"},
-                "triangle": triangle,
-            },
-            "bodies": [{"block": "brick", **body} for body in bodies],
-            "friction": {"block_block": 0.6, "block_ground": 0.6},
-            "time": {"scheme": "nonsmooth", "end": 1.0},
-            "output": {"every": 0.1},
-            **tables,
-        }
-    )
+    """Return the joints of bricks, or of other bodies, the fixed ones supports."""
+    rigid = {"time": {"scheme": "nonsmooth", "end": 1.0}, "friction": {"block_block": 0.6, "block_ground": 0.6}}
+    scenario = scenario_of([BRICK | {**body} for body in bodies], **rigid, **tables)
     placed = place_bodies(scenario)
     free = {i for i, body in enumerate(placed) if not body.fixed}
     level = scenario.ground.profile is None
@@ -58,7 +48,7 @@ def test_ends_of_a_joint_are_corners_of_either_block_and_corners_alone_are_no_jo
 
 
 def test_a_corner_on_a_face_is_a_joint_of_one_point_and_fixed_blocks_have_none_among_themselves() -> None:
-    tip = {"block": "triangle", "angle": "180 deg", "x": 0.1, "y": 0.2}
+    tip = {**TRIANGLE, "angle": math.pi, "x": 0.1, "y": 0.2}
     (joint,) = [one for one in joints({"x": 0.1, "y": 0.05, "fixed": True}, tip) if len(one.points) == 1]
     assert (joint.one, joint.other) == (0, 1)
     assert joint.normal == pytest.approx((0.0, 1.0))
@@ -70,7 +60,7 @@ def test_a_corner_on_a_face_is_a_joint_of_one_point_and_fixed_blocks_have_none_a
 
 def test_blocks_stand_on_pieces_of_ground_and_lean_on_walls() -> None:
     ground = {"profile": [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [2.0, 0.0]]}
-    walls = [{"from": [0.3, 1.0], "to": [0.3, 2.0], "material": "stone"}]
+    walls = [{"from": [0.3, 1.0], "to": [0.3, 2.0], "material": "aluminium"}]
     found = joints({"x": 0.2, "y": 1.05}, {"x": 1.0, "y": 1.15}, ground=ground, walls=walls)
     normals = sorted((round(one.normal[0], 9), round(one.normal[1], 9)) for one in found)
     assert normals == [(0.0, -1.0), (1.0, 0.0)]

@@ -124,23 +124,13 @@ BESIDE = "rows of particles on a rough base the active thrust on blocks is some"
 @pytest.mark.parametrize(
     ("keys", "body", "base", "expected"),
     [
-        (
-            {"gradient": "raw"},
-            {},
-            0.4,
-            [f"soils.column.gradient: with raw gradients and 20 {BESIDE} 11% "],
-        ),
+        ({"gradient": "raw"}, {}, 0.4, [f"soils.column.gradient: with raw gradients and 20 {BESIDE} 11% "]),
         ({"gradient": "raw"}, {}, 0.0, []),
         ({"gradient": "raw"}, {"x": -0.026}, 0.4, []),  # more than a spacing away
         ({"gradient": "raw"}, {"fixed": True}, 0.4, []),  # feels the pressure at rest, which is right
         ({"gradient": "raw"}, {"x": 0.05, "y": 0.16}, 0.4, []),  # lies on top
         ({}, {}, 0.4, []),
-        (
-            {"y": [0.0, 0.05]},
-            {},
-            0.4,
-            [f"soils.column.spacing: with corrected gradients and 10 {BESIDE} 6% "],
-        ),
+        ({"y": [0.0, 0.05]}, {}, 0.4, [f"soils.column.spacing: with corrected gradients and 10 {BESIDE} 6% "]),
         ({"y": [0.0, 0.08]}, {}, 0.4, []),
     ],
 )
@@ -155,10 +145,3 @@ def test_thrust_that_is_known_to_be_too_small_is_warned_of(
     assert [text.partition("too small")[0] for text in found] == expected
     if expected:
         assert found == blocksim.run(held).summary.warnings
-
-
-def test_a_thousand_particles_take_no_more_than_400_bytes_each() -> None:
-    built: Any = build_scene(scene(column(0.25, 0.1, 0.005)))
-    soils = built.systems[0]
-    assert soils.points.size == 1000
-    assert sum(array.nbytes for array in soils) <= 400 * soils.points.size
