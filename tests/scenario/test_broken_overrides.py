@@ -57,6 +57,10 @@ MIXED = {
     "a setting mends the file": (-1, ["materials.steel.density=1000", "time.end=0"]),
     "the last of two equal keys is blamed": (7850, ["time.end=0", "time.end=-1"]),
     "values from Python are named": (7850, {"time.end": "5 mm"}),
+    "keys that a sweep varies are named": (
+        7850,
+        {"sweep": {"mode": "list", **{f"friction.block_block.{key}": [0.1] for key in ("kinetic", "kinetic_ratio")}}},
+    ),
 }
 
 
