@@ -195,9 +195,8 @@ def distance_from(body: Record, table: Corners, x: float, y: float) -> tuple[flo
         if along > 0.0 and across > 0.0:
             distance = math.sqrt(along * along + across * across)
             return distance, math.copysign(along / distance, x), math.copysign(across / distance, y)
-        if along > across:
-            return along, math.copysign(1.0, x), 0.0
-        return across, 0.0, math.copysign(1.0, y)
+        is_beside = along > across
+        return (along, math.copysign(1.0, x), 0.0) if is_beside else (across, 0.0, math.copysign(1.0, y))
     face, best = 0, -math.inf
     for k in range(number_of_corners(body, table)):
         side = corner_of(body, table, k)
@@ -207,16 +206,7 @@ def distance_from(body: Record, table: Corners, x: float, y: float) -> tuple[flo
     side = corner_of(body, table, face)
     if best <= 0.0 or abs(side.nx * y - side.ny * x - side.middle) <= side.half:
         return best, side.nx, side.ny
-    return distance_beyond_ends(body, table, x, y)
-
-
-@rare_kernel
-def distance_beyond_ends(body: Record, table: Corners, x: float, y: float) -> tuple[float, float, float]:
-    """Return the same of a place outside a polygon that is beyond an end of the face which it is farthest from.
-
-    The nearest point is a corner, or lies on another face: beside a sharp corner that may be one that is nearer.
-    """
-    best, nx, ny = math.inf, 0.0, 1.0
+    best, nx, ny = math.inf, 0.0, 1.0  # beyond an end: nearest is a corner, or beside a sharp one another face
     for k in range(number_of_corners(body, table)):
         side = corner_of(body, table, k)
         gap = side.nx * x + side.ny * y - side.distance

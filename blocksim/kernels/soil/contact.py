@@ -96,9 +96,10 @@ def press(soils: Soils, world: arrays.World, touch: arrays.Record, step: float) 
         return
     values = soils.interactions[state.kind, body.contact_class]
     rate, slipping = rates(point, body, is_ground, nx, ny)
-    if depth <= 0.0:
+    if depth <= 0.0:  # the contact ends: what its springs hold and did not give back is lost
         drift = 0.0 if math.isinf(distance) else step  # a face has ended, and with it its directions
-        end_touch(soils, touch, values, drift * rate, drift * slipping)
+        book_touch(soils, touch, values, drift * rate, drift * slipping, 0.0, 0.0, 0.0, 0.0)
+        touch.fx = touch.fy = 0.0
         return
     mass, stiffness = soils.kinds[state.kind].mass, values.normal_stiffness
     shear = values.shear_ratio * stiffness
@@ -138,14 +139,6 @@ def book_touch(
     touch.shear_force = resistance
     touch.depth = depth
     touch.spring = spring
-
-
-@jit.rare_kernel
-def end_touch(soils: Soils, touch: arrays.Record, values: arrays.Record, closing: float, slip: float) -> None:
-    """End a contact; what its springs hold and did not give back is lost."""
-    book_touch(soils, touch, values, closing, slip, 0.0, 0.0, 0.0, 0.0)
-    touch.fx = 0.0
-    touch.fy = 0.0
 
 
 @jit.rare_kernel
@@ -210,16 +203,6 @@ def touch_supports(soils: Soils, _: arrays.World, world: arrays.World, k: int, s
 
 
 @jit.rare_kernel
-def extent_of(body: arrays.Record, is_ground: bool, reach: float) -> tuple[float, float, float, float]:
-    """Return left, right, bottom and top (m) of what is within reach of a body."""
-    if is_ground:
-        return -math.inf, math.inf, -math.inf, body.y + reach
-    wide = abs(body.cos) * body.half_x + abs(body.sin) * body.half_y + reach
-    high = abs(body.sin) * body.half_x + abs(body.cos) * body.half_y + reach
-    return body.x - wide, body.x + wide, body.y - high, body.y + high
-
-
-@jit.rare_kernel
 def find_near(soils: Soils, world: arrays.World, b: int, count: int) -> int:
     """Append the particles near body b to `by_body`, as far as there is room; return the count needed.
 
@@ -230,7 +213,11 @@ def find_near(soils: Soils, world: arrays.World, b: int, count: int) -> int:
     body = world.bodies[b]
     is_ground = b == world.bodies.size - 1
     reach = controls.radius + controls.skin
-    left, right, bottom, top = extent_of(body, is_ground, reach)
+    left, right, bottom, top = -math.inf, math.inf, -math.inf, body.y + reach  # of what is within reach
+    if not is_ground:
+        wide = abs(body.cos) * body.half_x + abs(body.sin) * body.half_y + reach
+        high = abs(body.sin) * body.half_x + abs(body.cos) * body.half_y + reach
+        left, right, bottom, top = body.x - wide, body.x + wide, body.y - high, body.y + high
     if right < controls.least_x or left > controls.most_x or top < controls.least_y or bottom > controls.most_y:
         return count
     first, last = neighbours.column_of(grid, left), neighbours.column_of(grid, right)
@@ -284,15 +271,6 @@ def keep(new: arrays.Record, old: arrays.Record) -> None:
 
 
 @jit.rare_kernel
-def carry_over(soils: Soils, state: arrays.Record, touch: arrays.Record) -> None:
-    """Give a touch the history that its particle had with this body, if any."""
-    touch.spring = touch.depth = touch.normal_force = touch.shear_force = touch.fx = touch.fy = 0.0
-    for e in range(state.first, state.first + state.count):
-        if soils.kept[e].body == touch.body:
-            keep(touch, soils.kept[e])
-
-
-@jit.rare_kernel
 def make_touches(soils: Soils, world: arrays.World) -> None:
     """List all touches anew, particles being in their new order; those of a particle are in the order of bodies."""
     controls = soils.controls[0]
@@ -308,7 +286,10 @@ def make_touches(soils: Soils, world: arrays.World) -> None:
             touch = soils.touches[e]
             touch.particle = i
             touch.body = b
-            carry_over(soils, soils.states[i], touch)
+            touch.spring = touch.depth = touch.normal_force = touch.shear_force = touch.fx = touch.fy = 0.0
+            for before in range(soils.states[i].first, soils.states[i].first + soils.states[i].count):
+                if soils.kept[before].body == b:
+                    keep(touch, soils.kept[before])
             soils.by_body[m] = e
     for i in range(soils.points.size):
         state = soils.states[i]
