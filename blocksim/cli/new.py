@@ -13,7 +13,6 @@ from blocksim.options import Option
 from blocksim.scenario import json_schema, spelling
 from blocksim.simulation.files import write_text
 
-TEMPLATES = "templates"
 PLACE = "@NAME@"
 NEXT = {".toml": "blocksim check {path}", ".csv": 'name it in a scenario: [experiment] table = "{path}"'}
 SWEEP = "sweep-"
@@ -21,10 +20,8 @@ SWEEP = "sweep-"
 
 def templates() -> dict[str, Traversable]:
     """Return the templates by kind: the name of their file without its extension."""
-    found = (files("blocksim.cli") / TEMPLATES).iterdir()
-    return {
-        entry.name.partition(".")[0]: entry for entry in sorted(found, key=lambda entry: entry.name.partition(".")[0])
-    }
+    found = (files("blocksim.cli") / "templates").iterdir()
+    return {entry.name.partition(".")[0]: entry for entry in sorted(found, key=lambda entry: entry.name)}
 
 
 def new_command(
