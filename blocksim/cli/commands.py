@@ -172,18 +172,13 @@ class CommandGroup(TyperGroup):
                 raise
 
 
-def function_of(name: str) -> Any:
-    """Return the function of a command."""
-    plain = name.replace("-", "_")
-    return getattr(import_module(f"blocksim.cli.{MODULES.get(name, plain)}"), f"{plain}_command")
-
-
 def load_command(name: str) -> Any:
     """Return the command of a name, ready to be called."""
     with pause_collector(), cleanup_state(wanted=False):
         from blocksim.cli.command_line import as_typer_command
 
-        function = function_of(name)
+        plain = name.replace("-", "_")
+        function = getattr(import_module(f"blocksim.cli.{MODULES.get(name, plain)}"), f"{plain}_command")
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
     ready = as_typer_command(function, reads_scenarios=name in WITH_SCENARIOS)
     alone.command(name, short_help=COMMANDS[name], context_settings=HELP)(ready)

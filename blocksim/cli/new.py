@@ -21,7 +21,7 @@ SWEEP = "sweep-"
 def templates() -> dict[str, Traversable]:
     """Return the templates by kind: the name of their file without its extension."""
     found = (files("blocksim.cli") / "templates").iterdir()
-    return {entry.name.partition(".")[0]: entry for entry in sorted(found, key=lambda entry: entry.name)}
+    return dict(sorted((entry.name.partition(".")[0], entry) for entry in found))
 
 
 def new_command(

@@ -102,7 +102,12 @@ class Timeline:
         for name in event.free:
             world = free_body(world, self.names[name], self.placed[self.names[name]])
         for name in event.unload:
-            end_load(world, self.loads.index(name))
+            load, clock, controls = world.loads[self.loads.index(name)], world.clock[0], world.controls[0]
+            last = int(load.last_piece) - 1
+            piece = world.load_pieces[last]
+            piece.start, piece.value, piece.rate = clock.steps * controls.step, 0.0, 0.0  # zero from now on
+            load.first_piece = last
+            controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()
         if event.velocity is not None:
             body = world.bodies[self.names[event.velocity.body]]
             for rate in RATES if body.inverse_mass > 0.0 else ():
@@ -157,16 +162,6 @@ def free_body(world: arrays.World, number: int, placed: PlacedBody) -> arrays.Wo
     body.mass, body.inertia = placed.mass, placed.inertia
     body.inverse_mass, body.inverse_inertia = 1.0 / placed.mass, 1.0 / placed.inertia
     return world
-
-
-def end_load(world: arrays.World, number: int) -> None:
-    """Let a load be zero from now on, and steady."""
-    load, clock, controls = world.loads[number], world.clock[0], world.controls[0]
-    last = int(load.last_piece) - 1
-    piece = world.load_pieces[last]
-    piece.start, piece.value, piece.rate = clock.steps * controls.step, 0.0, 0.0
-    load.first_piece = last
-    controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()
 
 
 def _without(world: arrays.World, number: int) -> arrays.World:

@@ -56,10 +56,17 @@ def read_sweep_data(folder: Path, experiment: Path | str | None = None) -> Sweep
         case = table["case"].iloc[int(np.argmax(is_cut))]
         raise InvalidInputError(f"{members.source}: case {case} has finished, but its row lacks positions of blocks")
     path = experiment or (None if scenario.experiment is None else scenario.experiment.table)
+    vary = {} if scenario.sweep is None else scenario.sweep.vary
+    heads = [head for name in table.columns if (head := Head.read(str(name))).key in vary]
+    missing = [key for key in vary if key not in {head.key for head in heads}]
+    if missing or not heads:
+        message = f"{TABLE} has no column {missing[0]}" if missing else f"{sweep_folder.PLAN} varies no key"
+        raise InvalidInputError(f"{message}; table and plan do not belong together")
+    inputs = [_input(scenario, head, table[str(head)], vary[head.key]) for head in heads]
     return SweepData(
         title=scenario.description or scenario.name,
         mode="" if scenario.sweep is None else scenario.sweep.mode,
-        inputs=_inputs(scenario, table),
+        inputs=tuple([one for one in inputs if one.count > 1] or inputs[:1]),
         blocks=blocks,
         x_mm=x_mm,
         rotation_deg=rotation_deg,
@@ -85,18 +92,6 @@ def measurements_of(table: ExperimentTable, blocks: tuple[str, ...]) -> Measurem
         },
         outcome=turned if len(turned) == len(blocks) else None,
     )
-
-
-def _inputs(scenario: Scenario, table: "pd.DataFrame") -> tuple[Input, ...]:
-    """Return the keys that take more than one value, or the first where none does."""
-    vary = {} if scenario.sweep is None else scenario.sweep.vary
-    heads = [head for name in table.columns if (head := Head.read(str(name))).key in vary]
-    missing = [key for key in vary if key not in {head.key for head in heads}]
-    if missing or not heads:
-        message = f"{TABLE} has no column {missing[0]}" if missing else f"{sweep_folder.PLAN} varies no key"
-        raise InvalidInputError(f"{message}; table and plan do not belong together")
-    inputs = [_input(scenario, head, table[str(head)], vary[head.key]) for head in heads]
-    return tuple([one for one in inputs if one.count > 1] or inputs[:1])
 
 
 def _input(scenario: Scenario, head: Head, column: "pd.Series", vary: Variation) -> Input:
@@ -149,16 +144,6 @@ METHODS = (
     ),
     IndexColumns("mu*", "±", "", ("mean change over a key's range, 95 % interval", ""), has_unit=True),
 )
-
-
-def _draw_indices(table: Path, options: "PlotOptions") -> Path:
-    """Draw the table of a sensitivity study. Raises what reading and drawing it raise, and for another kind."""
-    if options.kind not in {None, TORNADO}:
-        raise InvalidInputError(f"{table}: a table of indices is drawn as {TORNADO!r}, not as {options.kind!r}")
-    panels, labels = read_indices(table)
-    path = options.picture(f"{table.stem}.png")
-    studies.draw_tornado(panels, labels, path, title="Which inputs matter", paper=options.paper)
-    return path
 
 
 def read_indices(path: Path) -> tuple[list[studies.Bars], tuple[str, str]]:
@@ -510,5 +495,10 @@ def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
         return _draw_sweep(place, options), ""
     if place.suffix.lower() == ".csv":
         options.refuse(None, f"{place} is a table")
-        return _draw_indices(place, options), ""
+        if options.kind not in {None, TORNADO}:
+            raise InvalidInputError(f"{place}: a table of indices is drawn as {TORNADO!r}, not as {options.kind!r}")
+        panels, labels = read_indices(place)
+        path = options.picture(f"{place.stem}.png")
+        studies.draw_tornado(panels, labels, path, title="Which inputs matter", paper=options.paper)
+        return path, ""
     return (_draw_motion(place, options), "") if options.kind == MOTION else _draw_run(place, options)

@@ -46,7 +46,9 @@ class ForceScale:
     @property
     def example(self) -> str:
         """Length of the arrow of a round force."""
-        force = round_down(0.5 * self.longest / self.mm_per_newton)
+        most = 0.5 * self.longest / self.mm_per_newton
+        power = 10.0 ** np.floor(np.log10(most))
+        force = float(max(part * power for part in ROUND if part * power <= most * (1.0 + 1e-9)))
         return f"{force:g} N is {force * self.mm_per_newton:.3g} mm"
 
 
@@ -64,12 +66,6 @@ def force_scale(frames: Frames) -> ForceScale:
     usual = float(np.quantile(force, USUAL)) if len(force) else 1.0
     length = USUAL_LENGTH * MILLIMETRES * float(np.mean([frames.size_x.mean(), frames.size_y.mean()]))
     return ForceScale(length / usual, LONGEST * length)
-
-
-def round_down(value: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20 ... that is not larger."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(part * power for part in ROUND if part * power <= value * (1.0 + 1e-9)))
 
 
 def forces_on_upper(rows: Rows, tilt: float) -> Floats:
