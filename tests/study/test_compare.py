@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Judgement, Settings
-from blocksim.errors import InputMissingError, InvalidInputError
+from blocksim.errors import InputMissingError
 from blocksim.scenario import Document
 from blocksim.study.compare import compare, compare_sweep
 from blocksim.study.manifest import SweepResult
@@ -53,12 +52,3 @@ def test_table_alone_needs_an_experiment(swept: SweepResult, tmp_path: Path) -> 
     with pytest.raises(InputMissingError, match="--experiment"):
         compare_sweep(tmp_path)
     assert compare_sweep(tmp_path, PAPER).members == 2
-
-
-def test_damaged_table_is_reported(tmp_path: Path) -> None:
-    pd.DataFrame({"case": ["a"], "status": ["finished"], "1.x_mm": ["wide"]}).to_csv(
-        tmp_path / "sweep.csv", index=False
-    )
-    (tmp_path / "one.csv").write_text("block,quantity,unit,replicate,value\n1,x,mm,1,3\n")
-    with pytest.raises(InvalidInputError, match=r"sweep\.csv: 1\.x_mm: 'wide' in row 1 is not a number"):
-        compare_sweep(tmp_path, tmp_path / "one.csv")

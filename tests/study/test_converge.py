@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from blocksim.errors import StoppedEarlyError
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.start import soil_tables
 from blocksim.study.converge import (
@@ -240,14 +239,6 @@ def test_scenario_that_fails_as_it_is_and_one_cut_by_the_end_of_time_say_so(slid
     assert (failing.recommended, failing.studies[0].verdict) == (None, ConvergenceVerdict.FAILED)
     short = converge(with_setting(slide, "time.end", 0.01), studies=["step"], out=tmp_path / "short")
     assert any("depend on time.end" in text for text in short.notes)
-
-
-def test_interrupt_stops_the_study(slide: Scenario, tmp_path: Path) -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(StoppedEarlyError, match="stopped after 1 runs; rerun the command to finish"):
-        converge(slide, out=tmp_path, on_run=interrupt)
 
 
 def rigid(name: str, **values: object) -> Scenario:

@@ -12,9 +12,8 @@ from scipy.stats import norm
 
 from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
-from blocksim.errors import OutputExistsError, StoppedEarlyError, UnavailableError
+from blocksim.errors import UnavailableError
 from blocksim.scenario import Document
-from blocksim.study import executors as batches
 from blocksim.study.fragility import FragilityAnswer, fragility, read_fragility
 from blocksim.study.manifest import Shard
 from tests.sizes import in_all
@@ -78,29 +77,6 @@ def test_a_member_depends_on_its_number_and_intensity_alone() -> None:
     assert {place: many[place] for place in few} == few
     assert len(set(many.values())) == len(many)  # no value is common to intensities
     assert not set(drawn(["14 deg"], 4, seed=1).values()) & set(few.values())
-
-
-def test_a_study_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_nothing_twice(
-    tmp_path: Path, whole: FragilityAnswer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(batches, "MOST", 7)  # the last batch is not yet under way
-    for at in (1, 17):
-        seen: list[object] = []
-
-        def stop(done: int, _: int, row: dict[str, object], seen: list[object] = seen, at: int = at) -> None:
-            seen.append(row["case"])
-            if done == at and len(seen) == at:
-                raise KeyboardInterrupt
-
-        folder = tmp_path / f"stopped-{at}"
-        with pytest.raises(StoppedEarlyError, match="of 40 cases done; rerun the command to finish"):
-            slides(folder, on_row=stop)
-        again = slides(folder, on_row=stop)
-        kept = [json.loads(line)["number"] for line in (folder / "manifest.jsonl").read_text().splitlines()]
-        assert sorted(kept) == list(range(40))
-        assert again.run < 40
-        for name in ("fragility.csv", "members.csv"):
-            assert (folder / name).read_bytes() == (whole.folder / name).read_bytes()
 
 
 def test_more_members_and_another_criterion_do_not_repeat_what_has_run(tmp_path: Path) -> None:
@@ -183,13 +159,6 @@ def test_the_folder_holds_counts_curve_members_and_scenario(whole: FragilityAnsw
     assert Document.read(whole.folder / "fragility.toml").build().name == "slope"
 
 
-def test_another_study_is_not_replaced_unasked(tmp_path: Path) -> None:
-    slides(tmp_path, members=1)
-    with pytest.raises(OutputExistsError, match="contains another fragility study; --overwrite replaces it"):
-        slides(tmp_path, members=1, seed=1)
-    slides(tmp_path, members=1, seed=1, overwrite=True)
-
-
 def test_without_scipy_it_says_what_to_install_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -212,13 +181,6 @@ def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path)
     # four standard deviations
     assert covered / (5 * studies) > 0.95 - 4.0 * math.sqrt(0.95 * 0.05 / (5 * studies))
     assert abs(fitted / studies - 0.95) < 4.0 * math.sqrt(0.95 * 0.05 / studies)
-
-
-@pytest.mark.long
-def test_counts_and_members_are_the_same_from_processes(tmp_path: Path, whole: FragilityAnswer) -> None:
-    slides(tmp_path, executor="processes", jobs=2)
-    for name in ("fragility.csv", "members.csv"):
-        assert (tmp_path / name).read_bytes() == (whole.folder / name).read_bytes()
 
 
 RECORDS = [0.25, 0.29, 0.33, 0.37, 0.41, 0.45]

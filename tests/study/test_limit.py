@@ -2,9 +2,8 @@
 
 import json
 import math
-from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import AbstractContextManager, closing
+from contextlib import AbstractContextManager
 from functools import partial
 from multiprocessing import active_children
 from pathlib import Path
@@ -12,13 +11,11 @@ from typing import Any
 
 import pytest
 
-from blocksim.errors import InvalidInputError, OutputExistsError, StoppedEarlyError
 from blocksim.scenario import Document
 from blocksim.study.criterion import Stability
 from blocksim.study.executors.processes import pool_of
 from blocksim.study.limit import limit as searched
 from blocksim.study.limit_plan import is_sustained, read_limit, variants
-from blocksim.study.manifest import MANIFEST, Manifest
 
 limit = partial(searched, keep_runs=False)
 FRICTION = 0.38
@@ -71,30 +68,6 @@ def test_a_range_that_descends_is_searched_as_one_that_ascends(tmp_path: Path) -
     assert (down.changes, down.run) == (up.changes, 0)
 
 
-def test_a_search_that_was_stopped_anywhere_ends_as_one_that_was_not_and_runs_nothing_twice(tmp_path: Path) -> None:
-    values: list[float] = []
-    whole = limit(
-        unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path / "whole", on_run=lambda value, *_: values.append(value)
-    )
-    for at in (1, 5, 10, 13):
-        seen: list[float] = []
-
-        def stop(value: float, _: Stability, __: Mapping[str, object], seen: list[float] = seen, at: int = at) -> None:
-            seen.append(value)
-            if len(seen) == at:  # not again when it goes on
-                raise KeyboardInterrupt
-
-        folder = tmp_path / f"stopped-{at}"
-        with pytest.raises(StoppedEarlyError, match="rerun the command to finish"):
-            limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=folder, jobs=1, on_run=stop)
-        again = limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=folder, on_run=stop)
-        assert sorted(seen) == sorted(values)
-        assert again.run == whole.runs - at
-        assert (folder / "limit.csv").read_bytes() == (tmp_path / "whole" / "limit.csv").read_bytes()
-        assert again.changes == whole.changes
-    assert limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path / "whole").run == 0
-
-
 def test_processes_are_started_once_and_not_for_every_round(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[int] = []
 
@@ -120,19 +93,6 @@ def test_the_folder_holds_the_answer_for_programs_and_the_scenario(tmp_path: Pat
     assert Document.read(tmp_path / "limit.toml").build().name == "slope"
 
 
-def test_another_search_or_file_is_not_replaced_unasked(tmp_path: Path) -> None:
-    limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path, tolerance=0.1)
-    (tmp_path / "notes.txt").write_text("mine")
-    other = unsettled(block_on_a_slope(SLENDER))
-    with pytest.raises(OutputExistsError, match="contains another limit; --overwrite replaces it"):
-        limit(other, TILT, out=tmp_path, tolerance=0.1)
-    limit(other, TILT, out=tmp_path, tolerance=0.1, overwrite=True)
-    assert (tmp_path / "notes.txt").read_text() == "mine"
-    (tmp_path / "limit.csv").write_text("a table of somebody else")
-    with pytest.raises(OutputExistsError, match=r"limit\.csv: changed since the limit wrote it"):
-        limit(other, TILT, out=tmp_path, tolerance=0.1, overwrite=True)
-
-
 def test_whole_numbers_of_blocks_are_searched_as_such(tmp_path: Path) -> None:
     leaning = block_on_a_slope(SQUAT) | {
         "bodies": [],
@@ -145,17 +105,6 @@ def test_whole_numbers_of_blocks_are_searched_as_such(tmp_path: Path) -> None:
     assert found.brackets[0].above.outcome == "fell"
 
 
-def test_values_that_do_not_go_with_the_others_are_told_and_not_taken_for_falling(tmp_path: Path) -> None:
-    low = block_on_a_slope(SQUAT) | {
-        "bodies": [{"block": "b", "x": 0, "y": 0.025}, {"block": "b", "x": 0.15, "y": 0.025}]
-    }
-    found = limit(low, {"bodies.1.x": {"from": 0.15, "to": 0.2, "count": 2}}, out=tmp_path)
-    assert not found.changes
-    with pytest.raises(InvalidInputError, match="bodies 1 and 2 overlap"):
-        limit(low, {"bodies.1.x": {"from": 0.05, "to": 0.2}}, out=tmp_path / "other")
-    assert not (tmp_path / "other").exists()
-
-
 def test_both_laws_are_the_same_scene_without_what_only_one_of_them_knows() -> None:
     document = Document.from_mapping(block_on_a_slope(SQUAT, substeps=2, step=1e-3))
     both = {name: one.build() for name, one in variants(document, both_laws=True).items()}
@@ -163,15 +112,6 @@ def test_both_laws_are_the_same_scene_without_what_only_one_of_them_knows() -> N
     assert both["rigid contacts"] == document.build()
     assert both["springs"].time.scheme == "explicit"
     assert both["springs"].time.step == "auto"
-
-
-def test_a_folder_in_which_another_process_searches_is_left_to_it(tmp_path: Path) -> None:
-    limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path, tolerance=0.1)
-    with (
-        closing(Manifest(tmp_path / MANIFEST)),
-        pytest.raises(OutputExistsError, match="this limit is already running"),
-    ):
-        limit(unsettled(block_on_a_slope(SQUAT)), TILT, out=tmp_path, tolerance=0.1)
 
 
 def test_sustained_loads_come_at_rest_unless_told_not_to_and_others_as_they_are() -> None:
@@ -192,17 +132,6 @@ def test_sustained_loads_come_at_rest_unless_told_not_to_and_others_as_they_are(
         plan = read_limit(Document.from_mapping(scene), TILT, stands="outcome != fell")
         assert plan.scenario_at(10.0).start.settle is settles
         assert is_sustained(plan.scenario_at(10.0)) is (settles or scene == unsettled(slope))
-
-
-def test_sustained_loads_slip_at_the_friction_angle_with_both_schemes(tmp_path: Path) -> None:
-    degrees = math.degrees(math.atan(FRICTION))
-    near = {"ground.tilt": {"from": "19.5 deg", "to": "21.5 deg", "count": 3}}
-    soft = block_on_a_slope(SQUAT) | {"contact": {"restitution": 0, "stiffness_scale": 1e-3}}
-    for scheme in ("explicit", "nonsmooth"):
-        scene = soft | {"time": {"scheme": scheme, "end": 0.1}}
-        (change,) = limit(scene, near, out=tmp_path / scheme, stiffer=False).limits
-        assert change.low <= degrees <= change.high
-        assert change.high - change.low < 2e-3 * degrees
 
 
 def test_limits_of_rigid_contacts_that_go_with_the_step_hold_those_of_half_of_it(tmp_path: Path) -> None:

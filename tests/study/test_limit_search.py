@@ -1,4 +1,4 @@
-"""Which values a search tries, from the answers alone: no simulation."""
+"""What counts as standing, and which values a search tries, from the answers alone: no simulation."""
 
 import math
 from collections.abc import Callable
@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 from hypothesis import given, strategies as st
 
+from blocksim.study.criterion import DEFAULT, Stability, read_criterion
 from blocksim.study.limit_plan import Change, SearchRange, changes_in, next_near, next_values
 
 
@@ -95,3 +96,35 @@ def test_a_change_that_is_not_in_the_range_is_not_looked_for_without_end(answer:
         known |= dict.fromkeys(values, answer)
     assert changes_in(known) == []
     assert len(known) < 12
+
+
+ROW = {"status": "finished", "reason": "at rest", "outcome": "slid", "displacement_mm": 4.9, "turn_deg": 30.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "stands"),
+    [
+        (DEFAULT, False),
+        ("outcome != fell", True),
+        ("outcome = slid | stands", True),
+        ("outcome == slid", True),
+        ("moved < 5 mm", True),
+        ("moved < 0.0049 m", False),
+        ("moved <= 0.491 cm", True),
+        ("turned < 0.5 rad", False),
+        ("turned<31deg", True),
+        ("moved > 4 mm", True),
+        ("moved < 5 mm, turned < 10 deg", False),
+    ],
+)
+def test_conditions_are_judged_in_the_units_that_were_typed(text: str, stands: bool) -> None:
+    assert (read_criterion(text).verdict(ROW) is Stability.STANDS) is stands
+
+
+def test_a_run_that_failed_neither_stands_nor_falls() -> None:
+    assert read_criterion(DEFAULT).verdict({"status": "invalid"}) is Stability.FAILED
+
+
+@pytest.mark.parametrize(("text", "verdict"), [("moved < 5 mm", "undecided"), ("moved < 4 mm", "falls")])
+def test_what_meets_the_conditions_but_moves_on_at_its_end_is_undecided(text: str, verdict: str) -> None:
+    assert read_criterion(text).verdict({**ROW, "moves_on": True}) == verdict

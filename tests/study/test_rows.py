@@ -9,11 +9,8 @@ import pytest
 from blocksim.analysis.compare import compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.scenario import Document
-from blocksim.study.pictures import read_sweep_data
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.rows import Head, Range, Ranges, as_cell, heads_of
-from blocksim.study.sweep import sweep
-from blocksim.study.verify import verify_sweep
 from tests.study.conftest import SCENARIOS
 from tests.study.plans import OVERLAP, TILT, cases, plan_of
 
@@ -57,18 +54,6 @@ def test_head_is_read_back_and_bare_keys_of_older_tables_too() -> None:
     assert Head.read("ground.tilt [deg]") == Head(TILT, "deg")
     assert Head.read("ground.tilt") == Head(TILT)
     assert Head(TILT, "deg").cell(3.141592653589793) == pytest.approx(180.0)
-
-
-def test_table_pictures_and_verification_agree_on_the_unit(tmp_path: Path) -> None:
-    settings = {"contact.stiffness_scale": 0.001, "time.end": 0.01}
-    document = Document.read(SCENARIOS / "slide.toml").with_values(settings)
-    found = sweep(document, {TILT: {"from": "0 deg", "to": "10 deg", "count": 3}}, out=tmp_path / "out")
-    assert found.keys == ("ground.tilt [deg]",)
-    assert found.table["ground.tilt [deg]"].tolist() == [0.0, 5.0, 10.0]
-    (tilt,) = read_sweep_data(found.folder).inputs
-    assert (tilt.key, tilt.unit) == (TILT, "rad")
-    assert tilt.values[1:].tolist() == pytest.approx([0.08726646, 0.17453293])  # noqa: PD011 - an Input
-    assert verify_sweep(found.folder).agrees
 
 
 TABLE = SCENARIOS / "experiments" / "three_blocks.csv"

@@ -1,17 +1,20 @@
-"""Runs as they lie on the disk."""
+"""Runs as they lie on the disk, and what is compared when one is repeated."""
 
 import json
 import os
 import shutil
 from pathlib import Path
 
+import h5py
 import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.simulation import simulate_into
 from blocksim.study.run_folder import read_run
+from blocksim.study.verify import verify_run
 from tests.golden import Golden
+from tests.simulation.test_probes import PROBES, PULSE, scene
 from tests.study.conftest import SCENARIOS
 
 
@@ -50,3 +53,14 @@ def test_missing_and_damaged_frames_are_reported(folder: Path) -> None:
     (folder / "run.h5").unlink()
     with pytest.raises(InputMissingError, match=r"no run\.h5"):
         read_run(folder)
+
+
+def test_a_changed_sample_is_found_when_a_run_is_verified(tmp_path: Path) -> None:
+    result = simulate_into(scene("nonsmooth", PROBES, 0.03, motion=PULSE), tmp_path / "run")
+    assert result.folder is not None
+    assert verify_run(result.folder).agrees
+    with h5py.File(tmp_path / "run" / "run.h5", "r+") as file:
+        file["probes/joint4/slip"][2] += 1e-18
+    step = result.probes["joint4"].step[2]
+    (found,) = verify_run(result.folder).entries
+    assert (found.file, found.entry) == ("run.h5", f"probes/joint4/slip at step {step}")

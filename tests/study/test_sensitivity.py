@@ -1,14 +1,29 @@
-"""Sensitivity of scenarios: a slide whose indices are known, failed runs, outcomes."""
+"""Indices of known functions and of scenarios: a slide whose indices are known, failed runs, outcomes."""
 
 import math
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
+from blocksim.extras import load_module
 from blocksim.scenario import Document
+from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.study.plan import Values
-from blocksim.study.sensitivity import Sensitivity, TooManyFailuresError, sensitivity
+from blocksim.study.sensitivity import (
+    METHODS,
+    Floats,
+    Indices,
+    ModelOutput,
+    Sensitivity,
+    TooManyFailuresError,
+    indices_of,
+    sensitivity,
+    settings_at,
+    unit_cube,
+)
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SPEED, FRICTION = "bodies.0.velocity.0", "friction.block_ground"
@@ -82,3 +97,104 @@ def test_too_many_failures_and_one_block_are_refused() -> None:
         found("slide", vary, "sobol", 8)
     with pytest.raises(InvalidInputError, match="1 trajectories are too few; at least 2"):
         found("slide", {FRICTION: {"from": 0.3, "to": 0.4}}, "morris", 1)
+
+
+Function = Callable[..., Floats]
+
+
+def indices(method: str, function: Function, vary: Mapping[str, Variation], samples: int, seed: int = 0) -> Indices:
+    chosen = METHODS[method]
+    points = chosen.points(len(vary), samples, seed)
+    rows = [[float(str(value)) for value in row.values()] for row in settings_at(points, vary)]
+    return indices_of(ModelOutput("y", "mm", function(*np.array(rows).T)), points, chosen, seed)
+
+
+def ishigami(x: Floats, y: Floats, z: Floats) -> Floats:
+    return np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+
+
+def assert_within_confidence(found: Indices, column: str, exact: list[float]) -> None:
+    for index, (value, half, wanted) in enumerate(
+        zip(found.numbers[column], found.numbers[f"± {column}"], exact, strict=True)
+    ):
+        assert abs(value - wanted) <= half + 1e-6, (column, index, value, half, wanted)
+        assert half < 0.12
+
+
+def test_sobol_indices_of_the_ishigami_function() -> None:
+    # V = a^2/8 + b pi^4/5 + b^2 pi^8/18 + 1/2 with a = 7, b = 0.1 (Ishigami and Homma 1990)
+    b = 0.1
+    first, second = 0.5 * (1 + b * math.pi**4 / 5) ** 2, 7.0**2 / 8
+    both = b**2 * math.pi**8 * (1 / 18 - 1 / 50)
+    variance = first + second + both
+    found = indices("sobol", ishigami, dict.fromkeys("xyz", Uniform(-math.pi, math.pi)), 1024)
+    assert found.sd**2 == pytest.approx(variance, rel=0.02)
+    assert_within_confidence(found, "S1", [first / variance, second / variance, 0.0])
+    assert_within_confidence(found, "ST", [(first + both) / variance, second / variance, both / variance])
+
+
+def test_sobol_indices_follow_the_distributions() -> None:
+    # of x + y the shares are those of the variances: sd 3 against width sqrt(12) (sd 1)
+    found = indices("sobol", np.add, {"x": Normal(5.0, 3.0), "y": Uniform(0.0, math.sqrt(12.0))}, 1024)
+    assert_within_confidence(found, "S1", [0.9, 0.1])
+
+
+def test_morris_effects_of_a_plane_are_its_slopes_over_the_ranges() -> None:
+    found = indices("morris", lambda x, y, z: 2.0 * x - 3.0 * y + 0.0 * z, {
+        "x": Uniform(0.0, 5.0), "y": Uniform(1.0, 2.0), "z": Uniform(0.0, 1.0)
+    }, 8)  # fmt: skip
+    assert found.numbers["mu"] == pytest.approx((10.0, -3.0, 0.0), abs=1e-9)
+    assert found.numbers["mu*"] == pytest.approx((10.0, 3.0, 0.0), abs=1e-9)
+    assert found.numbers["sigma"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+def test_morris_tells_interaction_from_a_plain_effect() -> None:
+    found = indices("morris", lambda x, y, z: x * y + z, dict.fromkeys("xyz", Uniform(-1.0, 1.0)), 32)
+    x, y, z = found.numbers["sigma"]
+    assert min(x, y) > 1.0
+    assert z == pytest.approx(0.0, abs=1e-9)
+
+
+def test_morris_stays_off_the_infinite_ends_of_a_normal_distribution() -> None:
+    points = METHODS["morris"].points(1, 8, 0)
+    values = [float(str(row["x"])) for row in settings_at(points, {"x": Normal(0.0, 1.0)})]
+    assert max(map(abs, values)) == pytest.approx(2.5758, abs=1e-3)  # the 99.5 % quantile
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_same_seed_gives_the_same_design_and_numbers(method: str) -> None:
+    vary = dict.fromkeys("xyz", Uniform(-math.pi, math.pi))
+    for seed in (0, 7):
+        assert indices(method, ishigami, vary, 8, seed) == indices(method, ishigami, vary, 8, seed)
+    assert indices(method, ishigami, vary, 8, 0) != indices(method, ishigami, vary, 8, 7)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+@pytest.mark.parametrize("keys", [1, 2, 7])
+def test_designs_consist_of_whole_blocks_in_the_unit_cube(method: str, keys: int) -> None:
+    chosen = METHODS[method]
+    points = chosen.points(keys, 5, 0)
+    assert points.shape == (5 * (keys + chosen.more_rows), keys)
+    assert points.min() >= 0.0
+    assert points.max() <= 1.0
+
+
+def test_morris_trajectories_lie_farther_apart_than_random_ones_and_are_quick() -> None:
+    chosen = METHODS["morris"].points(6, 64, 0).reshape(64, 7, 6)
+    random = np.asarray(load_module("SALib.sample.morris", "a test").sample(unit_cube(6), 64, seed=0)).reshape(64, 7, 6)
+
+    def spread(trajectories: Floats) -> float:
+        centres = trajectories.mean(axis=1)
+        return float(np.mean((centres[:, None] - centres) ** 2))
+
+    assert spread(chosen) > 1.2 * spread(random)
+    steps = np.abs(np.diff(chosen, axis=1))
+    assert np.sort(steps, axis=2)[:, :, -1] == pytest.approx(2.0 / 3.0)  # one key at a time
+    assert np.sort(steps, axis=2)[:, :, :-1] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_result_that_does_not_vary_has_no_indices(method: str) -> None:
+    found = indices(method, lambda x, y: 16.0 + 1e-6 * x + 0.0 * y, dict.fromkeys("xy", Uniform(0.0, 1.0)), 4)
+    assert not found.numbers
+    assert found.numbers == {}

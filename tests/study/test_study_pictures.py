@@ -1,15 +1,16 @@
-"""Folders of studies drawn and reported: from their own files, damaged or not."""
+"""Folders and tables of studies drawn and reported: from their own files, damaged or not."""
 
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import replace_values
 from blocksim.study.fragility import FragilityAnswer, fragility
 from blocksim.study.limit import limit
-from blocksim.study.pictures import plot
+from blocksim.study.pictures import plot, read_indices
 from blocksim.study.report import report
 from blocksim.study.run_folder import read_run
 from tests.study.test_fragility import FRICTION, SLIDES, SLOPE, TILTS
@@ -98,3 +99,44 @@ def test_a_limit_without_a_change_has_nothing_to_draw_and_a_report(tmp_path: Pat
         plot(found, out=tmp_path / "picture.png")
     assert "nothing changes within the range" in report(found, out=tmp_path / "limit.html").read_text()
     assert not (tmp_path / "found" / "cases").exists()
+
+
+SOBOL = "output,unit,key,S1,± S1,ST,± ST\nx of block 2,mm,a,0.1,0.2,0.7,0.3\nx of block 2,mm,b,0.2,nan,0.4,\n"
+MORRIS = "output,unit,key,mu*,±,mu,sigma\nx of block 2,mm,a,5,1,-5,0\nmeasured outcome,share,a,0.5,0.1,0.5,0\n"
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "indices.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_sobol_bars_are_total_indices_with_those_of_the_key_alone(tmp_path: Path) -> None:
+    (bars,), labels = read_indices(written(tmp_path, SOBOL))
+    assert (bars.title, bars.keys) == ("x of block 2", ("a", "b"))
+    assert bars.values.tolist() == [0.7, 0.4]
+    assert bars.part is not None
+    assert bars.part.tolist() == [0.1, 0.2]
+    assert bars.half_widths[0] == 0.3
+    assert np.isnan(bars.half_widths[1])
+    assert "variance" in labels[0]
+
+
+def test_morris_bars_have_the_unit_of_their_result(tmp_path: Path) -> None:
+    (x, outcome), labels = read_indices(written(tmp_path, MORRIS))
+    assert (x.title, x.values.tolist(), x.part) == ("x of block 2 (mm)", [5.0], None)
+    assert outcome.title == "measured outcome"
+    assert labels[1] == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("block,quantity\n1,x\n", "not the table of `blocksim sensitivity --out`"),
+        (SOBOL.replace("0.7", "much"), "indices.csv:2"),
+        (SOBOL.splitlines()[0] + "\n", "no result varies"),
+    ],
+)
+def test_other_tables_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(InvalidInputError, match=told):
+        read_indices(written(tmp_path, text))

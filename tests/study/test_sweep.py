@@ -8,7 +8,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
-from multiprocessing import active_children
 from pathlib import Path
 from threading import Event, Semaphore
 from typing import Any
@@ -23,10 +22,10 @@ from blocksim.simulation.observables import table_columns
 from blocksim.study.executors.ensemble import run_case
 from blocksim.study.fragility import fragility, read_fragility
 from blocksim.study.limit import limit, limit_curve
-from blocksim.study.manifest import Manifest, read_sweep
+from blocksim.study.manifest import Manifest, Shard, read_sweep
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.run import run
-from blocksim.study.sweep import sweep
+from blocksim.study.sweep import merge, sweep
 from blocksim.study.sweep_folder import SWEEP, note_table, prepare
 from tests.study.conftest import SCENARIOS
 from tests.study.test_fragility import FRICTION, MU, SLOPE, TILTS
@@ -182,17 +181,6 @@ def test_first_failure_ends_a_sweep_that_is_to_fail_fast(quick: Document, tmp_pa
     whole = sweep(quick, vary, jobs=1, out=tmp_path)
     assert (whole.failed, whole.missing, len(whole.table)) == (1, 0, 64)
     assert len(lines(tmp_path)) == 64
-
-
-def test_impossible_case_and_one_that_cannot_be_built_have_rows_with_the_reason(
-    nominal: Document, tmp_path: Path
-) -> None:
-    vary: dict[str, Values] = {KINETIC: [0.9, 0.2], "time.step": ["auto", 1e-2]}
-    result = sweep(nominal.with_values({END: 0.01}), vary, out=tmp_path)
-    assert result.table["status"].tolist() == ["invalid", "invalid", "finished", "failed"]
-    assert "above static friction" in result.table["reason"][0]
-    assert "step" in result.table["reason"][3]
-    assert (result.failed, len(lines(tmp_path))) == (3, 4)
 
 
 def content(folder: Path) -> dict[Path, bytes]:
@@ -413,14 +401,30 @@ def test_rubbish_for_a_sweep_table_and_a_missing_one_are_refused(tmp_path: Path,
         read_sweep(tmp_path)
 
 
-@pytest.mark.long
-def test_interrupt_between_two_rows_ends_the_workers_at_once(tmp_path: Path) -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
+VARY = {"friction.block_block.kinetic": [0.1 + 0.02 * k for k in range(10)]}
 
-    shipped = SCENARIOS / "three_blocks_nominal.toml"
-    endless = Document.read(shipped).with_settings(["contact.stiffness_scale=0.001", "time.stop_at_rest=false"])
-    vary = {END: [0.001, 1e4, 2e4]}
-    with pytest.raises(StoppedEarlyError, match="1 of 3 cases done"):
-        sweep(endless, vary, out=tmp_path / "out", executor="processes", jobs=2, on_row=interrupt)
-    assert active_children() == []
+
+def test_sweep_does_what_shards_have_left(quick: Document, tmp_path: Path) -> None:
+    sweep(quick, VARY, out=tmp_path / "one")
+    sweep(quick, VARY, out=tmp_path / "two", shard=Shard(0, 2))
+    sweep(quick, VARY, out=tmp_path / "two")
+    assert (tmp_path / "two" / "manifest.jsonl").read_text().count("\n") == 5
+    assert (tmp_path / "two" / "sweep.csv").read_bytes() == (tmp_path / "one" / "sweep.csv").read_bytes()
+
+
+def test_case_that_was_retried_elsewhere_counts_as_finished(quick: Document, tmp_path: Path) -> None:
+    sweep(quick, VARY, out=tmp_path)
+    lines = (tmp_path / "manifest.jsonl").read_text().splitlines(keepends=True)
+    from blocksim.study.manifest import Entry  # noqa: PLC0415
+
+    entry = Entry.from_line(lines[3].encode())
+    assert entry is not None
+    died = Entry(entry.number, entry.case, entry.values, {"status": "failed", "reason": "died", "seconds": 0.0})
+    (tmp_path / "manifest-0-of-2.jsonl").write_bytes(died.to_line())
+    assert merge(tmp_path).failed == 0
+    assert read_sweep(tmp_path).failed == 0
+
+
+def test_shards_share_all_cases_out() -> None:
+    shards = [Shard.parse(f"{index}/3") for index in range(3)]
+    assert sorted(number for shard in shards for number in range(11)[shard.slice]) == list(range(11))
