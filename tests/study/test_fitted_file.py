@@ -12,7 +12,7 @@ from tests.golden import Golden
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 KINETIC = "friction.block_block.kinetic"
 WRITTEN: dict[str, tuple[str, dict[str, object], list[str]]] = {
-    "values and all else as it was": ("three_blocks", {KINETIC: 0.2, "contact.restitution": 0.25}, []),
+    "values": ("three_blocks", {KINETIC: 0.2, "contact.restitution": 0.25}, []),
     "bare number": ("three_blocks_nominal", {KINETIC: 0.2, "contact.restitution.block_ground": 0.1}, []),
     "units": ("three_blocks", {"structures.0.overlap": "10.12 mm", "structures.0.left": "1 mm"}, []),
     "new keys": ("three_blocks", {"contact.shear_damping_ratio": 0.3, "ground.tilt": "1 deg", "gravity": 9.8}, []),

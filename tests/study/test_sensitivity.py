@@ -1,4 +1,4 @@
-"""Indices of known functions and of scenarios: a slide whose indices are known, failed runs, outcomes."""
+"""Indices of known functions and of scenarios: failed runs, outcomes."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -26,42 +26,13 @@ from blocksim.study.sensitivity import (
 )
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-SPEED, FRICTION = "bodies.0.velocity.0", "friction.block_ground"
+FRICTION = "friction.block_ground"
 SOFT = {"contact.stiffness_scale": 0.001}
 
 
 def found(name: str, vary: dict[str, Values], method: str, samples: int, **values: object) -> Sensitivity:
     document = Document.read(SCENARIOS / f"{name}.toml").with_values({**SOFT, **values})
     return sensitivity(document, vary, method=method, samples=samples)
-
-
-def moments(low: float, high: float, power: int) -> float:
-    """Return the mean of x**power, x uniform."""
-    if power == -1:
-        return math.log(high / low) / (high - low)
-    return float((high ** (power + 1) - low ** (power + 1)) / ((power + 1) * (high - low)))
-
-
-def test_indices_of_a_slide_are_those_of_its_formula() -> None:
-    # x = v^2 / (2 mu g), a product of independent factors A = v^2 and B = 1 / (2 mu g):
-    # V = E[A]^2 V[B] + E[B]^2 V[A] + V[A] V[B], and the first two are those of friction and speed alone
-    v, mu, g = (0.4, 0.6), (0.3, 0.4), 9.81
-    mean_a, var_a = moments(*v, 2), moments(*v, 4) - moments(*v, 2) ** 2
-    mean_b = moments(*mu, -1) / (2 * g)
-    var_b = moments(*mu, -2) / (2 * g) ** 2 - mean_b**2
-    alone = {SPEED: mean_b**2 * var_a, FRICTION: mean_a**2 * var_b}
-    variance = sum(alone.values()) + var_a * var_b
-
-    result = found("slide", {SPEED: {"from": v[0], "to": v[1]}, FRICTION: {"from": mu[0], "to": mu[1]}}, "sobol", 128)
-    assert (result.runs, result.failed, result.left_out) == (512, 0, 0)
-    x = result.outputs[0]
-    assert (x.name, x.unit) == ("x of block block", "mm")
-    assert x.mean == pytest.approx(1e3 * mean_a * mean_b, rel=0.01)
-    assert x.sd == pytest.approx(1e3 * variance**0.5, rel=0.05)
-    for index, key in enumerate(result.keys):
-        assert abs(x.numbers["S1"][index] - alone[key] / variance) <= x.numbers["± S1"][index]
-        total = 1.0 - (variance - alone[key] - var_a * var_b) / variance
-        assert abs(x.numbers["ST"][index] - total) <= x.numbers["± ST"][index]
 
 
 def test_measured_quantities_and_outcome_are_looked_at() -> None:
