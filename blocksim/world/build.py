@@ -34,6 +34,8 @@ CHECKS = 500  # of rest, overlap and finiteness, in the time that rest must last
 CHEAP_CHECKS = 50  # steps between checks, from which on they cost almost nothing; where steps are long,
 FEWEST_CHECKS = 50  # in that time at least
 LONGEST_HOLD = 5.0  # ends of the run, as which a longer time that rest must last counts, and none
+LEAST_PAIRS = 16
+PAIRS_PER_BODY = 3
 GROWTH = 1.25  # of the room for pairs, each time that it does not suffice
 Floats = NDArray[np.float64]
 
@@ -338,7 +340,7 @@ def numbers(shape: int | tuple[int, ...], kind: type[np.generic]) -> Any:
 
 def first_capacity(bodies: int) -> int:
     """Return the room for pairs to start with: the contacts of convex bodies in a plane are at most three a body."""
-    return max(16, 3 * bodies)
+    return max(LEAST_PAIRS, PAIRS_PER_BODY * bodies)
 
 
 def empty_lists(capacity: int, slots: int, contacts: arrays.Records) -> dict[str, Any]:

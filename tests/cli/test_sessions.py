@@ -1,8 +1,10 @@
 """Sessions at a shell: commands one after the other in one folder, and all that is printed, in golden/sessions.txt."""
 
+import os
 import re
 import shlex
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,6 +49,7 @@ def in_shell(line: str, given: str = "") -> str:
     """Return what the shell prints at a line."""
     done = subprocess.run(
         ["bash", "-c", line],  # noqa: S607 - the one that users have
+        env={**os.environ, "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])},
         input=given,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

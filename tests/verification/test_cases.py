@@ -173,8 +173,8 @@ def test_a_number_is_inside_up_to_its_tolerance(row: Row, inside: bool) -> None:
 
 
 def test_cases_that_are_not_there_are_told_and_those_about_springs_say_why() -> None:
-    with pytest.raises(InvalidInputError, match="S12: no such case of soil; choose S1, S2"):
-        choose_cases(["S12"], Setting(), soil=True)
+    with pytest.raises(InvalidInputError, match="S13: no such case of soil; choose S1, S2"):
+        choose_cases(["S13"], Setting(), soil=True)
     assert [case.id for case in CASES if case not in cases_of(RIGID)] == ["V2", "V20", "V25"]
     assert all(len(reason) > 20 for reason in exclusions(RIGID))
     assert exclusions("explicit") == ()
