@@ -117,6 +117,7 @@ def strip_before(body: PlacedBody, face: Face) -> PlacedBody:
 
 
 MOST_MEETINGS = 20
+MOST_NAMES = 3
 PLACES_ON_A_WALL = 33
 
 
@@ -155,9 +156,12 @@ def _blocks_in(soil: SoilTable, scenario: Scenario) -> Iterator[tuple[str, NDArr
 def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Yield the key of an outline and what it meets: ground, walls, blocks that it is not poured onto, other soils."""
     found, corners = [*_boundaries(soil, scenario)], soil.corners
-    if soil.kind != "fill":
-        found += [f"block {name}" for name, _ in _blocks_in(soil, scenario)]
-    elif not len(particle_places(soil, scenario)):
+    blocks = [name for name, _ in _blocks_in(soil, scenario)]
+    if blocks and soil.kind != "fill":
+        more = f" and {len(blocks) - MOST_NAMES} more" if len(blocks) > MOST_NAMES else ""
+        which = f"blocks {', '.join(blocks[:MOST_NAMES])}" if len(blocks) > 1 else f"block {blocks[0]}"
+        found.append(f'{which}{more}; kind = "fill" leaves blocks out')
+    elif blocks and not len(particle_places(soil, scenario)):
         found.append("blocks everywhere: no particle has room")
     for other in soil_tables(scenario):
         if other is soil:
