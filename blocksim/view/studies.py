@@ -379,6 +379,7 @@ def draw_levels(
         width, height = style.size_of(row[0])
         for panel, axes in zip(panels, row, strict=True):
             axes.set_yscale("log")
+            style.number_axis(axes.yaxis, is_log=True)
             axes.set_ylim(low, high)
             _draw_level(axes, panel, shown, width)
             _draw_limits(axes, panel.tolerance_mm, least, named=axes is row[-1])

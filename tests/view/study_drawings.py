@@ -102,6 +102,7 @@ def motion(path: Path, paper: Paper) -> None:
 NINE = (9.0, 9.0)
 STUDIES: dict[str, Drawing] = {
     "levels of sixty blocks": lambda path, paper: draw_levels([panel(60)], path, title="slide", paper=paper),
+    "levels of nothing that moves": lambda path, paper: draw_levels([panel(size_mm=0.0)], path, paper=paper),
     "levels of little": lambda path, paper: draw_levels(
         [panel(size_mm=1e-6), panel(size_mm=20.0)], path, measured={"b1": 50.0}, paper=paper
     ),
