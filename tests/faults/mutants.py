@@ -81,7 +81,10 @@ def changes(node: ast.AST) -> Iterator[str]:
     elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
         yield str(not node.value)
     elif isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-        yield from (str(node.value + 1), str(node.value - 1) if isinstance(node.value, int) else str(2 * node.value))
+        yield from (
+            str(node.value + 1),
+            str(node.value - 1) if isinstance(node.value, int) else str(2 * node.value or 0.5),
+        )
     elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in {"min", "max"}:
         yield _changed(node, func=ast.Name("max" if node.func.id == "min" else "min"))
     elif isinstance(node, ast.Return) and node.value is not None:
