@@ -224,6 +224,9 @@ def _measurement(row: dict[str, input_files.TableCell], problems: list[Problem])
     return Measurement(block.text, row["quantity"].text, quantity.unit, int(number.text), value)
 
 
+PROPERTY_COLUMNS = ("property", "unit", "value")
+
+
 class Interval(NamedTuple):
     """The SI unit of a property and the open interval its value lies in."""
 
@@ -261,7 +264,7 @@ def load_properties(path: Path | str) -> PropertyTable:
 
     Raises InputMissingError when the file cannot be read and InvalidInputError with every mistake located.
     """
-    table = input_files.read_table(Path(path), ("property", "unit", "value"))
+    table = input_files.read_table(Path(path), PROPERTY_COLUMNS)
     values: dict[str, float] = {}
     for row in table.rows:
         cell, unit = row["property"], row["unit"]

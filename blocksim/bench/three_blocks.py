@@ -82,6 +82,7 @@ ENSEMBLE = harness.Benchmark("ensemble", "many collapses together", measure_ense
 CLOSE = 0.2e-3  # m
 DURATION, QUICK_DURATION = 0.4, 0.01  # s
 SCALES = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)
+QUICK_SCALES = (1e-4, 1e-3, 1e-2)
 SAFETIES = (0.1, 0.05)
 ONE_SWEEP = harness.TimeSteps(1e-3, substeps=1, velocity_sweeps=1)  # enough without restitution
 STEPS = (1e-3, 5e-4, 2e-4, 1e-4)  # s
@@ -139,7 +140,7 @@ def solve_level(setting: Mapping[str, float], scenario: Scenario, repeats: int) 
 
 def measure_explicit(effort: harness.Effort) -> harness.Readings:
     """Measure a step at full stiffness, and the cheapest collapse that greater stiffnesses confirm."""
-    scales = (1e-4, 1e-3, 1e-2) if effort.quick else SCALES
+    scales = QUICK_SCALES if effort.quick else SCALES
     rows = []
     for safety in SAFETIES:
         keys = [{"stiffness_scale": scale, "safety": safety} for scale in scales]

@@ -10,6 +10,7 @@ from blocksim.silence import silent
 from blocksim.study import calibrate, calibrate_plan
 
 COLUMNS = ("key", "prior", "fitted")
+TIED = ("key", "prior", "equally good", "written")
 TOLD_SECONDS = 2.0
 
 
@@ -92,7 +93,7 @@ def _values(found: calibrate.Fit) -> list[str]:
         for prior, value in rows
     ]
     return [
-        *output.table_lines(("key", "prior", "equally good", "written"), tied, left=1),
+        *output.table_lines(TIED, tied, left=1),
         "",
         f"{len(found.ties)} of {found.trials} trials tie: the measurement does not decide between their values;",
         "the file holds one of them. More measurements or --samples may tell them apart",

@@ -44,6 +44,7 @@ HARD_SPACE = "\N{NO-BREAK SPACE}"
 USUAL_SPEED = 0.6  # m/s, the root of gravity times a side of some centimetres, for which defaults are chosen
 UNSCALED = ("step", "rest_speed", "rest_hold", "velocity_tolerance", "restitution_threshold", "transition_speed")
 MILLI = 1e3
+MICRO = 1e6
 PREFIXES = ((1e6, "M"), (1e3, "k"))
 
 
@@ -87,7 +88,7 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         solved = f"each solved to {MILLI * rigid.tolerance:g} mm/s"
         yield f"           {rigid.why}"
         yield f"           in {rigid.substeps} substeps, {solved}; manual limit {rigid.longest_step:.1e} s"
-        sag = f"{1e6 * rigid.sag:.3g} µm at rest, block {rigid.block}"
+        sag = f"{MICRO * rigid.sag:.3g} µm at rest, block {rigid.block}"
         yield f"sag        {sag}: numerical, proportional to step squared"
         if rigid.warning:
             yield f"warning: {rigid.warning}"

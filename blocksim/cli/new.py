@@ -13,6 +13,7 @@ from blocksim.options import Option
 from blocksim.scenario import json_schema, spelling
 from blocksim.simulation.files import write_text
 
+TEMPLATES = "templates"
 PLACE = "@NAME@"
 NEXT = {".toml": "blocksim check {path}", ".csv": 'name it in a scenario: [experiment] table = "{path}"'}
 SWEEP = "sweep-"
@@ -20,7 +21,7 @@ SWEEP = "sweep-"
 
 def templates() -> dict[str, Traversable]:
     """Return the templates by kind: the name of their file without its extension."""
-    found = (files("blocksim.cli") / "templates").iterdir()
+    found = (files("blocksim.cli") / TEMPLATES).iterdir()
     return dict(sorted((entry.name.partition(".")[0], entry) for entry in found))
 
 

@@ -15,6 +15,7 @@ from blocksim.study import answer, manifest, run, run_folder, sweep, sweep_folde
 INDENT = "  "
 MOST_LINES = 5
 LONGEST = 60  # characters of an entry of the provenance
+MOST_WORDS = 12
 UNITS = {  # by the ends of names of quantities; the longer of two that fit first
     "_mm_s": " mm/s", "_deg_s": "°/s", "_mm": " mm", "_deg": "°", "_J": " J", "_s": " s", "_m": " m", "_N": " N"
 }  # fmt: skip
@@ -186,7 +187,7 @@ def _changes(origins: tuple[verify.OriginDifference, ...]) -> Iterator[str]:
     for one in origins:
         then, now = set(one.then.split()), set(one.now.split())
         change = f"{one.then[:LONGEST]} -> {one.now[:LONGEST]}"
-        if len(then | now) > 12:
+        if len(then | now) > MOST_WORDS:
             words = [f"-{word}" for word in sorted(then - now)] + [f"+{word}" for word in sorted(now - then)]
             change = " ".join(words)
         yield f"changed since: {one.name}: {change}"

@@ -18,6 +18,7 @@ MAX_SHOWN = 110
 """Characters of a line that a message shows; a longer line is cut on both sides of the caret."""
 
 _SYNTAX_PLACE = re.compile(r" \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
+_TWICE = re.compile("Cannot (overwrite a value|declare|mutate|redefine)|Duplicate inline table key")
 _CLEARER = {
     "Illegal character '\\n'": "a string in quotes must end on its line",
     "Expected newline or end of document after a statement": "this cannot follow here; strings need quotes",
@@ -90,7 +91,7 @@ class ScenarioText:
         number = len(self.text.rstrip("\n").split("\n")) if at_end else int(found["line"])  # type: ignore[index]
         line = self.lines[number - 1]
         column = len(line) if at_end else int(found["column"]) - 1  # type: ignore[index]
-        if re.match("Cannot (overwrite a value|declare|mutate|redefine)|Duplicate inline table key", message):
+        if _TWICE.match(message):
             head = re.match(r"\s*(\[*)([^=\]]*[^=\]\s])?", line)
             start, end = (head.start(2), head.end(2)) if head is not None and head[2] else (0, len(line))
             return self.problem_in("this key or table is defined further up", "", Span(number, start, end - start))

@@ -28,6 +28,7 @@ MAX_PARTS = 64  # of a dotted key; the time of tomllib grows with their square
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _BASIC = re.compile(r'"(?:[^"\\\n]|\\[^\n])*"')
+_LITERAL = re.compile(r"'[^'\n]*'")
 _BLANK = re.compile(r"[ \t]*")
 
 
@@ -39,7 +40,7 @@ def read_key(text: str, start: int = 0) -> tuple[tuple[str, ...], int]:
     parts: list[str] = []
     while len(parts) < MAX_PARTS:
         start = skip(text, start)
-        found = next((m for p in (_BASIC, re.compile(r"'[^'\n]*'"), _BARE) if (m := p.match(text, start))), None)
+        found = next((m for p in (_BASIC, _LITERAL, _BARE) if (m := p.match(text, start))), None)
         if found is None:
             raise ValueError("not a key")
         part = found[0]
@@ -185,6 +186,7 @@ Data = Mapping[str, object]
 MAX_DEPTH = 16
 SYNONYMS = {"kinetic": "kinetic_ratio", "kinetic_ratio": "kinetic"}
 """Two keys with the same meaning; setting one removes the other."""
+_NAMED = (("materials",), ("blocks",))
 _FRICTION = contact.Friction()
 
 
@@ -276,7 +278,7 @@ def _put(data: Data, node: object, parts: Sequence[str | int], value: object, do
         raise UnfitOverrideError(f"{format_key(done)} is {toml(node)}, not a table")
     part = str(parts[0])
     child = node.get(part, MISSING)
-    if child is MISSING and tuple(done) in (("materials",), ("blocks",)) and len(parts) > 1:
+    if child is MISSING and tuple(done) in _NAMED and len(parts) > 1:
         hint = did_you_mean_or_list(part, node)
         raise UnfitOverrideError(f"{done[0]} has no {toml(part)}, {hint}")
     if child is MISSING and not done and len(parts) > 1:

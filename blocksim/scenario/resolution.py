@@ -70,6 +70,8 @@ def resolve_pair(scenario: Scenario, one: str, other: str, *, ground: bool) -> R
 
 MARK = "# Resolved by blocksim"  # of every version; what follows in the line is for people
 HEADER = f"{MARK}: all values as used, in SI units (m, kg, s, N, Pa), angles in rad.\n"
+SCHEME = "time.scheme"
+UNHASHED = {"description", "experiment", "sweep", "provenance"}
 
 
 def scenario_to_toml(
@@ -97,7 +99,7 @@ def scenario_to_toml(
         for friction, path in frictions:
             if friction is not None and "kinetic" not in friction.model_fields_set:
                 functools.reduce(dict.__getitem__, path, data).pop("kinetic", None)
-    if scenario.sweep is not None and "time.scheme" in scenario.sweep.vary:
+    if scenario.sweep is not None and SCHEME in scenario.sweep.vary:
         data["time"] = {key: value for key, value in data["time"].items() if key in timeline.Time.model_fields}
     if experiment_table is not None and "experiment" in data:
         data["experiment"] = {"table": experiment_table}
@@ -112,7 +114,7 @@ def scenario_to_toml(
 
 def deciding_values(scenario: Scenario) -> dict[str, Any]:
     """Return everything that determines the motion and the output, as for JSON; of a table of motion its digest."""
-    data = scenario.model_dump(mode="json", exclude={"description", "experiment", "sweep", "provenance"})
+    data = scenario.model_dump(mode="json", exclude=UNHASHED)
     if isinstance(scenario.motion, motion.TABLED):
         data["motion"]["table"] = scenario.motion.table.digest
     for number, table in tables_of_bodies(scenario).items():

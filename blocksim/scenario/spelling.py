@@ -7,6 +7,7 @@ from itertools import islice
 MIN_BEGINNING = 3  # letters that a word needs before a similar word is suggested
 MAX_COMPARED = 1000
 """Known words that a misspelt one is compared with; a file of a million mistakes must not take minutes."""
+MAX_LISTED = 10
 LEAST_SHARE = 0.6  # of letters that two similar words have in common
 ROUND_OFF = 1e-9
 USUAL: Mapping[str, tuple[str, ...]] = {
@@ -87,7 +88,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"did you mean {similar!r}?" if similar else ""
 
 
-def did_you_mean_or_list(word: str, known: Iterable[object], what: str = "known", most: int = 10) -> str:
+def did_you_mean_or_list(word: str, known: Iterable[object], what: str = "known", most: int = MAX_LISTED) -> str:
     """Suggest the known word that may have been meant, or list the first known words after what they are."""
     names = [str(name) for name in known]
     first = ", ".join(names[:most]) + (", …" if len(names) > most else "")

@@ -20,6 +20,7 @@ ROOMS = ("kernels", "scenario", "simulation", "world")  # their code decides the
 PACKAGES = ("numpy", "numba", "llvmlite", "pydantic", "h5py", "pandas")  # the first three compile or compute the bits
 HASH_DIGITS = 12
 ROOM_PREFIX = "code_"  # and a room: the hash of its code
+CPU_INFO = Path("/proc/cpuinfo")
 
 
 def code_version() -> str:
@@ -87,7 +88,7 @@ def machine() -> str:
 
 def _processor() -> str:
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = CPU_INFO.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]

@@ -50,6 +50,7 @@ ARC = 2.0  # squares of these ways over that side, by which blocks on arcs overl
 HELD = ("inverse_mass", "inverse_inertia", "counts")
 VELOCITIES = ("vx", "vy", "spin")
 FALLS = ("fx", "fy", "torque")
+PATHS = ("shift", "turn")  # pieces of driven bodies that hold
 MILLI = 1e3
 Floats = NDArray[np.float64]
 Stop = Callable[[], str]
@@ -183,7 +184,7 @@ class _Settlement:
         world.controls[...] = controls
         world.load_pieces[...] = pieces
         world.motion[...] = paths
-        for name in ("shift", "turn"):
+        for name in PATHS:
             world.moved[name] = driven[name]
         for name in (*FALLS, "last_piece"):
             world.loads[name] = loads[name]

@@ -87,6 +87,9 @@ def force_on_supports(contacts: Contacts, up: tuple[float, float] = (0.0, 1.0), 
     return np.diff(np.concatenate([[0.0], total])[contacts.ends], prepend=0.0)
 
 
+EXTRA = "xarray"
+
+
 @dataclass(frozen=True, repr=False)
 class Frames:
     """Recorded states in SI; n frames of b bodies. Rotations counter-clockwise positive."""
@@ -169,7 +172,7 @@ def data_set(frames: Frames, name: str) -> "xr.Dataset":
     Variables of another system begin with its name, and have a dimension of their own. Raises UnavailableError without
     the extra `xarray`.
     """
-    xarray = load_module("xarray", "to_xarray", "xarray")
+    xarray = load_module("xarray", "to_xarray", EXTRA)
     variables: dict[str, Any] = {}
     coordinates: dict[str, Any] = {"time": ("time", frames.time, {"units": "s"})}
     for track in frames.tracks:

@@ -22,6 +22,7 @@ from blocksim.study.rows import FINISHED
 
 STANDS = "--stands"
 DEFAULT = "outcome = stands | rocked back"
+FORM = re.compile(r"\s*([a-z]+)\s*(<=|>=|!=|==?|<|>)\s*(.*?)\s*")
 UNITS = {  # of observables: kind, units in one of SI
     "mm": (q.LENGTH, 1e3),
     "deg": (q.ANGLE, math.degrees(1.0)),
@@ -87,7 +88,7 @@ def read_criterion(text: str, option: str = STANDS) -> Criterion:
 
 def _condition(text: str) -> tuple[Callable[[Mapping[str, object]], bool], list[float]]:
     """Return a condition, and the displacement (m) that it names if it does. Raises ValueError."""
-    match = re.fullmatch(r"\s*([a-z]+)\s*(<=|>=|!=|==?|<|>)\s*(.*?)\s*", text)
+    match = FORM.fullmatch(text)
     if match is None:
         raise ValueError('write for example "moved < 5 mm" or "outcome != fell"')
     word, sign, value = match[1], match[2].replace("==", "="), match[3]

@@ -42,6 +42,7 @@ from blocksim.view import studies as view, style
 INTENSITY, SCATTER, STRIPES, FAILS = "--intensity", "--scatter", "--stripes", "--fails"
 COLLAPSE = "outcome = fell"
 MEMBERS = 64
+MOST_SEED = 2**53
 NO_SCATTER = (
     "no scatter: give --scatter KEY=MEAN+-SD (or KEY=FROM:TO, KEY=a,b,c), --stripes KEY=a,b,c, or a [sweep] table with "
     "distributions"
@@ -219,7 +220,7 @@ def read_fragility(document: Document, options: FragilityOptions) -> FragilityPl
     shared = _stripes(bare, plans.Variations.of(options.stripes or {}))
     records = len(next(iter(shared.values()), ()))
     members = (records or MEMBERS) if options.members is None else options.members
-    if members < 1 or members * len(levels) > plans.MOST_CASES or not 0 <= seed <= 2**53:
+    if members < 1 or members * len(levels) > plans.MOST_CASES or not 0 <= seed <= MOST_SEED:
         raise InvalidInputError(
             f"{members} samples at {len(levels)} intensities with seed {seed}: "
             f"1 to {plans.MOST_CASES} runs are possible"

@@ -41,6 +41,7 @@ HALVINGS = 2  # of the spacing of a scan, beside a peak
 OUTWARD = 2.0  # widths of what is known, by which a search near a value goes on beyond it
 FLOOR = 1e-6  # of the range: brackets about zero get no narrower
 NEAR = 0.01  # of the smallest side of a block: what is farther from all others is to drop
+SCANNED = 9
 MOST_SCANNED = MOST_VALUES = 1000
 TOLERANCE = 1e-3
 LEAST_TOLERANCE = 1e-9
@@ -114,7 +115,7 @@ class SearchOptions(executors.Execution):
             "seen.",
             metavar="N",
         ),
-    ] = 9
+    ] = SCANNED
     stiffer: Annotated[
         bool | None,
         Option(

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+SHARD_FORM = re.compile(r"(\d{1,6})/(\d{1,6})")
 MANIFEST = "manifest.jsonl"
 PATTERN = "manifest*.jsonl"
 SUM = b',"sum":"'
@@ -48,7 +49,7 @@ class Shard:
     @classmethod
     def parse(cls, text: str) -> Self:
         """Read "i/n". Raises InvalidInputError unless 0 <= i < n."""
-        match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
+        match = SHARD_FORM.fullmatch(text.strip())
         shard = None if match is None else cls(int(match[1]), int(match[2]))
         if shard is None or shard.index >= shard.of:
             message = f"--shard {text}: write I/N with I from 0 to N - 1, such as 0/8 for the first of eight"
@@ -238,6 +239,7 @@ def note_timings(path: Path, executor: str, batch: Batch) -> None:
         raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
 
 
+TEXT_COLUMNS = {"case": str, "status": str, "reason": str, "first_mover": str}
 MOST_BYTES = 2000 * MEGABYTE  # of sweep.csv: a million cases of a hundred blocks do not fit into most memories
 OUTCOME = ("status", "reason", "seconds")
 NEEDED = {"case", "status"}
@@ -277,7 +279,7 @@ class SweepResult:
         path = self.folder / self.name
         try:
             refuse_large(path, MOST_BYTES)
-            table = pd.read_csv(path, dtype={"case": str, "status": str, "reason": str, "first_mover": str})
+            table = pd.read_csv(path, dtype=TEXT_COLUMNS)
         except (OSError, ValueError) as error:
             raise InvalidInputError(f"{path}: {NO_TABLE}: {str(error).strip()}") from error
         if not set(table.columns) >= NEEDED or table.columns[0] != "case":

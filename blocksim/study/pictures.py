@@ -125,6 +125,7 @@ def unit_of(scenario: Scenario, key: str) -> str:
 TORNADO = "tornado"
 LARGEST_FILE = 10_000_000  # bytes
 HEAD = ("output", "unit", "key")
+UNITLESS = ("share", "")
 
 
 @dataclass(frozen=True)
@@ -167,7 +168,7 @@ def read_indices(path: Path) -> tuple[list[studies.Bars], tuple[str, str]]:
         own = [row for row in rows if row["output"] == output]
         columns = {name: np.array([row[name] for row in own], dtype=np.float64) for name in own[0] if name not in HEAD}
         unit = str(own[0]["unit"])
-        bracket = f" ({unit})" if shown.has_unit and unit not in ("share", "") else ""
+        bracket = f" ({unit})" if shown.has_unit and unit not in UNITLESS else ""
         keys = tuple(str(row["key"]) for row in own)
         value, half_width = columns[shown.value], columns[shown.half_width]
         panels.append(studies.Bars(f"{output}{bracket}", keys, value, half_width, columns.get(shown.part)))

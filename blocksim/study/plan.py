@@ -160,6 +160,7 @@ def refuse_wrong_values(document: Document, columns: Iterable[CaseColumn]) -> No
 Places = NDArray[np.float64]  # numbers u with 0 < u < 1, shape (samples,)
 LEAST = 2.0**-54  # places stay this far away from 0, and one rounding from 1: the normal distribution is infinite there
 WORD_BYTES = 4
+DIMENSIONS = 128
 """Dimensions that are scrambled, however few are used: so those in use do not depend on how many they are."""
 BITS = 30
 CHUNK = 4096  # points made at a time; a power of two
@@ -208,7 +209,7 @@ def places_of(sweep: Sweep) -> Places:
     """
     if sweep.mode == "sobol":
         sequence = load_module("scipy.stats.qmc", "sampled sweeps").Sobol(
-            128, scramble=True, bits=BITS, seed=generator(sweep.seed, "sobol")
+            DIMENSIONS, scramble=True, bits=BITS, seed=generator(sweep.seed, "sobol")
         )
         size = min(CHUNK, 1 << (sweep.samples - 1).bit_length())
         chunks = [sequence.random(size)[:, : len(sweep.vary)].copy() for _ in range(0, sweep.samples, size)]
@@ -413,6 +414,7 @@ def table_digests(document: Document, vary: Mapping[str, Variation]) -> dict[str
 ENDS = ("from", "to", "count")
 LEAST_ENDS = 2
 LOG = "log"
+PLUS_MINUS = ("+-", "±")
 FORMS = "KEY=a,b,c, KEY=from:to:count, KEY=from:to or KEY=mean+-sd (from:to also with :log at the end)"
 RANGE = "KEY=from:to (also with :log at the end)"
 SPREAD = "KEY=from:to, KEY=mean+-sd or KEY=a,b,c (from:to also with :log at the end)"
@@ -467,7 +469,7 @@ def read_variations(texts: Sequence[str], option: str = "--vary", forms: str = F
 
 
 def _values(text: str) -> Values:
-    sign = next((sign for sign in ("+-", "±") if sign in text), None)
+    sign = next((sign for sign in PLUS_MINUS if sign in text), None)
     if sign is not None:
         mean, _, sd = text.partition(sign)
         return {"mean": _value(mean), "sd": _value(sd)}

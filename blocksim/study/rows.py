@@ -32,6 +32,7 @@ KEPT = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")  # of the final t
 QUARTER = 90.0  # deg
 DIGITS = 12  # of a number in the table: more show the rounding of the unit
 HEAD = re.compile(r"(?P<key>.*?) \[(?P<unit>[^\[\]]+)\]")
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
 MARK = "'"  # spreadsheets show what follows as text
 NUMBERS = "if"  # kinds of numpy
 
@@ -121,7 +122,7 @@ def as_cell(value: object) -> object:
 
     Values and reasons may come from the scenario of a stranger. Numbers and quantities ("-5 deg") stay as they are.
     """
-    if not isinstance(value, str) or not value.startswith(("=", "+", "-", "@", "\t", "\r")):
+    if not isinstance(value, str) or not value.startswith(FORMULA):
         return value
     for read in (float, lambda text: units.parse_quantity(text, units.NUMBER)):
         with suppress(ValueError):

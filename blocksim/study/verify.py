@@ -34,6 +34,7 @@ from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, Row, as_cell, inv
 CODE = "code"
 DECIDES = ("blocksim", provenance.ROOM_PREFIX, "python", "numpy", "numba", "llvmlite", "platform", "processor", "cpu")
 ALWAYS = ("name", "steps", "time_step_s", "simulated_time_s", "energy_J")
+UNLESS_INTERRUPTED = ("reason", "exit_code")
 OF_THE_MOTION = ("settled", "events", "movement")  # what earlier versions did not keep is not there, or null
 HASHES = ("run", "scenario_hash")  # of the code, or of what it makes of a file, too
 SAMPLE = 16  # rows, where nobody says how many
@@ -59,7 +60,7 @@ def differing_entries(
     The final state and the status are not among them: they are reported by themselves.
     """
     whole = then.status != INTERRUPTED
-    names = [*ALWAYS, *(("reason", "exit_code") if whole else ()), *(HASHES if same_code else ())]
+    names = [*ALWAYS, *(UNLESS_INTERRUPTED if whole else ()), *(HASHES if same_code else ())]
     stored, wanted = _read_entries(folder / files.SUMMARY), json.loads(now.to_json())
     if not whole and same_code:  # the repetition is of a scenario with another end
         wanted |= {name: getattr(then, name) for name in HASHES}

@@ -13,6 +13,7 @@ from blocksim.scenario.models.timeline import SCHEMES, SPRINGS
 from blocksim.verification.scene import CaseScene, Simulation
 
 NUMBERS = ("quantity", "unit", "expected", "measured", "error", "tolerance")  # of a row, for programs
+VELOCITY_TOLERANCE = 1e-6
 """Of the non-smooth scheme (m/s) at steps given by hand: studies of the step know no unsolved impulses."""
 
 
@@ -104,7 +105,7 @@ class Setting:
         contact = {"model": self.model, "law": self.law, **values.pop("contact", {})}
         stepping: dict[str, object] = {} if self.has_springs else {"scheme": self.scheme}
         if stepping and self.rigid_step is not None:
-            stepping |= {"step": self.rigid_step, "substeps": 1, "velocity_tolerance": 1e-6}
+            stepping |= {"step": self.rigid_step, "substeps": 1, "velocity_tolerance": VELOCITY_TOLERANCE}
         return CaseScene(bodies, contact=contact, time={**stepping, **values.pop("time", {})}, **values)
 
     def start(

@@ -23,6 +23,9 @@ EXACT_PLANE = {
     "kernel": "the plane is exact, the face of a fixed block is made of particles; bounces multiply the difference"
 }
 MEANS = {"kernel": "distances and normals are means over a smoothing length, which is halved with the spacing"}
+FEW_AT_EDGES = {
+    "kernel": "probably because few particles bear at an edge, which overlaps too far with these soft contacts"
+}
 LEDGER = {
     "particles": "probably because ends of ground segments have no disc, so contacts at edges end at full overlap",
     "kernel": "the stiffness of a particle changes with its angle to the face, without a corresponding torque",
@@ -30,6 +33,9 @@ LEDGER = {
 SAMPLING = dict.fromkeys(
     ("particles", "kernel"),
     "the position of the opposite particles decides how strongly an edge acts; small differences grow",
+)
+PAIRWISE = dict.fromkeys(
+    ("particles", "kernel"), "dashpots of a pair stand for the whole block, also where other pairs bear it too"
 )
 
 CASES = (
@@ -72,8 +78,7 @@ CASES = (
         "moments about edges",
         statics.overhanging_stacks,
         "linear law: a hundredth of the stiffness",
-        ROUNDING
-        | {"kernel": "probably because few particles bear at an edge, which overlaps too far with these soft contacts"},
+        ROUNDING | FEW_AT_EDGES,
     ),
     Case(
         "V14",
@@ -117,9 +122,7 @@ CASES = (
         "flat landings on one to three seats",
         "restitution, no spin",
         impacts.seats,
-        remarks=dict.fromkeys(
-            ("particles", "kernel"), "dashpots of a pair stand for the whole block, also where other pairs bear it too"
-        ),
+        remarks=PAIRWISE,
         not_for={IMPULSES: "it is about springs of several pairs below one block; V4 has rigid restitution"},
     ),
 )

@@ -13,6 +13,7 @@ from blocksim.verification import case, scene
 
 ANGLES = tuple(range(90))  # degrees
 FRICTIONS = tuple(tenth / 10 for tenth in range(11))
+LOSSY = (0.0, 0.3, 0.6, 0.9)  # restitutions
 SAFETY = 0.05  # the default; the stiffest mode has frequency times step = 2 safety
 PHASES = (0.1, 0.3, 0.5, 0.7, 0.9)  # of a step, at which an impact begins
 ROUND_OFF = 1e-12
@@ -40,7 +41,7 @@ def impacts(setting: case.Setting) -> Iterator[case.Row]:
         scene.Throw(radians(angle), friction, (scene.GOLDEN * number) % 1.0)
         for number, (angle, friction) in enumerate(product(ANGLES, FRICTIONS))
     ]
-    lossy = max(largest_gain(scene.Thrower(setting, e), throws) for e in (0.0, 0.3, 0.6, 0.9))
+    lossy = max(largest_gain(scene.Thrower(setting, e), throws) for e in LOSSY)
     yield case.Row("gain, e ≤ 0.9", "", 0.0, max(lossy, 0.0), ROUND_OFF)
     bound = (2.0 * SAFETY) ** 2 / 4.0 if setting.has_springs else ROUND_OFF
     yield case.Row("gain, e = 1", "", 0.0, max(largest_gain(scene.Thrower(setting, 1.0), throws), 0.0), bound)

@@ -13,6 +13,7 @@ from blocksim.verification.scene import GOLDEN, HEIGHT, POLL, WIDTH, PaperBlock,
 
 SPACINGS = (5e-4, 1e-3, 2e-3, 4e-3)  # m, of boundary particles
 DROP, RESTITUTION = 0.1, 0.5  # m, -
+FALL_POLL = 5e-5  # s
 LARGEST = 10.0  # m, m/s: the numbers of the flight are smaller
 BOUNCE_TOLERANCES = (0.01, 0.02, 0.04)
 LONGEST = 0.6  # s; all bounces are over by then
@@ -56,7 +57,7 @@ def observe_bounces(fall: Simulation) -> tuple[list[float], list[float]]:
     times: list[float] = []
     apexes = [0.0]
     falling = True
-    poll = max(5e-5, fall.step)
+    poll = max(FALL_POLL, fall.step)
     while len(times) <= len(BOUNCE_TOLERANCES) and fall.time < LONGEST:
         body = fall.to_time(fall.time + poll).bodies[0]
         if falling and body.vy > 0.0:
@@ -75,6 +76,7 @@ TILT = radians(30.0)
 FALLING = forms.Velocity(0.0, -1.0, 0.0)
 STICKING = 2.0  # friction coefficient
 EXACT = 1e-9  # m/s, rad/s: rigid impacts are those of the closed forms
+COLLISION_STEPS = 20_000
 COLLISION_END = 4e-3  # s, of rigid blocks
 WIDTH_TWO = 0.03  # m: of the second of two blocks that collide
 REBOUNDS, REBOUND = (0.2, 0.8), 1e-3  # restitutions; off them by, as arms are those before a step
@@ -137,7 +139,7 @@ def two_blocks(setting: Setting) -> Iterator[Row]:
     scenes = [collision(setting, e) for e in (0.0, 0.2, 1.0)]
     before = [momenta(scene) for scene in scenes]
     step = scenes[0].step
-    steps = 20_000 if setting.has_springs else round(COLLISION_END / step)
+    steps = COLLISION_STEPS if setting.has_springs else round(COLLISION_END / step)
     after = [momenta(scene.to_step(steps)) for scene in scenes]
     worst = np.abs(np.array(after) - np.array(before)).max(axis=0)
     mass = float(scenes[0].bodies.mass.sum())
@@ -193,6 +195,7 @@ SEATS = {
     "three seats": (-FAR, -4e-3, 3e-3, FAR),
 }  # m: ends of the seats from the centre of the block
 LOOSE = (-WIDTH, 0.0, WIDTH)  # m, as wide as the block
+SEAT_RESTITUTIONS = (0.0, 0.2, 0.5, 0.8, 1.0)
 GAP_STEPS = 100.37  # of flight, so that a contact begins within a step
 LANDING_POLL, MOST_STEPS = 10, 4000
 
@@ -200,7 +203,7 @@ LANDING_POLL, MOST_STEPS = 10, 4000
 def seats(setting: Setting) -> Iterator[Row]:
     """Drop a block on seats of several lengths for five restitutions; the farthest off counts."""
     for name, ends in SEATS.items():
-        landings = [(asked, land(setting, ends, asked)) for asked in (0.0, 0.2, 0.5, 0.8, 1.0)]
+        landings = [(asked, land(setting, ends, asked)) for asked in SEAT_RESTITUTIONS]
         rebounds = [vy - asked for asked, (vy, _) in landings]
         yield Row(f"{name}, e off by", "", 0.0, farthest(0.0, rebounds), 0.01)
         yield Row(f"{name}, spin", "rad/s", 0.0, farthest(0.0, [spin for _, (_, spin) in landings]), 0.05)

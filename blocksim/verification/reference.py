@@ -22,6 +22,7 @@ from blocksim.verification.cases import CASES, choose_cases, exclusions
 BEGIN = "<!-- verify: written by `make verify-table` -->"
 END = "<!-- end of verify -->"
 SOIL_BEGIN = "<!-- soil: written by `make verify-table` -->"
+SOIL_END = "<!-- end of soil -->"
 STORE = Path("results") / "verify.json"  # below the current folder
 COLUMNS = {  # head of the column: how it is measured
     "linear": Setting(),
@@ -113,7 +114,7 @@ def _reasons(stored: Stored, head: str, before: str = "") -> Iterator[str]:
 
 def with_table(text: str, stored: Stored) -> str:
     """Return a README with the tables between their marks replaced."""
-    return with_part(with_part(text, BEGIN, table(stored), END), SOIL_BEGIN, soil_table(stored), "<!-- end of soil -->")
+    return with_part(with_part(text, BEGIN, table(stored), END), SOIL_BEGIN, soil_table(stored), SOIL_END)
 
 
 def read_store(path: Path) -> Stored:

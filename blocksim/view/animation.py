@@ -33,6 +33,7 @@ CODE = np.array([1 << 16, 1 << 8, 1], dtype=np.int32)  # of red, green and blue:
 UNKNOWN = 255
 MOST_BYTES = 1 << 30  # of all pictures together, which Pillow keeps in memory
 
+PROGRAM = "ffmpeg"
 CODECS = {  # of ffmpeg, the best first; builds without H.264 have MPEG-4
     "libx264": ["-c:v", "libx264", "-crf", "18"],
     "libopenh264": ["-c:v", "libopenh264", "-b:v", "4M"],
@@ -111,7 +112,7 @@ def write_mp4(path: Path, pictures: Iterator[Pixels], seconds: run_data.Floats) 
     try:
         program = str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
     except (ImportError, RuntimeError) as error:
-        program = shutil.which("ffmpeg") or ""
+        program = shutil.which(PROGRAM) or ""
         if not program:
             needed = "MP4 needs ffmpeg, or the package imageio-ffmpeg"
             message = f"{needed} ({error}); install the extra: pip install 'blocksim[video]'"
@@ -146,11 +147,13 @@ def _codec(program: str) -> list[str]:
 
 WRITERS: dict[str, Writer] = {".gif": write_gif, ".mp4": write_mp4}  # by suffix; one function and one line a format
 DOTS_PER_INCH = 100.0  # letters of 11 pixels
+MARGINS = 0.15, 0.50, 0.42  # inches: at the sides, above and below the panel
 HIGHEST = 1.25  # height of the panel over its width
 KEY_FOOT = 0.04  # inches, below what explains the colours
 HELD = 1.5  # s that the last picture stays
 MOST_PICTURES = 10_000
 TIME_ROOM, MARKS_ROOM = 60.0, 70.0  # points: for the time, and for a mark of what acts on all bodies
+FEW_NAMES = 2  # of blocks that leave the view
 FEW_BLOCKS = 30  # up to which trails are drawn by default
 TRAIL: dict[str, Any] = {"linewidths": 1.0, "alpha": 0.5, "zorder": 2.5}  # below names
 
@@ -238,7 +241,7 @@ def beyond_view(names: Sequence[str], seen: run_data.Flags) -> str:
     if not gone:
         return ""
     verb = "leaves" if len(gone) == 1 else "leave"
-    if len(gone) <= 2:
+    if len(gone) <= FEW_NAMES:
         return f"block{'' if len(gone) == 1 else 's'} {' and '.join(gone)} {verb} the view"
     return f"{len(gone)} of {len(names)} blocks {verb} the view"
 
@@ -258,7 +261,7 @@ class Animation:
         paint = look.paint or paints.by_block(frames)
         self.scene = scene.Scene(frames, support, paint)
         across = look.width / DOTS_PER_INCH
-        side, head, foot = 0.15, 0.50, 0.42  # inches
+        side, head, foot = MARGINS
         self.seen = run_data.blocks_in_view(frames, self.drawable, support)
         self.beyond = beyond_view(frames.names, self.seen)
         extent = run_data.extent_of(frames, self.drawable, support, self.seen)

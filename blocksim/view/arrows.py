@@ -316,6 +316,7 @@ def _marks(times: Floats, support: Support) -> tuple[tuple[Mark, ...], ...]:
 
 
 COLOUR = "#A50026"
+ARC_POINTS = 24
 ROUND_HEAD = 4.0  # points, of round arrows
 LEAST_SWEEP = 0.02  # rad
 MARK, MARK_SIDE = 9.0, 12.0  # points: length of the arrow of a mark, and room for it
@@ -335,7 +336,7 @@ def draw_actions(canvas: Canvas, found: Actions, index: int, length: float) -> N
 
 def _draw_turn(canvas: Canvas, centre: Floats, radius: float, sweep: float) -> None:
     """Draw a round arrow (mm, rad), which is open at the right."""
-    angle = (0.25 * np.pi if sweep > 0.0 else -0.25 * np.pi) + np.linspace(0.0, sweep, 24)
+    angle = (0.25 * np.pi if sweep > 0.0 else -0.25 * np.pi) + np.linspace(0.0, sweep, ARC_POINTS)
     points = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     way = (points[-1] - points[-2]) / np.hypot(*(points[-1] - points[-2]))
     chord = float(np.hypot(*(points[-1] - points[0])))

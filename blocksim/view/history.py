@@ -37,6 +37,7 @@ ENERGY_LOOKS: dict[str, tuple[str, Any]] = {  # the same in every picture; dashe
     "given to support": ("#56B4E9", (0, (2, 1))),
     "given to loads": ("#D55E00", (0, (4, 1, 1, 1))),
 }
+OTHER_ENERGY: tuple[str, Any] = ("#999999", "-")
 INK: dict[str, Any] = {"color": style.INK, "linewidth": 0.8}
 
 
@@ -258,7 +259,7 @@ def _energies(seen: FramesInView) -> time_panels.TimePanel:
     """Return energies (J) by name, each in its own colour and dashes."""
     energies = time_panels.energy_groups(seen.frames.energy, seen.chosen)
     factor, unit = time_panels.unit_for(float(np.abs([*energies.values()]).max(initial=0.0)), "J")
-    looks = {name: ENERGY_LOOKS.get(name, ("#999999", "-")) for name in energies}
+    looks = {name: ENERGY_LOOKS.get(name, OTHER_ENERGY) for name in energies}
     return time_panels.TimePanel(
         f"energy ({unit})",
         {name: (seen.time, factor * values) for name, values in energies.items()},

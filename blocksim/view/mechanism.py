@@ -123,6 +123,7 @@ SIDE, GAP, HEAD, ROW_GAP, AXIS = 0.12, 0.16, 0.36, 0.12, 0.30  # inches
 VISIBLE = 0.3  # of a block's shortest side: displacement from which on a mechanism is seen
 SLIDES, ROCKS = "#E7298A", "#FFFFFF"  # no colour of displacements, loads or edges
 FIRST: dict[str, Any] = {"color": "#000000", "linewidth": 1.8, "zorder": 3.2, "solid_joinstyle": "miter"}
+ARROWS_OF_LOADS = "Red arrows: loads, on a scale of its own on each side."
 ARROWS_OF_SPEED = "Black arrows: velocity of driven bodies."
 SLIDING: dict[str, Any] = {"color": SLIDES, "linewidth": 2.6, "marker": "D", "markersize": 2.2, "zorder": 3.3}
 HINGE: dict[str, Any] = {"color": ROCKS, "marker": "o", "markersize": 4.0, "zorder": 3.4}
@@ -172,7 +173,7 @@ def draw_mechanisms(
     sides = [side for pair in brackets for side in pair]
     most = max(float(paints.displacements(side.frames, side.support)[side.frame].max()) for side in sides)
     paint = paints.by_displacement(sides[0].frames, sides[0].support, most)
-    texts = ["Red arrows: loads, on a scale of its own on each side."] if any(side.acts.sizes for side in sides) else []
+    texts = [ARROWS_OF_LOADS] if any(side.acts.sizes for side in sides) else []
     texts += [ARROWS_OF_SPEED] if any(arrows.SPEED in side.acts.largest for side in sides) else []
     notes = style.break_lines(" ".join(texts), width - 2.0 * SIDE) if texts else []
     columns = ENTRIES if width >= ENTRIES_WIDTH else 1

@@ -238,6 +238,7 @@ TOP = "Thick line inside a block: top face at the start."
 NAME_ROOM = 0.85, 0.7  # width and height for a block's name, as parts of its smaller side
 LEAST_SINE = 1e-9  # between two edges that are not parallel
 LETTERS = 100  # of a name; longer ones have no room anywhere
+FIXED_HATCH = "////"
 HALO = 2.0  # points around a name, so that paths of centres do not strike through it
 LEAST_HATCHED = 12.0  # points; on smaller blocks hatching is a few stray lines
 SMALL, CLOSED = 6.0, 0.42  # points, of discs drawn without gaps; share of a size that closes those of a square lattice
@@ -349,7 +350,7 @@ def draw_blocks(canvas: Canvas, scene: Scene, frame: int) -> None:
     smallest = run_data.MILLIMETRES * canvas.points_per_mm * float(frames.least_widths.min(initial=np.inf))
     thin = min(style.LINE_WIDTH, 0.05 * smallest)
     edge: dict[str, Any] = {"edgecolors": style.INK, "linewidths": thin, "transform": canvas.scene}
-    hatch = "////" if smallest >= LEAST_HATCHED else None
+    hatch = FIXED_HATCH if smallest >= LEAST_HATCHED else None
     for kind, lines in ((held, hatch), (free, None)):
         shown = [own[block] for block in np.flatnonzero(kind)]
         style.add_polygons(canvas.axes, outlines[kind], facecolors=shown, hatch=lines, **edge)

@@ -179,6 +179,7 @@ def _notes(support: run_data.Support, *, is_measured: bool) -> str:
 
 
 PROFILE_WIDTH, PROFILE_LEAST, PROFILE_TALLEST = 7.2, 2.0, 6.0  # inches
+PROFILE_MARGINS = 0.25, 0.40, 0.42  # inches: at the sides, above and below the panel
 LINES = 6  # by default
 COLOURS = "viridis"
 PALE = "#e8e8e8"
@@ -207,7 +208,7 @@ def draw_profile(frames: Frames, path: Path | str, options: scene.PictureOptions
     shades = [colors.to_hex(colour) for colour in colormaps[COLOURS](steps)]
     named = tuple((f"{float(frames.time[frame]):.3f} s", shade) for frame, shade in zip(chosen, shades, strict=True))
     key = paints.Paint(lambda _: [PALE] * len(frames.names), named)
-    side, head, foot = 0.25, 0.40, 0.42  # inches
+    side, head, foot = PROFILE_MARGINS
     extent, width = run_data.extent_of(frames, drawable, support), paper.width(PROFILE_WIDTH, PROFILE_LEAST)
     page = scene.page_for(extent, width, PROFILE_TALLEST, (side, head, foot + key.height))
     with style.open_figure(page.width, paper.height(page.height), paper.dots) as figure:

@@ -96,6 +96,7 @@ def draw_law(law: LawCurve, path: Path | str, title: str, paper: style.Paper = s
 MARGIN = 0.06  # of an axis
 MOST_NUMBERS = 6
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")  # by the kind of the change
+LINE_COLOUR = "#777777"
 OTHERS = ("#D55E00", "#000000", "#56B4E9", "#777777")  # of what others found
 MARKS = "DsX^"
 MOST_MARKS = 12  # series with more points are lines
@@ -153,7 +154,7 @@ def draw_limit_curve(
     brackets = [(x, one) for x, found in curve.points for one in found]
     with open_study_figure(path, title, curve.notes, paper) as axes:
         for start, end in join_brackets(curve):
-            axes.plot(*zip(start, end, strict=True), color="#777777", linewidth=1.0, zorder=2)
+            axes.plot(*zip(start, end, strict=True), color=LINE_COLOUR, linewidth=1.0, zorder=2)
         for number, series in enumerate(curve.beside):
             look: dict[str, Any] = {"color": OTHERS[number % len(OTHERS)], "linewidth": 1.4, "zorder": 1.5}
             if len(series.points) <= MOST_MARKS:

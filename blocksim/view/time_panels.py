@@ -242,6 +242,7 @@ def panels_of(probe: instruments.ProbeSeries) -> list[TimePanel]:
     return [force, *([panel("share of friction", "", 1.0, {"mobilised": mobilised})] if is_known else [])]
 
 
+BETWEEN = 4
 """Points of velocity and displacement a piece of the motion."""
 ROUND_OFF = 1e-9
 
@@ -264,7 +265,7 @@ def draw_support_motion(
     value = acceleration[last - 1] + share * (acceleration[last] - acceleration[last - 1])
     ends, acceleration = np.append(ends[:last], end), np.append(acceleration[:last], value)
     count = len(pieces.times) - 1
-    times = np.interp(np.linspace(0.0, count, 4 * count + 1), np.arange(count + 1), pieces.times)
+    times = np.interp(np.linspace(0.0, count, BETWEEN * count + 1), np.arange(count + 1), pieces.times)
     times = np.append(times[times < end], end)
     displacement, velocity = motion.displacement_and_velocity(pieces, times)
 

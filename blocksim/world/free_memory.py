@@ -4,7 +4,9 @@ import os
 from pathlib import Path
 
 UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
+THOUSAND = 1000
 MOST_SHOWN = 999.5  # rounds to four digits
+KIBI = 1024
 MOST_CHUNK_ROWS = 64  # frames in a chunk of run.h5
 CHUNK_VALUES = 1 << 17  # a megabyte
 # Of control groups of version 1 and 2, by their controllers: where they are mounted, their limit and usage, and the
@@ -19,7 +21,7 @@ def readable(count: int) -> str:
     """Return bytes in the largest unit of which there is at least one, such as "3.1 GB"."""
     value, unit = float(count), 0
     while value >= MOST_SHOWN and unit + 1 < len(UNITS):
-        value, unit = value / 1000, unit + 1
+        value, unit = value / THOUSAND, unit + 1
     return f"{value:.3g} {UNITS[unit]}"
 
 
@@ -37,7 +39,7 @@ def available_bytes(root: Path = Path("/")) -> int | None:
     limits = []
     for name, value, *_ in (line.split() for line in _lines(root / "proc/meminfo")):
         if name == "MemAvailable:":
-            limits.append(int(value) * 1024)
+            limits.append(int(value) * KIBI)
     if not limits and "SC_AVPHYS_PAGES" in getattr(os, "sysconf_names", {}):
         limits.append(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     for line in _lines(root / "proc/self/cgroup"):  # hierarchy:controllers:path

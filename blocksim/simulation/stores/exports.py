@@ -26,6 +26,7 @@ from blocksim.world.systems.system import Floats, Track
 FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
 CONTACT_NUMBERS = sorted(UNITS, key=lambda name: "m1N".index(UNITS[name]))  # lengths, directions, forces
 CONTACT_COLUMNS = ("time_s", *BODIES, *(f"{name}{instruments.TABLE_UNITS[UNITS[name]][0]}" for name in CONTACT_NUMBERS))
+NOBODY = ""
 """Name of what is no block: the ground, or a wall."""
 
 
@@ -51,7 +52,7 @@ def write_contacts_csv(path: Path, frames: Frames, contacts: Contacts) -> int:
     Bodies are named as in the table of frames; the cell of the ground or a wall is empty. Raises OutputError, and
     leaves an older file as it was then.
     """
-    names = np.array([*frames.names, ""], dtype=object)  # the support has number -1
+    names = np.array([*frames.names, NOBODY], dtype=object)  # the support has number -1
 
     def table(rows: NDArray[Any]) -> Iterator[tuple[Any, ...]]:
         columns = [instruments.TABLE_UNITS[UNITS[name]][1] * rows[name] for name in CONTACT_NUMBERS]

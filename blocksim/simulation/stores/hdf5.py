@@ -34,6 +34,7 @@ from blocksim.world.systems.system import System, SystemInScene
 PARTICLES, OBSERVABLES, CONTACTS, PROBES = "particles", "observables", "contacts", "probes"
 COMMITTED = "n_committed"
 STEP, TIME, ENDS = f"{PARTICLES}/blocks/step", f"{PARTICLES}/blocks/time", f"{CONTACTS}/end"
+SCENARIO_TEXT = "parameters/scenario"
 PROBE_STEP, PROBE_TIME = "step", "time"
 COUNTED_UNITS = {"contact_count": "1", "largest_overlap": "m"}
 Values = NDArray[Any]
@@ -450,7 +451,7 @@ class FrameFile(AbstractContextManager["FrameFile"]):
                 data_set.attrs["unit"] = constant.unit.replace("/s", " s-1")
             if elements.outlines is not None:  # (b, k, 2) of every element, the last corner repeated
                 self.file.create_dataset(f"{place}/outlines", data=elements.outlines).attrs["unit"] = "m"
-        text = self.file.create_dataset("parameters/scenario", data=np.bytes_(scenario_toml.encode()))
+        text = self.file.create_dataset(SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))
         text.attrs["unit"] = "TOML"
 
     def _reserve(self, size: int) -> None:

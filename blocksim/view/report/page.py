@@ -17,6 +17,7 @@ SCRIPTS = ("decode", "frames", "view", "drawing", "loads", "player", "pictures",
 PARTS = resources.files("blocksim.view.report") / "parts"
 
 MOST_KEYS = 2  # in a label
+UNTOLD = {"name", "description", "experiment", "provenance"}
 
 
 def write_report(subjects: Sequence[Subject], path: Path, *, title: str, version: str) -> int:
@@ -97,5 +98,5 @@ def _leaves(node: object, path: KeyPath = ()) -> Iterator[tuple[str, object]]:
         yield format_key(path), node
         return
     for key, entry in node.items() if isinstance(node, Mapping) else enumerate(node):
-        if path or key not in {"name", "description", "experiment", "provenance"}:
+        if path or key not in UNTOLD:
             yield from _leaves(entry, (*path, key))

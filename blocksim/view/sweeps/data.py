@@ -16,6 +16,7 @@ DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
 NARROW = 1e-2  # span over middle below which an axis shows distances from the middle
 LEAST_READABLE = 0.01  # in the typed unit: smaller distances from the middle have a prefix of SI instead
 ONE_PERCENT = 0.01
+PREFIXED = ("m", "s", "Pa")
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 
 
@@ -160,7 +161,7 @@ def scale_of(size: float, unit: str, typed: InputUnit | None = None) -> tuple[fl
     if unit == "rad":
         return 180.0 / np.pi, "°"
     power = 3 * int(np.floor(np.log10(size) / 3.0)) if size > 0.0 else 0
-    if unit in ("m", "s", "Pa"):
+    if unit in PREFIXED:
         power = min(max(power, min(PREFIXES)), max(PREFIXES))
         return 10.0**-power, PREFIXES[power] + unit
     if power in {-3, 0, 3}:

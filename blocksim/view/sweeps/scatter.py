@@ -19,6 +19,7 @@ LONGEST_LEVEL = 1.0  # inches
 FITTINGS = 4  # smaller panels leave less room for names beside them
 CROWDED = 0.08  # of an axis; a number this near to its start runs into the last one of the panel before
 MOST_INPUTS, MOST_BLOCKS = 9, 3
+BINS = 16
 RARE = 0.5  # percent of run-outs at either end that may lie beyond an axis
 MARGIN = 0.04
 SCATTER = 0.5  # of the distance between levels, over which their dots are spread
@@ -122,7 +123,7 @@ def _draw_panel(axes: "style.Axes", sweep: SweepData, up: Variable, across: Vari
     """
     if up is across:
         spread = np.geomspace if up.is_log else np.linspace
-        edges = spread(*up.limits, 17)
+        edges = spread(*up.limits, BINS + 1)
         for cases, colour in ((sweep.finished, OUTSIDE["color"]), (sweep.inside, INSIDE["color"])):
             if cases is not None:
                 counts, _ = np.histogram(up.values[cases], edges)
@@ -208,6 +209,7 @@ SIDES = 0.55, 0.2, 0.32, 0.42  # inches, around the panels of a histogram
 PANEL_HEIGHT, ROW_GAP, ROOM = 1.15, 0.62, 0.26  # inches; ROOM is above the bars, for the repeats
 LEAST_PANEL = 1.85, 0.6  # inches, of a panel where a size was asked for
 BLOCK_ROOM = 1.2  # inches, for the name of a block
+MOST_HISTOGRAMS = 4
 MANY_BINS = 40
 RARE_RUN_OUTS = 1.0  # percent at either end that may lie beyond the axis
 LEAST_BIN_MM = 0.01
@@ -220,7 +222,7 @@ _INTERVAL: dict[str, Any] = {**_MARK, "markersize": 4.0, "linewidth": 1.0}
 @contextmanager
 def draw_histogram(sweep: SweepData, paper: style.Paper = style.OWN) -> "Iterator[style.Figure]":
     """Give a panel for each block that moves."""
-    blocks = sweep.movers[-4:]
+    blocks = sweep.movers[-MOST_HISTOGRAMS:]
     own = style.COLUMN_WIDTH - sum(SIDES[:2]), PANEL_HEIGHT
     more: dict[str, Any] = {"title": sweep.title, "handles": _entries_histogram(sweep), "columns": 2}
     with style.open_panels(paper, [1] * len(blocks), own, LEAST_PANEL, SIDES, (0.0, ROW_GAP), **more) as opened:

@@ -15,6 +15,7 @@ from blocksim.world.systems.blocks import BLOCKS, SUPPORTS
 from blocksim.world.systems.soils import SOILS, soil_kernels
 from blocksim.world.systems.system import System, SystemInScene
 
+IN_WORLD = (BLOCKS, SUPPORTS)
 """Systems of every scene, whose arrays are the world, and whose steps, bounds and energies are the scheme's own."""
 Function = Callable[..., None]
 Interaction = Callable[[], Function] | None
@@ -60,7 +61,7 @@ def acts_of(systems: Sequence[System]) -> Iterator[tuple[int, int | None, Any]]:
     Raises InvalidInputError for a pair that is not modelled.
     """
     for i, one in enumerate(systems):
-        partners: list[tuple[int | None, System]] = [(None, other) for other in (BLOCKS, SUPPORTS)]
+        partners: list[tuple[int | None, System]] = [(None, other) for other in IN_WORLD]
         for number, other in (*partners, *enumerate(systems[i:], i)):
             pairs = [pair for pair in ((one.name, other.name), (other.name, one.name)) if pair in INTERACTIONS]
             if not pairs:

@@ -21,6 +21,7 @@ ACTS = {"soils": step.flow, "blocks": contact.touch_blocks, "supports": contact.
 # collapse loses 2 to 4 % of its energy to it, pressures at rest and thrusts stay as they are. A numerical choice.
 VISCOSITY = 0.003
 SKIN = 0.4  # of lists, in spacings
+FEW_TOUCHES = 128
 
 
 def build_soils(scenario: Scenario) -> arrays.Soils:
@@ -36,7 +37,7 @@ def build_soils(scenario: Scenario) -> arrays.Soils:
     states["number"] = np.arange(n)
     states["kind"] = np.repeat(np.arange(len(tables)), [len(one) for one in places])
     groups = math.ceil(n / arrays.GROUP)
-    room = n + 128
+    room = n + FEW_TOUCHES
     bodies = len(place_bodies(scenario)) + len(place_segments(scenario)) + 1
     spacing, controls = tables[0].spacing, zeros(1, arrays.CONTROLS)
     one = controls[0]
