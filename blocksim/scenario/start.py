@@ -156,13 +156,13 @@ def _blocks_in(soil: SoilTable, scenario: Scenario) -> Iterator[tuple[str, NDArr
 def meetings(soil: SoilTable, key: str, scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Yield the key of an outline and what it meets: ground, walls, blocks that it is not poured onto, other soils."""
     found, corners = [*_boundaries(soil, scenario)], soil.corners
-    blocks = [name for name, _ in _blocks_in(soil, scenario)]
-    if blocks and soil.kind != "fill":
+    if soil.kind == "fill":
+        if not len(particle_places(soil, scenario)):
+            found.append("blocks everywhere: no particle has room")
+    elif blocks := [name for name, _ in _blocks_in(soil, scenario)]:
         more = f" and {len(blocks) - MOST_NAMES} more" if len(blocks) > MOST_NAMES else ""
         which = f"blocks {', '.join(blocks[:MOST_NAMES])}" if len(blocks) > 1 else f"block {blocks[0]}"
         found.append(f'{which}{more}; kind = "fill" leaves blocks out')
-    elif blocks and not len(particle_places(soil, scenario)):
-        found.append("blocks everywhere: no particle has room")
     for other in soil_tables(scenario):
         if other is soil:
             break

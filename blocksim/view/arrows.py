@@ -241,13 +241,9 @@ class _Poses:
         self.time, self.angle = frames.time[chosen], frames.angle[chosen]
         self.places = np.stack([frames.x[chosen], frames.y[chosen]], axis=-1)
         self.velocities = np.stack([frames.vx[chosen], frames.vy[chosen]], axis=-1)
-        self.all_corners = frames.corners  # (b, k, 2) m
+        self.corners = frames.corners  # (b, k, 2) m, along axes of the bodies
         self.sides = np.stack([frames.size_x, frames.size_y], axis=-1)  # (b, 2)
         self.is_there = 1.0 - are_removed(frames.vx[chosen])  # (f, b) 1 or 0
-
-    def corners(self, body: int) -> list[tuple[float, float]]:
-        """Return the corners (m) of a body along its own axes."""
-        return [(x, y) for x, y in distinct(self.all_corners[body]).tolist()]
 
     def to_scene(self, body: int, vectors: Floats) -> Floats:
         """Return vectors (k, 2) of a body's own axes in those of the scene, (f, k, 2)."""
@@ -276,7 +272,8 @@ def _loads_and_speeds(poses: _Poses, support: Support) -> Iterator[Arrows]:
             yield poses.arrows(FORCE, one.body, arms, (load.magnitude * factor)[..., None] * ways)
         elif isinstance(load, Pressure):
             is_water = load.water_level is not None
-            begin, end, normal = map(np.array, face_of(poses.corners(one.body), load.face) or NO_FACE)
+            corners = distinct(poses.corners[one.body]).tolist()
+            begin, end, normal = map(np.array, face_of(corners, load.face) or NO_FACE)
             along = np.linspace(0.0, 1.0, DEEP) if is_water else (np.arange(UNIFORM) + 0.5) / UNIFORM
             arms = poses.to_scene(one.body, begin + np.outer(along, end - begin))
             up = np.array([np.sin(support.tilt), np.cos(support.tilt)])

@@ -27,15 +27,15 @@ FEW_TOUCHES = 128
 def build_soils(scenario: Scenario) -> arrays.Soils:
     """Return the arrays of the soils of a scenario at time zero."""
     tables = start.soil_tables(scenario)
-    places = [start.particle_places(table, scenario) for table in tables]  # m, (n, 2)
-    initial = soils.elements_of(scenario).start
+    elements = soils.elements_of(scenario)
+    initial, kinds = elements.start, {table.name: number for number, table in enumerate(tables)}
     n = initial.shape[1]
     points, states = zeros(n, arrays.POINT), zeros(n, arrays.STATE)
     for number, quantity in enumerate(soils.QUANTITIES):
         holder = points if number < 4 else states
         holder[quantity.name] = initial[number]
     states["number"] = np.arange(n)
-    states["kind"] = np.repeat(np.arange(len(tables)), [len(one) for one in places])
+    states["kind"] = [kinds[name.rpartition(".")[0]] for name in elements.names]
     groups = math.ceil(n / arrays.GROUP)
     room = n + FEW_TOUCHES
     bodies = len(place_bodies(scenario)) + len(place_segments(scenario)) + 1
