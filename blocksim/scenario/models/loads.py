@@ -136,7 +136,7 @@ class FaceChoice(q.FieldReader):
         """Pass what may name a face; raises a pydantic error."""
         if isinstance(value, str) and any(letter.isdigit() for letter in value):
             q.Quantity(q.ANGLE).read(value)
-        elif value not in NORMALS and not (type(value) is int and 0 < value <= geometry.COUNTS["maxItems"]):
+        elif value not in [*NORMALS] and not (type(value) is int and 0 < value <= geometry.COUNTS["maxItems"]):
             similar = spelling.nearest(value, NORMALS, most=2) if isinstance(value, str) else None
             hint = f"did you mean {q.toml(similar)}? " if similar else ""
             wanted = 'the direction of its normal such as "150 deg", or its number from 1 on'
