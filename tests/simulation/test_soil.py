@@ -13,7 +13,7 @@ import pytest
 import blocksim
 from blocksim.analysis.bits import differences
 from blocksim.scenario import Scenario
-from blocksim.simulation import simulate, simulate_into
+from blocksim.simulation import run_ensemble, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from tests.simulation.sliding import assert_same, interrupted_at
 from tests.sizes import in_all
@@ -184,6 +184,8 @@ def test_bits_do_not_depend_on_the_number_of_threads_nor_on_interruptions(
     for other in (again, result):
         assert other.summary.final_state_sha256 == whole.summary.final_state_sha256
     assert differences(result.frames, whole.frames).is_none
+    (end,) = run_ensemble([scenario])
+    assert (end.columns, end.ledger) == (whole.columns, whole.summary.energy_J)
     (soils,) = whole.frames.others
     assert soils.names[:2] == ("column.1", "column.2")
     for name in ("x", "y"):

@@ -1,5 +1,8 @@
 """What a run with soil leaves, beside blocks or alone: probes of thrust, soils.csv, pictures, exports, reports."""
 
+import csv
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -7,15 +10,23 @@ import numpy as np
 import pytest
 
 import blocksim
-from blocksim.errors import InvalidInputError, ScenarioError
+from blocksim.analysis.bits import differences
+from blocksim.errors import ExitCode, InvalidInputError, ScenarioError
 from blocksim.scenario import scenario_from_mapping
-from blocksim.simulation import Result
-from blocksim.simulation.stores.exports import write_geojson, write_vtkhdf
+from blocksim.simulation import Result, schemes
+from blocksim.simulation.loop import BY_CODE, diagnose
+from blocksim.simulation.schemes import build
+from blocksim.simulation.stores.exports import write_frames_csv, write_geojson, write_vtkhdf
+from blocksim.simulation.trajectory import data_set, tidy_table
 from blocksim.study.run import open_run
 from blocksim.view.kinds import run_kind
 from blocksim.view.paints import paint_of
 from blocksim.view.report.player import pack_frames
 from blocksim.view.scene import PictureOptions
+from blocksim.world.describe import describe
+from blocksim.world.free_memory import chunk_rows
+from blocksim.world.systems import INTERACTIONS
+from blocksim.world.systems.soils import SOILS
 from tests.soils import DEPTH, LEFT, column, data_of, scene
 from tests.view.made_up import toppling
 
@@ -73,6 +84,76 @@ def test_the_end_of_soils_is_a_table_of_the_folder_and_of_the_result(run: Result
     assert again.endings["soils"]["right_mm"][0] > 55.0
     assert "soils.csv" in run.summary.sha256
     blocksim.run(SCENE, out=run.folder, overwrite=True)  # it is blocksim's own file, and may be replaced
+
+
+def test_the_ledger_of_frames_and_files_has_the_entries_of_soil(run: Result) -> None:
+    entries = run.summary.energy_J
+    assert entries.relative_residual < 2e-3
+    assert abs(entries.residual - sum(values[-1] - values[0] for values in run.frames.energy.values())) < 1e-12
+    assert run.folder is not None
+    read = blocksim.open_run(run.folder)
+    assert read.summary.energy_J.residual == entries.residual
+    (held,), (soils,) = blocksim.run(SCENE).frames.others, read.frames.others
+    np.testing.assert_array_equal(soils.values, held.values)
+    with h5py.File(run.folder / "run.h5") as file:
+        group = file["particles/soils"]
+        assert (group["vy"].attrs["unit"], group["sxx"].attrs["unit"], len(group["mass"])) == ("m s-1", "Pa", 100)
+        assert "soils_plastic" in file["observables"]
+
+
+def test_a_changed_bit_of_soil_is_found(run: Result) -> None:
+    (soils,) = run.frames.others
+    values = soils.values.copy()
+    values[3, 1, 2] = np.nextafter(values[3, 1, 2], 1.0)
+    first = differences(run.frames, replace(run.frames, others=(replace(soils, values=values),))).first
+    assert first is not None
+    assert (first.frame, first.block, first.quantity) == (3, "column.3", "soils y (m)")
+
+
+def test_tables_have_a_row_a_particle_and_frame(run: Result, tmp_path: Path) -> None:
+    write_frames_csv(tmp_path / "run.csv", run.frames)
+    with (tmp_path / "run_soils.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[:4] == ["time_s", "particle", "x_mm", "y_mm"]
+    assert [float(row["y_mm"]) for row in rows] == (1e3 * run.frames.others[0]["y"]).ravel().tolist()
+    assert len(tidy_table(run.frames, "soils")) == 100 * len(run.frames)
+    assert data_set(run.frames, "soil")["soils_vy"].shape == (len(run.frames), 100)
+
+
+def test_soil_that_has_no_finite_place_ends_the_run_and_is_named() -> None:
+    one = build(SCENE)
+    one.scene.systems[0].points.y[1] = np.nan
+    after, code = schemes.ALONE.advance(one.scene, 100_000)
+    told = diagnose(BY_CODE[code], code, after, one.placed)
+    assert told.exit_code == ExitCode.NUMERICAL_FAILURE
+    assert "(soils, step " in told.reason
+
+
+def test_a_soil_that_is_not_modelled_or_gets_other_functions_once_compiled_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    build(SCENE)
+    monkeypatch.setitem(INTERACTIONS, ("soils", "supports"), lambda: float)
+    with pytest.raises(ValueError, match="compiled with other functions"):
+        build(SCENE)
+    monkeypatch.delitem(INTERACTIONS, ("soils", "blocks"))
+    for use in (blocksim.run, describe):
+        with pytest.raises(InvalidInputError, match=r"^soils and blocks cannot be in one scene: .* not modelled"):
+            use(SCENE)
+
+
+def test_threads_are_of_use_for_many_particles() -> None:
+    one = build(SCENE).scene
+    assert [schemes.team_for(one, 4, elements).threads for elements in (0, 3, 250, 1000)] == [1, 1, 2, 4]
+
+
+def test_check_counts_the_particles() -> None:
+    few, many = (describe(scene(column(0.1, 0.05 * k, 0.005, start="ramp"))) for k in (1, 2))
+    assert (few.systems, many.systems) == ({"soils": 200}, {"soils": 400})
+    cost, quantities = SOILS.cost, len(SOILS.quantities)
+    frames = math.ceil(many.frames / chunk_rows(400)) * chunk_rows(400)  # run.h5 has room for whole chunks
+    assert many.bytes - few.bytes == pytest.approx(200 * 8 * quantities * frames, rel=0.3)
+    assert many.memory - few.memory == 200 * cost.memory
 
 
 @pytest.mark.parametrize("kind", ["strip", "final", "profile"])

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 import blocksim
-from blocksim.errors import InvalidInputError
 from blocksim.kernels.soil import arrays
 from blocksim.scenario import GROUND
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.simulation.schemes import build, build_scene
 from blocksim.world.describe import describe
 from blocksim.world.interactions import contact_classes
-from blocksim.world.systems import INTERACTIONS
 from blocksim.world.systems.soil_arrays import interactions_with
 from blocksim.world.systems.soils import SOILS, earth_pressure_at_rest, friction_with, yield_surface
 from tests.soils import DEPTH, MATERIALS, SMOOTH_WALLS, UNIT_WEIGHT, column, right, scene
@@ -76,7 +74,8 @@ def test_the_step_is_that_of_the_waves_in_the_soil() -> None:
     expected = 0.4 * 1.5 * 0.005 / math.sqrt(modulus / (UNIT_WEIGHT / 9.81))
     assert SOILS.largest_step is not None
     assert SOILS.largest_step(scene(COLUMN)) == pytest.approx(expected)
-    assert build_scene(scene(COLUMN)).world.controls[0].step <= expected
+    alone = build_scene(scene(COLUMN, blocks={}, bodies=[]))
+    assert alone.world.controls[0].step == pytest.approx(expected, rel=0.01)
     assert SOILS.largest_step(scene(COLUMN, time={"end": 1.0, "safety": 0.025})) == pytest.approx(0.5 * expected)
     assert SOILS.largest_step(scene(COLUMN, time={"end": 1.0, "safety": 0.1})) == pytest.approx(expected)
 
@@ -88,12 +87,6 @@ def test_check_tells_whose_step_is_taken_and_which_stiffness_makes_both_equal() 
     assert equal is not None
     assert equal.blocks == pytest.approx(equal.systems, rel=1e-3)
     assert limits.blocks != pytest.approx(limits.systems, rel=0.1)
-
-
-def test_soil_beside_a_system_that_nobody_thought_of_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(INTERACTIONS, ("soils", "blocks"))
-    with pytest.raises(InvalidInputError, match="soils and blocks cannot be in one scene"):
-        build(scene(COLUMN))
 
 
 def test_the_ledger_names_energies_in_the_order_in_which_they_are_measured() -> None:
