@@ -9,15 +9,13 @@ import pytest
 
 from blocksim.bench.harness import pushed_wall
 from blocksim.errors import ExitCode
-from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 from blocksim.scenario import Scenario, load_scenario
 from blocksim.simulation import ensemble, simulate
-from blocksim.simulation.ensemble import Ensemble, EnsembleEnd, MemberEnd, MemberFailure, run_ensemble, run_in_batches
+from blocksim.simulation.ensemble import EnsembleEnd, MemberEnd, MemberFailure, run_ensemble, run_in_batches
 from blocksim.simulation.schemes import build_stacks
 from blocksim.world import build, memory
-from blocksim.world.build import SceneStack, arrays_of, member, only_stack
+from blocksim.world.build import SceneStack
 from blocksim.world.memory import SceneTooLargeError, scene_size
-from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.step import SkinTooSmallError, StepError
 from tests.simulation.conftest import SCENARIOS
 
@@ -104,25 +102,6 @@ def test_models_with_particles_go_together_too() -> None:
         assert_same(end, scenario)
 
 
-def test_a_member_whose_pair_list_is_full_gets_more_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenarios = collapses({"time.end": 0.02}, {"time.end": 0.03})
-    monkeypatch.setattr(build, "LEAST_PAIRS", 1)
-    monkeypatch.setattr(build, "PAIRS_PER_BODY", 0)
-    calls: list[int] = []
-    alone = Ensemble._run_alone
-
-    def counted(self: Ensemble, m: int, start: float) -> EnsembleEnd:
-        calls.append(m)
-        return alone(self, m, start)
-
-    monkeypatch.setattr(Ensemble, "_run_alone", counted)
-    ends = run_ensemble(scenarios)
-    assert calls == [0, 1]
-    monkeypatch.undo()
-    for end, scenario in zip(ends, scenarios, strict=True):
-        assert_same(end, scenario)
-
-
 @pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
 def test_a_pair_list_that_fills_up_on_the_way_changes_no_bit(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scenarios = [pushed_wall(4, 5, contact=WALL, time={"scheme": scheme, "end": end}) for end in (0.05, 0.06)]
@@ -187,18 +166,3 @@ def test_no_scenarios_give_no_ends_and_less_than_one_thread_or_member_is_refused
             run_ensemble([], threads=threads)
     with pytest.raises(ValueError, match="members must be at least 1, not 0"):
         run_in_batches([], most=0)
-
-
-def test_members_of_a_stack_are_the_scenes_that_would_be_built_alone() -> None:
-    rigid = [{"time.scheme": "nonsmooth", "time.step": step} for step in (1e-3, 5e-4, 2e-4)]
-    scenarios = collapses(*rigid, {}, {**rigid[0], "bodies": [{"block": "brick", "x": 0.3, "y": 0.1}]})
-    stacks = [one for one in build_stacks(scenarios) if isinstance(one, SceneStack)]
-    assert sorted(stack.numbers for stack in stacks) == [[0, 1, 2], [3], [4]]  # one for each scheme and shape
-    stack = only_stack(build_stacks(scenarios[:3]))
-    assert all(array.ctypes.data % 64 == 0 for array in arrays_of(stack.scenes) if array.size)
-    for m, scenario in enumerate(scenarios[:3]):
-        one, alone = member(stack.scenes, m), build_nonsmooth(scenario)
-        assert isinstance(one, Nonsmooth)
-        for a, b in zip(arrays_of(one), arrays_of(alone), strict=True):
-            assert (type(a), a.dtype, a.shape) == (type(b), b.dtype, b.shape)
-            assert np.array_equal(a, b)

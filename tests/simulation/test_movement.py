@@ -88,15 +88,6 @@ def both_ways(scenarios: Sequence[Scenario]) -> list[Movement]:
     return found
 
 
-@both
-def test_run_and_member_of_an_ensemble_move_alike(scheme: str) -> None:
-    (found,) = both_ways([load_scenario(SHIPPED, {**FALLING, "time.scheme": scheme})])
-    assert found.first_mover == "3"  # it stands on nothing but its left corner
-    assert 0.0 < (found.first_moved_s or 0.0) < 0.05
-    assert found.outcome == "fell"
-    assert found.largest_displacement_mm >= found.displacement_mm - 1e-9
-
-
 def rocking(spin: float = 2.0, **time: object) -> Scenario:
     """Return a block of 20 mm by 60 mm that starts to turn about its left corner (rad/s), and falls back."""
     block = {"block": "slab", "x": 0.0, "y": 0.03, "velocity": [-0.03 * spin, 0.01 * spin], "spin": spin}

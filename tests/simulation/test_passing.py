@@ -130,15 +130,6 @@ def test_rod_that_swings_does_not_pass_through_a_plate(spin: float, scale: float
     assert result.status == "finished" or "(block 1 and block 2 by " in result.reason
 
 
-@stiffnesses
-@pytest.mark.parametrize("frequency", [20.0, 1000.0])
-def test_support_that_is_driven_into_a_block_does_not_pass_through_it(scale: float, frequency: float) -> None:
-    bodies: list[dict[str, object]] = [{"y": FACE + 0.5 * HEIGHT + GAP}, plate()]
-    motion = {"kind": "harmonic", "amplitude": 0.05, "frequency": frequency, "direction": "90 deg"}
-    result = simulate(scene(bodies, 2.0 / frequency, {"stiffness_scale": scale}, motion=motion))
-    stays_or_says(result, "block 2", FACE)
-
-
 @pytest.mark.parametrize("gravity", [0.0, 1e-6])
 def test_plates_that_are_shaken_strike_a_rigid_block_between_them_and_do_not_pass_through(gravity: float) -> None:
     """Plates of 0.5 mm move by 13 mm in a step of 1 ms, and the block is 2 mm wide."""

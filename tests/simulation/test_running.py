@@ -7,7 +7,6 @@ import json
 import os
 import signal
 from datetime import datetime
-from itertools import pairwise
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ import pytest
 
 from blocksim.errors import InputMissingError, OutputError, OutputExistsError
 from blocksim.scenario import Scenario, load_scenario, placement
-from blocksim.simulation import Progress, Result, read_result, simulate, simulate_into
+from blocksim.simulation import Progress, Result, read_result, simulate_into
 from blocksim.simulation.run import RunCallbacks, bytes_needed
 from blocksim.simulation.schemes import build_scene, compile_kernels
 from blocksim.world.step import StepError
@@ -55,11 +54,6 @@ def test_summary_tells_status_cost_versions_and_ledger(folder: Path) -> None:
     assert told["energy_J"]["relative_residual"] < 1e-3
     assert told["energy_J"]["friction"] > 0.0
     assert datetime.fromisoformat(told["ended_at"]).tzinfo is not None
-
-
-@pytest.mark.parametrize("every", [1.7e-4, 10.0])
-def test_output_interval_does_not_change_the_motion(kept: Result, soft: Shipped, every: float) -> None:
-    assert bits(simulate(soft(output__every=every))) == bits(kept)
 
 
 def test_resolved_scenario_runs_to_the_same_bits_from_its_own_folder_too(
@@ -135,14 +129,6 @@ def test_vanished_experiment_leaves_no_folder(soft: Shipped, tmp_path: Path) -> 
 def test_run_is_not_overwritten_unasked(folder: Path, soft: Shipped) -> None:
     with pytest.raises(OutputExistsError, match="contains another run; --overwrite"):
         simulate_into(soft(time__end=0.01), folder)
-
-
-def test_progress_comes_to_the_end(soft: Shipped) -> None:
-    seen: list[Progress] = []
-    simulate(soft(time__end=0.02, time__stop_at_rest=False), on_progress=seen.append)
-    assert seen[-1].time == pytest.approx(0.02, abs=1e-5)
-    assert seen[-1].end == 0.02
-    assert all(a.steps < b.steps for a, b in pairwise(seen))
 
 
 def test_estimate_is_no_less_than_what_a_run_leaves_and_the_disk_has_to_have_it(
