@@ -12,7 +12,7 @@ from blocksim.simulation.files import sha256_of
 from blocksim.study.limit import limit
 from blocksim.study.manifest import read_entries
 from tests.cli.conftest import Command
-from tests.study.test_limit import SQUAT, block_on_a_slope
+from tests.study.plans import SQUAT, block_on_a_slope
 
 X = "1.x_mm"
 TILT: dict[str, Any] = {"ground.tilt": {"from": "5 deg", "to": "40 deg", "count": 2}}

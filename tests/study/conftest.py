@@ -1,10 +1,14 @@
-"""Short sweeps and runs."""
+"""Short sweeps and runs, and a study of each kind, of which all tests ask their questions."""
 
 from pathlib import Path
 
 import pytest
 
 from blocksim.scenario import Document, Scenario
+from blocksim.study.fragility import FragilityAnswer, fragility
+from blocksim.study.limit import limit
+from blocksim.study.limit_answer import LimitAnswer
+from tests.study.plans import SCATTER, SLIDES, SLOPE, SQUAT, TILTED, TILTS, block_on_a_slope
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -25,3 +29,16 @@ def scenario(nominal: Document) -> Scenario:
 def quick() -> Document:
     """Give rigid blocks that have hardly begun to fall: a case takes less than a millisecond."""
     return Document.read(SCENARIOS / "three_blocks_nonsmooth.toml").with_values({"time.end": 0.01})
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> FragilityAnswer:
+    """Give a fragility study of a block on a slope that was run in one go; its folder is not to be changed."""
+    out = tmp_path_factory.mktemp("fragility") / "study"
+    return fragility(SLOPE, TILTS, SCATTER, members=8, fails=SLIDES, jobs=1, out=out)
+
+
+@pytest.fixture(scope="session")
+def slid(tmp_path_factory: pytest.TempPathFactory) -> LimitAnswer:
+    """Give the limit of the tilt of a squat block to 2 %, with its runs; its folder is not to be changed."""
+    return limit(block_on_a_slope(SQUAT), TILTED, tolerance=0.02, out=tmp_path_factory.mktemp("limit") / "study")

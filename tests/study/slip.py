@@ -14,7 +14,7 @@ from blocksim.study.rows import Row
 from blocksim.study.sweep import Replay, runs_of
 from blocksim.study.sweep_folder import FolderKind
 from blocksim.view.style import Paper
-from tests.study.test_limit import SQUAT, block_on_a_slope
+from tests.study.plans import SQUAT, block_on_a_slope
 
 
 class Point(BaseModel, frozen=True):

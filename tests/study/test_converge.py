@@ -12,6 +12,7 @@ import pytest
 from blocksim.scenario import Document, Scenario
 from blocksim.scenario.start import soil_tables
 from blocksim.study.converge import (
+    Convergence,
     ConvergenceVerdict,
     Coordinates,
     Refinement,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
     from blocksim.study.rows import Row
 
+FAILED: Row = {"status": "failed", "reason": "an overlap exceeds contact.max_overlap", "seconds": 0.1}
 HALVED = Refinement("step", "time step", "time.safety", 0.05, 0.5, 1)
 
 
@@ -47,14 +49,8 @@ def coordinates(slide: Scenario) -> Coordinates:
 
 
 def finished(x_mm: float, rotation_deg: float = 0.0, seconds: float = 1.0, y_mm: float = 12.5) -> Row:
-    return {
-        "status": "finished",
-        "reason": "at rest",
-        "seconds": seconds,
-        "block.x_mm": x_mm,
-        "block.y_mm": y_mm,
-        "block.rotation_deg": rotation_deg,
-    }
+    ends = {"block.x_mm": x_mm, "block.y_mm": y_mm, "block.rotation_deg": rotation_deg}
+    return {"status": "finished", "reason": "at rest", "seconds": seconds, **ends}
 
 
 def judged(coordinates: Coordinates, places: list[float], tolerance_mm: float = 0.1) -> RefinementStudy:
@@ -68,19 +64,9 @@ def test_order_of_an_exact_power_law_is_observed(coordinates: Coordinates, order
     study = judged(coordinates, [70.0 + 3.0 * (0.5**level) ** order for level in range(5)])
     assert [isnan(level.order) for level in study.levels] == [True, True, False, False, False]
     assert [level.order for level in study.levels[2:]] == pytest.approx([order] * 3)
-
-
-@pytest.mark.parametrize(
-    "places",
-    [
-        [70.0, 70.2, 70.1],  # turns back
-        [70.0, 70.1, 70.3],  # grows
-        [70.0, 70.0, 70.0],  # stays
-        [70.0, 70.0 + 3e-7, 70.0 + 4e-7],  # round-off
-    ],
-)
-def test_no_order_is_made_up(coordinates: Coordinates, places: list[float]) -> None:
-    assert isnan(judged(coordinates, places).levels[-1].order)
+    turns_back, grows, stays, is_rounded = [0.0, 0.2, 0.1], [0.0, 0.1, 0.3], [0.0] * 3, [0.0, 3e-7, 4e-7]
+    for moves in (turns_back, grows, stays, is_rounded):
+        assert isnan(judged(coordinates, [70.0 + move for move in moves]).levels[-1].order)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +82,9 @@ def test_no_order_is_made_up(coordinates: Coordinates, places: list[float]) -> N
 def test_verdict_looks_at_two_refinements_in_a_row(
     coordinates: Coordinates, places: list[float], verdict: ConvergenceVerdict
 ) -> None:
-    assert judged(coordinates, places).verdict is verdict
+    study = judged(coordinates, places)
+    assert study.verdict is verdict
+    assert (study.recommendation is not None) == (verdict is ConvergenceVerdict.CONVERGED)
 
 
 def test_changes_that_shrink_from_outcome_to_outcome_are_no_convergence(coordinates: Coordinates) -> None:
@@ -109,26 +97,21 @@ def test_changes_that_shrink_from_outcome_to_outcome_are_no_convergence(coordina
     assert [bool(level.flipped) for level in settled.levels] == [False, True, False, False]
 
 
-@pytest.mark.parametrize(
-    ("end", "flips"),
-    [
+def test_outcome_is_another_one_beyond_the_size_of_a_block(coordinates: Coordinates) -> None:
+    for end, flips in (
         (finished(10.0 + 31.0), False),  # the block is 32 mm long and 25 mm high
         (finished(10.0 + 33.0), True),
         (finished(10.0, 44.0), False),
         (finished(10.0, -46.0), True),
         (finished(10.0, y_mm=12.5 + 12.0), False),
         (finished(10.0, y_mm=12.5 + 13.0), True),  # on another block
-        ({"status": "failed", "reason": "", "seconds": 0.1}, False),
-    ],
-)
-def test_outcome_is_another_one_beyond_the_size_of_a_block(coordinates: Coordinates, end: Row, flips: bool) -> None:
-    assert bool(coordinates.flips(finished(10.0), end)) is flips
-    assert bool(coordinates.flips(end, finished(10.0))) is flips
+        (FAILED, False),
+    ):
+        assert bool(coordinates.flips(finished(10.0), end)) is flips
+        assert bool(coordinates.flips(end, finished(10.0))) is flips
 
 
 def test_the_coarsest_converged_level_with_nothing_worse_above_it_is_recommended(coordinates: Coordinates) -> None:
-    for places in ([70.0, 74.0, 71.0, 73.9], [70.0, 74.0, 76.0, 77.0]):
-        assert judged(coordinates, places).recommendation is None
     by_luck = judged(coordinates, [70.0, 70.5, 70.03, 70.0, 70.0])
     assert by_luck.recommendation is by_luck.levels[2]
     own = judged(coordinates, [70.2, 70.05, 70.02, 70.0])
@@ -143,12 +126,11 @@ def test_a_turn_counts_as_far_as_it_moves_a_corner(coordinates: Coordinates) -> 
 
 
 def test_a_failed_level_is_neither_near_nor_far(coordinates: Coordinates) -> None:
-    failed: Row = {"status": "failed", "reason": "an overlap exceeds contact.max_overlap", "seconds": 0.1}
-    study = judge({0: finished(10.0), 1: finished(10.0), 2: failed}, HALVED, coordinates, 0.1)
+    study = judge({0: finished(10.0), 1: finished(10.0), 2: FAILED}, HALVED, coordinates, 0.1)
     assert study.verdict is ConvergenceVerdict.FAILED
     assert isnan(study.levels[2].change_mm)
     assert study.levels[0].to_finest_mm == 0.0
-    coarse = judge({-1: failed, 0: finished(10.0), 1: finished(10.0), 2: finished(10.0)}, HALVED, coordinates, 0.1)
+    coarse = judge({-1: FAILED, 0: finished(10.0), 1: finished(10.0), 2: finished(10.0)}, HALVED, coordinates, 0.1)
     assert coarse.verdict is ConvergenceVerdict.CONVERGED
     assert coarse.recommendation is coarse.own
 
@@ -167,13 +149,10 @@ def test_own_value_is_refined_and_coarsened_as_far_as_is_safe(slide: Scenario) -
     assert refinements_of(with_setting(slide, "time.step", 5e-6))[0].coarser == 0
 
 
-def test_spacing_is_refined_where_there_are_particles(slide: Scenario) -> None:
+def test_spacing_is_refined_where_there_are_particles_and_that_of_soil_where_it_is_asked_for(slide: Scenario) -> None:
     contact = slide.contact.model_copy(update={"model": "particles"})
     *_, spacing = refinements_of(slide.model_copy(update={"contact": contact}))
-    assert (spacing.key, spacing.value(0), spacing.value(1)) == ("contact.particle_spacing", 1e-3, 5e-4)
-
-
-def test_the_spacing_of_soil_is_halved_where_that_is_asked_for() -> None:
+    assert (spacing.key, levels(spacing, 1)[-2:]) == ("contact.particle_spacing", [1e-3, 5e-4])
     soil = scene(column(0.05, 0.05, 0.005))
     assert {one.study for one in refinements_of(soil)} == {"step", "stiffness"}
     (spacing,) = refinements_of(soil, ["spacing"])
@@ -182,9 +161,31 @@ def test_the_spacing_of_soil_is_halved_where_that_is_asked_for() -> None:
     assert table.spacing == pytest.approx(0.0025)
 
 
-def test_slide_converges_with_the_order_of_its_static_deflections(slide: Scenario, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def converged(slide: Scenario, tmp_path_factory: pytest.TempPathFactory) -> tuple[Convergence, Path, list[str]]:
+    """Give the study of a slide, its folder, and what was told of its runs; not to be changed."""
+    labels: list[str] = []
+    folder = tmp_path_factory.mktemp("converge")
+    return converge(slide, out=folder, on_run=lambda label, _: labels.append(label)), folder, labels
+
+
+def test_all_recommended_values_are_tried_together(converged: tuple[Convergence, Path, list[str]]) -> None:
+    result, folder, labels = converged
+    assert result.converged
+    assert result.recommended is not None
+    assert result.recommended.settings == {"time.safety": 0.1, "contact.stiffness_scale": 0.001}
+    assert labels[-1] == "recommended settings together"
+    assert len(labels) == len(list(folder.iterdir())) == 4 + 5 - 1 + 1  # the scenario's own run is shared
+    assert any("particle spacing has no effect" in text for text in result.notes)
+
+
+def test_slide_converges_with_the_order_of_its_static_deflections_and_runs_nothing_twice(
+    slide: Scenario, converged: tuple[Convergence, Path, list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     # what a sliding block owes to its springs are lengths such as m g / K: first order in the stiffness
-    result = converge(slide, studies=["stiffness"], out=tmp_path)
+    _, folder, _ = converged
+    monkeypatch.setattr(folders, "run", None)
+    result = converge(slide, studies=["stiffness"], out=folder, levels=9)
     (study,) = result.studies
     assert study.verdict is ConvergenceVerdict.CONVERGED
     assert [level.order for level in study.levels[2:]] == pytest.approx([1.0] * 3, abs=0.05)
@@ -192,23 +193,6 @@ def test_slide_converges_with_the_order_of_its_static_deflections(slide: Scenari
     assert result.recommended.settings == {"contact.stiffness_scale": 0.001}
     assert result.recommended.to_finest_mm < 1e-3
     assert study.own.x_mm[0] == pytest.approx(33.532, abs=1e-3)
-
-
-def test_all_recommended_values_are_tried_together(slide: Scenario, tmp_path: Path) -> None:
-    labels: list[str] = []
-    result = converge(slide, out=tmp_path, on_run=lambda label, _: labels.append(label))
-    assert result.converged
-    assert result.recommended is not None
-    assert result.recommended.settings == {"time.safety": 0.1, "contact.stiffness_scale": 0.001}
-    assert labels[-1] == "recommended settings together"
-    assert len(labels) == len(list(tmp_path.iterdir())) == 4 + 5 - 1 + 1  # the scenario's own run is shared
-    assert any("particle spacing has no effect" in text for text in result.notes)
-
-
-def test_more_levels_run_only_what_is_missing(slide: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = converge(slide, studies=["step"], out=tmp_path)
-    monkeypatch.setattr(folders, "run", None)
-    assert converge(slide, studies=["step"], out=tmp_path, levels=9) == before
 
 
 def test_refining_continues_until_the_tolerance_is_met(slide: Scenario, tmp_path: Path) -> None:

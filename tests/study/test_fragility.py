@@ -7,43 +7,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import norm
 
 from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
-from blocksim.errors import UnavailableError
+from blocksim.errors import InvalidInputError, UnavailableError
 from blocksim.scenario import Document
 from blocksim.study.fragility import FragilityAnswer, fragility, read_fragility
 from blocksim.study.manifest import Shard
+from blocksim.study.pictures import plot
+from blocksim.study.report import report
 from tests.sizes import in_all
-
-MU = "friction.block_ground"
-SLIDES = "outcome = slid"
-TILTS = {"ground.tilt": ["14 deg", "17 deg", "20 deg", "23 deg", "26 deg"]}
-FRICTION = {MU: {"mean": 0.38, "sd": 0.06}}
-STONE = {"density": 2500, "young_modulus": "30 GPa", "poisson_ratio": 0.2}
-SLOPE: dict[str, Any] = {
-    "schema": 1,
-    "name": "slope",
-    "materials": {"stone": STONE},
-    "blocks": {"b": {"width": 0.1, "height": 0.05, "length": 0.1, "material": "stone"}},
-    "bodies": [{"block": "b", "x": 0, "y": 0.025}],
-    "friction": {"block_ground": 0.38},
-    "contact": {"restitution": 0},
-    "time": {"scheme": "nonsmooth", "end": 0.5, "step": 2e-3},
-    "output": {"every": 0.05},
-}
+from tests.study.plans import MU, SCATTER, SLIDES, SLOPE, TILT, TILTS
 
 
 def slides(out: Path, members: int = 8, **wanted: Any) -> FragilityAnswer:
-    return fragility(SLOPE, TILTS, FRICTION, out=out, **{"members": members, "fails": SLIDES, "jobs": 1, **wanted})
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> FragilityAnswer:
-    """Give a study that was run in one go; not to be changed."""
-    return slides(tmp_path_factory.mktemp("whole") / "study")
+    return fragility(SLOPE, TILTS, SCATTER, out=out, **{"members": members, "fails": SLIDES, "jobs": 1, **wanted})
 
 
 def test_each_member_slides_where_its_own_friction_is_less_than_the_tangent_of_the_tilt(whole: FragilityAnswer) -> None:
@@ -64,8 +45,8 @@ def test_each_member_slides_where_its_own_friction_is_less_than_the_tangent_of_t
 
 def test_a_member_depends_on_its_number_and_intensity_alone() -> None:
     def drawn(tilts: list[str], members: int, seed: int = 0, **others: Any) -> dict[tuple[float, int], object]:
-        scatter = {**FRICTION, **others}
-        plan = read_fragility(Document.from_mapping(SLOPE), {"ground.tilt": tilts}, scatter, members=members, seed=seed)
+        scatter = {**SCATTER, **others}
+        plan = read_fragility(Document.from_mapping(SLOPE), {TILT: tilts}, scatter, members=members, seed=seed)
         numbers = list(plan.levels)
         values = enumerate(case[MU] for case in plan.cases.design)
         return {(numbers[case % len(numbers)], case // len(numbers)): value for case, value in values}
@@ -102,47 +83,29 @@ def test_shards_in_any_order_give_the_study_that_one_process_gives(tmp_path: Pat
 def test_members_whose_runs_fail_count_neither_as_failures_nor_as_survivors(tmp_path: Path) -> None:
     springs = SLOPE | {"time": {"end": 0.01}, "contact": {"restitution": 0, "stiffness_scale": 0.001}}
     limits = {"contact.max_overlap": [1e-2, 1e-12]}
-    found = fragility(
-        springs, {"ground.tilt": ["10 deg", "20 deg"]}, limits, members=8, fails="moved < 1 m", out=tmp_path
-    )
+    tilts = {TILT: ["10 deg", "20 deg"]}
+    found = fragility(springs, tilts, limits, members=8, fails="moved < 1 m", out=tmp_path / "springs")
     assert found.failed > 0
     for point in found.points:
         assert point.members + point.no_result == 8
         assert point.failures == point.members
-
-
-def test_members_that_do_not_come_to_rest_before_time_zero_fail(tmp_path: Path) -> None:
     settled = SLOPE | {"start": {"settle": True}, "time": {"end": 0.01, "scheme": "nonsmooth"}}
-    friction = {"friction.block_ground": [0.3, 0.4]}
-    found = fragility(
-        settled, {"ground.tilt": ["10 deg", "60 deg"]}, friction, members=4, fails="moved > 1 m", out=tmp_path
-    )
+    tilts, friction = {TILT: ["10 deg", "60 deg"]}, {MU: [0.3, 0.4]}  # the second one does not come to rest before zero
+    found = fragility(settled, tilts, friction, members=4, fails="moved > 1 m", out=tmp_path / "settled")
     assert [(point.members, point.failures, point.no_result) for point in found.points] == [(4, 0, 0), (4, 4, 0)]
 
 
 def test_survivors_that_move_on_at_the_end_are_counted(tmp_path: Path) -> None:
     found = slides(tmp_path, members=4, fails="moved > 100 m")
     assert sum(point.moving_on for point in found.points) > 0
-    assert found.points[-1].moving_on == sum(
-        row["moves_on"] in (True, "True") for _, row in _members(tmp_path).iterrows() if row["ground.tilt [deg]"] == 26
-    )
-
-
-def _members(folder: Path) -> Any:
-    import pandas as pd  # noqa: PLC0415
-
-    return pd.read_csv(folder / "members.csv")
+    steepest = pd.read_csv(tmp_path / "members.csv").query("`ground.tilt [deg]` == 26")
+    assert found.points[-1].moving_on == steepest["moves_on"].astype(str).eq("True").sum()
 
 
 def test_keys_that_take_whole_numbers_are_drawn_as_such() -> None:
-    wall = SLOPE | {
-        "bodies": [],
-        "structures": [
-            {"kind": "wall", "block": "b", "rows": 3, "columns": 3, "gap": "5 mm", "offset": "2 mm", "seed": 0}
-        ],
-    }
-    seeds = {"structures.0.seed": {"from": 1, "to": 4}}
-    plan = read_fragility(Document.from_mapping(wall), TILTS, seeds, members=40)
+    wall = {"kind": "wall", "block": "b", "rows": 3, "columns": 3, "gap": "5 mm", "offset": "2 mm", "seed": 0}
+    document = Document.from_mapping(SLOPE | {"bodies": [], "structures": [wall]})
+    plan = read_fragility(document, TILTS, {"structures.0.seed": {"from": 1, "to": 4}}, members=40)
     drawn = [case["structures.0.seed"] for case in plan.cases.design]
     assert all(type(seed) is int for seed in drawn)
     assert np.bincount(drawn)[1:].tolist() == pytest.approx([50] * 4, abs=25)  # type: ignore[arg-type]
@@ -168,6 +131,51 @@ def test_without_scipy_it_says_what_to_install_before_anything_runs(
     assert not (tmp_path / "study").exists()
 
 
+def test_the_picture_has_the_counts_and_the_curve_of_the_result(whole: FragilityAnswer) -> None:
+    found = FragilityAnswer.read(whole.folder).picture_of()
+    assert whole.plan is not None
+    assert found.x.tolist() == list(whole.plan.levels)
+    assert found.share.tolist() == [point.share for point in whole.points]
+    assert list(zip(found.low, found.high, strict=True)) == [(point.low, point.high) for point in whole.points]
+    assert found.band is not None
+    curve = whole.probability(found.band.x)
+    assert curve is not None
+    assert found.band.probability == pytest.approx(curve)
+    assert "median 21.7" in found.notes[0]
+
+
+def test_plot_and_report_take_the_study(
+    whole: FragilityAnswer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert plot(whole) == Path("slope_fragility.png")
+    assert (tmp_path / "slope_fragility.png").stat().st_size > 0
+    with pytest.raises(InvalidInputError, match="a fragility study is drawn as 'fragility', not as 'lines'"):
+        plot(whole, kind="lines")
+    with pytest.raises(InvalidInputError, match=r"--forces shows contacts of a run, but .* is a fragility study"):
+        plot(whole.folder, forces=True)
+    text = report(whole.folder, out="study.html").read_text()
+    assert 'data-kind="study"' in text
+    assert 'src="data:image/png;base64,' in text
+    assert '<td class="n"><bdi>14</bdi></td>' in text
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"points": "none"}, "not the answer of a fragility study"),
+        ({"points": []}, "no sample of this study has a result"),
+    ],
+)
+def test_a_damaged_answer_is_told(whole: FragilityAnswer, tmp_path: Path, change: dict[str, object], why: str) -> None:
+    data = json.loads((whole.folder / "fragility.json").read_text())
+    (tmp_path / "fragility.json").write_text(json.dumps({**data, **change}))
+    (tmp_path / "fragility.toml").write_bytes((whole.folder / "fragility.toml").read_bytes())
+    with pytest.raises(InvalidInputError, match=why):
+        plot(tmp_path, out=tmp_path / "picture.png")
+    assert not (tmp_path / "picture.png").exists()
+
+
 @pytest.mark.long
 def test_intervals_cover_the_closed_form_through_the_whole_chain(tmp_path: Path) -> None:
     studies, covered, fitted = in_all(100), 0, 0
@@ -189,7 +197,7 @@ RECORDS = [0.25, 0.29, 0.33, 0.37, 0.41, 0.45]
 def test_stripes_have_each_record_once_at_each_intensity_and_wider_intervals(tmp_path: Path) -> None:
     stripes: dict[str, Any] = {"stripes": {MU: RECORDS}, "fails": SLIDES, "jobs": 1}
     found = fragility(SLOPE, TILTS, **stripes, out=tmp_path / "study")
-    table = _members(tmp_path / "study")
+    table = pd.read_csv(tmp_path / "study" / "members.csv")
     assert [sorted(rows[MU]) for _, rows in table.groupby("ground.tilt [deg]")] == [RECORDS] * 5
     assert [point.members for point in found.points] == [6] * 5
     assert found.inflation is not None
@@ -204,7 +212,7 @@ def test_stripes_have_each_record_once_at_each_intensity_and_wider_intervals(tmp
 
 
 def test_a_median_beyond_what_was_run_is_known_as_such(whole: FragilityAnswer, tmp_path: Path) -> None:
-    low = {"ground.tilt": ["14 deg", "17 deg"]}
+    low = {TILT: ["14 deg", "17 deg"]}
     found = fragility(SLOPE, low, stripes={MU: [0.2, 0.26, *RECORDS[2:]]}, fails=SLIDES, jobs=1, out=tmp_path / "low")
     assert isinstance(found.curve, Curve)
     assert found.curve.median > 17.0

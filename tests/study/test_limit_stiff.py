@@ -16,7 +16,7 @@ from blocksim.study.limit import find_limit
 from blocksim.study.limit_answer import LimitAnswer
 from blocksim.study.limit_plan import LimitOptions, read_limit
 from blocksim.study.manifest import MANIFEST
-from tests.study.test_limit import block_on_a_slope
+from tests.study.plans import block_on_a_slope
 
 STIFF = 26.5  # deg: limit of stiff contacts
 SLENDER = (0.1, 0.2)
@@ -31,8 +31,10 @@ def linear(share: float) -> Law:
 class Formula(Execution):
     """Says at once that a block stands below the limit of its stiffness, and by how much it has turned."""
 
-    law: Law = staticmethod(linear(0.0))
-    is_known = True  # the turn
+    law: Law
+    is_known: bool  # the turn
+    beside: dict[str, object]
+    asked: list[Scenario]
 
     def ready(self, _: Path | None = None, /) -> tuple[Rounds, RunSetting]:
         def run(tasks: Iterator[Task], _: RunSetting) -> Generator[Batch, None, None]:
@@ -42,17 +44,18 @@ class Formula(Execution):
         return lambda: nullcontext(run), RunSetting(1)
 
     def row(self, scenario: Scenario) -> dict[str, object]:
-        tilt, scale = math.degrees(scenario.ground.tilt), scenario.contact.stiffness_scale
-        stands = tilt < self.law(scale)
+        self.asked.append(scenario)
+        limit = self.law(scenario.contact.stiffness_scale)
+        stands = math.degrees(scenario.ground.tilt) < limit
         outcome = ("stands" if self.is_known else "rocked back") if stands else "fell"
-        turn = STIFF - self.law(scale)
-        return {"status": "finished", "reason": "", "seconds": 1.0, "outcome": outcome, "b.rotation_deg": turn}
+        ended = {"status": "finished", "reason": "", "seconds": 1.0, "outcome": outcome}
+        return ended | {"b.rotation_deg": STIFF - limit} | self.beside
 
 
-def formula(law: Law, *, is_known: bool = True) -> Formula:
+def formula(law: Law, *, is_known: bool = True, **beside: object) -> Formula:
     found = Formula()
-    object.__setattr__(found, "law", law)
-    object.__setattr__(found, "is_known", is_known)
+    for name, value in (("law", law), ("is_known", is_known), ("beside", beside), ("asked", [])):
+        object.__setattr__(found, name, value)
     return found
 
 
@@ -82,20 +85,11 @@ def test_a_limit_of_springs_becomes_that_of_stiff_contacts(tmp_path: Path, share
     assert found_with(formula(linear(share)), tmp_path, stiffer=False).limits == [one.given for one in found.brackets]
 
 
-@pytest.mark.parametrize("share", [0.03, -0.03])
-def test_a_shift_that_nothing_foretells_is_found_by_two_runs_beyond_the_bracket(tmp_path: Path, share: float) -> None:
-    (answer,) = found_with(formula(linear(share), is_known=False), tmp_path).limits
-    assert answer.low < STIFF < answer.high
-
-
-def test_what_moves_on_at_the_end_is_extrapolated_as_what_stands(tmp_path: Path) -> None:
-    class Rocking(Formula):
-        def row(self, scenario: Scenario) -> dict[str, object]:
-            return super().row(scenario) | {"moves_on": True}
-
-    rocking = Rocking()
-    object.__setattr__(rocking, "law", linear(0.03))
-    (answer,) = found_with(rocking, tmp_path).changes
+def test_shifts_that_nothing_foretells_and_of_what_moves_on_at_the_end_are_found_too(tmp_path: Path) -> None:
+    for share in (0.03, -0.03):
+        (answer,) = found_with(formula(linear(share), is_known=False), tmp_path / f"{share}").limits
+        assert answer.low < STIFF < answer.high
+    (answer,) = found_with(formula(linear(0.03), moves_on=True), tmp_path / "rocking").changes
     assert (answer.below, answer.above) == ("undecided", "falls")
     assert answer.low < STIFF < answer.high
 
@@ -159,15 +153,8 @@ def test_springs_of_hertz_give_way_by_another_power_and_a_step_by_hand_is_shorte
     (answer,) = found_with(softer, tmp_path / "hertz", hertz).limits
     assert answer.low < STIFF < answer.high
     assert answer.high - answer.low < 5e-3 * STIFF
-    steps: set[float] = set()
-
-    class Noting(Formula):
-        def row(self, scenario: Scenario) -> dict[str, object]:
-            steps.add(float(scenario.time.step) * math.sqrt(scenario.contact.stiffness_scale))
-            return super().row(scenario)
-
-    noting = Noting()
-    object.__setattr__(noting, "law", linear(0.06))
+    noting = formula(linear(0.06))
     found_with(noting, tmp_path / "noting", on_springs(time={"scheme": "explicit", "end": 1.0, "step": 1e-6}))
-    assert min(steps) == pytest.approx(1e-6)
-    assert max(steps) == pytest.approx(1e-6)
+    assert len({one.contact.stiffness_scale for one in noting.asked}) > 1
+    for one in noting.asked:
+        assert float(one.time.step) * math.sqrt(one.contact.stiffness_scale) == pytest.approx(1e-6)

@@ -19,9 +19,7 @@ from blocksim.study.plan import Variations, with_sweep
 from blocksim.study.sweep import merge, sweep
 from tests.golden import Golden
 from tests.study.conftest import SCENARIOS
-from tests.study.plans import cases
-from tests.study.test_fragility import FRICTION, SLOPE, TILTS
-from tests.study.test_limit import TILT
+from tests.study.plans import SCATTER, SLOPE, TILTED, TILTS, cases
 
 REFUSED: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_name("refused.toml").read_text())
 THREE = Document.read(SCENARIOS / "three_blocks_nominal.toml")
@@ -36,7 +34,7 @@ def drawn(_: Path, vary: dict[str, Any], mode: str = "grid", **samples: int) -> 
     return cases(THREE, Variations(vary, {key: f"{key}=typed" for key in vary}), mode, **samples)
 
 
-def fragile(out: Path, intensity: Any = TILTS, scatter: Any = FRICTION, **wanted: Any) -> object:
+def fragile(out: Path, intensity: Any = TILTS, scatter: Any = SCATTER, **wanted: Any) -> object:
     return fragility(SLOPE, intensity, scatter, **wanted, out=out)
 
 
@@ -63,7 +61,7 @@ def converged(out: Path, scheme: str = "explicit", **wanted: Any) -> object:
 STUDIES: dict[str, Callable[..., object]] = {
     "criterion": lambda _, text: read_criterion(text),
     "limit": lambda out, vary: limit(SLOPE, vary, out=out),
-    "curve": lambda out, over: limit_curve(SLOPE, TILT, over, out=out),
+    "curve": lambda out, over: limit_curve(SLOPE, TILTED, over, out=out),
     "stiffer": stiffer,
     "fragility": fragile,
     "sweep": swept,

@@ -1,27 +1,38 @@
-"""One run and its comparison, from Python."""
+"""One run, from Python and as it lies on the disk; compared with an experiment, as sweeps are."""
 
+import json
 import os
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import h5py
 import pytest
 
 import blocksim
+from blocksim.analysis.compare import Comparison
+from blocksim.analysis.metrics import Judgement, Settings
 from blocksim.errors import InputMissingError, InvalidInputError
-from blocksim.scenario import Scenario, load_scenario
-from blocksim.simulation import Result
+from blocksim.scenario import Document, Scenario, load_scenario
+from blocksim.simulation import Result, simulate_into
 from blocksim.simulation.instruments import bytes_of_series
 from blocksim.study import run as single
-from blocksim.study.compare import compare_run
+from blocksim.study.compare import compare, compare_run, compare_sweep
+from blocksim.study.manifest import SweepResult
 from blocksim.study.run import run
-from blocksim.study.run_folder import find_run
+from blocksim.study.run_folder import find_run, read_run
+from blocksim.study.sweep import sweep
+from blocksim.study.verify import verify_run
 from blocksim.world.describe import describe
 from tests.golden import Golden
+from tests.simulation.test_probes import PROBES, PULSE, scene
 from tests.study.conftest import SCENARIOS
 
 if TYPE_CHECKING:
     import pandas as pd
+
+PAPER = SCENARIOS / "experiments" / "three_blocks.csv"
+BRIEF = {"time.end": 0.002, "contact.stiffness_scale": 0.001}
 
 
 @pytest.fixture(scope="module")
@@ -35,34 +46,26 @@ def copy(kept: Result, tmp_path: Path) -> Path:
     return Path(shutil.copytree(kept.folder, tmp_path / "run"))
 
 
-def test_python_users_need_four_names(tmp_path: Path) -> None:
-    scenario = blocksim.load(SCENARIOS / "three_blocks.toml", {"contact.stiffness_scale": 0.001})
-    result = blocksim.run(scenario)
-    assert result.folder is None
-    assert blocksim.compare(result).to_frame().shape[0] == 6
-    swept = blocksim.sweep(
-        SCENARIOS / "tower.toml", {"contact.stiffness_scale": [0.001], "time.end": [0.01]}, out=tmp_path, jobs=1
-    )
-    assert swept.failed == 0
-
-
-def test_run_without_a_folder_writes_nothing(
-    scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_python_users_need_four_names_and_a_run_without_a_folder_writes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    run(scenario)
+    result = blocksim.run(blocksim.load(SCENARIOS / "three_blocks.toml", {"contact.stiffness_scale": 0.001}))
+    assert result.folder is None
+    assert blocksim.compare(result).to_frame().shape[0] == 6
     assert list(tmp_path.iterdir()) == []
+    vary = {"contact.stiffness_scale": [0.001], "time.end": [0.01]}
+    assert blocksim.sweep(SCENARIOS / "tower.toml", vary, out=tmp_path, jobs=1).failed == 0
 
 
-def test_finished_run_is_not_run_again(kept: Result, scenario: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(single, "simulate_into", None)
-    assert run(scenario, out=kept.folder).summary == kept.summary
-
-
-def test_overwrite_runs_again(copy: Path, scenario: Scenario) -> None:
+def test_finished_run_is_not_run_again_unless_it_is_to_be_overwritten(
+    copy: Path, kept: Result, scenario: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
     os.utime(copy / "run.json", (0.0, 0.0))
     run(scenario, out=copy, overwrite=True)
     assert (copy / "run.json").stat().st_mtime_ns > 0
+    monkeypatch.setattr(single, "simulate_into", None)
+    assert run(scenario, out=kept.folder).summary == kept.summary
 
 
 def test_table_that_does_not_fit_the_blocks_is_reported_before_the_run(scenario: Scenario, tmp_path: Path) -> None:
@@ -75,20 +78,12 @@ def test_table_that_does_not_fit_the_blocks_is_reported_before_the_run(scenario:
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("what", ["result", "table", "folder", "parent"])
-def test_result_table_and_folder_compare_alike(kept: Result, what: str) -> None:
+def test_result_table_and_folder_compare_alike_and_a_table_alone_needs_an_experiment(kept: Result) -> None:
     assert kept.folder is not None
-    given: dict[str, Result | pd.DataFrame | Path] = {
-        "result": kept,
-        "table": kept.final,
-        "folder": kept.folder,
-        "parent": kept.folder.parent,
-    }
-    found = compare_run(given[what], SCENARIOS / "experiments" / "three_blocks.csv")
-    assert [row.simulated for row in found.rows] == [row.simulated for row in compare_run(kept).rows]
-
-
-def test_comparison_needs_a_table(kept: Result) -> None:
+    places: tuple[Result | pd.DataFrame | Path, ...] = (kept, kept.final, kept.folder, kept.folder.parent)
+    expected = [row.simulated for row in compare_run(kept).rows]
+    for place in places:
+        assert [row.simulated for row in compare_run(place, PAPER).rows] == expected
     with pytest.raises(InputMissingError, match="--experiment"):
         compare_run(kept.final)
 
@@ -105,7 +100,7 @@ def test_unfinished_run_is_not_judged(scenario: Scenario, tmp_path: Path) -> Non
 def test_missing_file_of_a_run_is_named(copy: Path, name: str) -> None:
     (copy / name).unlink()
     with pytest.raises(InputMissingError, match=name.replace(".", r"\.")):
-        compare_run(copy, SCENARIOS / "experiments" / "three_blocks.csv")
+        compare_run(copy, PAPER)
 
 
 def test_final_table_without_one_of_the_blocks_is_named(copy: Path) -> None:  # and not the experiment's, which has it
@@ -115,15 +110,36 @@ def test_final_table_without_one_of_the_blocks_is_named(copy: Path) -> None:  # 
         compare_run(copy)
 
 
-def test_scenario_without_its_run_says_what_to_do_or_which_run_there_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden
+@pytest.fixture(scope="module")
+def swept(nominal: Document, tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
+    """Give two members, of which the second fails."""
+    vary = {"contact.max_overlap": [1e-3, 1e-9]}
+    return sweep(nominal, vary, out=tmp_path_factory.mktemp("sweep") / "out", jobs=1)
+
+
+def test_sweep_and_its_folder_are_judged_alike_and_a_table_alone_needs_an_experiment(
+    swept: SweepResult, tmp_path: Path
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    tower = SCENARIOS / "tower.toml"
-    golden(refused(tower), "none")
-    values = {"time.end": 0.001, "contact.stiffness_scale": 0.001}
-    blocksim.run(blocksim.load(tower, values), out="results/tower/other")
-    golden(refused(tower), "with other values")
+    found = [compare(swept), compare(swept.folder), compare(str(swept.folder), PAPER)]
+    assert all(isinstance(one, Judgement) and one.members == 2 for one in found)
+    first, second, third = (one.to_dict() for one in found)
+    assert first == second
+    assert first["metrics"] == third["metrics"]
+    swept.table.to_csv(tmp_path / "sweep.csv", index=False)
+    with pytest.raises(InputMissingError, match="--experiment"):
+        compare_sweep(tmp_path)
+    assert compare_sweep(tmp_path, PAPER).members == 2
+
+
+def test_member_of_a_sweep_is_judged_as_a_run_of_its_own_and_by_the_settings(swept: SweepResult, kept: Result) -> None:
+    found, alone = compare_sweep(swept), compare(kept)
+    assert isinstance(alone, Comparison)
+    verdicts = {(row.block, row.quantity): int(row.verdict == "inside") for row in alone.rows}
+    rows = found.findings["inside"].rows[:-1]
+    assert {(row["block"], row["quantity"]): row["inside"] for row in rows} == verdicts
+    assert found.share_inside == swept.share_inside
+    assert any("not probabilities" in message for message in found.messages)  # chosen members are no sample
+    assert compare_sweep(swept, settings=Settings(threshold=0.0)).inside
 
 
 def refused(path: Path) -> str:
@@ -133,24 +149,28 @@ def refused(path: Path) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("files", "place"),
-    [
-        (["sweep-a/sweep.csv"], ""),
-        (["quay/a1/done.json", "wall/a1/done.json"], ""),
-        (["a1/run.h5"], ""),
-        (["sweep.csv"], ""),
-        (["measured.csv"], "measured.csv"),
-        ([], ""),
-        ([], "nix"),
-    ],
-    ids=["sweep below", "results above", "stopped run", "sweep", "table", "empty", "nothing"],
-)
-def test_folder_without_a_run_says_what_it_is(tmp_path: Path, golden: Golden, files: list[str], place: str) -> None:
-    for name in files:
+def test_place_without_a_run_says_what_it_is_and_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, golden: Golden
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told = [refused(SCENARIOS / "tower.toml")]
+    blocksim.run(blocksim.load(SCENARIOS / "tower.toml", BRIEF), out="results/tower/other")
+    told.append(refused(SCENARIOS / "tower.toml"))
+    measured = "block,quantity,unit,replicate,value\n1,x,mm,1,16\n"
+    for name, text, place in (
+        ("sweep below/sweep-a/sweep.csv", "", "sweep below"),
+        ("results above/quay/a1/done.json", "", "results above"),
+        ("results above/wall/a1/done.json", "", "results above"),
+        ("stopped run/a1/run.h5", "", "stopped run"),
+        ("sweep/sweep.csv", "", "sweep"),
+        ("table/measured.csv", measured, "table/measured.csv"),
+        ("empty/nix/nix", "", "empty/nix"),
+        ("empty/nix/nix", "", "nothing"),
+    ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("block,quantity,unit,replicate,value\n1,x,mm,1,16\n" * name.startswith("measured"))
-    golden(refused(tmp_path / place))
+        (tmp_path / name).write_text(text)
+        told.append(refused(tmp_path / place))
+    golden("\n\n".join(told))
 
 
 @pytest.mark.parametrize(
@@ -166,11 +186,54 @@ def test_size_of_a_run_is_forecast_within_a_factor_of_two(
     tmp_path: Path, name: str, changes: dict[str, object]
 ) -> None:
     scenario = load_scenario(SCENARIOS / f"{name}.toml", changes)
-    result = run(scenario, out=tmp_path / "run")
+    result = run(scenario, out=tmp_path)
     described = describe(scenario)
     assert result.frames.time.size > 0.9 * described.frames  # nothing came to rest before
-    stored = sum(
-        path.stat().st_size for path in (tmp_path / "run").iterdir() if path.name.startswith(("run.h5", "probe-"))
-    )
+    stored = sum(path.stat().st_size for path in tmp_path.iterdir() if path.name.startswith(("run.h5", "probe-")))
     told = described.bytes + bytes_of_series(scenario, described.steps, described.step, 14)
     assert 0.5 * stored < told < 2.0 * stored
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Give the folder of a short finished run."""
+    simulate_into(load_scenario(SCENARIOS / "bounce.toml", BRIEF), tmp_path / "run")
+    return tmp_path / "run"
+
+
+def test_newest_of_several_finished_runs_is_named_and_one_needs_no_remark(folder: Path) -> None:
+    stored = read_run(folder.parent)
+    assert (stored.remark, stored.scenario.name, len(stored.frames)) == ("", "bounce", 5)
+    shutil.copytree(folder, folder.parent / "older")
+    os.utime(folder.parent / "older" / "done.json", (0.0, 0.0))
+    assert read_run(folder.parent).remark == f"{folder.parent}: the newest of 2 runs is taken: {folder}"
+    assert read_run(folder).remark == ""
+
+
+def test_what_did_not_finish_and_missing_and_damaged_frames_are_reported(folder: Path, golden: Golden) -> None:
+    summary = json.loads((folder / "run.json").read_text())
+    told = []
+    for status in ("failed", "interrupted"):
+        (folder / "run.json").write_text(json.dumps({**summary, "status": status, "reason": "why"}))
+        told.append(read_run(folder).remark)
+    (folder / "run.json").write_text("{")
+    told.append(read_run(folder).remark)
+    (folder / "run.json").unlink()
+    told.append(read_run(folder).remark)
+    golden("\n".join(told))
+    (folder / "run.h5").write_bytes((folder / "run.h5").read_bytes()[:2000])
+    with pytest.raises(InvalidInputError, match=r"run\.h5: not a"):
+        read_run(folder)
+    (folder / "run.h5").unlink()
+    with pytest.raises(InputMissingError, match=r"no run\.h5"):
+        read_run(folder)
+
+
+def test_a_changed_sample_is_found_when_a_run_is_verified(tmp_path: Path) -> None:
+    result = simulate_into(scene("nonsmooth", PROBES, 0.03, motion=PULSE), tmp_path)
+    assert verify_run(tmp_path).agrees
+    with h5py.File(tmp_path / "run.h5", "r+") as file:
+        file["probes/joint4/slip"][2] += 1e-18
+    step = result.probes["joint4"].step[2]
+    (found,) = verify_run(tmp_path).entries
+    assert (found.file, found.entry) == ("run.h5", f"probes/joint4/slip at step {step}")

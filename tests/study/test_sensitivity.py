@@ -53,7 +53,7 @@ def test_measured_quantities_and_outcome_are_looked_at() -> None:
 def test_blocks_of_the_design_with_a_failed_run_are_left_out_and_counted() -> None:
     vary: dict[str, Values] = {
         "friction.block_ground": {"from": 0.3, "to": 0.4},
-        "bodies.0.y": ["12.5 mm", "12.5 mm", "12.5 mm", "12.5 mm", "12.5 mm", "12.5 mm", "12.5 mm", "11 mm"],
+        "bodies.0.y": [*["12.5 mm"] * 7, "11 mm"],
     }
     result = found("slide", vary, "sobol", 16)
     assert 0 < result.failed < result.runs
@@ -133,21 +133,16 @@ def test_morris_stays_off_the_infinite_ends_of_a_normal_distribution() -> None:
 
 
 @pytest.mark.parametrize("method", sorted(METHODS))
-def test_same_seed_gives_the_same_design_and_numbers(method: str) -> None:
+def test_designs_are_whole_blocks_in_the_unit_cube_which_a_seed_repeats(method: str) -> None:
+    for keys in (1, 2, 7):
+        points = METHODS[method].points(keys, 5, 0)
+        assert points.shape == (5 * (keys + METHODS[method].more_rows), keys)
+        assert points.min() >= 0.0
+        assert points.max() <= 1.0
     vary = dict.fromkeys("xyz", Uniform(-math.pi, math.pi))
-    for seed in (0, 7):
-        assert indices(method, ishigami, vary, 8, seed) == indices(method, ishigami, vary, 8, seed)
-    assert indices(method, ishigami, vary, 8, 0) != indices(method, ishigami, vary, 8, 7)
-
-
-@pytest.mark.parametrize("method", sorted(METHODS))
-@pytest.mark.parametrize("keys", [1, 2, 7])
-def test_designs_consist_of_whole_blocks_in_the_unit_cube(method: str, keys: int) -> None:
-    chosen = METHODS[method]
-    points = chosen.points(keys, 5, 0)
-    assert points.shape == (5 * (keys + chosen.more_rows), keys)
-    assert points.min() >= 0.0
-    assert points.max() <= 1.0
+    first, same, other = (indices(method, ishigami, vary, 8, seed) for seed in (0, 0, 7))
+    assert first == same
+    assert first != other
 
 
 def test_morris_trajectories_lie_farther_apart_than_random_ones_and_are_quick() -> None:
@@ -167,5 +162,4 @@ def test_morris_trajectories_lie_farther_apart_than_random_ones_and_are_quick() 
 @pytest.mark.parametrize("method", sorted(METHODS))
 def test_result_that_does_not_vary_has_no_indices(method: str) -> None:
     found = indices(method, lambda x, y: 16.0 + 1e-6 * x + 0.0 * y, dict.fromkeys("xy", Uniform(0.0, 1.0)), 4)
-    assert not found.numbers
     assert found.numbers == {}

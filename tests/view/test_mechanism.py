@@ -16,7 +16,7 @@ from blocksim.view.mechanism import SLIDES, BracketRun, draw_mechanisms, joints
 from blocksim.view.run_data import support_of
 from blocksim.view.scene import corners
 from blocksim.view.style import BLOCK_COLOURS, INK, MEASURED_COLOUR, Paper
-from tests.study.test_limit import SLENDER, SQUAT, block_on_a_slope
+from tests.study.plans import SLENDER, SQUAT, block_on_a_slope
 
 
 def side(size: tuple[float, float], tilt: str, *, contacts: bool = True, **tables: Any) -> BracketRun:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from multiprocessing import active_children, current_process
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,8 +21,8 @@ from blocksim.study.manifest import Shard
 from blocksim.study.plan import Values
 from blocksim.study.sweep import SweepOptions, merge, sweep
 from tests.study.conftest import SCENARIOS
+from tests.study.plans import KINETIC
 
-KINETIC = "friction.block_block.kinetic"
 # values that finish, fail in the run, fail before it, and do not go together; other shapes and schemes beside them
 VARY: dict[str, Values] = {
     KINETIC: [0.1, 0.2, 0.9],
@@ -29,8 +30,6 @@ VARY: dict[str, Values] = {
     "structures.0.count": [2, 3],
     "time.end": [0.004, 0.008],
 }
-
-
 COUNT = 400
 SCRIPT = f"""
 import os, sys
@@ -68,26 +67,24 @@ def without_experiment(document: Document) -> Document:
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("options", "most"),
     [
-        {"jobs": 3},
-        {"executor": "processes", "jobs": 2},
-        pytest.param({"keep_cases": True, "jobs": 2}, marks=pytest.mark.long),  # the same processes, with folders
+        ({"jobs": 3}, 1),
+        ({"jobs": 2}, 7),
+        ({"executor": "processes", "jobs": 2}, MOST),
+        pytest.param({"keep_cases": True, "jobs": 2}, MOST, marks=pytest.mark.long),  # the same processes, with folders
     ],
 )
-def test_table_is_the_same_from_every_executor(
-    quick: Document, whole: bytes, tmp_path: Path, options: dict[str, object]
-) -> None:
-    sweep(without_experiment(quick), SweepOptions(VARY, out=tmp_path, **options))  # type: ignore[arg-type]
-    assert (tmp_path / "sweep.csv").read_bytes() == whole
-
-
-@pytest.mark.parametrize("most", [1, 7])
-def test_table_does_not_depend_on_batches(
-    quick: Document, whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: int
+def test_table_is_the_same_from_every_executor_in_batches_of_any_size(
+    quick: Document,
+    whole: bytes,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: dict[str, Any],
+    most: int,
 ) -> None:
     monkeypatch.setattr(batches, "MOST", most)
-    sweep(without_experiment(quick), VARY, out=tmp_path, jobs=2)
+    sweep(without_experiment(quick), SweepOptions(VARY, out=tmp_path, **options))
     assert (tmp_path / "sweep.csv").read_bytes() == whole
 
 

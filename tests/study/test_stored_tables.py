@@ -1,4 +1,4 @@
-"""A sweep read back from its stored table, as pictures need it."""
+"""Tables of sweeps and of sensitivities read back, as pictures need them."""
 
 from pathlib import Path
 
@@ -7,12 +7,12 @@ import pytest
 
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.scenario import Document, Scenario
-from blocksim.study.pictures import plot, read_sweep_data, unit_of
+from blocksim.study.pictures import plot, read_indices, read_sweep_data, unit_of
 from blocksim.study.plan import Values, with_sweep
 from blocksim.study.sweep import sweep
 from blocksim.study.sweep_folder import prepare
 from blocksim.view.sweeps.data import SweepData, value_axis
-from tests.study.conftest import SCENARIOS
+from tests.study.plans import OVERLAP, TILT
 
 ENDS = ("x_mm", "y_mm", "rotation_deg", "left_mm", "right_mm")
 
@@ -34,19 +34,15 @@ def ended(x2: float, x3: float) -> str:
     return ",".join(["finished,at rest,0.5", *(f"{x},16,{turn},{x - 25},{x + 25}" for x, turn in blocks)])
 
 
-def test_values_are_in_si_with_the_unit_of_their_key(nominal: Document, tmp_path: Path) -> None:
-    vary: dict[str, Values] = {"structures.0.overlap": ["11 mm", "9 mm", 0.01]}
-    found = stored(nominal, tmp_path, vary, [f"{value},{ended(74.0, 130.0)}" for value in ("11 mm", "9 mm", "0.01")])
-    (overlap,) = found.inputs
-    assert (overlap.key, overlap.unit) == ("structures.0.overlap", "m")
-    assert overlap.values.tolist() == [0.011, 0.009, 0.01]
-
-
-def test_values_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) -> None:
-    vary: dict[str, Values] = {"structures.0.overlap": ["0.9 cm", "1 cm"], "ground.tilt": ["0.01 rad", "0.02 rad"]}
+def test_values_are_in_si_and_keep_the_unit_that_was_typed(quick: Document, tmp_path: Path) -> None:
+    vary: dict[str, Values] = {OVERLAP: ["0.9 cm", 0.01], TILT: ["0.01 rad", "0.02 rad"]}
     folder = sweep(quick, vary, out=tmp_path).folder
     overlap, tilt = read_sweep_data(folder).inputs
-    assert [(one.unit, one.typed and one.typed.unit) for one in (overlap, tilt)] == [("m", "cm"), ("rad", "rad")]
+    assert [(one.key, one.unit, one.typed and one.typed.unit) for one in (overlap, tilt)] == [
+        (OVERLAP, "m", "cm"),
+        (TILT, "rad", "rad"),
+    ]
+    assert overlap.values.tolist() == pytest.approx([0.009, 0.009, 0.01, 0.01])
     assert overlap.label(0.009) == "0.9 cm"
     for kind, second in (("map", "ground.tilt (rad)"), ("lines", "ground.tilt = 0.01 rad")):
         plot(folder, tmp_path / f"{kind}.svg", kind=kind)
@@ -90,13 +86,6 @@ def test_cases_are_inside_by_the_rules_of_compare_and_failed_ones_never(nominal:
     assert found.outcomes == [(0, -90, -90), (0, -90, -90), None]
 
 
-@pytest.mark.parametrize("kept", [3, 4, 6, 11, 15])
-def test_table_that_was_cut_off_in_a_finished_case_is_refused(nominal: Document, tmp_path: Path, kept: int) -> None:
-    cut = ",".join(ended(67.0, 130.0).split(",")[:kept])
-    with pytest.raises(InvalidInputError, match=r"sweep\.csv: case case1 has finished, but its row lacks positions"):
-        stored(nominal, tmp_path, {"gravity": [1.0, 2.0]}, [f"1.0,{ended(74.0, 130.0)}", f"2.0,{cut}"])
-
-
 def test_repeats_come_with_their_range_and_prediction_interval(nominal: Document, tmp_path: Path) -> None:
     known = stored(nominal, tmp_path, {"gravity": [1.0]}, [f"1.0,{ended(74.0, 130.0)}"]).measured
     assert known.x_mm["2"].tolist() == [71.69, 76.57, 72.70, 73.22, 73.73, 78.53]
@@ -105,19 +94,53 @@ def test_repeats_come_with_their_range_and_prediction_interval(nominal: Document
     assert known.outcome == (0, -90, -90)
 
 
-def test_sweep_without_experiment_measures_nothing(tmp_path: Path) -> None:
-    slide = Document.read(SCENARIOS / "slide.toml")
-    base = with_sweep(slide, {"gravity": [1.0]}).build()
-    prepare(tmp_path, base, "made-up", overwrite=False)
-    text = "case,gravity,status,reason,seconds,block.x_mm,block.rotation_deg\nc,1.0,finished,at rest,1,16,0\n"
-    (tmp_path / "sweep.csv").write_text(text, encoding="utf-8")
-    found = read_sweep_data(tmp_path)
-    assert found.inside is None
-    assert not found.measured.x_mm
-
-
-def test_what_cannot_be_drawn_is_refused(nominal: Document, tmp_path: Path) -> None:
+def test_without_experiment_nothing_is_measured_and_without_results_nothing_is_drawn(
+    nominal: Document, tmp_path: Path
+) -> None:
+    data = {key: table for key, table in nominal.data.items() if key != "experiment"}
+    unmeasured = Document(data, nominal.source, nominal.folder, nominal.overrides)
+    found = stored(unmeasured, tmp_path / "unmeasured", {"gravity": [1.0]}, [f"1.0,{ended(74.0, 130.0)}"])
+    assert (found.inside, found.measured.x_mm) == (None, {})
     with pytest.raises(InvalidInputError, match="no case of this sweep has finished"):
         stored(nominal, tmp_path / "failed", {"gravity": [1.0]}, ["1.0,failed,too large,0.1" + "," * 15])
     with pytest.raises(InputMissingError, match="no such file"):
         read_sweep_data(tmp_path / "nix")
+
+
+SOBOL = "output,unit,key,S1,± S1,ST,± ST\nx of block 2,mm,a,0.1,0.2,0.7,0.3\nx of block 2,mm,b,0.2,nan,0.4,\n"
+MORRIS = "output,unit,key,mu*,±,mu,sigma\nx of block 2,mm,a,5,1,-5,0\nmeasured outcome,share,a,0.5,0.1,0.5,0\n"
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "indices.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_bars_are_total_indices_with_those_of_the_key_alone_or_effects_with_their_unit(tmp_path: Path) -> None:
+    (bars,), labels = read_indices(written(tmp_path, SOBOL))
+    assert (bars.title, bars.keys) == ("x of block 2", ("a", "b"))
+    assert bars.values.tolist() == [0.7, 0.4]
+    assert bars.part is not None
+    assert bars.part.tolist() == [0.1, 0.2]
+    assert bars.half_widths[0] == 0.3
+    assert np.isnan(bars.half_widths[1])
+    assert "variance" in labels[0]
+
+    (x, outcome), labels = read_indices(written(tmp_path, MORRIS))
+    assert (x.title, x.values.tolist(), x.part) == ("x of block 2 (mm)", [5.0], None)
+    assert outcome.title == "measured outcome"
+    assert labels[1] == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("block,quantity\n1,x\n", "not the table of `blocksim sensitivity --out`"),
+        (SOBOL.replace("0.7", "much"), "indices.csv:2"),
+        (SOBOL.splitlines()[0] + "\n", "no result varies"),
+    ],
+)
+def test_other_tables_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(InvalidInputError, match=told):
+        read_indices(written(tmp_path, text))
