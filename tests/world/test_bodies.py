@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, inf, pi, sin
+from math import atan2, cos, hypot, pi, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 from blocksim.kernels.common.arrays import REACHED
-from blocksim.scenario import place_bodies, place_segments
+from blocksim.scenario import place_segments
 from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
 from blocksim.world.build import build_world
 
@@ -73,6 +73,7 @@ def corners(body: Record) -> np.ndarray:
 PROFILES = st.lists(st.tuples(st.floats(0.01, 0.3), st.floats(-0.3, 0.3)), min_size=1, max_size=6)
 
 
+@settings(max_examples=30)
 @given(steps=PROFILES)
 def test_upper_faces_of_slabs_are_the_line_of_the_profile(steps: list[tuple[float, float]]) -> None:
     points = np.concatenate([[[0.0, 0.0]], np.cumsum(steps, axis=0)])
@@ -92,27 +93,6 @@ def test_upper_faces_of_slabs_are_the_line_of_the_profile(steps: list[tuple[floa
         assert slab.radius == pytest.approx(hypot(slab.half_x, slab.half_y))
 
 
-def test_records_are_the_bodies_as_placed() -> None:
-    turned = {"y": 1.0, "angle": 0.3, "velocity": [0.4, -0.5], "spin": 3.0}
-    fixed = {"x": 1.0, "y": 1.0, "width": 0.1, "length": 0.2, "fixed": True}
-    scenario = scenario_of([turned, {"x": 2.0, "y": 2.0, "length": 0.2}, fixed, {"x": 3.0, "y": 1.0}])
-    placed, records = place_bodies(scenario), build_world(scenario).bodies
-    assert len(placed) == len(records) - 1 == 4
-    for body, record in zip(placed, records, strict=False):
-        assert (record.x, record.y, record.angle) == (body.x, body.y, body.angle)
-        assert (record.cos, record.sin) == (cos(body.angle), sin(body.angle))
-        assert (record.vx, record.vy, record.spin) == (body.vx, body.vy, body.spin)
-        assert (record.half_x, record.half_y) == (body.size_x / 2, body.size_y / 2)
-        assert record.radius == pytest.approx(hypot(body.size_x, body.size_y) / 2)
-        if body.fixed:
-            assert (record.mass, record.inertia, record.inverse_mass, record.inverse_inertia) == (0.0,) * 4
-        else:
-            assert (record.mass, record.inertia) == (body.mass, body.inertia)
-            assert (record.inverse_mass, record.inverse_inertia) == (1.0 / body.mass, 1.0 / body.inertia)
-    assert records.contact_class[:4].tolist() == [1, 2, 2, 1]  # by depth
-    assert records.is_moved[:4].tolist() == [0, 0, 1, 0]
-
-
 def test_slabs_can_be_touched_from_above_only_and_at_their_free_ends() -> None:
     slabs, pieces = slabs_of(ground={"profile": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.0]]})
     assert [piece.touches_end for piece in pieces] == [False, True, False, False]
@@ -130,11 +110,6 @@ def test_slabs_are_thicker_than_any_overlap_that_is_admitted() -> None:
         assert (2.0 * slabs.half_y >= 2.0 * (limit or 0.05 * HEIGHT)).all()
 
 
-def test_half_plane_is_out_of_reach_below_a_profile() -> None:
-    assert build_world(scenario_of([LYING], ground=FLAT)).bodies[-1].y == -inf
-    assert build_world(scenario_of([LYING], walls=[{"from": [1.0, 1.0], "to": [1.0, 0.0]}])).bodies[-1].y == 0.0
-
-
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("model", ["surface", "kernel"])
 @pytest.mark.parametrize("profile", [[[-1.0, 0.0], [1.0, 0.0]], [[-1.0, 0.0], [0.01, 0.0], [1.0, 0.0]]])
@@ -144,16 +119,6 @@ def test_level_profile_is_the_half_plane(model: str, law: str, profile: list[lis
     for time in (0.02, 0.05, 0.1):
         assert block_state(pieces.to_time(time)) == pytest.approx(block_state(usual.to_time(time)), abs=1e-11)
     assert abs(usual.bodies[0].angle) < 0.1  # it has fallen flat, or nearly so
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_wide_fixed_block_is_ground(law: str) -> None:
-    step = {"step": 5e-6}
-    usual = scene_of([THROWN], law=law, time=step)
-    wide = {"y": -0.1, "width": 2.0, "height": 0.2, "fixed": True}
-    block = scene_of([THROWN, wide], law=law, time=step, ground={"profile": [[-2.0, -0.2], [2.0, -0.2]]})
-    for time in (0.02, 0.05, 0.1):
-        assert block_state(block.to_time(time)) == pytest.approx(block_state(usual.to_time(time)), abs=1e-9)
 
 
 def turned(vector: Sequence[float], angle: float) -> list[float]:
@@ -190,7 +155,7 @@ def edge_at(drop: float) -> dict[str, object]:
     [("surface", 0.0), ("surface", 0.02), ("surface", 0.5), ("kernel", 0.02), ("particles", 0.02)],
 )
 def test_block_sliding_over_an_edge_gets_no_kick(model: str, drop: float) -> None:
-    scene = scene_of([{**LYING, "x": -0.03, "velocity": [1.0, 0.0]}], model=model, ground=edge_at(drop))
+    scene = scene_of([{**LYING, "x": -0.01, "velocity": [1.0, 0.0]}], model=model, ground=edge_at(drop))
     while scene.bodies[0].x < -1e-4:
         scene.to_step(scene.steps + 1)
         block = scene.bodies[0]

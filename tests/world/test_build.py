@@ -1,8 +1,8 @@
-"""From a scenario to arrays."""
+"""From a scenario to arrays, and how its support moves."""
 
 from __future__ import annotations
 
-from math import ceil, cos, hypot, radians, sin, sqrt
+from math import ceil, hypot, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,11 +18,13 @@ from blocksim.kernels.common.arrays import (
     STATUS,
     TEAM_SIZE,
     TEAM_WORDS,
+    Records,
     zeros,
 )
-from blocksim.kernels.explicit.energy import tallied
+from blocksim.kernels.common.supports import displacement, piece_at
 from blocksim.scenario import Scenario, place_bodies
 from blocksim.scenario.laws import LINEAR
+from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world import memory
 from blocksim.world.bodies import layout_of
@@ -35,6 +37,7 @@ from blocksim.world.build import (
     with_more_room,
     with_threads,
 )
+from blocksim.world.excitation import support_pieces
 from blocksim.world.interactions import contact_classes, damping_ratio, interactions_of
 from blocksim.world.memory import SceneTooLargeError
 from blocksim.world.step import ContactLoad, StepError, admissible_step, bounds_of
@@ -42,46 +45,12 @@ from blocksim.world.step import ContactLoad, StepError, admissible_step, bounds_
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.kernels.common.arrays import Records
-
 W, H = WIDTH, HEIGHT
 BODY = {"x": 0.1, "y": 0.2}
 
 
 def scenario(body: Mapping[str, object] | None = None, *more: Mapping[str, object], **tables: Any) -> Scenario:
     return scenario_of([{**BODY, **(body or {})}, *more], **tables)
-
-
-def test_fixed_bodies_move_with_the_support_as_the_ground_does() -> None:
-    world = build_world(scenario({"fixed": True}, {**BODY, "x": 0.5}))
-    fixed, free, ground = world.bodies
-    assert (fixed.is_moved, ground.is_moved, free.is_moved) == (1, 1, 0)
-    assert (ground.inverse_mass, ground.inverse_inertia, ground.contact_class) == (0.0, 0.0, 0)
-    assert [ground.x, ground.y, ground.cos, ground.sin] == [0.0, 0.0, 1.0, 0.0]
-
-
-@pytest.mark.parametrize("tilt", [0.0, 5.0, -20.0])
-def test_tilted_ground_turns_gravity_so_that_positive_tilt_raises_the_far_end(tilt: float) -> None:
-    controls = build_world(scenario(ground={"tilt": f"{tilt} deg"}, gravity=2.0)).controls[0]
-    assert controls.gravity_x == pytest.approx(-2.0 * sin(radians(tilt)), abs=1e-15)
-    assert controls.gravity_y == pytest.approx(-2.0 * cos(radians(tilt)))
-
-
-def test_world_starts_without_contacts_time_or_losses() -> None:
-    world = build_world(scenario({"velocity": [3.0, 0.0], "spin": 2.0}))
-    assert not world.pairs.active.any()
-    assert world.clock[0].next_update == 0
-    assert world.clock[0].steps == 0
-    assert world.clock[0].pair_count == 0
-    ledger, body = world.ledger[0], world.bodies[0]
-    assert tallied(world.ledger) == (0.0, 0.0, 0.0)
-    assert (ledger.to_support, ledger.travel_work) == (0.0, 0.0)
-    assert ledger.largest_kinetic == pytest.approx(0.5 * (body.mass * 9.0 + body.inertia * 4.0))
-
-
-def test_overlap_limit_is_the_given_one_and_zero_stands_for_none() -> None:
-    assert build_world(scenario()).controls[0].max_overlap == 0.0
-    assert build_world(scenario(contact={"max_overlap": 1e-4})).controls[0].max_overlap == 1e-4
 
 
 def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
@@ -215,3 +184,31 @@ def test_what_is_large_is_listed_and_cells_are_as_wide_as_two_others_can_reach()
     assert world.controls[0].cell_width == pytest.approx(hypot(W, H) + world.controls[0].skin)
     assert world.order.size == world.bodies.size - 1 == 10
     assert world.starts.size >= 3 * 10 + 3
+
+
+SHAKING: dict[str, Any] = {"kind": "harmonic", "amplitude": 0.01, "frequency": 5.0, "direction": "30 deg"}
+
+
+def shaken(**motion: object) -> Scenario:
+    return scenario_of([{"y": 0.5}], motion={**SHAKING, **motion}, time={"end": 2.0})
+
+
+def test_pieces_are_those_of_the_scenario_and_each_is_found_by_its_time() -> None:
+    of = shaken(start=0.5, duration=1.0)
+    records, pieces = support_pieces(of), motion_pieces(of)
+    found = np.stack([records.c0, records.c1, records.c2, records.c3], axis=1)
+    assert records.start.tolist() == pieces.times[: records.size].tolist()
+    assert found[: len(pieces.coefficients)].tolist() == pieces.coefficients.tolist()
+    times = np.array([0.4, 0.7, 0.9, 1.6])
+    places = [displacement(records[piece_at(records, 0, time)], time) for time in times]
+    assert places == pytest.approx(displacement_and_velocity(pieces, times)[0], abs=1e-15)
+
+
+def test_all_that_moves_with_the_support_is_listed_where_it_starts() -> None:
+    bodies = [{"y": 0.5, "fixed": True}, {"x": 0.2, "y": 0.5}, {"x": 0.4, "y": 0.7, "fixed": True}]
+    world = build_world(scenario_of(bodies, motion=SHAKING, time={"end": 2.0}))
+    assert world.moved.body.tolist() == [0, 2, 3]
+    assert world.moved.x.tolist() == [0.0, 0.4, 0.0]
+    assert world.moved.y.tolist() == [0.5, 0.7, 0.0]
+    assert not world.moved.fx.any()
+    assert not world.moved.fy.any()

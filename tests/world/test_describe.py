@@ -35,13 +35,6 @@ def test_walls_of_their_own_material_are_pairs_too() -> None:
     assert pairs["aluminium - wall of oak"].rules["friction"] == "pairs.aluminium.oak.friction"
 
 
-def test_more_output_costs_more_bytes_but_not_more_steps() -> None:
-    shipped = SCENARIOS / "tower.toml"
-    coarse, fine = (describe(load_scenario(shipped, [f"output.every={every}"])) for every in (0.001, 0.0001))
-    assert fine.bytes > 9 * coarse.bytes
-    assert fine.steps == coarse.steps
-
-
 def test_frames_closer_than_a_step_are_reported() -> None:
     slide = SCENARIOS / "slide.toml"
     step = describe(load_scenario(slide)).step

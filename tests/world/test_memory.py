@@ -53,15 +53,6 @@ def test_a_scene_that_does_not_fit_is_refused_with_both_numbers(monkeypatch: pyt
     assert "for 1000000 bodies and 8000000 pairs" in message
 
 
-def test_the_last_byte_decides(monkeypatch: pytest.MonkeyPatch) -> None:
-    size = scene_size(bodies=10, pairs=80, slots=8)
-    monkeypatch.setattr(memory, "available_bytes", lambda: size.bytes)
-    refuse_if_too_large(size)
-    monkeypatch.setattr(memory, "available_bytes", lambda: size.bytes - 1)
-    with pytest.raises(SceneTooLargeError):
-        refuse_if_too_large(size)
-
-
 def test_nothing_is_refused_where_memory_cannot_be_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "available_bytes", lambda: None)
     refuse_if_too_large(scene_size(bodies=10**6, pairs=10**7, slots=8))

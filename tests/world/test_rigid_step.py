@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from blocksim.bench.harness import pushed_wall, three_blocks
-from blocksim.scenario.models.timeline import Nonsmooth
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world.describe import describe
 from blocksim.world.nonsmooth import build_nonsmooth
@@ -42,13 +41,6 @@ def test_few_blocks_take_a_share_of_the_time_of_a_fall_over_their_sides_and_crow
     assert build_nonsmooth(three_blocks(time={"scheme": "nonsmooth"})).world.controls[0].step == 0.25 * USUAL_STEP
     assert wall_step(4, 4) == wall_step(10, 8) == USUAL_STEP
     assert step_of(RESTING, end=1e-5) == 1e-5
-
-
-def test_fixed_blocks_do_not_count_as_more() -> None:
-    scenario = scenario_of([RESTING, *({"x": 0.1 * i, "y": HEIGHT / 2, "fixed": True} for i in range(1, 20))])
-    time = Nonsmooth(scheme="nonsmooth")
-    step = build_nonsmooth(scenario.model_copy(update={"time": time})).world.controls[0].step
-    assert step == pytest.approx(step_of(RESTING))
 
 
 def test_fast_blocks_shrink_the_automatic_step_to_a_share_of_the_smallest_side() -> None:

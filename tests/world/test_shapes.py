@@ -10,9 +10,9 @@ import pytest
 
 from blocksim.kernels.common.arrays import ALL, OUTLINE
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE
-from blocksim.kernels.explicit.sides import MOST_CORNERS, UPPER
+from blocksim.kernels.explicit.sides import UPPER
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.scenario.geometry import MOST, centre_outline, least_width, regular
+from blocksim.scenario.geometry import centre_outline, least_width, regular
 from blocksim.world.bodies import body_records, cone_of, corner_rows, layout_of
 from blocksim.world.build import SceneStack, build_stacks, member
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
@@ -68,10 +68,6 @@ def test_ground_has_corners_from_the_lower_left_one_on() -> None:
         assert (upper.nx, upper.ny, upper.distance, upper.half) == (0.0, 1.0, body.half_y, body.half_x)
 
 
-def test_slots_have_room_for_the_corners_of_any_block() -> None:
-    assert MOST == MOST_CORNERS
-
-
 @pytest.mark.parametrize("outline", [TRIANGLE, regular(16, 0.1), [[0, 0], [1, 0], [1.01, 0.02], [0.5, 0.3], [0, 0.1]]])
 def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float]]) -> None:
     rows = np.array(corner_rows(centre_outline([(x, y) for x, y in outline])))
@@ -86,21 +82,6 @@ def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float
                 beyond = np.delete(rows, [k, k - 1, (k + 1) % len(rows)], axis=0)
                 assert np.all(beyond[:, 4] - beyond[:, 2:4] @ place >= far - depth - 1e-12)
         assert clear > 0.0
-
-
-def test_mass_and_inertia_of_a_polygon_are_about_its_centroid() -> None:
-    body = build_nonsmooth(scenario()).world.bodies[0]
-    assert body.mass == pytest.approx(2000.0 * 0.06 * 0.1, rel=1e-14)
-    assert body.inertia == pytest.approx(body.mass * (0.4**2 + 0.3**2) / 18.0, rel=1e-14)
-    assert body.radius == pytest.approx(math.hypot(0.4 - 0.4 / 3.0, 0.1), rel=1e-14)
-
-
-def test_box_about_the_centroid_holds_all_corners() -> None:
-    world = build_nonsmooth(scenario()).world
-    for body in world.bodies[:6]:
-        own = world.corners[body.first_corner : body.first_corner + body.corner_count]
-        assert body.half_x == pytest.approx(np.abs(own.x).max(), rel=1e-14)
-        assert body.half_y == pytest.approx(np.abs(own.y).max(), rel=1e-14)
 
 
 def test_least_width_is_the_least_height_over_a_face() -> None:
@@ -125,11 +106,6 @@ def test_members_of_a_stack_have_corners_of_their_own() -> None:
     for m, wedge in enumerate(wedges):
         alone = build_nonsmooth(wedge).world.corners
         assert member(stacks[0].scenes, m).world.corners.tobytes() == alone.tobytes()
-
-
-def test_scenes_of_rectangles_have_no_table() -> None:
-    world = build_nonsmooth(scenario(brick={"width": 0.2, "height": 0.1, "length": 0.1})).world
-    assert world.corners is None
 
 
 def test_faces_of_blunt_and_sharp_shapes_are_parallel_within_less_than_those_of_rectangles() -> None:

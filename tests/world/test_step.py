@@ -1,32 +1,40 @@
-"""The step that a scene takes, and the load that its contacts are expected to bear."""
+"""Step and skin of a scene: stable by its eigenvalues, under the load that contacts expect, no contact missed."""
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from math import cos, hypot, inf, pi, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
-from blocksim.kernels.common.arrays import AT_REST, REACHED
+from blocksim.errors import ExitCode
+from blocksim.kernels.common.arrays import AT_REST, REACHED, World
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, tangent_stiffness
 from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.bodies import layout_of
 from blocksim.world.build import build_world
+from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.step import (
     MOST_STEPS,
+    BlockKind,
     ContactLoad,
+    ContactStiffness,
+    SkinTooSmallError,
     StepError,
     bounds_of,
     expected_load,
+    frequency_squared,
     speeds_of,
+    stable_step,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.kernels.common.arrays import World
+    from blocksim.scenario import Scenario
 
 G, HERTZ = 9.81, LAWS["hertz-mindlin"]
 RADIUS = hypot(WIDTH, HEIGHT) / 2
@@ -73,9 +81,14 @@ def hertz(body: Mapping[str, object], **contact: object) -> Simulation:
 
 
 @pytest.mark.parametrize(
-    "body", [FALLING, {"y": 0.05}, {"y": 0.05, "angle": 0.66}, {**FALLING, "velocity": [0.0, -3.0]}]
+    ("body", "restitution"),
+    [
+        (FALLING, 1.0),
+        ({"y": 0.05}, 0.2),
+        ({"y": 0.05, "angle": 0.66}, 1.0),
+        ({**FALLING, "velocity": [0.0, -3.0]}, 0.2),
+    ],
 )
-@pytest.mark.parametrize("restitution", [0.2, 1.0])
 def test_no_contact_becomes_stiffer_than_the_step_expects(body: Mapping[str, object], restitution: float) -> None:
     scene = hertz(body, restitution=restitution, max_overlap=5e-3)
     world, block = scene.world, scene.bodies[0]
@@ -84,7 +97,7 @@ def test_no_contact_becomes_stiffer_than_the_step_expects(body: Mapping[str, obj
     expected = HERTZ.greatest_slope(stiffness, float(block.inverse_mass), *load)
     deepest = 0.0
     while scene.time < 0.25:
-        scene.to_step(scene.steps + 5)
+        scene.to_step(scene.steps + 10)
         assert scene.status in {REACHED, AT_REST}
         deepest = max(deepest, float(scene.ledger_row()[-1]))
     assert deepest > 0.0
@@ -115,13 +128,6 @@ def test_harder_impacts_get_a_shorter_step_with_hertz_only(change: Mapping[str, 
         assert hard <= usual
 
 
-def test_pieces_of_ground_do_not_shorten_the_step() -> None:
-    usual = world_of(FALLING).controls[0].step
-    wall = {"from": [1.0, 0.5], "to": [1.0, 0.0]}
-    hill = [[0.0, 0.0], [0.01, 0.01], [0.02, 0.0]]
-    assert world_of(FALLING, walls=[wall], ground={"profile": hill}).controls[0].step == usual
-
-
 @pytest.mark.parametrize("model", ["surface", "kernel", "particles"])
 def test_step_does_not_depend_on_the_contact_model(model: str) -> None:
     contact = {"model": model, "particle_spacing": 5e-4}
@@ -144,3 +150,156 @@ def test_block_moves_by_a_small_share_of_the_smallest_side_in_a_step(model: str)
     for extra, speed in (({}, 100.0), ({"motion": motion}, 100.0 + 2.0 * np.pi * 50.0 * 0.1)):
         step = float(world_of({**FALLING, "velocity": [100.0, 0.0]}, plate, **tables, **extra).controls[0].step)
         assert step * speed == pytest.approx(share * 2e-3, rel=1e-3)
+
+
+H = HEIGHT
+FALL = 0.2  # m, from the highest point of a block to the ground
+BODY = {"y": FALL - hypot(WIDTH, HEIGHT) / 2}
+SOFT = 1e-4  # of the stiffness
+
+
+def scenario(*more: dict[str, Any], contact: dict[str, Any] | None = None, **tables: Any) -> Scenario:
+    return scenario_of([BODY, *more], contact={"stiffness_scale": SOFT, **(contact or {})}, **tables)
+
+
+def test_by_default_the_skin_is_a_quarter_of_the_smallest_side_of_all_blocks() -> None:
+    plate = {"width": 0.3, "height": 0.01, "x": 1.0, "y": 0.1, "fixed": True}
+    assert build_world(scenario()).controls[0].skin == 0.25 * H
+    assert build_world(scenario(plate)).controls[0].skin == 0.25 * 0.01
+    walls = [{"from": [2, 0], "to": [2, 0.001]}]
+    assert build_world(scenario(walls=walls)).controls[0].skin == 0.25 * H  # boundaries are no blocks
+
+
+@pytest.mark.parametrize("model", ["particles", "kernel"])
+def test_with_particles_the_default_skin_is_a_twentieth_as_each_particle_within_it_costs(model: str) -> None:
+    contact = {"model": model, "particle_spacing": 4e-3}
+    assert build_world(scenario(contact=contact)).controls[0].skin == 0.05 * H
+
+
+def test_a_skin_that_blocks_can_outrun_is_refused_with_the_least_one() -> None:
+    step = float(build_world(scenario()).controls[0].step)
+    speed = sqrt(2 * 9.81 * FALL)
+    least = 5.0 * speed * step  # as the automatic step leaves it: a block moves by a fifth of the skin
+    assert build_world(scenario(contact={"skin": 1.001 * least})).controls[0].skin == 1.001 * least
+    with pytest.raises(SkinTooSmallError) as refusal:
+        build_world(scenario(contact={"skin": 0.999 * least}))
+    assert refusal.value.exit_code == ExitCode.INVALID_INPUT
+    assert refusal.value.least == pytest.approx(least, rel=1e-12)
+    assert f"{speed:.4g} m/s each come {400 * least:.4g} mm closer in {step:.4g} s" in str(refusal.value)
+    cure = float(str(refusal.value).split("at least ")[1].split()[0])
+    assert build_world(scenario(contact={"skin": 1e-3 * cure})).controls[0].skin == 1e-3 * cure
+
+
+def test_a_skin_that_a_shaken_support_outruns_is_refused_and_the_least_one_runs_to_the_end() -> None:
+    motion = {"kind": "harmonic", "amplitude": "0.2 m", "frequency": "10 Hz", "duration": "0.5 s"}
+    with pytest.raises(SkinTooSmallError) as refusal:
+        build_world(scenario(contact={"skin": 1e-3 * H}, motion=motion))
+    run = Simulation(build_world(scenario(contact={"skin": refusal.value.least}, motion=motion)))
+    assert run.to_time(0.1).status == REACHED
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_rigid_contacts_refuse_a_skin_with_which_impacts_are_found_late(share: float) -> None:
+    time = {"scheme": "nonsmooth"}
+    step = build_nonsmooth(scenario(time=time)).world.controls[0].step
+    least = 2.0 * sqrt(2 * 9.81 * FALL) * step
+    thin = scenario(contact={"skin": share * least}, time=time)
+    if share < 1.0:
+        with pytest.raises(SkinTooSmallError):
+            build_nonsmooth(thin)
+    else:
+        assert build_nonsmooth(thin).contacts.stepping[0].least_reach == 0.5 * share * least
+
+
+sizes = st.floats(1e-3, 1.0)
+ratios = st.floats(0.0, 6.0)
+shears = st.floats(0.05, 1.5)  # of the normal stiffness
+K = 9.5e8
+
+
+def body_of(size_x: float, size_y: float, density: float = 2700.0, depth: float = 0.05) -> BlockKind:
+    mass = density * size_x * size_y * depth
+    return BlockKind(0.5 * size_x, 0.5 * size_y, 1.0 / mass, 12.0 / (mass * (size_x**2 + size_y**2)), 1)
+
+
+def stiffness_at(points: list[tuple[float, float, float]], normal: float, shear: float) -> np.ndarray:
+    """Return the 3 x 3 stiffness of a body for contact points x, y and the angle of their normal."""
+    total = np.zeros((3, 3))
+    for x, y, angle in points:
+        for stiffness, direction in ((normal, angle), (shear, angle + pi / 2)):
+            nx, ny = cos(direction), sin(direction)
+            row = np.array([nx, ny, x * ny - y * nx])
+            total += stiffness * np.outer(row, row)
+    return total
+
+
+def largest(body: BlockKind, stiffness: np.ndarray) -> float:
+    root = np.sqrt([body.inverse_mass, body.inverse_mass, body.inverse_inertia])
+    return float(np.linalg.eigvalsh(root[:, None] * stiffness * root).max())
+
+
+@given(w=sizes, h=sizes, ratio=shears)
+def test_bound_is_the_largest_eigenvalue_of_a_face_contact(w: float, h: float, ratio: float) -> None:
+    body = body_of(w, h)
+    on_base = stiffness_at([(-w / 2, -h / 2, pi / 2), (w / 2, -h / 2, pi / 2)], K, ratio * K)
+    on_side = stiffness_at([(w / 2, -h / 2, pi), (w / 2, h / 2, pi)], K, ratio * K)
+    expected = max(largest(body, on_base), largest(body, on_side))
+    assert frequency_squared(body, K, ratio * K) == pytest.approx(expected, rel=1e-9)
+
+
+@given(w=sizes, h=sizes, ratio=st.floats(0.3, 1.5), place=st.floats(-1.0, 1.0), second=st.floats(-1.0, 1.0))
+def test_partly_overlapping_faces_are_faster_than_the_bound_by_a_fifth_at_most(
+    w: float, h: float, ratio: float, place: float, second: float
+) -> None:
+    # both points near one end see more rotation than the two ends do; a safety far below one has room for that
+    points = [(place * w / 2, -h / 2, pi / 2), (second * w / 2, -h / 2, pi / 2)]
+    frequency = sqrt(largest(body_of(w, h), stiffness_at(points, K, ratio * K)))
+    assert frequency <= 1.2 * sqrt(frequency_squared(body_of(w, h), K, ratio * K))
+
+
+@given(w=sizes, h=sizes, ratio=st.floats(0.3, 1.0), angle=st.floats(0.0, 2.0 * pi))
+def test_single_corner_is_not_faster_than_the_bound(w: float, h: float, ratio: float, angle: float) -> None:
+    corner = stiffness_at([(w / 2, h / 2, angle)], K, ratio * K)
+    assert largest(body_of(w, h), corner) <= 1.000001 * frequency_squared(body_of(w, h), K, ratio * K)
+
+
+@given(w=sizes, h=sizes, other=sizes, ratio=shears, shift=st.floats(-1.0, 1.0))
+def test_two_bodies_are_not_stiffer_than_the_sum_of_both_bounds(
+    w: float, h: float, other: float, ratio: float, shift: float
+) -> None:
+    a, b = body_of(w, h), body_of(other, other)
+    place = shift * other / 2
+    rows = []
+    for x in (-w / 2, w / 2):  # corners of a on the top of b, whose centre lies at `place`
+        for nx, ny, stiffness in ((0.0, 1.0, K), (1.0, 0.0, ratio * K)):
+            on_a = [nx, ny, x * ny + h / 2 * nx]
+            on_b = [-nx, -ny, -((x - place) * ny - other / 2 * nx)]
+            rows.append(sqrt(stiffness) * np.array(on_a + on_b))
+    inverse = [a.inverse_mass, a.inverse_mass, a.inverse_inertia, b.inverse_mass, b.inverse_mass, b.inverse_inertia]
+    scaled = np.array(rows) * np.sqrt(inverse)
+    inside = all(abs(x - place) <= other / 2 for x in (-w / 2, w / 2))
+    bound = frequency_squared(a, K, ratio * K) + frequency_squared(b, K, ratio * K)
+    assert not inside or float(np.linalg.eigvalsh(scaled @ scaled.T).max()) <= 1.000001 * bound
+
+
+@given(w=sizes, h=sizes, ratio=ratios, safety=st.floats(0.01, 1.0))
+def test_safety_is_the_share_of_the_stability_limit(w: float, h: float, ratio: float, safety: float) -> None:
+    body, contact = body_of(w, h), ContactStiffness(K, 0.8 * K, ratio)
+    whole = stable_step([(body, None, contact)], 1.0)
+    assert stable_step([(body, None, contact)], safety) == pytest.approx(safety * whole, rel=1e-12)
+    assert whole * sqrt(frequency_squared(body, K, 0.8 * K)) == pytest.approx(2.0 / max(1.0, ratio / 2), rel=1e-12)
+
+
+def test_stiffest_pair_decides() -> None:
+    big, small = body_of(0.1, 0.1), body_of(0.01, 0.01)
+    soft, hard = ContactStiffness(K, K, 0.5), ContactStiffness(10 * K, K, 0.5)
+    alone = stable_step([(small, None, hard)], 0.05)
+    assert stable_step([(big, None, soft), (small, None, hard), (big, big, soft)], 0.05) == alone
+
+
+def test_scene_in_which_nothing_can_move_has_no_limit() -> None:
+    wall = BlockKind(0.5, 0.5, 0.0, 0.0, 1)
+    assert (
+        stable_step([(wall, None, ContactStiffness(K, K, 0.5)), (wall, wall, ContactStiffness(K, K, 0.5))], 1.0) == inf
+    )
+    assert stable_step([], 1.0) == inf
