@@ -127,21 +127,6 @@ def test_lists_equal_those_of_a_search_over_all_pairs(positions: Floats, points:
     assert by_cells(positions, positions, radius) == by_brute_force(positions, positions, radius)
 
 
-@pytest.mark.parametrize(
-    ("positions", "points", "radius", "message"),
-    [
-        ([[0.0, 0.0], [np.nan, 0.0]], [[0.0, 0.0]], 1.0, "finite"),
-        ([[0.0, 0.0]], [[np.inf, 0.0]], 1.0, "finite"),
-        ([[0.0, 0.0]], [[0.0, 0.0]], 0.0, "radius above zero"),
-        ([[0.0, 0.0]], [[0.0, 0.0]], np.nan, "radius above zero"),
-        (np.empty((0, 2)), [[0.0, 0.0]], 1.0, "at least one particle"),
-    ],
-)
-def test_search_that_makes_no_sense_is_refused(positions: Floats, points: Floats, radius: float, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        find_neighbours(np.array(positions), np.array(points), radius)
-
-
 COUNT = 64
 HILL = {"ground": {"profile": [[-1.0, 0.2], [0.0, 0.0], [0.3, -0.1], [5.0, 0.4]]}}
 WALLS = {"walls": [{"from": [0.1, 0.5], "to": [0.1, 0.0]}]}
