@@ -26,7 +26,7 @@ from blocksim.view.studies import Bars, LevelPanel, draw_levels, draw_tornado
 from blocksim.view.sweeps.lines import Series, draw_series
 from tests.bench.peers.work_precision import Curve, Panel as Work, draw_work_precision
 from tests.view.made_up import HOSTILE, blocks_at, polygons, pressed, stacked, toppling
-from tests.view.sweeps.made_up import grid, made_up, samples
+from tests.view.made_up_sweeps import grid, made_up, samples
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

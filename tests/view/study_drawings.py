@@ -29,7 +29,7 @@ from blocksim.view.sweeps.data import Input
 from blocksim.view.time_panels import draw_probes, draw_support_motion
 from tests.scenario.test_motion import END, scenario
 from tests.view.drawings import KEYS, panel
-from tests.view.sweeps.made_up import grid, made_up
+from tests.view.made_up_sweeps import grid, made_up
 
 if TYPE_CHECKING:
     from pathlib import Path

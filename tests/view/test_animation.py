@@ -40,15 +40,18 @@ def near_the_centre(frames: Frames, frame: int, block: int) -> tuple[float, floa
     return 1000.0 * float(frames.x[frame, block]) + 9.0, 1000.0 * float(frames.y[frame, block]) - 9.0
 
 
-@pytest.mark.parametrize("trails", [True, False])
+@pytest.mark.parametrize("paint", PAINTS)
 @pytest.mark.parametrize("support", [Support(), MOVING, Support(tilt=0.2)], ids=["level", "moving", "tilted"])
-def test_blocks_are_where_they_were_recorded(support: Support, trails: bool) -> None:
+def test_blocks_are_where_they_were_recorded_in_the_colours_of_other_pictures(support: Support, paint: str) -> None:
     frames = toppling(2)
-    animation = Animation(frames, support, Look(width=400, trails=trails))
+    frames.vx[:, 1] *= 2.0
+    painted = PAINTS[paint](frames, load_scenario(SCENARIOS / "slope.toml"))
+    animation = Animation(frames, support, Look(width=400, trails=paint == "block", paint=painted))
     for frame in (0, 20, 39, 0):  # any order
         picture = animation.picture(frame)
         for block in range(2):
-            assert pixel_of(animation, picture, *near_the_centre(frames, frame, block)) == colour(block)
+            expected = [round(255 * part) for part in to_rgb(painted.fills(frame)[block])]
+            assert pixel_of(animation, picture, *near_the_centre(frames, frame, block)) == expected
 
 
 def test_a_moving_support_moves() -> None:
@@ -78,6 +81,10 @@ def test_pictures_are_even_in_time_and_the_last_frame_is_shown_and_held() -> Non
     assert len(chosen) == 73
     assert seconds[0] == pytest.approx(1.0 / 30.0)
     assert seconds[-1] > 1.0
+    uneven = replace(toppling(1, steps=4), time=np.array([0.0, 0.1, 0.11, 0.5]))
+    assert frame_times(uneven, np.arange(4), FAST)[0].tolist() == [0, 1, 2, 2, 3, 3]
+    chosen, seconds = frame_times(uneven, np.array([3]), FAST)
+    assert (chosen.tolist(), len(seconds)) == ([3], 1)
 
 
 def test_gif_plays_as_long_as_it_should_in_the_blocks_own_colours_with_the_same_bytes(tmp_path: Path) -> None:
@@ -117,44 +124,34 @@ def test_mp4_can_be_read_back(tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["film.MP4"]
 
 
+def ffmpeg_of(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return where the only ffmpeg that is found may be put."""
+    (folder / "bin").mkdir()
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", f"{folder / 'bin'}:/usr/bin:/bin")
+    return folder / "bin" / "ffmpeg"
+
+
 def test_the_system_s_ffmpeg_writes_mp4_where_the_package_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = pytest.importorskip("imageio_ffmpeg", reason="no ffmpeg to stand for the system's")
-    (tmp_path / "bin").mkdir()
-    (tmp_path / "bin" / "ffmpeg").symlink_to(package.get_ffmpeg_exe())
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    path = tmp_path / "film.mp4"
-    draw_animation(toppling(2), path, FAST, SMALL)
-    written, seconds = package.count_frames_and_secs(str(path))
-    assert written == 6 + 15
-    assert seconds == pytest.approx(2.1, abs=0.01)
+    ffmpeg_of(tmp_path, monkeypatch).symlink_to(package.get_ffmpeg_exe())
+    draw_animation(toppling(2), tmp_path / "film.mp4", FAST, SMALL)
+    written, seconds = package.count_frames_and_secs(str(tmp_path / "film.mp4"))
+    assert (written, seconds) == (6 + 15, pytest.approx(2.1, abs=0.01))
 
 
 @pytest.mark.parametrize("program", ["exit 1", "head -c 1000 >/dev/null; exit 1", "cat >/dev/null; exit 3"])
 def test_a_film_that_the_system_s_ffmpeg_does_not_finish_is_not_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str
 ) -> None:
-    (tmp_path / "bin").mkdir()
-    (tmp_path / "bin" / "ffmpeg").write_text(f"#!/bin/sh\n{program}\n", encoding="utf-8")
-    (tmp_path / "bin" / "ffmpeg").chmod(0o755)
-    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:/usr/bin:/bin")
+    ffmpeg = ffmpeg_of(tmp_path, monkeypatch)
+    ffmpeg.write_text(f"#!/bin/sh\n{program}\n", encoding="utf-8")
+    ffmpeg.chmod(0o755)
     with pytest.raises(OutputError, match=r"film\.mp4: cannot be written: ffmpeg stopped before the end"):
         draw_animation(toppling(1), tmp_path / "film.mp4", FAST, SMALL)
     assert [one.name for one in tmp_path.iterdir()] == ["bin"]
-
-
-@pytest.mark.parametrize("name", ["material", "speed", "turn"])
-def test_a_film_is_coloured_like_the_other_pictures(name: str) -> None:
-    frames = toppling(2)
-    frames.vx[:, 1] *= 2.0
-    paint = PAINTS[name](frames, load_scenario(SCENARIOS / "slope.toml"))
-    animation = Animation(frames, Support(), Look(width=400, trails=False, paint=paint))
-    for block in range(2):
-        found = pixel_of(animation, animation.picture(20), *near_the_centre(frames, 20, block))
-        assert found == [round(255 * part) for part in to_rgb(paint.fills(20)[block])]
 
 
 def test_blocks_far_from_one_another_stay_in_the_window_but_one() -> None:
@@ -184,11 +181,3 @@ def test_trails_are_drawn_for_few_blocks_unless_somebody_decides() -> None:
         Animation(toppling(1), Support(), Look(240, trails=one)).picture(39) for one in (False, True)
     )
     assert not np.array_equal(without, with_trails)
-
-
-def test_uneven_frames_are_shown_at_their_times_and_a_single_one_is_an_animation() -> None:
-    frames = replace(toppling(1, steps=4), time=np.array([0.0, 0.1, 0.11, 0.5]))
-    assert frame_times(frames, np.arange(4), Pace(1.0, 10.0))[0].tolist() == [0, 1, 2, 2, 3, 3]
-    chosen, seconds = frame_times(frames, np.array([3]), FAST)
-    assert chosen.tolist() == [3]
-    assert len(seconds) == 1

@@ -10,7 +10,7 @@ from blocksim.errors import InvalidInputError
 from blocksim.view.kinds import RUN_KINDS, SWEEP_KINDS, run_kind
 from blocksim.view.sweeps.data import Input, SweepData
 from tests.view.made_up import boxes_of, overlapping
-from tests.view.sweeps.made_up import grid, made_up, samples
+from tests.view.made_up_sweeps import grid, made_up, samples
 
 ONE = (Input("gravity", "m/s^2", np.linspace(1.0, 10.0, 8)),)
 MEMBER = tuple(Input(one.key, one.unit, one.values[:1]) for one in samples()[:1])

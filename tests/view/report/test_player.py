@@ -1,6 +1,8 @@
-"""Frames as text: what comes back, how far it is off, what is left out; particles lie where the world has them."""
+"""Frames as text, what comes back and how far it is off; pictures, where their panels and cases are."""
 
 import math
+import xml.etree.ElementTree as ET
+from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +13,14 @@ from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario
 from blocksim.scenario.geometry import regular
 from blocksim.simulation.results import EventRecord
+from blocksim.study.pictures import read_sweep_data
 from blocksim.view.report import player
 from blocksim.view.report.player import boundary_particles, pack, pack_frames, scene_data
+from blocksim.view.report.subjects import history_of, pictures_of
+from blocksim.view.run_data import Support
 from blocksim.world.build import build_world
 from tests.view.made_up import polygons, toppling
-from tests.view.report.folders import SCENARIOS, numbers, write_run
+from tests.view.report.folders import SCENARIOS, numbers, write_run, write_sweep
 
 
 def test_too_many_frames_are_thinned_and_that_is_reported(tmp_path: Path) -> None:
@@ -72,17 +77,39 @@ def test_polygons_are_packed_once_for_each_shape() -> None:
 
 
 @pytest.mark.parametrize(("most", "kind"), [(1000, "f4"), (10, "u2")])
-def test_told_error_is_the_largest_one(monkeypatch: pytest.MonkeyPatch, most: int, kind: str) -> None:
-    values = np.random.default_rng(1).normal(0.0, 100.0, (50, 7))
+def test_told_error_is_the_largest_one_and_there_is_none_for_equal_values(
+    monkeypatch: pytest.MonkeyPatch, most: int, kind: str
+) -> None:
     monkeypatch.setattr(player, "EXACT_VALUES", most)
-    part, error = pack(values)
-    assert part["type"] == kind
-    assert np.abs(numbers(part) - values.ravel()).max() == pytest.approx(error)
-    assert error <= 0.5 * np.ptp(values) / 65_535 * (1.0 + 1e-9)
+    for values in (np.random.default_rng(1).normal(0.0, 100.0, (50, 7)), np.full((30, 2), 4.5)):
+        part, error = pack(values)
+        assert part["type"] == kind
+        assert np.abs(numbers(part) - values.ravel()).max() == pytest.approx(error)
+        assert error <= 0.5 * np.ptp(values) / 65_535 * (1.0 + 1e-9)
 
 
-def test_equal_values_can_be_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(player, "EXACT_VALUES", 0)
-    part, error = pack(np.full((3, 2), 4.5))
-    assert numbers(part).tolist() == [4.5] * 6
-    assert error == 0.0
+def test_histories_are_small_the_same_each_time_and_say_where_their_panels_are() -> None:
+    frames = toppling(3)
+    source, panels = history_of(frames, Support(), None)
+    assert source == history_of(frames, Support(), None)[0]
+    assert len(source) < 150_000
+    svg = b64decode(source.partition("base64,")[2])
+    assert ET.fromstring(svg).tag.endswith("svg")  # noqa: S314 - our own file
+    assert [panel["name"] for panel in panels] == ["x", "y", "rotation", "energy", "contacts"]
+    tops = [panel["place"][1] for panel in panels]
+    assert tops == sorted(tops)
+    low, high = panels[0]["values"]
+    assert low < 1e3 * frames.x.min() < 1e3 * frames.x.max() < high
+
+
+def test_cases_of_a_map_are_where_their_inputs_are(tmp_path: Path) -> None:
+    write_sweep(tmp_path / "sweep", kept=0, planned=True)
+    pictures = pictures_of(read_sweep_data(tmp_path / "sweep"))
+    assert pictures[0]["label"] == "map of contact.restitution over block_block.kinetic"
+    assert [one["label"] for one in pictures[1:]] == ["lines", "matrix", "histogram"]
+    data = pictures[0]["data"]
+    assert data["column"] == [0] * 6
+    assert np.array(data["x"]) == pytest.approx(np.tile([1.0, 3.0, 5.0], 2) / 6.0, abs=1e-3)  # a grid of three by two
+    assert np.array(data["y"]) == pytest.approx(np.repeat([0.25, 0.75], 3), abs=1e-3)
+    assert len(data["panels"]) == 2
+    assert [one["data"] for one in pictures[1:]] == [None] * 3

@@ -1,23 +1,60 @@
-"""What pictures tell of loads besides where their arrows are: when there is none, and which way marks point."""
+"""Arrows of contact forces and of loads: how long, when there is none, which way, and what is reported of them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from blocksim.view.arrows import FORCE, Actions, actions_on, with_room
+from blocksim.errors import InvalidInputError
+from blocksim.simulation.trajectory import CONTACT_ROW, Contacts
+from blocksim.view.animation import Look, Pace, draw_animation
+from blocksim.view.arrows import FORCE, Actions, actions_on, force_scale, with_room
+from blocksim.view.kinds import RUN_KINDS
 from blocksim.view.run_data import Support, extent_of
+from blocksim.view.scene import PictureOptions
 from tests.view.drawings import COEFFICIENTS, END, FORCES, acting, slab
+from tests.view.made_up import pressed, toppling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from blocksim.simulation.trajectory import Frames
 
 PUSH = FORCES[0]
 RISING = {**PUSH, "history": {"kind": "ramp", "end": 4.0}}
+
+
+def test_scale_is_that_of_usual_forces_not_of_impacts_and_there_is_one_without_contacts() -> None:
+    frames = pressed(toppling(3))
+    scale = force_scale(frames)
+    assert frames.contacts is not None
+    frames.contacts.rows["normal_force"][:5] = 1e6
+    assert force_scale(frames).mm_per_newton == pytest.approx(scale.mm_per_newton, rel=0.1)
+    assert scale.longest == pytest.approx(2.0 * 0.6 * 41.0)
+    assert "5 N is 20.4 mm long, capped at 12.1 N" in scale.explanation
+    none = Contacts(np.zeros(3, dtype=np.int64), np.zeros(0, CONTACT_ROW))
+    assert force_scale(replace(toppling(1, steps=3), contacts=none)).mm_per_newton > 0.0
+
+
+@pytest.mark.parametrize("kind", [kind for kind in RUN_KINDS if kind != "profile"])  # draws soil, without forces
+def test_missing_contacts_are_reported_with_what_to_do(tmp_path: Path, kind: str) -> None:
+    with pytest.raises(InvalidInputError, match=r"stored no contacts.* --set output\.contacts=true"):
+        RUN_KINDS[kind](toppling(3), tmp_path / "picture.png", PictureOptions(forces=True))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_animation_with_forces_differs_and_one_of_a_run_without_is_refused(tmp_path: Path) -> None:
+    frames, pace = pressed(toppling(2, steps=4)), Pace(1.0, 5.0)
+    draw_animation(frames, tmp_path / "with.gif", pace, Look(240, forces=True))
+    draw_animation(frames, tmp_path / "without.gif", pace, Look(240))
+    assert (tmp_path / "with.gif").read_bytes() != (tmp_path / "without.gif").read_bytes()
+    with pytest.raises(InvalidInputError, match="stored no contacts"):
+        draw_animation(toppling(2), tmp_path / "none.gif", pace, Look(240, forces=True))
+    assert not (tmp_path / "none.gif").exists()
 
 
 def actions(loads: Sequence[Mapping[str, object]], frames: Frames, **tables: Any) -> Actions:
