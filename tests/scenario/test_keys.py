@@ -1,4 +1,6 @@
-"""Dotted keys: written, read, and followed through data and models."""
+"""Dotted keys: written, read, followed through data and models, and meant by misspelt words."""
+
+from typing import Any
 
 import pytest
 from hypothesis import given, strategies as st
@@ -6,7 +8,9 @@ from hypothesis import given, strategies as st
 from blocksim.scenario.models.contact import PairFriction
 from blocksim.scenario.models.motion import FromTable
 from blocksim.scenario.overrides import MISSING, field_at, follow, format_key, is_known, parse_key, table_at
+from blocksim.scenario.spelling import USUAL, meant_word, nearest
 from blocksim.scenario.structures.masonry import Stack
+from tests.scenario.conftest import SCENARIOS
 
 DATA = {
     "blocks": {"brick": {"width": 1}},
@@ -44,58 +48,58 @@ def test_a_key_that_was_written_is_read_again(parts: list[str]) -> None:
 def test_follow() -> None:
     assert follow(DATA, ("structures", 0, "kind")) == "stack"
     assert follow(DATA, ()) is DATA
-    nowhere: list[tuple[str | int, ...]] = [
-        ("structures", 3),
-        ("structures", -1),
-        ("structures", "0"),
-        ("nothing",),
-        ("friction", "block_block", 0),
-    ]
-    for path in nowhere:
+    structures: list[tuple[str | int, ...]] = [("structures", place) for place in (3, -1, "0")]
+    for path in (*structures, ("nothing",), ("friction", "block_block", 0)):
         assert follow(DATA, path) is MISSING
 
 
-def test_the_model_of_a_table_depends_on_the_kind_of_structure() -> None:
-    assert table_at(("structures", 0), DATA) is Stack
-    assert table_at(("structures", 1), DATA) is None
-    assert table_at(("structures", 2), DATA) is None
+def test_the_model_of_a_table_depends_on_its_kind_and_a_field_is_found_by_its_name_in_the_file() -> None:
+    assert [table_at(("structures", place), DATA) for place in range(3)] == [Stack, None, None]
     assert table_at(("friction", "block_ground"), DATA) is PairFriction
     assert table_at(("time", "end"), DATA) is None
-    assert table_at(("motion",), {"motion": {"kind": "table"}}) is FromTable
-    assert table_at(("motion",), {"motion": {"kind": "none"}}) is None
-    assert table_at(("motion",), DATA) is None
-
-
-def test_the_field_of_a_key_is_found_by_its_name_in_the_file() -> None:
+    motions: tuple[Any, ...] = ({"motion": {"kind": "table"}}, {"motion": {"kind": "none"}}, DATA)
+    assert [table_at(("motion",), data) for data in motions] == [FromTable, None, None]
     assert field_at(("schema",), DATA) is not None
-    assert field_at(("schema_version",), DATA) is None
-    assert field_at((), DATA) is None
+    assert field_at(("schema_version",), DATA) is field_at((), DATA) is None
+
+
+KNOWN = """time.end contact.restitution contact.restitution.block_ground blocks.brick blocks.brick.length
+    structures.0.offset pairs.steel pairs.steel.oak pairs.steel.oak.restitution pairs.steel.oak.friction.kinetic
+    ground.profile"""
+UNKNOWN = """blocks.stone structures.0.overlap structures.9 time.end.x friction.block_blok blocks.stone.length pairs.oak
+    pairs.steel.ground.restitution walls.0.from"""
+
+
+@pytest.mark.parametrize("key", [*KNOWN.split(), *UNKNOWN.split()])
+def test_known_keys(key: str) -> None:
+    path = tuple(int(part) if part.isdigit() else part for part in key.split("."))
+    assert is_known(path, DATA) is (key in KNOWN.split())
 
 
 @pytest.mark.parametrize(
-    ("path", "known"),
+    ("word", "known", "most", "meant"),
     [
-        (("time", "end"), True),
-        (("contact", "restitution"), True),
-        (("contact", "restitution", "block_ground"), True),
-        (("blocks", "brick"), True),
-        (("blocks", "brick", "length"), True),
-        (("structures", 0, "offset"), True),
-        (("blocks", "stone"), False),
-        (("structures", 0, "overlap"), False),
-        (("structures", 9), False),
-        (("time", "end", "x"), False),
-        (("friction", "block_blok"), False),
-        (("blocks", "stone", "length"), False),
-        (("pairs", "steel"), True),
-        (("pairs", "oak"), False),
-        (("pairs", "steel", "oak"), True),
-        (("pairs", "steel", "oak", "restitution"), True),
-        (("pairs", "steel", "oak", "friction", "kinetic"), True),
-        (("pairs", "steel", "ground", "restitution"), False),
-        (("walls", 0, "from"), False),
-        (("ground", "profile"), True),
+        ("MPA", ["Pa", "MPa"], 0, "MPa"),
+        ("widht", ["height", "width"], 1, "width"),
+        ("wdth", ["height", "width"], 1, "width"),
+        ("widthh", ["height", "width"], 1, "width"),
+        ("wudth", ["height", "width"], 1, "width"),
+        ("wudht", ["height", "width"], 1, None),
+        ("wudht", ["height", "width"], 2, "width"),
+        ("mn", ["kPa"], 1, None),
     ],
 )
-def test_known_keys(path: tuple[str | int, ...], *, known: bool) -> None:
-    assert is_known(path, DATA) is known
+def test_nearest_allows_so_many_letters_replaced_added_dropped_or_swapped(
+    word: str, known: list[str], most: int, meant: str | None
+) -> None:
+    assert nearest(word, known, most=most) == meant
+
+
+def test_symbols_of_papers_and_words_of_other_programs_lead_to_keys_that_exist() -> None:
+    assert meant_word("vx", ["x", "y", "velocity"]) == "velocity"
+    assert meant_word("e", ["young_modulus", "density"]) == "young_modulus"
+    assert meant_word("e", ["model", "restitution"]) == "restitution"
+    assert meant_word("vx", ["x", "y"]) is None
+    keys = (SCENARIOS / "README.md").read_text("utf-8")
+    known = {row.split("`")[1].rpartition(".")[2] for row in keys.splitlines() if row.startswith("| `")}
+    assert {key for meant in USUAL.values() for key in meant} - {"speed", "restitution"} <= known

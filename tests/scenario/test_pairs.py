@@ -6,15 +6,16 @@ import pytest
 
 from blocksim.scenario import GROUND, Document, Scenario, resolve_pair, scenario_from_mapping
 from blocksim.scenario.models.contact import PairFriction
+from tests.golden import Golden
 from tests.scenario.conftest import MATERIAL, data_of
+
+
+def scenario_data(**tables: object) -> dict[str, Any]:
+    return data_of(materials={"oak": MATERIAL, "steel": MATERIAL, "sand": MATERIAL, "S235.JR": MATERIAL}, **tables)
 
 
 def scenario(**tables: object) -> Scenario:
     return scenario_from_mapping(scenario_data(**tables))
-
-
-def scenario_data(**tables: object) -> dict[str, Any]:
-    return data_of(materials={"oak": MATERIAL, "steel": MATERIAL, "sand": MATERIAL}, **tables)
 
 
 def static_and_rule(made: Scenario, one: str, other: str, *, ground: bool) -> tuple[float, str]:
@@ -22,52 +23,17 @@ def static_and_rule(made: Scenario, one: str, other: str, *, ground: bool) -> tu
     return pair.friction.static, pair.rules["friction"]
 
 
-def test_without_any_key_everything_is_a_default_or_follows_from_the_materials() -> None:
-    block = resolve_pair(scenario(), "oak", "steel", ground=False)
-    ground = resolve_pair(scenario(), "oak", GROUND, ground=True)
-    assert (block.friction.static, ground.friction.static) == (0.31, 0.38)
-    assert (block.restitution, ground.restitution) == (0.2, 0.2)
-    assert block.normal_stiffness is block.shear_stiffness_ratio is block.shear_damping_ratio is None
-    assert dict(block.rules) == {
-        "friction": "default",
-        "restitution": "default",
-        "normal_stiffness": "materials",
-        "shear_stiffness_ratio": "materials",
-        "shear_damping_ratio": "default",
-    }
-
-
-def test_general_keys_are_named_where_they_are_given() -> None:
-    made = scenario(
-        friction={"block_ground": 0.5},
-        contact={
-            "restitution": {"block_block": 0.1},
-            "normal_stiffness": 1e6,
-            "shear_stiffness_ratio": 0.5,
-            "shear_damping_ratio": 0.3,
-        },
-    )
-    pair = resolve_pair(made, "oak", GROUND, ground=True)
-    assert (pair.friction.static, pair.restitution) == (0.5, 0.2)
-    assert (pair.normal_stiffness, pair.shear_stiffness_ratio, pair.shear_damping_ratio) == (1e6, 0.5, 0.3)
-    assert dict(pair.rules) == {
-        "friction": "friction.block_ground",
-        "restitution": "default",
-        "normal_stiffness": "contact.normal_stiffness",
-        "shear_stiffness_ratio": "contact.shear_stiffness_ratio",
-        "shear_damping_ratio": "contact.shear_damping_ratio",
-    }
-    assert resolve_pair(made, "oak", "oak", ground=False).rules["restitution"] == "contact.restitution.block_block"
-
-
-@pytest.mark.parametrize("order", [("oak", "steel"), ("steel", "oak")])
-def test_a_pair_of_blocks_may_be_given_and_asked_in_either_order(order: tuple[str, str]) -> None:
-    made = scenario(friction={"block_block": 0.7}, pairs={order[0]: {order[1]: {"friction": 0.2}}})
-    expected = (0.2, f"pairs.{order[0]}.{order[1]}.friction")
-    assert static_and_rule(made, "oak", "steel", ground=False) == expected
-    assert static_and_rule(made, "steel", "oak", ground=False) == expected
-    assert static_and_rule(made, "oak", "oak", ground=False) == (0.7, "friction.block_block")
-    assert static_and_rule(made, "oak", GROUND, ground=True) == (0.38, "default")
+def test_general_keys_are_named_where_they_are_given_and_others_are_defaults(golden: Golden) -> None:
+    stiff = {"normal_stiffness": 1e6, "shear_stiffness_ratio": 0.5, "shear_damping_ratio": 0.3}
+    contact = {"restitution": {"block_block": 0.1}, **stiff}
+    told = []
+    for made in (scenario(), scenario(friction={"block_ground": 0.5}, contact=contact)):
+        for other, ground in (("steel", False), (GROUND, True)):
+            pair = resolve_pair(made, "oak", other, ground=ground)
+            values = {name: getattr(pair, name) for name in ("restitution", *stiff)}
+            rules = [f"{name} = {value} ({pair.rules[name]})" for name, value in values.items()]
+            told.append(f"friction = {pair.friction.static} ({pair.rules['friction']}), {', '.join(rules)}")
+    golden("\n".join(told))
 
 
 def test_every_quantity_looks_for_its_own_key() -> None:
@@ -107,9 +73,8 @@ def test_rules_on_the_ground_and_on_walls(given: str, material: str | None, othe
 
 
 def test_names_with_dots_are_quoted_in_rules() -> None:
-    data = scenario_data(pairs={"S235.JR": {"ground": {"restitution": 0}}})
-    data["materials"]["S235.JR"] = MATERIAL
-    pair = resolve_pair(scenario_from_mapping(data), "S235.JR", GROUND, ground=True)
+    made = scenario(pairs={"S235.JR": {"ground": {"restitution": 0}}})
+    pair = resolve_pair(made, "S235.JR", GROUND, ground=True)
     assert (pair.restitution, pair.rules["restitution"]) == (0.0, 'pairs."S235.JR".ground.restitution')
 
 
@@ -135,12 +100,9 @@ def test_setting_the_kinetic_friction_of_a_pair_keeps_the_static_one(
 
 def test_a_pair_that_is_set_in_the_other_order_stays_one_pair() -> None:
     given = scenario_data() | {"pairs": {"oak": {"steel": {"restitution": 0.1}}}}
-    document = Document.from_mapping(given).with_values({"pairs.steel.oak.restitution": 0.3})
-    assert document.build().pairs["oak"].keys() == {"steel"}
-    assert resolve_pair(document.build(), "steel", "oak", ground=False).restitution == 0.3
-
-
-def test_the_friction_of_a_new_pair_of_blocks_starts_from_the_default() -> None:
-    document = Document.from_mapping(scenario_data()).with_values({"pairs.oak.steel.friction.kinetic": 0.1})
-    friction = resolve_pair(document.build(), "oak", "steel", ground=False).friction
-    assert friction == PairFriction(static=0.31, kinetic=0.1)
+    made = Document.from_mapping(given).with_values({"pairs.steel.oak.restitution": 0.3}).build()
+    assert made.pairs["oak"].keys() == {"steel"}
+    assert resolve_pair(made, "steel", "oak", ground=False).restitution == 0.3
+    new = Document.from_mapping(scenario_data()).with_values({"pairs.oak.steel.friction.kinetic": 0.1}).build()
+    friction = resolve_pair(new, "oak", "steel", ground=False).friction
+    assert friction == PairFriction(static=0.31, kinetic=0.1)  # the default

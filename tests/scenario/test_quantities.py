@@ -1,7 +1,7 @@
-"""Quantities: numbers and texts to SI floats, exactly."""
+"""Units and quantities: numbers and texts to SI floats, exactly; what is said of others is in golden/quantities.txt."""
 
 import math
-import re
+from fractions import Fraction
 from typing import Any
 
 import pytest
@@ -10,36 +10,66 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from blocksim.scenario import units as q
-from blocksim.scenario.units import LENGTH, STIFFNESS, TIME, UNIT_WEIGHT, Kind, Quantity, parse_quantity, toml
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
-        ("35 mm", 0.035),
-        ("35mm", 0.035),
-        (" 35  mm ", 0.035),
-        ("+3.5e1 mm", 0.035),
-        (".5 m", 0.5),
-        ("5. m", 5.0),
-        ("1_000 mm", 1.0),
-        ("-10 cm", -0.1),
-        ("1e-999999999 m", 0.0),
-        ("1e999999999 m", math.inf),
-        ("-1e308 km", -math.inf),
-    ],
+from blocksim.scenario.units import (
+    LENGTH,
+    STIFFNESS,
+    TIME,
+    UNIT_WEIGHT,
+    Kind,
+    Quantity,
+    Unit,
+    UnitError,
+    parse_quantity,
+    parse_unit,
+    toml,
+    unit_factor,
 )
-def test_a_text_becomes_the_nearest_float(text: str, value: float) -> None:
-    assert parse_quantity(text, LENGTH)[0] == value
+from tests.golden import Golden
+
+UNITS = "cm|kilometers|min|lb|Mg/m^3|kg/m s^2|in|µm|kN / m³|kN*m^-3|m/s**2|m·kg/m|kg m^2|t/m^3|g0"
+NO_PRODUCTS = "m**9**9|m^999|m;m|m+m|(m)|m//s|/s| m|m |m  s|2 m|f(m)||" + "m" * 50
+UNKNOWN = "kg/furlong^3|nan|NaN|nan*m|m/nan|inf|Infinity|nan^2|kms|MM|m2"
+FACTORS = "µm mm|inch mm|° deg|turn deg|1 1|deg mm|1 mm|rad mm|degC mm|mm/mm mm|mm^0*m mm|2*mm mm| mm|mm deg|rad 1"
 
 
-@given(st.floats(allow_nan=False, allow_infinity=False))
-def test_a_float_written_with_its_si_unit_comes_back_bit_equal(value: float) -> None:
+def test_a_degree_is_exact_to_the_last_bit() -> None:
+    assert float(180 * parse_unit("deg").factor) == math.pi
+    assert float(90 * parse_unit("degree").factor) == math.pi / 2
+
+
+def test_a_unit_has_its_exact_value_and_its_dimension(golden: Golden) -> None:
+    def told(text: str) -> str:
+        try:
+            found = parse_unit(text)
+        except UnitError as error:
+            return f"no unit {error}"
+        return f"{found.factor} {found.dimension}"
+
+    golden("\n".join(f"{text!r}: {told(text)}" for text in f"{UNITS}|{NO_PRODUCTS}|{UNKNOWN}".split("|")), "values")
+    factors = [(text, *text.rsplit(" ", 1)) for text in FACTORS.split("|")]
+    golden("\n".join(f"{text}: {unit_factor(unit, target)!r}" for text, unit, target in factors), "factors")
+    assert unit_factor("m" * 1000, "mm") is None
+    assert parse_unit("kg/m s^2") == Unit(Fraction(1), (-1, 1, 2, 0))
+
+
+TEXTS = "35 mm|35mm| 35  mm |+3.5e1 mm|.5 m|5. m|1_000 mm|-10 cm|1e-999999999 m|1e999999999 m|-1e308 km|0,5 s|-1,25mm"
+
+
+def test_a_text_becomes_the_nearest_float_and_a_decimal_comma_is_answered(
+    golden: Golden,
+) -> None:
+    def told(text: str) -> str:
+        try:
+            return repr(parse_quantity(text, LENGTH)[0])
+        except ValueError as error:
+            return str(error)
+
+    golden("\n".join(f"{text!r}: {told(text)}" for text in TEXTS.split("|")))
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False), st.integers(1, 10**6))
+def test_floats_come_back_bit_equal_and_millimetres_are_divided_by_no_rounded_factor(value: float, number: int) -> None:
     assert parse_quantity(f"{value!r} m", LENGTH)[0].hex() == value.hex()
-
-
-@given(st.integers(1, 10**6))
-def test_millimetres_are_divided_not_multiplied_by_a_rounded_factor(number: int) -> None:
     assert parse_quantity(f"{number} mm", LENGTH)[0] == number / 1000
 
 
@@ -63,24 +93,20 @@ def test_every_kind_reads_its_unit(annotation: Any, text: str, value: float) -> 
     assert TypeAdapter(annotation).validate_python(text) == value
 
 
-@pytest.mark.parametrize("value", [1, -0.5, "1", True, None, math.nan, math.inf, "3 m", "1 /s", 10**400])
-def test_what_is_no_angle(value: object) -> None:
-    with pytest.raises(ValidationError):
-        TypeAdapter(q.Angle).validate_python(value)
+NO_ANGLES = (1, -0.5, "1", True, None, math.nan, math.inf, "3 m", "1 /s", 10**400)
+BOUNDS = [
+    (q.PositiveLength, "1 nm", 0),
+    (q.NonNegativeTime, 0, "-1 ns"),
+    (q.Share, 1, 1.0000001),
+    (q.Safety, 0.1, 0.2),
+    (q.PoissonRatio, -0.999, -1),
+    (q.TiltAngle, "89.9 deg", "-90 deg"),
+    (q.Friction, "89 deg", "-1 deg"),
+    *((q.Angle, "1 deg", value) for value in NO_ANGLES),
+]
 
 
-@pytest.mark.parametrize(
-    ("annotation", "inside", "outside"),
-    [
-        (q.PositiveLength, "1 nm", 0),
-        (q.NonNegativeTime, 0, "-1 ns"),
-        (q.Share, 1, 1.0000001),
-        (q.Safety, 0.1, 0.2),
-        (q.PoissonRatio, -0.999, -1),
-        (q.TiltAngle, "89.9 deg", "-90 deg"),
-        (q.Friction, "89 deg", "-1 deg"),
-    ],
-)
+@pytest.mark.parametrize(("annotation", "inside", "outside"), BOUNDS)
 def test_bounds(annotation: Any, inside: object, outside: object) -> None:
     adapter = TypeAdapter(annotation)
     adapter.validate_python(inside)
@@ -88,50 +114,21 @@ def test_bounds(annotation: Any, inside: object, outside: object) -> None:
         adapter.validate_python(outside)
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (True, "true"),
-        ("a\tb", '"a\\tb"'),
-        ('say "no"', '"say \\"no\\""'),
-        ("\x1b[31m", '"\\x1b[31m"'),
-        ([1], "a list"),
-        ({"a": 1}, "a table"),
-        (10**60, "a huge whole number"),
-        ("x" * 50, '"' + "x" * 40 + '…"'),
-    ],
-)
-def test_values_are_shown_as_in_toml_and_short(value: object, text: str) -> None:
-    assert toml(value) == text
+def test_values_are_shown_as_in_toml_and_short(golden: Golden) -> None:
+    shown = (True, "a\tb", 'say "no"', "\x1b[31m", [1], {"a": 1}, 10**60, "x" * 50)
+    golden("\n".join(map(toml, shown)))
 
 
 @pytest.mark.parametrize("kind", [LENGTH, TIME, UNIT_WEIGHT, STIFFNESS])
-@pytest.mark.parametrize(
-    ("value", "told"),
-    [
-        (1e-19, "small to compute with; at least 1e-18"),
-        (5e-324, "small to compute with; at least 1e-18"),
-        (1e31, "large to compute with; at most 1e.30"),
-        (1e308, "large to compute with; at most 1e.30"),
-    ],
-)
-def test_numbers_whose_products_no_double_holds_are_refused(kind: Kind, value: float, told: str) -> None:
+def test_numbers_whose_products_no_double_holds_are_refused_and_places_may_be_round_off(kind: Kind) -> None:
+    small, large = "small to compute with; at least 1e-18", "large to compute with; at most 1e.30"
     quantity = Quantity(kind, above=0.0)
-    assert quantity.read(1.1e-18) == 1.1e-18
-    assert quantity.read(0.9e30) == 0.9e30
-    with pytest.raises(PydanticCustomError, match=rf"is too {told} \(SI\) is allowed"):
-        quantity.read(value)
-
-
-def test_places_may_be_round_off() -> None:
+    assert (quantity.read(1.1e-18), quantity.read(0.9e30)) == (1.1e-18, 0.9e30)
+    for value, told in ((1e-19, small), (5e-324, small), (1e31, large), (1e308, large)):
+        with pytest.raises(PydanticCustomError, match=rf"is too {told} \(SI\) is allowed"):
+            quantity.read(value)
     for value in (0.0, -0.0, 5e-324, -1e-300, 0.1 * 3 - 0.3):
-        assert Quantity(LENGTH).read(value) == value
-        assert Quantity(LENGTH, at_least=0.0).read(abs(value)) == abs(value)
+        assert Quantity(kind).read(value) == value
+        assert Quantity(kind, at_least=0.0).read(abs(value)) == abs(value)
     with pytest.raises(PydanticCustomError, match="is too large to compute with"):
-        Quantity(LENGTH).read(-1e31)
-
-
-@pytest.mark.parametrize(("text", "wanted"), [("0,5 s", '"0.5 s"'), ("-1,25mm", '"-1.25mm"')])
-def test_a_decimal_comma_is_answered_with_the_decimal_point(text: str, wanted: str) -> None:
-    with pytest.raises(ValueError, match="write a decimal point: " + re.escape(wanted)):
-        parse_quantity(text)
+        Quantity(kind).read(-1e31)

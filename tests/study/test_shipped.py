@@ -32,6 +32,10 @@ def test_nominal_scenario_gets_block_1_and_all_rotations_and_the_literal_reading
     assert [found[(block, "rotation")] for block in "123"] == [Verdict.INSIDE] * 3
     literal = {(row.block, row.quantity): row.distance for row in compare_run(run_shipped("three_blocks_literal")).rows}
     assert min(literal[("2", "x")], literal[("3", "x")]) > 10.0
+    printed, told = load_scenario(SCENARIOS / "three_blocks_literal.toml"), ("name", "description", "ground")
+    changed = {name: getattr(printed, name) for name in told}
+    nominal = load_scenario(SCENARIOS / "three_blocks_nominal.toml", {UPRIGHT: "height"})
+    assert nominal.model_copy(update=changed) == printed  # one value differs, beside the ground
 
 
 @pytest.mark.parametrize(("name", "count"), STUDIES.items())
