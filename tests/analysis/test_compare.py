@@ -1,7 +1,7 @@
-"""Verdicts about a run against the repeats of an experiment."""
+"""Verdicts about a run against repeats, exact limits of a probability, Student's quantiles beside scipy."""
 
 import json
-from math import isnan, sqrt
+from math import comb, isnan, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy import stats
 
-from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict, compare_final
+from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict, compare_final, interval, lower_bound, quantile
 from blocksim.analysis.experiment import ExperimentTable, Measurement, load_table
 from blocksim.errors import InvalidInputError
 from tests.golden import Golden
@@ -120,25 +120,6 @@ def test_final_tables_that_cannot_be_compared_are_refused(golden: Golden, tmp_pa
         golden(str(caught.value), name)
 
 
-def test_a_missing_repeat_is_reported_beside_the_verdict(tmp_path: Path) -> None:
-    path = tmp_path / "table.csv"
-    path.write_text("block,quantity,unit,replicate,value\n1,x,mm,1,5\n1,x,mm,2,\n1,x,mm,3,6\n")
-    comparison = compare_final(final_table(x=(5.5,), rotation=(0.0,)), load_table(path))
-    assert (comparison.inside, comparison.rows[0].n) == (True, 2)
-    assert comparison.messages == (f"{path}: replicate 2 has no x of block '1'",)
-
-
-def test_frame_and_dictionary_say_the_same() -> None:
-    """Block names may be read as integers."""
-    comparison = compare_final(final_table(x=(16.0, 76.05, 130.0)).astype({"block": int}), TABLE)  # the paper's own
-    frame, plain = comparison.to_frame(), comparison.to_dict()
-    assert list(frame["verdict"]) == ["inside"] * 6
-    assert list(frame.columns[:5]) == ["block", "quantity", "unit", "simulated", "mean"]
-    assert plain["inside"] is True
-    assert plain["experiment"] == TABLE.source
-    assert len(frame) == len(TABLE.blocks) * len({one.quantity for one in TABLE.measurements})
-
-
 finite = st.floats(-1e4, 1e4)
 
 
@@ -148,3 +129,47 @@ def test_distance_is_what_it_takes_to_come_inside(repeats: list[float], value: f
     nearest = min(max(value, min(repeats)), max(repeats))
     assert judged.distance == pytest.approx(abs(value - nearest), abs=1e-9)
     assert (judged.verdict is Verdict.INSIDE) == (min(repeats) <= value <= max(repeats))
+
+
+def at_least(count: int, total: int, p: float) -> float:
+    return sum(comb(total, k) * p**k * (1 - p) ** (total - k) for k in range(count, total + 1))
+
+
+@pytest.mark.parametrize(("count", "total"), [(1, 1), (1, 6), (3, 6), (5, 6), (17, 40), (39, 40)])
+def test_limits_leave_just_the_tails(count: int, total: int) -> None:
+    low, high = interval(count, total)
+    assert at_least(count, total, low) == pytest.approx(0.025, abs=1e-9)
+    assert 1.0 - at_least(count + 1, total, high) == pytest.approx(0.025 if count < total else 1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("total", [1, 6, 1000])
+def test_none_and_all_have_the_limits_of_pencil_and_paper(total: int) -> None:
+    # nobody of n: (1 - p)^n = 0.025; all of n: p^n = 0.025
+    assert interval(0, total) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / total)), abs=1e-12)
+    assert interval(total, total) == pytest.approx((0.025 ** (1 / total), 1.0), abs=1e-12)
+
+
+def test_six_of_six_are_at_least_61_percent() -> None:
+    assert lower_bound(6, 6) == pytest.approx(0.05 ** (1 / 6), abs=1e-12)
+    assert lower_bound(6, 6) == pytest.approx(0.61, abs=0.005)
+    assert lower_bound(0, 6) == 0.0
+    assert interval(0, 0) == (0.0, 1.0)
+    assert at_least(5, 6, lower_bound(5, 6)) == pytest.approx(0.05, abs=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [1, 2, 3, 4, 5, 6, 9, 30, 101])
+@pytest.mark.parametrize("probability", [0.001, 0.3, 0.5, 0.75, 0.975, 0.9995])
+def test_quantile_agrees_with_scipy(degrees: int, probability: float) -> None:
+    expected = float(stats.t.ppf(probability, degrees))
+    assert quantile(probability, degrees) == pytest.approx(expected, rel=1e-11, abs=1e-12)
+
+
+@pytest.mark.parametrize(("probability", "degrees"), [(0.0, 5), (1.0, 5), (0.975, 0)])
+def test_quantile_without_meaning_is_refused(probability: float, degrees: int) -> None:
+    with pytest.raises(ValueError, match="degree of freedom"):
+        quantile(probability, degrees)
+
+
+def test_large_numbers_agree_with_scipy() -> None:
+    expected = stats.binomtest(9_700, 10_000).proportion_ci(method="exact")
+    assert interval(9_700, 10_000) == pytest.approx((expected.low, expected.high), abs=1e-9)

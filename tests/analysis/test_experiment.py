@@ -80,13 +80,6 @@ def test_spreadsheet_habits_are_understood(tmp_path: Path) -> None:
     assert table.notes == ('a "note"',)
 
 
-def test_a_single_repeat_has_no_scatter(tmp_path: Path) -> None:
-    statistics = load_table(written(tmp_path, HEADER + "1,x,mm,1,3\n")).statistics()
-    assert list(statistics.columns) == ["block", "quantity", "unit", "mean", "s", "n", "minimum", "maximum"]
-    assert np.isnan(statistics["s"].iloc[0])
-    assert list(statistics["n"]) == [1]
-
-
 @pytest.mark.parametrize("cell", ["", " ", "NaN", "nan", "NA"])
 def test_a_repeat_without_a_value_is_left_out_and_told(tmp_path: Path, cell: str) -> None:
     rows = f"1,x,mm,1,3\n1,x,mm,2,{cell}\n1,x,mm,3,5\n"

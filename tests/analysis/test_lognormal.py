@@ -20,7 +20,7 @@ def found(failed: list[int], members: int = MEMBERS) -> Curve | NoCurve:
 
 
 def test_intervals_of_median_dispersion_and_curve_cover_what_they_say() -> None:
-    stream, draws = np.random.default_rng(1), 400
+    stream, draws = np.random.default_rng(1), 200
     hits = np.zeros(3)
     for _ in range(draws):
         one = found(stream.binomial(MEMBERS, P).tolist())
@@ -28,7 +28,7 @@ def test_intervals_of_median_dispersion_and_curve_cover_what_they_say() -> None:
         low, high = one.band(X[2:3])
         truths = (MEDIAN, one.median_interval), (DISPERSION, one.dispersion_interval), (P[2], (low[0], high[0]))
         hits += [ends[0] <= truth <= ends[1] for truth, ends in truths]
-    # four standard deviations of 400 draws that each hit with 0.95
+    # four standard deviations of 200 draws that each hit with 0.95
     assert np.abs(hits / draws - 0.95).max() < 4.0 * math.sqrt(0.95 * 0.05 / draws)
 
 
