@@ -211,7 +211,9 @@ def at_least_thickness(friction: float) -> tuple[float, Joints]:
     return RADIUS * share, limit_analysis(27, RADIUS * share * (1.0 + 1e-6), math.pi, friction, pulls=False)[1]
 
 
-@pytest.mark.parametrize(("friction", "hinges", "slips"), [(0.4, 6, 0), (0.35, 4, 2)])
+@pytest.mark.parametrize(
+    ("friction", "hinges", "slips"), [pytest.param(0.4, 6, 0, marks=pytest.mark.long), (0.35, 4, 2)]
+)
 def test_arch_just_thick_enough_has_hinges_and_slips_where_limit_analysis_has_them(
     friction: float, hinges: int, slips: int
 ) -> None:

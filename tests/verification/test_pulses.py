@@ -128,7 +128,7 @@ def test_rigid_blocks_slip_on_that_table_as_one_does(places: list[tuple[float, f
     assert slip[[40, 100]] == pytest.approx([SLIP, -2.0 * SLIP], rel=within)
 
 
-@pytest.mark.parametrize(("width", "height", "scale"), [(1.0, 0.25, 1.0), (0.5, 0.45, 1.0), (0.2, 0.1, 0.1)])
+@pytest.mark.parametrize(("width", "height", "scale"), [(0.5, 0.45, 1.0), (0.2, 0.1, 0.1)])
 def test_the_slip_of_springs_depends_neither_on_the_proportions_of_a_block_nor_on_their_stiffness(
     width: float, height: float, scale: float
 ) -> None:

@@ -71,11 +71,6 @@ def test_third_apex_of_a_drop_is_within_a_percent_at_the_default_step() -> None:
     assert abs(third.error) < 0.01
 
 
-def test_settings_of_rigid_contacts_do_not_reach_scenes_of_springs() -> None:
-    body = [{"y": 1.0}]
-    assert Setting(rigid_step=1.0).scene(body) == Setting().scene(body)
-
-
 @dataclass(frozen=True)
 class Wrong(Setting):
     """A setting whose scenes are changed."""
