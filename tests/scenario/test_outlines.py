@@ -60,9 +60,8 @@ def test_the_sense_of_the_corners_does_not_matter(angles: list[int], wide: float
 def test_an_outline_far_from_its_origin_keeps_its_digits() -> None:
     near = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.25), (0.0, 0.25)]
     far = [(x + 500_000.0, y + 5_500_000.0) for x, y in near]
-    assert (
-        centre_outline(far) == centre_outline(near) == ((-0.25, -0.125), (0.25, -0.125), (0.25, 0.125), (-0.25, 0.125))
-    )
+    centred = ((-0.25, -0.125), (0.25, -0.125), (0.25, 0.125), (-0.25, 0.125))
+    assert centre_outline(far) == centre_outline(near) == centred
 
 
 @pytest.mark.parametrize("sides", [3, 4, 6, 7, 16])
@@ -129,11 +128,6 @@ def moved(x: float, y: float) -> geometry.Floats:
     return np.asarray(SQUARE + np.array([x, y]))
 
 
-def test_corners_run_counter_clockwise_however_they_are_given() -> None:
-    assert geometry.area_of(geometry.corners_of([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])) == 1.0
-    assert geometry.area_of(ELL) == 3.0
-
-
 @pytest.mark.parametrize(
     ("other", "meets"),
     [
@@ -149,10 +143,7 @@ def test_corners_run_counter_clockwise_however_they_are_given() -> None:
 def test_polygons_overlap_where_they_have_more_than_edges_in_common(other: geometry.Floats, meets: bool) -> None:
     assert geometry.overlap(SQUARE, other) is meets
     assert geometry.overlap(other, SQUARE) is meets
-
-
-def test_the_notch_of_an_ell_is_free() -> None:
-    assert not geometry.overlap(ELL, moved(1.0, 1.0))
+    assert not geometry.overlap(ELL, moved(1.0, 1.0))  # the notch is free
     assert geometry.overlap(ELL, moved(0.9, 1.0))
 
 
@@ -170,7 +161,9 @@ def test_the_weight_above_counts_what_is_there_only() -> None:
     assert geometry.height_above(ELL, points) == pytest.approx([1.5, 0.75, 0.0])
 
 
-def test_edges_that_cross_are_found() -> None:
+def test_corners_run_counter_clockwise_and_edges_that_cross_are_found() -> None:
+    assert geometry.area_of(geometry.corners_of([(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)])) == 1.0
+    assert geometry.area_of(ELL) == 3.0
     bow = np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]])
     assert list(geometry.self_crossings(bow)) == [(0, 2)]
     assert list(geometry.self_crossings(ELL)) == []

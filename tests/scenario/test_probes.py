@@ -30,6 +30,11 @@ def test_the_joint_of_a_shifted_stack_spans_what_the_faces_share(turn: float) ->
     assert (*first, *last) == pytest.approx((-0.1, -0.05, 0.05, -0.05), abs=1e-12)
 
 
+def test_bodies_that_face_no_other_have_no_joint() -> None:
+    for other in ((0.3, 1.2, 0.0), (0.0, 1.11, 1.5)):
+        assert joint_between(*bodies((0.0, 1.0, 0.0), other)) is None
+
+
 def test_a_gap_is_part_of_a_joint_and_a_quarter_turn_too() -> None:
     joint = joint_between(*bodies((0.0, 1.0, 0.0), (0.17, 1.02, 90.0)))
     assert joint is not None
@@ -56,11 +61,6 @@ def test_a_joint_of_a_drawing_may_have_the_rounding_of_its_corners(corner: float
     assert joint.normal == pytest.approx((0.0, 1.0))
     gaps = [upper.y + of_b[1] - lower.y - of_a[1] for of_a, of_b in zip(joint.ends_of_a, joint.ends_of_b, strict=True)]
     assert gaps == pytest.approx([0.0, corner - 0.1], abs=1e-12)
-
-
-@pytest.mark.parametrize("other", [(0.3, 1.2, 0.0), (0.0, 1.11, 1.5)])
-def test_bodies_that_face_no_other_have_no_joint(other: tuple[float, float, float]) -> None:
-    assert joint_between(*bodies((0.0, 1.0, 0.0), other)) is None
 
 
 def test_more_probes_than_a_run_can_write_at_its_end_are_refused() -> None:

@@ -66,15 +66,10 @@ def test_every_joint_is_a_valley_of_both_pieces_or_an_edge_of_one(steps: list[tu
         assert (one.touches_end, other.touches_start) == (not is_valley, False)
 
 
-@pytest.mark.parametrize(
-    ("x", "height"), [(-9.0, 1.0), (0.0, 1.0), (1.0, 1.5), (2.0, 4.0), (2.5, 3.0), (3.0, 2.0), (99.0, 2.0)]
-)
-def test_the_height_of_the_surface(x: float, height: float) -> None:
+def test_the_height_of_the_surface_is_zero_on_flat_ground_which_is_no_segment() -> None:
     made = scenario([(0, 1), (2, 2), (2, 3), (2, 4), (3, 2)])
-    assert surface_heights(made, np.array([x]))[0] == height
-
-
-def test_the_flat_ground_is_no_segment_and_at_zero() -> None:
+    places = np.array([-9.0, 0.0, 1.0, 2.0, 2.5, 3.0, 99.0])
+    assert surface_heights(made, places).tolist() == [1.0, 1.0, 1.5, 4.0, 3.0, 2.0, 2.0]
     assert place_segments(scenario()) == ()
     assert surface_heights(scenario(), np.array([3.0]))[0] == 0.0
 
@@ -105,11 +100,8 @@ def test_a_wall_continues_where_the_ground_covers_its_end(profile: list[Point] |
     down = place_segments(scenario(profile, [wall((4, 5), foot)]))[-1]
     assert (extends(up), touches(up)) == ((True, False), (False, True))
     assert (extends(down), touches(down)) == ((False, True), (True, False))
-
-
-def test_a_wall_above_the_ground_does_not_go_on() -> None:
-    (piece,) = place_segments(scenario(walls=[wall((3, 1.1e-9), (3, 5))]))
-    assert extends(piece) == (False, False)
+    (above,) = place_segments(scenario(walls=[wall((3, 1.1e-9), (3, 5))]))
+    assert extends(above) == (False, False)
 
 
 def test_a_wall_continues_where_it_ends_on_another() -> None:

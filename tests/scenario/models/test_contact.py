@@ -11,24 +11,18 @@ from blocksim.scenario.models.contact import Contact, PairFriction, Restitution
 SIDE = "friction.block_block"
 
 
-@pytest.mark.parametrize(
-    ("given", "static", "kinetic", "speed"),
-    [
-        (0.31, 0.31, 0.31, 0.005),
-        (0, 0.0, 0.0, 0.005),
-        ("21 deg", math.tan(math.radians(21)), math.tan(math.radians(21)), 0.005),
-        ({"static": 0.3}, 0.3, 0.3, 0.005),
-        (
-            {"static": "45 deg", "kinetic": 0.5, "transition_speed": "1 mm/s"},
-            math.tan(math.pi / 4),
-            0.5,
-            0.001,
-        ),
-    ],
-)
-def test_forms_of_friction(given: object, static: float, kinetic: float, speed: float) -> None:
-    pair = PairFriction.model_validate(given)
-    assert (pair.static, pair.kinetic, pair.transition_speed) == (static, kinetic, speed)
+def test_forms_of_friction() -> None:
+    tan21, tan45 = math.tan(math.radians(21)), math.tan(math.pi / 4)
+    slow = {"static": "45 deg", "kinetic": 0.5, "transition_speed": "1 mm/s"}
+    for given, expected in (
+        (0.31, (0.31, 0.31, 0.005)),
+        (0, (0.0, 0.0, 0.005)),
+        ("21 deg", (tan21, tan21, 0.005)),
+        ({"static": 0.3}, (0.3, 0.3, 0.005)),
+        (slow, (tan45, 0.5, 0.001)),
+    ):
+        pair = PairFriction.model_validate(given)
+        assert (pair.static, pair.kinetic, pair.transition_speed) == expected
 
 
 @pytest.mark.parametrize(
@@ -47,28 +41,20 @@ def test_smoothing_length_and_reach_of_the_kernel(given: dict[str, object], leng
     assert [contact.resolved_smoothing_length, reach] == pytest.approx([length, support])
 
 
-@pytest.mark.parametrize("model", ["surface", "particles"])
-def test_a_short_smoothing_length_only_matters_to_the_kernel(model: str) -> None:
-    contact = Contact.model_validate({"model": model, "smoothing_length": 1e-6})
-    assert contact.smoothing_length == 1e-6
+def test_a_short_smoothing_length_only_matters_to_the_kernel() -> None:
+    for model in ("surface", "particles"):
+        assert Contact.model_validate({"model": model, "smoothing_length": 1e-6}).smoothing_length == 1e-6
 
 
-@pytest.mark.parametrize(
-    ("given", "block_block", "block_ground"),
-    [(0.5, 0.5, 0.5), (1, 1.0, 1.0), ({"block_ground": 0.1}, 0.2, 0.1), ({}, 0.2, 0.2)],
-)
-def test_forms_of_restitution(given: object, block_block: float, block_ground: float) -> None:
-    restitution = Restitution.model_validate(given)
-    assert (restitution.block_block, restitution.block_ground) == (block_block, block_ground)
+def test_forms_of_restitution() -> None:
+    for given, expected in ((0.5, (0.5, 0.5)), (1, (1.0, 1.0)), ({"block_ground": 0.1}, (0.2, 0.1)), ({}, (0.2, 0.2))):
+        restitution = Restitution.model_validate(given)
+        assert (restitution.block_block, restitution.block_ground) == expected
 
 
 @pytest.fixture
 def document(valid_text: str) -> Document:
     return Document.parse(valid_text)
-
-
-def friction(document: Document, values: dict[str, object]) -> PairFriction:
-    return document.with_values(values).build().friction.block_block
 
 
 @pytest.mark.parametrize(
@@ -80,12 +66,11 @@ def friction(document: Document, values: dict[str, object]) -> PairFriction:
         ({SIDE: {"static": 0.5, "kinetic_ratio": 0.25}, f"{SIDE}.kinetic": 0.3}, 0.3),
         ({SIDE: {"static": 0.5, "kinetic_ratio": 0.25}, f"{SIDE}.static": 0.4}, 0.1),
     ],
-    ids=["ratio", "opens a number", "replaces kinetic", "kinetic set last", "static set last"],
 )
 def test_kinetic_is_the_ratio_times_static_unless_set_last(
     document: Document, values: dict[str, object], kinetic: float
 ) -> None:
-    assert friction(document, values).kinetic == pytest.approx(kinetic)
+    assert document.with_values(values).build().friction.block_block.kinetic == pytest.approx(kinetic)
 
 
 def test_a_resolved_ratio_is_the_same_scenario_and_the_same_run_as_its_value(document: Document) -> None:

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import Scenario, json_schema, scenario_from_mapping
+from blocksim.scenario import json_schema, scenario_from_mapping
 from blocksim.scenario.geometry import edge_distance
 from blocksim.scenario.models.base import OneOf, Whole
 from blocksim.scenario.models.geometry import Block, Material
@@ -17,17 +17,17 @@ from blocksim.simulation.files import RESULTS, default_folder
 from tests.scenario.conftest import data_of
 
 
-@pytest.mark.parametrize("value", [True, 1.0, "2", 0, 6])
-def test_whole_number_is_no_flag_and_in_its_range(value: object) -> None:
-    with pytest.raises(PydanticCustomError, match="is not a whole number from 1 to 5"):
-        Whole(1, 5).read(value)
+def test_whole_number_is_no_flag_and_in_its_range() -> None:
+    for value in (True, 1.0, "2", 0, 6):
+        with pytest.raises(PydanticCustomError, match="is not a whole number from 1 to 5"):
+            Whole(1, 5).read(value)
     assert [Whole(1, 5).read(one) for one in (1, 5)] == [1, 5]
 
 
-@pytest.mark.parametrize("value", ["spheres", 2, 1.0, True])
-def test_word_is_one_of_those_that_are_available(value: object) -> None:
-    with pytest.raises(PydanticCustomError, match="is unknown"):
-        OneOf(("discs", 1)).read(value)
+def test_word_is_one_of_those_that_are_available() -> None:
+    for value in ("spheres", 2, 1.0, True):
+        with pytest.raises(PydanticCustomError, match="is unknown"):
+            OneOf(("discs", 1)).read(value)
 
 
 def test_distance_from_an_edge_is_that_from_its_end_beyond_it() -> None:
@@ -35,9 +35,9 @@ def test_distance_from_an_edge_is_that_from_its_end_beyond_it() -> None:
     assert edge_distance(np.array([[3.0, 0.5], [0.5, 0.25], [4.0, 5.0]]), square) == pytest.approx([2.0, 0.25, 5.0])
 
 
-@pytest.mark.parametrize("key", ["vx", "vy", "spin"])
-def test_velocity_of_an_event_may_be_one_component_alone(key: str) -> None:
-    assert getattr(NewVelocity.model_validate({"body": "1", key: 0.5}), key) == 0.5
+def test_velocity_of_an_event_may_be_one_component_alone() -> None:
+    for key in ("vx", "vy", "spin"):
+        assert getattr(NewVelocity.model_validate({"body": "1", key: 0.5}), key) == 0.5
 
 
 @pytest.mark.parametrize(
@@ -57,19 +57,13 @@ def test_sides_along_upright_and_deep(turned: dict[str, str], sizes: tuple[float
     assert (block.size_x, block.size_y, block.depth) == sizes
 
 
-def test_a_unit_weight_is_a_density_times_standard_gravity() -> None:
-    material = Material(unit_weight=9810.0, young_modulus=1.0, poisson_ratio=0.0)
-    assert material.density == 1000.0
-
-
 def test_a_given_density_is_used_as_it_is() -> None:
-    assert Material(density=2700.5, young_modulus=1.0, poisson_ratio=0.0).density == 2700.5
-
-
-@pytest.mark.parametrize("given", [{}, {"density": 1.0, "unit_weight": 9.81}])
-def test_exactly_one_density(given: dict[str, float]) -> None:
-    with pytest.raises(ValidationError, match="density"):
-        Material.model_validate({"young_modulus": 1.0, "poisson_ratio": 0.0, **given})
+    stone = {"young_modulus": 1.0, "poisson_ratio": 0.0}
+    assert Material.model_validate({"density": 2700.5, **stone}).density == 2700.5
+    assert Material.model_validate({"unit_weight": 9810.0, **stone}).density == 1000.0
+    for given in ({}, {"density": 1.0, "unit_weight": 9.81}):
+        with pytest.raises(ValidationError, match="density"):
+            Material.model_validate({**stone, **given})
 
 
 HOSTILE = (
@@ -80,23 +74,16 @@ HOSTILE = (
 FINE = ("a", "three_blocks", "7", "a.b-c_D", "CONE", "com10", "nulled.x", "x" * 100)
 
 
-def scenario_named(name: str) -> Scenario:
-    return scenario_from_mapping(data_of(name=name))
-
-
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_name_that_is_no_folder_everywhere_is_refused(name: str) -> None:
     with pytest.raises(ScenarioError, match="is not a name"):
-        scenario_named(name)
+        scenario_from_mapping(data_of(name=name))
 
 
-@pytest.mark.parametrize("name", FINE)
-def test_results_lie_in_a_folder_of_the_name_below_results(name: str) -> None:
-    folder = default_folder(scenario_named(name))
-    assert folder.parent.name == name
-    assert folder.resolve().parent.parent == RESULTS.resolve()
-
-
-def test_editors_are_reported_the_same() -> None:
+def test_results_lie_in_a_folder_of_the_name_below_results_and_editors_are_told_the_same() -> None:
+    for name in FINE:
+        folder = default_folder(scenario_from_mapping(data_of(name=name)))
+        assert folder.parent.name == name
+        assert folder.resolve().parent.parent == RESULTS.resolve()
     pattern = json_schema()["properties"]["name"]["pattern"].replace("$", r"\Z")  # it allows no line feed behind it
     assert [name for name in (*HOSTILE, *FINE) if re.search(pattern, name)] == list(FINE)

@@ -18,18 +18,12 @@ BRICK = Block(width=0.032, height=0.025, length=0.05, material="aluminium")
 FLAT = Block(width=0.05, height=0.025, length=0.032, material="aluminium")
 
 
-def test_blocks_of_a_staircase_overlap_by_the_overlap() -> None:
-    poses = Staircase(kind="staircase", block="brick", count=4, overlap=0.01, left=0.1).place(BRICK)
-    lefts = [pose.x - 0.016 for pose in poses]
-    assert lefts == pytest.approx([0.1, 0.122, 0.144, 0.166], abs=1e-15)
-    assert [pose.y - 0.0125 for pose in poses] == pytest.approx([0.0, 0.025, 0.05, 0.075], abs=1e-15)
-
-
-@pytest.mark.parametrize("offset", [0.0, 0.0105, -0.004])
-def test_a_stack_leans_by_its_offset(offset: float) -> None:
-    poses = Stack(kind="stack", block="brick", count=5, left=-0.1, offset=offset).place(BRICK)
-    assert [pose.x - 0.016 for pose in poses] == pytest.approx([-0.1 + i * offset for i in range(5)], abs=1e-15)
-    assert [pose.y for pose in poses] == pytest.approx([0.025 * (i + 0.5) for i in range(5)], abs=1e-15)
+def test_a_stack_leans_by_its_offset_and_a_staircase_overlaps_by_its_overlap() -> None:
+    stairs = Staircase(kind="staircase", block="brick", count=5, overlap=0.01, left=-0.1).place(BRICK)
+    stacks = {o: Stack(kind="stack", block="brick", count=5, left=-0.1, offset=o) for o in (0.0, 0.0105, -0.004)}
+    for offset, poses in ((0.022, stairs), *((offset, stack.place(BRICK)) for offset, stack in stacks.items())):
+        assert [pose.x - 0.016 for pose in poses] == pytest.approx([-0.1 + i * offset for i in range(5)], abs=1e-15)
+        assert [pose.y for pose in poses] == pytest.approx([0.025 * (i + 0.5) for i in range(5)], abs=1e-15)
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.004])
@@ -69,20 +63,16 @@ SHAPES = {
 }
 
 
-@pytest.mark.parametrize(("kind", "keys"), [(kind, keys) for kind, (keys, _) in SHAPES.items()])
-@pytest.mark.parametrize(("left", "bottom"), [(0.0, 0.1), (-0.3, -0.025)])
-def test_a_structure_stands_where_it_is_reported(
-    kind: str, keys: Mapping[str, object], left: float, bottom: float
+@pytest.mark.parametrize(("kind", "keys", "height"), [(kind, *shape) for kind, shape in SHAPES.items()])
+def test_every_structure_stands_where_it_is_told_and_can_be_thrown_and_sheared(
+    kind: str, keys: Mapping[str, object], height: float
 ) -> None:
     here = KINDS[kind].model_validate({"kind": kind, "block": "brick", **keys})
-    there = here.model_copy(update={"left": left, "bottom": bottom})
-    for pose, moved in zip(here.place(BRICK), there.place(BRICK), strict=True):
-        assert moved == pytest.approx(Pose(pose.x + left, pose.y + bottom, *pose[2:]), abs=1e-15)
-
-
-@pytest.mark.parametrize(("kind", "keys", "height"), [(kind, *shape) for kind, shape in SHAPES.items()])
-def test_every_structure_can_be_thrown_and_sheared(kind: str, keys: Mapping[str, object], height: float) -> None:
-    rest = KINDS[kind].model_validate({"kind": kind, "block": "brick", "bottom": 0.7, **keys})
+    for left, bottom in ((0.0, 0.1), (-0.3, -0.025)):
+        there = here.model_copy(update={"left": left, "bottom": bottom})
+        for pose, moved in zip(here.place(BRICK), there.place(BRICK), strict=True):
+            assert moved == pytest.approx(Pose(pose.x + left, pose.y + bottom, *pose[2:]), abs=1e-15)
+    rest = here.model_copy(update={"bottom": 0.7})
     moving = rest.model_copy(update={"velocity": (2.0, -1.0), "shear_velocity": 3.0})
     assert rest.height(BRICK) == pytest.approx(height)
     assert len(rest.start(BRICK)) == rest.size
@@ -126,11 +116,12 @@ def wall_of(**keys: object) -> list[Pose]:
     return list(BlockWall.model_validate(wall).place(FLAT))
 
 
-@pytest.mark.parametrize("keys", [{"missing": 0.3}, {"offset": 0.001}])
-def test_a_seed_decides(keys: dict[str, object]) -> None:
-    assert wall_of(**keys) == wall_of(**keys, seed=0)
-    assert wall_of(**keys, seed=1) == wall_of(**keys, seed=1)
-    assert wall_of(**keys, seed=1) != wall_of(**keys, seed=2)
+def test_a_seed_decides_and_leaving_blocks_out_does_not_shift_the_others_differently() -> None:
+    for keys in ({"missing": 0.3}, {"offset": 0.001}):
+        assert wall_of(**keys) == wall_of(**keys, seed=0)
+        assert wall_of(**keys, seed=1) == wall_of(**keys, seed=1)
+        assert wall_of(**keys, seed=1) != wall_of(**keys, seed=2)
+    assert set(wall_of(offset=0.001, missing=0.5)) < set(wall_of(offset=0.001))
 
 
 def test_random_numbers_are_those_of_every_other_version_and_machine() -> None:
@@ -138,10 +129,6 @@ def test_random_numbers_are_those_of_every_other_version_and_machine() -> None:
     poses = wall_of(offset=0.001)
     drawn = [0.5 + 0.5 * (pose.x - 0.025 - i * 0.052) / 0.001 for i, pose in enumerate(poses[:3])]
     assert drawn == pytest.approx([0.63696169, 0.26978671, 0.04097352], abs=1e-8)
-
-
-def test_leaving_blocks_out_does_not_shift_the_others_differently() -> None:
-    assert set(wall_of(offset=0.001, missing=0.5)) < set(wall_of(offset=0.001))
 
 
 @given(seed=st.integers(0, 2**32 - 1), gap=st.floats(0.0, 0.01))
@@ -165,6 +152,7 @@ def test_blocks_lie_in_rows_and_columns() -> None:
     assert [pose.x - 0.025 for pose in poses] == pytest.approx([0.0, 0.06, 0.12, 0.18] * 3, abs=1e-15)
     assert [pose.y - 0.0125 for pose in poses] == pytest.approx([0.0] * 4 + [0.045] * 4 + [0.09] * 4, abs=1e-15)
     assert {pose.angle for pose in poses} == {0.0}
+    assert len(grid_of(rows=1, gap_y=0.0, offset=0.001)) == 4  # a single row needs no distance to the next
 
 
 def test_blocks_are_shifted_and_turned_as_far_as_asked() -> None:
@@ -201,10 +189,6 @@ def test_gaps_too_small_for_shift_and_turn_are_refused(turn: float, gap_x: float
             with pytest.raises(UnfitError, match="is too small for such random shifts and angles") as caught:
                 grid_of(turn=turn, offset=offset, **{**dict.fromkeys(least, 1.0), key: 0.999 * gap})
             assert caught.value.key == key
-
-
-def test_a_single_row_needs_no_distance_to_the_next() -> None:
-    assert len(grid_of(rows=1, gap_y=0.0, offset=0.001)) == 4
 
 
 @given(

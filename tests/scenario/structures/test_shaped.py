@@ -63,6 +63,9 @@ def test_an_arch_by_its_span_has_that_clear_width() -> None:
 def test_shear_velocity_grows_with_height_to_its_value_at_the_top() -> None:
     drums = built(kind="column", count=4, height=4, width=1.2, bottom=0.0, shear_velocity=2.0)
     assert [body.vx for body in drums] == pytest.approx([2.0 * body.y / 4.0 for body in drums])
+    *ring, left, right = built(kind="arch", radius=4, thickness=1, count=9, velocity=[1, 0], shear_velocity=2)
+    assert all(body.vx > 1.0 for body in ring)  # of free blocks only
+    assert (left.vx, right.vx) == (0.0, 0.0)
 
 
 def test_drums_taper_on_straight_sides() -> None:
@@ -104,9 +107,3 @@ def test_rubble_is_apart_and_of_the_sizes_asked_for() -> None:
     assert list(overlapping_pairs(blocks)) == []
     assert built(**keys) == blocks
     assert built(**{**keys, "seed": 9})[0].outline != blocks[0].outline
-
-
-def test_only_the_free_blocks_of_a_structure_get_its_velocity() -> None:
-    *ring, left, right = built(kind="arch", radius=4, thickness=1, count=9, velocity=[1, 0], shear_velocity=2)
-    assert all(body.vx > 1.0 for body in ring)
-    assert (left.vx, right.vx) == (0.0, 0.0)
