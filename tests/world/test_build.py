@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import (
     ARRIVED,
     BODY as BODY_RECORD,
@@ -22,12 +21,9 @@ from blocksim.kernels.common.arrays import (
     zeros,
 )
 from blocksim.kernels.common.supports import displacement, piece_at
-from blocksim.scenario import Scenario, place_bodies
-from blocksim.scenario.laws import LINEAR
 from blocksim.scenario.motion import displacement_and_velocity, motion_pieces
 from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world import memory
-from blocksim.world.bodies import layout_of
 from blocksim.world.build import (
     GROWTH,
     LARGE_RATIO,
@@ -38,12 +34,12 @@ from blocksim.world.build import (
     with_threads,
 )
 from blocksim.world.excitation import support_pieces
-from blocksim.world.interactions import contact_classes, damping_ratio, interactions_of
 from blocksim.world.memory import SceneTooLargeError
-from blocksim.world.step import ContactLoad, StepError, admissible_step, bounds_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from blocksim.scenario import Scenario
 
 W, H = WIDTH, HEIGHT
 BODY = {"x": 0.1, "y": 0.2}
@@ -61,44 +57,10 @@ def test_rest_is_looked_for_only_where_it_may_stop_the_run() -> None:
     assert build_world(scenario(time={"rest_hold": 0.0})).controls[0].rest_checks == 1
 
 
-def test_automatic_step_is_the_admissible_one_and_follows_safety_and_stiffness() -> None:
-    world = build_world(scenario())
-    step = float(world.controls[0].step)
-    (bounds,) = bounds_of([layout_of(scenario())], world.bodies[np.newaxis])
-    table = interactions_of(scenario(), contact_classes(scenario(), place_bodies(scenario())))
-    assert step == admissible_step(bounds, table, 0.05, LINEAR, ContactLoad(0.0, 0.0))
-    assert build_world(scenario(time={"safety": 0.025})).controls[0].step == pytest.approx(step / 2)
-    assert build_world(scenario(contact={"stiffness_scale": 0.01})).controls[0].step == pytest.approx(10 * step)
-    strong = damping_ratio(0.0)
-    assert build_world(scenario(contact={"restitution": 0.0})).controls[0].step == pytest.approx(step / (strong / 2))
-
-
 def test_automatic_step_resolves_the_oscillation_on_two_corners() -> None:
     world = build_world(scenario())
     frequency = sqrt(2.0 * world.interactions[1, 0].normal_stiffness / world.bodies[0].mass)
     assert 0.02 < frequency * world.controls[0].step < 0.1
-
-
-def test_step_above_the_admissible_one_is_refused_with_both_numbers() -> None:
-    limit = float(build_world(scenario()).controls[0].step)
-    with pytest.raises(StepError) as refusal:
-        build_world(scenario(time={"step": 1e-5}))
-    assert str(refusal.value) == (
-        f'1e-05 s is above the largest safe step {limit:.4g} s; use step = "auto", or force_step = true to override'
-    )
-    assert refusal.value.exit_code == ExitCode.INVALID_INPUT
-    assert refusal.value.limit == limit
-
-
-def test_step_by_hand_is_taken_when_it_is_safe_or_forced() -> None:
-    limit = float(build_world(scenario()).controls[0].step)
-    assert build_world(scenario(time={"step": limit})).controls[0].step == limit
-    assert build_world(scenario(time={"step": 1e-8})).controls[0].step == 1e-8
-    assert build_world(scenario(time={"step": 1e-5, "force_step": True})).controls[0].step == 1e-5
-
-
-def test_step_is_never_longer_than_the_run() -> None:
-    assert build_world(scenario(time={"end": 1e-9})).controls[0].step == 1e-9
 
 
 @pytest.mark.parametrize("model", ["surface", "kernel"])

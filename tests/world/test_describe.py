@@ -19,11 +19,6 @@ def test_the_step_that_is_reported_is_the_one_that_is_taken() -> None:
     assert told.steps * told.step == pytest.approx(scenario.time.end, abs=told.step)
 
 
-def test_frames_closer_than_any_step_are_as_many_as_steps() -> None:
-    told = describe(load_scenario(SCENARIOS / "slide.toml", {"output.every": 1e-17}))
-    assert told.frames == told.steps + 1
-
-
 def test_walls_of_their_own_material_are_pairs_too() -> None:
     walls = [{"from": [1, 0], "to": [1, 1], "material": "oak"}, {"from": [2, 0], "to": [2, 1]}]
     oak = {"density": 700, "young_modulus": 11e9, "poisson_ratio": 0.3}

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import solve_ivp
 
+from blocksim.kernels.common.arrays import INTERACTION
 from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.world.interactions import (
     SMALLEST_RESTITUTION,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from blocksim.kernels.common.arrays import Records
+    from tests.golden import Golden
 
 ALUMINIUM = {"unit_weight": 26.7e3, "young_modulus": 69e9, "poisson_ratio": 0.3}
 OAK = {"density": 700.0, "young_modulus": 11e9, "poisson_ratio": 0.4}
@@ -54,6 +56,52 @@ def scenario(ground: Mapping[str, object] | None = None, **tables: Any) -> Scena
     )
 
 
+KINETIC = {"static": 0.31, "kinetic": 0.19, "transition_speed": 0.004}
+SPECIAL = {"restitution": 0.7, "normal_stiffness": 5e6, "shear_stiffness_ratio": 0.4, "shear_damping_ratio": 0.01}
+PLAIN, OAKEN = ({"from": [x, 0.5], "to": [x, 0.0]} for x in (1.0, 2.0))
+SCENES: dict[str, dict[str, Any]] = {
+    "as materials and defaults say": {},
+    "ground of oak": {"ground": {"material": "oak"}},
+    "stiffness given, and scaled": {
+        "contact": {"normal_stiffness": 1e6, "shear_stiffness_ratio": 0.5, "stiffness_scale": 3.0}
+    },
+    "friction and restitution of blocks and ground": {
+        "friction": {"block_block": KINETIC, "block_ground": 0.38},
+        "contact": {"restitution": {"block_block": 0.3, "block_ground": 0.6}},
+    },
+    "damping of shear given": {"contact": {"shear_damping_ratio": 0.05, "restitution": 0.2}},
+    "a pair of its own": {"pairs": {"aluminium": {"oak": {"friction": 0.9, **SPECIAL}}}},
+    "a pair with ground of oak": {
+        "ground": {"material": "oak"},
+        "pairs": {"aluminium": {"oak": {"friction": 0.9}, "ground": {"restitution": 0.5}}},
+    },
+    "a plain wall is ground": {"walls": [PLAIN]},
+    "a wall of oak": {
+        "walls": [PLAIN, {**OAKEN, "material": "oak"}],
+        "friction": {"block_block": 0.2, "block_ground": 0.5},
+    },
+    "the law of Hertz": {"contact": {"law": "hertz-mindlin"}},
+    "the law of Hertz, edges four times as round": {"contact": {"law": "hertz-mindlin", "contact_radius": 0.004}},
+}
+
+
+def test_parameters_of_all_pairs_are_those_that_were_read(golden: Golden) -> None:
+    """Of every pair of contact classes, by name and depth: the ground first, then blocks, then walls."""
+    texts = []
+    for name, tables in SCENES.items():
+        of = scenario(**tables)
+        found, table = classes(of), table_of(of)
+        assert (table == table.T).all()
+        names = [f"{one.material or 'ground'}{' wall' if one.is_wall else ''} {one.depth:g} m" for one in found]
+        rows = [
+            f"{names[i]} - {names[j]}: " + ", ".join(f"{value:.9g}" for value in table[i, j].tolist())
+            for i in range(len(found))
+            for j in range(i, len(found))
+        ]
+        texts.append("\n".join([name, *rows]))
+    golden("\n\n".join([", ".join(INTERACTION.names or ()), *texts]))
+
+
 def classes(of: Scenario) -> tuple[ContactClass, ...]:
     return contact_classes(of, place_bodies(of))
 
@@ -67,12 +115,6 @@ def modulus(one: Mapping[str, float], two: Mapping[str, float]) -> float:
     return 1.0 / sum((1.0 - m["poisson_ratio"] ** 2) / m["young_modulus"] for m in (one, two))
 
 
-def test_bodies_of_one_material_and_depth_share_a_class_after_the_ground() -> None:
-    ground, *others = classes(scenario())
-    assert ground == ContactClass(None, float("inf"))
-    assert others == [ContactClass("aluminium", 0.025), ContactClass("aluminium", 0.05), ContactClass("oak", 0.05)]
-
-
 def test_different_materials_add_their_compliances_and_the_shorter_depth_counts() -> None:
     of = scenario()
     _, paper, flat, wooden = classes(of)
@@ -82,96 +124,6 @@ def test_different_materials_add_their_compliances_and_the_shorter_depth_counts(
         2.0 * (2.0 - m["poisson_ratio"]) * (1.0 + m["poisson_ratio"]) / m["young_modulus"] for m in (ALUMINIUM, OAK)
     )
     assert interaction(of, flat, wooden).shear_ratio == pytest.approx(4.0 / shear / modulus(ALUMINIUM, OAK), rel=1e-12)
-
-
-def test_given_stiffness_replaces_that_of_the_materials_and_is_scaled() -> None:
-    of = scenario(contact={"normal_stiffness": 1e6, "shear_stiffness_ratio": 0.5, "stiffness_scale": 3.0})
-    table = table_of(of)
-    assert set(table.normal_stiffness[1:].ravel().tolist()) == {3e6}
-    assert set(table.shear_ratio[1:].ravel().tolist()) == {0.5}
-
-
-def test_table_is_symmetric_and_empty_for_the_ground_alone() -> None:
-    of = scenario()
-    table = table_of(of)
-    assert (table == table.T).all()
-    assert not table[0, 0].normal_stiffness
-
-
-def test_ground_and_blocks_have_their_own_friction_and_restitution() -> None:
-    of = scenario(
-        friction={
-            "block_block": {"static": 0.31, "kinetic": 0.19, "transition_speed": 0.004},
-            "block_ground": 0.38,
-        },
-        contact={"restitution": {"block_block": 0.3, "block_ground": 0.6}},
-    )
-    table = table_of(of)
-    blocks, ground = table[1, 2], table[1, 0]
-    assert (blocks.static_friction, blocks.kinetic_friction, blocks.transition_speed) == (0.31, 0.19, 0.004)
-    assert (ground.static_friction, ground.kinetic_friction) == (0.38, 0.38)
-    assert blocks.normal_damping == blocks.shear_damping == damping_ratio(0.3)
-    assert ground.normal_damping == ground.shear_damping == damping_ratio(0.6)
-
-
-def test_given_shear_damping_replaces_the_normal_one_in_shear_only() -> None:
-    of = scenario(contact={"shear_damping_ratio": 0.05, "restitution": 0.2})
-    ground, paper, *_ = classes(of)
-    found = interaction(of, paper, ground)
-    assert (found.normal_damping, found.shear_damping) == (damping_ratio(0.2), 0.05)
-
-
-def row(of: Scenario, one: str, two: str | None) -> Any:
-    """Return the parameters between a block type and another one, or the ground."""
-    order = ["ground", "paper", "flat", "wooden"]
-    return table_of(of)[order.index(one), order.index(two or "ground")]
-
-
-def test_pair_of_its_own_counts_for_its_two_materials_only() -> None:
-    special = {"restitution": 0.7, "normal_stiffness": 5e6, "shear_stiffness_ratio": 0.4, "shear_damping_ratio": 0.01}
-    usual, of = scenario(), scenario(pairs={"aluminium": {"oak": {"friction": 0.9, **special}}})
-    for block in ("paper", "flat"):
-        mixed = row(of, block, "wooden")
-        assert (mixed.static_friction, mixed.kinetic_friction) == (0.9, 0.9)
-        assert (mixed.normal_stiffness, mixed.shear_ratio) == (5e6, 0.4)
-        assert (mixed.normal_damping, mixed.shear_damping) == (damping_ratio(0.7), 0.01)
-        assert row(of, block, "flat") == row(usual, block, "flat")
-    assert row(of, "wooden", None) == row(usual, "wooden", None)
-
-
-def test_ground_of_a_named_material_rubs_as_the_pair_of_the_materials_says() -> None:
-    pairs = {"aluminium": {"oak": {"friction": 0.9}, "ground": {"restitution": 0.5}}}
-    of = scenario(ground={"material": "oak"}, pairs=pairs)
-    assert row(of, "paper", None).static_friction == 0.9
-    assert row(of, "paper", None).normal_damping == damping_ratio(0.5)
-    assert row(of, "wooden", None).normal_damping == damping_ratio(0.2)
-
-
-def test_walls_are_ground_unless_they_have_a_material_of_their_own() -> None:
-    plain, oaken = {"from": [1.0, 0.5], "to": [1.0, 0.0]}, {"from": [2.0, 0.5], "to": [2.0, 0.0], "material": "oak"}
-    assert classes(scenario(walls=[plain])) == classes(scenario())
-    of = scenario(walls=[plain, oaken], friction={"block_block": 0.2, "block_ground": 0.5})
-    *usual, wall = classes(of)
-    assert tuple(usual) == classes(scenario())
-    assert wall == ContactClass("oak", float("inf"), is_wall=True)
-    table = table_of(of)
-    assert table[1, -1].normal_stiffness == pytest.approx(modulus(ALUMINIUM, OAK) * 0.025, rel=1e-12)
-    assert table[1, -1].static_friction == 0.5
-    assert not table[0, -1].normal_stiffness
-
-
-def test_hertzian_stiffness_goes_with_the_modulus_and_the_root_of_the_radius() -> None:
-    law = {"law": "hertz-mindlin"}
-    usual, round_ = (
-        row(scenario(contact=law), "flat", "wooden"),
-        row(scenario(contact={**law, "contact_radius": 0.004}), "flat", "wooden"),
-    )
-    assert usual.normal_stiffness == pytest.approx(4.0 / 3.0 * modulus(ALUMINIUM, OAK) * 0.001**0.5, rel=1e-12)
-    assert round_.normal_stiffness == pytest.approx(2.0 * usual.normal_stiffness, rel=1e-12)
-    assert usual.shear_ratio == row(scenario(), "flat", "wooden").shear_ratio
-    assert row(scenario(contact=law), "paper", None).normal_stiffness == pytest.approx(
-        row(scenario(contact=law), "flat", None).normal_stiffness, rel=1e-12
-    )  # the depth of a block has no part in it
 
 
 def rebound(ratio: float, exponent: float = 1.0) -> float:

@@ -9,21 +9,17 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.errors import ExitCode
 from blocksim.kernels.common.arrays import AT_REST, REACHED, World
 from blocksim.kernels.explicit.laws import HERTZ_MINDLIN, tangent_stiffness
 from blocksim.scenario.laws import LAWS, LINEAR
 from blocksim.verification.scene import HEIGHT, WIDTH, Simulation, scenario_of
 from blocksim.world.bodies import layout_of
 from blocksim.world.build import build_world
-from blocksim.world.nonsmooth import build_nonsmooth
 from blocksim.world.step import (
-    MOST_STEPS,
     BlockKind,
     ContactLoad,
     ContactStiffness,
     SkinTooSmallError,
-    StepError,
     bounds_of,
     expected_load,
     frequency_squared,
@@ -34,7 +30,6 @@ from blocksim.world.step import (
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from blocksim.scenario import Scenario
 
 G, HERTZ = 9.81, LAWS["hertz-mindlin"]
 RADIUS = hypot(WIDTH, HEIGHT) / 2
@@ -118,97 +113,18 @@ def test_linear_contacts_and_fixed_pairs_do_not_stiffen() -> None:
     assert HERTZ.greatest_slope(7.0, 0.0, *load) == 7.0
 
 
-@pytest.mark.parametrize("change", [{"velocity": [0.0, -20.0]}, {"y": 5.0}, {"spin": 500.0}])
-def test_harder_impacts_get_a_shorter_step_with_hertz_only(change: Mapping[str, object]) -> None:
-    for law, is_shorter in (("linear", False), ("hertz-mindlin", True)):
-        usual, hard = (
-            float(world_of(body, contact={"law": law}).controls[0].step) for body in (FALLING, {**FALLING, **change})
-        )
-        assert (hard < 0.95 * usual) is is_shorter
-        assert hard <= usual
-
-
-@pytest.mark.parametrize("model", ["surface", "kernel", "particles"])
-def test_step_does_not_depend_on_the_contact_model(model: str) -> None:
-    contact = {"model": model, "particle_spacing": 5e-4}
-    assert world_of(FALLING, contact=contact).controls[0].step == world_of(FALLING).controls[0].step
-
-
-def test_step_that_time_cannot_be_divided_by_is_refused() -> None:
-    with pytest.raises(StepError, match="cannot be divided"):
-        world_of(FALLING, time={"step": 0.5 / MOST_STEPS, "end": 1.0})
-
-
-@pytest.mark.parametrize("model", ["surface", "kernel", "particles"])
-def test_block_moves_by_a_small_share_of_the_smallest_side_in_a_step(model: str) -> None:
-    """Otherwise it could pass through a thin one between two examines what touches what."""
-    plate = {"y": 1.0, "x": 1.0, "height": 2e-3, "fixed": True}
-    soft = {"stiffness_scale": 1e-6, "model": model, "particle_spacing": 5e-4}
-    motion = {"kind": "harmonic", "amplitude": 0.1, "frequency": 50.0}
-    tables: dict[str, Any] = {"gravity": 0.0, "contact": soft}
-    share = 0.05 if model == "surface" else 0.01
-    for extra, speed in (({}, 100.0), ({"motion": motion}, 100.0 + 2.0 * np.pi * 50.0 * 0.1)):
-        step = float(world_of({**FALLING, "velocity": [100.0, 0.0]}, plate, **tables, **extra).controls[0].step)
-        assert step * speed == pytest.approx(share * 2e-3, rel=1e-3)
-
-
 H = HEIGHT
 FALL = 0.2  # m, from the highest point of a block to the ground
 BODY = {"y": FALL - hypot(WIDTH, HEIGHT) / 2}
-SOFT = 1e-4  # of the stiffness
-
-
-def scenario(*more: dict[str, Any], contact: dict[str, Any] | None = None, **tables: Any) -> Scenario:
-    return scenario_of([BODY, *more], contact={"stiffness_scale": SOFT, **(contact or {})}, **tables)
-
-
-def test_by_default_the_skin_is_a_quarter_of_the_smallest_side_of_all_blocks() -> None:
-    plate = {"width": 0.3, "height": 0.01, "x": 1.0, "y": 0.1, "fixed": True}
-    assert build_world(scenario()).controls[0].skin == 0.25 * H
-    assert build_world(scenario(plate)).controls[0].skin == 0.25 * 0.01
-    walls = [{"from": [2, 0], "to": [2, 0.001]}]
-    assert build_world(scenario(walls=walls)).controls[0].skin == 0.25 * H  # boundaries are no blocks
-
-
-@pytest.mark.parametrize("model", ["particles", "kernel"])
-def test_with_particles_the_default_skin_is_a_twentieth_as_each_particle_within_it_costs(model: str) -> None:
-    contact = {"model": model, "particle_spacing": 4e-3}
-    assert build_world(scenario(contact=contact)).controls[0].skin == 0.05 * H
-
-
-def test_a_skin_that_blocks_can_outrun_is_refused_with_the_least_one() -> None:
-    step = float(build_world(scenario()).controls[0].step)
-    speed = sqrt(2 * 9.81 * FALL)
-    least = 5.0 * speed * step  # as the automatic step leaves it: a block moves by a fifth of the skin
-    assert build_world(scenario(contact={"skin": 1.001 * least})).controls[0].skin == 1.001 * least
-    with pytest.raises(SkinTooSmallError) as refusal:
-        build_world(scenario(contact={"skin": 0.999 * least}))
-    assert refusal.value.exit_code == ExitCode.INVALID_INPUT
-    assert refusal.value.least == pytest.approx(least, rel=1e-12)
-    assert f"{speed:.4g} m/s each come {400 * least:.4g} mm closer in {step:.4g} s" in str(refusal.value)
-    cure = float(str(refusal.value).split("at least ")[1].split()[0])
-    assert build_world(scenario(contact={"skin": 1e-3 * cure})).controls[0].skin == 1e-3 * cure
 
 
 def test_a_skin_that_a_shaken_support_outruns_is_refused_and_the_least_one_runs_to_the_end() -> None:
     motion = {"kind": "harmonic", "amplitude": "0.2 m", "frequency": "10 Hz", "duration": "0.5 s"}
+    high, soft = {"y": 0.2 - hypot(WIDTH, HEIGHT) / 2}, {"stiffness_scale": 1e-4}
     with pytest.raises(SkinTooSmallError) as refusal:
-        build_world(scenario(contact={"skin": 1e-3 * H}, motion=motion))
-    run = Simulation(build_world(scenario(contact={"skin": refusal.value.least}, motion=motion)))
+        world_of(high, contact={**soft, "skin": 1e-3 * HEIGHT}, motion=motion)
+    run = Simulation(world_of(high, contact={**soft, "skin": refusal.value.least}, motion=motion))
     assert run.to_time(0.1).status == REACHED
-
-
-@pytest.mark.parametrize("share", [0.999, 1.001])
-def test_rigid_contacts_refuse_a_skin_with_which_impacts_are_found_late(share: float) -> None:
-    time = {"scheme": "nonsmooth"}
-    step = build_nonsmooth(scenario(time=time)).world.controls[0].step
-    least = 2.0 * sqrt(2 * 9.81 * FALL) * step
-    thin = scenario(contact={"skin": share * least}, time=time)
-    if share < 1.0:
-        with pytest.raises(SkinTooSmallError):
-            build_nonsmooth(thin)
-    else:
-        assert build_nonsmooth(thin).contacts.stepping[0].least_reach == 0.5 * share * least
 
 
 sizes = st.floats(1e-3, 1.0)
