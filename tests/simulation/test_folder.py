@@ -18,14 +18,12 @@ import numpy as np
 import pytest
 
 from blocksim.errors import OutputError, OutputExistsError
-from blocksim.simulation import files, renew_copies, simulate_into
+from blocksim.simulation import files, renew_copies
 from blocksim.simulation.files import (
     clear_remains,
     default_folder,
-    folder_lock,
     holds_run,
     make_folder,
-    newest_run,
     prepare_folder,
     refuse_foreign,
     write_text,
@@ -35,7 +33,6 @@ from blocksim.study.manifest import Manifest
 from blocksim.view.animation import write_gif, write_mp4
 from blocksim.view.style import open_figure, save_figure
 from tests.simulation.conftest import SCENARIOS, Shipped
-from tests.simulation.sliding import MODELS, interrupted_at, sliding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -142,15 +139,6 @@ def test_folder_holds_only_its_own_scenario_and_rubbish_in_done_is_no_finished_r
     assert not holds_run(copy, soft())
 
 
-def test_newest_finished_run_is_found(folder: Path, tmp_path: Path) -> None:
-    assert newest_run(tmp_path) is None
-    for number, name in enumerate(("b", "c", "a")):
-        done = Path(shutil.copytree(folder, tmp_path / name)) / "done.json"
-        os.utime(done, (1e9 + number, 1e9 + number))
-    (tmp_path / "a" / "done.json").unlink()
-    assert newest_run(tmp_path) == tmp_path / "c"
-
-
 def test_what_changes_the_result_changes_the_default_folder(soft: Shipped) -> None:
     assert default_folder(soft()) == default_folder(soft(description="other words"))
     assert default_folder(soft()) != default_folder(soft(contact__restitution=0.21))
@@ -173,61 +161,6 @@ def test_files_and_links_that_lead_to_no_folder_are_in_the_way(tmp_path: Path) -
     (tmp_path / "good").symlink_to("elsewhere")
     make_folder(tmp_path / "good" / "run")
     assert (tmp_path / "elsewhere" / "run").is_dir()
-
-
-@pytest.fixture
-def read_only(tmp_path: Path) -> Iterator[Path]:
-    """Mount a read-only file system; a superuser, who may mount, is not kept out by permissions."""
-    place = tmp_path / "read_only"
-    place.mkdir()
-    try:
-        subprocess.run(["mount", "-t", "tmpfs", "-o", "ro", "tmpfs", place], check=True, capture_output=True)  # noqa: S607
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("nothing can be mounted here")
-    yield place
-    subprocess.run(["umount", place], check=True)  # noqa: S607
-
-
-def test_a_read_only_file_system_is_reported(read_only: Path) -> None:
-    with pytest.raises(OutputExistsError, match="run: cannot be created: Read-only file system"):
-        make_folder(read_only / "run")
-    make_folder(read_only)
-    with pytest.raises(OutputError, match="x: cannot be written: Read-only file system"):
-        write_text(read_only / "x", "text")
-
-
-@pytest.mark.parametrize(("resume", "overwrite"), [(False, False), (True, False), (False, True)])
-def test_no_run_writes_where_another_one_does(tmp_path: Path, resume: bool, overwrite: bool) -> None:
-    scenario = sliding(MODELS["surface-linear"], end=0.002)
-    interrupted_at(scenario, tmp_path, [50])
-    before = content_of(tmp_path)
-    with folder_lock(tmp_path), pytest.raises(OutputExistsError, match="a run is in progress here"):
-        simulate_into(scenario, tmp_path, resume=resume, overwrite=overwrite)
-    assert content_of(tmp_path) == before
-    assert simulate_into(scenario, tmp_path, resume=True).summary.resumed_from == (50,)
-
-
-HOLD = """
-import sys
-from pathlib import Path
-from blocksim.simulation.files import folder_lock
-with folder_lock(Path(sys.argv[1])):
-    print("folder_lock", flush=True)
-    sys.stdin.read()
-"""
-
-
-def test_folder_is_free_again_when_whoever_had_it_was_killed(tmp_path: Path) -> None:
-    pipe = subprocess.PIPE
-    with subprocess.Popen([sys.executable, "-c", HOLD, str(tmp_path)], stdin=pipe, stdout=pipe) as other:
-        assert other.stdout is not None
-        assert other.stdout.readline() == b"folder_lock\n"
-        with pytest.raises(OutputExistsError), folder_lock(tmp_path):
-            pass
-        other.kill()
-        other.wait()
-        with folder_lock(tmp_path):
-            pass
 
 
 def texts_in(folder: Path) -> dict[str, str]:

@@ -18,7 +18,7 @@ from blocksim.simulation import loop, run_ensemble, schemes, simulate, simulate_
 from blocksim.simulation.balance import BODY_STEPS, FIRST_CHECK, EnergyLedger, next_energy_check
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
 from blocksim.simulation.instruments import Recorder
-from blocksim.simulation.interruption import WallTime, interruptible, stop_requests
+from blocksim.simulation.interruption import interruptible, stop_requests
 from blocksim.simulation.loop import BY_CODE, CALL_SECONDS, MOST_GROWTH, RESIDUAL, Outcome, diagnose, steps_of_call
 from blocksim.simulation.schemes import build, build_scene
 from blocksim.world.build import build_world
@@ -198,12 +198,6 @@ def test_second_signal_stops_at_once_but_only_when_the_first_was_heard() -> None
         assert requests.reason() == "stopped by SIGTERM"
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
-
-
-def test_limit_of_wall_time_is_a_reason_to_stop_once_it_is_over() -> None:
-    assert WallTime(None).reason() == WallTime(60.0).reason() == ""
-    assert WallTime(1e-9).reason() == "wall-time limit of 1e-09 s reached"
-    assert WallTime(60.0, 61.0).reason() == "wall-time limit of 60 s reached"
 
 
 @pytest.mark.parametrize(("number", "own"), [(signal.SIGINT, lambda *_: None), (signal.SIGHUP, signal.SIG_IGN)])

@@ -218,16 +218,6 @@ def test_changed_frame_after_the_checkpoint_is_reported_when_it_is_repeated(begu
     assert told.startswith(f"{begun}/run.h5: the frame of step {steps[place]} differs from the recomputed one")
 
 
-def test_run_without_a_checkpoint_starts_anew_and_says_so(begun: Path, whole: Result) -> None:
-    for path in begun.glob("checkpoint.*"):
-        path.unlink()
-    again = simulate_into(sliding({}), begun, resume=True)
-    assert again.status == "finished"
-    assert again.summary.resumed_from == ()
-    assert again.summary.warnings == (f"{begun}: no checkpoint saved; the run starts again",)
-    assert_same(again, whole)
-
-
 def test_times_of_all_parts_are_summed_and_told(begun: Path) -> None:
     before = json.loads((begun / "run.json").read_text())
     scenario = load_scenario(begun / "scenario.toml")

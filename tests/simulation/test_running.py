@@ -7,10 +7,8 @@ import json
 import math
 import os
 import platform
-import signal
 from dataclasses import replace
 from datetime import datetime
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import llvmlite.binding
@@ -19,10 +17,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from blocksim.errors import InputMissingError, InvalidInputError, OutputError, OutputExistsError
+from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.kernels.common.jit import source_hash
 from blocksim.scenario import Scenario, load_scenario, placement
-from blocksim.simulation import Progress, Result, provenance, read_result, simulate_into
+from blocksim.simulation import Result, provenance, read_result, simulate_into
 from blocksim.simulation.results import read_summary
 from blocksim.simulation.run import RunCallbacks, bytes_needed
 from blocksim.simulation.schemes import build_scene, compile_kernels
@@ -95,35 +93,13 @@ def test_result_comes_back_from_its_folder_with_frames_from_start_to_end(kept: R
     np.testing.assert_allclose(np.diff(frames.time[:-1]), 1e-3, atol=kept.summary.time_step_s)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"contact__max_overlap": 1e-9},
-        {"time__force_step": True, "time__step": 1e-3, "contact__max_overlap": 1.0},  # numbers that JSON does not know
-    ],
-    ids=["overlap", "explosion"],
-)
-def test_failed_run_is_kept_in_valid_json_without_the_mark_of_a_finished_one(
-    soft: Shipped, tmp_path: Path, values: dict[str, Any]
-) -> None:
-    result = simulate_into(soft(**values), tmp_path / "run")
+def test_failed_run_is_kept_in_valid_json_without_the_mark_of_a_finished_one(soft: Shipped, tmp_path: Path) -> None:
+    """Also with numbers that JSON does not know."""
+    result = simulate_into(soft(time__force_step=True, time__step=1e-3, contact__max_overlap=1.0), tmp_path / "run")
     assert (result.status, result.summary.exit_code) == ("failed", 76)
-    assert "max_overlap" in result.reason or len(values) > 1
     assert {path.name for path in (tmp_path / "run").iterdir()} == FILES - {"done.json"}
     json.loads((tmp_path / "run" / "run.json").read_text(), parse_constant=pytest.fail)
     assert read_result(tmp_path / "run").status == "failed"
-
-
-def test_ctrl_c_keeps_what_there_is(soft: Shipped, tmp_path: Path) -> None:
-    def press_ctrl_c(where: Progress) -> None:
-        if where.time > 0.05:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    result = simulate_into(soft(), tmp_path / "run", on_progress=press_ctrl_c)
-    assert (result.status, result.summary.exit_code) == ("interrupted", 75)
-    assert 0.05 < result.summary.simulated_time_s < 0.06
-    assert read_result(tmp_path / "run").frames.time[-1] == result.summary.simulated_time_s
-    assert not (tmp_path / "run" / "done.json").exists()
 
 
 def test_vanished_experiment_leaves_no_folder(soft: Shipped, tmp_path: Path) -> None:
@@ -140,24 +116,11 @@ def test_run_is_not_overwritten_unasked(folder: Path, soft: Shipped) -> None:
         simulate_into(soft(time__end=0.01), folder)
 
 
-def test_estimate_is_no_less_than_what_a_run_leaves_and_the_disk_has_to_have_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_estimate_is_no_less_than_what_a_run_leaves(tmp_path: Path) -> None:
     scenario = sliding({}, end=0.05, every=5e-5)
     simulate_into(scenario, tmp_path / "run")
     needed = bytes_needed(scenario, build_scene(scenario))
     assert 0.5 * needed < (tmp_path / "run" / "run.h5").stat().st_size < 1.3 * needed
-    asked: list[Path] = []
-
-    def usage(place: Path) -> SimpleNamespace:
-        asked.append(place)
-        return SimpleNamespace(free=1_000_000)
-
-    monkeypatch.setattr("blocksim.simulation.run.shutil.disk_usage", usage)
-    with pytest.raises(OutputError, match=r"the results may take 2 MB, but only 1 MB are free there"):
-        simulate_into(sliding({}, end=0.05, every=1e-7), tmp_path / "not" / "yet")
-    assert asked == [tmp_path]
-    assert not (tmp_path / "not").exists()
 
 
 def test_blocks_are_placed_once_from_loading_to_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -235,6 +235,10 @@ def recount(count: int) -> Change:
     return lambda file: file["n_committed"].write_direct(np.array(count))
 
 
+def without(name: str) -> Change:
+    return lambda file: file.pop(name)
+
+
 def paced(step: object) -> Change:
     return lambda file: file[STEPS].attrs.create("time_step", step)
 
@@ -259,7 +263,7 @@ UNSAFE: dict[str, Change] = {
     "many frames announced": announce,
     **{f"{count} frames counted": recount(count) for count in (-1, 0, FRAMES + 1, 2**62)},
     **{f"a time step of {step}": paced(step) for step in (np.nan, np.inf, -1.0, 0.0, 1e308, "x", np.ones(3))},
-    **{f"without {name}": lambda file, name=name: file.pop(name) for name in ("n_committed", X, "observables", STEPS)},
+    **{f"without {name}": without(name) for name in ("n_committed", X, "observables", STEPS)},
 }
 
 
