@@ -87,7 +87,7 @@ def test_a_batch_of_everything_has_the_bits_of_runs_of_their_own() -> None:
     settling = ({**settled, **release}, {**rigid, **settled}, {**rigid, **settled, **jerk})
     scenarios = [
         one
-        for friction, some in ((0.25, (*kinds, *settling)), (0.35, kinds))
+        for friction, some in ((0.25, (*kinds, *settling)), (0.35, kinds[:7]))
         for kind in some
         for one in collapses({"time.end": 0.03, "friction.block_block": friction, **kind})
     ]
