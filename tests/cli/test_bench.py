@@ -28,7 +28,7 @@ def table_of_two(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "MEASUREMENTS", table)
 
 
-def test_table_fits_80_columns_and_names_the_machine(blocksim: Command) -> None:
+def test_table_fits_80_columns_and_names_the_machine_and_json_and_file_hold_the_same(blocksim: Command) -> None:
     answer = blocksim("bench", "first", "--repeats", 3, "--quick")
     assert answer.code == 0
     lines = answer.out.splitlines()
@@ -39,16 +39,12 @@ def test_table_fits_80_columns_and_names_the_machine(blocksim: Command) -> None:
     assert max(map(len, lines)) <= 80
     for told in ("first: soft", "first shortened: half of it", "cores, load", "numba", "blocksim 0"):
         assert told in answer.err
-
-
-def test_json_and_file_hold_the_same(blocksim: Command) -> None:
     answer = blocksim("bench", "first", "--json", "--out", "bench.json")
     assert answer.err == ""
     data = json.loads(answer.out)
     assert json.loads(Path("bench.json").read_text(encoding="utf-8")) == data
-    assert {"processor", "cores", "platform", "python", "numba", "numpy", "blocksim", "load", "busy"} <= set(
-        data["machine"]
-    )
+    machine = {"processor", "cores", "platform", "python", "numba", "numpy", "blocksim", "load", "busy"}
+    assert machine <= set(data["machine"])
     assert data["measurements"][0]["numbers"][0]["samples"] == [3.0, 1.0, 2.0]
     assert data["measurements"][0]["details"] == [{"quick": False}]
 

@@ -22,15 +22,6 @@ def test_calibrated_scenario_is_inside(blocksim: Command) -> None:
     assert answer.err == ""
 
 
-def test_literal_reading_is_outside_and_says_what_is_off(blocksim: Command) -> None:
-    assert blocksim("run", "scenarios/three_blocks_literal.toml", "--quiet").code == 0
-    answer = blocksim("compare", "results/three_blocks_literal")
-    assert answer.code == 1
-    assert "outside: x of block 2 by " in answer.out
-    assert "outside: x of block 3 by " in answer.out
-    assert "block 1 by" not in answer.out
-
-
 FAR = "3,x,mm,1,3500\n3,x,mm,2,3900\n2,rotation,deg,1,180\n2,rotation,deg,2,180\n"
 WIDE = "2,x,mm,1,0\n2,x,mm,2,1000\n"
 

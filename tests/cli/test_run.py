@@ -21,15 +21,12 @@ def test_more_threads_than_cores_are_a_warning(blocksim: Command, monkeypatch: p
     assert answer.err.startswith("warning: 3 threads on 2 cores: oversubscribed, use 2\n")
 
 
-@pytest.mark.parametrize("how", [(), ("--resume",), ("--overwrite",)])
-def test_folder_of_a_run_that_is_going_on_is_left_alone(
-    blocksim: Command, tmp_path: Path, how: tuple[str, ...]
-) -> None:
+def test_folder_of_a_run_that_is_going_on_is_left_alone(blocksim: Command, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     with folder_lock(tmp_path / "out"):
-        answer = blocksim("run", "scenarios/three_blocks_nominal.toml", *SOFT, "--out", "out", *how)
-    assert answer.code == 73
-    assert answer.err == "out: a run is in progress here; wait for it, or write elsewhere with --out DIR\n"
+        answers = [blocksim(*RUN, "--out", "out", *how) for how in ((), ("--resume",), ("--overwrite",))]
+    told = "out: a run is in progress here; wait for it, or write elsewhere with --out DIR\n"
+    assert [(answer.code, answer.err) for answer in answers] == [(73, told)] * 3
     assert not any((tmp_path / "out").iterdir())
 
 
@@ -55,18 +52,15 @@ def test_the_end_of_a_run_reads_none_of_its_frames(blocksim: Command, monkeypatc
 PLAN = ("sweep", "scenarios/three_blocks_nominal.toml", *SOFT, "--jobs", 2, "--dry-run")
 
 
-def test_twice_the_cores_take_half_the_time(blocksim: Command) -> None:
+def test_cost_grows_with_cases_and_steps_and_is_shared_by_cores(blocksim: Command) -> None:
     def solving(jobs: int) -> str:
         return blocksim(*PLAN, "--jobs", jobs, "--vary", "time.end=2,4").out.splitlines()[1]
 
-    assert solving(1).endswith(" on 1 core")
-    assert solving(1).removesuffix(" on 1 core") != solving(8).removesuffix(" on 8 cores")
-
-
-def test_cost_grows_with_cases_and_steps(blocksim: Command) -> None:
     def seconds(*vary: str) -> float:
         return float(json.loads(blocksim(*PLAN, "--json", *vary).out)["seconds"])
 
+    assert solving(1).endswith(" on 1 core")
+    assert solving(1).removesuffix(" on 1 core") != solving(8).removesuffix(" on 8 cores")
     one = seconds("--vary", "friction.block_block.kinetic=0.2")
     assert seconds("--vary", "friction.block_block.kinetic=0.2,0.21,0.22") / one == 3.0
     assert 1.9 < seconds("--vary", "time.end=4") / one < 2.1

@@ -31,7 +31,7 @@ def block_on_a_slope(size: tuple[float, float], **time: object) -> dict[str, Any
         "bodies": [{"block": "b", "x": 0, "y": 0.5 * height}],
         "friction": {"block_ground": FRICTION},
         "contact": {"restitution": 0},
-        "time": {"scheme": "nonsmooth", "end": 1.0, **time},
+        "time": {"scheme": "nonsmooth", "end": 1.0, "step": 1e-3, **time},
     }
 
 

@@ -33,7 +33,7 @@ from tests.study.plans import KINETIC, MU, SCATTER, SLIDES, SLOPE, TILT, TILTS, 
 END = "time.end"
 OVERLAP = "contact.max_overlap"
 TWO: dict[str, Values] = {KINETIC: [0.2, 0.25]}
-ROCKING = block_on_a_slope((0.02, 0.06), scheme="explicit", end=0.4) | {
+ROCKING = block_on_a_slope((0.02, 0.06), scheme="explicit", end=0.4, step="auto") | {
     "bodies": [{"block": "b", "x": 0.0, "y": 0.03, "spin": 0.0}],
     "contact": {"stiffness_scale": 0.001, "restitution": 0.0},
     "friction": {"block_ground": 0.6},
