@@ -9,6 +9,7 @@ import os
 import platform
 from dataclasses import replace
 from datetime import datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import llvmlite.binding
@@ -20,20 +21,19 @@ import pytest
 from blocksim.errors import InputMissingError, InvalidInputError, OutputExistsError
 from blocksim.kernels.common.jit import source_hash
 from blocksim.scenario import Scenario, load_scenario, placement
-from blocksim.simulation import Result, provenance, read_result, simulate_into
+from blocksim.simulation import Progress, Result, provenance, read_result, simulate_into
+from blocksim.simulation.balance import RESIDUAL_PROMISE
 from blocksim.simulation.results import read_summary
 from blocksim.simulation.run import RunCallbacks, bytes_needed
 from blocksim.simulation.schemes import build_scene, compile_kernels
 from blocksim.simulation.trajectory import COLUMNS, Frames, as_frame, csv_text, final_columns, read_table
 from blocksim.world.step import StepError
+from tests.simulation.conftest import SCENARIOS, Shipped
 from tests.simulation.sliding import sliding
 from tests.view.made_up import blocks_at, polygons
 
 if TYPE_CHECKING:
     import weakref
-    from pathlib import Path
-
-    from tests.simulation.conftest import Shipped
 
 FILES = {"scenario.toml", "experiment.csv", "final.csv", "run.h5", "run.json", "done.json"}
 
@@ -283,3 +283,36 @@ def test_edited_code_gives_runs_another_name(soft: Shipped, monkeypatch: pytest.
     before = provenance.run_hash(soft())
     monkeypatch.setattr(provenance, "code_hash", lambda: "of other code")
     assert provenance.run_hash(soft()) != before
+
+
+SIZE = {} if os.environ.get("BLOCKSIM_SOAK") == "full" else {"structures.0.rows": 10, "structures.0.columns": 25}
+WARM, SETTLED, END = 1.0, 3.0, 10.0  # s: by which all lists have found their size, and most blocks their place
+MEMORY = Path("/proc/self/statm")
+
+
+def memory() -> float:
+    """Return the memory of this process (pages), or nothing where the system does not tell."""
+    return int(MEMORY.read_text().split()[1]) if MEMORY.exists() else 1.0
+
+
+@pytest.mark.long
+def test_long_run_keeps_its_memory_its_energy_and_its_rest(tmp_path: Path) -> None:
+    values = {"time.end": END, "time.stop_at_rest": False, "output.every": "10 ms", **SIZE}
+    sizes: list[float] = []
+    residuals: list[float] = []
+
+    def watch(where: Progress) -> None:
+        residuals.append(where.relative_residual)
+        if where.time > WARM:
+            sizes.append(memory())
+
+    result = simulate_into(load_scenario(SCENARIOS / "wall.toml", values), tmp_path / "run", on_progress=watch)
+    assert (result.status, result.reason) == ("finished", "end of simulated time")
+    assert max(residuals) <= RESIDUAL_PROMISE
+    assert 0.95 * sizes[0] <= min(sizes) <= max(sizes) <= 1.05 * sizes[0]  # frames go to the disk
+    frames = result.frames
+    settled = int(np.searchsorted(frames.time, SETTLED))
+    resting = np.hypot(frames.vx[settled], frames.vy[settled]) < 1e-6  # m/s
+    moved = np.hypot(frames.x[settled:] - frames.x[settled], frames.y[settled:] - frames.y[settled])
+    assert resting.mean() > 0.9
+    assert moved[:, resting].max() <= 1e-9  # m; measured for 1000 blocks: 8e-11
