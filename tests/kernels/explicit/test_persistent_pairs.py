@@ -156,7 +156,8 @@ HEXAGON = {"outline": [[RADIUS * cos(k * pi / 3), RADIUS * sin(k * pi / 3)] for 
 WEDGE = {"outline": [[-0.03, -0.01], [0.03, -0.01], [0.0, 0.02]]}  # centroid in its origin, sharp ends
 SITUATIONS |= {
     f"{name}, as outlines": ([outlined(body) for body in bodies], values)
-    for name, (bodies, values) in SITUATIONS.items()
+    for name in ("rest on a slope", "sliding", "impact of b's corner", "aligned", "rocking", "no dashpots")
+    for bodies, values in (SITUATIONS[name],)
 }
 SITUATIONS |= {
     "column of hexagons": (

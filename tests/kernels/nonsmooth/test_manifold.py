@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 
 from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.nonsmooth.arrays import AWAY, CONSTRAINT, FAR, OPEN, STATE, STEPPING, TOUCHING
-from blocksim.kernels.nonsmooth.faces import Block as Seen, Edge, Face, block_ahead, clip
+from blocksim.kernels.nonsmooth.faces import Edge, Face, clip
 from blocksim.kernels.nonsmooth.narrow_phase import find_manifolds
 from blocksim.kernels.nonsmooth.slip import Constraints, Motion, bend_of, bend_time, follow_curvature, slip_of
 from blocksim.verification.scene import HEIGHT, WIDTH
@@ -298,17 +298,6 @@ def test_clipped_edge_stays_on_its_line_and_over_the_face(
         assert height == pytest.approx(gap + rise * (end - left) / width, abs=1e-12)
     # ends of the face can touch
     assert (bool(cut.is_left), bool(cut.is_right)) == (left < face.left, left + width > face.right)
-
-
-def test_block_ahead_turns_to_third_order_in_the_angle() -> None:
-    block = Seen(0.1, 0.2, math.cos(0.4), math.sin(0.4), 0.016, 0.0125)
-    errors = []
-    for ahead in (2e-3, 1e-3):
-        moved = block_ahead(block, 0.5, -0.7, 30.0, ahead)
-        assert (moved.x, moved.y) == pytest.approx((0.1 + 0.5 * ahead, 0.2 - 0.7 * ahead), abs=1e-15)
-        angle = 0.4 + 30.0 * ahead
-        errors.append(math.hypot(moved.cos - math.cos(angle), moved.sin - math.sin(angle)))
-    assert 0.0 < errors[1] < 0.13 * errors[0] < 0.13 * 0.06**3
 
 
 FAR_OFF = 4e-3

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from math import radians
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -43,70 +41,14 @@ def test_two_points_are_solved_exactly(lane: int | None) -> None:
         assert abs(x * rest).max() < 1e-9 * (1.0 + abs(x).max())
 
 
-@pytest.mark.parametrize("substeps", [1, 4])
-def test_slide_ends_where_coulomb_says(substeps: int) -> None:
-    run = single([{"x": 0.0, "y": ON_GROUND, "velocity": [1.0, 0.0]}], substeps=substeps).to_time(0.5)
-    assert run.bodies.x[0] == pytest.approx(1.0 / (2 * 0.38 * G), abs=1e-5)
-    assert abs(run.bodies.vx[0]) < 1e-12
-
-
-def pendulum(start: float, time: float) -> tuple[float, float, float]:
-    """Return x, y (m) and angle (rad) of a block that turns about its lower right corner, which is at the origin."""
-
-    def centre(angle: float) -> tuple[float, float]:
-        c, s = math.cos(angle), math.sin(angle)
-        return -(c * WIDTH + s * HEIGHT) / 2, (c * HEIGHT - s * WIDTH) / 2
-
-    square = (WIDTH**2 + HEIGHT**2) / 3  # of the radius of gyration about the corner
-    found = solve_ivp(
-        lambda _, y: (y[1], -G * centre(y[0])[0] / square), (0, time), (start, 0.0), rtol=1e-11, atol=1e-12
-    )
-    angle = float(found.y[0, -1])
-    return (*centre(angle), angle)
-
-
-def test_turning_about_an_edge_is_of_second_order() -> None:
-    start, time = -math.radians(60.0), 0.08
-    x, y, _ = pendulum(start, 0.0)
-    exact = np.array(pendulum(start, time))
-
-    def error(step: float, substeps: int) -> Any:
-        block = {"x": x, "y": y + 1e-12, "angle": start}  # so far up that round-off does not let it touch at once
-        run = single([block], restitution=0.0, friction=5.0, step=step, substeps=substeps).to_time(time)
-        return abs(run.state()[0, :3] - exact)
-
-    for step in (1e-3, 5e-4):
-        assert (error(step / 2, 1) < 0.27 * error(step, 1)).all()
-    for step in (1e-3, 5e-4):  # 0.45 where all substeps take the same bend
-        assert (error(step / 2, 4) < 0.31 * error(step, 4)).all()
-    assert error(1e-3, 4)[2] < 2e-5  # rad, of 0.19: seen 8e-6; 9e-4 with arms and normals of the start of the step
-    assert error(1e-3, 4)[:2].max() < 2e-6
-
-
 def test_static_friction_holds_what_kinetic_friction_does_not_stop() -> None:
-    slope = math.radians(20.0)
+    slope, time = math.radians(20.0), 0.1
     friction = {"static": 0.45, "kinetic": 0.2, "transition_speed": 0.001}
-    body = [{"y": ON_GROUND}]
-    stays = single(body, tilt=slope, restitution=0.0, ground_friction=friction, velocity_tolerance=1e-5).to_time(1.0)
-    assert abs(stays.bodies.x[0]) < 1e-4
-    pushed = [{"y": ON_GROUND, "velocity": [-0.3, 0.0]}]
-    slides = single(pushed, tilt=slope, restitution=0.0, ground_friction=friction, velocity_tolerance=1e-5).to_time(0.5)
-    expected = 0.3 + 0.5 * G * (math.sin(slope) - 0.2 * math.cos(slope))
+    values: dict[str, Any] = {"restitution": 0.0, "ground_friction": friction, "velocity_tolerance": 1e-5}
+    assert abs(single([{"y": ON_GROUND}], tilt=slope, **values).to_time(time).bodies.x[0]) < 1e-4
+    slides = single([{"y": ON_GROUND, "velocity": [-0.3, 0.0]}], tilt=slope, **values).to_time(time)
+    expected = 0.3 + time * G * (math.sin(slope) - 0.2 * math.cos(slope))
     assert abs(slides.bodies.vx[0]) == pytest.approx(expected, rel=0.01)
-
-
-@pytest.mark.parametrize("restitution", [0.0, 0.5, 0.9, 1.0])
-@pytest.mark.parametrize("friction", [0.0, 0.4, 1.0])
-def test_impacts_create_no_energy(restitution: float, friction: float) -> None:
-    random = np.random.default_rng(1)
-    for _ in range(20):
-        angle = float(random.uniform(-1.5, 1.5))
-        height = abs(math.sin(angle)) * WIDTH / 2 + abs(math.cos(angle)) * HEIGHT / 2 + 1e-4
-        body = {"y": height, "angle": angle, "velocity": [float(random.normal()), -1.0], "spin": float(random.normal())}
-        values = {"gravity": 0.0, "restitution": restitution, "ground_friction": friction, "step": 2e-4}
-        run = single([body], friction=friction, substeps=1, **values)
-        energies = [run.kinetic, *(run.to_step(k).kinetic for k in range(1, 20))]
-        assert np.diff(energies).max() < 1e-5 * energies[0]
 
 
 def test_edges_of_pieces_of_ground() -> None:
@@ -122,16 +64,9 @@ def test_edges_of_pieces_of_ground() -> None:
     assert math.degrees(run.bodies.angle[0]) == pytest.approx(-47.69, abs=0.3)
 
 
-def test_ledger_holds_on_a_slope() -> None:
-    run = single([{"y": ON_GROUND + 0.01, "angle": 0.2}], tilt=radians(35.0)).to_time(0.5)
-    assert run.residual() < 1e-12
-
-
-def test_overlap_beyond_the_limit_stops_the_run() -> None:
-    values: Any = {"restitution": 0.0, "contact": {"max_overlap": 1e-6}}
-    assert single([{"y": ON_GROUND}], **values).to_time(0.5).status == OVERLAP_LIMIT
-    values["contact"] = {"max_overlap": 2e-6}
-    assert single([{"y": ON_GROUND}], **values).to_time(0.5).status == 0
+@pytest.mark.parametrize(("most", "status"), [(1e-6, OVERLAP_LIMIT), (2e-6, 0)])
+def test_overlap_beyond_the_limit_stops_the_run(most: float, status: int) -> None:
+    assert single([{"y": ON_GROUND}], restitution=0.0, contact={"max_overlap": most}).to_time(0.05).status == status
 
 
 @pytest.mark.parametrize("name", ["y", "vy", "spin"])
@@ -188,9 +123,9 @@ def test_velocity_of_a_block_that_rolls_does_not_depend_on_lengths_that_are_not_
 def test_steps_of_crowds_and_of_weak_rebounds_of_more_than_two_are_not_cut() -> None:
     crowd = [{**HOPPING, "x": 0.1 * k} for k in range(13)]
     assert cut_steps(single(crowd, restitution=0.9), 40) == 0
-    assert cut_steps(single(crowd[:3], restitution=0.5), 400) == 0
-    assert cut_steps(single(crowd[:2], restitution=0.5), 400) > 0
-    assert cut_steps(single(crowd[:1], restitution=0.9), 400) > 0
+    assert cut_steps(single(crowd[:3], restitution=0.5), 100) == 0
+    assert cut_steps(single(crowd[:2], restitution=0.5), 100) > 0
+    assert cut_steps(single(crowd[:1], restitution=0.9), 100) > 0
 
 
 FREQUENCY = 2.0  # 1/s
@@ -235,15 +170,6 @@ def row(gap: float) -> list[dict[str, Any]]:
     blocks: list[dict[str, Any]] = [{"x": i * (WIDTH + gap), "y": 0.2} for i in range(5)]
     blocks[0] |= {"x": -1.3e-4, "velocity": [1.0, 0.0]}
     return blocks
-
-
-@pytest.mark.parametrize("has_cuts", [0, 1])  # in rounds of one substep, or in steps that are cut
-@pytest.mark.parametrize(("gap", "within"), [(1e-4, 1e-6), (1e-5, 1e-3)])
-def test_row_of_blocks_apart_passes_a_blow_on(gap: float, within: float, has_cuts: int) -> None:
-    run = single(row(gap), restitution=1.0, gravity=0.0, **SMOOTH)
-    run.scene.contacts.stepping[0].has_cuts = has_cuts
-    run.to_time(0.02)
-    assert run.bodies.vx == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.0], abs=within)
 
 
 def test_long_row_passes_a_blow_on() -> None:
