@@ -13,6 +13,8 @@ FIT = "calibrate slide.toml --experiment measured.csv --fit friction.block_groun
 SCATTER = "--scatter 'bodies.0.velocity.0=0.5 m/s+-0.01 m/s'"
 JUDGED = "compare swept --experiment measured.csv"
 MORRIS = "sensitivity scenarios/slide.toml --vary friction.block_ground=0.3:0.4"
+FRAGILE = "fragility scenarios/slide.toml --scatter friction.block_ground=0.38+-0.08"
+SAMPLED = "sweep scenarios/slide.toml --vary friction.block_ground=0.3:0.4"
 LINES = [line for line in Path(__file__).with_name("commands.txt").read_text().splitlines() if line and line[0] != "#"]
 
 SWEPT = "case,status,reason,block.x_mm\n1,finished,,42.0\n2,finished,,43.5\n"
@@ -67,6 +69,8 @@ NEEDED = {
     "optuna of calibrate": ("optuna", f"{FIT} {SCATTER}"),
     "scipy of calibrate": ("scipy.stats", f"{FIT} {SCATTER}"),
     "scipy of compare": ("scipy.special", JUDGED),
+    "scipy of fragility": ("scipy.special", f"{FRAGILE} --intensity gravity=1,2 --out out"),
+    "scipy of a sweep": ("scipy.stats", f"{SAMPLED} --mode lhs --samples 4 --out out"),
     "SALib of sensitivity": ("SALib", MORRIS),
     "SALib of sensitivity by Sobol": ("SALib", f"{MORRIS} --method sobol"),
 }

@@ -43,14 +43,11 @@ def test_error_becomes_a_line_and_its_exit_code(
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
-def test_shortage_that_a_library_wraps_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
+def test_shortage_that_a_library_wraps_is_reported_and_no_other_error(capsys: pytest.CaptureFixture[str]) -> None:
     error = RuntimeError("cannot compile")
     error.__cause__ = MemoryError()
     assert exit_code_of(error) == ExitCode.INPUT_OUTPUT
     assert capsys.readouterr().err.startswith("the system has run out of memory")
-
-
-def test_error_that_is_no_shortage_stays_what_it_is() -> None:
     with pytest.raises(ZeroDivisionError), errors_as_messages():
         raise ZeroDivisionError
 
@@ -66,7 +63,7 @@ def test_current_folder_that_is_gone_is_reported(
     assert answer.err == "the current folder no longer exists; change to another one with cd\n"
 
 
-def test_internal_error_is_one_line_and_a_file(
+def test_internal_error_is_one_line_and_a_file_also_on_a_full_disk(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -75,22 +72,14 @@ def test_internal_error_is_one_line_and_a_file(
     assert line.startswith("internal error: ValueError: two lines; please report it with the file ")
     assert line.count("\n") == 1
     assert "ValueError: two" in next(tmp_path.iterdir()).read_text()
-
-
-def test_internal_error_on_a_full_disk_is_still_told(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "nowhere"))
     report_internal_error(ValueError("x"))
     assert "internal error: ValueError: x" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [("export", LONG), ("report", LONG), ("compare", LONG), ("plot", LONG), ("animate", LONG), ("check", LONG)],
-)
-def test_names_that_are_too_long_are_reported_in_a_line(blocksim: Command, arguments: tuple[str, ...]) -> None:
-    answer = blocksim(*arguments)
+@pytest.mark.parametrize("command", ["export", "report", "compare", "plot", "animate", "check"])
+def test_names_that_are_too_long_are_reported_in_a_line(blocksim: Command, command: str) -> None:
+    answer = blocksim(command, LONG)
     assert answer.code in {66, 74}
     assert "File name too long" in answer.err
     assert len(answer.err) < 2 * len(LONG)

@@ -1,4 +1,4 @@
-"""Files of strangers: pipes that never end, links to private files, texts that steer a terminal or a spreadsheet."""
+"""Files of strangers and damaged ones: endless pipes, links to private files, texts that steer terminals and tables."""
 
 import csv
 import json
@@ -116,6 +116,24 @@ def test_pipes_and_links_in_a_sweep_are_not_read(
     answer = blocksim(command, swept)
     assert answer.code in {0, 65, 66}, answer  # without its table a sweep is none, and a report can do without the plan
     assert not tells(answer)
+
+
+JUDGED = ("run.json", "final.csv", "scenario.toml", "experiment.csv")
+READ_BY = {"run.h5": ("plot", "export", "animate"), **dict.fromkeys(JUDGED, ("compare",))}
+
+
+@pytest.mark.parametrize("name", READ_BY)
+def test_damaged_file_is_named_by_every_command_that_reads_it(blocksim: Command, copied: Path, name: str) -> None:
+    for content in (b"", b"rubbish" * 100, b"\x00\xff\xfe", None):
+        if content is None:
+            (copied / name).unlink()
+        else:
+            (copied / name).write_bytes(content)
+        for command in READ_BY[name]:
+            answer = blocksim(command, copied)
+            assert answer.code in ({65, 66} if content is None else {65})
+            assert name in answer.err
+            assert answer.out == ""
 
 
 def test_a_table_that_a_stored_scenario_names_is_no_link_even_within_reach(blocksim: Command, copied: Path) -> None:

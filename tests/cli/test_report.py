@@ -47,16 +47,14 @@ def test_report_does_not_name_folders_of_the_machine(
     write_run(run)
     write_sweep(swept)
     summary = json.loads((run / "run.json").read_text())
-    summary["environment"]["command"] = (
-        f"{tmp_path}/bin/blocksim run '{tmp_path}/my walls/x.toml' --set a.b={tmp_path}/c"
-    )
+    command = f"{tmp_path}/bin/blocksim run '{tmp_path}/my walls/x.toml' --set a.b={tmp_path}/c"
+    summary["environment"]["command"] = command
     (run / "run.json").write_text(json.dumps(summary))
     if damaged:
         (run / "run.h5").write_bytes(b"nothing")
     write_experiment(tmp_path / "repeats.csv")
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    monkeypatch.chdir(elsewhere)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
     answer = blocksim("report", run, swept, "--experiment", tmp_path / "repeats.csv")
     assert answer.code == (65 if damaged else 0)
     text = REPORT.read_text(encoding="utf-8")
@@ -65,19 +63,17 @@ def test_report_does_not_name_folders_of_the_machine(
     assert "repeats.csv" in text
 
 
-def test_report_of_a_folder_whose_name_is_no_text_is_written(blocksim: Command, tmp_path: Path) -> None:
+def test_report_of_a_folder_whose_name_is_no_text_leaves_out_frames_beyond_all_reach(
+    blocksim: Command, tmp_path: Path
+) -> None:
     folder = Path(os.fsdecode(b"caf\xe9"))
     write_run(tmp_path / folder)
-    assert blocksim("report", folder).code == 0
-    assert "caf?" in REPORT.read_text(encoding="utf-8")
-
-
-def test_frames_with_places_beyond_all_reach_are_left_out(blocksim: Command, tmp_path: Path) -> None:
-    write_run(tmp_path / "run")
-    with h5py.File("run/run.h5", "r+") as file:
+    with h5py.File(folder / "run.h5", "r+") as file:
         file["particles/blocks/x"][-1, 0] = 1e300
-    assert blocksim("report", "run").code == 0
-    ((kept, recorded),) = re.findall(r"(\d+) of (\d+) recorded frames", REPORT.read_text(encoding="utf-8"))
+    assert blocksim("report", folder).code == 0
+    text = REPORT.read_text(encoding="utf-8")
+    assert "caf?" in text
+    ((kept, recorded),) = re.findall(r"(\d+) of (\d+) recorded frames", text)
     assert int(kept) == int(recorded) - 1
 
 
@@ -95,22 +91,18 @@ def test_varied_inputs_of_a_real_sweep_are_its_keys_and_no_result(blocksim: Comm
     assert "<dt>varied</dt><dd><bdi>ground.tilt [deg], friction.block_block.kinetic</bdi></dd>" in REPORT.read_text()
 
 
-def test_several_places_are_parts_of_one_file(blocksim: Command, tmp_path: Path) -> None:
+def test_several_places_are_parts_of_one_file_and_members_beyond_the_limit_are_named(
+    blocksim: Command, tmp_path: Path
+) -> None:
     write_run(tmp_path / "run")
-    write_sweep(tmp_path / "sweep", cases=4, kept=2)
-    assert blocksim("report", "run", "sweep", "--out", "all.html").code == 0
+    write_sweep(tmp_path / "sweep", cases=4, kept=3)
+    assert blocksim("report", "run", "sweep", "--runs", 2, "--out", "all.html").code == 0
     sweep = data_of(Path("all.html"), "part-2")
     assert sweep["kind"] == "sweep"
-    assert list(sweep["members"].values()) == ["part-2-member-1", "part-2-member-2"]
+    names = [f"{number:012x}" for number in range(3)]
+    assert sweep["members"] == {names[0]: "part-2-member-1", names[1]: "part-2-member-2"}
+    assert sweep["left_out"] == names[2:]
     assert data_of(Path("all.html"), "part-2-member-2")["frames"]["names"] == ["1", "2", "3"]
-
-
-def test_members_beyond_the_limit_are_named(blocksim: Command, tmp_path: Path) -> None:
-    write_sweep(tmp_path / "sweep", cases=4, kept=3)
-    assert blocksim("report", "sweep", "--runs", 1).code == 0
-    sweep = data_of(REPORT)
-    assert list(sweep["members"]) == ["000000000000"]
-    assert sweep["left_out"] == ["000000000001", "000000000002"]
 
 
 def test_sweep_is_judged_by_the_repeats(blocksim: Command, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from math import isnan, radians
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from blocksim.study.rows import Row
+    from tests.golden import Golden
 
 FAILED: Row = {"status": "failed", "reason": "an overlap exceeds contact.max_overlap", "seconds": 0.1}
 HALVED = Refinement("step", "time step", "time.safety", 0.05, 0.5, 1)
@@ -53,48 +54,46 @@ def finished(x_mm: float, rotation_deg: float = 0.0, seconds: float = 1.0, y_mm:
     return {"status": "finished", "reason": "at rest", "seconds": seconds, **ends}
 
 
-def judged(coordinates: Coordinates, places: list[float], tolerance_mm: float = 0.1) -> RefinementStudy:
-    """Judge made-up final places, the first of the next coarser level, the second of the scenario's own."""
-    rows = {level: finished(x, seconds=2.0**level) for level, x in enumerate(places, start=-1)}
-    return judge(rows, HALVED, coordinates, tolerance_mm)
+PLACES = {  # mm: final places from the next coarser level on; the second one is the scenario's own
+    "half an order": [70.0 + 3.0 * 0.5 ** (0.5 * level) for level in range(5)],
+    "second order": [70.0 + 3.0 * 0.25**level for level in range(5)],
+    "turns back": [70.0, 70.2, 70.1],
+    "grows": [70.0, 70.1, 70.3],
+    "stays": [70.0, 70.0, 70.0],
+    "round-off": [70.0, 70.0 + 3e-7, 70.0 + 4e-7],
+    "small changes": [70.0, 70.05, 70.06, 70.09],
+    "two small changes after a large one": [70.0, 75.0, 75.05, 75.0],
+    "shrinking changes": [70.0, 74.0, 76.0, 77.0],
+    "to and fro": [70.0, 74.0, 71.0, 73.9],
+    "large change at last": [70.0, 70.01, 70.03, 70.2],
+    "from outcome to outcome": [70.0, 9000.0, 4900.0, 2800.0],
+    "another outcome at first": [9000.0, 70.0, 70.05, 70.02],
+    "near by luck": [70.0, 70.5, 70.03, 70.0, 70.0],
+    "own level is enough": [70.2, 70.05, 70.02, 70.0],
+}
 
 
-@pytest.mark.parametrize("order", [0.5, 2.0])
-def test_order_of_an_exact_power_law_is_observed(coordinates: Coordinates, order: float) -> None:
-    study = judged(coordinates, [70.0 + 3.0 * (0.5**level) ** order for level in range(5)])
-    assert [isnan(level.order) for level in study.levels] == [True, True, False, False, False]
-    assert [level.order for level in study.levels[2:]] == pytest.approx([order] * 3)
-    turns_back, grows, stays, is_rounded = [0.0, 0.2, 0.1], [0.0, 0.1, 0.3], [0.0] * 3, [0.0, 3e-7, 4e-7]
-    for moves in (turns_back, grows, stays, is_rounded):
-        assert isnan(judged(coordinates, [70.0 + move for move in moves]).levels[-1].order)
+def told(study: RefinementStudy) -> str:
+    """Return what a study came to, a line for each level."""
+    levels = [
+        f"{one.value:g}: change {one.change_mm:.6g} mm, order {one.order:.6g}, to the finest {one.to_finest_mm:.6g} mm"
+        + " *" * one.is_own
+        + "".join(f", {name} flips" for name in one.flipped)
+        for one in study.levels
+    ]
+    recommended = study.recommendation and f"{study.recommendation.value:g}"
+    return "\n".join([*levels, f"{study.verdict}; recommended: {recommended}\n"])
 
 
-@pytest.mark.parametrize(
-    ("places", "verdict"),
-    [
-        ([70.0, 70.05, 70.06, 70.09], ConvergenceVerdict.CONVERGED),
-        ([70.0, 75.0, 75.05, 75.0], ConvergenceVerdict.CONVERGED),
-        ([70.0, 74.0, 76.0, 77.0], ConvergenceVerdict.NOT_YET),
-        ([70.0, 74.0, 71.0, 73.9], ConvergenceVerdict.SCATTERED),
-        ([70.0, 70.01, 70.02, 70.2], ConvergenceVerdict.SCATTERED),
-    ],
-)
-def test_verdict_looks_at_two_refinements_in_a_row(
-    coordinates: Coordinates, places: list[float], verdict: ConvergenceVerdict
-) -> None:
-    study = judged(coordinates, places)
-    assert study.verdict is verdict
-    assert (study.recommendation is not None) == (verdict is ConvergenceVerdict.CONVERGED)
-
-
-def test_changes_that_shrink_from_outcome_to_outcome_are_no_convergence(coordinates: Coordinates) -> None:
-    study = judged(coordinates, [70.0, 9000.0, 4900.0, 4900.0 - 2100.0])
-    assert study.verdict is ConvergenceVerdict.FLIPS
-    assert [level.flipped for level in study.levels] == [(), ("block",), ("block",), ("block",)]
-    assert study.recommendation is None
-    settled = judged(coordinates, [9000.0, 70.0, 70.05, 70.02])
-    assert settled.verdict is ConvergenceVerdict.CONVERGED
-    assert [bool(level.flipped) for level in settled.levels] == [False, True, False, False]
+def test_order_verdict_and_recommendation_of_made_up_places(coordinates: Coordinates, golden: Golden) -> None:
+    rows = {name: [finished(x, seconds=2.0**i) for i, x in enumerate(places)] for name, places in PLACES.items()}
+    rows["turn of a degree"] = [finished(10.0), finished(10.0), finished(10.0, 1.0)]
+    rows["failed at last"] = [finished(10.0), finished(10.0), FAILED]
+    rows["failed at first"] = [FAILED, *[finished(10.0)] * 3]
+    studies = {name: judge(dict(enumerate(ends, -1)), HALVED, coordinates, 0.1) for name, ends in rows.items()}
+    golden("\n".join(f"{name}\n{told(study)}" for name, study in studies.items()))
+    turned = studies["turn of a degree"].levels[-1]
+    assert turned.change_mm == pytest.approx(radians(1.0) * 0.5 * (32.0**2 + 25.0**2) ** 0.5)  # that far a corner moves
 
 
 def test_outcome_is_another_one_beyond_the_size_of_a_block(coordinates: Coordinates) -> None:
@@ -109,30 +108,6 @@ def test_outcome_is_another_one_beyond_the_size_of_a_block(coordinates: Coordina
     ):
         assert bool(coordinates.flips(finished(10.0), end)) is flips
         assert bool(coordinates.flips(end, finished(10.0))) is flips
-
-
-def test_the_coarsest_converged_level_with_nothing_worse_above_it_is_recommended(coordinates: Coordinates) -> None:
-    by_luck = judged(coordinates, [70.0, 70.5, 70.03, 70.0, 70.0])
-    assert by_luck.recommendation is by_luck.levels[2]
-    own = judged(coordinates, [70.2, 70.05, 70.02, 70.0])
-    assert own.recommendation is own.own
-    assert own.own.value == 0.05
-
-
-def test_a_turn_counts_as_far_as_it_moves_a_corner(coordinates: Coordinates) -> None:
-    study = judge({0: finished(10.0), 1: finished(10.0, 1.0)}, HALVED, coordinates, 0.1)
-    half_diagonal = 0.5 * (32.0**2 + 25.0**2) ** 0.5
-    assert study.levels[1].change_mm == pytest.approx(radians(1.0) * half_diagonal)
-
-
-def test_a_failed_level_is_neither_near_nor_far(coordinates: Coordinates) -> None:
-    study = judge({0: finished(10.0), 1: finished(10.0), 2: FAILED}, HALVED, coordinates, 0.1)
-    assert study.verdict is ConvergenceVerdict.FAILED
-    assert isnan(study.levels[2].change_mm)
-    assert study.levels[0].to_finest_mm == 0.0
-    coarse = judge({-1: FAILED, 0: finished(10.0), 1: finished(10.0), 2: finished(10.0)}, HALVED, coordinates, 0.1)
-    assert coarse.verdict is ConvergenceVerdict.CONVERGED
-    assert coarse.recommendation is coarse.own
 
 
 def levels(refined: Refinement, finest: int) -> list[float]:

@@ -2,7 +2,6 @@
 
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from scipy.stats import norm
 
 from blocksim.analysis.compare import interval
 from blocksim.analysis.lognormal import Counts, Curve, NoCurve, fit
-from blocksim.errors import InvalidInputError, UnavailableError
+from blocksim.errors import InvalidInputError
 from blocksim.scenario import Document
 from blocksim.study.fragility import FragilityAnswer, fragility, read_fragility
 from blocksim.study.manifest import Shard
@@ -120,15 +119,6 @@ def test_the_folder_holds_counts_curve_members_and_scenario(whole: FragilityAnsw
     assert data["scatter"] == {MU: {"mean": 0.38, "sd": 0.06}}
     assert [point["failures"] for point in data["points"]] == [point.failures for point in whole.points]
     assert Document.read(whole.folder / "fragility.toml").build().name == "slope"
-
-
-def test_without_scipy_it_says_what_to_install_before_anything_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "scipy.special", None)
-    with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[study\]'"):
-        slides(tmp_path / "study")
-    assert not (tmp_path / "study").exists()
 
 
 def test_the_picture_has_the_counts_and_the_curve_of_the_result(whole: FragilityAnswer) -> None:

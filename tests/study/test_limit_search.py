@@ -6,8 +6,9 @@ from collections.abc import Callable
 import pytest
 from hypothesis import given, strategies as st
 
-from blocksim.study.criterion import DEFAULT, Stability, read_criterion
+from blocksim.study.criterion import DEFAULT, read_criterion
 from blocksim.study.limit_plan import Change, SearchRange, changes_in, next_near, next_values
+from tests.golden import Golden
 
 
 def searched(span: SearchRange, answer: Callable[[float], str], tolerance: float) -> dict[float, str]:
@@ -88,32 +89,14 @@ def test_a_change_that_is_not_in_the_range_is_not_looked_for_without_end() -> No
 
 
 ROW = {"status": "finished", "reason": "at rest", "outcome": "slid", "displacement_mm": 4.9, "turn_deg": 30.0}
+CONDITIONS = f"""{DEFAULT}; outcome != fell; outcome = slid | stands; outcome == slid; moved < 5 mm; moved < 0.0049 m;
+    moved <= 0.491 cm; turned < 0.5 rad; turned<31deg; moved > 4 mm; moved < 5 mm, turned < 10 deg; moved < 4 mm"""
 
 
-@pytest.mark.parametrize(
-    ("text", "stands"),
-    [
-        (DEFAULT, False),
-        ("outcome != fell", True),
-        ("outcome = slid | stands", True),
-        ("outcome == slid", True),
-        ("moved < 5 mm", True),
-        ("moved < 0.0049 m", False),
-        ("moved <= 0.491 cm", True),
-        ("turned < 0.5 rad", False),
-        ("turned<31deg", True),
-        ("moved > 4 mm", True),
-        ("moved < 5 mm, turned < 10 deg", False),
-    ],
-)
-def test_conditions_are_judged_in_the_units_that_were_typed(text: str, stands: bool) -> None:
-    assert (read_criterion(text).verdict(ROW) is Stability.STANDS) is stands
-
-
-def test_a_run_that_failed_neither_stands_nor_falls() -> None:
-    assert read_criterion(DEFAULT).verdict({"status": "invalid"}) is Stability.FAILED
-
-
-@pytest.mark.parametrize(("text", "verdict"), [("moved < 5 mm", "undecided"), ("moved < 4 mm", "falls")])
-def test_what_meets_the_conditions_but_moves_on_at_its_end_is_undecided(text: str, verdict: str) -> None:
-    assert read_criterion(text).verdict({**ROW, "moves_on": True}) == verdict
+def test_conditions_are_judged_in_the_units_that_were_typed(golden: Golden) -> None:
+    """By what is at rest and what moves on at its end; a run that failed neither stands nor falls."""
+    told = []
+    for text in map(str.strip, CONDITIONS.split(";")):
+        rows = (ROW, {**ROW, "moves_on": True}, {"status": "invalid"})
+        told.append(f"{text}: {', '.join(read_criterion(text).verdict(row) for row in rows)}")
+    golden("\n".join(told))

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blocksim import extras
-from blocksim.errors import UnavailableError
 from blocksim.scenario import Document, Sweep
 from blocksim.scenario.models.study import Normal, Uniform
 from blocksim.study.plan import design_of, draw_values, open_interval, remarks
@@ -149,14 +147,3 @@ def test_levels_are_equally_likely(nominal: Document, mode: str) -> None:
     spread = 4 * math.sqrt(1024) / 2 if mode == "normal" else 0
     assert abs(drawn.count("explicit") - 512) <= spread
     assert drawn.count("explicit") + drawn.count("nonsmooth") == 1024
-
-
-def test_a_missing_scipy_names_the_extra(nominal: Document, monkeypatch: pytest.MonkeyPatch) -> None:
-    def gone(name: str) -> None:
-        raise ImportError(name)
-
-    sweep = sweep_of(nominal, "lhs", {SCALE: UNIT})
-    monkeypatch.setattr(extras, "import_module", gone)
-    with pytest.raises(UnavailableError, match=r"pip install 'blocksim\[study\]'") as caught:
-        design_of(sweep)
-    assert caught.value.exit_code == 69

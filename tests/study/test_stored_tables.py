@@ -51,12 +51,11 @@ def test_values_are_in_si_and_keep_the_unit_that_was_typed(quick: Document, tmp_
         assert f"<!-- {second} -->" in drawn
 
 
-def test_refined_spacing_and_step_are_drawn_with_their_units(scenario: Scenario) -> None:
+def test_refined_settings_are_drawn_with_their_units_and_friction_angles_in_degrees(
+    nominal: Document, scenario: Scenario, tmp_path: Path
+) -> None:
     units = {key: unit_of(scenario, key) for key in ("contact.particle_spacing", "time.safety", "time.step")}
     assert units == {"contact.particle_spacing": "m", "time.safety": "", "time.step": "s"}
-
-
-def test_friction_angles_are_an_axis_in_degrees(nominal: Document, tmp_path: Path) -> None:
     rows = [f"{angle},{ended(74.0, 130.0)}" for angle in (20.0, 30.0)]
     vary: dict[str, Values] = {"friction.block_block": ["20 deg", "30 deg"]}
     (friction,) = stored(nominal, tmp_path, vary, rows, ("friction.block_block [deg]",)).inputs
@@ -77,32 +76,25 @@ def test_words_become_levels_and_keys_keep_their_order_but_those_of_one_value(
 
 
 def test_cases_are_inside_by_the_rules_of_compare_and_failed_ones_never(nominal: Document, tmp_path: Path) -> None:
-    rows = [f"1.0,{ended(74.0, 130.0)}", f"2.0,{ended(67.0, 130.0)}", "3.0,failed,too large,0.1" + "," * 15]
-    found = stored(nominal, tmp_path, {"gravity": [1.0, 2.0, 3.0]}, rows)
+    failed = "failed,too large,0.1" + "," * 15
+    rows = [f"1.0,{ended(74.0, 130.0)}", f"2.0,{ended(67.0, 130.0)}", f"3.0,{failed}"]
+    found = stored(nominal, tmp_path / "swept", {"gravity": [1.0, 2.0, 3.0]}, rows)
     assert found.inside is not None
     assert found.inside.tolist() == [True, False, False]
     assert found.finished.tolist() == [True, True, False]
     assert np.isnan(found.x_mm[2]).all()
     assert found.outcomes == [(0, -90, -90), (0, -90, -90), None]
-
-
-def test_repeats_come_with_their_range_and_prediction_interval(nominal: Document, tmp_path: Path) -> None:
-    known = stored(nominal, tmp_path, {"gravity": [1.0]}, [f"1.0,{ended(74.0, 130.0)}"]).measured
+    known = found.measured  # repeats come with their range and prediction interval
     assert known.x_mm["2"].tolist() == [71.69, 76.57, 72.70, 73.22, 73.73, 78.53]
     assert known.prediction_mm["2"] == pytest.approx((67.18, 81.63), abs=0.01)
     assert "1" not in known.prediction_mm  # repeats that are all equal predict nothing
     assert known.outcome == (0, -90, -90)
-
-
-def test_without_experiment_nothing_is_measured_and_without_results_nothing_is_drawn(
-    nominal: Document, tmp_path: Path
-) -> None:
     data = {key: table for key, table in nominal.data.items() if key != "experiment"}
     unmeasured = Document(data, nominal.source, nominal.folder, nominal.overrides)
-    found = stored(unmeasured, tmp_path / "unmeasured", {"gravity": [1.0]}, [f"1.0,{ended(74.0, 130.0)}"])
+    found = stored(unmeasured, tmp_path / "unmeasured", {"gravity": [1.0]}, rows[:1])
     assert (found.inside, found.measured.x_mm) == (None, {})
     with pytest.raises(InvalidInputError, match="no case of this sweep has finished"):
-        stored(nominal, tmp_path / "failed", {"gravity": [1.0]}, ["1.0,failed,too large,0.1" + "," * 15])
+        stored(nominal, tmp_path / "failed", {"gravity": [3.0]}, rows[2:])
     with pytest.raises(InputMissingError, match="no such file"):
         read_sweep_data(tmp_path / "nix")
 
@@ -133,14 +125,11 @@ def test_bars_are_total_indices_with_those_of_the_key_alone_or_effects_with_thei
     assert labels[1] == ""
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
+def test_other_tables_are_refused(tmp_path: Path) -> None:
+    for text, told in (
         ("block,quantity\n1,x\n", "not the table of `blocksim sensitivity --out`"),
         (SOBOL.replace("0.7", "much"), "indices.csv:2"),
         (SOBOL.splitlines()[0] + "\n", "no result varies"),
-    ],
-)
-def test_other_tables_are_refused(tmp_path: Path, text: str, told: str) -> None:
-    with pytest.raises(InvalidInputError, match=told):
-        read_indices(written(tmp_path, text))
+    ):
+        with pytest.raises(InvalidInputError, match=told):
+            read_indices(written(tmp_path, text))
