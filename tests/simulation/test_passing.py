@@ -85,8 +85,8 @@ def stays_or_says(result: Result, other: str, side: float, limit: str = "contact
 def test_block_rebounds_or_the_run_ends_whatever_its_speed(what: str, scale: float) -> None:
     """A block at 50 m/s could be beyond a plate of 1 mm between two steps, and one at 1 km/s beyond a wall."""
     finished = 0
-    for thickness in (1e-3, 1e-2, 1e-1) if what in {"fixed", "free"} else (1e-2,):
-        for speed in (1.0, 8.0, 60.0, 500.0, 1000.0):
+    for thickness in (1e-3, 1e-1) if what in {"fixed", "free"} else (1e-2,):
+        for speed in (1.0, 60.0, 1000.0):
             result = simulate(thrown(what, speed, thickness=thickness, stiffness_scale=scale))
             stays_or_says(result, BODIES[what], 0.0 if what == "ground" else FACE)
             if result.status == "finished":

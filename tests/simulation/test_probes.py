@@ -253,15 +253,15 @@ def test_contacts_and_weight_are_all_that_accelerates_blocks(soft: Shipped, mode
     assert off[..., 2].max() <= 1e-2 * size[2]
 
 
-@pytest.mark.parametrize("restitution", [0.2, 1.0])  # with 1.0 impacts follow one another within a substep
 def test_impulses_and_weight_are_all_that_accelerates_blocks_without_springs(
-    soft: Shipped, restitution: float, monkeypatch: pytest.MonkeyPatch
+    soft: Shipped, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Also of impacts that follow one another within a substep."""
     monkeypatch.setattr(
         "blocksim.world.nonsmooth.is_cut_at_impacts", lambda *_: False
     )  # no step is cut: a frame has the impulses of the last part
     values = {"time__end": 0.5, "time__substeps": 1, "output__contacts": True, "output__every": EVERY_STEP}
-    result = simulate(soft("three_blocks_nonsmooth", contact__restitution=restitution, **values))
+    result = simulate(soft("three_blocks_nonsmooth", contact__restitution=1.0, **values))
     found, expected = changes(result), accelerations(result)[1:]
     # velocities live half a step before positions; blocks in flight are shown half a kick later
     half_kick = 0.5 * result.scenario.gravity

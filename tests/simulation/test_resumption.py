@@ -5,10 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import signal
-import subprocess
-import sys
-import time
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -19,7 +15,7 @@ import pytest
 
 from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.kernels.common.arrays import CACHE_LINE
-from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping, scenario_to_toml
+from blocksim.scenario import Scenario, load_scenario, scenario_from_mapping
 from blocksim.simulation import Result, simulate, simulate_into
 from blocksim.simulation.checkpoint import (
     DIGEST_BYTES,
@@ -34,7 +30,6 @@ from blocksim.simulation.checkpoint import (
     restore_scene,
     write_checkpoint,
 )
-from blocksim.simulation.files import CHECKPOINTS
 from blocksim.simulation.provenance import code_hashes
 from blocksim.simulation.schemes import ALONE, AnyScene, Team, build_scene
 from blocksim.world.build import arrays_of
@@ -463,28 +458,3 @@ def test_two_threads_and_a_change_to_them_on_the_way_change_no_byte(scheme: str,
     interrupted_at(scenario, tmp_path / "parts", [whole.summary.events[0].step])
     assert_same(simulate_into(scenario, tmp_path / "parts", resume=True, threads=2), whole)
     assert_same_files(tmp_path / "parts", tmp_path / "one")
-
-
-@pytest.mark.long
-@both_schemes
-def test_runs_killed_again_and_again_end_with_the_same_bytes(scheme: str, tmp_path: Path) -> None:
-    scenario = all_together(scheme, columns=8, end=0.1 if scheme == "explicit" else 0.4)
-    whole = simulate_into(scenario, tmp_path / "whole")
-    (tmp_path / "together.toml").write_text(scenario_to_toml(scenario))
-    command = [sys.executable, "-c", "from blocksim.cli.app import main; main()", "run", "together.toml"]
-    command += ["--out", "killed", "--resume", "--quiet", "--checkpoint-steps", "100"]
-    for _ in range(4):
-        before = _newest(tmp_path / "killed")
-        running = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while running.poll() is None and _newest(tmp_path / "killed") == before:
-            time.sleep(0.01)
-        running.send_signal(signal.SIGKILL)
-        assert running.wait() == -signal.SIGKILL
-    assert_same(simulate_into(scenario, tmp_path / "killed", resume=True), whole)
-    assert_same_files(tmp_path / "killed", tmp_path / "whole")
-
-
-def _newest(folder: Path) -> int:
-    """Return when (ns) the newest checkpoint was written, 0 where there is none."""
-    files = (folder / name for name in CHECKPOINTS)
-    return max((file.stat().st_mtime_ns for file in files if file.is_file()), default=0)

@@ -285,6 +285,7 @@ def test_edited_code_gives_runs_another_name(soft: Shipped, monkeypatch: pytest.
     assert provenance.run_hash(soft()) != before
 
 
+# 250 blocks, a minute or so; with BLOCKSIM_SOAK=full the 1000 of scenarios/wall.toml, four minutes
 SIZE = {} if os.environ.get("BLOCKSIM_SOAK") == "full" else {"structures.0.rows": 10, "structures.0.columns": 25}
 WARM, SETTLED, END = 1.0, 3.0, 10.0  # s: by which all lists have found their size, and most blocks their place
 MEMORY = Path("/proc/self/statm")

@@ -14,7 +14,7 @@ import blocksim
 from blocksim.analysis.bits import differences
 from blocksim.errors import ExitCode, InvalidInputError, ScenarioError
 from blocksim.scenario import Scenario, scenario_from_mapping
-from blocksim.simulation import Result, run_ensemble, schemes, simulate, simulate_into
+from blocksim.simulation import Result, run_ensemble, schemes, simulate
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.loop import BY_CODE, diagnose
 from blocksim.simulation.schemes import build
@@ -29,8 +29,6 @@ from blocksim.world.describe import describe
 from blocksim.world.free_memory import chunk_rows
 from blocksim.world.systems import INTERACTIONS
 from blocksim.world.systems.soils import SOILS
-from tests.simulation.sliding import assert_same, interrupted_at
-from tests.sizes import in_all
 from tests.soils import DEPTH, FAR, LEFT, UNIT_WEIGHT, Soil, column, data_of, right, scene
 from tests.view.made_up import toppling
 
@@ -167,18 +165,6 @@ def test_bits_do_not_depend_on_the_number_of_threads_nor_on_interruptions(
         assert np.abs(soils[name][1] - soils[name][0]).max() < 0.5 * SPACING  # nobody has changed places
     assert soils["syy"][0][0] < 0.0
     assert set(soils.columns()) >= {"x_mm", "sxx_Pa", "plastic_strain"}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("material", ["rods", "clay"])
-def test_twenty_interruptions_of_a_run_with_soil_change_no_bit(tmp_path: Path, material: str) -> None:
-    scenario = collapse(0.05, 0.001, material=material)
-    whole = simulate_into(scenario, tmp_path / "whole")
-    steps = np.random.default_rng(20).choice(np.arange(1, whole.summary.steps), in_all(20), replace=False)
-    stopped = interrupted_at(scenario, tmp_path / "parts", sorted(steps.tolist()))
-    resumed = simulate_into(scenario, tmp_path / "parts", resume=True)
-    assert resumed.summary.resumed_from == tuple(stopped) == tuple(sorted(steps.tolist()))
-    assert_same(resumed, whole)
 
 
 PROBE = {"kind": "force", "on": "1", "by": "column", "every": "step"}
