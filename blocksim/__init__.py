@@ -8,9 +8,9 @@
 True
 
 Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). Runs: `run`, `open_run`; a result has
-`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `limit_curve`, `fragility`,
-`calibrate`, `sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions have the
-options of the command of the same name.
+`final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `limit_curve`, `static_limit`,
+`fragility`, `calibrate`, `sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions
+have the options of the command of the same name.
 """
 
 from importlib import import_module
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from blocksim.study.report import report
     from blocksim.study.run import open_run, run
     from blocksim.study.sensitivity import sensitivity
+    from blocksim.study.static_limit import static_limit
     from blocksim.study.sweep import sweep
 
 __version__ = "0.3.0"
@@ -47,6 +48,7 @@ __all__ = [
     "report",
     "run",
     "sensitivity",
+    "static_limit",
     "sweep",
 ]
 
@@ -67,6 +69,7 @@ _HOMES = {
     "report": ("blocksim.study.report", "report"),
     "run": ("blocksim.study.run", "run"),
     "sensitivity": ("blocksim.study.sensitivity", "sensitivity"),
+    "static_limit": ("blocksim.study.static_limit", "static_limit"),
     "sweep": ("blocksim.study.sweep", "sweep"),
 }
 

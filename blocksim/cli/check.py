@@ -4,10 +4,12 @@ import math
 import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Annotated
 
 from blocksim.cli import command_line, output, prepare
+from blocksim.errors import InvalidInputError
 from blocksim.options import Option
 from blocksim.scenario import (
     PlacedBody,
@@ -22,10 +24,12 @@ from blocksim.scenario import (
 )
 from blocksim.scenario.models import loads, timeline
 from blocksim.simulation.instruments import bytes_of_series
+from blocksim.statics.blockwork import Blockwork
 from blocksim.study.rows import check_experiment
 from blocksim.world import describe, free_memory, memory
 
 MOST_BODIES = 12
+MOST_STATIC = 300  # blocks: more would take longer than all the rest
 MOST_LINES = 8  # of events, loads or probes
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
 PAIR_COLUMNS = {
@@ -93,6 +97,7 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         if rigid.warning:
             yield f"warning: {rigid.warning}"
     yield from _unscaled(scenario, description.bodies)
+    yield from _statics(scenario)
     until_rest = ", less if it stops at rest" if scenario.time.stop_at_rest else ""
     yield f"solving    at most about {output.duration(description.seconds)} on one core{until_rest}"
     program = free_memory.readable(memory.PROCESS_BYTES)
@@ -127,6 +132,23 @@ def _limits(limits: describe.StepLimits | None) -> list[str]:
     more = f"{max(ratio, 1.0 / ratio):.0f} times as many steps as without them"
     cure = f"contact.stiffness_scale = {limits.scale:.1g} makes both equal"
     return [f"           {steps}", f"warning: because of the {who} {more}:", f"         {cure}"]
+
+
+def _statics(scenario: Scenario) -> Iterator[str]:
+    """Yield whether the blocks are in equilibrium as they are placed, where statics has an answer."""
+    with suppress(InvalidInputError):
+        blocks = Blockwork.of(scenario)
+        if len(blocks.names) > MOST_STATIC:
+            return
+        from blocksim.statics.programme import horizontal_margin
+
+        margin = horizontal_margin(blocks)
+        if margin is None:
+            yield "statics    no equilibrium: it cannot stand as it is placed"
+        elif math.isfinite(margin):
+            yield f"statics    in equilibrium, up to a horizontal acceleration of {margin:.3g} g at most"
+        else:
+            yield "statics    in equilibrium, whatever the horizontal acceleration"
 
 
 def _unscaled(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:

@@ -26,6 +26,9 @@ def limit_command(
     *,
     over: limit_plan.OtherKey = None,
     both_laws: Annotated[bool, Option("Search with springs and with rigid contacts, and compare.")] = False,
+    static: Annotated[
+        bool, Option("By statics alone, without a run: a bound beyond which no equilibrium exists.")
+    ] = False,
     no_runs: Annotated[bool, Option("Keep no runs of both sides of a bracket, which plot and report show.")] = False,
     screen: command_line.Screen,
 ) -> command_line.Report:
@@ -39,6 +42,13 @@ def limit_command(
     Example: blocksim limit scenarios/tilting_wall.toml --vary ground.tilt=20deg:40deg
     """
     document = source.document()
+    if static:
+        if both_laws or over is not None:
+            raise typer.BadParameter("statics has one key and no law; leave --both-laws and --over out")
+        from blocksim.study import static_limit
+
+        bound = static_limit.find_static(limit_plan.read_limit(document, options), options)
+        return command_line.report_of([bound], {"folder": str(bound.folder), **bound.to_dict()})
     if over is not None:
         if both_laws:
             raise typer.BadParameter(

@@ -32,6 +32,7 @@ STUDIES = {
     "fragility": "blocksim.study.fragility:FRAGILITY",
     "limit": "blocksim.study.limit:LIMIT",
     "limits": "blocksim.study.limit:CURVE",
+    "static": "blocksim.study.static_limit:STATIC",
 }
 """Studies by the name of their files; each is imported where it is needed."""
 

@@ -61,6 +61,7 @@ MOST_LEVELS = 4  # stiffnesses
 MOST_PICTURED = 3  # brackets whose sides are kept
 SHARPER = 0.8  # of the tolerance: what is extrapolated from two brackets is wider than the narrower one
 HALF = 0.5
+ASIDE = 0.49  # of the tolerance: how far from a static bound runs are expected to stand and to fall
 NO_STIFFER = "with springs {ratio:g} times as stiff there is no such limit in the range"
 NO_FINER = "with half the time step there is no such limit in the range"
 STILL_FAR = "limits of the last two stiffnesses are too far apart to be extrapolated well; give stiffer springs"
@@ -319,8 +320,15 @@ class _Search:
         """Return the answer, after all runs that it takes."""
         plan, folder = self.plan, self.runs.manifest.path.parent
         has_islands = plan.scenario.motion is not None  # a value may fall between others that stand: supports move
+        bound, near = (None, None) if plan.has_scan else self._foretold()
 
         def choose(rows: Rows) -> list[Number]:
+            if near is not None:
+                verdicts = plan.verdicts(rows)
+                values = limit_plan.next_near(plan.span, verdicts, near, plan.tolerance)
+                changes = [(one.below, one.above) for one in limit_plan.changes_in(verdicts)]
+                if values or changes == [(near.below, near.above)]:
+                    return values
             known = rows.items() if has_islands else ()
             peaks = {at: float(str(row[observables.PEAK])) for at, row in known if observables.PEAK in row}
             return limit_plan.next_values(plan.span, plan.verdicts(rows), plan.tolerance, peaks)
@@ -329,8 +337,20 @@ class _Search:
         brackets = [self._bracket(change, rows) for change in limit_plan.changes_in(plan.verdicts(rows))]
         others, is_as_given = (self.stiff_rows, self.step_rows), self.stiffer is False
         return limit_answer.LimitAnswer.of(
-            plan, folder, rows, brackets, *others, run=self.runs.new, is_as_given=is_as_given
+            plan, folder, rows, brackets, *others, run=self.runs.new, is_as_given=is_as_given, static_bound=bound
         )
+
+    def _foretold(self) -> tuple[float | None, Change[Stability] | None]:
+        """Return the value beyond which statics knows no equilibrium, and a bracket about it; none of several."""
+        from blocksim.study import static_limit  # noqa: PLC0415 - scipy takes a third of a second
+
+        plan, limit = self.plan, static_limit.bound_of(self.plan)
+        if limit is None or plan.span.is_whole:
+            return None, None
+        below, above = (Stability.FALLS if side == static_limit.NONE else Stability.STANDS for side in limit.sides)
+        width = ASIDE * plan.tolerance * abs(limit.bound)
+        low, high = (plan.span.clip(limit.bound + side * width) for side in (-1.0, 1.0))
+        return limit.bound, Change(low, high, below, above)
 
     def _searched(self, plan: LimitPlan, choose: Callable[[Rows], list[Number]]) -> dict[Number, Row]:
         """Go from round to round and return what it needed; rows of an earlier search are taken as they are."""
@@ -488,16 +508,11 @@ def with_sides(answer: limit_answer.LimitAnswer) -> limit_answer.LimitAnswer:
 
 def repeat_limit(answer: limit_answer.LimitAnswer, execution: sweep.Replay, out: Path) -> limit_answer.LimitAnswer:
     """Search again, with stiffer springs or not as in the first way that leads to the answer, or to any."""
-    ends: dict[str, object] = {"from": answer.low, "to": answer.high}
-    if answer.is_whole:
-        ends = {"from": int(answer.low), "to": int(answer.high)}
-    elif answer.unit:
-        ends = {name: f"{value:.12g} {answer.unit}" for name, value in ends.items()}
-    span = {**ends, "count": answer.count, **({"scale": "log"} if answer.is_log else {})}
     document = Document.read(answer.folder / answer.files.plan, is_stored=True)
-    options = limit_plan.LimitOptions(
-        {answer.key: span}, stands=answer.stands, tolerance=answer.tolerance, keep_runs=False
-    )
+    vary = answer.vary
+    if answer.static_bound is not None:  # nothing was scanned
+        del vary[answer.key]["count"]
+    options = limit_plan.LimitOptions(vary, stands=answer.stands, tolerance=answer.tolerance, keep_runs=False)
     plan = limit_plan.read_limit(document, options)
     tried: list[limit_answer.LimitAnswer] = []
     for stiffer in (None, True, False):  # what was asked for is not kept

@@ -170,12 +170,9 @@ class Bracket(BaseModel, frozen=True):
             yield f"warning: {turned}, as springs give way; the limit is off by some {self.give.share:.1%}; {hint}"
 
 
-class LimitAnswer(Answer, frozen=True):
-    """The brackets of a search, from the smallest value up; none where nothing changes."""
+class RangeAnswer(Answer, frozen=True):
+    """What was found along a key, and where it was searched."""
 
-    files: ClassVar[FolderKind] = FolderKind("limit", "a limit", "limit", {r"limit\.csv": rf"value{UNIT},verdict,.*"})
-    picture: ClassVar[str] = "mechanism"
-    caption: ClassVar[str] = "Both sides of every bracket"
     key: str
     unit: str
     low: float = Field(alias="from")
@@ -183,10 +180,37 @@ class LimitAnswer(Answer, frozen=True):
     count: int
     is_log: bool
     is_whole: bool
+
+    @staticmethod
+    def fields_of(plan: LimitPlan) -> dict[str, object]:
+        """Return these fields by their names in JSON, and the tolerance."""
+        span = plan.span
+        ends = {"from": span.low, "to": span.high, "count": span.count}
+        kinds = {"is_log": span.is_log, "is_whole": span.is_whole, "tolerance": plan.tolerance}
+        return {"key": plan.key, "unit": plan.unit, **ends, **kinds}
+
+    @property
+    def vary(self) -> dict[str, dict[str, object]]:
+        """The key and its range, as they are given to a search."""
+        ends: dict[str, object] = {"from": self.low, "to": self.high}
+        if self.is_whole:
+            ends = {"from": int(self.low), "to": int(self.high)}
+        elif self.unit:
+            ends = {name: f"{value:.12g} {self.unit}" for name, value in ends.items()}
+        return {self.key: {**ends, "count": self.count, **({"scale": "log"} if self.is_log else {})}}
+
+
+class LimitAnswer(RangeAnswer, frozen=True):
+    """The brackets of a search, from the smallest value up; none where nothing changes."""
+
+    files: ClassVar[FolderKind] = FolderKind("limit", "a limit", "limit", {r"limit\.csv": rf"value{UNIT},verdict,.*"})
+    picture: ClassVar[str] = "mechanism"
+    caption: ClassVar[str] = "Both sides of every bracket"
     stands: str
     tolerance: float
     scheme: str
     stiffness_scale: float | None
+    static_bound: float | None = None  # beyond it no equilibrium exists; the search began there
     runs: int
     brackets: tuple[Bracket, ...] = Field(alias="changes")
     is_as_given: bool = Field(default=False, exclude=True)  # neither stiffness nor step was corrected
@@ -205,6 +229,7 @@ class LimitAnswer(Answer, frozen=True):
         *,
         run: int,
         is_as_given: bool,
+        static_bound: float | None = None,
     ) -> Self:
         """Make the answer of a search; `stiffer` has rows by stiffness scale, `finer` by time step (s)."""
         scenario = plan.scenario
@@ -220,18 +245,13 @@ class LimitAnswer(Answer, frozen=True):
             for stiff, step, more in searches
             for value, row in sorted(more.items())
         ]
-        span = vars(plan.span)
         return cls.model_validate(
             {
-                "key": plan.key,
-                "unit": plan.unit,
-                "from": plan.span.low,
-                "to": plan.span.high,
-                **{name: span[name] for name in ("count", "is_log", "is_whole")},
+                **cls.fields_of(plan),
                 "stands": plan.criterion.text,
-                "tolerance": plan.tolerance,
                 "scheme": scenario.time.scheme,
                 "stiffness_scale": scale,
+                "static_bound": static_bound,
                 "runs": len(cells),
                 "changes": brackets,
                 "folder": folder,
@@ -299,6 +319,7 @@ class LimitAnswer(Answer, frozen=True):
         if not lines:
             answer = "" if plan is None else f": {sides[0].verdict.value} at all {len(self.rows)} values"
             lines = [f"no change from {with_unit(self.low, self.unit)} to {with_unit(self.high, self.unit)}{answer}"]
+        lines += self._statics()
         about = {"key": self.key, "stands means": self.stands, "contacts": contacts, "runs": str(self.runs)}
         found = lines if self.brackets else ["nothing changes within the range"]
         return Overview(
@@ -311,6 +332,18 @@ class LimitAnswer(Answer, frozen=True):
             summary=[*about.items(), *(("limit", line) for line in found)],
             code=ExitCode.SUCCESS if self.brackets else ExitCode.OUTSIDE,
         )
+
+    def _statics(self) -> Iterator[str]:
+        """Yield the bound by statics, where the search began there, and whether a run stands beyond it."""
+        bound = self.static_bound
+        if bound is None:
+            return
+        for one in self.limits:
+            is_up = one.above is Stability.FALLS
+            yield f"no equilibrium {'above' if is_up else 'below'} {with_unit(bound, self.unit)} (statics)"
+            beyond = one.low - bound if is_up else bound - one.high
+            if beyond > self.tolerance * abs(bound):
+                yield f"warning: runs stand beyond what statics can carry, by {beyond / abs(bound):.2%}"
 
     def warnings(self) -> list[str]:
         """Return what springs do to limits that are not those of stiff contacts."""

@@ -1,11 +1,12 @@
 """What a search for a limit needs: key, range and criterion, and which values to try next from those known.
 
-First a scan of evenly spaced values, as there may be more than one change. What rocks under a moving support may fall
-in an island between two of them: so the scan is denser, down to a quarter of its spacing, beside values at which the
-largest rotation is larger than at both neighbours. Narrower islands are not seen. Then every pair of neighbours with
-different verdicts is divided in three, until it is as narrow as wanted: two values a round run side by side, and four
-rounds narrow a bracket 81 times. What is tried depends on the answers of whole rounds alone, so neither on the number
-of threads nor on when a search was stopped and resumed.
+Where statics bounds what a structure can carry (static_limit.py), the search begins there. Else, and where a scan is
+asked for, it begins with evenly spaced values, as there may be more than one change. What rocks under a moving support
+may fall in an island between two of them: so the scan is denser, down to a quarter of its spacing, beside values at
+which the largest rotation is larger than at both neighbours. Narrower islands are not seen. Then every pair of
+neighbours with different verdicts is divided in three, until it is as narrow as wanted: two values a round run side by
+side, and four rounds narrow a bracket 81 times. What is tried depends on the answers of whole rounds alone, so neither
+on the number of threads nor on when a search was stopped and resumed.
 
 Gravity that comes at once is an impact: contacts that slip or open under it shift limits of arches and walls by 0.2 to
 4 %. What is searched along a load that is there from the beginning on is the limit of a structure that carries it, so
@@ -25,10 +26,11 @@ import numpy as np
 from blocksim.errors import BlocksimError, InvalidInputError
 from blocksim.options import Option, Overwrite, takes
 from blocksim.scenario import Document, Scenario, overlap, overrides, place_bodies, place_segments, scenario_hash, units
-from blocksim.scenario.models import loads, study, timeline
+from blocksim.scenario.models import study, timeline
 from blocksim.scenario.placement import smallest_width
 from blocksim.silence import silent
 from blocksim.simulation.provenance import code_hash
+from blocksim.statics.blockwork import why_not_sustained
 from blocksim.study import answer, criterion, executors, manifest
 from blocksim.study.criterion import Criterion, Stability
 from blocksim.study.plan import RANGE, Values, Variations, build_distributions, levels_of, variations_option
@@ -109,13 +111,13 @@ class SearchOptions(executors.Execution):
         ),
     ] = TOLERANCE
     scan: Annotated[
-        int,
+        int | None,
         Option(
-            "How many values are scanned first. An island between two of them, in which other things happen, is not "
-            "seen.",
+            "How many values are scanned first (default: 9; none where statics says where to begin). An island between "
+            "two of them, in which other things happen, is not seen.",
             metavar="N",
         ),
-    ] = SCANNED
+    ] = None
     stiffer: Annotated[
         bool | None,
         Option(
@@ -262,15 +264,9 @@ def is_sustained(scenario: Scenario) -> bool:
 
     A free block is to drop that has no other, no wall and not the ground near it.
     """
+    if why_not_sustained(scenario):
+        return False
     placed, segments = place_bodies(scenario), place_segments(scenario)
-    if scenario.motion is not None or scenario.events or scenario.systems:
-        return False
-    if any(body.driven or body.vx or body.vy or body.spin for body in placed):
-        return False
-    for load in scenario.loads:
-        stretches = loads.stretches_of(load, scenario.ground.tilt)
-        if any(stretch.rate != 0.0 or stretch.value != stretches[0].value for stretch in stretches):
-            return False
     outlines = overlap.Outlines.of(placed)
     if segments:
         outlines = outlines.and_pieces(overlap.Outlines.along(segments))
@@ -306,6 +302,11 @@ def numeric_levels(document: Document, given: Variations, option: str) -> tuple[
     return head, dict(sorted(levels.items()))
 
 
+def setting(key: str, number: Number, unit: str, *, is_whole: bool) -> dict[str, object]:
+    """Return a value of a key as it is set in a document."""
+    return {key: int(number) if is_whole else f"{number:.12g} {unit}" if unit else number}
+
+
 @dataclass(frozen=True)
 class LimitPlan:
     """One search."""
@@ -316,6 +317,7 @@ class LimitPlan:
     span: SearchRange
     criterion: Criterion
     tolerance: float  # of a bracket, relative to its ends
+    has_scan: bool = True  # all values of the range are scanned; if not, statics says where to begin
     apart: Mapping[str, object] = field(default_factory=dict)  # settings in which its runs differ from the document
 
     @cached_property
@@ -325,8 +327,7 @@ class LimitPlan:
 
     def settings(self, number: Number) -> dict[str, object]:
         """Return what distinguishes the run of a value from the document."""
-        value = int(number) if self.span.is_whole else f"{number:.12g} {self.unit}" if self.unit else number
-        return {self.key: value, **self.apart}
+        return {**setting(self.key, number, self.unit, is_whole=self.span.is_whole), **self.apart}
 
     def scenario_at(self, number: Number) -> Scenario:
         """Return the scenario at a value. Raises ScenarioError where the value does not go with the others."""
@@ -387,7 +388,7 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     if not isinstance(table, Mapping) or not {"from", "to"} <= set(table):
         message = f"{OPTION} {given.texts[key]}: a range is needed, as in {key}=FROM:TO or {key}=FROM:TO:COUNT"
         raise InvalidInputError(message)
-    count = table.get("count", options.scan)
+    count = table.get("count", SCANNED if options.scan is None else options.scan)
     if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_SCANNED:
         raise InvalidInputError(f"{count} values cannot be scanned; a whole number from 2 to {MOST_SCANNED} is needed")
     ends: dict[str, Any] = {name: table[name] for name in table if name != "count"}
@@ -401,7 +402,8 @@ def read_limit(document: Document, options: LimitOptions) -> LimitPlan:
     is_whole = takes_whole(bare, key) and all(type(ends[end]) is int for end in ("from", "to"))
     count = min(count, int(high - low) + 1) if is_whole else count  # every whole number that fits
     span = SearchRange(low, high, count, is_log=values.scale == "log", is_whole=is_whole)
-    plan = LimitPlan(bare, key, unit, span, stands, tolerance)
+    has_scan = "count" in table or options.scan is not None
+    plan = LimitPlan(bare, key, unit, span, stands, tolerance, has_scan)
     at_ends = []
     for number in (low, high):
         try:

@@ -14,8 +14,9 @@ from blocksim.simulation.rest_state import SettleError, settle
 from blocksim.simulation.schemes import ALONE, build
 from blocksim.verification.scene import scenario_of
 from blocksim.world.bodies import layout_of
+from blocksim.world.joints import ContactJoint, joints_of
 from blocksim.world.nonsmooth import build_nonsmooth
-from blocksim.world.rigid_step import USUAL_STEP, ContactJoint, joints_of, thrust_shift
+from blocksim.world.rigid_step import USUAL_STEP, thrust_shift
 from tests.verification.test_arches import RADIUS, limit_analysis
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Static limit analysis: what rigid blocks with dry friction can carry at all, by linear programmes."""

@@ -1,0 +1,142 @@
+"""Forces in the joints of a structure with the line of thrust, and the mechanism that statics finds beyond them."""
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from blocksim.scenario import Scenario, place_bodies
+from blocksim.simulation.trajectory import Frames
+from blocksim.statics.joint_forces import BlockMotion, JointForce
+from blocksim.view import arrows, mechanism, paints, run_data, scene, style
+
+WIDTH, TALLEST, LEAST_WIDTH = 7.2, 3.6, 3.0  # inches
+SIDE, GAP, HEAD = 0.12, 0.16, 0.36  # inches
+MOVED = 0.5  # of the smallest side of all blocks: the largest way in the picture of a mechanism
+LOADED = 1e-6  # of the greatest force: joints with less are not drawn
+BAR = 0.45  # of the mean side of the blocks: half the length of a bar of the greatest force
+THICK, THIN = 3.2, 0.7  # points: bars of the greatest force, and of none
+AT_AN_EDGE = 1e-3  # of a joint: a force that near to its end makes a hinge
+PAIR = 2
+FORCE: dict[str, Any] = {"colors": style.MEASURED_COLOUR, "capstyle": "round", "zorder": 3.2}
+LINE: dict[str, Any] = {"colors": style.INK, "linewidths": 1.0, "linestyles": [(0, (3, 2))], "zorder": 3.1}
+PALE = "#F4F4F4"
+NOTES = (
+    "Bars: forces in joints, in their direction; length and width go with the root of the force. Dashed: line of "
+    "thrust through blocks with two loaded joints. One of several equilibria, and one of several mechanisms, where "
+    "there is more than one."
+)
+
+
+class _Bar(NamedTuple):
+    """A force in a joint, as it is drawn."""
+
+    line: run_data.Floats  # (2, 2) m
+    share: float  # root of the force over the greatest
+
+
+def draw_thrust(
+    scenario: Scenario,
+    joints: Sequence[JointForce],
+    motions: Sequence[BlockMotion],
+    heads: Sequence[str],
+    path: Path,
+    title: str | None = None,
+    paper: style.Paper = style.OWN,
+) -> None:
+    """Draw joints with their forces, and the mechanism beside them, and write PNG, SVG or PDF.
+
+    `heads` stand above both panels. The same input gives the same bytes. Raises InvalidInputError for an unknown
+    picture format or too small a page, OutputError.
+    """
+    path = style.picture_path(path)
+    frames, support = _frames(scenario, motions), run_data.support_of(scenario)
+    acts = arrows.actions_on(frames, np.array([0]), support)
+    width = paper.width(WIDTH, LEAST_WIDTH)
+    across = 0.5 * (width - GAP)
+    notes = style.break_lines(NOTES, width - 2.0 * SIDE)
+    foot = style.LINE * (len(notes) + 1) + style.EDGE
+    tallest = min(paper.panel(TALLEST, 1, HEAD + HEAD + foot, mechanism.LOWEST), TALLEST)
+    extent = arrows.with_room(run_data.extent_of(frames, np.array([0, 1]), support), acts)[0]
+    page = scene.page_for(extent, across, tallest, (SIDE, HEAD, 0.0))
+    height = paper.height(HEAD + page.height + foot)
+    handles = [
+        style.legend_entry("force in a joint", color=style.MEASURED_COLOUR, linewidth=2.0),
+        style.legend_entry("hinge", linestyle="none", **mechanism.HINGE),
+        style.legend_entry("all friction in use", **mechanism.SLIDING),
+    ]
+    paint = paints.Paint(lambda _: [PALE] * len(frames.names))
+    with style.open_figure(width, height, paper.dots) as figure:
+        for number, head in enumerate(heads):
+            left = number * (across + GAP)
+            canvas = page.canvas(figure, left + SIDE, height - 2.0 * HEAD - page.panel_height)
+            shown = scene.Scene(frames, support, paint, with_tops=False)
+            scene.draw_scene(canvas, shown, number)
+            if number == 0:
+                _draw_joints(canvas, frames, joints)
+                arrows.draw_actions(canvas, acts, 0, arrows.LENGTH * max(page.extent.width, page.extent.height))
+            else:
+                start = scene.corners(frames, 0)
+                style.add_lines(canvas.axes, np.concatenate([start, start[:, :1]], axis=1), **scene.START_LINE,
+                    zorder=scene.START, transform=canvas.scene)  # fmt: skip
+            scene.finish_panel(canvas, labelled=False, is_numbered=False)
+            text = style.cut_to(head, page.panel_width * style.POINTS_PER_INCH, style.FONT_SIZE)
+            style.write_text(figure, left + SIDE, height - HEAD - style.LINE, text)
+        style.write_legend(figure, handles, SIDE, style.EDGE + style.LINE * len(notes), ncols=3, handlelength=1.6)
+        style.write_text(figure, SIDE, style.EDGE, "\n".join(notes), color=style.FAINT_INK, va="bottom")
+        style.write_heading(figure, title, SIDE)
+        style.save_figure(figure, path)
+
+
+def _frames(scenario: Scenario, motions: Sequence[BlockMotion]) -> Frames:
+    """Return the blocks as they are placed, and as they are when they have moved a little in the mechanism."""
+    placed = place_bodies(scenario)
+    ways = {one.block: (one.x_m, one.y_m, one.turn_rad) for one in motions}
+    moved = np.array([ways.get(body.name, (0.0, 0.0, 0.0)) for body in placed])
+    smallest = min(body.least_width for body in placed)
+    start = np.array([(body.x, body.y, body.angle) for body in placed])
+    x, y, angle = np.stack([start, start + MOVED * smallest * moved]).transpose(2, 0, 1)
+    rest = np.zeros_like(x)
+    most = max(len(body.corners) for body in placed)
+    corners = np.array([[*body.corners, *[body.corners[-1]] * (most - len(body.corners))] for body in placed])
+    size_x, size_y = np.array([(body.size_x, body.size_y) for body in placed]).T
+    names = tuple(body.name for body in placed)
+    return Frames(np.arange(2), np.zeros(2), x, y, angle, rest, rest, rest, {}, np.zeros(2), np.zeros(2), names,
+        size_x, size_y, start[:, 2], outlines=corners)  # fmt: skip
+
+
+def _draw_joints(canvas: scene.Canvas, frames: Frames, joints: Sequence[JointForce]) -> None:
+    """Draw the forces of joints, the line of thrust, hinges and sliding joints."""
+    forces = {id(one): float(np.hypot(one.compression, one.shear)) for one in joints}
+    greatest = max(forces.values(), default=0.0)
+    loaded = [one for one in joints if forces[id(one)] > LOADED * greatest]
+    side = 0.5 * float(frames.size_x.mean() + frames.size_y.mean())
+    bars = []
+    places: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    for one in loaded:
+        normal = np.array(one.normal)
+        force = one.compression * normal + one.shear * np.array([-normal[1], normal[0]])
+        share = float(np.sqrt(forces[id(one)] / greatest))
+        half = BAR * side * share * force / forces[id(one)]
+        place = np.array([one.x_m, one.y_m])
+        bars.append(_Bar(np.stack([place - half, place + half]), share))
+        for name in (one.one, one.other):
+            if name is not None:
+                places[name].append((one.x_m, one.y_m))
+    lines = [run_data.MILLIMETRES * np.array(pair) for pair in places.values() if len(pair) == PAIR]
+    style.add_lines(canvas.axes, lines, **LINE, transform=canvas.scene)
+    widths = [THIN + (THICK - THIN) * bar.share for bar in bars]
+    style.add_lines(
+        canvas.axes, [run_data.MILLIMETRES * bar.line for bar in bars], linewidths=widths, **FORCE,
+        transform=canvas.scene,
+    )  # fmt: skip
+    for one in loaded:
+        ends = run_data.MILLIMETRES * np.array(one.ends_m)
+        if one.slides:
+            canvas.axes.plot(*ends.T, transform=canvas.scene, solid_capstyle="butt", **mechanism.SLIDING)
+        elif len(ends) == PAIR and one.margin_m < AT_AN_EDGE * math.dist(*one.ends_m):
+            canvas.axes.plot(run_data.MILLIMETRES * one.x_m, run_data.MILLIMETRES * one.y_m, transform=canvas.scene,
+                **mechanism.HINGE)  # fmt: skip

@@ -1,0 +1,219 @@
+"""Static limit analysis against published factors and closed forms: walls, arches, wedges, blocks on slopes."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import load_scenario
+from blocksim.statics.blockwork import Blockwork
+from blocksim.statics.joint_forces import joint_forces
+from blocksim.statics.programme import Equilibrium, Programme, horizontal_margin
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+EXACT = 1e-4  # relative
+G = 9.81
+STONE = {"stone": {"density": 2000.0, "young_modulus": 1e10, "poisson_ratio": 0.2}}
+TIME = {"scheme": "nonsmooth", "end": 1.0}
+
+
+def blockwork(friction: float, **tables: Any) -> Blockwork:
+    """Return the blocks of a scenario in one material; every block is given by its width and height (m)."""
+    rules = {"block_block": friction, "block_ground": friction}
+    return Blockwork.of(
+        load_scenario({"schema": 1, "name": "s", "materials": STONE, "friction": rules, "time": TIME, **tables})
+    )
+
+
+def brick(width: float, height: float, depth: float = 1.0) -> dict[str, object]:
+    return {"width": width, "height": height, "length": depth, "material": "stone"}
+
+
+def least_thickness(friction: float, count: int = 27) -> float:
+    """Return the thickness over the radius at which a semicircular arch just carries itself."""
+    low, high = 0.05, 0.3
+    while high - low > 1e-6:
+        middle = 0.5 * (low + high)
+        arch = {"kind": "arch", "block": "v", "radius": 1.0, "thickness": middle, "embrace": "180 deg", "count": count}
+        blocks = blockwork(friction, blocks={"v": {"depth": 1.0, "material": "stone"}}, structures=[arch])
+        low, high = (low, middle) if Programme(blocks).carries(blocks.forces).factor else (middle, high)
+    return 0.5 * (low + high)
+
+
+def flush_wall(courses: int, whole: int, width: float, height: float, first: str = "whole") -> list[dict[str, Any]]:
+    """Return a wall in running bond whose ends are closed by halves."""
+    bodies = []
+    for course in range(courses):
+        is_whole = (course % 2 == 0) == (first == "whole")
+        pieces = [1.0] * whole if is_whole else [0.5, *[1.0] * (whole - 1), 0.5]
+        x = 0.0
+        for piece in pieces:
+            name = "brick" if piece == 1.0 else "half"
+            bodies.append({"block": name, "x": x + 0.5 * piece * width, "y": (course + 0.5) * height})
+            x += piece * width
+    return bodies
+
+
+def pushed(blocks: Blockwork, sign: float = 1.0) -> Equilibrium:
+    found = Programme(blocks).greatest(blocks.forces, sign * blocks.horizontal)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("friction", "thickness"), [(0.75, 0.10672), (0.375, 0.12597), (0.35, 0.15118), (0.325, 0.17821)]
+)
+def test_least_thickness_of_an_arch_of_27_voussoirs_is_the_published_one(friction: float, thickness: float) -> None:
+    assert least_thickness(friction) == pytest.approx(thickness, rel=EXACT)
+
+
+def test_wall_one_of_ferris_and_tin_loi_has_their_bound_and_nearly_their_least_factor() -> None:
+    blocks = Blockwork.of(load_scenario("scenarios/tilting_wall.toml", {"ground.tilt": "0 deg"}))
+    for sign in (1.0, -1.0):  # the wall is symmetric
+        found = pushed(blocks, sign)
+        assert found.factor == pytest.approx(0.64286, rel=EXACT)
+        estimate = Programme(blocks).estimate(blocks.forces, sign * blocks.horizontal, found.factor)
+        assert 0.63982 * (1.0 - EXACT) < estimate < 0.63982 * 1.0005
+
+
+@pytest.mark.parametrize(("force", "peak"), [(44.8e3, 15.89), (104.8e3, 38.53), (254.8e3, 95.14)])
+def test_a_dry_granite_wall_carries_the_force_at_its_head_that_a_linear_programme_by_hand_gives(
+    force: float, peak: float
+) -> None:
+    """Vasconcelos & Lourenco (2009): 1 x 1.2 m, eight courses; another programme has 15.9, 38.6 and 95.2 kN."""
+    weight = 4.8e3
+    beam = {"block": "beam", "name": "beam", "x": 0.5, "y": 1.325}
+    loads: Sequence[Mapping[str, object]] = [
+        {"kind": "force", "body": "beam", "magnitude": force - weight, "direction": "-90 deg"},
+        {"kind": "force", "body": "beam", "magnitude": 1.0},
+    ]
+    granite = STONE["stone"] | {"density": weight / G / (1.0 * 1.2 * 0.2)}
+    sizes = {"brick": brick(0.2, 0.15, 0.2), "half": brick(0.1, 0.15, 0.2)}
+    blocks = blockwork(
+        0.65,
+        gravity=G,
+        materials={"stone": granite, "light": granite | {"density": 1e-3}},
+        blocks={**sizes, "beam": brick(1.0, 0.25, 0.2) | {"material": "light"}},
+        bodies=[*flush_wall(8, 5, 0.2, 0.15), beam],
+        loads=loads,
+    )
+    live = np.zeros_like(blocks.forces)
+    live[blocks.names.index("beam"), 0] = 1.0
+    found = Programme(blocks).greatest(blocks.forces - live, live)
+    assert found is not None
+    assert 1e-3 * found.factor == pytest.approx(peak, abs=0.005)
+
+
+@pytest.mark.parametrize(("friction", "width", "height"), [(0.3, 0.3, 0.2), (0.9, 0.1, 0.4)])
+def test_a_block_slides_at_its_friction_or_topples_about_its_edge(friction: float, width: float, height: float) -> None:
+    blocks = blockwork(
+        friction, blocks={"b": brick(width, height)}, bodies=[{"block": "b", "x": 0.0, "y": 0.5 * height}]
+    )
+    found = pushed(blocks)
+    assert found.factor == pytest.approx(min(friction, width / height), rel=1e-9)
+    ((x, y, turn),) = found.mechanism
+    is_sliding = friction < width / height
+    assert (abs(turn) < 1e-9) == is_sliding
+    # it opens as it slides, by the coefficient of friction; about its right edge it turns clockwise
+    assert y / x == pytest.approx(friction if is_sliding else width / height, rel=1e-6)
+    (joint,) = joint_forces(blocks, found)
+    assert joint.slides == is_sliding
+    assert joint.compression == pytest.approx(-blocks.forces[0, 1])
+    if not is_sliding:
+        assert joint.margin_m == pytest.approx(0.0, abs=1e-9)
+        assert joint.x_m == pytest.approx(0.5 * width)
+
+
+@pytest.mark.parametrize("angle", [20.0, 35.0, 50.0])
+def test_a_wedge_between_two_fixed_slopes_carries_what_both_friction_cones_allow(angle: float) -> None:
+    """A triangle on its tip, pushed up: P = W tan(angle + phi) on the slope that it climbs, the other one opens."""
+    half, height = 0.1 * math.tan(math.radians(90.0 - angle)), 0.1
+    tip = {"outline": [[0.0, 0.0], [half, height], [-half, height]], "depth": 1.0, "material": "stone"}
+    slopes = [[[0.0, 0.0], [2.0 * half, 0.0], [2.0 * half, 2.0 * height]], [[0.0, 0.0], [-2.0 * half, 2.0 * height],
+        [-2.0 * half, 0.0]]]  # fmt: skip
+    friction = 0.2
+    sides = {f"slope_{k}": {"outline": one, "depth": 1.0, "material": "stone"} for k, one in enumerate(slopes)}
+    centres = [np.mean(one, axis=0) for one in slopes]
+    fixed = [{"block": f"slope_{k}", "x": x, "y": y, "fixed": True} for k, (x, y) in enumerate(centres)]
+    wedge = {"block": "tip", "x": 0.0, "y": 2.0 / 3.0 * height}
+    blocks = blockwork(friction, blocks={"tip": tip, **sides}, bodies=[wedge, *fixed])
+    expected = math.tan(math.radians(angle) + math.atan(friction))
+    for sign in (1.0, -1.0):
+        assert pushed(blocks, sign).factor == pytest.approx(expected, rel=EXACT)
+
+
+def test_forces_are_in_equilibrium_and_in_their_cones_and_the_mechanism_does_the_work_that_the_factor_says() -> None:
+    sizes = {"brick": brick(0.2, 0.1), "half": brick(0.1, 0.1)}
+    blocks = blockwork(0.4, blocks=sizes, bodies=flush_wall(5, 4, 0.2, 0.1))
+    found = pushed(blocks)
+    assert (found.normal >= -1e-9).all()
+    assert (np.abs(found.shear) <= blocks.friction * found.normal + 1e-6).all()
+    total = np.zeros((len(blocks.names) + 1, 3))
+    for rates, forces in ((blocks.assembly.across, found.normal), (blocks.assembly.along, found.shear)):
+        for side in (0, 1):
+            np.add.at(total, blocks.assembly.places[:, side], rates[:, side] * forces[:, None])
+    weight = float(np.abs(blocks.forces[:, 1]).sum())
+    residual = total[:-1] + blocks.forces + found.factor * blocks.horizontal
+    assert np.abs(residual).max() < 1e-7 * weight
+    dead, live = ((found.mechanism * forces).sum() for forces in (blocks.forces, blocks.horizontal))
+    assert live > 0.0
+    assert -dead / live == pytest.approx(found.factor, rel=1e-6)  # virtual work; dilatant joints take none
+
+
+def test_size_density_and_a_mirror_change_no_factor() -> None:
+    def factors(scale: float, density: float, mirror: float) -> list[float]:
+        stone = {"stone": STONE["stone"] | {"density": density}}
+        sizes = {"brick": brick(0.2 * scale, 0.1 * scale), "half": brick(0.1 * scale, 0.1 * scale)}
+        bodies = [one | {"x": mirror * one["x"]} for one in flush_wall(4, 3, 0.2 * scale, 0.1 * scale, "half")]
+        bodies = [one for one in bodies if one is not bodies[-1]]  # no symmetric wall
+        blocks = blockwork(0.9, materials=stone, blocks=sizes, bodies=bodies)
+        return [pushed(blocks, mirror * sign).factor for sign in (1.0, -1.0)]
+
+    usual = factors(1.0, 2000.0, 1.0)
+    assert usual[0] != pytest.approx(usual[1])
+    for other in (factors(1e-3, 2000.0, 1.0), factors(100.0, 5000.0, 1.0), factors(1.0, 2000.0, -1.0)):
+        assert other == pytest.approx(usual, rel=1e-7)
+
+
+def test_water_pushes_as_its_integral_and_a_dam_slides_at_the_friction_of_statics() -> None:
+    block = {"dam": brick(1.0, 2.0)}
+    level, gravity = 1.5, 9.81
+    water = {"kind": "pressure", "body": "1", "face": "left", "water_level": level}
+
+    def dam(friction: float) -> bool:
+        blocks = blockwork(friction, gravity=gravity, blocks=block, bodies=[{"block": "dam", "x": 0.5, "y": 1.0}],
+            loads=[water])  # fmt: skip
+        return bool(Programme(blocks).carries(blocks.forces).factor)
+
+    needed = 9810.0 * level**2 / 2.0 / (2000.0 * gravity * 2.0)
+    assert not dam(needed * (1.0 - EXACT))
+    assert dam(needed * (1.0 + EXACT))
+
+
+def test_the_horizontal_margin_is_that_of_the_weaker_side() -> None:
+    blocks = {"b": brick(0.2, 0.4)}
+    stands = blockwork(0.9, blocks=blocks, bodies=[{"block": "b", "x": 0.0, "y": 0.2}], ground={"tilt": "10 deg"})
+    assert horizontal_margin(stands) == pytest.approx(math.tan(math.atan(0.5) - math.radians(10.0)), rel=1e-6)
+    falls = blockwork(0.9, blocks=blocks, bodies=[{"block": "b", "x": 0.0, "y": 0.2}], ground={"tilt": "30 deg"})
+    assert horizontal_margin(falls) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"bodies": [{"block": "b", "x": 0.0, "y": 0.5}]}, "block 1 rests on nothing"),
+        ({"bodies": [{"block": "b", "x": 0.0, "y": 0.1, "velocity": [1.0, 0.0]}]}, "body 1 moves at the start"),
+        ({"bodies": [{"block": "b", "x": 0.0, "y": 0.1, "fixed": True}]}, "no block is free"),
+        ({"motion": {"kind": "harmonic", "frequency": 1.0, "amplitude": 0.01}}, "supports move"),
+    ],
+)
+def test_what_is_no_sustained_load_is_refused_with_the_reason(change: Mapping[str, object], reason: str) -> None:
+    tables = {"blocks": {"b": brick(0.2, 0.2)}, "bodies": [{"block": "b", "x": 0.0, "y": 0.1}], **change}
+    with pytest.raises(InvalidInputError, match=f"statics: {reason}"):
+        blockwork(0.5, **tables)
