@@ -1,12 +1,14 @@
 """Joints between bodies as they are placed."""
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
 from blocksim.errors import ScenarioError
 from blocksim.scenario import PlacedBody, place_bodies, scenario_from_mapping
-from blocksim.scenario.events import joint_between
+from blocksim.scenario.events import Joint, joint_between
+from tests.golden import Golden
 from tests.scenario.conftest import data_of
 
 
@@ -16,33 +18,28 @@ def bodies(*places: tuple[float, float, float]) -> list[PlacedBody]:
     return [*place_bodies(scenario_from_mapping(data_of(structures=(), bodies=tuple(placed))))]
 
 
-@pytest.mark.parametrize("turn", [0.0, 30.0, 137.0])
-def test_the_joint_of_a_shifted_stack_spans_what_the_faces_share(turn: float) -> None:
-    cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
-    above = (1.0 + 0.05 * cosine - 0.1 * sine, 1.0 + 0.05 * sine + 0.1 * cosine, turn)
-    joint = joint_between(*bodies((1.0, 1.0, turn), above))
-    assert joint is not None
-    assert joint.normal == pytest.approx((0.0, 1.0))
-    assert joint.tangent == pytest.approx((1.0, 0.0))
-    first, last = joint.ends_of_a
-    assert (*first, *last) == pytest.approx((-0.05, 0.05, 0.1, 0.05), abs=1e-12)
-    first, last = joint.ends_of_b
-    assert (*first, *last) == pytest.approx((-0.1, -0.05, 0.05, -0.05), abs=1e-12)
+def told(joint: Joint | None) -> str:
+    """Return what a joint is: its directions and its ends, in the frames of either body (mm)."""
+    if joint is None:
+        return "no joint"
+
+    def rounded(vector: Sequence[float], unit: float = 1.0) -> str:
+        return ", ".join(f"{round(unit * x, 6) + 0.0:g}" for x in vector)
+
+    first, second = (" to ".join(rounded(end, 1e3) for end in ends) for ends in (joint.ends_of_a, joint.ends_of_b))
+    directions = f"normal {rounded(joint.normal)}, tangent {rounded(joint.tangent)}"
+    return f"{directions}; of the first {first}; of the second {second}"
 
 
-def test_bodies_that_face_no_other_have_no_joint() -> None:
-    for other in ((0.3, 1.2, 0.0), (0.0, 1.11, 1.5)):
-        assert joint_between(*bodies((0.0, 1.0, 0.0), other)) is None
-
-
-def test_a_gap_is_part_of_a_joint_and_a_quarter_turn_too() -> None:
-    joint = joint_between(*bodies((0.0, 1.0, 0.0), (0.17, 1.02, 90.0)))
-    assert joint is not None
-    assert joint.normal == (1.0, 0.0)
-    assert joint.tangent == (0.0, -1.0)
-    assert (*joint.ends_of_a[0], *joint.ends_of_a[1]) == pytest.approx((0.1, 0.05, 0.1, -0.05))
-    # 20 mm away, its upper face to the left
-    assert (*joint.ends_of_b[1], *joint.ends_of_b[0]) == pytest.approx((-0.07, 0.05, 0.03, 0.05), abs=1e-12)
+def test_joints_span_what_faces_share(golden: Golden) -> None:
+    """Of shifted stacks that are turned, across a gap and a quarter turn, and of bodies that face no other."""
+    pairs = []
+    for turn in (0.0, 30.0, 137.0):
+        cosine, sine = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+        above = (1.0 + 0.05 * cosine - 0.1 * sine, 1.0 + 0.05 * sine + 0.1 * cosine, turn)
+        pairs.append(((1.0, 1.0, turn), above))
+    pairs += [((0.0, 1.0, 0.0), other) for other in ((0.17, 1.02, 90.0), (0.3, 1.2, 0.0), (0.0, 1.11, 1.5))]
+    golden("\n".join(told(joint_between(*bodies(*pair))) for pair in pairs))
 
 
 @pytest.mark.parametrize("corner", [0.1, 0.1007, 0.1017])

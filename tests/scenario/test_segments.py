@@ -3,14 +3,13 @@
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given, strategies as st
 
 from blocksim.scenario import PlacedSegment, Scenario, place_segments, scenario_from_mapping
-from blocksim.scenario.placement import ENDLESS, surface_heights
+from blocksim.scenario.placement import surface_heights
+from tests.golden import Golden
 from tests.scenario.conftest import data_of
 
 Point = tuple[float, float]
@@ -24,21 +23,6 @@ def scenario(profile: Sequence[Point] | None = None, walls: Sequence[Mapping[str
 
 def ends(segment: PlacedSegment) -> tuple[Point, Point]:
     return (segment.x0, segment.y0), (segment.x1, segment.y1)
-
-
-def extends(segment: PlacedSegment) -> tuple[bool, bool]:
-    return segment.extends_start, segment.extends_end
-
-
-def touches(segment: PlacedSegment) -> tuple[bool, bool]:
-    return segment.touches_start, segment.touches_end
-
-
-def test_points_within_a_straight_line_are_left_out() -> None:
-    level = [(0, 0.5), (1, 0.5), (7, 0.5)]
-    slope = [(0.1 * i, 0.03 * i) for i in range(8)]
-    assert [ends(piece) for piece in place_segments(scenario(level))] == [((-ENDLESS, 0.5), (7 + ENDLESS, 0.5))]
-    assert [ends(piece)[0] for piece in place_segments(scenario(slope))] == [(-ENDLESS, 0), slope[0], slope[-1]]
 
 
 PROFILES = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.5]), st.floats(-5, 5)), min_size=2, max_size=8)
@@ -74,55 +58,47 @@ def test_the_height_of_the_surface_is_zero_on_flat_ground_which_is_no_segment() 
     assert surface_heights(scenario(), np.array([3.0]))[0] == 0.0
 
 
-def wall(start: Point, end: Point, **keys: str) -> dict[str, Any]:
-    return {"from": start, "to": end, **keys}
+Scene = tuple[list[Point] | None, list[Mapping[str, object]]]
 
 
-def test_a_free_wall_has_two_edges() -> None:
-    (piece,) = place_segments(scenario(walls=[wall((1, 2), (3, 2), material="oak")]))
-    assert ends(piece) == ((1, 2), (3, 2))
-    assert (piece.material, piece.length) == ("oak", 2.0)
-    assert (extends(piece), touches(piece)) == ((False, False), (True, True))
+def wall(*points: Point, **keys: str) -> list[Mapping[str, object]]:
+    """Return walls from point to point."""
+    return [{"from": start, "to": end, **keys} for start, end in pairwise(points)]
 
 
-@pytest.mark.parametrize(
-    ("profile", "foot"),
-    [
-        (None, (3, 0)),
-        (None, (3, -0.5)),
-        (None, (3, 0.9e-9)),
-        ([(0, 0), (3, 1), (6, 0)], (3, 1)),
-        ([(0, 0), (3, 0), (3, 2)], (3, 1)),
-    ],
-)
-def test_a_wall_continues_where_the_ground_covers_its_end(profile: list[Point] | None, foot: Point) -> None:
-    up = place_segments(scenario(profile, [wall(foot, (4, 5))]))[-1]
-    down = place_segments(scenario(profile, [wall((4, 5), foot)]))[-1]
-    assert (extends(up), touches(up)) == ((True, False), (False, True))
-    assert (extends(down), touches(down)) == ((False, True), (True, False))
-    (above,) = place_segments(scenario(walls=[wall((3, 1.1e-9), (3, 5))]))
-    assert extends(above) == (False, False)
+TENT: list[Point] = [(0, 0), (3, 1), (6, 0)]
+RISER: list[Point] = [(0, 0), (3, 0), (3, 2)]
+SCENES: dict[str, Scene] = {
+    "a level profile": ([(0, 0.5), (1, 0.5), (7, 0.5)], []),
+    "a slope of many points": ([(0.1 * i, 0.03 * i) for i in range(8)], []),
+    "a free wall has two edges": (None, wall((1, 2), (3, 2), material="oak")),
+    "a wall up from the ground": (None, wall((3, 0), (4, 5))),
+    "a wall down to the ground": (None, wall((4, 5), (3, 0))),
+    "a wall from below the ground": (None, wall((3, -0.5), (4, 5))),
+    "a wall from less than a nanometre above the ground": (None, wall((3, 0.9e-9), (4, 5))),
+    "a wall from more than a nanometre above the ground": (None, wall((3, 1.1e-9), (3, 5))),
+    "a wall up from the tip of a profile": (TENT, wall((3, 1), (4, 5))),
+    "a wall down to the tip of a profile": (TENT, wall((4, 5), (3, 1))),
+    "a wall up from a riser": (RISER, wall((3, 1), (4, 5))),
+    "a wall down to a riser": (RISER, wall((4, 5), (3, 1))),
+    "a post on a shelf": (None, wall((0, 2), (4, 2)) + wall((3, 2), (3, 4))),
+    "walls that follow each other join as a profile does": (None, wall((0, 2), (1, 1), (2, 1), (2, 0.5))),
+    "two faces of one sheet have each edge once": (None, wall((0, 1), (0, 2), (0, 1))),
+    "segments of the profile come before walls": (
+        [(0, 0), (1, 1)],
+        wall((5, 5), (6, 6), material="oak") + wall((7, 7), (8, 8)),
+    ),
+}
 
 
-def test_a_wall_continues_where_it_ends_on_another() -> None:
-    shelf, post = place_segments(scenario(walls=[wall((0, 2), (4, 2)), wall((3, 2), (3, 4))]))
-    assert (extends(shelf), touches(shelf)) == ((False, False), (True, True))
-    assert (extends(post), touches(post)) == ((True, False), (False, True))
+def told(piece: PlacedSegment) -> str:
+    """Return where a piece begins and ends, and at which ends it extends or is touched."""
+    flags = [name for name in ("extends_start", "extends_end", "touches_start", "touches_end") if getattr(piece, name)]
+    material = f" of {piece.material}" if piece.material else ""
+    return f"({piece.x0:.4g}, {piece.y0:.4g}) to ({piece.x1:.4g}, {piece.y1:.4g}){material}: {', '.join(flags)}"
 
 
-def test_walls_that_follow_each_other_join_as_a_profile_does() -> None:
-    walls = [wall((0, 2), (1, 1)), wall((1, 1), (2, 1)), wall((2, 1), (2, 0.5))]
-    slope, floor, drop = place_segments(scenario(walls=walls))
-    assert [extends(piece) for piece in (slope, floor, drop)] == [(False, True), (True, False), (False, False)]
-    assert [touches(piece) for piece in (slope, floor, drop)] == [(True, False), (False, True), (False, True)]
-
-
-def test_two_faces_of_one_sheet_have_each_edge_once() -> None:
-    here, back = place_segments(scenario(walls=[wall((0, 1), (0, 2)), wall((0, 2), (0, 1))]))
-    assert extends(here) == extends(back) == (False, False)
-    assert touches(here) == touches(back) == (False, True)
-
-
-def test_segments_of_the_profile_come_before_walls() -> None:
-    made = scenario([(0, 0), (1, 1)], [wall((5, 5), (6, 6), material="oak"), wall((7, 7), (8, 8))])
-    assert [piece.material for piece in place_segments(made)] == [None, None, None, "oak", None]
+def test_pieces_join_where_they_meet(golden: Golden) -> None:
+    """Points within a straight line are left out; a wall continues where ground or another wall covers its end."""
+    pieces = {name: place_segments(scenario(profile, walls)) for name, (profile, walls) in SCENES.items()}
+    golden("\n".join("\n  ".join([name, *map(told, found)]) for name, found in pieces.items()))

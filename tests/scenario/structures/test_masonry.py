@@ -12,45 +12,43 @@ from blocksim.scenario.models.geometry import Block
 from blocksim.scenario.overlap import overlapping_pairs
 from blocksim.scenario.structures import KINDS
 from blocksim.scenario.structures.base import Pose, UnfitError
-from blocksim.scenario.structures.masonry import BlockWall, Dominoes, Grid, Pyramid, Stack, Staircase
+from blocksim.scenario.structures.masonry import BlockWall, Grid
+from tests.golden import Golden
 
 BRICK = Block(width=0.032, height=0.025, length=0.05, material="aluminium")
 FLAT = Block(width=0.05, height=0.025, length=0.032, material="aluminium")
 
 
-def test_a_stack_leans_by_its_offset_and_a_staircase_overlaps_by_its_overlap() -> None:
-    stairs = Staircase(kind="staircase", block="brick", count=5, overlap=0.01, left=-0.1).place(BRICK)
-    stacks = {o: Stack(kind="stack", block="brick", count=5, left=-0.1, offset=o) for o in (0.0, 0.0105, -0.004)}
-    for offset, poses in ((0.022, stairs), *((offset, stack.place(BRICK)) for offset, stack in stacks.items())):
-        assert [pose.x - 0.016 for pose in poses] == pytest.approx([-0.1 + i * offset for i in range(5)], abs=1e-15)
-        assert [pose.y for pose in poses] == pytest.approx([0.025 * (i + 0.5) for i in range(5)], abs=1e-15)
+PLACED: dict[str, dict[str, object]] = {
+    "stack": {"count": 3, "left": -0.1},
+    "stack that leans": {"count": 3, "left": -0.1, "offset": 0.0105},
+    "stack that leans to the left": {"count": 3, "offset": -0.004},
+    "staircase": {"count": 4, "overlap": 0.01, "left": 0.1},
+    "pyramid": {"rows": 3},
+    "pyramid with gaps": {"rows": 3, "gap": 0.004},
+    "dominoes": {"count": 4, "spacing": 0.01},
+    "dominoes with a push": {"count": 2, "spacing": 0.01, "push": 0.2},
+    "dominoes with a push to the left": {"count": 2, "spacing": 0.01, "push": -0.2},
+    "wall of a running bond": {"rows": 3, "columns": 3},
+    "wall of a running bond with gaps": {"rows": 3, "columns": 3, "gap": 0.002},
+    "wall with holes": {"rows": 3, "columns": 3, "bond": "stack", "holes": ((1, 1), (3, 2))},
+    "grid": {"rows": 3, "columns": 4, "gap_x": 0.01, "gap_y": 0.02},
+}
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.004])
-def test_every_course_of_a_pyramid_lies_in_the_middle_above_the_one_below(gap: float) -> None:
-    poses = Pyramid(kind="pyramid", block="brick", rows=3, gap=gap).place(BRICK)
-    pitch = 0.032 + gap
-    assert [pose.x - 0.016 for pose in poses] == pytest.approx(
-        [0.0, pitch, 2 * pitch, 0.5 * pitch, 1.5 * pitch, pitch], abs=1e-15
-    )
-    assert [pose.y for pose in poses] == pytest.approx([0.0125] * 3 + [0.0375] * 2 + [0.0625], abs=1e-15)
-
-
-def test_dominoes_stand_apart_by_their_spacing() -> None:
-    poses = Dominoes(kind="dominoes", block="brick", count=4, spacing=0.01).place(BRICK)
-    assert [pose.x - 0.016 for pose in poses] == pytest.approx([0.0, 0.042, 0.084, 0.126], abs=1e-15)
-    assert {pose.y for pose in poses} == {0.0125}
-    assert {pose[2:] for pose in poses} == {(0.0, 0.0, 0.0, 0.0)}
-
-
-@pytest.mark.parametrize("push", [0.2, -0.2])
-def test_a_pushed_domino_turns_about_its_edge(push: float) -> None:
-    first, *others = Dominoes(kind="dominoes", block="brick", count=3, spacing=0.01, push=push).place(BRICK)
-    edge = 0.016 if push > 0 else -0.016  # from the centre
-    assert first.vx - first.spin * -0.0125 == pytest.approx(0.0, abs=1e-15)  # velocity of the edge
-    assert first.vy + first.spin * edge == pytest.approx(0.0, abs=1e-15)
-    assert (first.vx, first.vy > 0.0) == (push, True)
-    assert {pose[3:] for pose in others} == {(0.0, 0.0, 0.0)}
+def test_blocks_are_placed_as_one_would_measure_with_a_ruler(golden: Golden) -> None:
+    """Left and lower edges of blocks of 32 by 25 mm, a row of the structure in a line, and how they move."""
+    told = []
+    for name, keys in PLACED.items():
+        kind = name.split()[0]
+        structure = KINDS[kind].model_validate({"kind": kind, "block": "brick", **keys})
+        rows: dict[str, list[str]] = {}
+        for pose in structure.place(BRICK):
+            moves = f" moves at ({pose.vx:g}, {pose.vy:.4g}) m/s, {pose.spin:.4g} rad/s" if any(pose[3:]) else ""
+            rows.setdefault(f"{1e3 * pose.y - 12.5:g}", []).append(f"{1e3 * pose.x - 16.0:g}{moves}")
+            assert pose.angle == 0.0
+        told.append("\n  ".join([name, *(f"{y} mm: {', '.join(row)}" for y, row in rows.items())]))
+    golden("\n".join(told))
 
 
 SHAPES = {
@@ -88,19 +86,6 @@ def courses(**keys: object) -> list[list[float]]:
     assert wall.size == len(poses)
     heights = sorted({pose.y for pose in poses})
     return [[pose.x - 0.025 for pose in poses if pose.y == height] for height in heights]
-
-
-@pytest.mark.parametrize("gap", [0.0, 0.002])
-def test_every_second_course_of_a_running_bond_is_shifted_by_half_a_block(gap: float) -> None:
-    pitch = 0.05 + gap
-    even, odd = [0.0, pitch, 2 * pitch], [0.5 * pitch, 1.5 * pitch, 2.5 * pitch]
-    found = courses(rows=3, columns=3, gap=gap)
-    assert found == [pytest.approx(course, abs=1e-15) for course in (even, odd, even)]
-
-
-def test_holes_are_counted_from_the_lower_left() -> None:
-    found = courses(rows=3, columns=3, bond="stack", holes=((1, 1), (3, 2)))
-    assert found == [pytest.approx(course, abs=1e-15) for course in ([0.05, 0.1], [0.0, 0.05, 0.1], [0.0, 0.1])]
 
 
 @pytest.mark.parametrize(("missing", "left"), [(0.0, 21), (0.1, 19), (0.5, 11), (0.93, 1)])
@@ -147,17 +132,10 @@ def grid_of(block: Block = FLAT, /, **keys: object) -> list[Pose]:
     return list(poses)
 
 
-def test_blocks_lie_in_rows_and_columns() -> None:
-    poses = grid_of()
-    assert [pose.x - 0.025 for pose in poses] == pytest.approx([0.0, 0.06, 0.12, 0.18] * 3, abs=1e-15)
-    assert [pose.y - 0.0125 for pose in poses] == pytest.approx([0.0] * 4 + [0.045] * 4 + [0.09] * 4, abs=1e-15)
-    assert {pose.angle for pose in poses} == {0.0}
-    assert len(grid_of(rows=1, gap_y=0.0, offset=0.001)) == 4  # a single row needs no distance to the next
-
-
 def test_blocks_are_shifted_and_turned_as_far_as_asked() -> None:
     wide = {"rows": 30, "columns": 30, "gap_x": 0.1, "gap_y": 0.1}
     regular, random = grid_of(**wide), grid_of(**wide, offset=0.001, turn=0.3)
+    assert len(grid_of(rows=1, gap_y=0.0, offset=0.001)) == 4  # a single row needs no distance to the next
     assert random != grid_of(**wide, offset=0.001, turn=0.3, seed=6)
     changes = [(a.x - b.x, a.y - b.y, a.angle) for a, b in zip(random, regular, strict=True)]
     for change, most in zip(zip(*changes, strict=True), (0.001, 0.001, 0.3), strict=True):
