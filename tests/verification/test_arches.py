@@ -251,12 +251,3 @@ def test_limit_on_springs_finds_the_least_thickness_and_what_stands_above_it(tmp
     assert 0.99 * least < change.low < change.high < 1.01 * least
     stands = read_run(found.folder / CASES / found.case_folders[change.high])
     assert_same(joints_of(stands.frames, 27, 0.35), expected)
-
-
-@pytest.mark.long
-def test_limit_on_springs_finds_the_tilt_at_which_an_arch_falls(tmp_path: Path) -> None:
-    found = searched("tilting_arch", 0.75, {"ground.tilt": {"from": "20 deg", "to": "21 deg"}}, tmp_path / "limit")
-    (change,) = found.limits
-    assert (change.below, change.above) == (Stability.STANDS, Stability.FALLS)
-    low, high = (math.tan(math.radians(degrees)) for degrees in (change.low, change.high))
-    assert 0.99 * PULL < low < high < 1.01 * PULL
