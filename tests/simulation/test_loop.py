@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.bench.harness import pushed_wall, three_blocks
+from blocksim.bench.harness import pushed_wall
 from blocksim.errors import ExitCode, InvalidInputError, OutputError
 from blocksim.kernels.common.arrays import NOT_FINITE, OVERLAP_LIMIT, REACHED
 from blocksim.kernels.nonsmooth.arrays import Nonsmooth
-from blocksim.scenario import Scenario, load_scenario, place_bodies, scenario_from_mapping
-from blocksim.scenario.models import timeline
+from blocksim.scenario import Scenario, place_bodies, scenario_from_mapping
 from blocksim.simulation import loop, run_ensemble, schemes, simulate, simulate_into
 from blocksim.simulation.balance import BODY_STEPS, FIRST_CHECK, EnergyLedger, next_energy_check
 from blocksim.simulation.checkpoint import CheckpointPolicy, read_checkpoint
@@ -34,7 +33,6 @@ from blocksim.simulation.schemes import (
     build,
     build_scene,
     measure_row,
-    scheme_of,
     team_for,
     useful_threads,
 )
@@ -42,11 +40,12 @@ from blocksim.simulation.schemes.explicit import SURFACE_OF_OUTLINES
 from blocksim.simulation.schemes.nonsmooth import IN_ROUNDS, OF_OUTLINES
 from blocksim.world import build as world_build
 from blocksim.world.build import InitialScene, arrays_of, build_world
-from tests.simulation.conftest import SCENARIOS, Shipped
 from tests.simulation.sliding import sliding
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from tests.simulation.conftest import Shipped
 
 
 def steps_of(recorder: Recorder, last: int) -> list[int]:
@@ -104,11 +103,6 @@ def test_calls_come_to_last_as_long_as_wanted(seconds_a_step: float) -> None:
     assert steps * seconds_a_step == pytest.approx(max(CALL_SECONDS, seconds_a_step), rel=0.01)
     assert steps_of_call(25_000, 1, 0.0) <= MOST_GROWTH * 25_000  # quick first steps do not make a call endless
     assert steps_of_call(1, 1, 1e6) == 1
-
-
-def test_body_that_hangs_in_the_air_does_not_rest_however_slowly_it_falls() -> None:
-    slow = {"gravity": 0.001, "time.stop_at_rest": True, "time.end": 0.08, "contact.stiffness_scale": 0.001}
-    assert simulate(load_scenario(SCENARIOS / "bounce.toml", slow)).reason == "end of simulated time"
 
 
 ENTRIES = dict.fromkeys(sorted(set(EnergyLedger.model_fields) - {"start", "in_play"}), 0.0)
@@ -277,14 +271,6 @@ def bits(scene: Any) -> dict[str, bytes]:
 def alone() -> dict[str, dict[str, bytes]]:
     """Return the walls as one thread leaves them."""
     return {scheme: bits(ALONE.advance(build_scene(wall(scheme)), last)[0]) for scheme, last in STEPS.items()}
-
-
-def test_every_scheme_of_the_file_can_be_run() -> None:
-    assert set(SCHEMES) == set(timeline.SCHEMES)
-    for name, scheme in SCHEMES.items():
-        scene = build_scene(three_blocks(time={"scheme": name}))
-        assert scheme_of(scene) is scheme
-        assert len(measure_row(ALONE.advance(scene, 0)[0])) == len(scheme.row_names)
 
 
 @both

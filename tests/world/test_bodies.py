@@ -1,7 +1,9 @@
-"""Bodies at time zero, and what pieces of ground and walls do to blocks that meet them."""
+"""Bodies at time zero: pieces of ground and walls and what they do to blocks, particles of boundaries, corners."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from math import atan2, cos, hypot, pi, sin
 from typing import TYPE_CHECKING, Any
 
@@ -9,15 +11,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from blocksim.kernels.common.arrays import REACHED
-from blocksim.scenario import place_segments
+from blocksim.kernels.common.arrays import ALL, OUTLINE, REACHED, Record, Records, World
+from blocksim.kernels.common.tolerances import CONE_TOLERANCE
+from blocksim.kernels.explicit.sides import UPPER
+from blocksim.scenario import Scenario, place_segments, scenario_from_mapping
+from blocksim.scenario.geometry import centre_outline, regular
 from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
-from blocksim.world.build import build_world
+from blocksim.world.bodies import body_records, cone_of, corner_rows, division, layout_of, slots_of_a_pair
+from blocksim.world.build import SceneStack, build_stacks, build_world, member
+from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
+from blocksim.world.step import bounds_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-
-    from blocksim.kernels.common.arrays import Record, Records
 
 SOFT = 1e-3  # of the material's stiffness
 FRICTION = 0.3
@@ -212,3 +218,191 @@ def test_wall_sends_a_block_back_with_the_restitution_asked(model: str, e: float
     vx, vy = scene.bodies[0].vx, scene.bodies[0].vy
     assert out @ (vx, vy) == pytest.approx(0.7 * e, abs=0.007)
     assert scene.bodies[0].spin == pytest.approx(0.0, abs=0.05)
+
+
+sides = st.floats(1e-2, 0.1)
+spacings = st.floats(5e-4, 3e-3)
+WITH_PARTICLES = ["kernel", "particles"]
+
+
+def dense(bodies: Sequence[Mapping[str, object]], model: str, spacing: float, **tables: Any) -> Scenario:
+    return scenario_of(bodies, contact={"model": model, "particle_spacing": spacing}, **tables)
+
+
+def particles_of(world: World, body: int) -> Records:
+    """Return the particles of one body."""
+    record = world.bodies[body]
+    found: Records = world.particles[record.first_particle : record.first_particle + record.particle_count]
+    return found
+
+
+@settings(max_examples=30)
+@given(width=sides, height=sides, spacing=spacings)
+def test_kernel_particles_lie_on_the_edge_and_share_every_face(width: float, height: float, spacing: float) -> None:
+    world = build_world(dense([{"y": 0.5, "width": width, "height": height}], "kernel", spacing))
+    particles = particles_of(world, 0)
+    assert particles.length.sum() == pytest.approx(2.0 * (width + height), rel=1e-12)
+    assert np.maximum(np.abs(particles.x) - width / 2, np.abs(particles.y) - height / 2) == pytest.approx(
+        0.0, abs=1e-15
+    )
+    for normal in ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)):
+        face = particles[(particles.nx == normal[0]) & (particles.ny == normal[1])]
+        outward = face.x * normal[0] + face.y * normal[1]
+        assert outward == pytest.approx(np.abs(0.5 * np.array([width, height]) @ normal), abs=1e-15)
+        assert face.share.sum() == pytest.approx(1.0, rel=1e-12)
+        along = np.sort(face.x * normal[1] - face.y * normal[0])
+        assert np.diff(along).max() <= spacing * (1.0 + 1e-9)
+        assert along[-1] - along[0] == pytest.approx(height if normal[1] == 0.0 else width, rel=1e-12)
+    assert (
+        particles.size == 2 * (division(width, spacing) + division(height, spacing)) + 4
+    )  # corners belong to two faces
+
+
+def test_round_off_in_the_division_adds_no_particle() -> None:
+    assert division(0.3, 0.1) == 3  # 0.3/0.1 is just below 3, 0.1 * 3 just above 0.3
+    assert [division(side, 1e-3) for side in (0.032, 0.025)] == [32, 25]
+
+
+@settings(max_examples=30)
+@given(width=sides, height=sides, spacing=spacings)
+def test_discs_fit_into_the_block_and_share_all_four_faces(width: float, height: float, spacing: float) -> None:
+    world = build_world(dense([{"y": 0.5, "width": width, "height": height}], "particles", spacing))
+    particles = particles_of(world, 0)
+    inner = (width - spacing, height - spacing)
+    beyond = np.maximum(np.abs(particles.x) - inner[0] / 2, np.abs(particles.y) - inner[1] / 2)
+    assert beyond == pytest.approx(0.0, abs=1e-15)
+    assert particles.length.sum() == pytest.approx(2.0 * sum(inner), rel=1e-12)
+    assert particles.share.sum() == pytest.approx(4.0, rel=1e-12)
+    assert len(set(zip(particles.x.tolist(), particles.y.tolist(), strict=True))) == particles.size
+    assert particles.size == 2 * sum(division(side, spacing) for side in inner)
+    ring = np.stack([particles.x, particles.y], axis=1)
+    assert np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).max() <= spacing * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("model", WITH_PARTICLES)
+def test_rows_follow_one_another_counter_clockwise(model: str) -> None:
+    world = build_world(dense([{"y": 0.5}], model, 1.7e-3))
+    particles, body = particles_of(world, 0), world.bodies[0]
+    rows = [body.row_x, body.row_y, body.row_x, body.row_y]
+    begins = np.cumsum([0, *(row + (model == "kernel") for row in rows)])
+    signs = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    for begin, sign in zip(begins, signs, strict=False):
+        assert (np.sign(particles.x[begin]), np.sign(particles.y[begin])) == sign
+    assert begins[-1] == particles.size
+
+
+@pytest.mark.parametrize("model", WITH_PARTICLES)
+def test_pair_of_the_two_largest_bodies_has_a_slot_for_every_contact(model: str) -> None:
+    small, large = {"y": 0.5}, {"y": 0.5, "x": 0.2, "width": 0.064}
+    world = build_world(dense([small, large, {**large, "x": 0.4}], model, 1e-3))
+    most = int(world.bodies[1].particle_count)
+    assert slots_of_a_pair(world.bodies, model) == (2 if model == "kernel" else 4) * most
+    assert world.candidates.shape[1] == world.contacts.shape[1] == slots_of_a_pair(world.bodies, model)
+    assert world.points.size == world.contacts.shape[1] + 1
+
+
+def test_slabs_of_ground_have_particles_at_their_free_ends_only() -> None:
+    hill = {"profile": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.0]]}
+    world = build_world(dense([{"y": 0.5}], "kernel", 1e-3, ground=hill))
+    counts = world.bodies.particle_count[1:-1].tolist()
+    assert counts == [0, 1, 0, 0]
+    peak, slab = particles_of(world, 2)[0], world.bodies[2]
+    x = slab.x + slab.cos * peak.x - slab.sin * peak.y
+    y = slab.y + slab.sin * peak.x + slab.cos * peak.y
+    assert [x, y] == pytest.approx([0.1, 0.1], abs=1e-12)
+    discs = build_world(dense([{"y": 0.5}], "particles", 1e-3, ground=hill))
+    assert discs.bodies.particle_count[1:-1].tolist() == [0, 0, 0, 0]
+
+
+TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]
+
+
+def blocks_of(*, ground: dict[str, object] | None = None, **blocks: dict[str, object]) -> Scenario:
+    """Return blocks high up and apart; a triangle, a brick and a hexagon, two of each, unless told."""
+    tables = blocks or {
+        "triangle": {"outline": TRIANGLE, "depth": 0.1},
+        "brick": {"width": 0.2, "height": 0.1, "length": 0.1},
+        "hexagon": {"sides": 6, "radius": 0.2, "depth": 0.1},
+    }
+    return scenario_from_mapping(
+        {
+            "schema": 1,
+            "name": "shapes",
+            "materials": {"stone": {"density": 2000.0, "young_modulus": 1e9, "poisson_ratio": 0.2}},
+            "blocks": {name: {**table, "material": "stone"} for name, table in tables.items()},
+            "bodies": [{"block": name, "x": float(i), "y": 2.0} for i, name in enumerate([*tables, *tables])],
+            "time": {"scheme": "nonsmooth", "end": 1.0},
+            **({} if ground is None else {"ground": ground}),
+        }
+    )
+
+
+def test_every_shape_is_in_the_table_once_with_outward_normals() -> None:
+    world = build_nonsmooth(blocks_of()).world
+    assert world.corners.size == 3 * 6 + 4  # each block has room for the corners of the hexagon
+    assert world.bodies.first_corner.tolist() == [0, 6, 12] * 2 + [18]
+    assert world.bodies.corner_count.tolist() == [3, 4, 6] * 2 + [4]
+    assert world.bodies.faces[:6].tolist() == [OUTLINE, ALL, OUTLINE] * 2
+    for body in world.bodies[:6]:
+        own = world.corners[body.first_corner : body.first_corner + body.corner_count]
+        heights = np.stack([own.nx, own.ny], axis=-1) @ np.stack([own.x, own.y])
+        assert (heights <= own.distance[:, np.newaxis] + 1e-15).all()
+        assert body.inner_radius == own.distance.min()
+        assert np.hypot(own.nx, own.ny) == pytest.approx(1.0, abs=1e-15)
+        assert 2.0 * own.half == pytest.approx(np.hypot(own.x - np.roll(own.x, -1), own.y - np.roll(own.y, -1)))
+
+
+def test_ground_has_corners_from_the_lower_left_one_on() -> None:
+    """The upper face of a piece, and of the half-plane, has the same number in both schemes."""
+    profile: dict[str, object] = {"profile": [[-1.0, 0.5], [0.0, 0.0], [3.0, 0.0]]}
+    world = build_nonsmooth(blocks_of(ground=profile)).world
+    for body in world.bodies[6:]:
+        own = world.corners[body.first_corner : body.first_corner + body.corner_count]
+        assert own.x.tolist() == [-body.half_x, body.half_x, body.half_x, -body.half_x]
+        assert own.y.tolist() == [-body.half_y, -body.half_y, body.half_y, body.half_y]
+        upper = own[UPPER]
+        assert (upper.nx, upper.ny, upper.distance, upper.half) == (0.0, 1.0, body.half_y, body.half_x)
+
+
+@pytest.mark.parametrize("outline", [TRIANGLE, regular(16, 0.1), [[0, 0], [1, 0], [1.01, 0.02], [0.5, 0.3], [0, 0.1]]])
+def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float]]) -> None:
+    rows = np.array(corner_rows(centre_outline([(x, y) for x, y in outline])))
+    for k, (x, y, nx, ny, distance, half, middle, clear, far, *_) in enumerate(rows):
+        assert nx * y - ny * x == pytest.approx(middle - half)
+        others = np.delete(rows, k, axis=0)
+        for end, depth in itertools.product(np.linspace(0.0, 1.0, 9) * half, (0.0, 0.01 * half)):
+            for along in (middle - half + end, middle + half - end):
+                place = (distance - depth) * np.array([nx, ny]) + along * np.array([-ny, nx])
+                least = (others[:, 4] - others[:, 2:4] @ place).min()
+                assert least >= clear * end - depth - 1e-12
+                beyond = np.delete(rows, [k, k - 1, (k + 1) % len(rows)], axis=0)
+                assert np.all(beyond[:, 4] - beyond[:, 2:4] @ place >= far - depth - 1e-12)
+        assert clear > 0.0
+
+
+def test_steps_are_bounded_by_the_least_width_of_a_polygon() -> None:
+    layout = layout_of(blocks_of(sliver={"outline": [[0.0, 0.0], [1.0, 1.0], [0.98, 1.02]], "depth": 0.1}))
+    (bounds,) = bounds_of([layout], body_records([layout]))
+    assert bounds.smallest == pytest.approx(0.028, rel=0.02)
+
+
+def test_members_of_a_stack_have_corners_of_their_own() -> None:
+    """Of one shape where they have equally many corners; rectangles are in a stack without any."""
+    wedges = [blocks_of(wedge={"outline": [[0.0, 0.0], [0.4, 0.0], [0.1, h]], "depth": 0.1}) for h in (0.2, 0.3)]
+    hexagon = blocks_of(hexagon={"sides": 6, "radius": 0.2, "depth": 0.1})
+    brick = blocks_of(brick={"width": 0.2, "height": 0.1, "length": 0.1})
+    stacks = [one for one in build_stacks([*wedges, hexagon, brick], NONSMOOTH) if isinstance(one, SceneStack)]
+    assert [stack.numbers for stack in stacks] == [[0, 1], [2], [3]]
+    assert stacks[-1].scenes.world.corners is None
+    for m, wedge in enumerate(wedges):
+        alone = build_nonsmooth(wedge).world.corners
+        assert member(stacks[0].scenes, m).world.corners.tobytes() == alone.tobytes()
+
+
+def test_faces_of_blunt_and_sharp_shapes_are_parallel_within_less_than_those_of_rectangles() -> None:
+    def even(sides: int) -> tuple[tuple[float, float], ...]:
+        return tuple((math.cos(2.0 * math.pi * k / sides), math.sin(2.0 * math.pi * k / sides)) for k in range(sides))
+
+    assert cone_of(even(4)) == cone_of(even(6)) == CONE_TOLERANCE
+    assert cone_of(even(16)) == pytest.approx(math.sin(math.pi / 16))
+    assert cone_of(((0.0, 0.0), (1.0, -0.05), (1.0, 0.05))) == pytest.approx(math.sin(math.atan(0.05)))

@@ -9,14 +9,8 @@ import numpy as np
 import pytest
 
 from blocksim.kernels.common.arrays import (
-    ARRIVED,
     BODY as BODY_RECORD,
-    CACHE_LINE,
     GROUP,
-    MEETINGS,
-    STATUS,
-    TEAM_SIZE,
-    TEAM_WORDS,
     Records,
     zeros,
 )
@@ -100,15 +94,6 @@ def test_threads_have_a_share_each_and_as_much_room_between_them_as_there_is_for
     for roomy in (world, with_more_room(world)):
         assert roomy.shares.size == threads
         assert roomy.between.size == (1 if threads == 1 else roomy.pairs.size)
-
-
-def test_threads_write_to_no_common_cache_line() -> None:
-    world = with_threads(build_world(scenario()), 5)
-    places = [world.shares[k : k + 1].ctypes.data for k in range(5)]
-    assert all(place % CACHE_LINE == 0 for place in places)
-    assert (np.diff(places) >= CACHE_LINE).all()
-    assert np.diff([TEAM_SIZE, ARRIVED, MEETINGS, STATUS, TEAM_WORDS]).min() * world.team.itemsize >= CACHE_LINE
-    assert world.team.size == TEAM_WORDS
 
 
 def test_more_room_than_there_is_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

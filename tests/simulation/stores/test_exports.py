@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blocksim.errors import InvalidInputError, OutputError
+from blocksim.errors import InvalidInputError
 from blocksim.scenario import load_scenario, place_bodies
 from blocksim.scenario.geometry import regular
 from blocksim.scenario.structures.polygons import read_drawing
@@ -19,9 +19,7 @@ from blocksim.simulation.files import refuse_foreign
 from blocksim.simulation.stores import exports
 from blocksim.simulation.stores.exports import (
     CONTACT_COLUMNS,
-    FORMATS,
     FRAME_COLUMNS,
-    find_format,
     write_contacts_csv,
     write_contacts_vtkhdf,
     write_dxf,
@@ -66,15 +64,6 @@ def test_every_frame_has_a_row_for_every_block_in_the_units_of_its_heads(tmp_pat
         "time_s": np.repeat(frames.time, 3),
     }.items():
         assert [float(row[key]) for row in rows] == values.ravel().tolist()
-
-
-def test_trouble_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot be written: No such file"):
-        write_frames_csv(tmp_path / "none" / "frames.csv", toppling(1))
-    (tmp_path / "folder.csv").mkdir()
-    with pytest.raises(OutputError, match=r"folder\.csv: cannot be written"):
-        write_frames_csv(tmp_path / "folder.csv", toppling(1))
-    assert [path.name for path in tmp_path.iterdir()] == ["folder.csv"]
 
 
 def test_every_contact_has_a_row_with_the_names_of_its_bodies(tmp_path: Path) -> None:
@@ -128,13 +117,6 @@ def test_dxf_has_them_with_blocks_names_and_what_is_fixed(tmp_path: Path) -> Non
     told = [tuple(one.properties[name] for name in ("block", "name", "fixed")) for one in read]
     assert told == [(body.block, body.name, body.fixed) for body in placed]
     assert told[-1][1:] == ("key-stone", True)
-
-
-def test_formats_are_found_and_misspelt_ones_told() -> None:
-    assert [find_format(name) for name in FORMATS] == list(FORMATS.values())
-    told = "--format vtkhfd: unsupported format; use csv or vtkhdf or geojson or dxf"
-    with pytest.raises(InvalidInputError, match=told):
-        find_format("vtkhfd")
 
 
 SLOPE = load_scenario(SCENARIOS / "slope.toml")
