@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from blocksim.kernels.common.arrays import ALL, OUTLINE, REACHED, Record, Records, World
+from blocksim.kernels.common.arrays import REACHED, Record, Records, World
 from blocksim.kernels.common.tolerances import CONE_TOLERANCE
-from blocksim.kernels.explicit.sides import UPPER
 from blocksim.scenario import Scenario, place_segments, scenario_from_mapping
 from blocksim.scenario.geometry import centre_outline, regular
 from blocksim.verification.scene import HEIGHT, Simulation, scenario_of
-from blocksim.world.bodies import body_records, cone_of, corner_rows, division, layout_of, slots_of_a_pair
+from blocksim.world.bodies import cone_of, corner_rows, division
 from blocksim.world.build import SceneStack, build_stacks, build_world, member
 from blocksim.world.nonsmooth import NONSMOOTH, build_nonsmooth
-from blocksim.world.step import bounds_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from tests.golden import Golden
 
 SOFT = 1e-3  # of the material's stiffness
 FRICTION = 0.3
@@ -97,23 +97,6 @@ def test_upper_faces_of_slabs_are_the_line_of_the_profile(steps: list[tuple[floa
             assert slab.half_x - reach == pytest.approx(beyond, abs=1e-9)
         assert atan2(slab.sin, slab.cos) == pytest.approx(slab.angle, abs=1e-12)
         assert slab.radius == pytest.approx(hypot(slab.half_x, slab.half_y))
-
-
-def test_slabs_can_be_touched_from_above_only_and_at_their_free_ends() -> None:
-    slabs, pieces = slabs_of(ground={"profile": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.0]]})
-    assert [piece.touches_end for piece in pieces] == [False, True, False, False]
-    assert slabs.faces.tolist() == [2] * 4
-    assert slabs.corners.tolist() == [0, 4, 0, 0]
-    assert not slabs.inverse_mass.any()
-    assert not slabs.mass.any()
-    assert (slabs.is_moved == 1).all()
-
-
-def test_slabs_are_thicker_than_any_overlap_that_is_admitted() -> None:
-    for limit in (None, 1e-3, 2e-2):
-        contact = {} if limit is None else {"max_overlap": limit}
-        slabs, _ = slabs_of(ground=FLAT, contact=contact)
-        assert (2.0 * slabs.half_y >= 2.0 * (limit or 0.05 * HEIGHT)).all()
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -279,41 +262,6 @@ def test_discs_fit_into_the_block_and_share_all_four_faces(width: float, height:
     assert np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).max() <= spacing * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("model", WITH_PARTICLES)
-def test_rows_follow_one_another_counter_clockwise(model: str) -> None:
-    world = build_world(dense([{"y": 0.5}], model, 1.7e-3))
-    particles, body = particles_of(world, 0), world.bodies[0]
-    rows = [body.row_x, body.row_y, body.row_x, body.row_y]
-    begins = np.cumsum([0, *(row + (model == "kernel") for row in rows)])
-    signs = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-    for begin, sign in zip(begins, signs, strict=False):
-        assert (np.sign(particles.x[begin]), np.sign(particles.y[begin])) == sign
-    assert begins[-1] == particles.size
-
-
-@pytest.mark.parametrize("model", WITH_PARTICLES)
-def test_pair_of_the_two_largest_bodies_has_a_slot_for_every_contact(model: str) -> None:
-    small, large = {"y": 0.5}, {"y": 0.5, "x": 0.2, "width": 0.064}
-    world = build_world(dense([small, large, {**large, "x": 0.4}], model, 1e-3))
-    most = int(world.bodies[1].particle_count)
-    assert slots_of_a_pair(world.bodies, model) == (2 if model == "kernel" else 4) * most
-    assert world.candidates.shape[1] == world.contacts.shape[1] == slots_of_a_pair(world.bodies, model)
-    assert world.points.size == world.contacts.shape[1] + 1
-
-
-def test_slabs_of_ground_have_particles_at_their_free_ends_only() -> None:
-    hill = {"profile": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.0]]}
-    world = build_world(dense([{"y": 0.5}], "kernel", 1e-3, ground=hill))
-    counts = world.bodies.particle_count[1:-1].tolist()
-    assert counts == [0, 1, 0, 0]
-    peak, slab = particles_of(world, 2)[0], world.bodies[2]
-    x = slab.x + slab.cos * peak.x - slab.sin * peak.y
-    y = slab.y + slab.sin * peak.x + slab.cos * peak.y
-    assert [x, y] == pytest.approx([0.1, 0.1], abs=1e-12)
-    discs = build_world(dense([{"y": 0.5}], "particles", 1e-3, ground=hill))
-    assert discs.bodies.particle_count[1:-1].tolist() == [0, 0, 0, 0]
-
-
 TRIANGLE = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]]
 
 
@@ -337,33 +285,6 @@ def blocks_of(*, ground: dict[str, object] | None = None, **blocks: dict[str, ob
     )
 
 
-def test_every_shape_is_in_the_table_once_with_outward_normals() -> None:
-    world = build_nonsmooth(blocks_of()).world
-    assert world.corners.size == 3 * 6 + 4  # each block has room for the corners of the hexagon
-    assert world.bodies.first_corner.tolist() == [0, 6, 12] * 2 + [18]
-    assert world.bodies.corner_count.tolist() == [3, 4, 6] * 2 + [4]
-    assert world.bodies.faces[:6].tolist() == [OUTLINE, ALL, OUTLINE] * 2
-    for body in world.bodies[:6]:
-        own = world.corners[body.first_corner : body.first_corner + body.corner_count]
-        heights = np.stack([own.nx, own.ny], axis=-1) @ np.stack([own.x, own.y])
-        assert (heights <= own.distance[:, np.newaxis] + 1e-15).all()
-        assert body.inner_radius == own.distance.min()
-        assert np.hypot(own.nx, own.ny) == pytest.approx(1.0, abs=1e-15)
-        assert 2.0 * own.half == pytest.approx(np.hypot(own.x - np.roll(own.x, -1), own.y - np.roll(own.y, -1)))
-
-
-def test_ground_has_corners_from_the_lower_left_one_on() -> None:
-    """The upper face of a piece, and of the half-plane, has the same number in both schemes."""
-    profile: dict[str, object] = {"profile": [[-1.0, 0.5], [0.0, 0.0], [3.0, 0.0]]}
-    world = build_nonsmooth(blocks_of(ground=profile)).world
-    for body in world.bodies[6:]:
-        own = world.corners[body.first_corner : body.first_corner + body.corner_count]
-        assert own.x.tolist() == [-body.half_x, body.half_x, body.half_x, -body.half_x]
-        assert own.y.tolist() == [-body.half_y, -body.half_y, body.half_y, body.half_y]
-        upper = own[UPPER]
-        assert (upper.nx, upper.ny, upper.distance, upper.half) == (0.0, 1.0, body.half_y, body.half_x)
-
-
 @pytest.mark.parametrize("outline", [TRIANGLE, regular(16, 0.1), [[0, 0], [1, 0], [1.01, 0.02], [0.5, 0.3], [0, 0.1]]])
 def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float]]) -> None:
     rows = np.array(corner_rows(centre_outline([(x, y) for x, y in outline])))
@@ -378,12 +299,6 @@ def test_other_faces_are_as_far_as_is_told_along_a_face(outline: list[list[float
                 beyond = np.delete(rows, [k, k - 1, (k + 1) % len(rows)], axis=0)
                 assert np.all(beyond[:, 4] - beyond[:, 2:4] @ place >= far - depth - 1e-12)
         assert clear > 0.0
-
-
-def test_steps_are_bounded_by_the_least_width_of_a_polygon() -> None:
-    layout = layout_of(blocks_of(sliver={"outline": [[0.0, 0.0], [1.0, 1.0], [0.98, 1.02]], "depth": 0.1}))
-    (bounds,) = bounds_of([layout], body_records([layout]))
-    assert bounds.smallest == pytest.approx(0.028, rel=0.02)
 
 
 def test_members_of_a_stack_have_corners_of_their_own() -> None:
@@ -406,3 +321,49 @@ def test_faces_of_blunt_and_sharp_shapes_are_parallel_within_less_than_those_of_
     assert cone_of(even(4)) == cone_of(even(6)) == CONE_TOLERANCE
     assert cone_of(even(16)) == pytest.approx(math.sin(math.pi / 16))
     assert cone_of(((0.0, 0.0), (1.0, -0.05), (1.0, 0.05))) == pytest.approx(math.sin(math.atan(0.05)))
+
+
+HIGH, HILL = [{"y": 10.0}], {"profile": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.0]]}
+DROP: dict[str, object] = {"profile": [[-1.0, 0.5], [0.0, 0.0], [3.0, 0.0]]}
+BRICKS = [{"x": 0.1 * i, "y": 0.2} for i in range(1, 10)]
+PLANK = {"x": 0.0, "y": 1.0, "width": 3.2}
+SHAKING = {"kind": "harmonic", "amplitude": 0.01, "frequency": 5.0, "direction": "30 deg"}
+MOVED = [{"y": 0.5, "fixed": True}, {"x": 0.2, "y": 0.5}, {"x": 0.4, "y": 0.7, "fixed": True}]
+LIKE = [{"y": 0.5}, {"y": 0.5, "x": 0.2, "width": 0.064}, {"y": 0.5, "x": 0.4, "width": 0.064}]
+SCENES = {
+    "a hill": scenario_of(HIGH, ground=HILL),
+    "a hill, overlaps of 20 mm": scenario_of(HIGH, ground=HILL, contact={"max_overlap": 2e-2}),
+    "a wall, solid at its right": scenario_of(HIGH, walls=[{"from": [1.0, 1.0], "to": [1.0, 0.0]}]),
+    "bricks and a plank": scenario_of([*BRICKS[:4], PLANK, *BRICKS[4:]]),
+    "fixed blocks on a shaken support": scenario_of(MOVED, motion=SHAKING, time={"end": 2.0}),
+    **{f"{model}, blocks on a hill": dense(LIKE, model, 8e-3, ground=HILL) for model in WITH_PARTICLES},
+    "polygons": blocks_of(ground=DROP),
+}
+PLACE = ["x", "y", "half_x", "half_y", "radius", "inner_radius", "mass", "inertia", "contact_class", "is_moved"]
+SHOWN = [*PLACE, "faces", "corners", "first_corner", "corner_count", "first_particle", "particle_count"]
+LISTS = {
+    "corners": ("x", "y", "nx", "ny", "distance", "half"),
+    "particles": ("x", "y", "nx", "ny", "length", "share"),
+    "moved": ("body", "x", "y"),
+}
+
+
+def printed(rows: Records | None, names: Sequence[str]) -> list[str]:
+    """Return a line for each record, of which the first names all numbers."""
+    if rows is None or not rows.size:
+        return []
+    texts = [", ".join(f"{round(float(row[name]), 12) + 0.0:.9g}" for name in names) for row in rows]
+    return [", ".join(names), *texts]
+
+
+def test_scenes_are_the_arrays_that_were_read(golden: Golden) -> None:
+    texts = []
+    for name, scenario in SCENES.items():
+        is_rigid = scenario.time.has_rigid_contacts
+        world = build_nonsmooth(scenario).world if is_rigid else build_world(scenario)
+        slots = [world.candidates.shape[1], world.contacts.shape[1], world.points.size] if world.contacts.size else []
+        controls = world.controls[0]
+        grid = f"{controls.cell_radius:.9g} m, cells of {controls.cell_width:.9g} m, large {world.large.tolist()}"
+        lists = [line for key, names in LISTS.items() for line in printed(getattr(world, key), names)]
+        texts.append("\n".join([name, f"grid {grid}, slots of a pair {slots}", *printed(world.bodies, SHOWN), *lists]))
+    golden("\n\n".join(texts))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, hypot, sqrt
+from math import ceil, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from blocksim.verification.scene import HEIGHT, WIDTH, scenario_of
 from blocksim.world import memory
 from blocksim.world.build import (
     GROWTH,
-    LARGE_RATIO,
     MOST_LARGE,
     build_world,
     cell_radius,
@@ -110,27 +109,11 @@ def radii(*values: float) -> Records:
     return bodies
 
 
-def test_grid_holds_all_bodies_of_about_the_same_size() -> None:
-    assert cell_radius(radii(0.5)) == 0.5
-    assert cell_radius(radii(1.0, LARGE_RATIO, 2.0)) == LARGE_RATIO
-
-
 def test_few_bodies_that_are_much_larger_stay_out_of_the_grid() -> None:
     assert cell_radius(radii(*[1.0] * 8, 50.0)) == 1.0
     assert cell_radius(radii(*[1.0] * 7, 50.0, 60.0)) == 50.0  # more than one in eight are not few
     assert cell_radius(radii(*[1.0] * 2000, *[50.0] * MOST_LARGE)) == 1.0
     assert cell_radius(radii(*[1.0] * 2000, *[50.0] * (MOST_LARGE + 1))) == 50.0
-
-
-def test_what_is_large_is_listed_and_cells_are_as_wide_as_two_others_can_reach() -> None:
-    bricks = [{**BODY, "x": 0.1 * i} for i in range(2, 10)]
-    plank = {"x": 0.0, "y": 1.0, "width": 3.2}
-    world = build_world(scenario(None, *bricks[:3], plank, *bricks[3:]))
-    assert world.large.tolist() == [4]
-    assert world.controls[0].cell_radius == pytest.approx(hypot(W, H) / 2)
-    assert world.controls[0].cell_width == pytest.approx(hypot(W, H) + world.controls[0].skin)
-    assert world.order.size == world.bodies.size - 1 == 10
-    assert world.starts.size >= 3 * 10 + 3
 
 
 SHAKING: dict[str, Any] = {"kind": "harmonic", "amplitude": 0.01, "frequency": 5.0, "direction": "30 deg"}
@@ -149,13 +132,3 @@ def test_pieces_are_those_of_the_scenario_and_each_is_found_by_its_time() -> Non
     times = np.array([0.4, 0.7, 0.9, 1.6])
     places = [displacement(records[piece_at(records, 0, time)], time) for time in times]
     assert places == pytest.approx(displacement_and_velocity(pieces, times)[0], abs=1e-15)
-
-
-def test_all_that_moves_with_the_support_is_listed_where_it_starts() -> None:
-    bodies = [{"y": 0.5, "fixed": True}, {"x": 0.2, "y": 0.5}, {"x": 0.4, "y": 0.7, "fixed": True}]
-    world = build_world(scenario_of(bodies, motion=SHAKING, time={"end": 2.0}))
-    assert world.moved.body.tolist() == [0, 2, 3]
-    assert world.moved.x.tolist() == [0.0, 0.4, 0.0]
-    assert world.moved.y.tolist() == [0.5, 0.7, 0.0]
-    assert not world.moved.fx.any()
-    assert not world.moved.fy.any()

@@ -39,6 +39,7 @@ THROWS: dict[str, dict[str, Any]] = {
     "a spin": {**FALLING, "spin": 500.0},
 }
 MODELS, LAWS, DENSE = ("surface", "kernel", "particles"), ("linear", "hertz-mindlin"), {"particle_spacing": 5e-4}
+SLIVER = [[0.0, 0.0], [1.0, 1.0], [0.98, 1.02]]
 THIN = {"y": 1.0, "x": 1.0, "height": 2e-3, "fixed": True}
 HIGH = {"y": 0.2}
 SOFT = {"stiffness_scale": 1e-4}
@@ -69,6 +70,7 @@ SCENES: dict[str, Scenario] = {
     "a high wall": wall(10, 100),
     "a short end": rigid(time={"end": 1e-5}),
     "a fast block": rigid({**REST, "velocity": [50.0, 0.0]}),
+    "a fast sliver, 28 mm wide": rigid({"outline": SLIVER, "y": 2.0, "velocity": [50.0, 0.0]}),
     "a drop from 50 m": rigid({"y": 50.0}),
     "by hand": rigid(time={"step": 1e-4}),
     **{f"{name}, friction holds or not": rigid(time={"end": 100.0}, friction=MU, **SLOPES[name]) for name in SLOPES},
