@@ -69,6 +69,12 @@ def wait_until(is_so: Callable[[], bool], running: Running) -> None:
         time.sleep(0.005)
 
 
+def end_of(running: Running) -> Answer:
+    """Wait for the end of a process."""
+    out, err = running.communicate(timeout=PATIENCE)
+    return Answer(running.returncode, out, err)
+
+
 def wait_for(path: Path, running: Running) -> None:
     """Wait until a process has made a file."""
     wait_until(path.exists, running)

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from blocksim.cli.commands import app
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5 import read_frames
-from tests.cli.conftest import PATIENCE, SCENARIOS, SOFT, Command, Process, committed, wait_for, wait_for_frames
+from tests.cli.conftest import SCENARIOS, SOFT, Command, Process, committed, end_of, wait_for, wait_for_frames
 from tests.sizes import in_all
 
 SCENES = Path(__file__).with_name("scenes")
@@ -24,11 +24,10 @@ LONG = (*ENDLESS, "--set", "time.end=10")  # seconds of a process that is killed
 SHORT = (*ENDLESS, "--set", "time.end=4")
 OFTEN = ("--checkpoint-every", "50 ms")
 OTHERS = [pytest.param(number, marks=pytest.mark.long) for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)]
-Wanted = dict[str, object]
 
 
-def told(folder: Path) -> Wanted:
-    summary: Wanted = json.loads((folder / "run.json").read_text())
+def summary_of(folder: Path) -> dict[str, object]:
+    summary: dict[str, object] = json.loads((folder / "run.json").read_text())
     return summary
 
 
@@ -52,7 +51,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def assert_same(folder: Path, whole: Path) -> None:
     """Assert that a run has the bits of the whole one, in its final state and in every frame."""
-    assert told(folder)["final_state_sha256"] == told(whole)["final_state_sha256"]
+    assert summary_of(folder)["final_state_sha256"] == summary_of(whole)["final_state_sha256"]
     assert (folder / "final.csv").read_bytes() == (whole / "final.csv").read_bytes()
     one, other = (read_frames(path / "run.h5", load_scenario(path / "scenario.toml")) for path in (folder, whole))
     for name in ("step", "x", "y", "angle", "vx", "vy", "spin", "contact_count", "largest_overlap"):
@@ -79,7 +78,7 @@ def kill_again_and_again(process: Process, folder: Path, kills: int, most: float
 def frames_in(folder: Path) -> int:
     """Return how many frames of a folder can be read, all of them finite and one after the other."""
     if (folder / "done.json").exists():
-        assert told(folder)["status"] == "finished"
+        assert summary_of(folder)["status"] == "finished"
     if committed(folder / "run.h5") == 0:
         return 0
     frames = read_frames(folder / "run.h5", load_scenario(folder / "scenario.toml"))
@@ -94,9 +93,8 @@ def test_killed_run_with_soil_continues_to_the_same_bits(process: Process, tmp_p
     whole = in_one_go(run, tmp_path / "whole")
     folder = tmp_path / "out"
     assert kill_again_and_again(process, folder, in_all(5), 1.5, run) >= 1
-    running = process(*run, "--out", folder, "--resume")
-    _, err = running.communicate(timeout=PATIENCE)
-    assert running.returncode == 0, err
+    ended = end_of(process(*run, "--out", folder, "--resume"))
+    assert ended.code == 0, ended.err
     assert_same(folder, whole)
     assert (folder / "soils.csv").read_bytes() == (whole / "soils.csv").read_bytes()
 
@@ -108,11 +106,9 @@ def test_hundred_kills_lose_nothing(process: Process, tmp_path: Path, whole: Pat
     for number in range(kills):
         folder = tmp_path / str(number)
         killed += kill_again_and_again(process, folder, min(12, kills - killed), 1.5)
-        running = process(*LONG, "--out", folder, "--resume")
-        running.communicate(timeout=PATIENCE)
-        assert running.returncode == 0
+        assert end_of(process(*LONG, "--out", folder, "--resume")).code == 0
         assert_same(folder, whole)
-        resumed += bool(told(folder)["resumed_from"])
+        resumed += bool(summary_of(folder)["resumed_from"])
         if killed == kills:
             break
     assert killed == kills
@@ -126,19 +122,17 @@ def test_stopped_run_continues_to_the_same_bits(
     running = process(*SHORT, "--out", "out")
     wait_for_frames(tmp_path / "out" / "run.h5", running)
     running.send_signal(number)
-    _, err = running.communicate(timeout=PATIENCE)
-    assert running.returncode == 75, err
-    assert (
-        f"interrupted: stopped by {number.name}; partial results are in out\ncontinue with --resume (checkpoint" in err
-    )
-    assert "Traceback" not in err
-    assert told(tmp_path / "out")["status"] == "interrupted"
+    ended = end_of(running)
+    assert ended.code == 75, ended.err
+    told = f"interrupted: stopped by {number.name}; partial results are in out\ncontinue with --resume (checkpoint"
+    assert told in ended.err
+    assert "Traceback" not in ended.err
+    assert summary_of(tmp_path / "out")["status"] == "interrupted"
     assert frames_in(tmp_path / "out") > 1
     assert not (tmp_path / "out" / "done.json").exists()
-    step = told(tmp_path / "out")["steps"]
-    running = process(*SHORT, "--out", "out", "--resume")
-    running.communicate(timeout=PATIENCE)
-    assert told(tmp_path / "out")["resumed_from"] == [step]
+    step = summary_of(tmp_path / "out")["steps"]
+    end_of(process(*SHORT, "--out", "out", "--resume"))
+    assert summary_of(tmp_path / "out")["resumed_from"] == [step]
     assert_same(tmp_path / "out", short)
 
 
@@ -146,7 +140,7 @@ def test_wall_time_stops_and_resume_tells_where_it_continues(blocksim: Command, 
     stopped = blocksim(*SHORT, "--out", "out", "--wall-time", "0.1 s")
     assert stopped.code == 75
     assert "interrupted: wall-time limit of 0.1 s reached" in stopped.err
-    step = told(tmp_path / "out")["steps"]
+    step = summary_of(tmp_path / "out")["steps"]
     assert blocksim(*SHORT, "--out", "out").code == 73
     loud = tuple(word for word in SHORT if word != "--quiet")
     again = blocksim(*loud, "--out", "out", "--resume")
@@ -159,11 +153,10 @@ def test_wall_time_stops_and_resume_tells_where_it_continues(blocksim: Command, 
 
 def test_the_limit_of_wall_time_counts_from_the_start_of_the_process(process: Process, tmp_path: Path) -> None:
     slow = "import time, blocksim.cli.commands as late; late.app = lambda obj, app=late.app: app(obj=obj - 1000.0)"
-    running = process(*LONG, "--wall-time", "1000 s", "--out", "out", before=slow)
-    _, err = running.communicate(timeout=PATIENCE)
-    assert running.returncode == 75, err
-    assert "wall-time limit of 1000 s reached" in err
-    assert told(tmp_path / "out")["steps"] == 0
+    ended = end_of(process(*LONG, "--wall-time", "1000 s", "--out", "out", before=slow))
+    assert ended.code == 75, ended.err
+    assert "wall-time limit of 1000 s reached" in ended.err
+    assert summary_of(tmp_path / "out")["steps"] == 0
 
 
 def test_run_of_other_code_or_values_that_waits_is_reported(blocksim: Command) -> None:
@@ -179,23 +172,20 @@ def test_run_of_other_code_or_values_that_waits_is_reported(blocksim: Command) -
 def test_disk_that_fills_is_74_and_keeps_what_was_there(process: Process, small_disk: Path, whole: Path) -> None:
     small_disk.joinpath("others").write_bytes(bytes(1_200_000))
     roomy = "import shutil; shutil.disk_usage = lambda _: type('', (), {'free': 1 << 60})"  # as if others filled it
-    running = process(*LONG, *OFTEN, "--out", small_disk / "out", before=roomy)
-    _, err = running.communicate(timeout=PATIENCE)
-    assert (running.returncode, err.count("\n")) == (74, 1)
-    assert "No space left on device" in err
+    ended = end_of(process(*LONG, *OFTEN, "--out", small_disk / "out", before=roomy))
+    assert (ended.code, ended.err.count("\n")) == (74, 1)
+    assert "No space left on device" in ended.err
     folder = small_disk / "out"
     before = len(read_frames(folder / "run.h5", load_scenario(folder / "scenario.toml")))
     assert before > 100
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]
     small_disk.joinpath("others").unlink()
-    running = process(*LONG, "--out", small_disk / "out", "--resume", before=roomy)
-    running.communicate(timeout=PATIENCE)
-    assert running.returncode in {0, 74}  # it may not fit at all
+    again = end_of(process(*LONG, "--out", small_disk / "out", "--resume", before=roomy))
+    assert again.code in {0, 74}  # it may not fit at all
     elsewhere = shutil.copytree(folder, small_disk.parent / "elsewhere")
-    if running.returncode == 74:
-        running = process(*LONG, "--out", elsewhere, "--resume")
-        assert running.communicate(timeout=PATIENCE)[1] == ""
-    assert told(elsewhere)["resumed_from"]
+    if again.code == 74:
+        assert end_of(process(*LONG, "--out", elsewhere, "--resume")).err == ""
+    assert summary_of(elsewhere)["resumed_from"]
     assert_same(elsewhere, whole)
 
 
@@ -217,26 +207,17 @@ def test_full_disk_leaves_the_older_picture_or_export(
     (small_disk / name).write_bytes(b"older")
     room = shutil.disk_usage(small_disk).free
     (small_disk / "others").write_bytes(bytes(max(0, room - free - 8192)))
-    running = process(*calls, "--overwrite")
-    _, err = running.communicate(timeout=PATIENCE)
-    assert (running.returncode, err.count("\n")) == (74, 1), err
-    assert f"{name}: cannot be written: No space left on device" in err
+    ended = end_of(process(*calls, "--overwrite"))
+    assert (ended.code, ended.err.count("\n")) == (74, 1), ended.err
+    assert f"{name}: cannot be written: No space left on device" in ended.err
     assert {path.name: path.stat().st_size for path in small_disk.iterdir() if path.name != "others"} == {name: 5}
 
 
 def test_full_disk_is_74_and_not_a_limit_without_its_runs(
     blocksim: Command, small_disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    search = (
-        "limit",
-        SCENES / "slender.toml",
-        "--vary",
-        "ground.tilt=5deg:40deg:2",
-        "--to",
-        "50%",
-        "--out",
-        small_disk / "out",
-    )
+    vary = ("--vary", "ground.tilt=5deg:40deg:2", "--to", "50%")
+    search = ("limit", SCENES / "slender.toml", *vary, "--set", "time.step=1e-3", "--out", small_disk / "out")
     room = shutil.disk_usage(small_disk).free
     (small_disk / "others").write_bytes(bytes(room - 200_000))
     roomy = SimpleNamespace(free=10**9)  # as if others filled it while the search runs

@@ -20,7 +20,7 @@ from blocksim.cli.app import STOPPED_EARLY
 from blocksim.errors import ExitCode
 from blocksim.scenario import load_scenario
 from blocksim.simulation.stores.hdf5 import read_frames
-from tests.cli.conftest import PATIENCE, SOFT, Process, wait_for, wait_for_frames
+from tests.cli.conftest import PATIENCE, SOFT, Process, end_of, wait_for, wait_for_frames
 
 NOMINAL = "scenarios/three_blocks_nominal.toml"
 ENDLESS = ("run", NOMINAL, *SOFT, "--set", "time.end=500", "--set", "time.stop_at_rest=false", "--out", "out")
@@ -64,25 +64,22 @@ LONG = ("full disk at once", "full disk soon")
 @pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.long if one in LONG else ()) for one in ENDS])
 def test_a_process_ends_with_its_exit_code_and_at_most_a_line(process: Process, tmp_path: Path, name: str) -> None:
     arguments, before, code, told = ENDS[name]
-    running = process(*arguments, before=before)
-    out, err = running.communicate(timeout=PATIENCE)
+    ended = end_of(process(*arguments, before=before))
+    err = ended.err
     for file in re.findall(r"with the file (\S+)", err):
         Path(file).unlink()
         err = err.replace(file, "FILE")
-    assert (running.returncode, err, bool(out)) == (code, told, name == "last moments")
+    assert (ended.code, err, bool(ended.out)) == (code, told, name == "last moments")
     assert not list((tmp_path / "out").glob(".*"))
     if name == "full disk":
         assert len(read_frames(tmp_path / "out" / "run.h5", load_scenario(tmp_path / "out" / "scenario.toml"))) > 0
-
-
-def test_exit_code_after_ctrl_c_is_the_one_that_is_documented() -> None:
-    assert STOPPED_EARLY == ExitCode.STOPPED_EARLY
 
 
 def test_nothing_heavy_is_imported_before_ctrl_c_is_handled() -> None:
     code = "import sys; import blocksim.cli.app; print({'dataclasses', 'inspect', 'typer'} & set(sys.modules))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "set()"
+    assert STOPPED_EARLY == ExitCode.STOPPED_EARLY  # which is the one that is documented
 
 
 def test_ctrl_c_while_worker_processes_start_prints_no_traceback(process: Process) -> None:
@@ -93,11 +90,10 @@ def test_ctrl_c_while_worker_processes_start_prints_no_traceback(process: Proces
         "p.Popen._launch = lambda *a: (launch(*a), interrupt())"
     )
     cases = ("--executor", "processes", "--jobs", "2", "--vary", "ground.tilt=0deg:1deg:8", "--out", "out")
-    running = process("sweep", NOMINAL, *SOFT, *cases, before=early, start_new_session=True)
-    _, err = running.communicate(timeout=PATIENCE)
-    assert running.returncode == 75, err
-    assert "Traceback" not in err
-    assert "rerun the command to finish" in err
+    ended = end_of(process("sweep", NOMINAL, *SOFT, *cases, before=early, start_new_session=True))
+    assert ended.code == 75, ended.err
+    assert "Traceback" not in ended.err
+    assert "rerun the command to finish" in ended.err
 
 
 @pytest.mark.parametrize(
@@ -117,9 +113,10 @@ def test_ctrl_c_again_stops_a_run_that_is_writing(process: Process, tmp_path: Pa
     for press in range(presses):
         time.sleep(0.002 * press)
         running.send_signal(signal.SIGINT)
-    _, err = running.communicate(timeout=PATIENCE)  # sooner than it is written
-    assert running.returncode == 75
-    assert err == "stopped\n" or (presses > 1 and err.count("\n") <= 3 and "Traceback" not in err)
+    ended = end_of(running)  # sooner than it is written
+    assert ended.code == 75
+    is_short = presses > 1 and ended.err.count("\n") <= 3 and "Traceback" not in ended.err
+    assert ended.err == "stopped\n" or is_short
 
 
 @pytest.mark.parametrize(
@@ -146,17 +143,15 @@ def test_answer_that_nobody_can_take_is_74(process: Process) -> None:
     os.close(read_end)
     with Path("/dev/full").open("w") as full:
         for target, told in ((full, "the answer: cannot be written: No space left on device\n"), (write_end, "")):
-            running = process("schema", stdout=target)
-            _, err = running.communicate(timeout=PATIENCE)
-            assert (running.returncode, err) == (74, told)
+            ended = end_of(process("schema", stdout=target))
+            assert (ended.code, ended.err) == (74, told)
     os.close(write_end)
 
 
 def test_terminal_without_the_signs_gets_an_answer(process: Process) -> None:
     before = "import sys; sys.stdout.reconfigure(encoding='ascii'); sys.stderr.reconfigure(encoding='ascii')"
-    running = process("run", NOMINAL, *SOFT, "--out", "out", before=before)
-    out, _ = running.communicate(timeout=PATIENCE)
-    assert (running.returncode, "16.00 ? 0.00" in out) == (0, True)
+    ended = end_of(process("run", NOMINAL, *SOFT, "--out", "out", before=before))
+    assert (ended.code, "16.00 ? 0.00" in ended.out) == (0, True)
 
 
 def test_terminal_shows_progress_on_one_line_and_clears_it(process: Process) -> None:
