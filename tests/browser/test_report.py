@@ -37,20 +37,21 @@ def report(*arguments: object) -> None:
     assert result.exit_code == 0, result.output
 
 
-@pytest.fixture(scope="session")
-def three(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Frames]:
-    folder = tmp_path_factory.mktemp("three")
-    frames = write_run(folder / "run", count=21)
+def reported(folder: Path, *scenario: str, count: int, **overrides: object) -> tuple[Path, Frames]:
+    """Write a run and its report; return the page and the frames."""
+    frames = write_run(folder / "run", *scenario, count=count, overrides=overrides)
     report(folder / "run", "--out", folder / "report.html")
     return folder / "report.html", frames
+
+
+@pytest.fixture(scope="session")
+def three(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Frames]:
+    return reported(tmp_path_factory.mktemp("three"), count=21)
 
 
 @pytest.fixture(scope="session")
 def wall(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Frames]:
-    folder = tmp_path_factory.mktemp("wall")
-    frames = write_run(folder / "run", "wall", count=12, overrides={"output.contacts": True})
-    report(folder / "run", "--out", folder / "report.html")
-    return folder / "report.html", frames
+    return reported(tmp_path_factory.mktemp("wall"), "wall", count=12, **{"output.contacts": True})
 
 
 @pytest.fixture(scope="session")
@@ -68,9 +69,14 @@ def pixels(one: Opened) -> NDArray[np.int64]:
     return np.asarray(picture.convert("RGB"), dtype=np.int64)
 
 
-def middle_of(picture: NDArray[np.int64], colour: tuple[int, ...]) -> NDArray[np.float64]:
+def seen(one: Opened, colour: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return which pixels of the canvas have a colour."""
+    return np.asarray((np.abs(pixels(one) - colour) <= 2).all(axis=-1))
+
+
+def middle_of(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the middle of all pixels of one colour: that of a rectangle, however it is turned."""
-    rows, columns = np.nonzero((np.abs(picture - colour) <= 2).all(axis=-1))
+    rows, columns = np.nonzero(mask)
     return 0.5 * np.array([columns.min() + columns.max() + 1, rows.min() + rows.max() + 1])
 
 
@@ -82,7 +88,7 @@ def test_polygons_have_their_corners_and_are_found_under_the_pointer(tmp_path: P
     one = open_page(tmp_path / "report.html")
     one.page.evaluate(f"{PLAYER}.toggle('names')")
     scale = one.state()["scale"]
-    own = np.count_nonzero((np.abs(pixels(one) - COLOURS[0]) <= 2).all(axis=-1))
+    own = np.count_nonzero(seen(one, COLOURS[0]))
     whole = 0.5 * (30.0 * scale) ** 2
     assert 0.85 * whole < own < whole  # less edges and the line along the upper side
     found = one.page.evaluate(f"[[5, 0], [14, 14]].map(([x, y]) => {PLAYER}.drawing.frames.isIn(0, x, y))")
@@ -99,7 +105,7 @@ def test_blocks_are_where_the_run_says_to_a_pixel(three: tuple[Path, Frames], op
     for frame in (0, 12, 20):
         one.page.evaluate(f"{PLAYER}.show({frame})")
         state = one.state()
-        drawn.append([middle_of(pixels(one), colour) for colour in COLOURS])
+        drawn.append([middle_of(seen(one, colour)) for colour in COLOURS])
         assert np.abs(np.array(state["centres"]) - drawn[-1]).max() < 1.0
     places = np.stack([frames.x, -frames.y], axis=-1)[[0, 12, 20]]  # m; y goes down on a screen
     ways = 1e3 * scale * (places - places[0, 0])
@@ -119,8 +125,8 @@ def test_blocks_that_an_event_removed_are_neither_drawn_nor_found(tmp_path: Path
     for frame, is_there in ((9, True), (10, False)):
         one.page.evaluate(f"{PLAYER}.show({frame})")
         x, y = one.state()["centres"][2]
-        seen = (np.abs(pixels(one) - COLOURS[2]) <= 2).all(axis=-1).any()
-        assert (bool(seen), one.page.evaluate(f"{PLAYER}.blockAt({x}, {y}) === 2")) == (is_there, is_there)
+        is_drawn = bool(seen(one, COLOURS[2]).any())
+        assert (is_drawn, one.page.evaluate(f"{PLAYER}.blockAt({x}, {y}) === 2")) == (is_there, is_there)
     one.page.evaluate(f"{PLAYER}.mark(2)")
     assert "removed" in one.page.locator(".player .state").inner_text()
 
@@ -128,20 +134,17 @@ def test_blocks_that_an_event_removed_are_neither_drawn_nor_found(tmp_path: Path
 def test_loads_are_drawn_where_they_act_and_when_they_act(tmp_path: Path, open_page: Open) -> None:
     steps = {"kind": "steps", "times": [0.1], "factors": [1.0]}
     loads = [{"kind": "force", "body": "1", "magnitude": 5.0, "point": [-0.012, 0.0], "history": steps}]
-    write_run(tmp_path / "run", count=21, overrides={"loads": loads})
-    report(tmp_path / "run", "--out", tmp_path / "report.html")
-    one = open_page(tmp_path / "report.html")
+    one = open_page(reported(tmp_path, count=21, loads=loads)[0])
     red = (165, 0, 38)
     one.page.evaluate(f"{PLAYER}.show(9)")
-    assert not (np.abs(pixels(one) - red) <= 2).all(axis=-1).any()
+    assert not seen(one, red).any()
     one.page.evaluate(f"{PLAYER}.show(10)")
-    seen = (np.abs(pixels(one) - red) <= 2).all(axis=-1)
-    columns, rows = np.nonzero(seen.any(axis=0))[0], np.nonzero(seen.any(axis=1))[0]
+    rows, columns = np.nonzero(seen(one, red))
     (x, y), scale = one.state()["centres"][0], one.state()["scale"]
     assert columns.max() == pytest.approx(x - 12.0 * scale, abs=2.0)
-    assert rows.mean() == pytest.approx(y, abs=1.5)
+    assert 0.5 * (rows.min() + rows.max()) == pytest.approx(y, abs=1.5)
     one.page.keyboard.press("l")
-    assert not (np.abs(pixels(one) - red) <= 2).all(axis=-1).any()
+    assert not seen(one, red).any()
 
 
 def frames_a_second(one: Opened) -> float:
@@ -182,26 +185,19 @@ def test_thousand_blocks_open_and_play_at_thirty_frames_a_second(wall: tuple[Pat
 
 def test_keys_move_the_player(three: tuple[Path, Frames], open_page: Open) -> None:
     one = open_page(three[0])
-    press = one.page.keyboard.press
-    press("ArrowRight")
-    press("ArrowRight")
-    assert one.state()["frame"] == 2
-    press("Shift+ArrowRight")
-    assert one.state()["frame"] == 12
-    press("End")
-    assert one.state()["frame"] == 20
-    press("Home")
+    press, scale = one.page.keyboard.press, one.state()["scale"]
+    for key, frame in {"ArrowRight": 1, "Shift+ArrowRight": 11, "End": 20, "Home": 0}.items():
+        press(key)
+        assert one.state()["frame"] == frame
     press("Space")
     one.page.get_by_role("button", name="Pause").wait_for()
     one.page.wait_for_timeout(700)  # ms; the page forbids eval, by which Playwright waits for anything else
     assert 0 < one.state()["frame"] < 20
     press("Space")
     assert not one.state()["playing"]
-    scale = one.state()["scale"]
-    press("+")
-    assert one.state()["scale"] == pytest.approx(1.25 * scale)
-    press("0")
-    assert one.state()["scale"] == pytest.approx(scale)
+    for key, factor in {"+": 1.25, "0": 1.0}.items():
+        press(key)
+        assert one.state()["scale"] == pytest.approx(factor * scale)
     press("b")
     assert "block 1" in one.page.locator(".player .state").inner_text()
     press("?")
@@ -343,12 +339,12 @@ MEASURED = (213, 94, 0)
 
 def test_measured_ranges_stand_below_the_ground(three: tuple[Path, Frames], open_page: Open) -> None:
     one = open_page(three[0])
-    columns = np.nonzero((np.abs(pixels(one) - MEASURED) <= 2).all(axis=-1))[1]
+    columns = np.nonzero(seen(one, MEASURED))[1]
     scale, (start, _) = one.state()["scale"], one.state()["centres"][0]
     ends = start + scale * (np.array([16.0, 136.05]) - 16.0)  # block 1 is measured at 16 mm, block 3 up to 136.05
     assert np.abs([columns.min() + 3.0 - ends[0], columns.max() - ends[1]]).max() < 2.0
     one.page.locator("[data-option=measured]").uncheck()
-    assert not (np.abs(pixels(one) - MEASURED) <= 2).all(axis=-1).any()
+    assert not seen(one, MEASURED).any()
 
 
 def test_sweep_is_sorted_filtered_and_its_members_open(swept: Path, open_page: Open) -> None:
@@ -382,7 +378,12 @@ def test_measured_range_is_marked_in_the_table(tmp_path: Path, open_page: Open) 
     assert one.page.locator("table.cases td.outside", has_text="70.00").count() == 1
 
 
-def test_case_without_frames_says_how_to_get_them(swept: Path, open_page: Open) -> None:
+def test_what_is_not_stored_is_told_with_how_to_store_it(
+    three: tuple[Path, Frames], swept: Path, open_page: Open
+) -> None:
+    one = open_page(three[0])
+    assert one.page.get_by_label("contact forces").count() == 0
+    assert "--set output.contacts=true" in one.page.locator(".player .notes").inner_text()
     one = open_page(swept)
     one.page.locator(".map .over").first.focus()
     for _ in range(6):
@@ -471,9 +472,7 @@ def test_paper_is_white_and_has_no_controls(three: tuple[Path, Frames], open_pag
 
 
 def test_forces_are_shown_on_request_and_where_the_contacts_are(tmp_path: Path, open_page: Open) -> None:
-    write_run(tmp_path / "run", count=5, overrides={"output.contacts": True})
-    report(tmp_path / "run", "--out", tmp_path / "report.html")
-    one = open_page(tmp_path / "report.html")
+    one = open_page(reported(tmp_path, count=5, **{"output.contacts": True})[0])
     one.page.evaluate(f"{PLAYER}.toggle('names')")
     one.page.evaluate(f"{PLAYER}.show(4)")
     before = pixels(one)
@@ -488,9 +487,3 @@ def test_forces_are_shown_on_request_and_where_the_contacts_are(tmp_path: Path, 
     assert np.nonzero(changed.any(axis=1))[0].size == pytest.approx(0.6 * 41.0 * scale, abs=6.0)
     assert "Arrows: contact forces" in one.page.locator(".player .notes").inner_text()
     one.keep("three-blocks-forces")
-
-
-def test_run_without_contacts_says_how_to_store_them(three: tuple[Path, Frames], open_page: Open) -> None:
-    one = open_page(three[0])
-    assert one.page.get_by_label("contact forces").count() == 0
-    assert "--set output.contacts=true" in one.page.locator(".player .notes").inner_text()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,10 +25,7 @@ from blocksim.scenario.models.soil import SoilTable
 from blocksim.simulation.schemes import build_scene
 from blocksim.world.systems.soil_arrays import kind_records
 from blocksim.world.systems.soils import SMOOTHING
-from tests.soils import BLOCKS, FAR, LEFT, MATERIALS, SMOOTH_WALLS, Soil, column, right, scene
-
-if TYPE_CHECKING:
-    from blocksim.scenario import Scenario
+from tests.soils import BLOCKS, FAR, LEFT, SMOOTH_WALLS, Soil, column, right, scene
 
 STEP = 1e-5  # s
 
@@ -205,17 +202,19 @@ def test_the_decay_from_row_to_row_is_that_of_the_kernel_on_its_lattice() -> Non
     assert one * stress[2] + two / 2.0 * (stress[3] + stress[1]) == pytest.approx(one * stress[0], rel=5e-4)
 
 
+SMOOTH_GROUND = {"rods": {**SMOOTH_WALLS["rods"], "ground": {"friction": 0.0}}}
+
+
 @pytest.mark.parametrize("wall", [None, 0.05])
 def test_soil_at_rest_starts_with_all_forces_in_equilibrium(wall: float | None) -> None:
     blocks: dict[str, Any] = {**BLOCKS, "wall": {"width": 0.05, "height": 0.05, "length": 0.05, "material": "smooth"}}
     pile = [{"block": "wall", "x": 0.075, "y": 0.025 + 0.05 * k, "fixed": True} for k in (0, 1)]
-    pairs = {"rods": {**SMOOTH_WALLS["rods"], "ground": {"friction": 0.0}}}
     held = scene(
         column(0.05, 0.1, SPACING, gradient="raw"),
         blocks=blocks,
         bodies=[FAR] if wall else [*pile, FAR],
         walls=[LEFT, right(wall)] if wall else [LEFT],
-        pairs=pairs,
+        pairs=SMOOTH_GROUND,
     )
     soil = Soil(held)
     points, states, pull = soil.soils.points, soil.soils.states, 9.81 * float(soil.soils.kinds["mass"][0])
@@ -226,18 +225,11 @@ def test_soil_at_rest_starts_with_all_forces_in_equilibrium(wall: float | None) 
     assert off[is_corner].max() < 1.5
 
 
-def corrected_column(width: float, **material: Any) -> Scenario:
-    """Return soil with corrected gradients at rest between smooth walls on a smooth ground."""
-    table = column(width, 0.1, SPACING, gradient="corrected")
-    materials = {**MATERIALS, "rods": {**MATERIALS["rods"], **material}}
-    pairs = {"rods": {**SMOOTH_WALLS["rods"], "ground": {"friction": 0.0}}}
-    return scene(table, walls=[LEFT, right(width)], pairs=pairs, materials=materials)
-
-
-def test_corrected_gradients_start_with_the_forces_across_all_faces_in_equilibrium() -> None:
+def test_corrected_gradients_start_in_equilibrium_across_all_faces_and_within_the_yield_surface() -> None:
     width = 0.06
-    soil = Soil(corrected_column(width))
-    points, states, pull = soil.soils.points, soil.soils.states, 9.81 * float(soil.soils.kinds["mass"][0])
+    table = column(width, 0.1, SPACING, gradient="corrected")
+    soils = Soil(scene(table, walls=[LEFT, right(width)], pairs=SMOOTH_GROUND)).soils
+    points, states, kind, pull = soils.points, soils.states, soils.kinds[0], 9.81 * float(soils.kinds["mass"][0])
     side = 0.5 * width - np.abs(points["x"] - 0.5 * width)
     is_low, is_at_wall = points["y"] < 3.0 * SPACING, side < 3.0 * SPACING
     is_high = points["y"] > 0.1 - 4.0 * SPACING  # no face: up to a quarter of the weight
@@ -245,22 +237,15 @@ def test_corrected_gradients_start_with_the_forces_across_all_faces_in_equilibri
     assert fx[~is_low].max() < 0.05  # 9 with the stress inside
     assert fy[~is_at_wall & ~is_high].max() < 0.1  # 17
     assert fy[is_at_wall & ~is_low & ~is_high].max() < 0.3  # what the yield surface leaves to the others
-
-
-def test_corrected_soil_starts_within_the_yield_surface() -> None:
-    soils = Soil(corrected_column(0.06)).soils
-    states, kind = soils.states, soils.kinds[0]
     normal = np.array([states["sxx"], states["syy"], states["szz"]])
-    total, shear = normal.sum(axis=0), states["sxy"]
-    deviator = np.sqrt(0.5 * ((normal - total / 3.0) ** 2).sum(axis=0) + shear**2)
+    total = normal.sum(axis=0)
+    deviator = np.sqrt(0.5 * ((normal - total / 3.0) ** 2).sum(axis=0) + states["sxy"] ** 2)
     assert (deviator + kind["slope"] * total).max() < 1e-9 * np.abs(normal).max()
     assert states["plastic"].max() < 1e-12
 
 
 RADIUS = 0.0025
 INTERPRETED = pytest.mark.skipif(not config.DISABLE_JIT, reason="calls kernels with whole worlds, or without records")
-SIDES = {"width": 0.04, "height": 0.04, "length": 0.05, "material": "soft"}
-OUTLINE = {"outline": [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]], "depth": 0.05, "material": "soft"}
 
 
 def world_of(**changes: Any) -> Any:
@@ -268,49 +253,30 @@ def world_of(**changes: Any) -> Any:
 
 
 @INTERPRETED
-@pytest.mark.parametrize("shape", [SIDES, OUTLINE], ids=["sides", "outline"])
-@pytest.mark.parametrize(
-    ("u", "v", "distance", "normal"),
-    [
-        (0.03, 0.0, 0.01, (1.0, 0.0)),
-        (0.0, -0.021, 0.001, (0.0, -1.0)),
-        (0.023, 0.024, 0.005, (0.6, 0.8)),
-        (-0.019, 0.0, -0.001, (-1.0, 0.0)),
-    ],
-)
-def test_a_rectangle_has_faces_and_corners_however_it_is_given_and_turned(
-    u: float, v: float, distance: float, normal: tuple[float, float], shape: dict[str, Any]
-) -> None:
-    world = world_of(blocks={"far": shape})
-    block = world.bodies[0]
-    for angle in (0.0, 0.4, 2.0):
-        block.cos, block.sin = math.cos(angle), math.sin(angle)
-        turn = np.array([[block.cos, -block.sin], [block.sin, block.cos]])
-        x, y = (block.x, block.y) + turn @ (u, v)
-        found, nx, ny = from_body(world, 0, x, y, RADIUS)
-        assert found == pytest.approx(distance, abs=1e-12)
-        assert (nx, ny) == pytest.approx(tuple(turn @ normal), abs=1e-9)
-
-
-@INTERPRETED
-@pytest.mark.parametrize("angles", [(0, 170, 190), (0, 100, 200, 280), (0, 40, 90, 150, 210, 280)])
-def test_distance_from_a_polygon_is_that_from_the_nearest_place_on_its_outline(angles: tuple[int, ...]) -> None:
-    """A triangle with a tip of 10 degrees is among them."""
-    turns = np.radians(angles)
+@pytest.mark.parametrize("angles", [(), (0, 170, 190), (0, 100, 200, 280), (0, 40, 90, 150, 210, 280)])
+def test_distance_from_a_block_is_that_from_the_nearest_place_on_its_outline(angles: tuple[int, ...]) -> None:
+    """A rectangle that is given by its sides, and a triangle with a tip of 10 degrees are among them."""
+    turns = np.radians(angles or (45, 135, 225, 315))
     outline = 0.04 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
-    kind = {"outline": outline.tolist(), "depth": 0.05, "material": "soft"}
+    size = 0.04 * math.sqrt(2.0)
+    shape = {"outline": outline.tolist(), "depth": 0.05} if angles else {"width": size, "height": size, "length": 0.05}
     world = world_of(
-        blocks={"far": kind}, soils=[column(0.04, 0.04, 0.0005)], bodies=[{"block": "far", "x": -1, "y": 1}]
+        blocks={"far": {**shape, "material": "soft"}},
+        soils=[column(0.04, 0.04, 0.0005)],
+        bodies=[{"block": "far", "x": -1, "y": 1}],
     )
-    corners = outline - np.array(geometry.centroid(outline.tolist()))
+    block, corners = world.bodies[0], outline - np.array(geometry.centroid(outline.tolist()))
+    block.cos, block.sin = math.cos(2.0), math.sin(2.0)
+    turn = np.array([[block.cos, -block.sin], [block.sin, block.cos]])
     places = np.random.default_rng(5).uniform(-0.07, 0.07, (300, 2))
     apart = geometry.edge_distance(places, corners) * np.where(geometry.is_inside(places, corners), -1.0, 1.0)
-    for (x, y), expected in zip(places, apart, strict=True):
-        found, nx, ny = from_body(world, 0, x - 1.0, y + 1.0, RADIUS)
+    for place, expected in zip(places, apart, strict=True):
+        x, y = (-1.0, 1.0) + turn @ place
+        found, *normal = from_body(world, 0, x, y, RADIUS)
         assert found == pytest.approx(expected, abs=1e-15)
-        foot = np.array([[x - found * nx, y - found * ny]])
-        assert geometry.edge_distance(foot, corners)[0] == pytest.approx(0.0, abs=1e-14)
-        assert is_near(world, 0, x - 1.0, y + 1.0, 0.02) or expected >= 0.02
+        foot = place - found * turn.T @ np.array(normal)
+        assert geometry.edge_distance(foot[np.newaxis], corners)[0] == pytest.approx(0.0, abs=1e-14)
+        assert is_near(world, 0, x, y, 0.02) or expected >= 0.02
 
 
 @INTERPRETED

@@ -137,11 +137,6 @@ def test_no_two_pairs_of_a_colour_share_a_free_body_and_all_have_one(seed: int) 
     assert meets.max() <= len(colours) <= 2 * meets.max() - 1  # of a greedy colouring
 
 
-def test_fixed_bodies_and_the_ground_take_no_colour() -> None:
-    scene = listed(posed([Block(0.04 * i, 0.0125) for i in range(9)]))
-    assert [len(pairs) for pairs in of_colours(scene)] == [9]
-
-
 def test_pairs_beyond_the_last_colour_are_solved_one_by_one() -> None:
     scene = listed(posed(comb()))
     colours = of_colours(scene)
@@ -157,13 +152,6 @@ def test_pairs_beyond_the_last_colour_are_solved_one_by_one() -> None:
     assert last - first == len(colours[-1])
     assert np.all(scene.contacts.packs["count"][first:last] == 1)
     assert last <= most_packs(scene) <= scene.contacts.packs.size
-
-
-def test_constraints_know_how_the_materials_of_their_bodies_touch() -> None:
-    scene = listed(posed(crowd(0), friction=0.25, ground_friction=0.75))
-    for constraint in listed_constraints(scene):
-        expected = 0.75 if constraint.b == scene.world.bodies.size - 1 else 0.25
-        assert scene.contacts.materials[constraint.material].kinetic_friction == expected
 
 
 def test_impulses_go_with_their_pair_into_the_next_list() -> None:
