@@ -37,9 +37,11 @@ def report(*arguments: object) -> None:
     assert result.exit_code == 0, result.output
 
 
-def reported(folder: Path, *scenario: str, count: int, **overrides: object) -> tuple[Path, Frames]:
+def reported(
+    folder: Path, name: str = "three_blocks", *, count: int, overrides: dict[str, object] | None = None
+) -> tuple[Path, Frames]:
     """Write a run and its report; return the page and the frames."""
-    frames = write_run(folder / "run", *scenario, count=count, overrides=overrides)
+    frames = write_run(folder / "run", name, count=count, overrides=overrides)
     report(folder / "run", "--out", folder / "report.html")
     return folder / "report.html", frames
 
@@ -51,7 +53,7 @@ def three(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Frames]:
 
 @pytest.fixture(scope="session")
 def wall(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Frames]:
-    return reported(tmp_path_factory.mktemp("wall"), "wall", count=12, **{"output.contacts": True})
+    return reported(tmp_path_factory.mktemp("wall"), "wall", count=12, overrides={"output.contacts": True})
 
 
 @pytest.fixture(scope="session")
@@ -134,7 +136,7 @@ def test_blocks_that_an_event_removed_are_neither_drawn_nor_found(tmp_path: Path
 def test_loads_are_drawn_where_they_act_and_when_they_act(tmp_path: Path, open_page: Open) -> None:
     steps = {"kind": "steps", "times": [0.1], "factors": [1.0]}
     loads = [{"kind": "force", "body": "1", "magnitude": 5.0, "point": [-0.012, 0.0], "history": steps}]
-    one = open_page(reported(tmp_path, count=21, loads=loads)[0])
+    one = open_page(reported(tmp_path, count=21, overrides={"loads": loads})[0])
     red = (165, 0, 38)
     one.page.evaluate(f"{PLAYER}.show(9)")
     assert not seen(one, red).any()
@@ -472,7 +474,7 @@ def test_paper_is_white_and_has_no_controls(three: tuple[Path, Frames], open_pag
 
 
 def test_forces_are_shown_on_request_and_where_the_contacts_are(tmp_path: Path, open_page: Open) -> None:
-    one = open_page(reported(tmp_path, count=5, **{"output.contacts": True})[0])
+    one = open_page(reported(tmp_path, count=5, overrides={"output.contacts": True})[0])
     one.page.evaluate(f"{PLAYER}.toggle('names')")
     one.page.evaluate(f"{PLAYER}.show(4)")
     before = pixels(one)

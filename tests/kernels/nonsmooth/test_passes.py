@@ -8,21 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from blocksim.kernels.common.arrays import zeros
 from blocksim.kernels.common.tolerances import LATE
-from blocksim.kernels.nonsmooth.arrays import BEFORE, FAR, STATE, TALLY_PACKS
-from blocksim.kernels.nonsmooth.motion import kick, kick_warm, place
+from blocksim.kernels.nonsmooth.arrays import FAR, TALLY_PACKS
 from blocksim.kernels.nonsmooth.passes import FIRST_VELOCITY, POSITION, VELOCITY, range_of_thread, sweep, velocity_pass
 from blocksim.kernels.nonsmooth.step import bodies_of_thread, substep
 from blocksim.world.sag import soft_contact
 from tests.kernels.references import Dense, dense
-from tests.kernels.scenes import Block, after_substep, collided, make_body, pile, posed, single, velocities
+from tests.kernels.scenes import Block, after_substep, collided, pile, posed, single, velocities
 
 if TYPE_CHECKING:
     from numpy.random import Generator
     from numpy.typing import NDArray
 
-    from blocksim.kernels.common.arrays import Records
     from blocksim.kernels.nonsmooth.arrays import Nonsmooth
 
 G = 9.81
@@ -316,44 +313,3 @@ def test_velocity_pass_ends_at_its_tolerance_or_after_its_sweeps() -> None:
         assert scene.contacts.stepping[0].sweeps == sweeps[tolerance] + 1
     assert sweeps[0.1] < sweeps[1e-3] < sweeps[1e-6]
     assert after_substep(blocks, velocity_tolerance=1e-6, velocity_sweeps=3).contacts.stepping[0].sweeps == 3
-
-
-KICK = (0.5 * H, -9.0 * H)
-
-
-def kicked(vx: float, vy: float, spin: float, share: float) -> tuple[Records, Records]:
-    """Return the state of a free body after a share of a kick, and what is kept from before the substep."""
-    states, before = zeros(1, STATE), zeros(1, BEFORE)
-    one = states[0]
-    one.vx, one.vy, one.spin, one.inverse_mass, one.inverse_inertia = vx, vy, spin, 10.0, 1e4
-    kick(states, before, 0, 1, share, *KICK)
-    return states, before
-
-
-@pytest.mark.parametrize("last", [0.5, 1.0])
-def test_warm_kick_gives_again_what_impulses_gave_and_one_whole_kick(last: float) -> None:
-    states, kept = kicked(1.0, -2.0, 3.0, last)
-    one, before = states[0], kept[0]
-    pushed = np.array([0.1, 0.4, -5.0])
-    one.vx, one.vy, one.spin = np.array([one.vx, one.vy, one.spin]) + pushed
-    now = np.array([one.vx, one.vy, one.spin])
-    kick_warm(states, kept, 0, 1, last, *KICK)
-    assert [one.vx, one.vy, one.spin] == pytest.approx(now + pushed + (*KICK, 0.0), abs=1e-14)
-    assert [before.vx, before.vy, before.spin] == now.tolist()
-
-
-@pytest.mark.parametrize("turned", [1e-4, -0.3])
-@pytest.mark.parametrize("is_touching", [False, True])
-def test_step_ends_with_the_pose_that_the_drifts_add_up_to(turned: float, is_touching: bool) -> None:
-    """Velocities of bodies in flight are brought up by half a kick; a support holds against that."""
-    body = make_body(0.2, 0.1, 0.6)
-    (one,), (before,) = kicked(1.0, -2.0, 3.0, 1.0)
-    one.vy += 0.1 * is_touching
-    one.dx, one.dy, one.turned = 0.01, -0.02, turned
-    velocity = np.array([one.vx, one.vy, one.spin])
-    place(body, one, before, 1.0, (*KICK, 0.0))
-    assert (body.x, body.y, body.angle) == pytest.approx((0.21, 0.08, 0.6 + turned), abs=1e-15)
-    assert (body.cos, body.sin) == pytest.approx((math.cos(body.angle), math.sin(body.angle)), abs=1e-14)
-    brought = np.array([0.0, 0.0, 0.0]) if is_touching else np.array([*KICK, 0.0]) / 2
-    assert [body.vx, body.vy, body.spin] == pytest.approx(velocity + brought, abs=1e-15)
-    assert (one.dx, one.dy, one.turned) == (0.0, 0.0, 0.0)
