@@ -23,6 +23,8 @@ from tests.bench.peers.work_precision import SMALLEST_SHARE, Curve, Panel, draw_
 if TYPE_CHECKING:
     from pathlib import Path
 
+# of the wrapper of Box2D
+pytestmark = pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")
 ENGINES = pytest.mark.parametrize(
     ("module", "solver"),
     [
@@ -56,27 +58,19 @@ class Shifted:
         return Final(x + self.by, y, self.by if self.seconds is None else self.seconds)
 
 
-def solved(module: str, solver: Solver, scene: Scene) -> Final:
-    if module == "Box2D":
-        pytest.importorskip(module, exc_type=ImportError)
-    pytest.importorskip(module)
-    return solver.solve(scene)
-
-
 @ENGINES
-@pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")  # Box2D's wrapper
 def test_blocks_start_alike_fall_freely_and_land_on_the_ground(module: str, solver: Solver) -> None:
+    pytest.importorskip(module, exc_type=ImportError)
     (scene,) = starts(1)
-    soon = solved(module, solver, replace(scene, end=2e-3))
+    soon = solver.solve(replace(scene, end=2e-3))
     assert soon.x == pytest.approx([0.016, 0.038, 0.060], abs=1e-5)
     assert soon.y == pytest.approx([0.025, 0.075, 0.125], abs=3e-5)
-    rest = solved(module, solver, scene)
+    rest = solver.solve(scene)
     assert rest.y == pytest.approx([0.025, 0.016, 0.016], abs=3e-5)  # upright, and two on their sides
     assert rest.x == pytest.approx([0.016, 0.068, 0.131], abs=3e-3)
     assert rest.seconds > 0.0
 
 
-@pytest.mark.filterwarnings("ignore:builtin type .* has no __module__ attribute:DeprecationWarning")
 def test_a_heap_of_hexagons_is_timed_and_compared() -> None:
     for module in ("pymunk", "Box2D"):
         pytest.importorskip(module, exc_type=ImportError)
