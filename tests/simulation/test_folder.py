@@ -37,6 +37,8 @@ from tests.simulation.conftest import SCENARIOS, Shipped
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from tests.golden import Golden
+
 
 def content_of(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -71,26 +73,35 @@ def refusal(folder: Path, *, overwrite: bool = True) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("overwrite", [False, True])
-def test_foreign_file_is_never_removed(copy: Path, overwrite: bool) -> None:
-    (copy / "thesis.tex").write_text("years of work")
-    assert "not a blocksim run (thesis.tex)" in refusal(copy, overwrite=overwrite)
-
-
 TAKEN = ("scenario.toml", "experiment.csv", "motion.csv", ".final.csv.swp")
+RESULTS = ("final.csv", "run.h5", "run.json", "done.json", "probe-base.csv")
 
 
-@pytest.mark.parametrize("name", [*TAKEN, "final.csv", "run.h5", "run.json", "done.json", "probe-base.csv"])
-def test_a_file_of_a_person_with_the_name_of_a_result_is_never_removed(tmp_path: Path, copy: Path, name: str) -> None:
-    for folder in (tmp_path / "alone", copy) if name in TAKEN else (tmp_path / "alone",):
-        folder.mkdir(exist_ok=True)
-        (folder / name).write_text("years,of,work\n")
-        assert name in refusal(folder)
-
-
-def test_scenario_written_by_a_person_is_never_removed(tmp_path: Path) -> None:
-    shutil.copyfile(SCENARIOS / "tower.toml", tmp_path / "scenario.toml")
-    assert "scenario.toml" in refusal(tmp_path)
+def test_what_a_person_has_written_is_never_removed(copy: Path, tmp_path: Path, golden: Golden) -> None:
+    """Foreign files, files with the names of results, and scenarios that no run has resolved."""
+    texts = []
+    for name in ("thesis.tex", *TAKEN):
+        place = Path(shutil.copytree(copy, tmp_path / f"a run with {name}"))
+        (place / name).write_text("years,of,work\n")
+        texts += [refusal(place), refusal(place, overwrite=False)]
+    for name in (*TAKEN, *RESULTS):
+        place = tmp_path / f"only {name}"
+        place.mkdir()
+        (place / name).write_text("years,of,work\n")
+        texts.append(refusal(place))
+    (tmp_path / "mine").mkdir()
+    shutil.copyfile(SCENARIOS / "tower.toml", tmp_path / "mine" / "scenario.toml")
+    texts.append(refusal(tmp_path / "mine"))
+    (tmp_path / "broken").symlink_to(tmp_path / "nowhere")
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    (tmp_path / "link").symlink_to("file")
+    for name in ("broken", "broken/run", "file", "file/run", "link", "link/run"):
+        with pytest.raises(OutputExistsError) as caught:
+            prepare_folder(tmp_path / name, overwrite=True)
+        texts.append(str(caught.value))
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
+    assert not (tmp_path / "nowhere").exists()
+    golden("\n".join(texts))
 
 
 def test_a_link_in_the_place_of_a_result_is_not_removed_but_replaced_and_not_what_it_leads_to(
@@ -137,18 +148,7 @@ def test_what_changes_the_result_changes_the_default_folder(soft: Shipped) -> No
     assert default_folder(soft()).parent == Path("results/three_blocks_nominal")
 
 
-def test_files_and_links_that_lead_to_no_folder_are_in_the_way(tmp_path: Path) -> None:
-    (tmp_path / "broken").symlink_to(tmp_path / "nowhere")
-    (tmp_path / "file").write_text("mine", encoding="utf-8")
-    (tmp_path / "link").symlink_to("file")
-    for names, told in ((("broken",), "broken is a broken link"), (("file", "link"), "is a file, not a folder")):
-        for folder in (tmp_path / name / run for name in names for run in ("", "run")):
-            with pytest.raises(OutputExistsError, match=told):
-                prepare_folder(folder, overwrite=True)
-    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
-    assert not (tmp_path / "nowhere").exists()
-    with pytest.raises(OutputExistsError, match="cannot be created: File name too long"):
-        make_folder(tmp_path / ("x" * 300))
+def test_a_folder_is_made_where_a_link_leads(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "good").symlink_to("elsewhere")
     make_folder(tmp_path / "good" / "run")
