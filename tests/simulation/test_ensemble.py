@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +22,8 @@ from tests.simulation.conftest import SCENARIOS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+    from tests.golden import Golden
 
 WALL = {"stiffness_scale": 1e-3}
 SOFT = {"contact.stiffness_scale": 1e-3, "contact.restitution": 0.2, "time.end": 0.3}
@@ -199,39 +200,39 @@ def seen(
     return found
 
 
-@pytest.mark.parametrize(
-    ("end", "manner"),
-    [
-        ({"dx": 0.31}, Response.STANDS),  # a hundredth of 32 mm is 0.32 mm
-        ({"dx": 0.33}, Response.SLID),
-        ({"turn": 0.5}, Response.STANDS),  # half a diagonal is 29.7 mm
-        ({"turn": 0.7}, Response.SLID),
-        ({"turn": -46.0}, Response.FELL),
-        ({"dy": -15.0}, Response.SLID),
-        ({"dy": -17.0}, Response.FELL),
-        ({"dy": 17.0}, Response.SLID),
-    ],
-)
-def test_manner_follows_from_the_end(end: dict[str, float], manner: Response) -> None:
-    assert seen([(frame(), 0.0), (frame(**end), 0.1)]).outcome == manner
+def ended(**end: float) -> Movement:
+    return seen([(frame(), 0.0), (frame(**end), 0.1)])
 
 
-def test_block_that_comes_back_has_rocked_and_its_largest_turn_is_kept() -> None:
-    turns = ((0.0, 0.0), (0.1, 0.1), (0.2, 12.0), (0.3, -5.0), (0.4, 0.0))
-    found = seen([(frame(turn=turn), time) for time, turn in turns])
-    assert (found.outcome, found.rotated_block, found.first_mover) == ("rocked back", "2", "2")
-    assert (found.first_moved_s, found.largest_rotation_deg) == (0.2, pytest.approx(12.0))
+def moving(speed: float = 0.0, spin: float = 0.0, support: float = 0.0) -> Movement:
+    """Return what is told of a frame in which block 2 goes on at a speed (m/s) and a spin (rad/s)."""
+    motion = frame()
+    motion[3] = support
+    motion[3, 1], motion[5, 1] = speed, spin
+    return seen([(motion, 0.6)], velocity=support)
 
 
-def test_fixed_and_driven_blocks_are_not_the_ones_that_moved() -> None:
-    fixed = tuple(body._replace(fixed=True) for body in PLACED)
-    frames = [(frame(), 0.0), (frame(dx=100.0, turn=100.0), 100.0)]
-    found = seen(frames, fixed)
-    assert (found.outcome, found.first_mover) == ("stands", None)
-    frames[1][0][0, 2] += 1e-4
-    found = seen(frames, (PLACED[0], fixed[1], PLACED[2]))
-    assert (found.displaced_block, found.largest_rotation_deg) == ("3", 0.0)
-    assert found.largest_displacement_mm == pytest.approx(0.1)
+FIXED = tuple(body._replace(fixed=True) for body in PLACED)
+AWAY = frame(dx=100.0, turn=100.0)
+AWAY[0, 2] += 1e-4  # block 3, by 0.1 mm
+TURNS = ((0.0, 0.0), (0.1, 0.1), (0.2, 12.0), (0.3, -5.0), (0.4, 0.0))
+MOVEMENTS = {
+    **{f"by {dx} mm": ended(dx=dx) for dx in (0.31, 0.33)},  # a hundredth of 32 mm is 0.32 mm
+    **{f"by {turn} degrees": ended(turn=turn) for turn in (0.5, 0.7, -46.0)},  # half a diagonal is 29.7 mm
+    **{f"up by {dy} mm": ended(dy=dy) for dy in (-15.0, -17.0, 17.0)},
+    "back": seen([(frame(turn=turn), time) for time, turn in TURNS]),
+    "fixed ones": seen([(frame(), 0.0), (AWAY, 100.0)], FIXED),
+    "a fixed one, another by 0.1 mm": seen([(frame(), 0.0), (AWAY, 100.0)], (PLACED[0], FIXED[1], PLACED[2])),
+    "at rest": moving(),
+    **{f"at {speed} m/s": moving(speed) for speed in (0.005, 0.006)},  # 0.32 mm in a tenth of 0.6 s: 0.0053 m/s
+    "riding on the table": moving(0.2, support=0.2),
+    "turning": moving(spin=0.2),  # corners, half a diagonal from the centre
+}
+
+
+def test_movements_are_told_as_they_were_read(golden: Golden) -> None:
+    texts = {name: ", ".join(f"{key} {value}" for key, value in one.values.items()) for name, one in MOVEMENTS.items()}
+    golden("\n".join(f"{name}: {text}" for name, text in texts.items()), rules=["digits"])
 
 
 def both_ways(scenarios: Sequence[Scenario]) -> list[Movement]:
@@ -265,27 +266,6 @@ def test_members_that_rock_back_are_told_from_those_that_stand() -> None:
     # the last ones are caught on their way, the first of them long before it would be seen to go on
     assert [one.outcome for one in found] == [Response.ROCKED, Response.ROCKED, Response.SLID, Response.ROCKING]
     assert all(one.largest_rotation_deg > 0.5 for one in found)
-
-
-@pytest.mark.parametrize(
-    ("speed", "spin", "support", "fastest", "moves_on"),
-    [
-        (0.0, 0.0, 0.0, 0.0, False),
-        (0.005, 0.0, 0.0, 0.005, False),  # 0.3 mm in a tenth of 0.6 s; a hundredth of 32 mm is 0.32 mm
-        (0.006, 0.0, 0.0, 0.006, True),
-        (0.2, 0.0, 0.2, 0.0, False),  # it rides on the table
-        (0.0, 0.2, 0.0, 0.1 * math.hypot(0.032, 0.05), True),  # its corners, half a diagonal from the centre
-    ],
-)
-def test_a_block_moves_on_that_would_soon_have_left_its_place(
-    speed: float, spin: float, support: float, fastest: float, *, moves_on: bool
-) -> None:
-    motion = frame()
-    motion[3] = support
-    motion[3, 1], motion[5, 1] = speed, spin
-    found = seen([(motion, 0.6)], velocity=support)
-    assert found.fastest_m_s == pytest.approx(fastest, rel=1e-5)
-    assert found.moves_on is moves_on
 
 
 def on_a_table(scheme: str, **motion: object) -> Scenario:
