@@ -1,17 +1,33 @@
-"""What fields of a scenario take: words, whole numbers, sides of blocks, densities, names that folders can have."""
+"""What fields of a scenario take, long and short forms of contacts and loads, and the JSON Schema of all of them."""
 
+import math
 import re
+import tomllib
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from blocksim.errors import ScenarioError
-from blocksim.scenario import json_schema, scenario_from_mapping
+from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
+from blocksim.scenario import (
+    Document,
+    Scenario,
+    json_schema,
+    load_scenario,
+    scenario_from_mapping,
+    scenario_hash,
+    scenario_to_toml,
+)
 from blocksim.scenario.geometry import edge_distance
 from blocksim.scenario.models.base import OneOf, Whole
+from blocksim.scenario.models.contact import Contact, PairFriction, Restitution
 from blocksim.scenario.models.geometry import Block, Material
+from blocksim.scenario.models.loads import Gravity, Stretch, VaryingLoad, stretches_of
 from blocksim.scenario.models.timeline import NewVelocity
 from blocksim.simulation.files import RESULTS, default_folder
 from tests.scenario.conftest import data_of
@@ -87,3 +103,164 @@ def test_results_lie_in_a_folder_of_the_name_below_results_and_editors_are_told_
         assert folder.resolve().parent.parent == RESULTS.resolve()
     pattern = json_schema()["properties"]["name"]["pattern"].replace("$", r"\Z")  # it allows no line feed behind it
     assert [name for name in (*HOSTILE, *FINE) if re.search(pattern, name)] == list(FINE)
+
+
+SIDE = "friction.block_block"
+
+
+def test_forms_of_friction() -> None:
+    tan21, tan45 = math.tan(math.radians(21)), math.tan(math.pi / 4)
+    slow = {"static": "45 deg", "kinetic": 0.5, "transition_speed": "1 mm/s"}
+    for given, expected in (
+        (0.31, (0.31, 0.31, 0.005)),
+        (0, (0.0, 0.0, 0.005)),
+        ("21 deg", (tan21, tan21, 0.005)),
+        ({"static": 0.3}, (0.3, 0.3, 0.005)),
+        (slow, (tan45, 0.5, 0.001)),
+    ):
+        pair = PairFriction.model_validate(given)
+        assert (pair.static, pair.kinetic, pair.transition_speed) == expected
+
+
+@pytest.mark.parametrize(
+    ("given", "length", "support"),
+    [
+        ({}, 0.0013, 0.0026),
+        ({"particle_spacing": 0.002}, 0.0026, 0.0052),
+        ({"particle_spacing": 0.002, "kernel": "cubic-spline"}, 0.0026, 0.0052),
+        ({"particle_spacing": 0.002, "kernel": "quintic-spline"}, 0.0026, 0.0078),
+        ({"particle_spacing": 0.002, "smoothing_length": 0.0016}, 0.0016, 0.0032),
+    ],
+)
+def test_smoothing_length_and_reach_of_the_kernel(given: dict[str, object], length: float, support: float) -> None:
+    contact = Contact.model_validate({"model": "kernel", **given})
+    reach = support_radius(KERNEL_CODES[contact.kernel], contact.resolved_smoothing_length)
+    assert [contact.resolved_smoothing_length, reach] == pytest.approx([length, support])
+
+
+def test_a_short_smoothing_length_only_matters_to_the_kernel() -> None:
+    for model in ("surface", "particles"):
+        assert Contact.model_validate({"model": model, "smoothing_length": 1e-6}).smoothing_length == 1e-6
+
+
+def test_forms_of_restitution() -> None:
+    for given, expected in ((0.5, (0.5, 0.5)), (1, (1.0, 1.0)), ({"block_ground": 0.1}, (0.2, 0.1)), ({}, (0.2, 0.2))):
+        restitution = Restitution.model_validate(given)
+        assert (restitution.block_block, restitution.block_ground) == expected
+
+
+@pytest.fixture
+def document(valid_text: str) -> Document:
+    return Document.parse(valid_text)
+
+
+@pytest.mark.parametrize(
+    ("values", "kinetic"),
+    [
+        ({SIDE: {"static": "45 deg", "kinetic_ratio": 1}}, 1.0),
+        ({SIDE: 0.5, f"{SIDE}.kinetic_ratio": 0.25}, 0.125),
+        ({SIDE: {"static": 0.5, "kinetic": 0.4}, f"{SIDE}.kinetic_ratio": 0.25}, 0.125),
+        ({SIDE: {"static": 0.5, "kinetic_ratio": 0.25}, f"{SIDE}.kinetic": 0.3}, 0.3),
+        ({SIDE: {"static": 0.5, "kinetic_ratio": 0.25}, f"{SIDE}.static": 0.4}, 0.1),
+    ],
+)
+def test_kinetic_is_the_ratio_times_static_unless_set_last(
+    document: Document, values: dict[str, object], kinetic: float
+) -> None:
+    assert document.with_values(values).build().friction.block_block.kinetic == pytest.approx(kinetic)
+
+
+def test_a_resolved_ratio_is_the_same_scenario_and_the_same_run_as_its_value(document: Document) -> None:
+    by_ratio = document.with_values({SIDE: {"static": 0.31, "kinetic_ratio": 0.62}}).build()
+    by_value = document.with_values({SIDE: {"static": 0.31, "kinetic": 0.31 * 0.62}}).build()
+    assert Document.parse(scenario_to_toml(by_ratio)).build() == by_ratio
+    assert scenario_hash(by_ratio) == scenario_hash(by_value)
+
+
+CUBE = {"width": 1, "height": 1, "length": 1, "material": "oak"}
+BODIES: list[dict[str, Any]] = [
+    {"block": "cube", "x": 0, "y": 0.5},
+    {"block": "cube", "x": 1, "y": 0.5, "fixed": True},
+]
+
+
+def data_with(*loads: dict[str, Any], bodies: list[dict[str, Any]] = BODIES) -> dict[str, Any]:
+    return data_of(blocks={"cube": CUBE}, bodies=bodies, loads=list(loads))
+
+
+def scenario(*loads: dict[str, Any], folder: Path | None = None) -> Scenario:
+    return scenario_from_mapping(data_with(*loads), *([] if folder is None else [folder]))
+
+
+FORCE: dict[str, Any] = {"kind": "force", "body": "1", "magnitude": "2 kN"}
+
+
+def test_a_table_is_read_and_the_resolved_scenario_needs_it_no_more(tmp_path: Path) -> None:
+    (tmp_path / "load.csv").write_text("# jack\ntime_s,factor\n0.5,1\n1.5,3\n")
+    (tmp_path / "tilt.csv").write_text("time_s,tilt_deg\n0,0\n10,20\n")
+    read = scenario(
+        {**FORCE, "history": {"kind": "table", "table": "load.csv"}},
+        {"kind": "gravity", "table": "tilt.csv"},
+        folder=tmp_path,
+    )
+    one, two = read.loads
+    assert isinstance(one, VaryingLoad)
+    assert stretches_of(one, 0.0) == (Stretch(0.0, 1.0, 0.0), Stretch(0.5, 1.0, 2.0), Stretch(1.5, 3.0, 0.0))
+    assert isinstance(two, Gravity)
+    assert two.tilts == pytest.approx((0.0, 0.3490658503988659))
+    (tmp_path / "scenario.toml").write_text(scenario_to_toml(read))
+    for name in ("load.csv", "tilt.csv"):
+        (tmp_path / name).unlink()
+    again = load_scenario(tmp_path / "scenario.toml")
+    assert again == read
+    assert scenario_hash(again) == scenario_hash(read)
+
+
+def test_a_load_is_set_by_its_name() -> None:
+    named = data_with(FORCE, {**FORCE, "name": "push"})
+    changed = load_scenario(named, {"loads.push.magnitude": "5 kN"})
+    assert [getattr(load, "magnitude", None) for load in changed.loads] == [2000.0, 5000.0]
+    with pytest.raises(ScenarioError, match='loads has no "pull", known: push'):
+        load_scenario(named, {"loads.pull.magnitude": "5 kN"})
+
+
+FORMS: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("schema.toml").read_text())
+
+
+@pytest.fixture(scope="module")
+def validator() -> Draft202012Validator:
+    return Draft202012Validator(json_schema())
+
+
+def test_it_is_a_schema() -> None:
+    schema = json_schema()
+    Draft202012Validator.check_schema(schema)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+
+
+def test_shipped_scenarios_are_valid_as_written_and_resolved(validator: Draft202012Validator, shipped: Path) -> None:
+    validator.validate(tomllib.loads(shipped.read_text()))
+    validator.validate(tomllib.loads(scenario_to_toml(load_scenario(shipped))))
+
+
+@pytest.mark.parametrize("addition", FORMS["valid"], ids=lambda text: text.strip().splitlines()[-1])
+def test_every_form_of_a_value_is_valid(validator: Draft202012Validator, valid_text: str, addition: str) -> None:
+    validator.validate(tomllib.loads(f"{valid_text}\n{addition}\n"))
+
+
+@pytest.mark.parametrize("addition", FORMS["wrong"], ids=lambda text: text.strip().splitlines()[-1])
+def test_mistakes_are_refused(validator: Draft202012Validator, valid_text: str, addition: str) -> None:
+    assert not validator.is_valid(tomllib.loads(f"{valid_text}\n{addition}\n"))
+
+
+def test_every_key_is_described() -> None:
+    schema = json_schema()
+    tables: dict[str, Any] = {"Scenario": schema, **schema["$defs"]}
+    missing = [
+        f"{name}.{key}"
+        for name, table in tables.items()
+        for option in [table, *table.get("anyOf", [])]
+        for key, entry in option.get("properties", {}).items()
+        if not entry.get("description")
+    ]
+    assert missing == []
