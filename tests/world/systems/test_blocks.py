@@ -7,7 +7,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import blocksim
 from blocksim.scenario import load_scenario
@@ -17,6 +16,7 @@ from blocksim.simulation.trajectory import data_set, tidy_table
 from blocksim.view.history import MOTIONS, FramesInView
 from blocksim.view.run_data import Support, drawable_frames
 from blocksim.world.systems.blocks import placed_points, support_motion, support_quads
+from tests.golden import Golden
 from tests.view.made_up import toppling
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -59,32 +59,13 @@ def test_corners_turn_counter_clockwise_with_their_block() -> None:
     np.testing.assert_allclose(found, [[[3.0, 5.0], [1.0, 4.0]]], atol=1e-15)
 
 
-def areas(quads: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the areas (m2) of quadrilaterals, positive for corners that run counter-clockwise."""
-    one, other = quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1]
-    return np.asarray(0.5 * (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]))
-
-
-def test_profile_is_filled_below_and_a_wall_behind_its_face() -> None:
-    scenario = load_scenario(SCENARIOS / "slope.toml")
-    quads = support_quads(scenario, toppling(2).tracks[0])
-    assert (areas(quads) > 0.0).all()
-    profile = np.array(scenario.ground.profile)
-    tops = quads[:-1, 2:].reshape(-1, 2)
-    assert all(np.isclose(tops, point).all(axis=1).any() for point in profile)
-    wall = quads[-1]
-    np.testing.assert_allclose(wall[3], [0.5, 0.0])
-    np.testing.assert_allclose(wall[2], [0.5, 0.2])
-    assert (wall[:2, 0] > 0.5).all()  # the blocks come from the left
-
-
-def test_level_ground_reaches_beyond_all_blocks() -> None:
-    frames = toppling(30)
-    quads = support_quads(load_scenario(SCENARIOS / "three_blocks.toml"), frames.tracks[0])
-    assert quads.shape == (1, 4, 2)
-    assert quads[0, :, 0].min() < frames.x.min() - 0.059
-    assert quads[0, :, 0].max() > frames.x.max() + 0.059
-    assert quads[0, :, 1].max() == 0.0
+def test_ground_and_walls_are_cells_solid_inwards_beyond_all_blocks(golden: Golden) -> None:
+    """Corners run counter-clockwise; a profile is filled below, a wall behind its face, from which no blocks come."""
+    texts = []
+    for name, count in (("slope", 2), ("three_blocks", 30)):
+        quads = support_quads(load_scenario(SCENARIOS / f"{name}.toml"), toppling(count).tracks[0])
+        texts += [f"{name}: {', '.join(f'({x:.9g}, {y:.9g})' for x, y in quad)}" for quad in quads.tolist()]
+    golden("\n".join(texts))
 
 
 def test_table_moves_as_the_scenario_says() -> None:
