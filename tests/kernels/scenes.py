@@ -358,12 +358,9 @@ def with_particles(model: str) -> World:
 
 
 SCENES: dict[str, tuple[Callable[[], World], int]] = {  # and steps
-    "wall": (wall, 4000),
-    "wall with Hertz law": (lambda: wall(law="hertz-mindlin"), 4000),
-    "among fixed blocks": (among_fixed, 4000),
-    "among moving supports": (lambda: shake(among_fixed()), 4000),
-    "on hills": (on_hills, 4000),
-    "on moving hills": (lambda: shake(on_hills()), 4000),
+    "wall with Hertz law": (lambda: wall(law="hertz-mindlin"), 1500),
+    "among moving supports": (lambda: shake(among_fixed()), 1500),
+    "on moving hills": (lambda: shake(on_hills()), 1500),
     "discs": (lambda: with_particles("particles"), 600),
-    "kernel": (lambda: with_particles("kernel"), 600),
+    "kernel": (lambda: with_particles("kernel"), 300),
 }

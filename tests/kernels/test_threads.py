@@ -164,8 +164,8 @@ def evaluate_in_shares(world: World, size: int, *, goes_on: bool = False) -> Non
 
 
 @pytest.mark.parametrize("goes_on", [False, True])
-@pytest.mark.parametrize("size", [2, 3, CREW])
-@pytest.mark.parametrize("scene", ["wall", "among moving supports", "on hills", "discs"])
+@pytest.mark.parametrize("size", [2, CREW])
+@pytest.mark.parametrize("scene", [name for name in SCENES if name != "kernel"])
 def test_forces_of_several_shares_have_the_bits_of_one(
     moving: Callable[[str], World], scene: str, size: int, *, goes_on: bool
 ) -> None:

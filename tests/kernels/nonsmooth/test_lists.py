@@ -122,21 +122,6 @@ def free_bodies(scene: Nonsmooth, pairs: list[tuple[int, int]]) -> list[int]:
     return [i for pair in pairs for i in pair if scene.contacts.states.inverse_mass[i] > 0.0]
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_no_two_pairs_of_a_colour_share_a_free_body_and_all_have_one(seed: int) -> None:
-    scene = listed(posed(crowd(seed)))
-    colours = of_colours(scene)
-    assert len(colours) > 6
-    for pairs in colours:
-        free = free_bodies(scene, pairs)
-        assert pairs
-        assert len(set(free)) == len(free)
-    everything = [pair for pairs in colours for pair in pairs]
-    assert len(set(everything)) == len(everything) == listed_constraints(scene).size
-    meets = np.bincount(free_bodies(scene, everything))
-    assert meets.max() <= len(colours) <= 2 * meets.max() - 1  # of a greedy colouring
-
-
 def test_pairs_beyond_the_last_colour_are_solved_one_by_one() -> None:
     scene = listed(posed(comb()))
     colours = of_colours(scene)

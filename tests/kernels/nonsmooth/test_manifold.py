@@ -380,22 +380,6 @@ def test_gaps_change_as_the_points_move_and_bend_as_blocks_turn(examples: list[M
         assert (after - 2.0 * now + before) / TIME**2 == pytest.approx(bend.normal, abs=within)
 
 
-def test_slip_is_that_of_the_places_on_both_bodies(examples: list[Moving]) -> None:
-    for one in examples:
-        n, t = np.array([one.constraint.nx, one.constraint.ny]), np.array([-one.constraint.ny, one.constraint.nx])
-        expected = []
-        for at in places_of(one.constraint, one.a, of_a=True):
-            va, vb = (
-                v[:2] + v[2] * np.array([body.y - at[1], at[0] - body.x])
-                for body, v in ((one.a, one.va), (one.b, one.vb))
-            )
-            expected.append(va - vb)
-        slip = slip_of(one.constraints, *one.motion[:2], one.motion.spin_a, one.motion.spin_b)
-        assert (slip.one, slip.two) == pytest.approx([u @ n for u in expected], abs=1e-12)
-        assert slip.shear == pytest.approx(expected[0] @ t, abs=1e-12)
-        assert expected[1] @ t == pytest.approx(expected[0] @ t, abs=1e-12)
-
-
 def test_point_that_sticks_is_drawn_to_both_centres(examples: list[Moving]) -> None:
     for one in examples:
         t = np.array([-one.constraint.ny, one.constraint.nx])
