@@ -88,7 +88,7 @@ def test_members_whose_runs_fail_count_neither_as_failures_nor_as_survivors(tmp_
     for point in found.points:
         assert point.members + point.no_result == 8
         assert point.failures == point.members
-    settled = SLOPE | {"start": {"settle": True}, "time": {"end": 0.01, "scheme": "nonsmooth"}}
+    settled = SLOPE | {"start": {"settle": True}, "time": {**SLOPE["time"], "end": 0.01}}
     tilts, friction = {TILT: ["10 deg", "60 deg"]}, {MU: [0.3, 0.4]}  # the second one does not come to rest before zero
     found = fragility(settled, tilts, friction, members=4, fails="moved > 1 m", out=tmp_path / "settled")
     assert [(point.members, point.failures, point.no_result) for point in found.points] == [(4, 0, 0), (4, 4, 0)]

@@ -10,14 +10,14 @@ from blocksim.scenario import Document, load_scenario
 from blocksim.study.limit import STIFFNESS, limit
 from blocksim.study.limit_plan import with_scheme
 from blocksim.study.run import run
+from tests.study.conftest import SCENARIOS
+from tests.study.plans import block_on_a_slope
 
 SCHEMES = ("nonsmooth", "explicit")
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SLOPE, WALL = SCENARIOS / "toppling_slope.toml", SCENARIOS / "tilting_wall.toml"
 FRICTION = "friction.block_block"
 WIDTH, HEIGHT = 0.2, 0.1  # m
 GRAVITY = 9.81
-STONE = {"density": 2500, "young_modulus": "30 GPa", "poisson_ratio": 0.2}
 
 
 @pytest.mark.parametrize(
@@ -83,20 +83,12 @@ def test_a_pulse_overturns_a_block_on_soft_springs_from_the_published_amplitude_
 
 def rows_of(*counts: int, scheme: str) -> dict[str, Any]:
     """Return rows of so many blocks from below, each centred: half overlapped where they differ by one."""
-    time = {"step": 2e-4} if scheme == "nonsmooth" else {}  # with 1 ms, what contacts give way grows to a fall
-    return {
-        "schema": 1,
-        "name": "rows",
-        "materials": {"stone": STONE},
-        "blocks": {"b": {"width": WIDTH, "height": HEIGHT, "length": 0.1, "material": "stone"}},
-        "bodies": [
-            {"block": "b", "x": WIDTH * (i - 0.5 * (count - 1)), "y": HEIGHT * (row + 0.5)}
-            for row, count in enumerate(counts)
-            for i in range(count)
-        ],
+    step = 2e-4 if scheme == "nonsmooth" else "auto"  # with 1 ms, what contacts give way grows to a fall
+    places = [(i - 0.5 * (count - 1), row + 0.5) for row, count in enumerate(counts) for i in range(count)]
+    return block_on_a_slope((WIDTH, HEIGHT), scheme=scheme, end=0.4, step=step) | {
+        "bodies": [{"block": "b", "x": WIDTH * x, "y": HEIGHT * y} for x, y in places],
         "friction": {"block_block": 0.0, "block_ground": 0.0},
         "contact": {"restitution": 0.0} | ({"stiffness_scale": 0.1} if scheme == "explicit" else {}),
-        "time": {"scheme": scheme, "end": 0.4, **time},
         "output": {"every": 0.05},
     }
 

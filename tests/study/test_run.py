@@ -96,13 +96,6 @@ def test_unfinished_run_is_not_judged(scenario: Scenario, tmp_path: Path) -> Non
             compare_run(given)
 
 
-@pytest.mark.parametrize("name", ["run.json", "final.csv", "scenario.toml"])
-def test_missing_file_of_a_run_is_named(copy: Path, name: str) -> None:
-    (copy / name).unlink()
-    with pytest.raises(InputMissingError, match=name.replace(".", r"\.")):
-        compare_run(copy, PAPER)
-
-
 def test_final_table_without_one_of_the_blocks_is_named(copy: Path) -> None:  # and not the experiment's, which has it
     lines = (copy / "final.csv").read_text().splitlines(keepends=True)
     (copy / "final.csv").write_text("".join(lines[:1] + lines[2:]))
