@@ -65,31 +65,23 @@ def test_statistics_of_the_paper_match_numpy_and_the_design(centres: ExperimentT
     assert third["s"] == pytest.approx(2.84, abs=0.005)
 
 
-def test_units_become_millimetres_and_degrees(tmp_path: Path) -> None:
-    rows = "1,x,cm,1,2.5\n1,y,m,1,-0.001\n1,rotation,rad,1,-1.5707963267948966\n1,left,in,1,1\n"
-    table = load_table(written(tmp_path, HEADER + rows))
-    assert list(table.data["value"]) == pytest.approx([25.0, -1.0, -90.0, 25.4], rel=1e-15)
-    assert list(table.data["unit"]) == ["mm", "mm", "deg", "mm"]
+TABLES = {
+    "units": "1,x,cm,1,2.5\n1,y,m,1,-0.001\n1,rotation,rad,1,-1.5707963267948966\n1,left,in,1,1\n",
+    **{f"a cell of {cell!r}": f"1,x,mm,1,3\n1,x,mm,2,{cell}\n1,x,mm,3,5\n" for cell in ("", " ", "NaN", "nan", "NA")},
+    "three of them, and a row that is absent": "1,x,mm,1,3\n1,x,mm,2,\n1,x,mm,3,5\n1,x,mm,4,\n1,x,mm,5,\n2,x,mm,2,7\n",
+}
+HABITS = '\ufeff# a "note"\r\n\r\nvalue , block,quantity,unit,replicate\r\n 1.5e1, "left, ""L""" ,x,mm, 2\r\n'
 
 
-def test_spreadsheet_habits_are_understood(tmp_path: Path) -> None:
-    text = '\ufeff# a "note"\r\n\r\nvalue , block,quantity,unit,replicate\r\n 1.5e1, "left, ""L""" ,x,mm, 2\r\n'
-    table = load_table(written(tmp_path, text))
-    assert table.blocks == ('left, "L"',)
-    assert list(table.values('left, "L"', "x").items()) == [(2, 15.0)]
-    assert table.notes == ('a "note"',)
-
-
-@pytest.mark.parametrize("cell", ["", " ", "NaN", "nan", "NA"])
-def test_a_repeat_without_a_value_is_left_out_and_told(tmp_path: Path, cell: str) -> None:
-    rows = f"1,x,mm,1,3\n1,x,mm,2,{cell}\n1,x,mm,3,5\n"
-    path = written(tmp_path, HEADER + rows)
-    table = load_table(path)
-    assert (list(table.values("1", "x").items()), table.summaries()[0].n) == ([(1, 3.0), (3, 5.0)], 2)
-    assert table.messages == (f"{path}: replicate 2 has no x of block '1'",)
-    table = load_table(written(tmp_path, HEADER + rows + f"1,x,mm,4,{cell}\n1,x,mm,5,\n2,x,mm,2,7\n"))
-    assert table.messages[0].endswith("replicate 2 has no x of block '1' (and 2 more such rows)")
-    assert [row.n for row in table.summaries()] == [2, 1]  # a row that is absent is no mistake
+def test_tables_are_understood_as_they_were_read(golden: Golden, tmp_path: Path) -> None:
+    """In millimetres and degrees, with the habits of spreadsheets; repeats without a value are left out and told."""
+    texts = []
+    for name, text in {"habits": HABITS, **{name: HEADER + rows for name, rows in TABLES.items()}}.items():
+        table = load_table(written(tmp_path, text))
+        rows = [", ".join(str(cell) for cell in row) for row in table.data.itertuples(index=False)]
+        counts = f"repeats {[row.n for row in table.summaries()]}"
+        texts.append("\n".join([f"{name}: {counts}", *rows, *table.messages, *table.notes]))
+    golden("\n\n".join(texts), rules=["digits"])
 
 
 def test_table_1_and_the_sizes_arrive_in_si() -> None:
