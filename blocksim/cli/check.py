@@ -183,7 +183,7 @@ def _use_of_particles(scenario: Scenario) -> str:
 def _acting(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
     """Yield lines about driven bodies, events, loads, the start and probes, the first ones of many."""
     for drive in motion.drives_of(scenario):
-        spec = scenario.bodies[drive.body - sum(structure.size for structure in scenario.structures)]
+        spec = scenario.bodies[drive.body - len(placed) + len(scenario.bodies)]
         kind = "" if spec.motion is None else f" ({spec.motion.kind})"
         speed, spin = motion.greatest_rate(drive.shift), math.degrees(motion.greatest_rate(drive.turn))
         rates = [f"{output.number(MILLI * speed)} mm/s"] * (speed > 0.0) + [f"{output.number(spin)} °/s"] * (spin > 0.0)

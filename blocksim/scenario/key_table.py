@@ -15,6 +15,7 @@ from blocksim.scenario.models.base import HELD, SYSTEMS
 from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS
 from blocksim.scenario.structures.base import Structure
+from blocksim.scenario.structures.openings import Opening
 
 BEGIN = "<!-- keys: written by `make readme` -->"
 END = "<!-- end of keys -->"
@@ -31,6 +32,7 @@ def key_table() -> str:
         ("blocks.NAME", geometry.Block),
         ("structures, every kind", Structure),
         *((f'structures, kind = "{kind}"', model) for kind, model in KINDS.items()),
+        ("structures.openings", Opening),
         ("bodies", geometry.BodySpec),
         *((f'bodies.motion, kind = "{kind}"', model) for kind, model in motion.OWN_DRIVES.items()),
         ("ground", geometry.Ground),

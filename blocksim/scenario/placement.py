@@ -161,7 +161,7 @@ def _built(scenario: Scenario, structure: Structure, first: int) -> list[PlacedB
             (left, bottom), (right, top) = geometry.box_of(outline)
             density = scenario.materials[block.material].density
             what = cell.name or str(number), key, block.material, right - left, top - bottom, block.depth, density
-            built.append(PlacedBody(*what, *pose, cell.fixed, outline=outline))
+            built.append(PlacedBody(*what, *pose[:-1], cell.fixed, outline=outline))
         return built
     x, y = geometry.middle_of(scenario.blocks[structure.block].polygon or ((0.0, 0.0),))
     if x or y:  # structures place the middle of the bounding box, bodies are placed by their centroid
@@ -180,8 +180,12 @@ def _moved(pose: Pose, x: float, y: float) -> Pose:
 def place_blocks(scenario: Scenario, key: str, named: Iterable[tuple[str, Pose]], *, fixed: bool) -> list[PlacedBody]:
     """Return bodies of one kind of block by their names and poses; looking up its sides every time would be slow."""
     block = scenario.blocks[key]
-    what = block.material, block.size_x, block.size_y, block.depth, scenario.materials[block.material].density
-    return [PlacedBody(name, key, *what, *pose, fixed, outline=block.polygon) for name, pose in named]
+    material, size_x, outline = block.material, block.size_x, block.polygon
+    what = block.size_y, block.depth, scenario.materials[material].density
+    return [
+        PlacedBody(name, key, material, pose.width or size_x, *what, *pose[:-1], fixed, outline=outline)
+        for name, pose in named
+    ]
 
 
 ENDLESS = 1e5  # m; how far the level ground beyond the ends of a profile is drawn

@@ -15,7 +15,7 @@ from blocksim.view import arrows, mechanism, paints, run_data, scene, style
 
 WIDTH, TALLEST, LEAST_WIDTH = 7.2, 3.6, 3.0  # inches
 SIDE, GAP, HEAD = 0.12, 0.16, 0.36  # inches
-MOVED = 0.5  # of the smallest side of all blocks: the largest way in the picture of a mechanism
+MOVED = 0.4  # of the usual side of a block: the largest way in the picture of a mechanism
 LOADED = 1e-6  # of the greatest force: joints with less are not drawn
 BAR = 0.45  # of the mean side of the blocks: half the length of a bar of the greatest force
 THICK, THIN = 3.2, 0.7  # points: bars of the greatest force, and of none
@@ -96,9 +96,9 @@ def _frames(scenario: Scenario, motions: Sequence[BlockMotion]) -> Frames:
     placed = place_bodies(scenario)
     ways = {one.block: (one.x_m, one.y_m, one.turn_rad) for one in motions}
     moved = np.array([ways.get(body.name, (0.0, 0.0, 0.0)) for body in placed])
-    smallest = min(body.least_width for body in placed)
+    usual = float(np.median([body.least_width for body in placed]))
     start = np.array([(body.x, body.y, body.angle) for body in placed])
-    x, y, angle = np.stack([start, start + MOVED * smallest * moved]).transpose(2, 0, 1)
+    x, y, angle = np.stack([start, start + MOVED * usual * moved]).transpose(2, 0, 1)
     rest = np.zeros_like(x)
     most = max(len(body.corners) for body in placed)
     corners = np.array([[*body.corners, *[body.corners[-1]] * (most - len(body.corners))] for body in placed])

@@ -23,7 +23,10 @@ Seed = Annotated[int, Whole(0, MAX_SEED)]
 
 
 class Pose(NamedTuple):
-    """Centre (m), angle (rad, counter-clockwise), velocity (m/s) and spin (rad/s) of one placed block."""
+    """Centre (m), angle (rad, counter-clockwise), velocity (m/s) and spin (rad/s) of one placed block.
+
+    A block that is cut has a width (m) of its own.
+    """
 
     x: float
     y: float
@@ -31,6 +34,7 @@ class Pose(NamedTuple):
     vx: float = 0.0
     vy: float = 0.0
     spin: float = 0.0
+    width: float | None = None
 
 
 class UnfitError(ValueError):

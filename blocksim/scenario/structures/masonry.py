@@ -11,6 +11,9 @@ from blocksim.scenario import units as q
 from blocksim.scenario.models import base, geometry
 from blocksim.scenario.models.base import setting
 from blocksim.scenario.structures.base import Count, Courses, Pose, Seed, Structure, UnfitError, draws, poses_at
+from blocksim.scenario.structures.openings import Opening, Piece, closed_course, cut_courses
+
+HALF = 0.5
 
 
 class Stack(Structure):
@@ -47,6 +50,7 @@ class Staircase(Structure):
 
 
 Bond = Annotated[Literal["running", "stack"], base.OneOf(("running", "stack"))]
+Ends = Annotated[Literal["toothed", "flush"], base.OneOf(("toothed", "flush"))]
 
 
 def _hole(value: object) -> object:
@@ -62,14 +66,16 @@ class BlockWall(Courses):
     """Block j of course i (both from 0) begins at x = left + j (size_x + gap) and y = bottom + i size_y.
 
     In running bond every second course is shifted to the right by half of that distance; all courses have whole blocks
-    and the same number of them, so that the ends are toothed. A missing block does not support the ones above,
-    which fall into the hole as far as their neighbours allow.
+    and the same number of them, so that the ends are toothed; flush ends are closed by halves. A missing block does not
+    support the ones above, which fall into the hole as far as their neighbours allow. Blocks are cut at openings.
     """
 
     kind: Literal["wall"] = setting("kind of structure")
     columns: Count = setting("number of blocks in a course")
     bond: Bond = setting("running: every second course is shifted by half a block; stack: none is", "running")
     gap: q.NonNegativeLength = setting("gap between neighbours in a course", 0.0)
+    ends: Ends = setting("toothed: whole blocks only; flush: halves close every second course", "toothed")
+    openings: tuple[Opening, ...] = setting("openings, at which blocks are cut, with lintels", ())
     holes: tuple[Hole, ...] = setting("blocks to leave out, [row, column] from 1, the lowest and leftmost first", ())
     missing: q.Share = setting("share of the other blocks to leave out at random", 0.0)
     offset: q.NonNegativeLength = setting(
@@ -87,6 +93,10 @@ class BlockWall(Courses):
             if (row, column) in seen:
                 raise q.invalid(f"[{row}, {column}] is left out twice", "holes", number)
             seen.add((row, column))
+        cut = "openings" if self.openings else "ends" if self.ends == "flush" else ""
+        random = next((key for key in ("holes", "missing", "offset") if getattr(self, key)), "")
+        if cut and random:
+            raise q.invalid(f"this is for walls of whole blocks; leave it or {cut} out", random)
         if self.size == 0:
             message = "this wall has no block left"
             raise q.invalid(message, "holes" if len(self.holes) == self.rows * self.columns else "missing")
@@ -99,12 +109,39 @@ class BlockWall(Courses):
 
     @property
     def size(self) -> int:
-        """Number of blocks that are not left out."""
+        """Number of blocks that are not left out; where blocks are cut at most so many."""
+        if self.is_cut:
+            return (self.rows + 1) * (self.columns + 2 + 2 * len(self.openings))
         others = self.rows * self.columns - len(self.holes)
         return others - round(self.missing * others)
 
+    @property
+    def is_cut(self) -> bool:
+        """Whether some blocks are not whole."""
+        return bool(self.openings) or self.ends == "flush"
+
+    def _cut(self, block: geometry.Block) -> Sequence[Pose]:
+        """Return the poses of a wall with blocks that are cut."""
+        width, height = block.size_x, block.size_y
+        if block.polygon:
+            raise UnfitError("block", "only rectangular blocks can be cut; give width, height and length")
+        courses = []
+        for row in range(self.rows):
+            is_shifted = self.bond == "running" and row % 2 == 1
+            course = closed_course(row, self.columns, width, self.gap, is_shifted=is_shifted and self.ends == "flush")
+            shift = HALF * (width + self.gap) if is_shifted and self.ends != "flush" else 0.0
+            courses.append([Piece(row, piece.left + shift, piece.right + shift) for piece in course])
+        pieces = cut_courses(courses, self.openings, width, height, self.gap)
+        return [
+            Pose(self.left + HALF * (one.left + one.right), self.bottom + (one.course + HALF) * height,
+                 width=one.right - one.left)
+            for one in pieces
+        ]  # fmt: skip
+
     def place(self, block: geometry.Block) -> Sequence[Pose]:
         """Return the poses course by course, each from left to right."""
+        if self.is_cut:
+            return self._cut(block)
         random = draws(self.seed, 2, self.rows, self.columns)
         pitch = block.size_x + self.gap
         row, column = np.indices((self.rows, self.columns))

@@ -32,20 +32,40 @@ PLACED: dict[str, dict[str, object]] = {
     "wall of a running bond": {"rows": 3, "columns": 3},
     "wall of a running bond with gaps": {"rows": 3, "columns": 3, "gap": 0.002},
     "wall with holes": {"rows": 3, "columns": 3, "bond": "stack", "holes": ((1, 1), (3, 2))},
+    "wall with flush ends": {"rows": 3, "columns": 3, "ends": "flush"},
+    "wall with flush ends and gaps": {"rows": 2, "columns": 3, "ends": "flush", "gap": 0.002},
+    "wall with an opening": {
+        "rows": 4,
+        "columns": 5,
+        "ends": "flush",
+        "openings": ({"left": 0.05, "bottom": 0.025, "width": 0.04, "height": 0.05, "lintel": 0.07},),
+    },
+    "wall with an opening at its end, and short pieces beside it": {
+        "rows": 2,
+        "columns": 4,
+        "openings": ({"left": 0.0, "width": 0.03, "height": 0.025}, {"left": 0.1, "width": 0.02, "height": 0.05}),
+    },
     "grid": {"rows": 3, "columns": 4, "gap_x": 0.01, "gap_y": 0.02},
 }
 
 
 def test_blocks_are_placed_as_one_would_measure_with_a_ruler(golden: Golden) -> None:
-    """Left and lower edges of blocks of 32 by 25 mm, a row of the structure in a line, and how they move."""
+    """Left and lower edges of blocks of 32 by 25 mm, a row in a line, with other widths and how they move."""
     told = []
     for name, keys in PLACED.items():
         kind = name.split()[0]
         structure = KINDS[kind].model_validate({"kind": kind, "block": "brick", **keys})
         rows: dict[str, list[str]] = {}
         for pose in structure.place(BRICK):
-            moves = f" moves at ({pose.vx:g}, {pose.vy:.4g}) m/s, {pose.spin:.4g} rad/s" if any(pose[3:]) else ""
-            rows.setdefault(f"{1e3 * pose.y - 12.5:g}", []).append(f"{1e3 * pose.x - 16.0:g}{moves}")
+            moves = f" moves at ({pose.vx:g}, {pose.vy:.4g}) m/s, {pose.spin:.4g} rad/s" if any(pose[3:6]) else ""
+            width = pose.width or BRICK.size_x
+            cut = (
+                ""
+                if pose.width is None or abs(width - BRICK.size_x) < 1e-9
+                else f" to {1e3 * (pose.x + 0.5 * width):g}"
+            )
+            left = f"{1e3 * (pose.x - 0.5 * width):g}"
+            rows.setdefault(f"{1e3 * pose.y - 12.5:g}", []).append(f"{left}{cut}{moves}")
             assert pose.angle == 0.0
         told.append("\n  ".join([name, *(f"{y} mm: {', '.join(row)}" for y, row in rows.items())]))
     golden("\n".join(told))
@@ -180,5 +200,5 @@ def test_the_smallest_gaps_keep_all_blocks_apart(seed: int, turn: float, offset:
     )
     gaps = {"gap_x": widest - side + 2 * offset + 1e-6, "gap_y": highest - 0.025 + 2 * offset + 1e-6}
     poses = grid_of(block, rows=6, columns=6, **gaps, offset=offset, seed=seed, turn=turn)
-    bodies = [PlacedBody("b", "brick", "m", side, 0.025, 1.0, 1.0, *pose, fixed=False) for pose in poses]
+    bodies = [PlacedBody("b", "brick", "m", side, 0.025, 1.0, 1.0, *pose[:-1], fixed=False) for pose in poses]
     assert list(overlapping_pairs(bodies)) == []
