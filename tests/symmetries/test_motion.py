@@ -38,7 +38,7 @@ SAME_COLLISION = {EXPLICIT: ROUND_OFF, RIGID: APPROACH * 0.16 * RIGID_STEP}  # m
 
 
 @SCHEMES
-@some(6, 150)
+@some(4, 150)
 @pytest.mark.parametrize("view", ["mirror", "elsewhere", "numbers"])
 def test_stack_moves_the_same_seen_in_a_mirror_elsewhere_and_under_other_numbers(
     scheme: str, view: str, examples: int
@@ -78,7 +78,7 @@ def thrown(bodies: list[Body], vx: float, vy: float) -> list[dict[str, object]]:
 
 
 @SCHEMES
-@some(6, 150)
+@some(4, 150)
 def test_collisions_are_the_same_in_a_moving_frame(scheme: str, examples: int) -> None:
     def check(scene: tuple[Stack, int, float, float]) -> None:
         stack, seed, vx, vy = scene
