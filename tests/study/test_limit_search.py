@@ -1,14 +1,25 @@
-"""What counts as standing, and which values a search tries, from the answers alone: no simulation."""
+"""Which values a search tries, what counts as standing, and limits of springs: from answers alone, without a run."""
 
+import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import nullcontext, suppress
+from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, strategies as st
 
+from blocksim.errors import StoppedEarlyError
+from blocksim.scenario import Scenario, document_of
 from blocksim.study.criterion import DEFAULT, read_criterion
-from blocksim.study.limit_plan import Change, SearchRange, changes_in, next_near, next_values
+from blocksim.study.executors import Batch, Execution, Rounds, RunSetting, Task
+from blocksim.study.limit import find_limit
+from blocksim.study.limit_answer import LimitAnswer
+from blocksim.study.limit_plan import Change, LimitOptions, SearchRange, changes_in, next_near, next_values, read_limit
+from blocksim.study.manifest import MANIFEST
 from tests.golden import Golden
+from tests.study.plans import block_on_a_slope
 
 
 def searched(span: SearchRange, answer: Callable[[float], str], tolerance: float) -> dict[float, str]:
@@ -100,3 +111,145 @@ def test_conditions_are_judged_in_the_units_that_were_typed(golden: Golden) -> N
         rows = (ROW, {**ROW, "moves_on": True}, {"status": "invalid"})
         told.append(f"{text}: {', '.join(read_criterion(text).verdict(row) for row in rows)}")
     golden("\n".join(told))
+
+
+STIFF = 26.5  # deg: limit of stiff contacts
+SLENDER = (0.1, 0.2)
+Law = Callable[[float], float]
+
+
+def linear(share: float) -> Law:
+    """Return the limit over the stiffness scale of springs that take away so much at a scale of one."""
+    return lambda scale: STIFF * (1.0 - share / scale)
+
+
+class Formula(Execution):
+    """Says at once that a block stands below the limit of its stiffness, and by how much it has turned."""
+
+    law: Law
+    is_known: bool  # the turn
+    beside: dict[str, object]
+    asked: list[Scenario]
+
+    def ready(self, _: Path | None = None, /) -> tuple[Rounds, RunSetting]:
+        def run(tasks: Iterator[Task], _: RunSetting) -> Generator[Batch, None, None]:
+            for task in tasks:
+                yield Batch((task,), (self.row(task.scenario),), 0.0, "")
+
+        return lambda: nullcontext(run), RunSetting(1)
+
+    def row(self, scenario: Scenario) -> dict[str, object]:
+        self.asked.append(scenario)
+        limit = self.law(scenario.contact.stiffness_scale)
+        stands = math.degrees(scenario.ground.tilt) < limit
+        outcome = ("stands" if self.is_known else "rocked back") if stands else "fell"
+        ended = {"status": "finished", "reason": "", "seconds": 1.0, "outcome": outcome}
+        return ended | {"b.rotation_deg": STIFF - limit} | self.beside
+
+
+def formula(law: Law, *, is_known: bool = True, **beside: object) -> Formula:
+    found = Formula()
+    for name, value in (("law", law), ("is_known", is_known), ("beside", beside), ("asked", [])):
+        object.__setattr__(found, name, value)
+    return found
+
+
+def on_springs(**tables: Any) -> dict[str, Any]:
+    time = {"scheme": "explicit", "end": 1.0}
+    contact = {"restitution": 0, "normal_stiffness": 1e5}
+    data = block_on_a_slope(SLENDER) | {"time": time, "contact": contact, "start": {"settle": True}}
+    return data | tables
+
+
+def found_with(execution: Execution, out: Path, data: Mapping[str, Any] | None = None, **wanted: Any) -> LimitAnswer:
+    vary = {"ground.tilt": {"from": "5 deg", "to": "40 deg"}}
+    options = LimitOptions(vary, stands="outcome != fell", tolerance=1e-3, out=out, keep_runs=False, **wanted)
+    return find_limit(read_limit(document_of(data or on_springs()), options), options, execution)
+
+
+@pytest.mark.parametrize(("share", "scales"), [(0.06, 2), (0.006, 2), (0.2, 3)])
+def test_a_limit_of_springs_becomes_that_of_stiff_contacts(tmp_path: Path, share: float, scales: int) -> None:
+    found = found_with(formula(linear(share)), tmp_path)
+    (answer,) = found.limits
+    assert answer.low < STIFF < answer.high
+    assert answer.high - answer.low < 5e-3 * STIFF
+    levels = found.brackets[0].levels
+    assert [one.stiffness_scale for one in levels] == [10.0**n for n in range(scales)]
+    assert all(one.low < linear(share)(one.stiffness_scale) < one.high for one in levels)
+    assert found.runs - len(found.rows) <= 8 * (scales - 1)
+    assert found_with(formula(linear(share)), tmp_path, stiffer=False).limits == [one.given for one in found.brackets]
+
+
+def test_shifts_that_nothing_foretells_and_of_what_moves_on_at_the_end_are_found_too(tmp_path: Path) -> None:
+    for share in (0.03, -0.03):
+        (answer,) = found_with(formula(linear(share), is_known=False), tmp_path / f"{share}").limits
+        assert answer.low < STIFF < answer.high
+    (answer,) = found_with(formula(linear(0.03), moves_on=True), tmp_path / "rocking").changes
+    assert (answer.below, answer.above) == ("undecided", "falls")
+    assert answer.low < STIFF < answer.high
+
+
+def test_where_springs_do_not_shift_a_limit_two_runs_say_so_and_none_where_they_cannot(tmp_path: Path) -> None:
+    found = found_with(formula(linear(1e-4), is_known=False), tmp_path / "may")
+    assert found.runs == len(found.rows) + 2
+    (answer,), (given,) = found.limits, [one.given for one in found.brackets]
+    assert answer.low == given.low < STIFF < answer.high < given.high * (1.0 + 3e-3)  # they were looked for so far
+    stiff = on_springs(contact={"restitution": 0})  # the stone's own stiffness
+    assert found_with(formula(linear(1e-4), is_known=False), tmp_path / "cannot", stiff).runs == len(found.rows)
+
+
+def test_under_a_late_abrupt_pulse_stiffer_springs_are_asked_whatever_their_stiffness(tmp_path: Path) -> None:
+    pulse = {"kind": "pulse", "shape": "cosine", "amplitude": 1.0, "duration": 0.1}
+    for start, asked in ((0.0, 0), (0.5, 2)):
+        stiff = on_springs(contact={"restitution": 0}, motion=pulse | {"start": start}, start={"settle": False})
+        found = found_with(formula(linear(1e-4)), tmp_path / f"{start}", stiff)
+        assert found.runs == len(found.rows) + asked
+
+
+def test_without_a_start_at_rest_the_bracket_holds_what_goes_with_the_root_of_the_stiffness_too(tmp_path: Path) -> None:
+    data = on_springs(start={"settle": False})
+    for law in (linear(0.03), lambda scale: STIFF * (1.0 - 0.03 / math.sqrt(scale))):
+        (answer,) = found_with(formula(law), tmp_path / f"{law(4.0)}", data).limits
+        assert answer.low < STIFF < answer.high
+
+
+def test_a_limit_that_stiffer_springs_do_not_have_is_told_and_left_as_given(tmp_path: Path) -> None:
+    found = found_with(formula(lambda scale: 24.0 if scale == 1.0 else 50.0), tmp_path)
+    (bracket,) = found.brackets
+    assert bracket.problem == "with springs 10 times as stiff there is no such limit in the range"
+    assert found.limits == [bracket.given]
+    (change,) = json.loads((tmp_path / "limit.json").read_text())["changes"]
+    assert (change["extrapolated"], change["problem"]) == (False, bracket.problem)
+
+
+def test_a_search_stopped_after_any_run_goes_on_with_the_same_values_and_repeats_none(tmp_path: Path) -> None:
+    execution = formula(linear(0.2))
+    whole = found_with(execution, tmp_path / "whole")
+    seen: list[object] = []
+
+    def stop(*run: object) -> None:
+        seen.append(run)
+        raise KeyboardInterrupt
+
+    for _ in range(whole.runs):
+        with suppress(StoppedEarlyError):
+            found_with(execution, tmp_path / "stopped", on_run=stop)
+    again = found_with(execution, tmp_path / "stopped")
+    assert again.run == 0
+    assert len(seen) == whole.runs == len((tmp_path / "stopped" / MANIFEST).read_text().splitlines())
+    tables = [(tmp_path / name / "limit.csv").read_bytes() for name in ("whole", "stopped")]
+    assert tables[0] == tables[1]
+    assert again.limits == whole.limits
+
+
+def test_springs_of_hertz_give_way_by_another_power_and_a_step_by_hand_is_shortened_with_them(tmp_path: Path) -> None:
+    hertz = on_springs(contact={"restitution": 0, "law": "hertz-mindlin", "contact_radius": 0.01})
+    softer = formula(lambda scale: STIFF * (1.0 - 0.06 / scale ** (2.0 / 3.0)))
+    (answer,) = found_with(softer, tmp_path / "hertz", hertz).limits
+    assert answer.low < STIFF < answer.high
+    assert answer.high - answer.low < 5e-3 * STIFF
+    noting = formula(linear(0.06))
+    found_with(noting, tmp_path / "noting", on_springs(time={"scheme": "explicit", "end": 1.0, "step": 1e-6}))
+    assert len({one.contact.stiffness_scale for one in noting.asked}) > 1
+    for one in noting.asked:
+        assert float(one.time.step) * math.sqrt(one.contact.stiffness_scale) == pytest.approx(1e-6)
