@@ -64,6 +64,7 @@ def test_ends_are_judged_as_they_were_read(golden: Golden) -> None:
         plain = json.loads(json.dumps(found.to_dict(), allow_nan=False))
         rows = [", ".join(f"{key} {value}" for key, value in row.items()) for row in plain["rows"]]
         texts += [f"\n{name}: {found!r}", *(text for text in rows if text not in texts), *found.messages]
+        assert found.to_frame()["verdict"].tolist() == [row["verdict"] for row in plain["rows"]]
     golden("\n".join(texts), rules=["digits"])
 
 

@@ -23,6 +23,7 @@ from blocksim.simulation.trajectory import data_set, tidy_table
 from blocksim.study.run import open_run
 from blocksim.view.kinds import run_kind
 from blocksim.view.paints import paint_of
+from blocksim.view.report import player
 from blocksim.view.report.player import pack_frames
 from blocksim.view.scene import PictureOptions
 from blocksim.world.describe import describe
@@ -31,6 +32,7 @@ from blocksim.world.systems import INTERACTIONS
 from blocksim.world.systems.soils import SOILS
 from tests.soils import DEPTH, FAR, LEFT, UNIT_WEIGHT, Soil, column, data_of, right, scene
 from tests.view.made_up import toppling
+from tests.view.report.folders import numbers
 
 SPACING = 0.005
 SINE = math.sin(math.radians(21.9))
@@ -345,6 +347,20 @@ def test_the_player_gets_every_shade_with_its_scale(run: Result) -> None:
     assert labels == ["displacement", "speed", "plastic shear strain", "mean pressure"]
     assert all(shade["high"] > 0.0 for shade in soil["shades"])
     assert len(set(soil["palette"])) == len(soil["palette"])
+
+
+def test_the_player_gets_all_corners_of_elements_that_grow(run: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    (soil,) = pack_frames(run.frames).data["systems"]
+    assert soil["shape"] is not None
+    outlines, every = player._outlines, np.arange(len(run.frames))
+    few = player.element_bytes(run.frames, every)
+    monkeypatch.setattr(player, "_outlines", lambda track, frame: outlines(track, frame) * (1.0 + frame))
+    (grown,) = pack_frames(run.frames).data["systems"]
+    (track,) = run.frames.others
+    wanted = np.stack([outlines(track, frame) * (1.0 + frame) for frame in range(len(run.frames))])
+    assert grown["shape"] is None
+    assert player.element_bytes(run.frames, every) - few == 4 * (wanted.shape[2] - 1) * wanted.shape[1]
+    np.testing.assert_allclose(numbers(grown["x"]), wanted[..., 0].ravel(), rtol=1e-6)
 
 
 def test_paraview_gets_displacement_stress_and_pressure(run: Result, tmp_path: Path) -> None:

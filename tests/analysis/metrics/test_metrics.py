@@ -144,6 +144,7 @@ def test_members_that_do_not_scatter_leave_the_scatter_of_the_repeats() -> None:
     low, high = area_interval(np.full(4, 5.0), np.array([0.0, 1.0, 2.0, 3.0]), 500)
     # the area is 5 minus the mean of the repeats: between 5 - 3 and 5 - 0 for any resample
     assert 2.0 <= low < 3.5 < high <= 5.0
+    assert np.isnan(area_interval(np.arange(3.0), np.arange(6.0))).all()
 
 
 CROSS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
