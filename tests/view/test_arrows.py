@@ -11,9 +11,8 @@ import pytest
 from blocksim.errors import InvalidInputError
 from blocksim.simulation.trajectory import CONTACT_ROW, Contacts
 from blocksim.view.animation import Look, Pace, draw_animation
-from blocksim.view.arrows import FORCE, Actions, actions_on, force_scale, with_room
+from blocksim.view.arrows import FORCE, Actions, actions_on, force_scale
 from blocksim.view.kinds import RUN_KINDS
-from blocksim.view.run_data import Support, extent_of
 from blocksim.view.scene import PictureOptions
 from tests.view.drawings import COEFFICIENTS, END, FORCES, acting, slab
 from tests.view.made_up import pressed, toppling
@@ -83,17 +82,3 @@ def test_marks_show_where_gravity_points_in_the_picture() -> None:
     table = {"kind": "gravity", "to": "60 deg", "rate": "30 deg/s"}
     tilted = actions([table], slab([0.0, 0.0]), ground={"tilt": "30 deg"}).marks
     assert tilted[0][0].way == pytest.approx((0.0, -1.0))  # such a picture is turned
-
-
-def test_arrows_are_inside_the_picture_and_nothing_changes_without_loads() -> None:
-    frames, chosen, loaded = slab([0.0, 0.5 * np.pi]), np.arange(2), acting(FORCES)
-    extent = extent_of(frames, chosen, loaded)
-    found = actions_on(frames, chosen, loaded)
-    room, length = with_room(extent, found)
-    for lines in (one.lines(length).reshape(-1, 2) for one in found.arrows):
-        assert ([room.left, room.bottom] < lines.min(axis=0)).all()
-        assert (lines.max(axis=0) < [room.right, room.top]).all()
-    nothing = actions_on(frames, chosen, Support())
-    assert (nothing.arrows, nothing.turns, any(nothing.marks)) == ((), None, False)
-    assert with_room(extent, nothing)[0] == extent
-    assert nothing.explanation == ""

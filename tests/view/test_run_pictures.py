@@ -9,18 +9,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from blocksim.errors import InvalidInputError
-from blocksim.scenario.geometry import holds, least_width, regular
 from blocksim.simulation.trajectory import final_columns
 from blocksim.view import strip
 from blocksim.view.final import draw_final
 from blocksim.view.history import draw_history
 from blocksim.view.paints import by_block, by_speed, by_turn
 from blocksim.view.run_data import Extent, Support, extent_of
-from blocksim.view.scene import Canvas, PictureOptions, Scene, draw_scene, readable_scale, upper_sides
-from blocksim.view.strip import Lines, arrangement, plan
-from blocksim.view.style import OWN, open_figure
+from blocksim.view.scene import Canvas, PictureOptions, Scene, draw_scene, readable_scale
+from blocksim.view.strip import arrangement
+from blocksim.view.style import open_figure
 from tests.golden import Golden
-from tests.view.made_up import blocks_at, boxes_of, polygons, stacked, toppling
+from tests.view.made_up import blocks_at, boxes_of, stacked, toppling
 
 
 def test_rotation_of_what_turned_while_settling_is_that_of_the_table(caught: list[Figure]) -> None:
@@ -74,29 +73,10 @@ def test_long_scenes_and_small_names_get_fewer_columns(
     assert arrangement(extent, readable=readable) == expected
 
 
-def test_tilted_panels_have_room_for_the_numbers_along_the_ground() -> None:
-    level, tilted = (plan(OWN, Extent(0, 400, 0, 300, tilt=tilt), 4, 8, Lines(measured_rows=1)) for tilt in (0.0, 0.3))
-    below = [one.panel[1] * 72 - (300 - one.extent.lowest) * one.points_per_mm for one in (level, tilted)]
-    assert below[1] - below[0] > 12.0
-
-
 def test_importing_the_room_does_not_load_matplotlib() -> None:
     code = "import sys, blocksim.view; sys.exit('matplotlib' in sys.modules or 'pandas' in sys.modules)"
     root = Path(strip.__file__).parents[2]
     assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
-
-
-WEDGE = ((-0.01, -0.01), (0.02, -0.01), (-0.01, 0.02))
-
-
-@pytest.mark.parametrize(
-    "shape", [WEDGE, regular(6, 0.03), regular(5, 0.03), ((-0.03, -0.01), (0.03, -0.01), (0, 0.02))]
-)
-def test_the_line_along_the_upper_side_is_within_the_polygon(shape: tuple[tuple[float, float], ...]) -> None:
-    (ends,) = upper_sides(polygons(blocks_at([0.0]), shape))
-    width = least_width(shape)
-    assert all(holds(shape, (float(x), float(y)), -0.069 * width) for x, y in ends)
-    assert np.hypot(*(ends[1] - ends[0])) > 0.2 * width
 
 
 @pytest.mark.parametrize(("share", "name"), [(1.01, "1"), (0.99, "")])
