@@ -11,6 +11,7 @@ import pytest
 
 from blocksim.kernels.common.arrays import NORMAL, SHEAR
 from blocksim.kernels.common.integrate import kick_and_drift
+from blocksim.kernels.common.jit import config
 from blocksim.kernels.explicit.contact import pair_forces
 from blocksim.kernels.explicit.forces import NOTHING
 from blocksim.kernels.explicit.partition import add_kept, keep
@@ -231,7 +232,7 @@ def test_corner_of_a_polygon_beyond_the_end_of_its_face_is_not_steady(
     assert kind == (CHANGED if changes else TOUCHING)
 
 
-TRIES = 4000
+TRIES = 1000 if config.DISABLE_JIT else 4000
 SIX = [[np.cos(angle), np.sin(angle)] for angle in np.arange(6) * np.pi / 3.0]
 SHARP = [[-1.0, -0.2], [1.0, -0.2], [-0.8, 0.9]]
 QUADRANGLE = [[-1.0, -0.5], [1.2, -0.7], [0.6, 0.8], [-0.9, 0.4]]
