@@ -13,7 +13,7 @@ FIT = "calibrate slide.toml --experiment measured.csv --fit friction.block_groun
 SCATTER = "--scatter 'bodies.0.velocity.0=0.5 m/s+-0.01 m/s'"
 JUDGED = "compare swept --experiment measured.csv"
 MORRIS = "sensitivity scenarios/slide.toml --vary friction.block_ground=0.3:0.4"
-FRAGILE = "fragility scenarios/slide.toml --scatter friction.block_ground=0.38+-0.08"
+FRAGILE = "fragility scenarios/slide.toml --scatter friction.block_ground=0.3:0.4"
 SAMPLED = "sweep scenarios/slide.toml --vary friction.block_ground=0.3:0.4"
 LINES = [line for line in Path(__file__).with_name("commands.txt").read_text().splitlines() if line and line[0] != "#"]
 
