@@ -16,7 +16,7 @@ from blocksim.view import arrows, mechanism, paints, run_data, scene, style
 WIDTH, TALLEST, LEAST_WIDTH = 7.2, 3.6, 3.0  # inches
 SIDE, GAP, HEAD = 0.12, 0.16, 0.36  # inches
 MOVED = 0.4  # of the usual side of a block: the largest way in the picture of a mechanism
-LOADED = 1e-6  # of the greatest force: joints with less are not drawn
+LOADED = 1e-3  # of the greatest force: joints with less are not drawn
 BAR = 0.45  # of the mean side of the blocks: half the length of a bar of the greatest force
 THICK, THIN = 3.2, 0.7  # points: bars of the greatest force, and of none
 AT_AN_EDGE = 1e-3  # of a joint: a force that near to its end makes a hinge
@@ -73,8 +73,7 @@ def draw_thrust(
         for number, head in enumerate(heads):
             left = number * (across + GAP)
             canvas = page.canvas(figure, left + SIDE, height - 2.0 * HEAD - page.panel_height)
-            shown = scene.Scene(frames, support, paint, with_tops=False)
-            scene.draw_scene(canvas, shown, number)
+            scene.draw_scene(canvas, scene.Scene(frames, support, paint, with_tops=False), number)
             if number == 0:
                 _draw_joints(canvas, frames, joints)
                 arrows.draw_actions(canvas, acts, 0, arrows.LENGTH * max(page.extent.width, page.extent.height))
@@ -83,6 +82,7 @@ def draw_thrust(
                 style.add_lines(canvas.axes, np.concatenate([start, start[:, :1]], axis=1), **scene.START_LINE,
                     zorder=scene.START, transform=canvas.scene)  # fmt: skip
             scene.finish_panel(canvas, labelled=False, is_numbered=False)
+            canvas.axes.spines["bottom"].set_visible(False)
             text = style.cut_to(head, page.panel_width * style.POINTS_PER_INCH, style.FONT_SIZE)
             style.write_text(figure, left + SIDE, height - HEAD - style.LINE, text)
         style.write_legend(figure, handles, SIDE, style.EDGE + style.LINE * len(notes), ncols=3, handlelength=1.6)
