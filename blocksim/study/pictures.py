@@ -21,7 +21,7 @@ from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns
 from blocksim.view import animation, paints, run_data, scene, studies, style, time_panels
-from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, run_kind
+from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, THRUST, run_kind
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def _read(cell: input_files.TableCell, problems: list[Problem]) -> str | float:
 
 OF_SCENES = (STRIP, FINAL, PROFILE)
 LOOKS = {  # options of the pictures of runs, by field: their flag, what they do, and the kinds that have them
-    "times": ("--at", "selects frames of a run's strip, final picture or profile", OF_SCENES),
+    "times": ("--at", "selects frames of a run's strip, final picture, profile or thrust", (*OF_SCENES, THRUST)),
     "frames": ("--frames", "sets the number of panels of a run's strip", (STRIP,)),
     "panels": ("--panels", "selects the panels of a run's history", (HISTORY,)),
     "blocks": ("--block", "selects the blocks of a run's history", (HISTORY,)),

@@ -128,7 +128,7 @@ class StaticAnswer(RangeAnswer, frozen=True):
         one = self.limits[0]
         setting = limit_plan.setting(self.key, one.value, self.unit, is_whole=self.is_whole)
         scenario = Document.read(self.folder / self.files.plan, is_stored=True).with_values(setting).build()
-        heads = [f"{POSSIBLE} at {self.key} = {with_unit(one.value, self.unit)}", "a mechanism beyond it"]
+        heads = f"{POSSIBLE} at {self.key} = {with_unit(one.value, self.unit)}", "a mechanism beyond it"
         thrust.draw_thrust(scenario, one.joints, one.mechanism, heads, path, title, paper)
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from blocksim.errors import InvalidInputError
 from blocksim.scenario.spelling import nearest
 from blocksim.simulation.trajectory import Frames
-from blocksim.view import final, history, scene, strip, style
+from blocksim.view import final, history, scene, strip, style, thrust
 from blocksim.view.sweeps import data, lines, outcome_map, scatter
 
-STRIP, FINAL, HISTORY, PROFILE = "strip", "final", "history", "profile"
+STRIP, FINAL, HISTORY, PROFILE, THRUST = "strip", "final", "history", "profile", "thrust"
 MOTION = "motion"  # of the supports; needs no run
 PROBE = "probe"
 RUN_KINDS: dict[str, Callable[[Frames, Path, scene.PictureOptions], None]] = {
@@ -19,6 +19,7 @@ RUN_KINDS: dict[str, Callable[[Frames, Path, scene.PictureOptions], None]] = {
     FINAL: final.draw_final,
     HISTORY: history.draw_history,
     PROFILE: strip.draw_profile,
+    THRUST: thrust.draw_run_thrust,
 }
 MOST_SLIPS = 2
 

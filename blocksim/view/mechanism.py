@@ -34,7 +34,7 @@ class _Followed(NamedTuple):
 
 def joints(frames: Frames, frame: int, support: run_data.Support) -> list[JointMotion]:
     """Return the joints that slide or rock in a frame; none where no contact was recorded."""
-    now = _by_pair(arrows.contacts_of(frames).at(frame))
+    now = contacts_by_pair(arrows.contacts_of(frames).at(frame))
     found = [
         _joint(frames, (before, frame), support, rows, now.get(pair, rows[:0]))
         for pair, (before, rows) in _at_the_start(frames, frame, support).items()
@@ -53,7 +53,7 @@ def _at_the_start(frames: Frames, frame: int, support: run_data.Support) -> dict
     has_moved = np.maximum.accumulate(moved, axis=0)
     found: dict[Pair, tuple[int, Rows]] = {}
     for time in range(pressed, frame + 1):
-        for pair, rows in _by_pair(contacts.at(time)).items():
+        for pair, rows in contacts_by_pair(contacts.at(time)).items():
             is_early = time == pressed or not has_moved[time, list(pair)].any()
             if is_early and (pair not in found or len(rows) > len(found[pair][1])):
                 found[pair] = time, rows
@@ -62,7 +62,7 @@ def _at_the_start(frames: Frames, frame: int, support: run_data.Support) -> dict
     return found
 
 
-def _by_pair(rows: Rows) -> dict[Pair, Rows]:
+def contacts_by_pair(rows: Rows) -> dict[Pair, Rows]:
     """Return contacts by the bodies that they are between, of those that press."""
     pairs: dict[Pair, list[int]] = defaultdict(list)
     for index, ends in enumerate(zip(rows["body_a"].tolist(), rows["body_b"].tolist(), strict=True)):

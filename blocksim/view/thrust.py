@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blocksim.scenario import Scenario, place_bodies
-from blocksim.simulation.trajectory import Frames
+from blocksim.simulation.trajectory import SUPPORT, Frames, forces_on_a
 from blocksim.statics.joint_forces import BlockMotion, JointForce
 from blocksim.view import arrows, mechanism, paints, run_data, scene, style
 
@@ -26,9 +26,9 @@ LINE: dict[str, Any] = {"colors": style.INK, "linewidths": 1.0, "linestyles": [(
 PALE = "#F4F4F4"
 NOTES = (
     "Bars: forces in joints, in their direction; length and width go with the root of the force. Dashed: line of "
-    "thrust through blocks with two loaded joints. One of several equilibria, and one of several mechanisms, where "
-    "there is more than one."
+    "thrust through blocks with two loaded joints."
 )
+SEVERAL = "One of several equilibria, and one of several mechanisms, where there is more than one."
 
 
 class _Bar(NamedTuple):
@@ -38,11 +38,21 @@ class _Bar(NamedTuple):
     share: float  # root of the force over the greatest
 
 
+class _Panels(NamedTuple):
+    """What is drawn: frames with what stands above each, forces in the joints of the first one, and notes."""
+
+    frames: Frames
+    support: run_data.Support
+    shown: Sequence[tuple[int, str]]
+    joints: Sequence[JointForce]
+    notes: str
+
+
 def draw_thrust(
     scenario: Scenario,
     joints: Sequence[JointForce],
     motions: Sequence[BlockMotion],
-    heads: Sequence[str],
+    heads: tuple[str, str],
     path: Path,
     title: str | None = None,
     paper: style.Paper = style.OWN,
@@ -52,35 +62,84 @@ def draw_thrust(
     `heads` stand above both panels. The same input gives the same bytes. Raises InvalidInputError for an unknown
     picture format or too small a page, OutputError.
     """
-    path = style.picture_path(path)
     frames, support = _frames(scenario, motions), run_data.support_of(scenario)
-    acts = arrows.actions_on(frames, np.array([0]), support)
+    _draw(_Panels(frames, support, [*enumerate(heads)], joints, f"{NOTES} {SEVERAL}"), path, title, paper)
+
+
+def draw_run_thrust(frames: Frames, path: Path, options: scene.PictureOptions = scene.PLAIN) -> None:
+    """Draw the forces in the joints of a run in its last frame, or the one nearest to the last time asked for.
+
+    Raises InvalidInputError for runs without contacts, and as `draw_thrust`.
+    """
+    drawable = run_data.drawable_frames(frames)
+    chosen = drawable if options.times is None else run_data.moments_at(frames, drawable, options.times)
+    frame = int(chosen[-1])
+    head = f"forces in joints at {float(frames.time[frame]):.3f} s"
+    panels = _Panels(frames, options.support, [(frame, head)], run_joints(frames, frame), NOTES)
+    _draw(panels, path, options.title, options.paper)
+
+
+def run_joints(frames: Frames, frame: int) -> list[JointForce]:
+    """Return what joints carry in a frame of a run. Raises InvalidInputError where no contacts were stored."""
+    joints = []
+    for (a, b), rows in mechanism.contacts_by_pair(arrows.contacts_of(frames).at(frame)).items():
+        normal = np.array([rows["normal_x"], rows["normal_y"]]).mean(axis=1)
+        normal /= np.hypot(*normal)  # from body b to body a
+        force, pressed = forces_on_a(rows).sum(axis=0), rows["normal_force"]
+        points = np.stack([rows["x"], rows["y"]], axis=-1)
+        along = points @ np.array([-normal[1], normal[0]])
+        x, y = pressed @ points / pressed.sum()
+        reach = float(np.array([x, y]) @ np.array([-normal[1], normal[0]]))
+        ends = points[[int(np.argmin(along)), int(np.argmax(along))]]
+        joints.append(
+            JointForce(
+                one=None if b == SUPPORT else frames.names[b],
+                other=None if a == SUPPORT else frames.names[a],
+                x_m=x,
+                y_m=y,
+                compression=float(force @ normal),
+                shear=float(force @ np.array([-normal[1], normal[0]])),
+                margin_m=min(reach - float(along.min()), float(along.max()) - reach),
+                slides=False,
+                ends_m=ends.tolist(),
+                normal=normal.tolist(),
+            )
+        )
+    return joints
+
+
+def _draw(panels: _Panels, path: Path, title: str | None, paper: style.Paper) -> None:
+    path = style.picture_path(path)
+    frames, support, shown, joints, _ = panels
+    first, chosen = shown[0][0], np.array([frame for frame, _ in shown])
+    acts = arrows.actions_on(frames, chosen[:1], support)
     width = paper.width(WIDTH, LEAST_WIDTH)
-    across = 0.5 * (width - GAP)
-    notes = style.break_lines(NOTES, width - 2.0 * SIDE)
+    across = (width - GAP * (len(shown) - 1)) / len(shown)
+    notes = style.break_lines(panels.notes, width - 2.0 * SIDE)
     foot = style.LINE * (len(notes) + 1) + style.EDGE
     tallest = min(paper.panel(TALLEST, 1, HEAD + HEAD + foot, mechanism.LOWEST), TALLEST)
-    extent = arrows.with_room(run_data.extent_of(frames, np.array([0, 1]), support), acts)[0]
+    extent = arrows.with_room(run_data.extent_of(frames, chosen, support), acts)[0]
     page = scene.page_for(extent, across, tallest, (SIDE, HEAD, 0.0))
     height = paper.height(HEAD + page.height + foot)
     handles = [
         style.legend_entry("force in a joint", color=style.MEASURED_COLOUR, linewidth=2.0),
         style.legend_entry("hinge", linestyle="none", **mechanism.HINGE),
-        style.legend_entry("all friction in use", **mechanism.SLIDING),
     ]
+    if any(one.slides for one in joints):
+        handles.append(style.legend_entry("all friction in use", **mechanism.SLIDING))
     paint = paints.Paint(lambda _: [PALE] * len(frames.names))
     with style.open_figure(width, height, paper.dots) as figure:
-        for number, head in enumerate(heads):
+        for number, (frame, head) in enumerate(shown):
             left = number * (across + GAP)
             canvas = page.canvas(figure, left + SIDE, height - 2.0 * HEAD - page.panel_height)
-            scene.draw_scene(canvas, scene.Scene(frames, support, paint, with_tops=False), number)
+            scene.draw_scene(canvas, scene.Scene(frames, support, paint, with_tops=False), frame)
             if number == 0:
                 _draw_joints(canvas, frames, joints)
                 arrows.draw_actions(canvas, acts, 0, arrows.LENGTH * max(page.extent.width, page.extent.height))
             else:
-                start = scene.corners(frames, 0)
-                style.add_lines(canvas.axes, np.concatenate([start, start[:, :1]], axis=1), **scene.START_LINE,
-                    zorder=scene.START, transform=canvas.scene)  # fmt: skip
+                start = scene.corners(frames, first)
+                closed = np.concatenate([start, start[:, :1]], axis=1)
+                style.add_lines(canvas.axes, closed, **scene.START_LINE, zorder=scene.START, transform=canvas.scene)
             scene.finish_panel(canvas, labelled=False, is_numbered=False)
             canvas.axes.spines["bottom"].set_visible(False)
             text = style.cut_to(head, page.panel_width * style.POINTS_PER_INCH, style.FONT_SIZE)
