@@ -62,6 +62,8 @@ MOST_PICTURED = 3  # brackets whose sides are kept
 SHARPER = 0.8  # of the tolerance: what is extrapolated from two brackets is wider than the narrower one
 HALF = 0.5
 ASIDE = 0.49  # of the tolerance: how far from a static bound runs are expected to stand and to fall
+SLIDES = 0.01  # calibrated: of a bound, how far below it the estimate of joints that slip is where runs fall there
+BEYOND_ESTIMATE = 0.1  # calibrated: of the way from there to the bound, up to which they stand
 NO_STIFFER = "with springs {ratio:g} times as stiff there is no such limit in the range"
 NO_FINER = "with half the time step there is no such limit in the range"
 STILL_FAR = "limits of the last two stiffnesses are too far apart to be extrapolated well; give stiffer springs"
@@ -348,8 +350,11 @@ class _Search:
         if limit is None or plan.span.is_whole:
             return None, None
         below, above = (Stability.FALLS if side == static_limit.NONE else Stability.STANDS for side in limit.sides)
-        width = ASIDE * plan.tolerance * abs(limit.bound)
-        low, high = (plan.span.clip(limit.bound + side * width) for side in (-1.0, 1.0))
+        ends = [limit.bound + side * ASIDE * plan.tolerance * abs(limit.bound) for side in (-1.0, 1.0)]
+        if limit.estimate is not None and abs(limit.estimate - limit.bound) > SLIDES * abs(limit.bound):
+            way = BEYOND_ESTIMATE * (limit.bound - limit.estimate)
+            ends = sorted([limit.estimate - HALF * way, limit.estimate + way])
+        low, high = map(plan.span.clip, ends)
         return limit.bound, Change(low, high, below, above)
 
     def _searched(self, plan: LimitPlan, choose: Callable[[Rows], list[Number]]) -> dict[Number, Row]:

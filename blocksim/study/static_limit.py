@@ -32,7 +32,7 @@ POSSIBLE, NONE = "equilibrium", "none"
 SAME = 1e-9  # of the weight: difference of forces that is none
 SLIGHT = 1e-4  # of a bound: an estimate that is nearer says nothing else
 EXACT = 1e-6  # of a value: a bracket costs little
-FEW = 200  # blocks, up to which estimates take seconds
+FEW = 100  # blocks, up to which estimates take seconds
 
 
 class StaticLimit(BaseModel, frozen=True):

@@ -86,6 +86,29 @@ def test_a_limit_of_runs_begins_at_the_bound_and_says_it_and_a_scan_is_made_wher
     assert {0.0, 1.0, 2.0} <= set(scanned.rows)
 
 
+def test_where_blocks_slide_runs_begin_at_the_estimate_and_fall_far_below_the_bound(tmp_path: Path) -> None:
+    """Four courses with a door in the middle; the lintel has whole stones on both sides of the door below it."""
+    door = {"left": 0.2, "width": 0.2, "height": 0.2, "lintel": 0.4}
+    wall = {"kind": "wall", "block": "b", "rows": 4, "columns": 3, "ends": "flush", "openings": [door]}
+    scenario = slab(
+        blocks={"b": {"width": 0.2, "height": 0.1, "length": 1.0, "material": "stone"}},
+        bodies=[],
+        structures=[wall],
+        friction={"block_block": 0.8, "block_ground": 0.8},
+        loads=[{"kind": "horizontal", "name": "push", "magnitude": 0.1}],
+        contact={"restitution": 0.0},
+    )
+    vary = {PUSH: {"from": 0.0, "to": 1.2}}
+    (static,) = static_limit(scenario, vary, out=tmp_path / "static").limits
+    found = limit(scenario, vary, out=tmp_path / "runs", tolerance=0.01, keep_runs=False)
+    assert static.estimate is not None
+    assert static.estimate == pytest.approx(1.0 / 3.0, rel=1e-3)
+    assert static.bound > 0.55
+    (bracket,) = found.brackets
+    assert 0.98 * static.estimate < bracket.low < bracket.high < 1.02 * static.estimate
+    assert found.runs <= 10  # a scan begins with nine
+
+
 def test_scenes_that_statics_cannot_judge_are_refused_with_the_reason_and_searched_by_runs(tmp_path: Path) -> None:
     ramp = {"kind": "ramp", "start": 0.0, "end": 1.0}
     loads = [{"kind": "force", "name": "push", "body": "1", "magnitude": 10.0, "history": ramp}]
