@@ -1,12 +1,14 @@
 """What statics finds, joint by joint and block by block: forces and their margins, and a mechanism."""
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import BaseModel
 
-from blocksim.statics.blockwork import Blockwork
-from blocksim.statics.programme import Equilibrium
+if TYPE_CHECKING:  # pictures of runs need neither solver nor kernels
+    from blocksim.statics.blockwork import Blockwork
+    from blocksim.statics.programme import Equilibrium
 
 ALL = 1e-6  # of the friction: what is missing is round-off
 HALF = 0.5
@@ -36,7 +38,7 @@ class BlockMotion(BaseModel, frozen=True):
     turn_rad: float
 
 
-def joint_forces(structure: Blockwork, found: Equilibrium) -> tuple[JointForce, ...]:
+def joint_forces(structure: "Blockwork", found: "Equilibrium") -> tuple[JointForce, ...]:
     """Return what all joints carry."""
     assembly = structure.assembly
     names = dict(zip(assembly.blocks, structure.names, strict=True))
@@ -64,7 +66,7 @@ def joint_forces(structure: Blockwork, found: Equilibrium) -> tuple[JointForce, 
     return tuple(joints)
 
 
-def block_motions(structure: Blockwork, found: Equilibrium) -> tuple[BlockMotion, ...]:
+def block_motions(structure: "Blockwork", found: "Equilibrium") -> tuple[BlockMotion, ...]:
     """Return how the blocks move in the mechanism."""
     ways = zip(structure.names, found.mechanism.tolist(), strict=True)
     return tuple(BlockMotion(block=name, x_m=x, y_m=y, turn_rad=turn) for name, (x, y, turn) in ways)

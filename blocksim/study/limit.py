@@ -349,13 +349,13 @@ class _Search:
         plan, limit = self.plan, static_limit.bound_of(self.plan)
         if limit is None or plan.span.is_whole:
             return None, None
-        below, above = (Stability.FALLS if side == static_limit.NONE else Stability.STANDS for side in limit.sides)
+        sides = {static_limit.NONE: Stability.FALLS, static_limit.POSSIBLE: Stability.STANDS}
         ends = [limit.bound + side * ASIDE * plan.tolerance * abs(limit.bound) for side in (-1.0, 1.0)]
         if limit.estimate is not None and abs(limit.estimate - limit.bound) > SLIDES * abs(limit.bound):
             way = BEYOND_ESTIMATE * (limit.bound - limit.estimate)
             ends = sorted([limit.estimate - HALF * way, limit.estimate + way])
         low, high = map(plan.span.clip, ends)
-        return limit.bound, Change(low, high, below, above)
+        return limit.bound, Change(low, high, sides[limit.below], sides[limit.above])
 
     def _searched(self, plan: LimitPlan, choose: Callable[[Rows], list[Number]]) -> dict[Number, Row]:
         """Go from round to round and return what it needed; rows of an earlier search are taken as they are."""

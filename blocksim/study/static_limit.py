@@ -47,11 +47,6 @@ class StaticLimit(BaseModel, frozen=True):
     mechanism: tuple[BlockMotion, ...] = ()
 
     @property
-    def sides(self) -> tuple[str, str]:
-        """What there is below and above."""
-        return self.below, self.above
-
-    @property
     def bound(self) -> float:
         """The value on the side without equilibrium: beyond it no structure stands."""
         return self.high if self.above == NONE else self.low
@@ -65,8 +60,9 @@ class StaticLimit(BaseModel, frozen=True):
         """Yield the answer in words."""
         side = "above" if self.above == NONE else "below"
         bound = with_unit(self.bound, unit)
-        width = (self.high - self.low) / max(abs(self.low), abs(self.high))
-        yield f"no equilibrium {side} {bound}" + (f" (bracket {width:.1g})" if width else "")
+        yield f"no equilibrium {side} {bound}"
+        if self.high > self.low:
+            yield f"an equilibrium at {with_unit(self.value, unit)}"
         if self.estimate is not None:
             yield f"joints that slip without opening: about {with_unit(self.estimate, unit)}, an estimate"
 
