@@ -47,7 +47,7 @@ def compare_command(
 
     Exit code 1: anything is out of range. A position is inside between the smallest and the largest repeat (0.5 mm
     either side where all repeats are equal), a rotation within 5 degrees of the mean. Of a sweep, at least the share
-    --threshold of the samples must be within all measured ranges; this needs the extra blocksim[study]. Its numbers:
+    --threshold of the samples must be within all measured ranges. Its numbers:
 
     {meanings}
 

@@ -129,7 +129,7 @@ def fragility_command(
     fits a lognormal curve by maximum likelihood: median, dispersion and their intervals. --stripes runs the same
     records at every intensity, each once, and widens the intervals of the curve accordingly. Runs that do not finish
     are listed and not counted (exit code 77). The same command again, also after a kill or with more samples, runs only
-    what is missing. Needs the extra blocksim[study]. Exit code 1: no curve fits, as nothing or everything fails.
+    what is missing. Exit code 1: no curve fits, as nothing or everything fails.
 
     Example: blocksim fragility mine.toml --intensity motion.scale=0.5:2:7 --scatter friction.block_block=0.6+-0.05
     """

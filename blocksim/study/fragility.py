@@ -437,7 +437,7 @@ def fragility(scenario: Source, options: FragilityOptions) -> FragilityAnswer:
     Samples are drawn independently at every intensity, so that limits and intervals hold. Runs are kept; the same call,
     also one with more samples, does only what is missing. After all shards the call without one makes the curve.
     `on_row` is called with every row, and how many there are. Raises ScenarioError, InvalidInputError,
-    OutputExistsError where the folder is not free, UnavailableError without scipy (extra `study`), StoppedEarlyError on
+    OutputExistsError where the folder is not free, UnavailableError without scipy, StoppedEarlyError on
     Ctrl-C.
     """
     return run_fragility(read_fragility(document_of(scenario), options), options)
