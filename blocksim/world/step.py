@@ -28,6 +28,9 @@ may come far into another: at the greatest speed expected it moves by at most a 
 fifth of the skin. That shortens the steps of scenes whose blocks are too fast for their springs, which end with exit
 code 76 where such blocks meet, instead of passing through one another.
 
+Loads. What they push gets no faster than in the time of the run, and than on the way across the scene: beyond it there
+is nothing that it could meet.
+
 Skin. Bodies no farther apart are listed as neighbours, and only listed ones are examined for contacts. The list is made
 again before two that are not in it can meet, so that a skin decides how long the list is and how often it is made, and
 never what moves where. Particles need nothing on top: they touch nothing before they are inside the other block.
@@ -44,7 +47,7 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.kernels.explicit.inertia import APPROACH_STEPS
-from blocksim.scenario import Scenario, laws, motion, placement
+from blocksim.scenario import Scenario, geometry, laws, motion, placement
 from blocksim.scenario.models.timeline import Explicit
 from blocksim.world import excitation, systems
 from blocksim.world.bodies import Layout, Shapes
@@ -194,10 +197,23 @@ def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
     pairs = product({*fixed, *bounds.grounds}, free)
     friction = min((layout.interactions[i][j].kinetic_friction for i, j in pairs), default=math.inf)
     held = friction * math.cos(tilt)
-    pull = max(0.0, scenario.gravity * (math.sin(tilt) - held) + layout.applied.push)
+    slope, push = scenario.gravity * (math.sin(tilt) - held), layout.applied.push
+    slide = max(0.0, slope + push) * scenario.time.end
+    if push > 0.0:
+        slide = min(slide, max(0.0, slope) * scenario.time.end + math.sqrt(2.0 * push * _extent_of(layout)))
     support = 0.0 if scenario.motion is None else motion.greatest_rate(motion.motion_pieces(scenario))
     impact = math.hypot(given, fall)
-    return Speeds(given, fall, impact, impact + pull * scenario.time.end, support)
+    return Speeds(given, fall, impact, impact + slide, support)
+
+
+def _extent_of(layout: Layout) -> float:
+    """Return the diagonal (m) of the box around blocks, ground and walls: farther on a load pushes into nothing."""
+    points = [(body.x + way * body.radius, body.y + way * body.radius) for body in layout.placed for way in (-1.0, 1.0)]
+    points += layout.scenario.ground.profile or ()
+    walls = placement.wall_segments(layout.scenario)
+    points += [end for wall in walls for end in ((wall.x0, wall.y0), (wall.x1, wall.y1))]
+    low, high = geometry.box_of([*points, (points[0][0], 0.0)])
+    return math.dist(low, high)
 
 
 class ContactStiffness(NamedTuple):
