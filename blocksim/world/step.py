@@ -199,7 +199,7 @@ def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
     held = friction * math.cos(tilt)
     slope, push = scenario.gravity * (math.sin(tilt) - held), layout.applied.push
     slide = max(0.0, slope + push) * scenario.time.end
-    if push > 0.0:
+    if push > 0.0 and scenario.time.has_springs:  # rigid contacts sink in under loads, with the square of the step
         slide = min(slide, max(0.0, slope) * scenario.time.end + math.sqrt(2.0 * push * _extent_of(layout)))
     support = 0.0 if scenario.motion is None else motion.greatest_rate(motion.motion_pieces(scenario))
     impact = math.hypot(given, fall)
