@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.options import takes
-from blocksim.scenario import Document, Source, document_of
+from blocksim.scenario import Document, Source, document_of, place_bodies
 from blocksim.statics.blockwork import Blockwork
 from blocksim.statics.joint_forces import BlockMotion, JointForce, block_motions, joint_forces
 from blocksim.statics.programme import Equilibrium, Programme
@@ -33,6 +33,7 @@ SAME = 1e-9  # of the weight: difference of forces that is none
 SLIGHT = 1e-4  # of a bound: an estimate that is nearer says nothing else
 EXACT = 1e-6  # of a value: a bracket costs little
 FEW = 100  # blocks, up to which estimates take seconds
+MOST = 300  # blocks, up to which a search by statics takes seconds
 
 
 class StaticLimit(BaseModel, frozen=True):
@@ -140,8 +141,12 @@ def static_limit(scenario: Source, options: limit_plan.LimitOptions) -> StaticAn
 
 
 def bound_of(plan: LimitPlan) -> StaticLimit | None:
-    """Return the only limit by statics in a range; None where there are none or several, or statics has no answer."""
-    if not all(map(limit_plan.is_sustained, (plan.scenario_at(plan.span.low), plan.scenario_at(plan.span.high)))):
+    """Return the only limit by statics in a range; None where there are none or several, or statics has no answer.
+
+    Nor is it asked of so many blocks that it would take as long as runs.
+    """
+    ends = [plan.scenario_at(end) for end in (plan.span.low, plan.span.high)]
+    if len(place_bodies(ends[1])) > MOST or not all(map(limit_plan.is_sustained, ends)):
         return None
     with suppress(InvalidInputError):  # such as a value at which a block rests on nothing
         limits = search_statics(plan).limits
