@@ -24,12 +24,11 @@ from blocksim.scenario import (
 )
 from blocksim.scenario.models import loads, timeline
 from blocksim.simulation.instruments import bytes_of_series
-from blocksim.statics.blockwork import Blockwork
+from blocksim.statics.blockwork import MOST_BLOCKS, Blockwork
 from blocksim.study.rows import check_experiment
 from blocksim.world import describe, free_memory, memory
 
 MOST_BODIES = 12
-MOST_STATIC = 300  # blocks: more would take longer than all the rest
 MOST_LINES = 8  # of events, loads or probes
 SIDES = ("along x", "upright", "depth mm", "mass kg", "inertia kg m²")
 PAIR_COLUMNS = {
@@ -97,7 +96,7 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         if rigid.warning:
             yield f"warning: {rigid.warning}"
     yield from _unscaled(scenario, description.bodies)
-    yield from _statics(scenario)
+    yield from _statics(scenario, description.bodies)
     until_rest = ", less if it stops at rest" if scenario.time.stop_at_rest else ""
     yield f"solving    at most about {output.duration(description.seconds)} on one core{until_rest}"
     program = free_memory.readable(memory.PROCESS_BYTES)
@@ -134,12 +133,12 @@ def _limits(limits: describe.StepLimits | None) -> list[str]:
     return [f"           {steps}", f"warning: because of the {who} {more}:", f"         {cure}"]
 
 
-def _statics(scenario: Scenario) -> Iterator[str]:
+def _statics(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
     """Yield whether the blocks are in equilibrium as they are placed, where statics has an answer."""
+    if len(placed) > MOST_BLOCKS:
+        return
     with suppress(InvalidInputError):
         blocks = Blockwork.of(scenario)
-        if len(blocks.names) > MOST_STATIC:
-            return
         from blocksim.statics.programme import horizontal_margin
 
         margin = horizontal_margin(blocks)

@@ -12,6 +12,8 @@ from blocksim.scenario.models import loads
 from blocksim.world.bodies import Layout, layout_of
 from blocksim.world.joints import Assembly, Floats, applied_forces
 
+MOST_BLOCKS = 300  # up to so many statics is asked unasked: more take longer than what it is asked for
+
 
 class Blockwork(NamedTuple):
     """Free blocks (n), the points of their joints (p), and what acts on them from time zero on."""

@@ -17,7 +17,7 @@ from pydantic import BaseModel
 from blocksim.errors import ExitCode, InvalidInputError
 from blocksim.options import takes
 from blocksim.scenario import Document, Source, document_of, place_bodies
-from blocksim.statics.blockwork import Blockwork
+from blocksim.statics.blockwork import MOST_BLOCKS, Blockwork
 from blocksim.statics.joint_forces import BlockMotion, JointForce, block_motions, joint_forces
 from blocksim.statics.programme import Equilibrium, Programme
 from blocksim.study import limit_plan, sweep
@@ -33,7 +33,6 @@ SAME = 1e-9  # of the weight: difference of forces that is none
 SLIGHT = 1e-4  # of a bound: an estimate that is nearer says nothing else
 EXACT = 1e-6  # of a value: a bracket costs little
 FEW = 100  # blocks, up to which estimates take seconds
-MOST = 300  # blocks, up to which a search by statics takes seconds
 
 
 class StaticLimit(BaseModel, frozen=True):
@@ -145,10 +144,9 @@ def bound_of(plan: LimitPlan) -> StaticLimit | None:
 
     Nor is it asked of so many blocks that it would take as long as runs.
     """
-    ends = [plan.scenario_at(end) for end in (plan.span.low, plan.span.high)]
-    if len(place_bodies(ends[1])) > MOST or not all(map(limit_plan.is_sustained, ends)):
+    if len(place_bodies(plan.scenario_at(plan.span.high))) > MOST_BLOCKS:
         return None
-    with suppress(InvalidInputError):  # such as a value at which a block rests on nothing
+    with suppress(InvalidInputError):  # such as a load that changes with time, or a block that rests on nothing
         limits = search_statics(plan).limits
         return limits[0] if len(limits) == 1 else None
     return None
