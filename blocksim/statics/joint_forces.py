@@ -11,7 +11,6 @@ if TYPE_CHECKING:  # pictures of runs need neither solver nor kernels
     from blocksim.statics.programme import Equilibrium
 
 ALL = 1e-6  # of the friction: what is missing is round-off
-HALF = 0.5
 
 
 class JointForce(BaseModel, frozen=True):
@@ -27,6 +26,12 @@ class JointForce(BaseModel, frozen=True):
     slides: bool  # shear is all that friction allows
     ends_m: tuple[tuple[float, float], ...]
     normal: tuple[float, float]  # from the first to the second
+
+    @property
+    def force(self) -> tuple[float, float]:
+        """The force (N) on the second body along x and y."""
+        x, y = self.normal
+        return self.compression * x - self.shear * y, self.compression * y + self.shear * x
 
 
 class BlockMotion(BaseModel, frozen=True):
@@ -48,7 +53,7 @@ def joint_forces(structure: "Blockwork", found: "Equilibrium") -> tuple[JointFor
         normal, shear = found.normal[own], float(found.shear[own].sum())
         total, points = float(normal.sum()), np.array(joint.points)
         x, y = normal @ points / total if total > 0.0 else points.mean(axis=0)
-        share = float(normal[0]) / total if total > 0.0 else HALF
+        share = float(normal[0]) / total if total > 0.0 else 0.5
         joints.append(
             JointForce(
                 one=names.get(joint.one),

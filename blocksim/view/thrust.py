@@ -32,13 +32,6 @@ NOTES = (
 SEVERAL = "One of several equilibria, and one of several mechanisms, where there is more than one."
 
 
-class _Bar(NamedTuple):
-    """A force in a joint, as it is drawn."""
-
-    line: run_data.Floats  # (2, 2) m
-    share: float  # root of the force over the greatest
-
-
 class _Panels(NamedTuple):
     """What is drawn: frames with what stands above each, forces in the joints of the first one, and notes."""
 
@@ -168,29 +161,27 @@ def _frames(scenario: Scenario, motions: Sequence[BlockMotion]) -> Frames:
 
 def _draw_joints(canvas: scene.Canvas, frames: Frames, joints: Sequence[JointForce]) -> None:
     """Draw the forces of joints, the line of thrust, hinges and sliding joints."""
-    forces = {id(one): float(np.hypot(one.compression, one.shear)) for one in joints}
-    greatest = max(forces.values(), default=0.0)
-    loaded = [one for one in joints if forces[id(one)] > LOADED * greatest]
+    forces = np.array([one.force for one in joints]).reshape(-1, 2)
+    sizes = np.hypot(*forces.T)
+    greatest = float(sizes.max(initial=0.0))
     side = 0.5 * float(frames.size_x.mean() + frames.size_y.mean())
-    bars = []
+    loaded, bars, widths = [], [], []
     places: dict[str, list[tuple[float, float]]] = defaultdict(list)
-    for one in loaded:
-        normal = np.array(one.normal)
-        force = one.compression * normal + one.shear * np.array([-normal[1], normal[0]])
-        share = float(np.sqrt(forces[id(one)] / greatest))
-        half = BAR * side * share * force / forces[id(one)]
+    for one, force, size in zip(joints, forces, sizes.tolist(), strict=True):
+        if not size > LOADED * greatest:
+            continue
+        loaded.append(one)
+        share = float(np.sqrt(size / greatest))
+        half = BAR * side * share * force / size
         place = np.array([one.x_m, one.y_m])
-        bars.append(_Bar(np.stack([place - half, place + half]), share))
+        bars.append(run_data.MILLIMETRES * np.stack([place - half, place + half]))
+        widths.append(THIN + (THICK - THIN) * share)
         for name in (one.one, one.other):
             if name is not None:
                 places[name].append((one.x_m, one.y_m))
     lines = [run_data.MILLIMETRES * np.array(pair) for pair in places.values() if len(pair) == PAIR]
     style.add_lines(canvas.axes, lines, **LINE, transform=canvas.scene)
-    widths = [THIN + (THICK - THIN) * bar.share for bar in bars]
-    style.add_lines(
-        canvas.axes, [run_data.MILLIMETRES * bar.line for bar in bars], linewidths=widths, **FORCE,
-        transform=canvas.scene,
-    )  # fmt: skip
+    style.add_lines(canvas.axes, bars, linewidths=widths, **FORCE, transform=canvas.scene)
     for one in loaded:
         ends = run_data.MILLIMETRES * np.array(one.ends_m)
         if one.slides:

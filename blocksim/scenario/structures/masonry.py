@@ -13,8 +13,6 @@ from blocksim.scenario.models.base import setting
 from blocksim.scenario.structures.base import Count, Courses, Pose, Seed, Structure, UnfitError, draws, poses_at
 from blocksim.scenario.structures.openings import Opening, Piece, closed_course, cut_courses
 
-HALF = 0.5
-
 
 class Stack(Structure):
     """Block i (from 0) has its left edge at left + i offset and its lower edge at bottom + i size_y."""
@@ -129,11 +127,11 @@ class BlockWall(Courses):
         for row in range(self.rows):
             is_shifted = self.bond == "running" and row % 2 == 1
             course = closed_course(row, self.columns, width, self.gap, is_shifted=is_shifted and self.ends == "flush")
-            shift = HALF * (width + self.gap) if is_shifted and self.ends != "flush" else 0.0
+            shift = 0.5 * (width + self.gap) if is_shifted and self.ends != "flush" else 0.0
             courses.append([Piece(row, piece.left + shift, piece.right + shift) for piece in course])
         pieces = cut_courses(courses, self.openings, width, height, self.gap)
         return [
-            Pose(self.left + HALF * (one.left + one.right), self.bottom + (one.course + HALF) * height,
+            Pose(self.left + 0.5 * (one.left + one.right), self.bottom + (one.course + 0.5) * height,
                  width=one.right - one.left)
             for one in pieces
         ]  # fmt: skip

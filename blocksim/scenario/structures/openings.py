@@ -11,7 +11,6 @@ from blocksim.scenario.structures.base import UnfitError
 
 LEAST = 0.2  # of a block: a shorter piece beside a cut becomes part of its neighbour
 SAME = 1e-9  # of a block: lengths that differ by no more are the same
-HALF = 0.5
 
 
 class Opening(Table):
@@ -50,8 +49,8 @@ def closed_course(course: int, columns: int, width: float, gap: float, *, is_shi
     pitch = width + gap
     if not is_shifted:
         return [Piece(course, k * pitch, k * pitch + width) for k in range(columns)]
-    half = HALF * (width - gap)
-    inner = [Piece(course, (k + HALF) * pitch, (k + HALF) * pitch + width) for k in range(columns - 1)]
+    half = 0.5 * (width - gap)
+    inner = [Piece(course, (k + 0.5) * pitch, (k + 0.5) * pitch + width) for k in range(columns - 1)]
     end = columns * pitch - gap
     return [Piece(course, 0.0, half), *inner, Piece(course, end - half, end)]
 
@@ -73,7 +72,7 @@ def cut_courses(
         for course in range(first, last):
             cuts[course].append(_Cut(one.left, one.left + one.width))
         if one.lintel is not None:
-            left = one.left + HALF * (one.width - one.lintel)
+            left = one.left + 0.5 * (one.width - one.lintel)
             if last == len(courses) or left < -SAME * end or left + one.lintel > end * (1.0 + SAME):
                 raise UnfitError("openings", f"the lintel of opening {number + 1} reaches out of the wall")
             lintel = Piece(last, left, left + one.lintel)
@@ -107,16 +106,12 @@ def _left_over(course: Sequence[Piece], cuts: Sequence[_Cut], width: float, gap:
     joined: list[Piece] = []
     for part in parts:
         before = joined[-1] if joined else None
-        is_short = before is not None and min(_length(before), _length(part)) < LEAST * width
+        is_short = before is not None and min(before.right - before.left, part.right - part.left) < LEAST * width
         if before is not None and is_short and part.left - before.right <= gap + SAME * width:
             joined[-1] = before._replace(right=part.right)
         else:
             joined.append(part)
     return joined
-
-
-def _length(piece: Piece) -> float:
-    return piece.right - piece.left
 
 
 def _outside(piece: Piece, cut: _Cut) -> list[tuple[float, float]]:
