@@ -20,7 +20,7 @@ chance; a quantile of a beta distribution solves that equation.
 """
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from html import escape
 from math import cos, inf, isfinite, nan, pi, sin, sqrt, tan
@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, Statistics, quote_names
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
+from blocksim.notebook import Shown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -118,12 +119,16 @@ class ComparisonRow:
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """All compared quantities of one run; `source` is the measured table, `messages` list what is missing."""
+class Comparison(Shown):
+    """All compared quantities of one run; `source` is the measured table, `messages` list what is missing.
+
+    `run` is what was compared, where it can be drawn: a result or its folder.
+    """
 
     rows: tuple[ComparisonRow, ...]
     source: str
     messages: tuple[str, ...] = ()
+    run: Any = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         """Return a line: the table and how many quantities are inside; the numbers are in `to_frame`."""
@@ -144,8 +149,8 @@ class Comparison:
         return frame
 
     def _repr_html_(self) -> str:
-        """Return the same line above the table, for notebooks."""
-        return html_of(self, self.to_frame())
+        """Return the same line above the table and the picture of the end, for notebooks."""
+        return html_of(self, self.to_frame()) + self._picture()
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON; a missing number is None."""

@@ -17,6 +17,7 @@ from blocksim.analysis import compare, evidence as facts
 from blocksim.analysis.experiment import ExperimentTable
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
+from blocksim.notebook import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -408,7 +409,7 @@ class Settings:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Judgement:
+class Judgement(Shown):
     """Results of all metrics by name; `sweep` and `source` are what was compared."""
 
     sweep: str
@@ -444,8 +445,8 @@ class Judgement:
         return pd.DataFrame(self.findings[metric].rows, columns=names)
 
     def _repr_html_(self) -> str:
-        """Return the same line above the samples inside the measured limits, for notebooks."""
-        return compare.html_of(self, self.to_frame())
+        """Return the same line above the samples inside the measured limits, and the sweep, for notebooks."""
+        return compare.html_of(self, self.to_frame()) + self._picture()
 
     def to_dict(self) -> dict[str, object]:
         """Return plain values for JSON, with the meaning of each; a missing number is None."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import BaseModel, ValidationError
 
 from blocksim.errors import InvalidInputError
+from blocksim.notebook import Shown
 from blocksim.scenario import Scenario, input_files, load_stored, place_bodies
 from blocksim.simulation import balance, files, instruments, observables, trajectory
 from blocksim.simulation.stores.hdf5 import read_frames, read_probes
@@ -109,7 +110,7 @@ MOST_ROWS = 20  # of the table that a notebook shows
 
 
 @dataclass(frozen=True, repr=False)
-class Result:
+class Result(Shown):
     """One run: columns of the final table (mm, degrees), frames (SI), and the summary that run.json holds."""
 
     name: str
@@ -169,10 +170,10 @@ class Result:
         return f"<Result {self.name}: {self.status} ({self.reason}), {blocks}, {seconds:.4g} s simulated, {where}>"
 
     def _repr_html_(self) -> str:
-        """Return the same line above the final table, for notebooks."""
+        """Return the same line above the final table and picture, for notebooks."""
         line = f"{self.name}: {self.status} ({self.reason}), {self.summary.simulated_time_s:.4g} s simulated"
         table: str = self.final.to_html(index=False, max_rows=MOST_ROWS, float_format="{:.2f}".format)
-        return f"<p>{escape(line)}</p>{table}"
+        return f"<p>{escape(line)}</p>{table}{self._picture()}"
 
     @property
     def status(self) -> str:

@@ -8,6 +8,7 @@ is one module or two, for its search and its answer, and a line in STUDIES; see 
 import json
 import math
 from collections.abc import Callable, Sequence
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 from pydantic import BaseModel, Field, ValidationError
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
+from blocksim.notebook import Shown
 from blocksim.scenario import input_files, load_stored
 from blocksim.study.sweep_folder import FolderKind, write_answer
 from blocksim.view.report.subjects import StudyPage
@@ -72,7 +74,7 @@ def number_text(number: float, digits: int) -> str:
     return text[1:] if text.startswith("-") and not text.strip("-0.") else text
 
 
-class Answer(BaseModel, frozen=True):
+class Answer(Shown, BaseModel, frozen=True):
     """What a study has come to; its fields are those of NAME.json, in their order."""
 
     files: ClassVar[FolderKind]
@@ -116,6 +118,14 @@ class Answer(BaseModel, frozen=True):
     def overview(self) -> Overview:
         """Return what it is for people."""
         raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        """Return title, table, remarks and picture, for notebooks."""
+        told = self.overview()
+        head = "".join(f"<th>{escape(one)}</th>" for one in told.heads)
+        lines = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in told.texts())
+        notes = "".join(f"<p>{escape(line)}</p>" for line in (*told.lines, *told.notes))
+        return f"<p>{escape(told.title)}</p><table><tr>{head}</tr>{lines}</table>{notes}{self._picture()}"
 
     def draw(self, path: Path, title: str, paper: Paper) -> None:
         """Draw the picture of an answer that was read. Raises InvalidInputError where there is nothing to draw."""

@@ -1,5 +1,6 @@
 """Comparison of whatever was simulated, one run or a sweep, with measured repeats."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, overload
 
@@ -87,12 +88,14 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
     InvalidInputError for a run that did not finish.
     """
     final: Columns | pd.DataFrame
+    drawn: Result | Path | None = None
     if isinstance(run, Result):
         name, summary, final, named = run.name, run.summary, run.columns, run.experiment
+        drawn = run
     elif not isinstance(run, Path | str):
         name, summary, final, named = "", None, run, None
     else:
-        folder = run_folder.find_run(run)
+        drawn = folder = run_folder.find_run(run)
         name, summary = str(folder), results.read_summary(folder / files.SUMMARY)
         was = load_stored(folder / files.SCENARIO)
         final = results.read_final(folder, was) if summary.status == rows.FINISHED else {}
@@ -105,4 +108,4 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
     table = experiment or named
     if table is None:
         raise InputMissingError("the scenario names no experiment; give a table with --experiment")
-    return compare_final(final, load_table(table))
+    return replace(compare_final(final, load_table(table)), run=drawn)

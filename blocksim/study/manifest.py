@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from blocksim.errors import InvalidInputError, OutputError, OutputExistsError
+from blocksim.notebook import Shown
 from blocksim.scenario.input_files import MEGABYTE, open_regular, read_limited, refuse_large
 from blocksim.simulation import files, observables, provenance
 from blocksim.study import plan, rows
@@ -264,7 +265,7 @@ def table_rows(
 
 
 @dataclass(frozen=True, repr=False)
-class SweepResult:
+class SweepResult(Shown):
     """The folder of a sweep and its table, one row per case."""
 
     folder: Path
@@ -296,8 +297,9 @@ class SweepResult:
         return f"<SweepResult {self.folder}: {len(self.table)} cases{failed}; varied: {', '.join(self.keys)}>"
 
     def _repr_html_(self) -> str:
-        """Return the same line above the table, for notebooks."""
-        return f"<p>{escape(repr(self)[1:-1])}</p>{self.table.to_html(index=False, max_rows=MOST_ROWS)}"
+        """Return the same line above the table and the picture that suits it, for notebooks."""
+        table = self.table.to_html(index=False, max_rows=MOST_ROWS)
+        return f"<p>{escape(repr(self)[1:-1])}</p>{table}{self._picture()}"
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -17,7 +17,6 @@ from blocksim.scenario import Scenario, input_files, load_scenario, load_stored,
 from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.silence import silent
 from blocksim.simulation import files
-from blocksim.simulation.stores.hdf5 import read_probes
 from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns
 from blocksim.view import animation, paints, run_data, scene, studies, style, time_panels
@@ -311,23 +310,24 @@ class PlotOptions(style.PageOptions):
         return path
 
 
-def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
+def draw_run(find: Callable[[], run_folder.StoredRun], options: PlotOptions) -> tuple[Path, str]:
     """Draw a run, or its probes; return the picture's path and a remark on an unfinished run.
 
     The path is by default NAME.png or NAME_KIND.png. Raises InvalidInputError for an unknown kind or format and options
-    that mean nothing for it, what `run_folder` and `PlotOptions.picture` raise, OutputError.
+    that mean nothing for it, what `find` and `PlotOptions.picture` raise, OutputError.
     """
     kind = options.kind or STRIP
     draw = None if kind == PROBE else run_kind(kind)
     options.refuse(kind, f"this picture is of kind {kind}")
-    stored = run_folder.read_run(run)
+    stored = find()
     scenario = stored.scenario
     table = options.experiment or (scenario.experiment.table if scenario.experiment is not None else None)
     measured = None if table is None or draw is None else load_table(table).summaries()
     picture = options.picture(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
     if draw is None:
-        probes = read_probes(stored.folder / files.FRAMES, scenario)
-        time_panels.draw_probes(probes, picture, f"{scenario.name}: probes", tuple(options.probes or ()), options.paper)
+        time_panels.draw_probes(
+            stored.probes(), picture, f"{scenario.name}: probes", tuple(options.probes or ()), options.paper
+        )
         return picture, stored.remark
     asked = scene.PictureOptions(
         scenario.name,
@@ -346,16 +346,13 @@ def _draw_run(run: Path, options: PlotOptions) -> tuple[Path, str]:
     return picture, stored.remark
 
 
-def _draw_motion(place: Path, options: PlotOptions) -> Path:
+def draw_motion(find: Callable[[], Scenario], options: PlotOptions) -> Path:
     """Draw how the supports of a run or of a scenario file move, which need not have been run; return the picture.
 
-    Raises what loading the scenario and `draw_support_motion` raise.
+    Raises what `find` and `draw_support_motion` raise.
     """
     options.refuse(MOTION, f"this picture is of kind {MOTION}")
-    if place.is_file():
-        scenario = load_scenario(place)
-    else:
-        scenario = load_stored(run_folder.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)
+    scenario = find()
     picture = options.picture(f"{scenario.name}_{MOTION}.png")
     support = run_data.support_of(scenario)
     time_panels.draw_support_motion(support, scenario.time.end, picture, f"{scenario.name}: motion", options.paper)
@@ -389,15 +386,20 @@ def draw_film(place: Path, options: AnimateOptions) -> tuple[Path, str, str]:
     if options.out is not None:
         animation.writer_of(Path(options.out))
     stored = run_folder.read_run(place)
-    scenario = stored.scenario
-    path = Path(options.out or f"{scenario.name}.gif")
+    path = Path(options.out or f"{stored.scenario.name}.gif")
     files.refuse_foreign(path, overwrite=options.overwrite)
     older = OLDER if path.exists() else ""
+    count, beyond = animate_run(stored, path, options)
+    return path, f"{older}{count} frames{f'; {beyond}' if beyond else ''}", stored.remark
+
+
+def animate_run(stored: run_folder.StoredRun, path: Path, options: AnimateOptions) -> tuple[int, str]:
+    """Write a run as an animation; return the number of frames, and which blocks leave the view."""
+    scenario = stored.scenario
     paint = paints.paint_of(options.colour, stored.frames, scenario)
     look = animation.Look(options.width, options.trails, scenario.name, options.forces, paint)
     support, pace = run_data.support_of(scenario, stored.events), animation.Pace(options.speed, options.fps)
-    count, beyond = animation.draw_animation(stored.frames, path, pace, look, support, options.on_picture)
-    return path, f"{older}{count} frames{f'; {beyond}' if beyond else ''}", stored.remark
+    return animation.draw_animation(stored.frames, path, pace, look, support, options.on_picture)
 
 
 @takes(AnimateOptions)
@@ -502,4 +504,13 @@ def draw(place: Path, options: PlotOptions) -> tuple[Path, str]:
         path = options.picture(f"{place.stem}.png")
         studies.draw_tornado(panels, labels, path, title="Which inputs matter", paper=options.paper)
         return path, ""
-    return (_draw_motion(place, options), "") if options.kind == MOTION else _draw_run(place, options)
+    if options.kind == MOTION:
+        return draw_motion(lambda: _scenario_at(place), options), ""
+    return draw_run(lambda: run_folder.read_run(place), options)
+
+
+def _scenario_at(place: Path) -> Scenario:
+    """Return the scenario of a file or of a run."""
+    if place.is_file():
+        return load_scenario(place)
+    return load_stored(run_folder.find_run(place, needed=(files.SCENARIO,)) / files.SCENARIO)

@@ -9,8 +9,8 @@ from blocksim.analysis.compare import Comparison, compare_final
 from blocksim.analysis.experiment import load_table
 from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
-from blocksim.scenario import input_files, load_stored
-from blocksim.simulation import files
+from blocksim.scenario import input_files, load_stored, scenario_to_toml
+from blocksim.simulation import Result, files
 from blocksim.study import answer, compare, manifest, pictures, rows, run_folder, sweep_folder
 from blocksim.view.report import page, player, subjects as parts
 
@@ -49,6 +49,33 @@ def report_on(
     `members` is the maximum number of runs of a sweep in the page; `on_remark` hears which of several runs is taken.
     Raises what finding and reading them raises, and OutputError.
     """
+    shown, problems = subjects_of(places, experiment, members, on_remark)
+    return page.write_report(shown, out, title=title_of(shown), version=__version__), problems
+
+
+def title_of(shown: Sequence[parts.Subject]) -> str:
+    """Return the title of a page, after those of its subjects that no other one leads to."""
+    names = dict.fromkeys(subject.name for subject in shown if not subject.page.get("parent"))
+    return f"{', '.join(names)} – blocksim report"
+
+
+def page_of_result(result: Result, experiment: Path | None = None) -> str:
+    """Return the text of the page of a run in memory. Raises as `report` does."""
+    text = scenario_to_toml(result.scenario)
+    run = parts.PartialRun(
+        Path(result.name), result.scenario, text, result.summary, result.frames, result.columns, probes=result.probes
+    )
+    shown = [parts.run_subject("part-1", run, *_compared(run, experiment))]
+    return page.page_text(shown, title=title_of(shown), version=__version__)
+
+
+def subjects_of(
+    places: Sequence[Path],
+    experiment: Path | None = None,
+    members: int = MEMBERS,
+    on_remark: Callable[[str], None] = lambda _: None,
+) -> tuple[list[parts.Subject], list[str]]:
+    """Return runs, sweeps and studies as parts of a page, see `report_on`, and what is damaged in them."""
     shown: list[parts.Subject] = []
     problems: list[str] = []
     for place in places:
@@ -69,8 +96,7 @@ def report_on(
                 on_remark(remark)
         shown += subjects
         problems += damage
-    names = dict.fromkeys(subject.name for subject in shown if not subject.page.get("parent"))
-    return page.write_report(shown, out, title=f"{', '.join(names)} – blocksim report", version=__version__), problems
+    return shown, problems
 
 
 def _compared(run: parts.PartialRun, experiment: Path | None) -> tuple[dict[str, object] | None, tuple[str, ...]]:

@@ -3,15 +3,16 @@
 Finished, failed, stopped, killed or still in progress.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError
 from blocksim.scenario import Scenario, load_scenario, load_stored, spelling
-from blocksim.simulation import files, results, trajectory
-from blocksim.simulation.stores.hdf5 import read_frames
+from blocksim.simulation import files, instruments, results, trajectory
+from blocksim.simulation.stores.hdf5 import read_frames, read_probes
 from blocksim.study.rows import FINISHED, TABLE
 
 MOST_FOLDERS = 5  # named in a message
@@ -35,7 +36,8 @@ def folder_of(place: Place) -> Path:
         return Path(place)
     if place.folder is None:
         name = getattr(place, "name", "run")
-        message = f"{name}: this result is in memory only; run it with out=FOLDER to store what pictures need"
+        how = "run it with out=FOLDER to store what pictures need, or use its own plot, animate and report"
+        message = f"{name}: this result is in memory only; {how}"
         raise InvalidInputError(message)
     return place.folder
 
@@ -96,6 +98,7 @@ class StoredRun(NamedTuple):
     frames: trajectory.Frames
     events: tuple[results.EventRecord, ...]  # that have happened; none where run.json is missing or damaged
     remark: str  # for whoever examines the frames; empty for a finished run that was meant for certain
+    probes: Callable[[], Mapping[str, instruments.ProbeSeries]]  # samples by name
 
 
 def read_run(place: Path | str) -> StoredRun:
@@ -115,7 +118,8 @@ def read_run(place: Path | str) -> StoredRun:
             events, was = summary.events, "was" if summary.status == "interrupted" else "has"
             state = f"this run {was} {summary.status} ({summary.reason})" if summary.status != FINISHED else ""
     end = f"{folder}: {state}; its {len(frames)} frames end at {float(frames.time[-1]):.4g} s"
-    return StoredRun(folder, scenario, frames, events, end if state else choice(Path(place), folder))
+    probes = partial(read_probes, folder / files.FRAMES, scenario)
+    return StoredRun(folder, scenario, frames, events, end if state else choice(Path(place), folder), probes)
 
 
 def choice(place: Path, folder: Path) -> str:

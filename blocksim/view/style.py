@@ -6,6 +6,7 @@ import warnings
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import KW_ONLY, dataclass
 from io import BytesIO
 from itertools import accumulate
@@ -123,9 +124,26 @@ def in_style(dots: float | None = None) -> Iterator[None]:
         yield
 
 
+KEPT: "ContextVar[list[Figure] | None]" = ContextVar("KEPT", default=None)
+
+
+@contextmanager
+def keep_figures() -> Iterator["list[Figure]"]:
+    """Give a list that receives all figures drawn meanwhile, which are not written."""
+    kept: list[Figure] = []
+    token = KEPT.set(kept)
+    try:
+        yield kept
+    finally:
+        KEPT.reset(token)
+
+
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write the figure as PNG, SVG or PDF after its suffix; raises OutputError when it cannot be written."""
-    write_bytes(path, figure_bytes(figure, picture_path(path).suffix.lower()))
+    if (kept := KEPT.get()) is not None:
+        kept.append(figure)
+    else:
+        write_bytes(path, figure_bytes(figure, picture_path(path).suffix.lower()))
 
 
 def figure_bytes(figure: "Figure", suffix: str) -> bytes:

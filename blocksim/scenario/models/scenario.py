@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 import pydantic
 from pydantic.json_schema import SkipJsonSchema
 
+from blocksim.notebook import Shown
 from blocksim.scenario import units as q
 from blocksim.scenario.models.base import HELD, SYSTEMS, Identifier, OneOf, SystemTable, Table, read_tables, setting
 from blocksim.scenario.models.contact import Contact, Friction, Pair
@@ -21,7 +22,7 @@ SCHEMA_VERSION = 1
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-class Scenario(Table):
+class Scenario(Shown, Table):
     """Complete input of one simulation, in SI.
 
     Build it with `load_scenario` or `scenario_from_mapping`, which also check what no single table can know:
@@ -82,7 +83,7 @@ class Scenario(Table):
         return f"<Scenario {self.name}: {', '.join(parts)}; scheme {self.time.scheme}>"
 
     def _repr_html_(self) -> str:
-        """Return the same line, blocks and materials, and all values as they stand in a file, for notebooks."""
+        """Return the same line, blocks and materials, all values as in a file, and the start, for notebooks."""
         from blocksim.scenario.resolution import scenario_to_toml  # noqa: PLC0415 - needs this model
 
         rows = ""
@@ -91,7 +92,7 @@ class Scenario(Table):
             cells = name, size, f"{block.depth:g} m deep", block.material
             rows += f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
         values = f"<details><summary>all values</summary><pre>{escape(scenario_to_toml(self))}</pre></details>"
-        return f"<p>{escape(repr(self)[1:-1])}</p><table>{rows}</table>{values}"
+        return f"<p>{escape(repr(self)[1:-1])}</p><table>{rows}</table>{values}{self._picture()}"
 
 
 def json_schema() -> dict[str, Any]:

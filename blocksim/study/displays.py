@@ -1,0 +1,114 @@
+"""What results show in a notebook, and give as pictures, animations and pages in memory."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from blocksim import __version__
+from blocksim.analysis.compare import Comparison
+from blocksim.analysis.metrics import Judgement
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario, place_bodies
+from blocksim.simulation import Result
+from blocksim.simulation.instruments import FrameRows, frames_from_rows
+from blocksim.study import pictures, report, run_folder
+from blocksim.view import style
+from blocksim.view.display import AnimationDisplay, PageDisplay, PictureDisplay
+from blocksim.view.kinds import FINAL, MOTION
+from blocksim.view.report import page
+from blocksim.world.systems import others_of
+from blocksim.world.systems.blocks import block_system
+
+SIZES = np.zeros((2, 2))  # of two frames: contacts and overlaps
+
+
+class Unwritten(pictures.PlotOptions):
+    """A picture that is kept in memory, under whatever name."""
+
+    def picture(self, default: str) -> Path:
+        """Return the default."""
+        return Path(default)
+
+
+def picture_of(shown: Any, *, kind: str | None = None, **options: Any) -> PictureDisplay:
+    """Return a picture of a scenario, a run, a sweep, the answer of a study or a comparison.
+
+    Without `kind` it is the final state of a run, the start of a scenario, and what suits a sweep. Raises as
+    `blocksim.plot`.
+    """
+    subject = _subject(shown)
+    if isinstance(shown, Judgement):
+        options = {"experiment": shown.source, **options}
+    elif isinstance(shown, Comparison):
+        options = {"experiment": Path(shown.source), **options}
+    if isinstance(subject, Result | Scenario):
+        kind = kind or FINAL
+    asked = Unwritten(kind=kind, **options)
+    with style.keep_figures() as kept:
+        if isinstance(subject, Scenario):
+            if kind not in {FINAL, MOTION}:
+                raise InvalidInputError(f"{kind}: a scenario is drawn as {FINAL} or {MOTION}; run it for others")
+            _draw_scenario(subject, asked)
+        elif not isinstance(subject, Result):
+            pictures.draw(subject, asked)
+        elif kind == MOTION:
+            pictures.draw_motion(lambda: subject.scenario, asked)
+        else:
+            pictures.draw_run(_stored(subject), asked)
+    return PictureDisplay(kept[-1], asked.paper.dots)
+
+
+def animation_of(shown: Any, **options: Any) -> AnimationDisplay:
+    """Return an animation of a run. Raises as `blocksim.animate`, and InvalidInputError for anything else."""
+    run = _subject(shown)
+    if isinstance(run, Scenario):
+        raise InvalidInputError(f"{run.name}: run the scenario first; its result is animated")
+    stored = _stored(run) if isinstance(run, Result) else lambda: run_folder.read_run(run)
+    asked = pictures.AnimateOptions(**options)
+    return AnimationDisplay(lambda path: pictures.animate_run(stored(), path, asked), lambda: picture_of(shown))
+
+
+def page_of(shown: Any, *, experiment: Path | str | None = None) -> PageDisplay:
+    """Return the page of `blocksim.report` of a run, a sweep or the answer of a study. Raises as that does."""
+    subject = _subject(shown)
+    if isinstance(subject, Scenario):
+        raise InvalidInputError(f"{subject.name}: run the scenario first; a report is about its result")
+    table = None if experiment is None else Path(experiment)
+    if isinstance(subject, Result):
+        return PageDisplay(report.page_of_result(subject, table))
+    parts, problems = report.subjects_of([subject], table)
+    if problems:
+        raise InvalidInputError("\n".join(problems))
+    return PageDisplay(page.page_text(parts, title=report.title_of(parts), version=__version__))
+
+
+def _subject(shown: Any) -> Any:
+    """Return what is drawn of something: a scenario, a result, or the folder of a sweep or a study."""
+    if isinstance(shown, Comparison):
+        if shown.run is None:
+            raise InvalidInputError("this comparison is of a table; nothing to draw")
+        return shown.run
+    if isinstance(shown, Judgement):
+        return Path(shown.sweep).parent
+    return shown if isinstance(shown, Result | Scenario) else run_folder.folder_of(shown)
+
+
+def _stored(run: Result) -> Callable[[], run_folder.StoredRun]:
+    return lambda: run_folder.StoredRun(
+        run.folder or Path(), run.scenario, run.frames, run.summary.events, "", lambda: run.probes
+    )
+
+
+def _draw_scenario(scenario: Scenario, options: pictures.PlotOptions) -> None:
+    """Draw the motion of the supports, or everything as it is placed."""
+    if options.kind == MOTION:
+        pictures.draw_motion(lambda: scenario, options)
+        return
+    systems = (block_system(place_bodies(scenario)), *others_of(scenario))
+    states = tuple(np.stack([one.elements.start] * len(SIZES)) for one in systems)
+    frames = frames_from_rows(systems, 0.0, FrameRows(np.arange(len(SIZES)), states, SIZES, ()))
+    start = run_folder.StoredRun(Path(), scenario, frames, (), "", dict)
+    pictures.draw_run(lambda: start, replace(options, times=(0.0,)))
