@@ -14,10 +14,11 @@ PYTHON ?= python3
 # A PYTHON that somebody names is the only one tried; otherwise newer names are, where python3 is too old.
 CANDIDATES := $(PYTHON) $(if $(filter file,$(origin PYTHON)),python3.13 python3.12 python3.11)
 
-# Exact versions and the SHA-256 of every file of them, for all platforms: what blocksim, its developers' tools, the
-# engines to compare with and VTK need. The last three name only what they need beside the first, which they include.
+# Exact versions and the SHA-256 of every file of them, for all platforms: what blocksim, its developers' tools, the site,
+# the engines to compare with and VTK need. All but the first name only what they need beside it, and include it.
 CONSTRAINTS := tests/constraints.txt
 DEV_CONSTRAINTS := tests/constraints-dev.txt
+DOCS_CONSTRAINTS := tests/constraints-docs.txt
 BENCH_CONSTRAINTS := tests/constraints-bench.txt
 VTK_CONSTRAINTS := tests/constraints-paraview-check.txt
 VENV := .venv
@@ -32,10 +33,11 @@ INSTALL_BLOCKSIM := $(PIP_INSTALL) --no-deps --no-build-isolation --editable .
 FOLDER := $(shell pwd | cksum | cut -d ' ' -f 1)
 RUN_STAMP := $(VENV)/.installed-run-$(FOLDER)
 DEV_STAMP := $(VENV)/.installed-dev-$(FOLDER)
+DOCS_STAMP := $(VENV)/.installed-docs-$(FOLDER)
 BENCH_STAMP := $(VENV)/.installed-bench-$(FOLDER)
 FULL_STAMP := $(VENV)/.installed-full-$(FOLDER)
-INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) $(DEV_CONSTRAINTS) $(BENCH_CONSTRAINTS) $(VTK_CONSTRAINTS) \
-    blocksim/__init__.py
+INSTALL_DECIDES := pyproject.toml $(CONSTRAINTS) $(DEV_CONSTRAINTS) $(DOCS_CONSTRAINTS) $(BENCH_CONSTRAINTS) \
+    $(VTK_CONSTRAINTS) blocksim/__init__.py
 # Without a Python (none yet, or it was upgraded away) the stamps are void.
 VOID := $(if $(realpath $(VENV_PYTHON)),,void)
 
@@ -162,6 +164,10 @@ demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, animation
 	$(BLOCKSIM) animate $(DEMO)/run --forces --speed 0.1 --fps 20 --width 640 --out $(DEMO)/animation.gif --overwrite
 	$(BLOCKSIM) report $(DEMO)/run --out $(DEMO)/report.html
 
+.PHONY: dist
+dist: $(DOCS_STAMP) ## Build sdist and wheel into dist/, twice, and try the wheel in an empty environment; some minutes
+	$(VENV_PYTHON) -m tests.dist
+
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers
 
@@ -184,12 +190,14 @@ lock: ## Rewrite the locked versions and hashes: the newest that fit pyproject.t
 	resolve pyproject.toml "$$folder/build.in" --extra study -o "$$folder/run.txt"; \
 	known=$$(names "$$folder/run.txt" | sed 's/^/--no-emit-package /'); \
 	resolve pyproject.toml --extra dev -c "$$folder/run.txt" $$known -o "$$folder/dev.txt"; \
+	resolve pyproject.toml --extra docs --extra dist -c "$$folder/run.txt" -c "$$folder/dev.txt" $$known \
+	    -o "$$folder/docs.txt"; \
 	resolve pyproject.toml --extra bench --extra study -c "$$folder/run.txt" $$known -o "$$folder/bench.txt"; \
 	resolve pyproject.toml --extra paraview-check --extra study -c "$$folder/run.txt" $$known \
 	    -o "$$folder/paraview-check.txt"; \
 	head() { echo "# $$1. Written by: make lock"; }; \
 	{ head "Exact versions, with hashes, of what make run installs"; cat "$$folder/run.txt"; } >$(CONSTRAINTS); \
-	for extra in dev bench paraview-check; do \
+	for extra in dev docs bench paraview-check; do \
 	    { head "What the extra $$extra needs beside"; echo "-r constraints.txt"; cat "$$folder/$$extra.txt"; } \
 	        >tests/constraints-$$extra.txt; \
 	done; \
@@ -233,9 +241,16 @@ $(BENCH_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 	@$(INSTALL_BLOCKSIM)
 	@touch $(RUN_STAMP) $@
 
+$(DOCS_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
+	@echo "Installing what builds the site and checks the package into $(VENV) (versions: $(DOCS_CONSTRAINTS))"
+	@$(INSTALL_LOCKED) $(DOCS_CONSTRAINTS)
+	@$(INSTALL_BLOCKSIM)
+	@touch $(RUN_STAMP) $@
+
 # One call for all of them: most of its time goes into what they share.
 $(FULL_STAMP): $(INSTALL_DECIDES) $(VOID) | $(VENV_PYTHON)
 	@echo "Installing all that tests use into $(VENV) (versions: $(CONSTRAINTS:.txt=*.txt))"
-	@$(INSTALL_LOCKED) $(DEV_CONSTRAINTS) --requirement $(BENCH_CONSTRAINTS) --requirement $(VTK_CONSTRAINTS)
+	@$(INSTALL_LOCKED) $(DEV_CONSTRAINTS) --requirement $(DOCS_CONSTRAINTS) --requirement $(BENCH_CONSTRAINTS) \
+	    --requirement $(VTK_CONSTRAINTS)
 	@$(INSTALL_BLOCKSIM)
-	@touch $(RUN_STAMP) $(DEV_STAMP) $(BENCH_STAMP) $@
+	@touch $(RUN_STAMP) $(DEV_STAMP) $(DOCS_STAMP) $(BENCH_STAMP) $@

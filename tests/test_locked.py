@@ -12,6 +12,7 @@ ENTRY = re.compile(r"^([a-z0-9][a-z0-9-]*)==([^ ;\\]+)", flags=re.MULTILINE)
 EXTRAS = {
     "constraints.txt": ("study",),
     "constraints-dev.txt": ("study", "dev", "dxf"),
+    "constraints-docs.txt": ("docs", "dist"),
     "constraints-bench.txt": ("bench",),
     "constraints-paraview-check.txt": ("paraview-check",),
 }

@@ -73,6 +73,21 @@ def test_a_new_table_can_be_compared_with(blocksim: Command) -> None:
     assert blocksim("check", "mine.toml").code == 0
 
 
+def test_the_list_has_a_line_for_every_template_and_every_scenario_that_ships(blocksim: Command) -> None:
+    lines = blocksim("new", "--list").out.splitlines()
+    shown = {line.split()[0]: line.split(maxsplit=1)[1] for line in lines}  # none without its text
+    assert set(templates()) <= set(shown)
+    assert {path.as_posix() for path in Path("scenarios").rglob("*.toml")} <= set(shown)
+
+
+def test_scenarios_that_ship_are_copied_with_their_tables(blocksim: Command) -> None:
+    made = blocksim("new", "scenarios", "all")
+    assert (made.code, made.out, made.err) == (0, "all\n", "next: blocksim run all/three_blocks.toml\n")
+    assert load_scenario("all/record_column.toml").motion is not None
+    assert load_scenario("all/three_blocks.toml").experiment is not None
+    assert blocksim("new", "scenarios", "all").code == 73
+
+
 def test_a_full_disk_leaves_no_half_file(blocksim: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(_: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
