@@ -2,7 +2,7 @@
 
 import math
 import weakref
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -125,6 +125,15 @@ def has_outlines(scenario: Scenario) -> bool:
     """Return True if any block is no rectangle, without placing them."""
     shaped = any(isinstance(structure, PolygonStructure) for structure in scenario.structures)
     return shaped or any(block.polygon for block in scenario.blocks.values())
+
+
+def outlines_of(placed: Sequence[PlacedBody]) -> NDArray[np.float64] | None:
+    """Return the corners (m, (b, k, 2)) of blocks, the last one repeated; None where all are rectangles."""
+    if not any(body.outline for body in placed):
+        return None
+    most = max(len(body.corners) for body in placed)
+    full = [(*body.corners, *body.corners[-1:] * (most - len(body.corners))) for body in placed]
+    return np.array(full, dtype=np.float64)
 
 
 def placement_of(scenario: Scenario) -> Placement:

@@ -228,7 +228,7 @@ def impossible_starts(scenario: Scenario) -> Iterator[Mistake]:
             except base.UnfitError as error:
                 yield Mistake(("structures", number, error.key), str(error))
         return
-    endless = [*_endless(origins, bodies)]
+    endless = [*_endless(scenario, origins, bodies)]
     if endless:
         yield from endless
         return
@@ -303,8 +303,10 @@ def _why_impossible(body: PlacedBody) -> str:
     return "" if is_possible else f"a block of {mass:g} kg and {inertia:g} kg m^2 cannot be simulated"
 
 
-def _endless(origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody]) -> Iterator[Mistake]:
-    """Find bodies with places or velocities beyond all numbers, or else outlines with such masses; one an origin."""
+def _endless(
+    scenario: Scenario, origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody]
+) -> Iterator[Mistake]:
+    """Find bodies with places or velocities beyond all numbers, or else cells with such masses; one an origin."""
     numbers = map(attrgetter("x", "y", "vx", "vy", "spin"), bodies)
     values = np.fromiter(chain.from_iterable(numbers), np.float64, 5 * len(bodies)).reshape(-1, 5)
     lost = {origins[index]: bodies[index] for index in reversed(np.flatnonzero(~np.isfinite(values).all(axis=1)))}
@@ -314,10 +316,10 @@ def _endless(origins: Sequence[overrides.KeyPath], bodies: Sequence[PlacedBody])
             f"({body.vx:g}, {body.vy:g}) m/s and a spin of {body.spin:g} rad/s; check the keys of its structure"
         )
         yield Mistake(origin, message)
-    told: set[overrides.KeyPath] = set()
+    parted = {("structures", n) for n, one in enumerate(scenario.structures) if isinstance(one, base.PolygonStructure)}
     for origin, body in () if lost else zip(origins, bodies, strict=True):
-        if body.outline and origin not in told and (why := _why_impossible(body)):
-            told.add(origin)
+        if origin in parted and (why := _why_impossible(body)):
+            parted.remove(origin)
             yield Mistake(origin, f"body {body.name}: {why}")
 
 

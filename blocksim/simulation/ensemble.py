@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from blocksim.errors import BlocksimError
 from blocksim.kernels.common import arrays, compiler, frame_times, systems
 from blocksim.kernels.common.members import Watched
-from blocksim.scenario import PlacedBody, Scenario, motion as motions
+from blocksim.scenario import PlacedBody, Scenario, motion as motions, placement
 from blocksim.simulation import balance, instruments, loop, observables, rest_state, schemes, trajectory
 from blocksim.simulation.observables import MOVED_SHARE, OBSERVABLES, Value, Watch, observe
 from blocksim.world import build
-from blocksim.world.systems import blocks
+from blocksim.world.systems import blocks, system
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,7 +97,7 @@ def member_ends(
     time_steps: list[float] = world.controls["step"][:, 0].tolist()
     seconds = [float(steps[m, 0]) * time_steps[m] for m in range(count)]
     size_x, size_y, angles = np.array([(one.size_x, one.size_y, one.angle) for one in bodies]).reshape(-1, 3).T
-    corners, angles = blocks.local_corners(size_x, size_y, blocks.outlines_of(bodies)), angles.reshape(count, -1)
+    corners, angles = system.local_corners(size_x, size_y, placement.outlines_of(bodies)), angles.reshape(count, -1)
     tables = trajectory.final_values(motion, corners.reshape(*angles.shape, *corners.shape[1:]), angles).tolist()
     support = np.stack([world.bodies["vx"][:, -1], world.bodies["vy"][:, -1]], axis=1)
     in_rows = [name for name, one in OBSERVABLES.items() if one.in_rows]

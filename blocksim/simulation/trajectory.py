@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
 from blocksim.scenario.input_files import MEGABYTE, read_limited
-from blocksim.world.systems.blocks import BLOCKS, boxes_around, local_corners, outward_normals
-from blocksim.world.systems.system import Elements, SystemInScene, Track
+from blocksim.world.systems.blocks import BLOCKS, boxes_around, outward_normals
+from blocksim.world.systems.system import Elements, SystemInScene, Track, local_corners
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from blocksim.scenario import Scenario, place_bodies
+from blocksim.scenario import Scenario, place_bodies, placement
 from blocksim.simulation.trajectory import SUPPORT, Frames, forces_on_a
 from blocksim.statics.joint_forces import BlockMotion, JointForce
 from blocksim.view import arrows, mechanism, paints, run_data, scene, style
-from blocksim.world.systems.blocks import outlines_of
 
 WIDTH, TALLEST, LEAST_WIDTH = 7.2, 3.6, 3.0  # inches
 SIDE, GAP, HEAD = 0.12, 0.16, 0.36  # inches
@@ -156,7 +155,7 @@ def _frames(scenario: Scenario, motions: Sequence[BlockMotion]) -> Frames:
     size_x, size_y = np.array([(body.size_x, body.size_y) for body in placed]).T
     names = tuple(body.name for body in placed)
     return Frames(np.arange(2), np.zeros(2), x, y, angle, rest, rest, rest, {}, np.zeros(2), np.zeros(2), names,
-        size_x, size_y, start[:, 2], outlines=outlines_of(placed))  # fmt: skip
+        size_x, size_y, start[:, 2], outlines=placement.outlines_of(placed))  # fmt: skip
 
 
 def _draw_joints(canvas: scene.Canvas, frames: Frames, joints: Sequence[JointForce]) -> None:

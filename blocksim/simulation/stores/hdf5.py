@@ -444,13 +444,10 @@ class FrameFile(AbstractContextManager["FrameFile"]):
             chunks, most = (one.chunk, *(size or 1 for size in one.row)), (None, *(size or None for size in one.row))
             data_set = self.file.create_dataset(one.name, (0, *one.row), dtype=one.kind, maxshape=most, chunks=chunks)
             data_set.attrs["unit"] = one.unit
-        for system, elements in ((present.system, present.elements) for present in self.systems):
-            place = f"{PARTICLES}/{system.name}"
-            for constant, values in zip(system.constants, elements.constants, strict=True):
-                data_set = self.file.create_dataset(f"{place}/{constant.name}", data=values)
+        for present in self.systems:
+            for constant, values in present.constants():
+                data_set = self.file.create_dataset(f"{PARTICLES}/{present.system.name}/{constant.name}", data=values)
                 data_set.attrs["unit"] = constant.unit.replace("/s", " s-1")
-            if elements.outlines is not None:  # (b, k, 2) of every element, the last corner repeated
-                self.file.create_dataset(f"{place}/outlines", data=elements.outlines).attrs["unit"] = "m"
         text = self.file.create_dataset(SCENARIO_TEXT, data=np.bytes_(scenario_toml.encode()))
         text.attrs["unit"] = "TOML"
 

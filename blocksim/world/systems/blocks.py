@@ -18,7 +18,6 @@ MILLI, DEGREES = 1e3, float(np.degrees(1.0))
 # of the centre, the angle that of the body axes, counter-clockwise, never wrapped; sizes are along these axes
 QUANTITIES = system.datasets(x="m", y="m", angle="rad", vx="m/s", vy="m/s", spin="rad/s")
 CONSTANTS = system.datasets(size_x="m", size_y="m", depth="m", mass="kg", inertia="kg m2")
-UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
 def kinetic_energy(track: system.Track) -> system.Floats:
@@ -29,19 +28,8 @@ def kinetic_energy(track: system.Track) -> system.Floats:
 
 def corners(track: system.Track, chosen: system.Indices) -> system.Floats:
     """Return the corners (m) of blocks in some frames, from the lower left one on, (f, b, 4, 2)."""
-    local = local_corners(track["size_x"], track["size_y"], track.present.elements.outlines)
+    local = system.local_corners(track["size_x"], track["size_y"], track.present.elements.outlines)
     return placed_points(local, track["x"][chosen], track["y"][chosen], track["angle"][chosen])
-
-
-def local_corners(size_x: system.Floats, size_y: system.Floats, outlines: system.Floats | None) -> system.Floats:
-    """Return the corners (m) of blocks along their own axes, counter-clockwise, (b, k, 2).
-
-    A rectangle (4 corners) begins at its lower left one. Where there are `outlines` they are returned as they are: a
-    block with fewer corners than others has its last one several times.
-    """
-    if outlines is not None:
-        return outlines
-    return np.asarray(UNIT_CORNERS * np.stack([size_x, size_y], axis=-1)[:, None])
 
 
 def placed_points(local: system.Floats, x: system.Floats, y: system.Floats, angle: system.Floats) -> system.Floats:
@@ -79,15 +67,6 @@ def outward_normals(corners: system.Floats) -> tuple[system.Floats, Any]:
     lengths = np.hypot(edges[..., 0], edges[..., 1])
     is_edge = lengths > 0.0
     return np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None], is_edge
-
-
-def outlines_of(placed: Sequence[PlacedBody]) -> system.Floats | None:
-    """Return the corners (m, (b, k, 2)) of blocks as `local_corners` takes them; None where all are rectangles."""
-    if not any(body.outline for body in placed):
-        return None
-    most = max(len(body.corners) for body in placed)
-    full = [(*body.corners, *body.corners[-1:] * (most - len(body.corners))) for body in placed]
-    return np.array(full, dtype=np.float64)
 
 
 def motion_of(bodies: Any) -> system.Floats:
@@ -139,7 +118,7 @@ def block_system(placed: Sequence[PlacedBody]) -> system.SystemInScene:
     constants = np.array([[getattr(body, one.name) for body in placed] for one in CONSTANTS], dtype=np.float64)
     start = np.array([[getattr(body, one.name) for body in placed] for one in QUANTITIES], dtype=np.float64)
     names = tuple(body.name for body in placed)
-    return system.SystemInScene(BLOCKS, system.Elements(names, constants, start, outlines_of(placed)))
+    return system.SystemInScene(BLOCKS, system.Elements(names, constants, start, placement.outlines_of(placed)))
 
 
 BEYOND = 2.0  # diagonals of the largest block; so far the ground reaches beyond all blocks

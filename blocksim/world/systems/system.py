@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Table = dict[str, list[Any]]  # columns of a table by their names
+UNIT_CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,12 @@ class SystemInScene:
         """Number of elements."""
         return len(self.elements.names)
 
+    def constants(self) -> Iterator[tuple[Dataset, Floats]]:
+        """Yield what is kept of every element once, (b,), and outlines (b, k, 2) where any block is a polygon."""
+        yield from zip(self.system.constants, self.elements.constants, strict=True)
+        if self.elements.outlines is not None:
+            yield Dataset("outlines", "m"), self.elements.outlines
+
 
 @dataclass(frozen=True)
 class Track:
@@ -152,7 +159,7 @@ class Track:
         for number, one in enumerate(self.system.quantities):
             if one.name == name:
                 return np.asarray(self.values[:, number])
-        for one, values in zip(self.system.constants, self.present.elements.constants, strict=True):
+        for one, values in self.present.constants():
             if one.name == name:
                 return np.asarray(values)
         raise KeyError(name)
@@ -169,6 +176,17 @@ class Track:
     def columns(self) -> dict[str, Floats]:
         """Return what tables show, (n, b) by the name of the column."""
         return {one.column: one.factor * one.of(self) for one in self.system.outputs}
+
+
+def local_corners(size_x: Floats, size_y: Floats, outlines: Floats | None) -> Floats:
+    """Return the corners (m) of blocks along their own axes, counter-clockwise, (b, k, 2).
+
+    A rectangle (4 corners) begins at its lower left one. Where there are `outlines` they are returned as they are: a
+    block with fewer corners than others has its last one several times.
+    """
+    if outlines is not None:
+        return outlines
+    return np.asarray(UNIT_CORNERS * np.stack([size_x, size_y], axis=-1)[:, None])
 
 
 def discs(track: Track, chosen: Indices, radius: Floats, corners: int = 8) -> Floats:
