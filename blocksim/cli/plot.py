@@ -9,7 +9,7 @@ from blocksim.errors import InvalidInputError, OutputExistsError
 from blocksim.options import Option, Replace
 from blocksim.silence import silent
 from blocksim.simulation import files
-from blocksim.simulation.stores.exports import find_format
+from blocksim.simulation.stores.exports import FORMATS
 from blocksim.study import compare, pictures, report, run_folder
 
 MEGABYTE = 1e6
@@ -130,7 +130,9 @@ def export_command(
 
     Example: blocksim export scenarios/three_blocks.toml --format vtkhdf
     """
-    form = find_format(kind)
+    if kind not in FORMATS:
+        raise InvalidInputError(f"--format {kind}: unsupported format; use {' or '.join(FORMATS)}")
+    form = FORMATS[kind]
     stored = run_folder.read_run(run)
     contacts = stored.frames.contacts
     file = out or Path(f"{stored.scenario.name}.{kind}")

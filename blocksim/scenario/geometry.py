@@ -18,6 +18,14 @@ ROUND_OFF = 1e-9  # m; polygons that overlap by less touch
 DISC_SHARE = 0.5 * (1.0 - 1e-6)  # radius of a particle in spacings, less what round-off may take
 
 
+def outward_normals(corners: Floats) -> tuple[Floats, Flags]:
+    """Return the unit normals (b, k, 2) of the edges that begin at corners (m, (b, k, 2)), and which have a length."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.hypot(edges[..., 0], edges[..., 1])
+    is_edge = lengths > 0.0
+    return np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None], is_edge
+
+
 def corners_of(points: Sequence[Corner]) -> Floats:
     """Return corners (m) as an array (k, 2), counter-clockwise."""
     corners = np.array(points, dtype=np.float64).reshape(-1, 2)

@@ -129,10 +129,7 @@ def penetration(ones: Outlines, others: Outlines) -> Floats:
 
 def _least_reach(ones: Floats, others: Floats) -> Floats:
     """Return how far (m) other corners (m, k, 2) reach behind the edge of ones behind which they reach least."""
-    edges = np.roll(ones, -1, axis=1) - ones
-    lengths = np.hypot(edges[..., 0], edges[..., 1])
-    is_edge = lengths > 0.0
-    normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None]
+    normals, is_edge = geometry.outward_normals(ones)
     offsets = np.einsum("mec,mec->me", normals, ones - ones[:, :1])
     farthest = np.einsum("mec,mkc->mek", normals, others - ones[:, :1]).min(axis=2)
     least: Floats = np.where(is_edge, offsets - farthest, np.inf).min(axis=1)

@@ -282,7 +282,8 @@ def find_resumption(folder: Path, scenario: Scenario) -> Resumption:
     """
     if not folder.exists() or not any(folder.iterdir()):
         which = "an unfinished run of another scenario or code version is in"
-        others = files.unfinished_siblings(folder)
+        beside = {path.parent for name in files.CHECKPOINTS for path in folder.parent.glob(f"*/{name}")} - {folder}
+        others = (place for place in sorted(beside) if not (place / files.DONE).is_file())
         return Resumption(notes=tuple(f"nothing to resume in {folder}; {which} {other}" for other in others))
     files.check_folder(folder)
     paths = [folder / name for name in files.CHECKPOINTS if (folder / name).is_file()]

@@ -552,9 +552,3 @@ def newest_run(folder: Path) -> Path | None:
     """Return the newest finished run right below a folder, or None."""
     finished = [path.parent for path in folder.glob(f"*/{DONE}")]
     return max(finished, key=lambda path: (path / DONE).stat().st_mtime_ns, default=None)
-
-
-def unfinished_siblings(folder: Path) -> list[Path]:
-    """Return the folders beside one in which checkpoints of runs that did not finish wait."""
-    checkpoints = (path for name in CHECKPOINTS for path in folder.parent.glob(f"*/{name}"))
-    return sorted({path.parent for path in checkpoints if path.parent != folder and not (path.parent / DONE).is_file()})

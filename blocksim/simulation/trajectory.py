@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from blocksim.errors import InvalidInputError
 from blocksim.extras import load_module
+from blocksim.scenario import geometry
 from blocksim.scenario.input_files import MEGABYTE, read_limited
-from blocksim.world.systems.blocks import BLOCKS, boxes_around, outward_normals
+from blocksim.world.systems.blocks import BLOCKS, boxes_around
 from blocksim.world.systems.system import Elements, SystemInScene, Track, local_corners
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ class Frames:
     @cached_property
     def least_widths(self) -> Floats:
         """Least distances of parallel lines around every block, of a rectangle its smaller side, (b,) m."""
-        normals, is_edge = outward_normals(self.corners)
+        normals, is_edge = geometry.outward_normals(self.corners)
         heights = np.einsum("bec,bkc->bek", normals, self.corners)
         return np.asarray(np.where(is_edge, np.ptp(heights, axis=2), np.inf).min(axis=1))
 

@@ -271,11 +271,7 @@ def calibration_plan(document: Document, options: CalibrateOptions) -> Calibrati
         load_table(experiment)  # so that its mistakes are reported of the option
         document = document.with_values({TABLE: input_files.user_value(TABLE, str(experiment.absolute()))})
     fits = plans.build_distributions(document, fit, FIT, MODE)
-    if scatter:
-        scattered: Sweep | None = plans.build_distributions(document, scatter, SCATTER, MODE)
-    else:
-        own = document.build().sweep
-        scattered = own if own is not None and own.is_sampled else None
+    scattered = plans.distributions_of(document, scatter, SCATTER, MODE)
     bare = document.without_sweep()
     base = bare.build()
     if base.experiment is None:

@@ -255,20 +255,13 @@ def _stripes(document: Document, given: plans.Variations) -> dict[str, tuple[obj
 
 
 def _scatter(document: Document, given: plans.Variations, *, needed: bool) -> Sweep | None:
-    if given:
-        spread = plans.build_distributions(document.without_sweep(), given, SCATTER, "normal")
-        constant = next(
-            (key for key, values in spread.vary.items() if len(set(map(str, plans.levels_of(values)))) == 1), None
-        )
-        if constant is not None:
-            raise InvalidInputError(f"{SCATTER} {given.texts[constant]}: one value does not scatter; set it with --set")
-        return spread
-    own = document.build().sweep
-    if own is None or not own.is_sampled:
-        if needed:
-            raise InvalidInputError(NO_SCATTER)
-        return None
-    return own
+    spread = plans.distributions_of(document, given, SCATTER, "normal")
+    if spread is None and needed:
+        raise InvalidInputError(NO_SCATTER)
+    for key, values in spread.vary.items() if spread is not None and given else ():
+        if len(set(map(str, plans.levels_of(values)))) == 1:
+            raise InvalidInputError(f"{SCATTER} {given.texts[key]}: one value does not scatter; set it with --set")
+    return spread
 
 
 class Point(BaseModel, frozen=True):

@@ -498,6 +498,12 @@ def build_distributions(document: Document, given: Variations, option: str, mode
     return cast("Sweep", with_sweep(document, given, mode, option=option).build().sweep)  # it was just put there
 
 
+def distributions_of(document: Document, given: Variations, option: str, mode: str) -> Sweep | None:
+    """Return the distributions that are given, else those of the scenario's own [sweep] table; None without any."""
+    own = build_distributions(document, given, option, mode) if given else document.build().sweep
+    return own if own is not None and (given or own.is_sampled) else None
+
+
 @dataclass(frozen=True)
 class Estimate:
     """Cases of a sweep and what they cost, from the steps of some of them and the measured speed of a step."""

@@ -13,7 +13,7 @@ from blocksim.analysis.experiment import QUANTITIES, ExperimentTable, load_table
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.extras import load_module
 from blocksim.options import Option, takes
-from blocksim.scenario import Source, Sweep, document_of
+from blocksim.scenario import Source, document_of
 from blocksim.scenario.models.study import Normal, Variation
 from blocksim.silence import silent
 from blocksim.simulation import schemes, trajectory
@@ -285,13 +285,8 @@ def sensitivity(scenario: Source, options: SensitivityOptions) -> Sensitivity:
         raise InvalidInputError(f"unknown method {options.method!r}; choose one of {', '.join(METHODS)}")
     document, method = document_of(scenario), METHODS[options.method]
     vary, is_typed = options.vary, isinstance(options.vary, plans.Variations)
-    if vary:
-        plan: Sweep | None = plans.build_distributions(
-            document, plans.Variations.of(vary), VARY if is_typed else "vary", MODE
-        )
-    else:
-        plan = document.build().sweep
-    if plan is None or not plan.is_sampled:
+    plan = plans.distributions_of(document, plans.Variations.of(vary or {}), VARY if is_typed else "vary", MODE)
+    if plan is None:
         form = f"{VARY} KEY=FROM:TO" if is_typed else "vary={key: {'from': a, 'to': b}}"
         raise InvalidInputError(f"nothing to vary: give {form}, or a [sweep] table with distributions")
     document = document.without_sweep()

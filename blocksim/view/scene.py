@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from blocksim.scenario import PlacedSegment, placement
+from blocksim.scenario import PlacedSegment, geometry, placement
 from blocksim.simulation.trajectory import Frames
 from blocksim.view import paints, run_data, style
-from blocksim.world.systems.blocks import are_removed, outward_normals, placed_points
+from blocksim.world.systems.blocks import are_removed, placed_points
 
 GROUND_THICKNESS = 5.0  # points, below the lowest ground
 RULER_EDGE = 10.0  # points; no number is nearer to the edge of a panel
@@ -416,7 +416,7 @@ def upper_sides(frames: Frames) -> run_data.Floats:
     """
     outlines = frames.corners
     inset = 0.5 * (1.0 - EDGE_INSET) * frames.least_widths
-    normals, is_edge = outward_normals(outlines)
+    normals, is_edge = geometry.outward_normals(outlines)
     depth = np.einsum("bec,bec->be", normals, outlines) - inset[:, None]
     blocks = np.arange(len(outlines))
     upper = np.argmax(np.where(is_edge, normals[..., 1], -np.inf), axis=1)

@@ -23,7 +23,6 @@ from blocksim.simulation.trajectory import BODIES, UNITS, Contacts, Frames, forc
 from blocksim.world.systems.blocks import BLOCKS, are_removed, distinct, placed_points, supports_track
 from blocksim.world.systems.system import Floats, Track
 
-FRAME_COLUMNS = ("time_s", "block", *(one.column for one in BLOCKS.outputs))
 CONTACT_NUMBERS = sorted(UNITS, key=lambda name: "m1N".index(UNITS[name]))  # lengths, directions, forces
 CONTACT_COLUMNS = ("time_s", *BODIES, *(f"{name}{instruments.TABLE_UNITS[UNITS[name]][0]}" for name in CONTACT_NUMBERS))
 NOBODY = ""
@@ -309,10 +308,3 @@ FORMATS: dict[str, Format] = {
     "geojson": Format(write_geojson, counted="blocks"),
     "dxf": Format(write_dxf, counted="blocks"),
 }
-
-
-def find_format(name: str) -> Format:
-    """Return what writes files of a format. Raises InvalidInputError for an unknown one."""
-    if name not in FORMATS:
-        raise InvalidInputError(f"--format {name}: unsupported format; use {' or '.join(FORMATS)}")
-    return FORMATS[name]

@@ -61,14 +61,6 @@ def boxes_around(
     return low, high
 
 
-def outward_normals(corners: system.Floats) -> tuple[system.Floats, Any]:
-    """Return the unit normals (b, k, 2) of the edges that begin at corners (m, (b, k, 2)), and which have a length."""
-    edges = np.roll(corners, -1, axis=1) - corners
-    lengths = np.hypot(edges[..., 0], edges[..., 1])
-    is_edge = lengths > 0.0
-    return np.stack([edges[..., 1], -edges[..., 0]], axis=-1) / np.where(is_edge, lengths, 1.0)[..., None], is_edge
-
-
 def motion_of(bodies: Any) -> system.Floats:
     """Return the quantities (..., 6, b) of bodies (..., b): a removed one is where it was and has no velocity: NaN."""
     from blocksim.kernels.common.arrays import REMOVED  # noqa: PLC0415 - kernels, not for readers
