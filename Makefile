@@ -168,6 +168,10 @@ demo: $(RUN_STAMP) ## Run the three blocks with contact forces; strip, animation
 dist: $(DOCS_STAMP) ## Build sdist and wheel into dist/, twice, and try the wheel in an empty environment; some minutes
 	$(VENV_PYTHON) -m tests.dist
 
+.PHONY: docs
+docs: $(DOCS_STAMP) ## Build the site into build/site: pages, keys, commands, gallery, notebooks; four minutes
+	$(VENV_PYTHON) -m tests.site
+
 .PHONY: setup
 setup: $(DEV_STAMP) ## Create or update .venv, with the tools for developers
 

@@ -19,7 +19,9 @@ PAGES = [
     *sorted((ROOT / "blocksim").rglob("*.md")),
     ROOT / "scenarios/README.md",
     ROOT / "results/README.md",
+    ROOT / "results/software_paper.md",
     ROOT / "tests/README.md",
+    ROOT / ".github/CONTRIBUTING.md",
 ]
 # Phrases that readers stumbled over, as quoted by them; pages, help, templates and messages have better ones.
 STUMBLING = (
@@ -44,7 +46,12 @@ def test_the_first_page_is_short() -> None:
 
 
 def test_no_text_for_users_has_a_phrase_that_readers_stumbled_over() -> None:
-    sources = [*PAGES, *(ROOT / "blocksim/cli").rglob("*.toml"), *(ROOT / "blocksim/cli").rglob("*.py")]
+    sources = [
+        *PAGES,
+        *(ROOT / ".docs").rglob("*.md"),
+        *(ROOT / "blocksim/cli").rglob("*.toml"),
+        *(ROOT / "blocksim/cli").rglob("*.py"),
+    ]
     sources += [*(ROOT / "blocksim/study").glob("*.py"), *(ROOT / "blocksim/scenario").glob("*.py")]
     found = [
         (str(path.relative_to(ROOT)), phrase)
