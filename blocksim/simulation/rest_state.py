@@ -12,6 +12,11 @@ need a time of sqrt(m/k) to take that up, in which a block that is about to slip
 keeps. So the inertial force of that acceleration is loaded too, after gravity, as far as the scene carries it at rest.
 With springs a scene under a pulse that begins at its peak at time zero settles unasked, if it rests as it was placed.
 
+On springs an equilibrium of all this load is looked for without time first (blocksim/statics/spring_equilibrium.py):
+where it is found steps confirm it, and where nothing holds the blocks the scene fails. It is where growing parts lead,
+to 1e-3 of the deepest overlap as long as few contacts slip; what the vibrations of each part make slip beyond the need
+stays so in parts. Where neither is certain loads grow in parts.
+
 A scene at rest is one whose blocks have no acceleration (springs), or move no further (rigid contacts). One that fails
 moves on, as no kinetic energy peaks there: it ends once a block has come farther than springs give way, or as soon as
 it is a mechanism (`_is_mechanism`): blocks have come many times as far as contacts can give way, faster and faster, and
@@ -94,7 +99,8 @@ def settle(
     run = _Settlement(scene, scenario, placed, team, stop)
     with run.without_time():
         try:
-            run.load_up()
+            if not run.balance():
+                run.load_up()
             run.rest(run.pace.most)
             run.follow_support()
         except SettleError:
@@ -193,6 +199,30 @@ class _Settlement:
         for name, values in velocities.items():
             self.bodies[name] = values
 
+    def balance(self, inertial: float = 0.0) -> bool:
+        """Return True once all loads are in equilibrium with contacts, as found without time, after steps with them.
+
+        `inertial` is the share of that force. Otherwise the scene is as it was. Raises SettleError where nothing holds
+        the blocks, unless they are released.
+        """
+        if self.scheme.equilibrium is None or not self.is_free.any() or not self.scale > 0.0:
+            return False
+        scene, kept = self.scene, [array.copy() for array in arrays_of(self.scene)]
+        self._load(1.0, inertial)
+        outcome = self.scheme.equilibrium(scene, self._advanced, self.is_free, self.scale, self.smallest)
+        self.scene, change = outcome.scene, outcome.change
+        if outcome.holds:
+            self.steps = int(self.scene.world.clock[0].steps)
+            self._go()
+            return True
+        way = float(schemes.corner_ways(change, self.bodies["radius"]).max())
+        falls = outcome.holds is False and not self.is_released
+        if falls and not any(self._meets(change * (share * self.smallest / way), share) for share in AHEAD):
+            raise self._error()
+        _restore(scene, kept)
+        self.scene = scene
+        return False
+
     def load_up(self) -> None:
         """Let gravity and loads grow to their size."""
         for part in range(1, PARTS + 1):
@@ -218,15 +248,17 @@ class _Settlement:
     def follow_support(self) -> None:
         """Let the inertial force of the supports' acceleration at time zero grow as far as it is carried at rest."""
         part = FIRST_SHARE if any(self.support) else 0.0
-        most = max(self.steps, self.pace.part)  # as many as gravity took
+        parts = 1 if self.scheme.equilibrium is None else PARTS
+        most = max(self.steps, parts * self.pace.part)  # as many as gravity took, or may have taken
         is_bounded = False
         while self.carried < 1.0 and part >= LAST_SHARE:
             scene, steps = self.scene, self.steps
             kept = [array.copy() for array in arrays_of(scene)]
             share = min(self.carried + part, 1.0)
-            self._load(1.0, share)
             try:
-                self._go()
+                if not self.balance(share):
+                    self._load(1.0, share)
+                    self._go()
                 self.rest(self.steps + most)
                 self.carried = share
             except SettleError:
@@ -260,11 +292,9 @@ class _Settlement:
 
         Raises SettleError, and StoppedEarlyError.
         """
-        if why := self.stop():
-            raise StoppedEarlyError(f"{why} while the scene settled; nothing is kept of that")
         self.before = self._places()
         self.steps += self.pace.call
-        self.scene, status = self.team.advance(self.scene, self.steps)
+        self.scene, status = self._advanced(self.scene, self.steps)
         energy = self._kinetic()
         if status != REACHED or not np.isfinite(energy) or self.ways().max() > MOVED_SHARE * self.smallest:
             raise self._error()
@@ -275,6 +305,12 @@ class _Settlement:
         else:
             self.energy = energy
             self.speeds.append(float(np.sqrt(energy)))
+
+    def _advanced(self, scene: schemes.AnyScene, last_step: int) -> tuple[schemes.AnyScene, int]:
+        """Return a scene at a step, and its status. Raises StoppedEarlyError."""
+        if why := self.stop():
+            raise StoppedEarlyError(f"{why} while the scene settled; nothing is kept of that")
+        return self.team.advance(scene, last_step)
 
     def _stop(self) -> None:
         for name in VELOCITIES:
@@ -354,11 +390,10 @@ class _Settlement:
         fastest = int(np.nanargmax(np.where(self.is_free, speeds, -1.0)))
         ways = self.ways()
         far = int(np.nanargmax(ways))
-        return SettleError(
-            f"the scene {results.NOT_AT_REST} (start.settle): block {self.placed[fastest].name} moves at "
-            f"{MILLI * float(speeds[fastest]):.3g} mm/s, block {self.placed[far].name} has come "
-            f"{MILLI * float(ways[far]):.3g} mm, after {self.steps} steps"
-        )
+        come = f"block {self.placed[far].name} has come {MILLI * float(ways[far]):.3g} mm"
+        moves = f"block {self.placed[fastest].name} moves at {MILLI * float(speeds[fastest]):.3g} mm/s, {come}, after "
+        what = f"{moves}{self.steps} steps" if speeds.any() else f"{come} without meeting anything that holds it"
+        return SettleError(f"the scene {results.NOT_AT_REST} (start.settle): {what}")
 
 
 def _restore(scene: schemes.AnyScene, kept: Sequence[NDArray[Any]]) -> None:

@@ -15,6 +15,7 @@ from blocksim.simulation import Result, read_result, simulate, simulate_into
 from blocksim.simulation.checkpoint import CheckpointPolicy
 from blocksim.simulation.rest_state import SettleError, initial_scene, settle
 from blocksim.simulation.schemes import ALONE, build, build_scene, scheme_of
+from blocksim.statics import spring_equilibrium
 from blocksim.study.criterion import DEFAULT, Stability, read_criterion
 from blocksim.verification.scene import HEIGHT, PaperBlock, Simulation, scenario_of
 from tests.simulation.conftest import SCENARIOS
@@ -470,7 +471,22 @@ def tilted_ring(tilt: str) -> Scenario:
     )
 
 
-def test_a_mechanism_on_springs_is_told_before_it_has_gone_far() -> None:
+def nothing_is_known(scene: Any, _advance: Any, is_free: Any, *_: float) -> spring_equilibrium.SpringRest:
+    """Be a search for an equilibrium without time that does not come to an end."""
+    return spring_equilibrium.SpringRest(scene, None, np.zeros((3, is_free.size)), np.inf)
+
+
+def test_a_mechanism_on_springs_is_told_without_time() -> None:
+    with pytest.raises(SettleError, match=r"block \S+ has come 0\.\d+ mm without meeting anything") as caught:
+        simulate(tilted_ring("17.6 deg"))
+    assert read_criterion(DEFAULT).verdict({"status": "failed", "reason": str(caught.value)}) is Stability.FALLS
+    settled = simulate(tilted_ring("17.3 deg")).summary.settled
+    assert settled is not None
+    assert settled.steps < 100
+
+
+def test_a_mechanism_on_springs_is_told_before_it_has_gone_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spring_equilibrium, "equilibrium", nothing_is_known)
     with pytest.raises(SettleError, match=r"block \S+ moves at .* has come 0\.0\d+ mm, after \d+ steps") as caught:
         simulate(tilted_ring("19 deg"))
     assert caught.value.exit_code == ExitCode.NUMERICAL_FAILURE

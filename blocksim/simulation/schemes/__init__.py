@@ -131,6 +131,7 @@ class Scheme:
 
     # settling before time zero
     settling: SettlingSteps = SHORT_STEPS
+    equilibrium: Callable[..., Any] | None = None  # without time: statics/spring_equilibrium.py
     halt: Callable[[Any, int], None] = silent  # takes velocities of so many blocks from arrays beside the bodies
     begin: Callable[[Any], None] = silent  # begins its own books anew, at rest
     unrest: Callable[[Any, NDArray[np.bool_], Floats, float, float], float] = _unrest_of_accelerations

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common import arrays, systems, tolerances
-from blocksim.kernels.explicit import energy, models, sides, step
+from blocksim.kernels.explicit import energy, models, step
 from blocksim.scenario.overlap import penetration
 from blocksim.simulation import schemes, trajectory
 from blocksim.world import build
+from blocksim.world.contact_places import places_of
 
 WORK_SPACE = ("points", "matrices", "before", "action")
-Indices = NDArray[np.intp]
-SIDES_X, SIDES_Y = (-1.0, 1.0, 1.0, -1.0), (-1.0, -1.0, 1.0, 1.0)  # of the corners, counter-clockwise from lower left
 
 
 def explicit_contacts(world: arrays.World, blocks: int) -> trajectory.Rows:
@@ -26,7 +25,7 @@ def explicit_contacts(world: arrays.World, blocks: int) -> trajectory.Rows:
     a, b = pairs["a"][pair].astype(np.intp), pairs["b"][pair].astype(np.intp)
     rows = np.zeros(len(contacts), trajectory.CONTACT_ROW)
     rows["body_a"], rows["body_b"] = a, np.where(b < blocks, b, trajectory.SUPPORT)
-    for name, values in zip(list(trajectory.UNITS)[:4], _places(world, contacts, a, b), strict=True):
+    for name, values in zip(list(trajectory.UNITS)[:4], places_of(world, contacts, a, b), strict=True):
         rows[name] = values
     rows["overlap"] = contacts["depth"]
     rows["normal_force"] = contacts["normal_force"]
@@ -42,28 +41,6 @@ def explicit_contacts(world: arrays.World, blocks: int) -> trajectory.Rows:
         rows["x"] -= way * rows["normal_y"]
         rows["y"] += way * rows["normal_x"]
     return rows
-
-
-def _places(world: arrays.World, contacts: Any, a: Indices, b: Indices) -> list[Any]:
-    """Return place (m) and normal of contacts: those of particles keep them, corners are found again as kernels do."""
-    if "nx" in (contacts.dtype.names or ()):
-        return [contacts[name] for name in ("x", "y", "nx", "ny")]
-    is_of_a = contacts["slot"] < sides.MOST_CORNERS
-    owner, touched = world.bodies[np.where(is_of_a, a, b)], world.bodies[np.where(is_of_a, b, a)]
-    number, face = contacts["slot"] % sides.MOST_CORNERS, contacts["face"]
-    cosine, sine = touched["cos"], touched["sin"]
-    if world.corners is None:
-        px, py = np.choose(number, SIDES_X) * owner["half_x"], np.choose(number, SIDES_Y) * owner["half_y"]
-        # faces 0: -y, 1: +x, 2: +y, 3: -x
-        nx, ny = np.choose(face, [sine, cosine, -sine, -cosine]), np.choose(face, [-cosine, sine, cosine, -sine])
-    else:
-        corner, edge = world.corners[owner["first_corner"] + number], world.corners[touched["first_corner"] + face]
-        px, py = corner["x"], corner["y"]
-        nx, ny = cosine * edge["nx"] - sine * edge["ny"], sine * edge["nx"] + cosine * edge["ny"]
-    outward = np.where(is_of_a, 1.0, -1.0)  # from b to a, whichever of the two is touched
-    cosine, sine = owner["cos"], owner["sin"]
-    x, y = owner["x"] + cosine * px - sine * py, owner["y"] + sine * px + cosine * py
-    return [x, y, outward * nx, outward * ny]
 
 
 def with_own_work_space(world: arrays.World) -> arrays.World:
@@ -137,6 +114,13 @@ def _inside(change: Callable[..., Any]) -> Callable[..., systems.Coupled]:
     return lambda scene, *values: scene._replace(world=change(scene.world, *values))
 
 
+def equilibrium(*scene: Any) -> Any:
+    """Bring a scene to equilibrium without time; see blocksim.statics.spring_equilibrium."""
+    from blocksim.statics import spring_equilibrium  # noqa: PLC0415 - scipy takes a third of a second
+
+    return spring_equilibrium.equilibrium(*scene)
+
+
 WORLDS = schemes.Scheme(
     name="explicit",
     scene_type=arrays.World,
@@ -157,6 +141,7 @@ WORLDS = schemes.Scheme(
         PARTICLES: {"contact": {"model": "kernel", "particle_spacing": 0.1}},  # the code serves all models of particles
         SURFACE_OF_OUTLINES: {"blocks": POLYGON},
     },
+    equilibrium=equilibrium,
     give=lambda scene: float(_depths(scene.world)[1].max(initial=0.0)),
     ledger=energy.LEDGER_ROW,
     measure=energy.measure,
@@ -167,6 +152,7 @@ WORLDS = schemes.Scheme(
 COUPLED = replace(
     WORLDS,
     scene_type=systems.Coupled,
+    equilibrium=None,
     advance=lambda scene, last_step: int(step.advance_coupled_alone(scene, last_step)),
     advance_in_team=step.advance_coupled_in_team,
     advance_members=None,
