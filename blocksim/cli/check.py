@@ -22,11 +22,11 @@ from blocksim.scenario import (
     scenario_to_toml,
     units,
 )
-from blocksim.scenario.models import loads, timeline
+from blocksim.scenario.models import actuators, loads, timeline
 from blocksim.simulation.instruments import bytes_of_series
 from blocksim.statics.blockwork import MOST_BLOCKS, Blockwork
 from blocksim.study.rows import check_experiment
-from blocksim.world import describe, free_memory, memory
+from blocksim.world import describe, excitation, free_memory, memory
 
 MOST_BODIES = 12
 MOST_LINES = 8  # of events, loads or probes
@@ -110,7 +110,7 @@ def _summary(scenario: Scenario, description: describe.Description) -> Iterator[
         peaks = f"{output.number(MILLI * support.displacement)} mm, {output.number(MILLI * support.speed)} mm/s"
         greatest = f"at most {peaks} and {output.number(support.acceleration / units.STANDARD_GRAVITY)} g"
         yield f"supports   move {greatest}; {output.number(MILLI * support.final_speed)} mm/s at the end"
-    yield from _acting(scenario, description.bodies)
+    yield from _acting(scenario, description.bodies, description.step)
     if rigid is None:
         yield f"boundary   {description.particles} particles ({_use_of_particles(scenario)})"
     yield from (f"{name:<10} {count} particles or elements" for name, count in description.systems.items())
@@ -179,8 +179,11 @@ def _use_of_particles(scenario: Scenario) -> str:
             return f"at most {output.number(MILLI * contact.particle_spacing)} mm apart"
 
 
-def _acting(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
-    """Yield lines about driven bodies, events, loads, the start and probes, the first ones of many."""
+def _acting(scenario: Scenario, placed: Sequence[PlacedBody], step: float) -> Iterator[str]:
+    """Yield lines about driven bodies, events, loads, actuators, the start and probes, the first ones of many.
+
+    `step` (s) is that of the run.
+    """
     for drive in motion.drives_of(scenario):
         spec = scenario.bodies[drive.body - len(placed) + len(scenario.bodies)]
         kind = "" if spec.motion is None else f" ({spec.motion.kind})"
@@ -193,11 +196,13 @@ def _acting(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[str]:
     yield from _some("event", [f"{at}: {events.describe_event(one)}" for at, one in zip(times, ordered, strict=True)])
     names = [load.name or f"loads.{number}" for number, load in enumerate(scenario.loads)]
     yield from _some("load", [f"{name}: {_load(load)}" for name, load in zip(names, scenario.loads, strict=True)])
+    springs = excitation.springs_of(scenario, placed, step)
+    jacks = zip(events.actuator_names(scenario), scenario.actuators, springs, strict=True)
+    yield from _some("actuator", [f"{name}: {_actuator(one, spring)}" for name, one, (spring, _) in jacks])
     if motion.settles(scenario):
         held = f"; held: {', '.join(scenario.start.hold)}" if scenario.start.hold else ""
         yield from _some("start", [f"settles before time zero{held}"])
-    probes = zip(events.probe_names(scenario), scenario.probes, strict=True)
-    yield from _some("probe", [f"{name}: {_probe(one)}" for name, one in probes])
+    yield from _some("probe", [f"{name}: {_probe(one)}" for name, one in events.probes_of(scenario).items()])
 
 
 def _some(head: str, lines: Sequence[str]) -> Iterator[str]:
@@ -244,6 +249,24 @@ def _in_unit(value: float, unit: str) -> str:
     return f"{value / factor:.4g} {prefix}{unit}"
 
 
+def _actuator(one: actuators.Actuator, stiffness: float) -> str:
+    """Return what an actuator does, in words, with its stiffness (N/m)."""
+    path = one.displacement
+    verb = {"both": "moves", "push": "pushes", "pull": "pulls"}[one.sense]
+    text = f"{verb} {one.body} at {math.degrees(one.direction):g}°"
+    match path:
+        case actuators.RampPath():
+            text = f"{text}, to {MILLI * path.to:g} mm at {MILLI * path.rate:g} mm/s"
+        case actuators.Cycles():
+            most = f"{MILLI * max(path.amplitudes):g} mm at {MILLI * path.rate:g} mm/s"
+            text = f"{text}, {path.repeats * len(path.amplitudes)} cycles up to {most}"
+        case _:
+            text = f"{text}, by {len(path.times)} displacements"
+    given = "" if one.stiffness is not None else ", which follows from the step"
+    until = actuators.stretches_of(path)[-1].start
+    return f"{text} until {until:.4g} s; {output.number(1e-6 * stiffness)} kN/mm{given}"
+
+
 def _probe(probe: timeline.AnyProbe) -> str:
     """Return what a probe records and how often, in words."""
     match probe:
@@ -253,6 +276,8 @@ def _probe(probe: timeline.AnyProbe) -> str:
             text = f"point of {probe.body}"
         case timeline.EnergyProbe():
             text = "energies"
+        case timeline.ActuatorProbe():
+            text = f"force, displacement and work of {probe.actuator}"
         case _:
             text = f"joint of {' and '.join(probe.bodies)}"
     if probe.every is None:

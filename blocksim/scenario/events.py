@@ -11,7 +11,7 @@ from blocksim.scenario.geometry import Corner, dot, edges_of
 from blocksim.scenario.mistakes import Mistake, repetitions, unknown
 from blocksim.scenario.models.loads import Gravity
 from blocksim.scenario.models.scenario import Scenario
-from blocksim.scenario.models.timeline import Event, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.models.timeline import ActuatorProbe, AnyProbe, Event, ForceProbe, JointProbe, PointProbe
 from blocksim.scenario.placement import TOLERANCE, PlacedBody
 from blocksim.scenario.units import toml
 
@@ -147,21 +147,32 @@ LEAST_SHARE = 1e-6
 """Of the smallest width of both: what faces share at least, and by how much they may overlap across."""
 
 
-def probe_names(scenario: Scenario) -> list[str]:
-    """Return the names of all probes; one without a name is called by its kind and its number from 1."""
-    return [probe.name or f"{probe.kind}{number}" for number, probe in enumerate(scenario.probes, start=1)]
+def actuator_names(scenario: Scenario) -> list[str]:
+    """Return the names of all actuators; one without a name is called by its number from 1."""
+    return [one.name or f"actuator{number}" for number, one in enumerate(scenario.actuators, start=1)]
+
+
+def probes_of(scenario: Scenario) -> dict[str, AnyProbe]:
+    """Return all probes by name: those of the file, without a name by kind and number from 1, and of all actuators."""
+    own = {probe.name or f"{probe.kind}{number}": probe for number, probe in enumerate(scenario.probes, start=1)}
+    recorded = {probe.actuator for probe in scenario.probes if isinstance(probe, ActuatorProbe)}
+    others = [name for name in actuator_names(scenario) if name not in recorded]
+    return own | {name: ActuatorProbe(kind="actuator", actuator=name) for name in others}
 
 
 def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[Mistake]:
     """Find names given twice, bodies and supports that do not exist, and bodies without a joint."""
-    names = probe_names(scenario)
+    names = [probe.name or f"{probe.kind}{number}" for number, probe in enumerate(scenario.probes, start=1)]
     for number in repetitions(names):
         yield Mistake(("probes", number, "name"), f"two probes are named {toml(names[number])}")
+    jacks = actuator_names(scenario)
     bodies = {body.name: body for body in placed}
     others = [str(name) for tables in scenario.systems.values() for one in tables if (name := getattr(one, "name", ""))]
     known = [*bodies, GROUND, SUPPORTS, *([WALLS] if scenario.walls else []), *wall_names(scenario), *others]
     for number, probe in enumerate(scenario.probes):
         path = ("probes", number)
+        if names[number] in jacks and getattr(probe, "actuator", None) != names[number]:
+            yield Mistake((*path, "name"), f"{toml(names[number])} is the name of an actuator, whose record has it")
         match probe:
             case ForceProbe():
                 for key in ("on", "by"):
@@ -170,6 +181,8 @@ def unfit_probes(scenario: Scenario, placed: Sequence[PlacedBody]) -> Iterator[M
                     yield Mistake((*path, "by"), f"{toml(probe.by)} exerts no force on itself")
             case PointProbe():
                 yield from unknown((*path, "body"), "body", bodies, probe.body)
+            case ActuatorProbe():
+                yield from unknown((*path, "actuator"), "actuator", jacks, probe.actuator)
             case JointProbe():
                 for place, name in enumerate(probe.bodies):
                     yield from unknown((*path, "bodies", place), "body", bodies, name)

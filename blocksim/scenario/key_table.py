@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from blocksim.scenario.models import contact, geometry, loads, motion, scenario, study, timeline
+from blocksim.scenario.models import actuators, contact, geometry, loads, motion, scenario, study, timeline
 from blocksim.scenario.models.base import HELD, SYSTEMS
 from blocksim.scenario.overrides import options, si_unit
 from blocksim.scenario.structures import KINDS
@@ -43,6 +43,8 @@ def key_table() -> str:
         ("loads, every kind", loads.Load),
         *((f'loads, kind = "{kind}"', model) for kind, model in loads.LOADS.items()),
         *((f'loads.history, kind = "{kind}"', model) for kind, model in loads.HISTORIES.items()),
+        ("actuators", actuators.Actuator),
+        *((f'actuators.displacement, kind = "{kind}"', model) for kind, model in actuators.PATHS.items()),
         ("start", timeline.Start),
         ("friction", contact.Friction),
         ("friction.PAIR", contact.PairFriction),

@@ -6,7 +6,7 @@ from typing import Any, Literal, NamedTuple, cast
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from blocksim.scenario.models import base, loads, motion, scenario, timeline
+from blocksim.scenario.models import actuators, base, loads, motion, scenario, timeline
 from blocksim.scenario.overrides import MISSING, NAMED, KeyPath, field_at, fields_of, follow, marks_of, table_at
 from blocksim.scenario.spelling import did_you_mean, did_you_mean_or_list, meant_word, nearest
 from blocksim.scenario.structures import KINDS
@@ -21,6 +21,7 @@ KINDS_IN: dict[str | int, Iterable[str]] = {
     "bodies": motion.DRIVES,
     "loads": loads.LOADS,
     "history": loads.HISTORIES,
+    "displacement": actuators.PATHS,
 }
 
 
@@ -100,6 +101,8 @@ def _path(loc: Sequence[str | int]) -> KeyPath:
             path = (*path[:3], *path[4:])
         case ("loads", _, _, "history", *_):
             path = (*path[:2], "history", *path[5:])
+        case ("actuators", _, "displacement", *_):
+            path = (*path[:3], *path[4:])
         case ("loads", *_):
             path = (*path[:2], *path[3:])
         case ("time", scheme, *_) if scheme not in timeline.SCHEMES:

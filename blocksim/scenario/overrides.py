@@ -16,7 +16,7 @@ from blocksim.scenario.units import Kind, Quantity, toml
 
 KeyPath = tuple[str | int, ...]  # path in a scenario, such as ("structures", 0, "overlap")
 
-_LISTS = ("materials", "blocks", "structures", "bodies", "walls", "events", "loads", "probes")
+_LISTS = ("materials", "blocks", "structures", "bodies", "walls", "events", "loads", "actuators", "probes")
 NAMED: dict[str | int, int] = {**dict.fromkeys(_LISTS, 2), "pairs": 3}
 """Tables of named or numbered entries: how many parts of a path lead to one entry."""
 

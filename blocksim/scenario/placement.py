@@ -16,6 +16,10 @@ from blocksim.scenario.structures.base import PolygonStructure, Pose, Structure
 LENGTH_WITHOUT_BLOCKS = 0.1  # m: can be seen beside soil
 
 
+GUIDED = 1e15
+"""Of the inertia of a guided block: in an hour moments turn it by less than round-off of its corners."""
+
+
 class PlacedBody(NamedTuple):
     """One block at the start: centroid x, y, turned by angle, all in SI (m, kg/m³, rad, m/s, rad/s).
 
@@ -40,6 +44,7 @@ class PlacedBody(NamedTuple):
     driven: bool = False  # by a motion of its own; fixed as well
     freed: bool = False  # by an event
     outline: geometry.Corners = ()  # empty for a rectangle
+    guided: bool = False  # it does not turn
 
     @property
     def is_polygon(self) -> bool:
@@ -55,10 +60,12 @@ class PlacedBody(NamedTuple):
 
     @property
     def inertia(self) -> float:
-        """Moment of inertia about the centroid in kg m²."""
+        """Moment of inertia about the centroid in kg m²; of a guided block so large that it does not turn."""
         if self.is_polygon:
-            return self.density * geometry.section_of(self.outline)[1] * self.depth
-        return self.mass * (self.size_x * self.size_x + self.size_y * self.size_y) / 12.0
+            own = self.density * geometry.section_of(self.outline)[1] * self.depth
+        else:
+            own = self.mass * (self.size_x * self.size_x + self.size_y * self.size_y) / 12.0
+        return GUIDED * own if self.guided else own
 
     @property
     def corners(self) -> geometry.Corners:
@@ -152,7 +159,9 @@ def placement_of(scenario: Scenario) -> Placement:
         name = spec.name or str(len(bodies) + 1)
         is_driven = spec.motion is not None
         body = place_blocks(scenario, spec.block, [(name, pose)], fixed=spec.fixed or is_driven)[0]
-        bodies.append(body._replace(driven=is_driven, freed=name in freed) if is_driven or freed else body)
+        if is_driven or freed or spec.guide != "none":
+            body = body._replace(driven=is_driven, freed=name in freed, guided=spec.guide != "none")
+        bodies.append(body)
         origins.append(("bodies", number))
     _latest[:] = [Placement(weakref.ref(scenario, lambda _: _latest.clear()), tuple(bodies), origins)]
     return _latest[0]

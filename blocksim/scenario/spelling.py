@@ -28,6 +28,9 @@ USUAL: Mapping[str, tuple[str, ...]] = {
     "c": ("cohesion",),
     "psi": ("dilation",),
     "mu": ("block_block", "friction", "static"),
+    "size": ("width",),
+    "size_x": ("width",),
+    "size_y": ("height",),
     "w": ("width",),
     "h": ("height",),
     "l": ("length",),
@@ -42,6 +45,7 @@ USUAL: Mapping[str, tuple[str, ...]] = {
     "dt": ("step", "every"),
     "timestep": ("step",),
     "interval": ("every",),
+    "speed": ("rate",),
     "duration": ("end",),
     "tmax": ("end",),
 }

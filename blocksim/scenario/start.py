@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from blocksim.scenario import events, geometry, laws, overlap, overrides, placement, resolution
 from blocksim.scenario.mistakes import MAX_MISTAKES, Mistake, repetitions, unknown
+from blocksim.scenario.models.actuators import Actuator
 from blocksim.scenario.models.contact import NO_FIXED_STIFFNESS, SUPPORT
 from blocksim.scenario.models.loads import NORMALS, Face, Force, Gravity, OnBody, Pressure
 from blocksim.scenario.models.motion import MOST_BODY_TABLES, PIECES_PER_CYCLE, Harmonic
@@ -33,7 +34,9 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mi
     if len(loads) > MAX_LOADS:
         yield Mistake(("loads",), f"{len(loads)} loads are too many; at most {MAX_LOADS} are allowed")
         return
-    by_name = {body.name: body for body in bodies} if loads or scenario.start.hold else {}
+    for number in repetitions(name for name in events.actuator_names(scenario)):
+        yield Mistake(("actuators", number, "name"), f"two actuators are named {toml(scenario.actuators[number].name)}")
+    by_name = {body.name: body for body in bodies} if loads or scenario.actuators or scenario.start.hold else {}
     for number in repetitions(load.name for load in loads):
         yield Mistake(("loads", number, "name"), f"two loads are named {toml(loads[number].name)}")
     for number in [number for number, load in enumerate(loads) if isinstance(load, Gravity)][1:]:
@@ -43,6 +46,10 @@ def unfit_loads(scenario: Scenario, bodies: Sequence[PlacedBody]) -> Iterator[Mi
             yield from unknown(("loads", number, "body"), "body", by_name, load.body)
             if load.body in by_name:
                 yield from _on_body(scenario, number, load, by_name)
+    for number, actuator in enumerate(scenario.actuators):
+        yield from unknown(("actuators", number, "body"), "body", by_name, actuator.body)
+        if actuator.body in by_name:
+            yield from _at_point(("actuators", number), actuator, by_name[actuator.body])
     for number, name in enumerate(scenario.start.hold):
         yield from unknown(("start", "hold", number), "body", by_name, name)
         if name in by_name and by_name[name].fixed:
@@ -55,10 +62,7 @@ def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str,
     if body.fixed:
         yield Mistake((*path, "body"), f"body {toml(load.body)} is fixed; a load has no effect on it")
     elif isinstance(load, Force):
-        if not geometry.holds(body.corners, load.point, 0.5 * STRIP * body.least_width):
-            (left, bottom), (right, top) = ((1e3 * x, 1e3 * y) for x, y in geometry.box_of(body.corners))
-            extent = f"which extends from ({left:g}, {bottom:g}) to ({right:g}, {top:g}) mm along its own axes"
-            yield Mistake((*path, "point"), f"the point lies outside of body {toml(load.body)}, {extent}")
+        yield from _at_point(path, load, body)
     elif isinstance(load, Pressure) and face_of(body.corners, load.face) is None:
         numbers = f"1 to {len(body.corners)}, counter-clockwise from its first corner"
         message = f"no face, or no single one, of body {toml(load.body)} is that; its faces have the numbers {numbers}"
@@ -68,6 +72,17 @@ def _on_body(scenario: Scenario, number: int, load: OnBody, bodies: Mapping[str,
         if other is not None:
             message = f"this face of body {toml(load.body)} is covered by {other}; pressure needs a free face"
             yield Mistake((*path, "face"), message)
+
+
+def _at_point(path: overrides.KeyPath, acting: Force | Actuator, body: PlacedBody) -> Iterator[Mistake]:
+    """Find that a body cannot be moved, or does not reach to the point at which something acts."""
+    if body.fixed:
+        what = "driven" if body.driven else "fixed"
+        yield Mistake((*path, "body"), f"body {toml(body.name)} is {what}; nothing else moves it")
+    elif not geometry.holds(body.corners, acting.point, 0.5 * STRIP * body.least_width):
+        (left, bottom), (right, top) = ((1e3 * x, 1e3 * y) for x, y in geometry.box_of(body.corners))
+        extent = f"which extends from ({left:g}, {bottom:g}) to ({right:g}, {top:g}) mm along its own axes"
+        yield Mistake((*path, "point"), f"the point lies outside of body {toml(body.name)}, {extent}")
 
 
 def face_of(corners: Sequence[geometry.Corner], face: Face) -> geometry.Edge | None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody, Scenario, events, place_segments
-from blocksim.scenario.models.timeline import STEP, ForceProbe, JointProbe, PointProbe
+from blocksim.scenario.models.timeline import STEP, ActuatorProbe, ForceProbe, JointProbe, PointProbe
 from blocksim.simulation import balance, observables, trajectory
 from blocksim.world.systems import systems_of
 from blocksim.world.systems.blocks import BLOCKS, block_system
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from blocksim.simulation.stores.hdf5 import FrameFile
 
 
-FORCE, POINT, JOINT, ENERGY = "force", "point", "joint", "energy"
+FORCE, POINT, JOINT, ACTUATOR, ENERGY = "force", "point", "joint", "actuator", "energy"
 TABLE_UNITS = {"m": ("_mm", 1e3), "m/s": ("_mm_s", 1e3), "rad": ("_deg", math.degrees(1.0)), "N": ("_N", 1.0),
            "J": ("_J", 1.0), "1": ("", 1.0)}  # fmt: skip
 """Ending of the name and factor of a column in tables for people, by its SI unit."""
@@ -53,6 +53,9 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
     # slip: displacement of the second body along the joint, towards +x where it lies on the first; rotation: angle that
     # the second body has turned relative to the first
     JOINT: {"opening": "m", "opening_first": "m", "opening_last": "m", "slip": "m", "rotation": "rad"},
+    # force on the body along the direction of the actuator; displacement of its point since time zero and of its head,
+    # both along it; work done on the body
+    ACTUATOR: {"force": "N", "displacement": "m", "head": "m", "work": "J"},
 }
 """What each kind of probe records, by name: the unit (SI)."""
 
@@ -107,7 +110,7 @@ class ProbeSeries:
 def bytes_of_series(scenario: Scenario, steps: int, step: float, energies: int) -> int:
     """Return the bytes that the probes of a run of so many steps (s) take in its folder, with so many energies."""
     total = 0.0
-    for probe in scenario.probes:
+    for probe in events.probes_of(scenario).values():
         every = step if probe.every == STEP else float(probe.every or scenario.output.every)
         columns = energies if probe.kind == ENERGY else len(COLUMNS[probe.kind])
         rows = steps * step / max(every, step) + 1
@@ -240,6 +243,25 @@ def joint_sampler(bodies: tuple[int, int], placed: tuple[PlacedBody, PlacedBody]
     return sample
 
 
+def actuator_sampler(number: int) -> Sampler:
+    """Return what samples an actuator, given its number among all loads."""
+
+    def sample(moment: Snapshot) -> Values:
+        world = moment.scene.world
+        load = world.loads[number]
+        body = world.bodies[load.body]
+        arm_x, arm_y = _arm(float(body.angle), (float(load.x), float(load.y)))
+        way = (body.x + arm_x - load.base_x) * load.fx + (body.y + arm_y - load.base_y) * load.fy
+        force = load.last_fx * load.fx + load.last_fy * load.fy
+        pieces = world.load_pieces[load.first_piece : load.last_piece]
+        piece = pieces[max(0, int(np.searchsorted(pieces["start"], moment.time, side="right")) - 1)]
+        since = moment.time - piece.start
+        head = piece.value + since * (piece.rate + 0.5 * since * piece.acceleration)
+        return float(force), float(way), float(head), float(load.work)
+
+    return sample
+
+
 def _arm(angle: float, at: tuple[float, float]) -> tuple[float, float]:
     cosine, sine = math.cos(angle), math.sin(angle)
     return cosine * at[0] - sine * at[1], sine * at[0] + cosine * at[1]
@@ -322,7 +344,7 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
         return flags
 
     made = []
-    for probe, name in zip(scenario.probes, events.probe_names(scenario), strict=True):
+    for name, probe in events.probes_of(scenario).items():
         sampler: Sampler = attrgetter("energies")
         match probe:
             case ForceProbe():
@@ -336,6 +358,8 @@ def probes_of(scenario: Scenario, placed: Sequence[PlacedBody], time_step: float
                 joint = events.joint_between(placed[first], placed[second])
                 assert joint is not None  # noqa: S101 - the scenario was checked
                 sampler = joint_sampler((first, second), (placed[first], placed[second]), joint)
+            case ActuatorProbe():
+                sampler = actuator_sampler(len(scenario.loads) + events.actuator_names(scenario).index(probe.actuator))
         every = scenario.output.every if probe.every is None else probe.every
         period = 1.0 if every == STEP else max(float(every) / time_step, 1.0)
         columns = dict.fromkeys(ledger, "J") if probe.kind == ENERGY else COLUMNS[probe.kind]

@@ -105,7 +105,8 @@ class Timeline:
             load, clock, controls = world.loads[self.loads.index(name)], world.clock[0], world.controls[0]
             last = int(load.last_piece) - 1
             piece = world.load_pieces[last]
-            piece.start, piece.value, piece.rate = clock.steps * controls.step, 0.0, 0.0  # zero from now on
+            piece.start, piece.value = clock.steps * controls.step, 0.0  # zero from now on
+            piece.rate = piece.acceleration = 0.0
             load.first_piece = last
             controls.loads_end = world.load_pieces["start"][world.loads["last_piece"] - 1].max()
         if event.velocity is not None:

@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.errors import BlocksimError, ExitCode, StoppedEarlyError
-from blocksim.kernels.common.arrays import REACHED
+from blocksim.kernels.common.arrays import LOAD_ACTUATOR, REACHED
 from blocksim.scenario import PlacedBody, Scenario, motion, overlap, placement
 from blocksim.simulation import results, schemes
 from blocksim.world.build import arrays_of
@@ -55,6 +55,7 @@ ARC = 2.0  # squares of these ways over that side, by which blocks on arcs overl
 HELD = ("inverse_mass", "inverse_inertia", "counts")
 VELOCITIES = ("vx", "vy", "spin")
 FALLS = ("fx", "fy", "torque")
+SPRINGS = ("stiffness", "damping")
 PATHS = ("shift", "turn")  # pieces of driven bodies that hold
 MILLI = 1e3
 Floats = NDArray[np.float64]
@@ -181,7 +182,9 @@ class _Settlement:
             self.bodies[name][self.held] = 0
         world.controls["motion_x"] = world.controls["motion_y"] = 0.0
         world.controls["rest_checks"] = 0
-        world.load_pieces["rate"] = 0.0
+        world.load_pieces["rate"] = world.load_pieces["acceleration"] = 0.0
+        for name in SPRINGS:  # actuators are attached once all is at rest
+            world.loads[name] = 0.0
         world.loads["last_piece"] = world.loads["first_piece"] + 1
         self.loads = loads
         self._stop()
@@ -192,8 +195,12 @@ class _Settlement:
         world.motion[...] = paths
         for name in PATHS:
             world.moved[name] = driven[name]
-        for name in (*FALLS, "last_piece"):
+        for name in (*FALLS, *SPRINGS, "last_piece"):
             world.loads[name] = loads[name]
+        for load in (one for one in world.loads if one.kind == LOAD_ACTUATOR):
+            body = world.bodies[load.body]
+            load.base_x = body.x + body.cos * load.x - body.sin * load.y
+            load.base_y = body.y + body.sin * load.x + body.cos * load.y
         for name, values in held.items():
             self.bodies[name][self.held] = values
         for name, values in velocities.items():

@@ -172,7 +172,7 @@ def simulate_into(
             with FrameFile(folder / files.FRAMES, recorder, toml, schemes.ledger_names(scene)) as sink:
                 recorder.sink = sink
                 del recorder.held[:-1]  # the file has them
-                probes = (f"{files.PROBE}{name}.csv" for name in events.probe_names(scenario))
+                probes = (f"{files.PROBE}{name}.csv" for name in events.probes_of(scenario))
                 files.clear_remains(folder, (files.FINAL, files.SOILS, files.SUMMARY, *probes))  # of the part before
                 periods = precautions.periods(recorder.time_step)
                 seconds = precautions.checkpoint_seconds

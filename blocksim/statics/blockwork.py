@@ -44,12 +44,18 @@ class Blockwork(NamedTuple):
             raise InvalidInputError(f"statics: block {name} rests on nothing; it falls until it meets something")
         blocks = [layout.placed[number] for number in assembly.blocks]
         low, high = geometry.box_of([body.ground_point(x, y) for body in blocks for x, y in body.corners])
+        forces = applied_forces(layout, assembly.blocks)
+        guided = [place for place, body in enumerate(blocks) if body.guided]  # the guide takes all moments
+        forces[guided, 2] = 0.0
+        rates = [one.copy() for one in (assembly.across, assembly.along)]
+        for one in rates:
+            one[..., 2][np.isin(assembly.places, guided)] = 0.0
         return cls(
             tuple(body.name for body in blocks),
-            assembly,
+            assembly._replace(across=rates[0], along=rates[1]),
             _friction(layout, assembly),
             np.array([body.mass for body in blocks]),
-            applied_forces(layout, assembly.blocks),
+            forces,
             scenario.gravity,
             scenario.ground.tilt,
             0.5 * float(np.hypot(*np.subtract(high, low))),
@@ -89,6 +95,8 @@ def _others(scenario: Scenario) -> Iterator[str]:
         yield f"{next(iter(scenario.systems))} act on the blocks, whose thrust a run finds"
     if scenario.motion is not None:
         yield "supports move"
+    if scenario.actuators:
+        yield "actuators move the blocks"
     if scenario.events:
         yield "events change the structure"
     for body in place_bodies(scenario):

@@ -128,7 +128,7 @@ class Case:
     measure: Measure
     quick: str = ""  # what the quick size leaves out; empty where there is but one size
     remarks: Mapping[str, str] = field(default_factory=dict)  # model: why it may be outside
-    not_for: Mapping[str, str] = field(default_factory=dict)  # scheme: why the case does not apply to it
+    not_for: Mapping[str, str] = field(default_factory=dict)  # scheme, model or law: why the case does not apply to it
 
 
 def farthest(expected: float, values: Iterable[float]) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.scenario.models.timeline import IMPULSES
-from blocksim.verification import collapse, energy, impacts, statics, toppling
+from blocksim.verification import actuators, collapse, energy, impacts, statics, toppling
 from blocksim.verification.case import Case, Setting
 from blocksim.verification.soil import SOIL_CASES
 
@@ -125,6 +125,17 @@ CASES = (
         remarks=PAIRWISE,
         not_for={IMPULSES: "it is about springs of several pairs below one block; V4 has rigid restitution"},
     ),
+    Case(
+        "V26",
+        "wall and block that an actuator moves",
+        "moments, virtual work",
+        actuators.actuators,
+        "displacements of 2 and 20 mm",
+        not_for={
+            "hertz-mindlin": "points of a radius of 1 mm give way below a wall of 1 m by more than its head moves",
+            **dict.fromkeys(("kernel", "particles"), "a wall of 1 m has thousands of particles"),
+        },
+    ),
 )
 
 
@@ -151,12 +162,15 @@ def choose_cases(ids: Sequence[str], setting: Setting, *, soil: bool = False) ->
         known = f"{CASES[0].id} to {CASES[-1].id}"
         wrong = f"case of soil; choose {', '.join(case.id for case in table)}" if soil else f"case; choose {known}"
         raise InvalidInputError(f"{', '.join(unknown)}: no such {wrong}")
-    foreign = [reason for reason in exclusions(scheme) if reason.split()[0] in wanted]
-    if foreign:
-        raise SettingError(f"not for --scheme {scheme}: {'; '.join(foreign)}")
-    return tuple(case for case in table if scheme not in case.not_for and (not wanted or case.id in wanted))
+    words = {"scheme": scheme, "model": setting.model, "law": setting.law}
+    for option, word in words.items():
+        foreign = [reason for reason in exclusions(word) if reason.split()[0] in wanted]
+        if foreign:
+            raise SettingError(f"not for --{option} {word}: {'; '.join(foreign)}")
+    chosen = (case for case in table if not wanted or case.id in wanted)
+    return tuple(case for case in chosen if not case.not_for.keys() & words.values())
 
 
-def exclusions(scheme: str) -> tuple[str, ...]:
-    """Return the cases that do not apply to a scheme, each with the reason."""
-    return tuple(f"{case.id} ({case.not_for[scheme]})" for case in CASES if scheme in case.not_for)
+def exclusions(word: str) -> tuple[str, ...]:
+    """Return the cases that do not apply to a scheme, a model or a law, each with the reason."""
+    return tuple(f"{case.id} ({case.not_for[word]})" for case in CASES if word in case.not_for)

@@ -20,7 +20,7 @@ from blocksim.kernels.common.systems import Act, Coupled, Plan, plan
 from blocksim.kernels.explicit import models
 from blocksim.kernels.sph.functions import KERNEL_CODES, support_radius
 from blocksim.scenario import PlacedBody, Scenario, laws, motion
-from blocksim.world import interactions, memory
+from blocksim.world import excitation, interactions, memory
 from blocksim.world.bodies import Layout, body_records, layout_of, motion_records, place_particles, slots_of_a_pair
 from blocksim.world.step import MOST_STEPS, Bounds, Stride, bounds_of, choose_stride
 from blocksim.world.systems import acts_of
@@ -324,6 +324,10 @@ def assemble_world(
         load_pieces=join_records([layout.applied.pieces for layout in layouts]),
     )
     world.large[...] = large
+    for layout, records, control in zip(layouts, world.loads, controls[:, 0], strict=True):
+        springs = excitation.springs_of(layout.scenario, layout.placed, float(control["step"]))
+        for record, (stiffness, damping) in zip(records[len(layout.scenario.loads) :], springs, strict=True):
+            record.stiffness, record.damping = stiffness, damping
     world.clock["motion_piece"][:, 0] = layouts[0].drives.paths
     world.controls["driven"][:, 0] = layouts[0].drives.driven.size
     speed_squared = bodies["vx"] ** 2 + bodies["vy"] ** 2

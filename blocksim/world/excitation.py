@@ -11,7 +11,7 @@ import numpy as np
 
 from blocksim.kernels.common import arrays
 from blocksim.scenario import PlacedBody, Scenario, motion, place_bodies, start
-from blocksim.scenario.models import loads
+from blocksim.scenario.models import actuators, loads
 
 COEFFICIENTS = ("c0", "c1", "c2", "c3")
 STANDSTILL = arrays.zeros(1, arrays.MOTION_PIECE)
@@ -27,12 +27,13 @@ class LoadArrays(NamedTuple):
 
 
 def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
-    """Return the loads of a scenario, in its order."""
-    numbers = {body.name: number for number, body in enumerate(placed)} if scenario.loads else {}
-    records = arrays.zeros(len(scenario.loads), arrays.LOAD)
-    rows: list[tuple[float, float, float]] = []
+    """Return the loads of a scenario in its order, then its actuators, whose stiffness follows from the step."""
+    acts = bool(scenario.loads or scenario.actuators)
+    numbers = {body.name: number for number, body in enumerate(placed)} if acts else {}
+    records = arrays.zeros(len(scenario.loads) + len(scenario.actuators), arrays.LOAD)
+    rows: list[loads.Stretch] = []
     push = end = 0.0
-    for record, load in zip(records, scenario.loads, strict=True):
+    for record, load in zip(records, scenario.loads, strict=False):
         stretches = loads.stretches_of(load, scenario.ground.tilt)
         largest = max(abs(one.value) for one in stretches)
         fields, own = _fields(scenario, load, placed, numbers, largest)
@@ -43,8 +44,18 @@ def load_arrays(scenario: Scenario, placed: Sequence[PlacedBody]) -> LoadArrays:
         level = 1.0  # m: of water the history is that of the level
         if isinstance(load, loads.Pressure) and load.water_level is not None:
             level = load.water_level
-        rows += [(one.start, level * one.value, level * one.rate) for one in stretches]
+        rows += [one._replace(value=level * one.value, rate=level * one.rate) for one in stretches]
         push, end = push + own, max(end, stretches[-1].start)
+    for record, actuator in zip(records[len(scenario.loads) :], scenario.actuators, strict=True):
+        path, body = actuators.stretches_of(actuator.displacement), placed[numbers[actuator.body]]
+        record.kind, record.body, (record.x, record.y) = arrays.LOAD_ACTUATOR, numbers[actuator.body], actuator.point
+        record.fx, record.fy = math.cos(actuator.direction), math.sin(actuator.direction)
+        record.base_x, record.base_y = body.ground_point(*actuator.point)
+        record.least = 0.0 if actuator.sense == "push" else -math.inf
+        record.most = 0.0 if actuator.sense == "pull" else math.inf
+        record.first_piece, record.last_piece = len(rows), len(rows) + len(path)
+        rows += path
+        end = max(end, path[-1].start)
     pieces = arrays.zeros(len(rows), arrays.LOAD_PIECE)
     for name, column in zip(loads.Stretch._fields, zip(*rows, strict=True), strict=False):
         pieces[name] = column
@@ -74,6 +85,8 @@ def _fields(
         x, y = load.point
         fx, fy = load.magnitude * math.cos(load.direction), load.magnitude * math.sin(load.direction)
         fields = {"kind": arrays.LOAD_FORCE, "x": x, "y": y, "fx": fx, "fy": fy, "turns": load.axes == "body"}
+        base_x, base_y = body.ground_point(x, y)
+        fields |= {"stays": load.line == "space", "base_x": base_x, "base_y": base_y}
         force, arm = abs(load.magnitude), math.hypot(*load.point)
     else:
         (x0, y0), (x1, y1), (nx, ny) = start.face_of(body.corners, load.face) or start.NO_FACE
@@ -91,6 +104,46 @@ def _fields(
             deepest = load.unit_weight * (load.water_level + math.hypot(body.x, body.y) + radius)
         force, arm = deepest * (length * body.depth), radius
     return fields, largest * (force / body.mass + force * arm * radius / body.inertia)
+
+
+STIFF = 0.2
+"""Frequency of an actuator alone with its body, times the substep, where contacts are rigid: stable up to 0.82."""
+STIFF_ON_SPRINGS = 1.0 / 30.0
+"""The same where contacts are springs: a third of the fastest of those, at the usual step."""
+
+
+def compliances(scenario: Scenario, placed: Sequence[PlacedBody]) -> list[float]:
+    """Return what a force at the point of each actuator accelerates it by, at most (1/kg)."""
+    bodies = {body.name: body for body in placed} if scenario.actuators else {}
+    held = [(bodies[one.body], math.hypot(*one.point)) for one in scenario.actuators]
+    return [1.0 / body.mass + arm**2 / body.inertia for body, arm in held]
+
+
+def springs_of(scenario: Scenario, placed: Sequence[PlacedBody], step: float) -> list[tuple[float, float]]:
+    """Return stiffness (N/m) and damping (N s/m) of all actuators of a run with steps of this length (s).
+
+    Where no stiffness is given the body alone would swing as fast on it as a substep resolves well. The dashpot damps
+    that critically.
+    """
+    share = STIFF_ON_SPRINGS if scenario.time.has_springs else STIFF
+    frequency = share * scenario.time.parts / step
+    springs = []
+    for one, compliance in zip(scenario.actuators, compliances(scenario, placed), strict=True):
+        stiffness = frequency**2 / compliance if one.stiffness is None else one.stiffness
+        springs.append((stiffness, 2.0 * math.sqrt(stiffness / compliance)))
+    return springs
+
+
+def greatest_frequency(scenario: Scenario, placed: Sequence[PlacedBody]) -> float:
+    """Return the greatest angular frequency (1/s) of bodies on actuators whose stiffness is given; zero without."""
+    pairs = zip(scenario.actuators, compliances(scenario, placed), strict=True)
+    return max((math.sqrt(one.stiffness * compliance) for one, compliance in pairs if one.stiffness), default=0.0)
+
+
+def greatest_head_speed(scenario: Scenario) -> float:
+    """Return the greatest speed (m/s) of the head of an actuator."""
+    paths = (actuators.stretches_of(one.displacement) for one in scenario.actuators)
+    return max((abs(one.rate) for path in paths for one in path), default=0.0)
 
 
 def steepest_tilt(scenario: Scenario) -> float:

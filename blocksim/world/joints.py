@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.kernels.common import loads
-from blocksim.kernels.common.arrays import LOAD_FIELD, LOAD_TILT, LOAD_WATER
+from blocksim.kernels.common.arrays import LOAD_ACTUATOR, LOAD_FIELD, LOAD_TILT, LOAD_WATER
 from blocksim.scenario import PlacedBody, PlacedSegment, geometry, placement
 from blocksim.world.bodies import Layout
 from blocksim.world.sag import TOUCHING
@@ -187,12 +187,12 @@ def applied_forces(layout: Layout, blocks: Sequence[int]) -> Floats:
             tilt = value
         elif load.kind == LOAD_FIELD:
             push += value * np.array([load.fx, load.fy])
-        elif load.body in place:
+        elif load.body in place and load.kind != LOAD_ACTUATOR:
             body = layout.placed[load.body]
             c, s = math.cos(body.angle), math.sin(body.angle)
             size, share = value, 0.0
             if load.kind == LOAD_WATER:
-                size, share = loads.water_on(load, value, loads.Pose(body.x, body.y, c, s))
+                size, share = loads.water_on(load, value, loads.Pose(body.x, body.y, c, s, 0.0, 0.0, 0.0))
             x, y = load.x + share * (load.end_x - load.x), load.y + share * (load.end_y - load.y)
             x, y = c * x - s * y, s * x + c * y  # the point turns with the body
             fx, fy = (c * load.fx - s * load.fy, s * load.fx + c * load.fy) if load.turns else (load.fx, load.fy)

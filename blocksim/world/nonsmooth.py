@@ -53,7 +53,8 @@ def velocity_tolerance(scenario: Scenario, blocks: int) -> float:
 
 def is_cut_at_impacts(scenario: Scenario, free: int) -> bool:
     """Return True if steps of so many free blocks may be cut at impacts, where these go in rounds."""
-    return free < rigid_step.FEW and not scenario.loads  # cuts shift velocities by what gravity alone brings them
+    acts = scenario.loads or scenario.actuators
+    return free < rigid_step.FEW and not acts  # cuts shift velocities by what gravity alone brings them
 
 
 def has_row(placed: Sequence[PlacedBody]) -> bool:

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.scenario import PlacedBody, geometry, motion
+from blocksim.world import excitation
 from blocksim.world.bodies import Layout
 from blocksim.world.joints import Assembly, Floats, applied_forces
 from blocksim.world.sag import CRUSHED_SHARE, UNLIKE, WARNING_SHARE, scene_sag, soft_contact
@@ -57,6 +58,7 @@ SLACK = 1e-12  # of its stiffness: what holds a block that joints do not
 LOOSE = 1e6  # over the overlap of one point that carries everything: only mechanisms move farther
 FALLS = 50.0  # over displacements with all points closed: only mechanisms move farther
 FEW_UPRIGHT = 3  # rectangles along the axes, of which a stack cannot lean far
+STIFFEST = 0.5  # frequency of an actuator with its body alone, times the longest substep; see excitation.STIFF
 COURSED = 0.5  # calibrated: limits of columns and walls are off by half as much as those of arches, or less
 PARALLEL = 1e-3  # sine of the angle between normals of one direction
 
@@ -84,7 +86,7 @@ def thrust_shift(layout: Layout) -> float:
     free = {i for i, body in enumerate(placed) if not body.fixed or body.freed}
     is_level = scenario.ground.profile is None
     is_upright = is_level and all(not body.angle and geometry.is_upright(body.corners) for body in placed)
-    is_vertical = scenario.ground.tilt == 0.0 and not scenario.loads
+    is_vertical = scenario.ground.tilt == 0.0 and not scenario.loads and not scenario.actuators
     if not free or (is_upright and (len(free) <= FEW_UPRIGHT or is_vertical)):
         return 0.0
     assembly = Assembly.of(layout, free)
@@ -249,6 +251,10 @@ def reason_of_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> Reason:
     if period > 0.0:
         why = "a twentieth of {:.3g} s, the shortest period of a motion"
         reasons.append(Reason(PERIOD_SHARE * period, why, (period,)))
+    frequency = excitation.greatest_frequency(scenario, layout.placed)
+    if frequency > 0.0:
+        why = "the stiffest actuator swings with its body alone at {:.3g} Hz"
+        reasons.append(Reason(excitation.STIFF * scenario.time.parts / frequency, why, (frequency / (2.0 * math.pi),)))
     if bounds.free and scenario.gravity > 0.0:
         share = NATURAL * bounds.free / FEW
         why = "{:.2g} √(L/g) for so few blocks, L = {:.4g} mm the smallest side"
@@ -295,4 +301,6 @@ def longest_step(layout: Layout, bounds: Bounds, speeds: Speeds) -> float:
     time = layout.scenario.time
     rate = max(speeds.given + speeds.support, speeds.greatest / time.parts)
     longest = SHARE * bounds.smallest / rate if rate > 0.0 else time.end
+    if (frequency := excitation.greatest_frequency(layout.scenario, layout.placed)) > 0.0:
+        longest = min(longest, STIFFEST * time.parts / frequency)
     return min(longest, PERIOD_SHARE * motion.shortest_cycle(layout.scenario))

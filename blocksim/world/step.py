@@ -184,7 +184,7 @@ def speeds_of(layout: Layout, bounds: Bounds) -> Speeds:
     """Return the bounds of the speeds of a scene."""
     scenario, tilt = layout.scenario, excitation.steepest_tilt(layout.scenario)
     driven, rise = excitation.drive_bounds(scenario)
-    given = max(bounds.speed, driven)
+    given = max(bounds.speed, driven, excitation.greatest_head_speed(scenario))
     for one in [event.velocity for event in scenario.events if event.velocity is not None]:
         size = max((math.hypot(block.size_x, block.size_y) for block in scenario.blocks.values()), default=0.0)
         given = max(given, math.hypot(one.vx or 0.0, one.vy or 0.0) + 0.5 * size * abs(one.spin or 0.0))
@@ -328,6 +328,8 @@ def choose_stride(layout: Layout, bounds: Bounds) -> Stride:
         share = TRAVEL_SHARE_OF_PARTICLES if has_particles else TRAVEL_SHARE
         of_travel = share * bounds.smallest / speed if speed > 0.0 else math.inf
         limit = min(step_of_contacts(layout, bounds, speeds), of_travel, systems.largest_step(scenario))
+        if (frequency := excitation.greatest_frequency(scenario, layout.placed)) > 0.0:
+            limit = min(limit, safety_of(scenario) * STABILITY_LIMIT / frequency)
     limit = min(limit, time.end)
     step = limit if time.step == "auto" else time.step
     refuse_uncountable(time.end, step)

@@ -63,7 +63,7 @@ OFFERED = {
     "plot run --kind tor": "tornado",
     "plot run --colour s": "speed",
     "animate run --colour pl": "plastic",
-    "verify V2": "V2 V20 V21 V22 V23 V24 V25",
+    "verify V2": "V2 V20 V21 V22 V23 V24 V25 V26",
     "verify --soil S1": "S1 S10 S11 S12",
     "plo": "plot",
 }

@@ -54,7 +54,7 @@ HASHED = tomllib.loads(Path(__file__).with_name("other_values.toml").read_text()
 OTHER_SHAPES = {"blocks.b.outline", "blocks.b.sides", "blocks.b.radius", "blocks.b.depth"}
 """Tried by themselves, below: a block has one shape."""
 SINGLE_CHOICE = {"schema", "time.scheme", "materials.m.unit_weight", "motion.kind", "probes.0.kind", "loads.0.kind"}
-SINGLE_CHOICE |= {"loads.0.history.kind"}
+SINGLE_CHOICE |= {"loads.0.history.kind", "actuators.0.displacement.kind"}
 OF_SOILS = ("friction_angle", "cohesion", "dilation", "yield_surface")
 """Keys that a block's material does not have; tests/scenario/models/test_soil.py looks at them."""
 
@@ -75,7 +75,9 @@ def data() -> dict[str, Any]:
         "motion": {"kind": "harmonic", "amplitude": 1, "frequency": 1},
         "probes": [{"kind": "point", "body": "1"}],
         "loads": [{"kind": "force", "body": "1", "magnitude": 1}],
+        "actuators": [{"body": "1", "displacement": {"kind": "ramp", "to": 0.1, "rate": 0.1}}],
         "start": {"settle": True},
+        "time": {"end": 2},
     }
 
 

@@ -130,6 +130,22 @@ def test_a_block_slides_at_its_friction_or_topples_about_its_edge(friction: floa
         assert joint.x_m == pytest.approx(0.5 * width)
 
 
+def test_below_a_head_that_stays_parallel_a_wall_carries_what_virtual_work_says() -> None:
+    """It turns about its toe and lifts the head by the opposite corner: V h = (Q + W/2) b."""
+    bodies = [
+        {"block": "wall", "x": 0.0, "y": 0.6},
+        {"block": "head", "name": "head", "x": 0.0, "y": 1.3, "guide": "no rotation"},
+    ]
+    down = {"kind": "force", "body": "head", "magnitude": "50 kN", "direction": "-90 deg", "point": [0.3, 0.0]}
+    blocks = blockwork(1.8, blocks={"wall": brick(1.0, 1.2), "head": brick(1.0, 0.2)}, bodies=bodies, loads=[down])
+    push = np.zeros_like(blocks.forces)
+    push[1, 0] = 1.0
+    found = Programme(blocks).greatest(blocks.forces, push)
+    assert found is not None
+    wall, head = blocks.masses * 9.81
+    assert found.factor == pytest.approx((50e3 + head + 0.5 * wall) / 1.2, rel=1e-9)
+
+
 @pytest.mark.parametrize("angle", [20.0, 35.0, 50.0])
 def test_a_wedge_between_two_fixed_slopes_carries_what_both_friction_cones_allow(angle: float) -> None:
     """A triangle on its tip, pushed up: P = W tan(angle + phi) on the slope that it climbs, the other one opens."""

@@ -252,19 +252,22 @@ MOVED = record_type(
 )
 MOTION_PIECE = record_type("start c0 c1 c2 c3")  # s, m, m/s ...: c0 + c1 t + c2 t^2 + c3 t^3 with t from the start
 # kinds of loads: accelerations of all free bodies first
-LOAD_FIELD, LOAD_TILT, LOAD_FORCE, LOAD_WATER = range(4)
+LOAD_FIELD, LOAD_TILT, LOAD_FORCE, LOAD_WATER, LOAD_ACTUATOR = range(5)
 LOAD = record_type(
     "x y "  # m: where it acts, in the body frame; of water the lower end of the face, of which the other is
     "end_x end_y "
     "fx fy torque "  # N, N, N m for a value of one; of accelerations m/s2; of a face m of depth times its inward normal
     "unit_weight "  # N/m2: of water, times the length of the face
     "up_x up_y "  # -: against gravity as it is at the start
+    "base_x base_y "  # m: where its point was at time zero
+    "stiffness damping least most "  # N/m, N s/m, N, N: of an actuator, and between what its force is
+    "work "  # J: that of an actuator on its body
     "last_fx last_fy last_torque",  # N, N, N m: in the last evaluation
     counters="first_piece last_piece",  # its pieces, from the first to before the last
     indices="body",
-    flags="kind turns",  # flag: its force turns with the body
+    flags="kind turns stays",  # flags: its force turns with the body; its line of action stays in space
 )
-LOAD_PIECE = record_type("start value rate")  # s, value, 1/s: value + rate (t - start)
+LOAD_PIECE = record_type("start value rate acceleration")  # s, value, 1/s, 1/s2; see Stretch in models/loads.py
 
 
 class World(NamedTuple):

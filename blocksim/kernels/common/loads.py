@@ -1,8 +1,12 @@
 """Loads: forces on single bodies and accelerations of all free bodies, as functions of time and pose.
 
-A load is a value over time (pieces of straight lines) and what it does per value. Nothing is kept from step to step but
-the last force of each, for the trapezoid rule by which all work is tallied; so bits depend on time and pose alone. A
-load on one body is evaluated by the thread that has the body; accelerations of all bodies by every thread for its own.
+A load is a value over time (pieces of lines and parabolas) and what it does per value. Nothing is kept from step to
+step but the last force of each, for the trapezoid rule by which all work is tallied; so bits depend on time and pose
+alone. A load on one body is evaluated by the thread that has the body; accelerations of all bodies by every thread for
+its own.
+
+An actuator is a spring and a dashpot between its point of a body and a head that moves along a line; its value is the
+displacement of the head. Its force follows from pose and velocity.
 
 Potential energy is that in the gravity of the controls. What turned gravity does beyond that is work of a load.
 """
@@ -14,17 +18,20 @@ from blocksim.kernels.common import arrays, jit, shapes
 
 
 class Pose(NamedTuple):
-    """Where a body is: centre (m), cosine and sine of its angle."""
+    """Where a body is and how it moves: centre (m), cosine and sine of its angle, velocity (m/s), spin (rad/s)."""
 
     x: float
     y: float
     cos: float
     sin: float
+    vx: float
+    vy: float
+    spin: float
 
 
 @jit.rare_kernel
-def value_at(world: arrays.World, load: arrays.Record, time: float) -> float:
-    """Return the value of a load at a time (s): a factor, a level (m) or a tilt (rad)."""
+def piece_at(world: arrays.World, load: arrays.Record, time: float) -> arrays.Record:
+    """Return the piece of a load that holds at a time (s)."""
     low = load.first_piece
     high = load.last_piece
     while high - low > 1:
@@ -33,8 +40,15 @@ def value_at(world: arrays.World, load: arrays.Record, time: float) -> float:
             low = middle
         else:
             high = middle
-    piece = world.load_pieces[low]
-    return piece.value + (time - piece.start) * piece.rate
+    return world.load_pieces[low]
+
+
+@jit.rare_kernel
+def value_at(world: arrays.World, load: arrays.Record, time: float) -> float:
+    """Return the value of a load at a time (s): a factor, a level (m), a tilt (rad) or a displacement (m)."""
+    piece = piece_at(world, load, time)
+    since = time - piece.start
+    return piece.value + since * (piece.rate + 0.5 * since * piece.acceleration)
 
 
 @jit.rare_kernel
@@ -71,6 +85,20 @@ def water_on(load: arrays.Record, level: float, pose: Pose) -> tuple[float, floa
 
 
 @jit.rare_kernel
+def thrust_of(load: arrays.Record, piece: arrays.Record, time: float, pose: Pose) -> float:
+    """Return the force (N) of an actuator along its direction, given the piece of its displacement."""
+    arm_x = pose.cos * load.x - pose.sin * load.y
+    arm_y = pose.sin * load.x + pose.cos * load.y
+    way = (pose.x + arm_x - load.base_x) * load.fx + (pose.y + arm_y - load.base_y) * load.fy
+    speed = (pose.vx - pose.spin * arm_y) * load.fx + (pose.vy + pose.spin * arm_x) * load.fy
+    since = time - piece.start
+    head = piece.value + since * (piece.rate + 0.5 * since * piece.acceleration)
+    rate = piece.rate + since * piece.acceleration
+    force = load.stiffness * (head - way) + load.damping * (rate - speed)
+    return min(max(force, load.least), load.most)
+
+
+@jit.rare_kernel
 def force_at(world: arrays.World, load: arrays.Record, time: float, pose: Pose) -> tuple[float, float, float]:
     """Return force (N) and torque about the centre (N m) of a load on its body."""
     value = value_at(world, load, time)
@@ -78,6 +106,8 @@ def force_at(world: arrays.World, load: arrays.Record, time: float, pose: Pose) 
     size = value
     if load.kind == arrays.LOAD_WATER:
         size, along = water_on(load, value, pose)
+    elif load.kind == arrays.LOAD_ACTUATOR:
+        size = thrust_of(load, piece_at(world, load, time), time, pose)
     x = load.x + along * (load.end_x - load.x)
     y = load.y + along * (load.end_y - load.y)
     arm_x = pose.cos * x - pose.sin * y
@@ -86,6 +116,9 @@ def force_at(world: arrays.World, load: arrays.Record, time: float, pose: Pose) 
     fy = size * load.fy
     if load.turns:
         fx, fy = pose.cos * fx - pose.sin * fy, pose.sin * fx + pose.cos * fy
+    if load.stays:
+        arm_x = load.base_x - pose.x
+        arm_y = load.base_y - pose.y
     return fx, fy, size * load.torque + arm_x * fy - arm_y * fx
 
 
@@ -111,9 +144,11 @@ def accelerate(world: arrays.World, load: arrays.Record, first: int, last: int, 
 def push(world: arrays.World, load: arrays.Record, time: float, step: float) -> None:
     """Add a load on one body to its totals, and tally its work of the last drift as `accelerate` does."""
     body = world.bodies[load.body]
-    fx, fy, torque = force_at(world, load, time, Pose(body.x, body.y, body.cos, body.sin))
+    pose = Pose(body.x, body.y, body.cos, body.sin, body.vx, body.vy, body.spin)
+    fx, fy, torque = force_at(world, load, time, pose)
     work = (load.last_fx + fx) * body.vx + (load.last_fy + fy) * body.vy + (load.last_torque + torque) * body.spin
     world.ledger[load.body // arrays.GROUP].to_loads -= 0.5 * step * work
+    load.work += 0.5 * step * work
     load.last_fx = fx
     load.last_fy = fy
     load.last_torque = torque
@@ -137,6 +172,22 @@ def push_bodies(world: arrays.World, first: int, last: int, time: float, step: f
 def are_loads_steady(world: arrays.World) -> bool:
     """Return True if no load changes any more with time, or there is none."""
     return world.clock[0].steps * world.controls[0].step >= world.controls[0].loads_end
+
+
+@jit.rare_kernel
+def tally_actuators(
+    world: arrays.World, lines: arrays.Records, before: arrays.Records, first: int, last: int, half: float
+) -> None:
+    """Tally the work of actuators on the bodies from `first` to before `last` in a substep of the non-smooth scheme.
+
+    `half` (s) is one half of the kick.
+    """
+    for load in world.loads:
+        if load.kind == arrays.LOAD_ACTUATOR and first <= load.body < last:
+            line = lines[load.body]
+            then = before[load.body]
+            along = load.last_fx * (then.vx + line.vx) + load.last_fy * (then.vy + line.vy)
+            load.work += half * (along + load.last_torque * (then.spin + line.spin))
 
 
 @jit.rare_kernel
@@ -169,7 +220,11 @@ def add_force(world: arrays.World, load: arrays.Record, line: arrays.Record, one
     """Add what a load on one body gives it, at its place in the step so far."""
     body = world.bodies[load.body]
     cos, sin = shapes.turn(body.cos, body.sin, line.turned)
-    fx, fy, torque = force_at(world, load, time, Pose(body.x + line.dx, body.y + line.dy, cos, sin))
+    pose = Pose(body.x + line.dx, body.y + line.dy, cos, sin, line.vx, line.vy, line.spin)
+    fx, fy, torque = force_at(world, load, time, pose)
+    load.last_fx = fx
+    load.last_fy = fy
+    load.last_torque = torque
     one.ax += line.inverse_mass * fx
     one.ay += line.inverse_mass * fy
     one.rate += line.inverse_inertia * torque

@@ -239,6 +239,7 @@ def kick_again(contacts: arrays.Contacts, pushes: Records, first: int, last: int
 def tally_loads(scene: arrays.Nonsmooth, first: int, last: int, share: float) -> None:
     """Tally what loads have brought the bodies from `first` to before `last` in a substep with that share of a kick."""
     half = 0.5 * share * scene.contacts.stepping[0].substep
+    loads.tally_actuators(scene.world, scene.contacts.states, scene.contacts.before, first, last, half)
     for i in range(first, last):
         state = scene.contacts.states[i]
         if state.inverse_mass > 0.0:

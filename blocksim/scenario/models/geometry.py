@@ -180,6 +180,9 @@ class Block(Table):
         return high[axis] - low[axis]
 
 
+Guide = Literal["none", "no rotation"]
+
+
 class BodySpec(Table):
     """One body placed by hand."""
 
@@ -191,6 +194,9 @@ class BodySpec(Table):
     spin: q.Spin = setting("angular velocity, counter-clockwise positive", 0.0)
     fixed: bool = setting("true for a body that never moves", default=False)
     motion: AnyDrive | None = setting("prescribed motion of this body alone", None)
+    guide: Annotated[Guide, OneOf(get_args(Guide))] = setting(
+        'what a frame keeps it from: "no rotation", as of a loading beam whose head stays parallel; or "none"', "none"
+    )
     name: Identifier | None = setting("name in tables (default: its number, from 1)", None)
 
     def _check(self) -> None:
@@ -198,6 +204,8 @@ class BodySpec(Table):
             raise q.invalid("a fixed body cannot have a velocity or a spin", "fixed")
         if self.motion is not None and self.fixed:
             raise q.invalid("a body with a motion is driven, not fixed; remove one of the two", "fixed")
+        if self.guide != "none" and (self.fixed or self.motion is not None or self.spin != 0.0):
+            raise q.invalid("a body with a guide is free and does not spin", "guide")
         if self.motion is not None and (self.velocity != (0.0, 0.0) or self.spin != 0.0):
             raise q.invalid("velocity and spin of a driven body follow from its motion", "motion")
 

@@ -14,9 +14,9 @@ and that of the last line after it. The resolved scenario holds the samples, so 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -31,11 +31,12 @@ Times = tuple[q.NonNegativeTime, ...]
 
 
 class Stretch(NamedTuple):
-    """From `start` (s) on, until the next one: value + rate (t - start)."""
+    """From `start` (s) on, until the next one: value + rate (t - start) + acceleration (t - start)^2 / 2."""
 
     start: float
     value: float
     rate: float
+    acceleration: float = 0.0
 
 
 class Constant(base.Table):
@@ -61,7 +62,7 @@ class RampHistory(base.Table):
             raise q.invalid(message, "end")
 
 
-class _Sampled(base.Table):
+class Sampled(base.Table):
     """Numbers under a key at `times` that increase: in the scenario, or those of a CSV table that it names."""
 
     column: ClassVar[str] = ""  # of the table; without one no table can be named
@@ -84,7 +85,8 @@ class _Sampled(base.Table):
         except motion.MotionTableError as error:
             raise q.invalid(f"{path.name}: {error}", "table") from None
         kept = {name: entry for name, entry in value.items() if name != "table"}
-        samples = tuple(f"{one!r} deg" for one in values) if cls.column.endswith("_deg") else values
+        unit = cls.column.rpartition("_")[2]
+        samples = tuple(f"{one!r} {unit}" for one in values) if unit in ("deg", "mm") else values
         return {**kept, "times": times, cls.key: samples}
 
     def _check(self) -> None:
@@ -99,7 +101,7 @@ class _Sampled(base.Table):
                 raise q.invalid(f"{other:g} s comes after {one:g} s; times must increase", "times", number)
 
 
-class Steps(_Sampled):
+class Steps(Sampled):
     """Factors that hold from their time on; none before the first."""
 
     least = 1
@@ -108,7 +110,7 @@ class Steps(_Sampled):
     factors: tuple[q.Number, ...] = setting("factor from each of these times on; 0 before")
 
 
-class Samples(_Sampled):
+class Samples(Sampled):
     """Factors at some times, joined by straight lines: of a CSV table, or `times` and `factors`."""
 
     column = "factor"
@@ -125,6 +127,7 @@ HISTORIES: dict[str, type[base.Table]] = base.by_kind(AnyHistory)
 
 
 Axes = Annotated[Literal["world", "body"], base.OneOf(("world", "body"))]
+Line = Literal["body", "space"]
 NORMALS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, 1.0), "bottom": (0.0, -1.0)}
 """Outward normals of the sides of a body, along its axes."""
 
@@ -175,6 +178,15 @@ class Force(VaryingLoad):
     direction: q.Angle = setting("direction, counter-clockwise from +x of the axes", 0.0)
     axes: Axes = setting("axes of the direction: world, or body, with which it turns", "world")
     point: geometry.Point = setting("[x, y] of its point in the body, from the centre", (0.0, 0.0))
+    line: Annotated[Line, base.OneOf(get_args(Line))] = setting(
+        'what its line of action follows: "body", with whose point it travels; or "space", where it stays as it is at '
+        "the start, as that of a jack that rolls",
+        "body",
+    )
+
+    def _check(self) -> None:
+        if self.line == "space" and self.axes == "body":
+            raise q.invalid("a line that stays in space cannot turn with the body", "line")
 
 
 class Moment(VaryingLoad):
@@ -217,7 +229,7 @@ class Horizontal(VaryingLoad):
     magnitude: q.Number = setting("acceleration over that of gravity, towards +x where positive")
 
 
-class Gravity(Load, _Sampled):
+class Gravity(Load, Sampled):
     """Gravity that turns, as on a tilting table: from one tilt of the ground to another at a rate, or as samples say.
 
     Tilts are those of `ground.tilt`, which it takes the place of.
@@ -275,7 +287,11 @@ def stretches_of(load: AnyLoad, tilt: float) -> tuple[Stretch, ...]:
             times, values = history.times, history.tilts
         case _:
             times, values = history.times, history.factors
-    is_stepped = isinstance(history, Steps)
+    return joined(times, values, is_stepped=isinstance(history, Steps))
+
+
+def joined(times: Sequence[float], values: Sequence[float], *, is_stepped: bool = False) -> tuple[Stretch, ...]:
+    """Return values at times (s) that increase, joined by straight lines, or stepped: each until the next, 0 before."""
     rows = [Stretch(0.0, 0.0 if is_stepped else values[0], 0.0)] if times[0] > 0.0 else []
     for (begin, one), (until, other) in pairwise(zip(times, values, strict=True)):
         rows.append(Stretch(begin, one, 0.0 if is_stepped else (other - one) / (until - begin)))

@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from html import escape
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import pydantic
 from pydantic.json_schema import SkipJsonSchema
 
 from blocksim.notebook import Shown
 from blocksim.scenario import units as q
+from blocksim.scenario.models.actuators import Actuator, end_of
 from blocksim.scenario.models.base import HELD, SYSTEMS, Identifier, OneOf, SystemTable, Table, read_tables, setting
 from blocksim.scenario.models.contact import Contact, Friction, Pair
 from blocksim.scenario.models.geometry import Block, BodySpec, Ground, Material, Wall
@@ -44,6 +45,7 @@ class Scenario(Shown, Table):
     motion: AnyMotion | None = setting("prescribed motion of ground, walls and fixed bodies", None)
     events: tuple[Event, ...] = setting("what happens to bodies and walls during the run", ())
     loads: tuple[AnyLoad, ...] = setting("loads on bodies, and on all of them", ())
+    actuators: tuple[Actuator, ...] = setting("jacks that move points of bodies", ())
     start: Start = setting("what happens before time zero", Start())
     friction: Friction = setting("friction between blocks and with the ground", Friction())
     pairs: dict[str, dict[str, Pair]] = setting("pairs of materials that differ, as in [pairs.aluminium.ground]", {})
@@ -68,6 +70,13 @@ class Scenario(Shown, Table):
             return data
         held = {name: entry for name, entry in data.items() if name in SYSTEMS}
         return {**{key: entry for key, entry in data.items() if key not in held}, HELD: held}
+
+    @pydantic.model_validator(mode="after")
+    def _until_heads_stop(self) -> Self:
+        if self.actuators and "end" not in self.time.model_fields_set:
+            time = self.time.model_copy(update={"end": end_of(self.actuators)})
+            object.__setattr__(self, "time", time)  # the table is frozen
+        return self
 
     @pydantic.model_serializer(mode="wrap")
     def _without_systems(self, write: pydantic.SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -36,7 +36,7 @@ class Time(Table):
     scheme: Annotated[Scheme, _WORDS] = setting(
         "time stepping: explicit (springs and dashpots) or nonsmooth (impulses)", "explicit"
     )
-    end: q.PositiveTime = setting("simulated time", 2.0)
+    end: q.PositiveTime = setting("simulated time (with actuators, by default: until the last one stops)", 2.0)
     step: Step = setting('time step, or "auto" for the largest safe one', "auto")
     force_step: bool = setting("true to accept a step above the safe limit", default=False)
     stop_at_rest: bool = setting("true to end the run once everything rests", default=True)
@@ -225,12 +225,19 @@ class JointProbe(Probe):
     )
 
 
+class ActuatorProbe(Probe):
+    """Force, displacement and work of an actuator; every actuator has one of its name, unless another is given."""
+
+    kind: Literal["actuator"] = setting("kind of probe")
+    actuator: str = setting("name of the actuator")
+
+
 class EnergyProbe(Probe):
     """The energies of the ledger."""
 
     kind: Literal["energy"] = setting("kind of probe")
 
 
-AnyProbe = Annotated[ForceProbe | PointProbe | JointProbe | EnergyProbe, Field(discriminator="kind")]
+AnyProbe = Annotated[ForceProbe | PointProbe | JointProbe | ActuatorProbe | EnergyProbe, Field(discriminator="kind")]
 """Any probe, distinguished by its `kind`."""
 PROBES: dict[str, type[Probe]] = by_kind(AnyProbe)  # class by kind, as written in a scenario

@@ -265,7 +265,7 @@ def read_probes(path: Path, scenario: Scenario) -> dict[str, instruments.ProbeSe
 
     Raises InputMissingError, or InvalidInputError for a damaged file or one without these probes.
     """
-    names = events.probe_names(scenario)
+    names = [*events.probes_of(scenario)]
     if not names:
         return {}
     with open_hdf5(path) as file, refuse_damage(path, "its probes cannot be read"):

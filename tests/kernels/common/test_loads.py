@@ -106,7 +106,9 @@ def test_water_on_a_face_is_the_exact_integral_along_it(level: float, angle: flo
     """Below it, above it, halfway up, and on a face that has turned."""
     load = {"kind": "pressure", "body": "1", "face": "left", "water_level": level, "unit_weight": "10 kN/m^3"}
     world: World = build_world(scenario_with(load, bodies=[{"block": "b", "x": 0.0, "y": 1.0}]))
-    fx, fy, torque = force_at(world, world.loads[0], 0.0, Pose(0.0, 1.0, math.cos(angle), math.sin(angle)))
+    fx, fy, torque = force_at(
+        world, world.loads[0], 0.0, Pose(0.0, 1.0, math.cos(angle), math.sin(angle), 0.0, 0.0, 0.0)
+    )
     count = 100_000
     s = HEIGHT * ((np.arange(count) + 0.5) / count - 0.5)
     x = -0.5 * WIDTH * math.cos(angle) - s * math.sin(angle)

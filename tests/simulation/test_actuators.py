@@ -1,0 +1,85 @@
+"""Actuators: what they record, what they can exert, and that a run with one is resumed to the same bits.
+
+Forces on walls and energies of cycles are case V26.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.simulation import simulate, simulate_into
+from tests.simulation.sliding import interrupted_at
+
+both = pytest.mark.parametrize("scheme", ["explicit", "nonsmooth"])
+WEIGHT = 1000 * 0.2 * 0.1 * 0.1 * 9.81  # N
+RAMP = {"kind": "ramp", "to": "2 mm", "rate": "20 mm/s"}
+
+
+def pushed(scheme: str, end: float | None = None, **jack: Any) -> Scenario:
+    """Return a brick on the ground with an actuator."""
+    time = {"scheme": scheme, "stop_at_rest": False} | ({} if end is None else {"end": end})
+    data = {
+        "schema": 1,
+        "name": "a",
+        "materials": {"oak": {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}},
+        "blocks": {"brick": {"width": 0.2, "height": 0.1, "length": 0.1, "material": "oak"}},
+        "bodies": [{"block": "brick", "name": "b", "x": 0.0, "y": 0.05}],
+        "friction": {"block_ground": 0.5},
+        "contact": {"restitution": 0.0} | ({} if scheme == "nonsmooth" else {"stiffness_scale": 0.01}),
+        "start": {"settle": True},
+        "time": time,
+        "output": {"every": "1 ms"},
+        "actuators": [{"name": "jack", "body": "b", "displacement": RAMP, **jack}],
+    }
+    return scenario_from_mapping(data)
+
+
+@both
+def test_a_run_ends_when_the_head_stops_and_the_block_has_come_with_it(scheme: str) -> None:
+    """0.1 s at full speed, and a tenth more for speeding up and slowing down."""
+    jack = simulate(pushed(scheme)).probes["jack"]
+    assert jack.time[-1] == pytest.approx(0.11, abs=1e-3)
+    assert jack["head"][-1] == pytest.approx(2e-3, abs=1e-7)
+    assert jack["displacement"][-1] == pytest.approx(2e-3, rel=0.01)
+    middle = len(jack) // 2
+    assert jack["force"][middle] == pytest.approx(0.5 * WEIGHT, rel=0.01)
+    assert float(np.trapezoid(jack["force"], jack["displacement"])) == pytest.approx(jack["work"][-1], rel=0.01)
+
+
+@both
+def test_an_actuator_is_attached_once_the_block_has_settled(scheme: str) -> None:
+    """It holds nothing then, although the block has sunk into its contacts."""
+    jack = simulate(pushed(scheme, end=0.02, direction="90 deg", displacement={**RAMP, "start": "1 s"})).probes["jack"]
+    assert np.abs(jack["force"]).max() < 0.02 * WEIGHT  # contacts of impulses give way by nanometres
+    assert jack["displacement"][0] == pytest.approx(0.0, abs=1e-15)
+
+
+@both
+def test_an_actuator_that_pushes_does_not_pull_back(scheme: str) -> None:
+    there_and_back = {"kind": "table", "times": [0, 0.05, 0.1], "displacements": ["0 mm", "1 mm", "0 mm"]}
+    for sense, sign in (("push", 1.0), ("pull", -1.0)):
+        jack = simulate(pushed(scheme, sense=sense, displacement=there_and_back)).probes["jack"]
+        assert (sign * jack["force"]).min() == 0.0
+        assert (sign * jack["force"]).max() > 0.4 * WEIGHT
+    assert jack["displacement"][-1] == pytest.approx(-1e-3 if sign > 0.0 else 0.0, abs=2e-5)
+
+
+def test_a_stiff_actuator_makes_the_step_shorter_in_both_schemes() -> None:
+    for scheme in ("explicit", "nonsmooth"):
+        steps = [simulate(pushed(scheme, end=1e-3, stiffness=k)).summary.time_step_s for k in (1e4, 1e9)]
+        assert steps[1] < 0.5 * steps[0]
+
+
+@both
+def test_a_run_with_an_actuator_is_resumed_to_the_same_bits(scheme: str, tmp_path: Path) -> None:
+    whole = simulate_into(pushed(scheme), tmp_path / "whole")
+    half = whole.summary.steps // 2
+    interrupted_at(pushed(scheme), tmp_path / "parts", [half])
+    resumed = simulate_into(pushed(scheme), tmp_path / "parts", resume=True)
+    assert resumed.summary.resumed_from != ()
+    assert resumed.summary.final_state_sha256 == whole.summary.final_state_sha256
+    for column in ("force", "displacement", "work"):
+        assert np.array_equal(resumed.probes["jack"][column], whole.probes["jack"][column])
