@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from blocksim.errors import BlocksimError, ExitCode, InvalidInputError
 from blocksim.scenario.models.timeline import IMPULSES
-from blocksim.verification import actuators, collapse, energy, impacts, statics, toppling
+from blocksim.verification import collapse, energy, impacts, pushover, statics, toppling
 from blocksim.verification.case import Case, Setting
 from blocksim.verification.soil import SOIL_CASES
 
@@ -129,7 +129,7 @@ CASES = (
         "V26",
         "wall and block that an actuator moves",
         "moments, virtual work",
-        actuators.actuators,
+        pushover.pushover,
         "displacements of 2 and 20 mm",
         not_for={
             "hertz-mindlin": "points of a radius of 1 mm give way below a wall of 1 m by more than its head moves",

@@ -39,7 +39,7 @@ RUBBED = 0.4  # friction of a block that slides
 AMPLITUDE = 0.02  # m
 
 
-def actuators(setting: Setting) -> Iterator[Row]:
+def pushover(setting: Setting) -> Iterator[Row]:
     """Push the head of a wall, and a block to and fro: forces, the energy lost in a cycle, and work in the ledger."""
     ways = DISPLACEMENTS[0:3:2] if setting.quick else DISPLACEMENTS
     for name, line, guide in (
