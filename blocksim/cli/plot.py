@@ -55,7 +55,14 @@ def plot_command(
 
 
 def animate_command(
-    run: RunPath, options: pictures.AnimateOptions, screen: command_line.TextScreen
+    run: RunPath,
+    options: pictures.AnimateOptions,
+    screen: command_line.TextScreen,
+    *,
+    live: Annotated[
+        bool,
+        Option("Show the run on a page of the loopback address instead, until Ctrl-C; it follows one in progress."),
+    ] = False,
 ) -> command_line.Report:
     """Render a run as an animation, GIF or MP4.
 
@@ -66,6 +73,11 @@ def animate_command(
 
     Example: blocksim animate scenarios/three_blocks.toml --speed 0.1
     """
+    if live:
+        from blocksim.study.live import serve
+
+        serve(run_folder.find_run(run, needed=(files.SCENARIO,)), lambda address: output.note(f"live: {address}"))
+        return command_line.Report()
     with progress.count_progress("frames", quiet=screen.quiet) as on_picture:
         path, what, remark = pictures.draw_film(run, replace(options, on_picture=on_picture))
     return command_line.Report(notes=[f"animation: {path} ({what})"], always=[remark] if remark else [])

@@ -3,13 +3,16 @@
 import os
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from blocksim.cli import command_line, compare, output, prepare, progress
+from blocksim.options import Option
 from blocksim.simulation import Result, files, loop, observables, trajectory
 from blocksim.simulation.run import RunCallbacks
 from blocksim.study import compare as judgement, rows, run
@@ -20,11 +23,17 @@ INTERRUPTED = "interrupted"
 
 
 def run_command(
-    context: typer.Context, source: prepare.ScenarioInput, options: run.RunOptions, screen: command_line.Screen
+    context: typer.Context,
+    source: prepare.ScenarioInput,
+    options: run.RunOptions,
+    screen: command_line.Screen,
+    *,
+    live: Annotated[bool, Option("Show the run while it computes, on a page of the loopback address.")] = False,
 ) -> None:
     """Simulate a scenario and print the final positions.
 
     If the scenario names an experiment, the table has the measured ranges. A finished run is not repeated but shown.
+    --live prints the address of a page with the report's player, which follows the run and closes with it.
     Ctrl-C, SIGTERM, SIGHUP, SIGQUIT, SIGUSR1 and --wall-time stop a run; --resume continues it with bit-identical
     results.
 
@@ -49,11 +58,22 @@ def run_command(
         if context.obj is not None:  # imports and compiling are waited for too
             over = time.monotonic() - context.obj
             options = replace(options, precautions=replace(options.precautions, time_over=over))
-        result = run.run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
+        with _page(Path(out)) if live else nullcontext():
+            result = run.run(ready, replace(options, out=out, on_progress=on_progress, listener=listener))
     # SIGHUP reports that the terminal is lost
     with nullcontext() if result.status == rows.FINISHED else suppress(OSError):
         screen.show(_report(result))
     raise typer.Exit(result.summary.exit_code)
+
+
+@contextmanager
+def _page(folder: Path) -> Iterator[None]:
+    """Show a run while it computes; the address is a note, also beside --quiet."""
+    from blocksim.study import live
+
+    with live.beside_run(folder) as address:
+        output.note(f"live: {address}")
+        yield
 
 
 def _report(result: Result) -> command_line.Report:
