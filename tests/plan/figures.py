@@ -212,6 +212,9 @@ FIGURES: Mapping[str, Callable[[list[Module]], float]] = {
     "noqa": _count("# noqa"),
     "noqa without a reason": lambda modules: len(questions(modules, NOQA_ALONE)),
     "lines that ask for the shape": lambda modules: len(questions(modules, SHAPE_QUESTION)),
+    "files that ask for the shape": lambda modules: len(
+        {place.partition(":")[0] for place in questions(modules, SHAPE_QUESTION)}
+    ),
     "lines that ask for the scheme": lambda modules: len(
         questions(modules, SCHEME_QUESTION, outside=OWNERS_OF_SCHEMES)
     ),
