@@ -47,7 +47,8 @@ def case(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.P
 
 def printed(case: pytest.Pytester, *options: str, passed: int = 0, failed: int = 0, errors: int = 0) -> str:
     """Run the tests of a folder and return what pytest printed."""
-    result = case.runpytest_inprocess("-p", "tests.golden", "-p", "no:cacheprovider", *options)
+    plugins = ("-p", "tests.golden", "-p", "no:cacheprovider", "-p", "no:randomly")  # texts are in the order of tests
+    result = case.runpytest_inprocess(*plugins, *options)
     result.assert_outcomes(passed=passed, failed=failed, errors=errors)
     return result.stdout.str()
 
