@@ -3,6 +3,8 @@
 Forces on walls and energies of cycles are case V26.
 """
 
+from bisect import bisect_right
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 
 from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.scenario.models.actuators import PathTable, stretches_of
 from blocksim.simulation import simulate, simulate_into
 from tests.simulation.sliding import interrupted_at
 
@@ -50,11 +53,40 @@ def test_a_run_ends_when_the_head_stops_and_the_block_has_come_with_it(scheme: s
 
 
 @both
+def test_while_the_head_moves_evenly_the_spring_alone_carries_the_force(scheme: str) -> None:
+    jack = simulate(pushed(scheme, stiffness=1e5)).probes["jack"]
+    middle = len(jack) // 2
+    lag = jack["head"][middle] - jack["displacement"][middle]
+    assert lag == pytest.approx(jack["force"][middle] / 1e5, rel=1e-3)
+
+
+@both
 def test_an_actuator_is_attached_once_the_block_has_settled(scheme: str) -> None:
     """It holds nothing then, although the block has sunk into its contacts."""
     jack = simulate(pushed(scheme, end=0.02, direction="90 deg", displacement={**RAMP, "start": "1 s"})).probes["jack"]
     assert np.abs(jack["force"]).max() < 0.02 * WEIGHT  # contacts of impulses give way by nanometres
     assert jack["displacement"][0] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_the_head_follows_a_table_without_a_jump_of_its_rate() -> None:
+    times, values = [1.0, 1.2, 1.3, 2.0, 4.0], [0.001, 0.002, 0.0, -0.003, -0.003]
+    for last in (5, 2):
+        path = PathTable(kind="table", times=tuple(times[:last]), displacements=tuple(values[:last]))
+        pieces = stretches_of(path)
+        assert all(one.start < other.start for one, other in pairwise(pieces))
+        for one, other in pairwise(pieces):
+            since = other.start - one.start
+            assert other.rate == pytest.approx(one.rate + since * one.acceleration, abs=1e-12)
+            assert other.value == pytest.approx(
+                one.value + since * (one.rate + 0.5 * since * one.acceleration), abs=1e-12
+            )
+        assert (pieces[0].value, pieces[0].rate) == (0.001, 0.0)
+        assert (pieces[-1].start, pieces[-1].value, pieces[-1].rate) == (times[last - 1], values[last - 1], 0.0)
+        starts = [one.start for one in pieces]
+        for time, value in zip(times[:last], values[:last], strict=True):
+            one = pieces[bisect_right(starts, time) - 1]
+            since = time - one.start
+            assert one.value + since * (one.rate + 0.5 * since * one.acceleration) == pytest.approx(value, abs=5e-5)
 
 
 @both
@@ -65,7 +97,7 @@ def test_an_actuator_that_pushes_does_not_pull_back(scheme: str) -> None:
         jack = simulate(pushed(scheme, sense=sense, displacement=path)).probes["jack"]
         assert (sign * jack["force"]).min() == 0.0
         assert (sign * jack["force"]).max() > 0.4 * WEIGHT
-        assert sign * jack["displacement"][-1] == pytest.approx(1e-3, rel=0.02)
+        assert sign * jack["displacement"][-1] == pytest.approx(1e-3, rel=0.05)
 
 
 def test_a_stiff_actuator_makes_the_step_shorter_in_both_schemes() -> None:

@@ -12,6 +12,8 @@ of displacements is CSV:
 """
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, Literal, get_args
 
 from pydantic import ConfigDict, Field
@@ -56,7 +58,7 @@ class Cycles(base.Table):
 
 
 class PathTable(loads.Sampled):
-    """Displacements at some times, joined by straight lines: of a CSV table, or `times` and `displacements`."""
+    """Displacements at some times, joined by straight lines with rounded corners: of a CSV table, or as lists."""
 
     model_config = ConfigDict(title="Table of displacements")
     column, key = "displacement_mm", "displacements"
@@ -106,7 +108,7 @@ def stretches_of(path: AnyPath) -> tuple[loads.Stretch, ...]:
         case Cycles():
             turns = [way for one in path.amplitudes for _ in range(path.repeats) for way in (one, -one)] + [0.0]
         case _:
-            return loads.joined(path.times, path.displacements)
+            return _rounded(path.times, path.displacements)
     at, place = path.start, 0.0
     pieces = [loads.Stretch(0.0, 0.0, 0.0)] if at > 0.0 else []
     for turn in turns:
@@ -118,6 +120,28 @@ def stretches_of(path: AnyPath) -> tuple[loads.Stretch, ...]:
         pieces.append(loads.Stretch(at + even, turn - 0.5 * rate * short, rate, -rate / short))
         at, place = at + even + short, turn
     return (*pieces, loads.Stretch(at, place, 0.0))
+
+
+CORNER = 0.05
+"""Of the shorter interval beside a time of a table: as long before it and after it the rate of the head changes."""
+
+
+def _rounded(times: Sequence[float], values: Sequence[float]) -> tuple[loads.Stretch, ...]:
+    """Return straight lines between values (m) at times (s) with parabolas in place of corners, at rest at both ends.
+
+    The ways of the first and of the last interval are gone in a little less than their time.
+    """
+    first, last = (CORNER * (times[k] - times[k - 1]) for k in (1, -1))
+    ends = [times[0], times[0] + first, *times[1:-1], times[-1] - last, times[-1]]
+    turns = [values[0], values[0], *values[1:-1], values[-1], values[-1]]
+    lines = [*pairwise(zip(ends, turns, strict=True))]
+    pieces = [] if times[0] == 0.0 else [loads.Stretch(0.0, values[0], 0.0)]
+    for ((begin, was), (at, value)), (_, (end, to)) in pairwise(lines):
+        half = CORNER * min(at - begin, end - at) if times[0] < begin and end < times[-1] else min(at - begin, end - at)
+        before, after = (value - was) / (at - begin), (to - value) / (end - at)
+        pieces.append(loads.Stretch(at - half, value - half * before, before, (after - before) / (2.0 * half)))
+        pieces.append(loads.Stretch(at + half, value + half * after, after))
+    return (*pieces[:-1], loads.Stretch(times[-1], values[-1], 0.0))
 
 
 def end_of(actuators: tuple[Actuator, ...]) -> float:
