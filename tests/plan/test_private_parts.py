@@ -51,3 +51,14 @@ def test_every_private_part_is_listed_with_its_purpose() -> None:
 def test_missing_part_is_named_with_the_versions_to_install(arguments: tuple[str, ...], missing: str) -> None:
     with pytest.raises(ImportError, match=rf"^{missing} is missing from numba \d.*; install numba"):
         compiler.private(*arguments)
+
+
+def test_plain_numba_does_without_what_is_missing_except_for_lanes_and_barriers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(ImportError, match="or set BLOCKSIM_PLAIN_NUMBA=1"):
+        compiler.private("numba.core.gone", "Gone")
+    monkeypatch.setattr(compiler, "PLAIN", True)
+    assert issubclass(compiler.private("numba.core.gone", "Gone"), object)
+    with pytest.raises(ImportError, match=r"install numba\S*$"):
+        compiler.private("llvmlite.ir", "Gone")

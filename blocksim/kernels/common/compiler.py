@@ -42,17 +42,22 @@ import functools
 import gc
 import hashlib
 import importlib
+import os
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from typing import Any
 
+PLAIN = os.environ.get("BLOCKSIM_PLAIN_NUMBA") == "1"
+"""Kernels are compiled as numba does by itself: without libraries, compilers, cache and shortcuts of this module."""
+NEEDED = ("numba.core.cgutils", "numba.core.typing.templates", "llvmlite.ir")  # by any code with lanes and barriers
 VERSIONS = " ".join(f"{name} {metadata.version(name)}" for name in ("numba", "llvmlite", "numpy"))
 
 
 def private(module: str, name: str = "", *members: str) -> Any:
     """Return a module of numba or llvmlite, or what it calls `name`, which has to have some `members`.
 
-    Raises ImportError that names what is missing, and the versions that blocksim was tried with.
+    Raises ImportError that names what is missing, and the versions that blocksim was tried with; not where plain numba
+    does without it.
     """
     whole = missing = f"{module}.{name}".rstrip(".")
     try:
@@ -62,10 +67,13 @@ def private(module: str, name: str = "", *members: str) -> Any:
             missing = f"{whole}.{one}"
             getattr(part, one)
     except (ImportError, AttributeError) as error:
+        if PLAIN and module not in NEEDED:
+            return type(name, (), {})
         tried = "the numba that blocksim names"
         with contextlib.suppress(metadata.PackageNotFoundError):
             tried = next((one for one in metadata.requires("blocksim") or () if one.startswith("numba")), tried)
         message = f"{missing} is missing from {VERSIONS}, and blocksim compiles kernels with it; install {tried}"
+        message += "" if module in NEEDED else ", or set BLOCKSIM_PLAIN_NUMBA=1, which compiles longer"
         raise ImportError(message) from error
     return part
 
@@ -104,6 +112,8 @@ def import_array_functions() -> None:
 
     They import it only to see that there is a BLAS; whoever compiles a function that calls one has it imported then.
     """
+    if PLAIN:
+        return
     linalg = private("numba.np.linalg", "", "ensure_blas")
     ensure_blas = linalg.ensure_blas
     linalg.ensure_blas = lambda: None
@@ -198,19 +208,23 @@ def shortcuts() -> Iterator[None]:
 
 
 PASSES: tuple[Any, ...] = (
-    untyped_passes.TranslateByteCode,
-    untyped_passes.FixupArgs,
-    untyped_passes.IRProcessing,
-    untyped_passes.RewriteSemanticConstants,
-    untyped_passes.DeadBranchPrune,
-    untyped_passes.GenericRewrites,
-    untyped_passes.ReconstructSSA,
-    typed_passes.NopythonTypeInference,
-    typed_passes.PreLowerStripPhis,
-    typed_passes.NoPythonSupportedFeatureValidation,
-    typed_passes.IRLegalization,
-    typed_passes.NativeLowering,
-    typed_passes.NoPythonBackend,
+    ()
+    if PLAIN
+    else (
+        untyped_passes.TranslateByteCode,
+        untyped_passes.FixupArgs,
+        untyped_passes.IRProcessing,
+        untyped_passes.RewriteSemanticConstants,
+        untyped_passes.DeadBranchPrune,
+        untyped_passes.GenericRewrites,
+        untyped_passes.ReconstructSSA,
+        typed_passes.NopythonTypeInference,
+        typed_passes.PreLowerStripPhis,
+        typed_passes.NoPythonSupportedFeatureValidation,
+        typed_passes.IRLegalization,
+        typed_passes.NativeLowering,
+        typed_passes.NoPythonBackend,
+    )
 )
 
 INNER = "inner"  # how a library is kept that has no machine code
@@ -229,7 +243,7 @@ def compiling() -> Iterator[None]:
     often = gc.get_threshold()
     gc.set_threshold(RARELY, *often[1:])
     try:
-        with shortcuts():
+        with contextlib.nullcontext() if PLAIN else shortcuts():
             yield
     finally:
         gc.set_threshold(*often)

@@ -35,6 +35,7 @@ import numba
 from numba import config as numba_config, types as numba_types
 
 from blocksim.kernels.common.compiler import (
+    PLAIN,
     VERSIONS,
     CPUDispatcher,
     FunctionCache,
@@ -231,7 +232,7 @@ KERNEL_FOLDER = Path(__file__).resolve().parents[1]
 
 def source_hash(folder: Path = KERNEL_FOLDER) -> str:
     """Return a hash of every Python source below `folder`, with the versions of what compiles it."""
-    digest = hashlib.sha256(VERSIONS.encode())
+    digest = hashlib.sha256(f"{VERSIONS}{' plain' * PLAIN}".encode())
     for path in sorted(folder.rglob("*.py")):
         digest.update(path.relative_to(folder).as_posix().encode())
         digest.update(path.read_bytes())
@@ -311,8 +312,12 @@ def mark(name: str) -> None:
 
 def _compiled(function: Function, kind: str, **options: object) -> Function:
     """Compile a function; `kind` tells apart on the disk what is compiled from it in several ways."""
-    compiled: Any = njit(**OPTIONS, **options)(function)
     folder = cache_folder()
+    if PLAIN:  # with numba's own cache, in the folder of exactly these sources
+        config.CACHE_DIR = str(folder or "")
+        plain: Function = njit(**OPTIONS, **options, cache=folder is not None)(function)
+        return plain
+    compiled: Any = njit(**OPTIONS, **options)(function)
     if folder is not None and not config.DISABLE_JIT:
         with contextlib.suppress(OSError):  # a function without a source file
             stamp = (kind, _stamp(function))
@@ -365,6 +370,8 @@ def _inner(function: Function, **options: object) -> Function:
     """Compile a function that kernels call."""
     if config.DISABLE_JIT:
         return function
+    if PLAIN:
+        return _compiled(function, "inner", **options)
     compiler = LeanCompiler if Path(function.__code__.co_filename).is_relative_to(KERNEL_FOLDER) else InnerCompiler
     compiled: Any = _compiled(function, "inner", **options, no_cpython_wrapper=True, pipeline_class=compiler)
     compiled.__class__ = _Inner
