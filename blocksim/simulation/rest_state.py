@@ -90,6 +90,20 @@ def initial_scene(
     return scene, None
 
 
+def rests(scenario: Scenario) -> bool | None:
+    """Return whether a scenario has an equilibrium on its contacts, found without time; None where that is not known.
+
+    Raises as `build`.
+    """
+    built = schemes.build(scenario)
+    run = _Settlement(built.scene, scenario, built.placed, schemes.ALONE, str)
+    with run.without_time():
+        try:
+            return True if run.balance() else None
+        except SettleError:
+            return False
+
+
 def settle(
     scene: schemes.AnyScene, scenario: Scenario, placed: Sequence[PlacedBody], team: schemes.Team, stop: Stop = str
 ) -> tuple[schemes.AnyScene, results.RestState]:

@@ -10,8 +10,8 @@ equilibrium. Steps of backward Euler lead there: f(u) = R (u - u_k)/h, R in prop
 to where they rest. h grows with success and shrinks with failure, and at equilibrium is large. Shear springs are drawn
 from where the step of the load began, not from u_k: what slipped only on the way there leaves nothing behind.
 
-The first guess has all contacts closed and none that slides. Within Newton's method a step that overshoots, so that the
-forces at its end push back along it, is shortened (secant).
+The first guess has all contacts closed and none that slides. A step of Newton's method that does not bring down the
+squares of what is left is halved where half of it leaves less.
 
 Where there is no equilibrium blocks creep on: the unrest, the greatest acceleration over that of the loads, falls no
 more, or grows, while they come many times as far as contacts give way. An elastic structure that comes to rest, however
@@ -38,18 +38,19 @@ NEARLY = 1e-3, 1e-2  # unrest, share of it: what is left of a step of creep that
 DRAG = 1e-3  # of the stiffest contact, at h = 1
 FIRST, LEAST = 1e2, 1e-9  # h
 GROWTH, SHRINKAGE, CAREFUL = 10.0, 0.1, 2.0  # of h after success, after failure, and after the next success
-ITERATIONS, PATIENCE = 15, 6  # of Newton's method in a step, and without halving what is left
+ITERATIONS, PATIENCE = 15, 5  # of Newton's method in a step, and without halving what is left
 STICKY = 1e3  # times the friction, in a first guess without slip
 CREEP = 1e-4  # of the drag, in that guess
-OVERSHOOT, SHORTENINGS = 0.5, 2  # of the work of a step at its beginning; how often it is shortened
-SHORTEST = 0.1  # of a step that overshoots
+SHORTENINGS, HALF = 2, 0.5  # lengths of a step of Newton's method that are tried, each half of the one before
+DESCENT = 0.2  # of what is left, by which a whole step has to bring it down
+LONGEST = 10.0  # of the overlap of one contact that bears all: a step of Newton's method
 EVALUATIONS = 2000  # calibrated: beyond it time steps are as fast
 SLIGHT, FAILURES = 1e-3, 3  # unrest that steps of a run end, after steps of creep that fail one after the other: forces
 # jump by less where an end of a contact passes another
 LOOKS_BACK = 4  # steps of creep over which unrest is compared
 FAR = 50.0  # calibrated: times the deepest overlap, where creep grows faster
 LEAST_FAR = 2e-4  # of the smallest side of a block: the same
-FADES = 0.95  # of the unrest LOOKS_BACK steps before: what comes to rest has less
+FADES = 0.95  # of the unrest LOOKS_BACK steps before, or at first: what comes to rest has less
 VELOCITIES, ACCELERATIONS = ("vx", "vy", "spin"), ("ax", "ay", "spin_rate")
 DASHPOTS = ("normal_left", "shear_left")
 PIVOT = 0.1  # of the largest in a column: a smaller diagonal is none
@@ -216,7 +217,7 @@ class _Search:
         controls, blocks = forces.world.controls[0], forces.bodies[forces.free]
         exponent, stiffest = float(controls.exponent), float(forces.interactions["normal_stiffness"].max())
         weight = float(blocks["mass"].sum()) * scale
-        deep = (weight / stiffest) ** (1.0 / exponent)  # m, where one contact bears all
+        deep = self.deep = (weight / stiffest) ** (1.0 / exponent)  # m, where one contact bears all
         self.drag = DRAG * exponent * stiffest * deep ** (exponent - 1.0) * forces.masses / forces.masses[:, :1]
         size = float(max(np.abs(blocks["x"]).max(), np.abs(blocks["y"]).max()))
         digit = float(np.finfo(np.float64).eps) * size * stiffest / float(blocks["mass"].min()) / scale
@@ -246,50 +247,52 @@ class _Search:
         for _ in range(ITERATIONS):
             if found is None:
                 break
-            left = found * self.forces.masses - drag * (now - before)
-            error, unrest = (self.forces.unrest(one) / self.scale for one in (left / self.forces.masses, found))
+            left = found - drag * (now - before) / self.forces.masses
+            error, unrest = (self.forces.unrest(one) / self.scale for one in (left, found))
             if error <= max(self.balance, min(NEARLY[0], NEARLY[1] * unrest)):
                 return _Newton(now, found, is_solved=True)
             best, patience = (error, PATIENCE) if error < 0.5 * best else (best, patience - 1)
             if patience == 0:
                 break
             try:
-                change = self.forces.tangent(drag).solve(left.ravel()).reshape(-1, 3)
+                change = self.forces.tangent(drag).solve((left * self.forces.masses).ravel()).reshape(-1, 3)
             except RuntimeError:  # exactly singular
                 break
-            if not self.way(change) <= self.most:
-                break
-            now, found = self._shortened(now, change, drag, before, float((left * change).sum()))
+            longest = min(self.most, max(LONGEST * self.deep, self.way(now)))
+            change *= min(1.0, longest / max(self.way(change), longest))
+            now, found = self._shortened(now, change, drag, before, self._square(left))
         return _Newton(now, None, is_solved=False)
 
+    def _square(self, accelerations: Floats) -> float:
+        """Return the sum of m a^2 (N2/kg) of what is left."""
+        return float((self.forces.masses * accelerations**2).sum())
+
     def _shortened(
-        self, now: Floats, change: Floats, drag: Floats, before: Floats, work: float
+        self, now: Floats, change: Floats, drag: Floats, before: Floats, left: float
     ) -> tuple[Floats, Floats | None]:
-        """Return where a step of Newton's method ends, and the accelerations there; `work` (J) is its slope."""
-        share, found = 1.0, None
-        for attempt in range(SHORTENINGS + 1):
+        """Return where a step of Newton's method ends, all of it or the better of that and half, and accelerations."""
+        share, best = 1.0, tuple[float, Floats, Floats | None]((math.inf, now, None))
+        for _ in range(SHORTENINGS):
             after = now + share * change
             found = self.forces.at(after)
-            if attempt == SHORTENINGS:
-                break
-            if found is None:
-                share *= SHORTEST
-                continue
-            back = float(((found * self.forces.masses - drag * (after - before)) * change).sum())
-            if not (work > 0.0 and back < -OVERSHOOT * work):
-                break
-            share *= max(work / (work - back), SHORTEST)
-        return now + share * change, found
+            if found is not None:
+                square = self._square(found - drag * (after - before) / self.forces.masses)
+                if square < best[0]:
+                    best = square, after, found
+                if square < (1.0 - DESCENT * share) * left:
+                    break
+            share *= HALF
+        return best[1:]
 
     def _sticky(self) -> Floats:
         """Return displacements at which nothing slides, or those from which they were looked for."""
-        values = self.forces.interactions_now
-        friction = values["static_friction"].copy()
-        for name in ("static_friction", "kinetic_friction"):
-            values[name] = STICKY * friction
+        values, names = self.forces.interactions_now, ["static_friction", "kinetic_friction"]
+        friction = values[names].copy()
+        for name in names:
+            values[name] = STICKY * friction[name]
         result = self.solved(np.zeros_like(self.drag), self.closed, CREEP * self.drag)
-        for name in ("static_friction", "kinetic_friction"):
-            values[name] = friction
+        for name in names:
+            values[name] = friction[name]
         return result.displacements if result.is_solved else self.closed
 
     def creep(self) -> tuple[bool | None, Floats, float]:
@@ -321,13 +324,11 @@ class _Search:
     def _falls(self, history: list[tuple[float, float]]) -> bool:
         """Return True where unrest grew from step to step, far from the start, or faded too little very far from it."""
         last = history[-LOOKS_BACK - 1 :]
-        if len(last) <= LOOKS_BACK:
-            return False
         (unrest, way), rests = last[-1], [one for one, _ in last]
         if way > self.most:
-            return unrest >= FADES * rests[0]
+            return len(last) > 1 and unrest >= FADES * rests[0]
         is_far = way > max(FAR * self.forces.deepest, LEAST_FAR * self.smallest)
-        return is_far and all(one < other for one, other in pairwise(rests))
+        return len(last) > LOOKS_BACK and is_far and all(one < other for one, other in pairwise(rests))
 
 
 def equilibrium(scene: Any, advance: Advance, is_free: NDArray[np.bool_], scale: float, smallest: float) -> SpringRest:

@@ -47,7 +47,7 @@ from blocksim.options import takes
 from blocksim.scenario import Document, Scenario, Source, document_of, laws, motion, place_bodies, placement
 from blocksim.scenario.models import motion as motions, timeline
 from blocksim.silence import silent
-from blocksim.simulation import observables, provenance, schemes
+from blocksim.simulation import observables, provenance, rest_state, schemes
 from blocksim.study import limit_answer, limit_plan, manifest, sweep, sweep_folder
 from blocksim.study.answer import Study, without_cases
 from blocksim.study.criterion import Stability, falls_before_zero
@@ -355,7 +355,23 @@ class _Search:
             way = BEYOND_ESTIMATE * (limit.bound - limit.estimate)
             ends = sorted([limit.estimate - HALF * way, limit.estimate + way])
         low, high = map(plan.span.clip, ends)
-        return limit.bound, Change(low, high, sides[limit.below], sides[limit.above])
+        return limit.bound, self._on_springs(Change(low, high, sides[limit.below], sides[limit.above]))
+
+    def _on_springs(self, near: Change[Stability]) -> Change[Stability]:
+        """Return a bracket of equilibria on springs, found without time and as narrow as wanted; if none, that given.
+
+        Two runs confirm it.
+        """
+        plan, verdicts = self.plan, dict[Number, Stability]()
+        while values := limit_plan.next_near(plan.span, verdicts, near, plan.tolerance):
+            for value in values:
+                scenario = plan.scenario_at(value)
+                found = rest_state.rests(scenario) if motion.settles(scenario) else None
+                if found is None:
+                    return near
+                verdicts[value] = Stability.STANDS if found else Stability.FALLS
+        changes = limit_plan.changes_in(verdicts)
+        return changes[0] if len(changes) == 1 else near
 
     def _searched(self, plan: LimitPlan, choose: Callable[[Rows], list[Number]]) -> dict[Number, Row]:
         """Go from round to round and return what it needed; rows of an earlier search are taken as they are."""

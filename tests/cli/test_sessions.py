@@ -30,6 +30,7 @@ VARIES = (  # with the machine, or with the last bits of a long motion
     r"\d+(?= steps of)",
     r"(?<= s in )[\d.]+ s; relative energy error \S+",
     "(?<=moves at ).*(?= steps)",
+    "(?<=has come ).*(?= mm without)",
     r"(?<!at most )\b\d+(?= frames\b)",
 )
 LINES = re.compile(f"^(?:{'|'.join(SOMETIMES)})\n", re.MULTILINE)

@@ -70,6 +70,16 @@ def test_columns_about_to_topple_press_on_one_another_as_in_their_limit_equilibr
         assert found[10:] == pytest.approx(BETWEEN_COLUMNS[10:], rel=3e-2)
 
 
+def test_two_runs_confirm_the_limit_of_a_wall_on_springs_that_is_found_without_time(tmp_path: Path) -> None:
+    """Wall 1 of Ferris & Tin-Loi: 32.68 degrees."""
+    span = {"ground.tilt": {"from": "20 deg", "to": "40 deg"}}
+    wall = with_scheme(Document.read(WALL), "explicit")
+    found = limit(wall, span, out=tmp_path, keep_runs=False, stiffer=False)
+    (change,) = found.limits
+    assert found.runs == 2
+    assert [change.low, change.high] == pytest.approx([32.68, 32.68], rel=2e-3)
+
+
 def test_a_pulse_overturns_a_block_on_soft_springs_from_the_published_amplitude_on(tmp_path: Path) -> None:
     """Zhang & Makris: from 0.7362 g; on springs of a hundredth of the stiffness themselves from 0.749 g."""
     soft = {STIFFNESS: 0.01, "time.end": 7.0, "motion.start": 1.0}
