@@ -190,14 +190,15 @@ lock: ## Rewrite the locked versions and hashes: the newest that fit pyproject.t
 	printf '%s\n' editables pip >>"$$folder/build.in"; \
 	names() { sed -n 's/^\([a-z0-9][^= ]*\)==.*/\1/p' "$$1"; }; \
 	resolve() { "$$folder/venv/bin/uv" pip compile -q --universal --python-version 3.11 --generate-hashes --no-header \
-	    --no-annotate --fork-strategy fewest --no-emit-package colorama "$$@"; }; \
-	resolve pyproject.toml "$$folder/build.in" --extra study -o "$$folder/run.txt"; \
+	    --no-annotate --fork-strategy fewest "$$@"; }; \
+	none="--no-emit-package colorama"; \
+	resolve pyproject.toml "$$folder/build.in" --extra study $$none -o "$$folder/run.txt"; \
 	known=$$(names "$$folder/run.txt" | sed 's/^/--no-emit-package /'); \
-	resolve pyproject.toml --extra dev -c "$$folder/run.txt" $$known -o "$$folder/dev.txt"; \
+	resolve pyproject.toml --extra dev -c "$$folder/run.txt" $$known $$none -o "$$folder/dev.txt"; \
 	resolve pyproject.toml --extra docs --extra dist -c "$$folder/run.txt" -c "$$folder/dev.txt" $$known \
 	    -o "$$folder/docs.txt"; \
-	resolve pyproject.toml --extra bench --extra study -c "$$folder/run.txt" $$known -o "$$folder/bench.txt"; \
-	resolve pyproject.toml --extra paraview-check --extra study -c "$$folder/run.txt" $$known \
+	resolve pyproject.toml --extra bench --extra study -c "$$folder/run.txt" $$known $$none -o "$$folder/bench.txt"; \
+	resolve pyproject.toml --extra paraview-check --extra study -c "$$folder/run.txt" $$known $$none \
 	    -o "$$folder/paraview-check.txt"; \
 	head() { echo "# $$1. Written by: make lock"; }; \
 	{ head "Exact versions, with hashes, of what make run installs"; cat "$$folder/run.txt"; } >$(CONSTRAINTS); \
