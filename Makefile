@@ -93,6 +93,16 @@ verify-table: $(DEV_STAMP) ## Measure all verification cases and write their tab
 findings: $(DEV_STAMP) ## Run what results/README.md quotes and write its table
 	$(VENV_PYTHON) -m blocksim.verification.findings results/README.md --measure
 
+WALLS := 40:36.15 100:96.15 250:246.15  # vertical load in the name of a test, and its part that is not the beam's, kN
+.PHONY: walls
+walls: $(RUN_STAMP) ## Push three measured walls: their curves, bounds of statics, and the comparison
+	for wall in $(WALLS); do number=$${wall%%:*}; run=results/granite_wall_$$number; \
+	$(BLOCKSIM) run scenarios/walls/pushed_granite_wall.toml --quiet --out $$run \
+	  --set "loads.weight.magnitude=$${wall##*:} kN" --set experiment.table=granite_wall_$$number.csv; \
+	$(BLOCKSIM) capacity $$run; \
+	$(BLOCKSIM) compare $$run --tolerance 0.1 || [ $$? -eq 1 ]; \
+	$(BLOCKSIM) plot $$run --kind capacity --out $$run.png --overwrite; done
+
 .PHONY: bench
 bench: $(RUN_STAMP) ## Measure speed and memory, some minutes; nothing else should run
 	$(BLOCKSIM) bench --out results/bench.json

@@ -9,8 +9,8 @@ True
 
 Scenarios: `load` (a file or dictionaries), `replace` (change keys, validated). Runs: `run`, `open_run`; a result has
 `final`, `frames`, `to_frame()`, `to_xarray()`. Studies: `sweep`, `open_sweep`, `limit`, `limit_curve`, `static_limit`,
-`fragility`, `calibrate`, `sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`, `report`. Functions
-have the options of the command of the same name.
+`capacity`, `fragility`, `calibrate`, `sensitivity`, `converge`. Judging: `compare`. Looking: `plot`, `animate`,
+`report`. Functions have the options of the command of the same name.
 """
 
 from importlib import import_module
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from blocksim.scenario import load_scenario as load, replace_values as replace
     from blocksim.study.calibrate import calibrate
+    from blocksim.study.capacity import capacity
     from blocksim.study.compare import compare
     from blocksim.study.converge import converge
     from blocksim.study.fragility import fragility
@@ -35,6 +36,7 @@ __version__ = "0.3.0"
 __all__ = [
     "animate",
     "calibrate",
+    "capacity",
     "compare",
     "converge",
     "fragility",
@@ -56,6 +58,7 @@ __all__ = [
 _HOMES = {
     "animate": ("blocksim.study.pictures", "animate"),
     "calibrate": ("blocksim.study.calibrate", "calibrate"),
+    "capacity": ("blocksim.study.capacity", "capacity"),
     "compare": ("blocksim.study.compare", "compare"),
     "converge": ("blocksim.study.converge", "converge"),
     "fragility": ("blocksim.study.fragility", "fragility"),

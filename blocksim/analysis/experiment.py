@@ -162,6 +162,9 @@ def load_table(path: Path | str) -> ExperimentTable:
     Raises InputMissingError when the file cannot be read and InvalidInputError with every mistake, located by line and
     column.
     """
+    heads = [head.text for head in input_files.read_table(Path(path)).heads]
+    if heads[:2] == ["probe", "replicate"]:
+        raise InvalidInputError(f"{path}: curves of probes; a table of final positions ({','.join(COLUMNS)}) is needed")
     table = input_files.read_table(Path(path), COLUMNS)
     rows = []
     first_lines: dict[tuple[str, str, int], int] = {}

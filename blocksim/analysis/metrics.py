@@ -395,15 +395,18 @@ METRICS: dict[str, facts.Metric] = {
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings: the share of members that must be inside, and u_num (mm)."""
+    """Settings: the share of members that must be inside, and u_num (mm); the tolerance of curves (curves.py)."""
 
     threshold: float = THRESHOLD
     u_num: float = U_NUM
+    tolerance: float | None = None
 
     def __post_init__(self) -> None:
         """Raise InvalidInputError for an invalid share or uncertainty."""
         if not 0.0 <= self.threshold <= 1.0:
             raise InvalidInputError(f"threshold {self.threshold} is not a share from 0 to 1")
+        if self.tolerance is not None and not 0.0 <= self.tolerance < inf:
+            raise InvalidInputError(f"tolerance {self.tolerance} is not a share from 0 up")
         if not 0.0 <= self.u_num < inf:
             raise InvalidInputError(f"u_num {self.u_num} is not an uncertainty in mm: a number from 0 up")
 

@@ -264,7 +264,7 @@ def _actuator(one: actuators.Actuator, stiffness: float) -> str:
             text = f"{text}, by {len(path.times)} displacements"
     given = "" if one.stiffness is not None else ", which follows from the step"
     until = actuators.stretches_of(path)[-1].start
-    return f"{text} until {until:.4g} s; {output.number(1e-6 * stiffness)} kN/mm{given}"
+    return f"{text} until {until:.4g} s; {1e-6 * stiffness:.4g} kN/mm{given}"
 
 
 def _probe(probe: timeline.AnyProbe) -> str:

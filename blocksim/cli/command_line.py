@@ -237,9 +237,9 @@ def completion_of(names: Callable[[], Iterable[str]]) -> Complete:
 
 
 def _kinds() -> list[str]:
-    from blocksim.view.kinds import MOTION, PROBE, RUN_KINDS, SWEEP_KINDS
+    from blocksim.view.kinds import MOTION, OF_RECORDS, RUN_KINDS, SWEEP_KINDS
 
-    return [*RUN_KINDS, MOTION, PROBE, *SWEEP_KINDS, "tornado"]
+    return [*RUN_KINDS, MOTION, *OF_RECORDS, *SWEEP_KINDS, "tornado"]
 
 
 def _cases() -> list[str]:

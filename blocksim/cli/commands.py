@@ -107,6 +107,7 @@ COMMANDS = {  # name: first line of its help; `verify-run` is verify_run_command
     "check": "Validate a scenario and summarise it.",
     "sweep": "Run a scenario many times with some keys varied.",
     "limit": "Find the critical value of a parameter (collapse threshold).",
+    "capacity": "Find peak force and softening of what actuators move.",
     "fragility": "Find the probability of collapse over an intensity.",
     "calibrate": "Fit inputs to measured repeats, within their priors.",
     "sensitivity": "Rank the inputs by their effect on final positions.",
@@ -127,7 +128,7 @@ MODULES |= {"schema": "new", "fragility": "limit", "bench": "verify"}
 GROUPS = {  # heads of the list in `blocksim --help`
     "Run": ("new", "run", "schema"),
     "Look": ("plot", "animate", "report", "export"),
-    "Study": ("sweep", "limit", "fragility", "calibrate", "sensitivity", "converge"),
+    "Study": ("sweep", "limit", "capacity", "fragility", "calibrate", "sensitivity", "converge"),
     "Check": ("check", "compare", "verify", "verify-run", "bench"),
 }
 WITH_SCENARIOS = set(COMMANDS) - {"verify", "verify-run", "bench", "new", "schema"}

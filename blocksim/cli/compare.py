@@ -41,12 +41,22 @@ def compare_command(
         float,
         Option("For sweeps: standard uncertainty of the numerical solution, in mm.", metavar="MM", least=0.0, most=1e6),
     ] = metrics.U_NUM,
+    tolerance: Annotated[
+        float | None,
+        Option(
+            "For curves: widen the range of repeats by this share of their mean (default: 0; 0.1 of a single one).",
+            least=0.0,
+            most=10.0,
+        ),
+    ] = None,
     screen: command_line.Screen,
 ) -> command_line.Report:
     """Compare runs with measured repeats.
 
     Exit code 1: anything is out of range. A position is inside between the smallest and the largest repeat (0.5 mm
-    either side where all repeats are equal), a rotation within 5 degrees of the mean. Of a sweep, at least the share
+    either side where all repeats are equal), a rotation within 5 degrees of the mean. A table of curves (columns probe,
+    replicate, and two quantities of that probe such as displacement_mm and force_kN) judges peak, place of the peak,
+    stiffness and area; all repeats set the range. Of a sweep, at least the share
     --threshold of the samples must be within all measured ranges. Its numbers:
 
     {meanings}
@@ -64,7 +74,7 @@ def compare_command(
             judged.append(judgement.inside)
         else:
             head = run_folder.find_run(place)
-            comparison = compare_run(head, experiment)
+            comparison = compare_run(head, experiment, metrics.Settings(tolerance=tolerance))
             source, lines = comparison.source, [*comparison_table(comparison), *verdict_lines(comparison)]
             data.append({"run": str(head), **comparison.to_dict()})
             judged.append(comparison.inside)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, overload
 
 from blocksim.analysis.compare import Comparison, compare_final
+from blocksim.analysis.curves import TIME, compare_curves, has_curves, load_curves
 from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import load_table
 from blocksim.analysis.metrics import Judgement, Settings, judge
@@ -15,8 +16,11 @@ from blocksim.simulation import Result, files, results
 from blocksim.study import manifest, rows, run_folder, sweep_folder
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas as pd
 
+    from blocksim.simulation.instruments import ProbeSeries
     from blocksim.simulation.trajectory import Columns
 
 ExperimentTablePath = Annotated[
@@ -48,11 +52,12 @@ def compare(
 ) -> Comparison | Judgement:
     """Compare a run, or a sweep or its folder, with an experiment table.
 
-    A run is what `compare_run` takes; `settings` are for sweeps. Raises what `compare_run` and `compare_sweep` raise.
+    A run is what `compare_run` takes; `settings` are for sweeps and curves. Raises what `compare_run` and
+    `compare_sweep` raise.
     """
     if isinstance(run, manifest.SweepResult) or (isinstance(run, Path | str) and manifest.is_sweep(run)):
         return compare_sweep(run, experiment, settings)
-    return compare_run(run, experiment)
+    return compare_run(run, experiment, settings)
 
 
 def compare_sweep(
@@ -81,11 +86,16 @@ def compare_sweep(
     return judge(members, load_table(table), settings, remarks)
 
 
-def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | str | None = None) -> Comparison:
+def compare_run(
+    run: "Result | pd.DataFrame | Path | str",
+    experiment: Path | str | None = None,
+    settings: Settings | None = None,
+) -> Comparison:
     """Compare a result, a final table or what `find_run` understands with an experiment table.
 
-    Without `experiment` the table that the run's scenario names is taken. Raises InputMissingError without any table,
-    InvalidInputError for a run that did not finish.
+    A table of final positions is compared with the final table, one of curves with the probes of the run. Without
+    `experiment` the table that the run's scenario names is taken; `settings` has the tolerance of curves. Raises
+    InputMissingError without any table, InvalidInputError for a run that did not finish.
     """
     final: Columns | pd.DataFrame
     drawn: Result | Path | None = None
@@ -108,4 +118,26 @@ def compare_run(run: "Result | pd.DataFrame | Path | str", experiment: Path | st
     table = experiment or named
     if table is None:
         raise InputMissingError("the scenario names no experiment; give a table with --experiment")
-    return replace(compare_final(final, load_table(table)), run=drawn)
+    probes: Mapping[str, ProbeSeries] | None = None
+    if drawn is not None and has_curves(table):
+        result = drawn if isinstance(drawn, Result) else results.read_result(drawn)
+        probes = result.probes
+    return replace(against(table, final, probes, (settings or Settings()).tolerance), run=drawn)
+
+
+def against(
+    table: Path | str,
+    final: "Columns | pd.DataFrame",
+    probes: "Mapping[str, ProbeSeries] | None",
+    tolerance: float | None = None,
+) -> Comparison:
+    """Compare a final table, or probes, with a measured table, as that is of final positions or of curves.
+
+    Raises InvalidInputError, also for curves where there are no probes.
+    """
+    if not has_curves(table):
+        return compare_final(final, load_table(table))
+    if probes is None:
+        raise InvalidInputError(f"{table}: curves are compared with the probes of a run; this is a final table")
+    records = {name: {TIME: one.time, **one.columns} for name, one in probes.items()}
+    return compare_curves(records, load_curves(table), tolerance)

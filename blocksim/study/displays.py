@@ -15,9 +15,10 @@ from blocksim.scenario import Scenario, place_bodies
 from blocksim.simulation import Result
 from blocksim.simulation.instruments import FrameRows, frames_from_rows
 from blocksim.study import pictures, report, run_folder
+from blocksim.study.capacity import CapacityAnswer
 from blocksim.view import style
 from blocksim.view.display import AnimationDisplay, PageDisplay, PictureDisplay
-from blocksim.view.kinds import FINAL, MOTION
+from blocksim.view.kinds import CAPACITY, FINAL, MOTION
 from blocksim.view.report import page
 from blocksim.world.systems import others_of
 from blocksim.world.systems.blocks import block_system
@@ -42,6 +43,8 @@ def picture_of(shown: Any, *, kind: str | None = None, **options: Any) -> Pictur
     subject = _subject(shown)
     if isinstance(shown, Judgement):
         options = {"experiment": shown.source, **options}
+    elif isinstance(shown, CapacityAnswer):
+        kind = kind or CAPACITY
     elif isinstance(shown, Comparison):
         options = {"experiment": Path(shown.source), **options}
     if isinstance(subject, Result | Scenario):
@@ -93,6 +96,8 @@ def _subject(shown: Any) -> Any:
         return shown.run
     if isinstance(shown, Judgement):
         return Path(shown.sweep).parent
+    if isinstance(shown, CapacityAnswer):
+        return shown.run
     return shown if isinstance(shown, Result | Scenario) else run_folder.folder_of(shown)
 
 

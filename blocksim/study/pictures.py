@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from blocksim.analysis.compare import limits, prediction_half_width
+from blocksim.analysis.curves import has_curves, load_curves
 from blocksim.analysis.evidence import Members
 from blocksim.analysis.experiment import ExperimentTable, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
@@ -17,10 +18,22 @@ from blocksim.scenario import Scenario, input_files, load_scenario, load_stored,
 from blocksim.scenario.models.study import Normal, Uniform, Variation
 from blocksim.silence import silent
 from blocksim.simulation import files
-from blocksim.study import answer, compare, manifest, run_folder, sweep_folder
+from blocksim.study import answer, capacity, compare, manifest, run_folder, sweep_folder
 from blocksim.study.rows import FINISHED, TABLE, Head, Ranges, X, quarter_turns
 from blocksim.view import animation, paints, run_data, scene, studies, style, time_panels
-from blocksim.view.kinds import FINAL, HISTORY, MOTION, PROBE, PROFILE, STRIP, SWEEP_KINDS, THRUST, run_kind
+from blocksim.view.kinds import (
+    CAPACITY,
+    FINAL,
+    HISTORY,
+    MOTION,
+    OF_RECORDS,
+    PROBE,
+    PROFILE,
+    STRIP,
+    SWEEP_KINDS,
+    THRUST,
+    run_kind,
+)
 from blocksim.view.sweeps.data import Input, InputUnit, Measurements, SweepData
 
 if TYPE_CHECKING:
@@ -263,9 +276,9 @@ class PlotOptions(style.PageOptions):
     kind: Annotated[
         str | None,
         Option(
-            "Of a run: strip (default), final, history, profile (the surface of soil), motion (of the supports) or "
-            "probe. Of a sweep: lines, map (two inputs), matrix (every two inputs) or histogram; tornado for "
-            "sensitivities (default: what suits).",
+            "Of a run: strip (default), final, history, profile (the surface of soil), motion (of the supports), "
+            "probe or capacity (of actuators). Of a sweep: lines, map (two inputs), matrix (every two inputs) or "
+            "histogram; tornado for sensitivities (default: what suits).",
             metavar="KIND",
             complete="kinds",
         ),
@@ -317,13 +330,17 @@ def draw_run(find: Callable[[], run_folder.StoredRun], options: PlotOptions) -> 
     that mean nothing for it, what `find` and `PlotOptions.picture` raise, OutputError.
     """
     kind = options.kind or STRIP
-    draw = None if kind == PROBE else run_kind(kind)
+    draw = None if kind in OF_RECORDS else run_kind(kind)
     options.refuse(kind, f"this picture is of kind {kind}")
     stored = find()
     scenario = stored.scenario
     table = options.experiment or (scenario.experiment.table if scenario.experiment is not None else None)
-    measured = None if table is None or draw is None else load_table(table).summaries()
+    curves = load_curves(table) if table is not None and has_curves(table) else None
+    measured = None if table is None or curves is not None or draw is None else load_table(table).summaries()
     picture = options.picture(f"{scenario.name}.png" if kind == STRIP else f"{scenario.name}_{kind}.png")
+    if kind == CAPACITY:
+        capacity.draw_capacity(scenario, stored.probes(), curves, picture, options.paper)
+        return picture, stored.remark
     if draw is None:
         time_panels.draw_probes(
             stored.probes(), picture, f"{scenario.name}: probes", tuple(options.probes or ()), options.paper

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from blocksim import __version__
-from blocksim.analysis.compare import Comparison, compare_final
-from blocksim.analysis.experiment import load_table
+from blocksim.analysis.compare import Comparison
 from blocksim.analysis.metrics import Judgement
 from blocksim.errors import BlocksimError, InputMissingError, InvalidInputError, UnavailableError
 from blocksim.scenario import input_files, load_stored, scenario_to_toml
@@ -108,7 +107,7 @@ def _compared(run: parts.PartialRun, experiment: Path | None) -> tuple[dict[str,
     if run.status != rows.FINISHED:
         return None, ("only a finished run is compared with the measurement",)
     try:
-        return _shown(compare_final(run.final, load_table(table))), ()
+        return _shown(compare.against(table, run.final, run.probes)), ()
     except BlocksimError as error:
         if experiment is not None:
             raise

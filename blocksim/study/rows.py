@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blocksim.analysis import compare, experiment
+from blocksim.analysis import compare, curves, experiment
 from blocksim.errors import BlocksimError, InvalidInputError
-from blocksim.scenario import Scenario, Sweep, place_bodies, units
+from blocksim.scenario import Scenario, Sweep, events, place_bodies, spelling, units
 from blocksim.simulation.trajectory import COLUMNS, Columns
 
 if TYPE_CHECKING:
@@ -199,6 +199,13 @@ class Ranges:
 def check_experiment(scenario: Scenario) -> None:
     """Check that the table that a scenario names goes with the blocks: better now than after the run."""
     if scenario.experiment is None:
+        return
+    if curves.has_curves(scenario.experiment.table):
+        table, known = curves.load_curves(scenario.experiment.table), events.probes_of(scenario)
+        for name in table.curves:
+            if name not in known:
+                hint = spelling.did_you_mean_or_list(name, known) if known else "the scenario has no probes"
+                raise InvalidInputError(f"{table.source}: unknown probe '{name}', {hint}")
         return
     names = [body.name for body in place_bodies(scenario)]
     unknown = dict.fromkeys(COLUMNS[1:], [0.0] * len(names))

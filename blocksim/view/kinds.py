@@ -14,6 +14,8 @@ from blocksim.view.sweeps import data, lines, outcome_map, scatter
 STRIP, FINAL, HISTORY, PROFILE, THRUST = "strip", "final", "history", "profile", "thrust"
 MOTION = "motion"  # of the supports; needs no run
 PROBE = "probe"
+CAPACITY = "capacity"  # of actuators
+OF_RECORDS = (PROBE, CAPACITY)  # need no frames
 RUN_KINDS: dict[str, Callable[[Frames, Path, scene.PictureOptions], None]] = {
     STRIP: strip.draw_strip,
     FINAL: final.draw_final,
@@ -53,7 +55,8 @@ SWEEP_KINDS = {  # by default the first that suits a sweep is drawn
 def run_kind(name: str) -> Callable[[Frames, Path, scene.PictureOptions], None]:
     """Return what draws pictures of a kind. Raises InvalidInputError for an unknown one."""
     if name not in RUN_KINDS:
-        meant = nearest(name, [*RUN_KINDS, MOTION, PROBE], MOST_SLIPS)
-        hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join([*RUN_KINDS, MOTION, PROBE])}"
+        known = [*RUN_KINDS, MOTION, *OF_RECORDS]
+        meant = nearest(name, known, MOST_SLIPS)
+        hint = f"did you mean '{meant}'?" if meant else f"choose {', '.join(known)}"
         raise InvalidInputError(f"--kind {name}: unknown kind for a run, {hint}")
     return RUN_KINDS[name]

@@ -36,9 +36,11 @@ class ActingLoad(NamedTuple):
 
     def values(self, times: Floats) -> Floats:
         """Return its factor, or the tilt (rad) of gravity, at these times (s)."""
-        starts, values, rates = np.array(self.stretches).T
+        starts, *terms = np.array(self.stretches).T
         piece = (np.searchsorted(starts, times, side="right") - 1).clip(min=0)
-        return np.where(times < self.end, values[piece] + rates[piece] * (times - starts[piece]), 0.0)
+        value, rate, acceleration = (one[piece] for one in terms)
+        since = times - starts[piece]
+        return np.where(times < self.end, value + since * (rate + 0.5 * acceleration * since), 0.0)
 
 
 BEYOND_REACH = 1e34

@@ -1,0 +1,100 @@
+"""Capacities of actuators: peak, bound of statics, directions, and how slow a run was."""
+
+from typing import Any
+
+import pytest
+
+import blocksim
+from blocksim.errors import InvalidInputError
+from blocksim.scenario import Scenario, scenario_from_mapping
+from blocksim.study.capacity import bound_of
+
+WIDTH, HEIGHT = 0.1, 0.2  # m
+WEIGHT = 1000 * WIDTH * HEIGHT * 0.1 * 9.81  # N
+CYCLES = {"kind": "cycles", "amplitudes": ["5 mm"], "rate": "5 mm/s"}
+
+
+def rocked(path: dict[str, Any], **tables: Any) -> Scenario:
+    """Return a slender block that an actuator pushes at its head."""
+    data: dict[str, Any] = {
+        "schema": 1,
+        "name": "a",
+        "materials": {"oak": {"density": 1000, "young_modulus": 1e9, "poisson_ratio": 0.3}},
+        "blocks": {"b": {"width": WIDTH, "height": HEIGHT, "length": 0.1, "material": "oak"}},
+        "bodies": [{"block": "b", "name": "b", "x": 0.0, "y": 0.5 * HEIGHT}],
+        "friction": {"block_ground": 2.0},
+        "contact": {"restitution": 0.0},
+        "start": {"settle": True},
+        "time": {"scheme": "nonsmooth", "stop_at_rest": False},
+        "output": {"every": "5 ms"},
+        "actuators": [{"name": "jack", "body": "b", "point": [0, 0.5 * HEIGHT], "displacement": path}],
+    }
+    return scenario_from_mapping({**data, **tables})
+
+
+def test_a_rocking_block_has_the_peak_of_statics_in_both_directions() -> None:
+    """W b/2h; where it is pushed farther it falls as W (b/2 - x/2) does, x at half of the height."""
+    answer = blocksim.capacity(blocksim.run(rocked(CYCLES)))
+    push, pull = answer.all
+    assert (push.sense, pull.sense) == ("push", "pull")
+    for one, sign in ((push, 1.0), (pull, -1.0)):
+        assert one.bound == pytest.approx(0.5 * WEIGHT * WIDTH / HEIGHT, rel=1e-6)
+        assert one.peak == pytest.approx(one.bound, rel=0.01)
+        assert 0.0 < sign * one.displacement < 1e-3
+    assert answer.to_frame()["peak"].tolist() == [push.peak, pull.peak]
+    picture = answer.plot("capacity")._repr_png_()
+    assert picture is not None
+    assert picture.startswith(b"\x89PNG")
+
+
+def test_statics_bounds_push_and_pull_of_a_lopsided_block_by_its_own_edges() -> None:
+    """A triangle with its right angle below: its centroid is a third of the width from one edge."""
+    wedge = {"outline": [[0, 0], [0.1, 0], [0, 0.2]], "depth": 0.1, "material": "oak"}
+    jacks = [{"body": "b", "point": [-0.033, 0.0], "displacement": CYCLES}]
+    bodies = [{"block": "b", "name": "b", "x": 0.0, "y": 0.2 / 3}]
+    scenario = rocked(CYCLES, blocks={"b": wedge}, bodies=bodies, actuators=jacks)
+    (jack,) = scenario.actuators
+    weight, arm = 0.5 * WEIGHT, 0.2 / 3
+    assert bound_of(scenario, jack, 1.0) == pytest.approx(weight * (0.2 / 3) / arm, rel=1e-6)
+    assert bound_of(scenario, jack, -1.0) == pytest.approx(weight * (0.1 / 3) / arm, rel=1e-6)
+
+
+def test_softening_is_where_the_force_has_fallen_to_0_8_of_the_peak() -> None:
+    """A block that turns by t carries W (b/2 cos t - h/2 sin t) / (h cos t + b/2 sin t) at its head."""
+    answer = blocksim.capacity(blocksim.run(rocked({"kind": "ramp", "to": "20 mm", "rate": "5 mm/s"})))
+    (one,) = answer.all
+    lever = 1.0 / WIDTH + 0.8 * 0.5 * WIDTH / HEIGHT**2  # for small angles
+    assert one.fallen == pytest.approx(0.2 / lever, rel=0.02)
+    assert answer.warnings == ()
+
+
+def test_a_run_that_is_not_slow_is_warned_of() -> None:
+    answer = blocksim.capacity(blocksim.run(rocked({"kind": "ramp", "to": "30 mm", "rate": "500 mm/s"})))
+    assert "a lower rate is nearer to statics" in answer.warnings[0]
+
+
+def test_a_curve_that_still_rises_at_its_end_is_warned_of() -> None:
+    springs = {"time": {"scheme": "explicit", "stop_at_rest": False}}
+    soft = {"contact": {"restitution": 0.0, "stiffness_scale": 1e-4}}
+    answer = blocksim.capacity(
+        blocksim.run(rocked({"kind": "ramp", "to": "0.2 mm", "rate": "0.1 mm/s"}, **springs, **soft))
+    )
+    assert any("still rises" in text for text in answer.warnings)
+    assert answer.all[0].stiffness > 0.0
+
+
+def test_what_an_actuator_at_a_hundredth_of_the_speed_finds_is_the_same() -> None:
+    fast, slow = (
+        blocksim.capacity(blocksim.run(rocked({"kind": "ramp", "to": "2 mm", "rate": rate}))).all[0]
+        for rate in ("1 mm/s", "0.01 mm/s")
+    )
+    assert slow.peak == pytest.approx(fast.peak, rel=2e-3)
+    assert slow.work == pytest.approx(fast.work, rel=2e-3)
+
+
+def test_runs_without_actuators_are_refused() -> None:
+    result = blocksim.run(rocked(CYCLES, actuators=[], time={"scheme": "nonsmooth", "end": 0.01}))
+    with pytest.raises(InvalidInputError, match=r"no \[\[actuators\]\]"):
+        blocksim.capacity(result)
+    with pytest.raises(InvalidInputError, match=r"no \[\[actuators\]\]"):
+        result.plot("capacity")
