@@ -22,11 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blocksim.analysis.compare import Comparison, ComparisonRow, Verdict
+from blocksim.analysis.experiment import CURVES
 from blocksim.errors import InvalidInputError
 from blocksim.scenario import input_files, spelling, units
 
 Floats = NDArray[np.float64]
-FIRST = ("probe", "replicate")
+FIRST = (CURVES, "replicate")
 TIME = "time"
 STIFF = (0.15, 0.4)  # of the peak, between which the secant is
 FALLEN = 0.8  # of the peak
@@ -120,11 +121,6 @@ class CurveTable:
         if (self.x.name, self.y.name) != (x, y):
             return []
         return [(self.x.factor * one, self.y.factor * other) for one, other in self.curves.get(probe, {}).values()]
-
-
-def has_curves(path: Path | str) -> bool:
-    """Return True if a table is one of curves, by its first column. Raises as reading it does."""
-    return input_files.read_table(Path(path)).heads[0].text == FIRST[0]
 
 
 def load_curves(path: Path | str) -> CurveTable:

@@ -1,6 +1,7 @@
 """Measured tables: the repeats of a laboratory experiment, and sizes and materials of its blocks."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import fsum, inf, isfinite, nan, pi, sqrt
 from pathlib import Path
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+CURVES = "probe"  # first column of a table of curves; see curves.py
 COLUMNS = ("block", "quantity", "unit", "replicate", "value")
 LONGEST_NAME = 100  # characters in a block name
 LARGEST_VALUE = 1e9  # mm or degrees: squares and sums stay far from overflow
@@ -155,6 +157,13 @@ def quote_names(names: Sequence[str]) -> str:
     return spelling.list_names([f"'{name}'" for name in names], MOST_NAMES)
 
 
+def has_curves(path: Path | str) -> bool:
+    """Return True if a table is one of curves of probes, by its first column. Raises InputMissingError."""
+    with suppress(InvalidInputError):  # what is wrong in it is said by whatever reads it
+        return input_files.read_table(Path(path)).heads[0].text == CURVES
+    return False
+
+
 def load_table(path: Path | str) -> ExperimentTable:
     """Read a measured table (`block,quantity,unit,replicate,value`, `#` starts a comment line).
 
@@ -162,8 +171,7 @@ def load_table(path: Path | str) -> ExperimentTable:
     Raises InputMissingError when the file cannot be read and InvalidInputError with every mistake, located by line and
     column.
     """
-    heads = [head.text for head in input_files.read_table(Path(path)).heads]
-    if heads[:2] == ["probe", "replicate"]:
+    if has_curves(path):
         raise InvalidInputError(f"{path}: curves of probes; a table of final positions ({','.join(COLUMNS)}) is needed")
     table = input_files.read_table(Path(path), COLUMNS)
     rows = []

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, overload
 
 from blocksim.analysis.compare import Comparison, compare_final
-from blocksim.analysis.curves import TIME, compare_curves, has_curves, load_curves
+from blocksim.analysis.curves import TIME, compare_curves, load_curves
 from blocksim.analysis.evidence import Members
-from blocksim.analysis.experiment import load_table
+from blocksim.analysis.experiment import has_curves, load_table
 from blocksim.analysis.metrics import Judgement, Settings, judge
 from blocksim.errors import InputMissingError, InvalidInputError
 from blocksim.options import Option

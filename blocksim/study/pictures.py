@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from blocksim.analysis.compare import limits, prediction_half_width
-from blocksim.analysis.curves import has_curves, load_curves
+from blocksim.analysis.curves import load_curves
 from blocksim.analysis.evidence import Members
-from blocksim.analysis.experiment import ExperimentTable, load_table
+from blocksim.analysis.experiment import ExperimentTable, has_curves, load_table
 from blocksim.errors import InputMissingError, InvalidInputError, Problem
 from blocksim.options import Option, Replace, takes
 from blocksim.scenario import Scenario, input_files, load_scenario, load_stored, overrides, spelling, units

@@ -200,7 +200,7 @@ def check_experiment(scenario: Scenario) -> None:
     """Check that the table that a scenario names goes with the blocks: better now than after the run."""
     if scenario.experiment is None:
         return
-    if curves.has_curves(scenario.experiment.table):
+    if experiment.has_curves(scenario.experiment.table):
         table, known = curves.load_curves(scenario.experiment.table), events.probes_of(scenario)
         for name in table.curves:
             if name not in known:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from blocksim.analysis.compare import Verdict
-from blocksim.analysis.curves import Envelope, compare_curves, has_curves, load_curves
-from blocksim.analysis.experiment import load_table
+from blocksim.analysis.curves import Envelope, compare_curves, load_curves
+from blocksim.analysis.experiment import has_curves, load_table
 from blocksim.errors import InvalidInputError
 
 RISE = "jack,1,0,0\njack,1,1,10\njack,1,2,10\njack,1,4,6\njack,2,0,0\njack,2,1,12\njack,2,2,11\njack,2,4,8\n"
