@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 LEAST_SHARE = 1e-6  # of the displacement of the head: less is no way in that direction
 RISING = 0.9  # of the way: from there on a peak may be none, as the head slows down where the curve ends
+WINDOWS = 100  # over which changes of momentum are averaged
 SLOW = 0.01  # of work and of peak: more inertia than that is warned of
 
 
@@ -158,7 +159,8 @@ def _shares_of_motion(
     kinetic = float(frames.energy["kinetic"][early].max(initial=0.0))
     ways = math.cos(actuator.direction), math.sin(actuator.direction)
     momentum = np.nan_to_num(ways[0] * frames.vx + ways[1] * frames.vy) @ mass
-    force = np.gradient(momentum[early], frames.time[early]) if np.count_nonzero(early) > 2 else np.zeros(1)
+    times = np.linspace(0.0, until, WINDOWS + 1)  # what jumps from one frame to the next is no force
+    force = np.diff(np.interp(times, frames.time, momentum)) / np.diff(times)
     return kinetic / work if work > 0.0 else math.nan, float(np.abs(force).max()) / peak
 
 
