@@ -64,7 +64,7 @@ def build_all(out: Path) -> list[Path]:
         again = Path(folder) / "again"
         again.mkdir()
         with tarfile.open(made[0]) as packed:
-            packed.extractall(folder, filter="data")
+            packed.extractall(folder)  # noqa: S202 - built here, a line above; 3.11.2 knows no filter
         (source,) = Path(folder).glob("blocksim-*")
         others = [build(ROOT, again, "sdist", epoch), build(source, again, "wheel", epoch)]
         for one, other in zip(made, others, strict=True):

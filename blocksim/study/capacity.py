@@ -21,10 +21,9 @@ from blocksim.scenario import Scenario, events
 from blocksim.scenario.models.actuators import Actuator
 from blocksim.scenario.models.loads import Force
 from blocksim.simulation import Result, read_result
+from blocksim.simulation.balance import solver_module
 from blocksim.simulation.instruments import ACTUATOR, ProbeSeries
 from blocksim.simulation.trajectory import Frames
-from blocksim.statics.blockwork import Blockwork
-from blocksim.statics.programme import Programme
 from blocksim.study import run_folder
 from blocksim.view import capacity as view, style
 
@@ -166,16 +165,17 @@ def _shares_of_motion(
 
 def bound_of(scenario: Scenario, actuator: Actuator, sign: float) -> float:
     """Return the force (N) beyond which no equilibrium carries what an actuator exerts; NaN where statics has none."""
+    blockwork, programme = (solver_module(f"statics.{name}") for name in ("blockwork", "programme"))
     force = {"body": actuator.body, "magnitude": sign, "direction": f"{actuator.direction!r} rad"}
     unit = Force.model_validate({"kind": "force", "point": actuator.point, **force})
     with suppress(InvalidInputError):
         at_rest, pushed = (
-            Blockwork.of(scenario.model_copy(update={"actuators": (), "loads": (*scenario.loads, *more)}))
+            blockwork.Blockwork.of(scenario.model_copy(update={"actuators": (), "loads": (*scenario.loads, *more)}))
             for more in ((), (unit,))
         )
-        found = Programme(at_rest).greatest(at_rest.forces, pushed.forces - at_rest.forces)
+        found = programme.Programme(at_rest).greatest(at_rest.forces, pushed.forces - at_rest.forces)
         if found is not None and found.factor > 0.0:
-            return found.factor
+            return float(found.factor)
     return math.nan
 
 
